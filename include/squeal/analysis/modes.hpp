@@ -1,0 +1,59 @@
+#pragma once
+/// Complex modes of the structure linearised about steady sliding (method, section 3):
+///     (lambda^2 Y'M Z + lambda Y'(C + C_f) Z + Y'K Z) phi = 0,   u(t) ~ phi exp(lambda t),   Re(lambda) > 0:
+///     squeal-prone.
+/// Z keeps closed pairs closed, Y removes their normal reactions; all three matrices are unsymmetric.
+#include "squeal/analysis/equilibrium.hpp"
+
+#include <complex>
+
+namespace squeal
+{
+
+/// Errors are backward errors in the full problem, whichever route found the mode:
+///     eta = |Q(lambda) phi| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |phi|), Frobenius or 1-norms of the projected
+///     matrices.
+struct ComplexMode
+{
+  std::complex<double> lambda;                 // [1/s]
+  Owned<Vec> real, imaginary;                  // in the structure's dofs; largest entry of |phi| is 1
+  std::vector<std::complex<double>> reactions; // normal reaction per pair [N per m of the mode]; 0 on open pairs
+  double backward_error = 0;
+
+  double frequency_hz() const; // |Im(lambda)| / 2 pi
+  double growth_rate() const { return lambda.real(); }
+  double damping_ratio() const; // -Re/|lambda|
+};
+
+/// Frictionless undamped modes with closed pairs kept closed, M-normalised, ascending.
+struct RealModes
+{
+  std::vector<double> omega;      // [rad/s]
+  std::vector<Owned<Vec>> shapes; // in the structure's dofs
+};
+
+/// outcome: "converged", "not converged" (fewer than asked, or backward errors above 1e-8), "skipped".
+/// residual: the largest backward error reported.
+struct Modes
+{
+  Outcome outcome;
+  std::string method;                 // "full", "projection", "both"
+  double band = 0;                    // [Hz] covered: every mode below is here
+  std::vector<ComplexMode> modes;     // Im(lambda) >= 0, largest growth first
+  std::vector<ComplexMode> projected; // the other route's, when both ran
+  int unstable_count = 0;
+  std::string count_check; // how the count of unstable modes was confirmed by a second means, or why it was not
+};
+
+RealModes find_real_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                          int count);
+
+/// Real modes with frequency below `band` [Hz].
+RealModes find_real_modes_below(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                                double band);
+
+/// Options, prefix -modes_.
+Modes find_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                 const ModesSettings& settings);
+
+} // namespace squeal

@@ -1,0 +1,34 @@
+#pragma once
+/// State of the structure, and the outcome that every result carries.
+#include "squeal/contact/interface.hpp"
+
+namespace squeal
+{
+
+/// "converged", or why not; `words` of each stage are listed in its header and in the README.
+struct Outcome
+{
+  std::string word;   // "converged", "not converged", …
+  std::string reason; // one sentence when the word is not enough
+  int iterations = 0;
+  double residual = 0; // what it measures is said by each result
+};
+
+struct State
+{
+  Owned<Vec> u, v;               // [m, m/s]
+  double time = 0;               // [s]
+  std::vector<double> reactions; // [N] of the last step (impulse / h); warm start of the next
+};
+
+State copy_of(const State& state);
+
+/// Scalar energies and norms in the structure's own inner product.
+double kinetic_energy(const Structure& structure, Vec v);   // v'Mv/2 [J]
+double potential_energy(const Structure& structure, Vec u); // u'Ku/2 [J]
+
+/// Vec u, then Vec v, PETSc binary.
+void write_state(const State& state, const std::filesystem::path& file);
+State read_state(const std::filesystem::path& file, const Structure& structure);
+
+} // namespace squeal

@@ -1,0 +1,66 @@
+#pragma once
+/// Errors, and how all ranks come to throw them together.
+///
+/// Bad input and failed calls are exceptions whose text names the place, the value and the remedy. What may fail on one
+/// rank only (reading a file on rank 0, say) is agreed by all ranks before anyone throws, so that no rank is left
+/// waiting in a collective call. A stage that does not converge is a result, never an exception.
+#include <mpi.h>
+#include <stdexcept>
+#include <string>
+
+namespace squeal
+{
+
+struct Error : std::runtime_error
+{
+  using std::runtime_error::runtime_error;
+};
+
+/// Collective. Throws Error on every rank, with the text of the lowest rank that brings one, unless all are empty.
+void agree(MPI_Comm comm, const std::string& problem);
+
+/// Collective. Runs `work` on rank 0 alone; an exception it throws there becomes an Error with the same text
+/// everywhere.
+template <class Work> void on_rank_zero(MPI_Comm comm, Work work)
+{
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  std::string problem;
+  if (rank == 0)
+  {
+    try
+    {
+      work();
+    }
+    catch (const std::exception& error)
+    {
+      problem = error.what();
+      if (problem.empty()) problem = "unknown failure on rank 0";
+    }
+  }
+  agree(comm, problem);
+}
+
+/// Of `known`, the word with the smallest edit distance to `word`, for "did you mean" messages; empty if none is near.
+template <class Words> std::string nearest_word(const std::string& word, const Words& known);
+
+/// Number of single-character insertions, deletions and substitutions that turn `a` into `b` (Levenshtein 1966).
+int edit_distance(const std::string& a, const std::string& b);
+
+template <class Words> std::string nearest_word(const std::string& word, const Words& known)
+{
+  std::string best;
+  int least = static_cast<int>(word.size()) / 2 + 2;
+  for (const auto& candidate : known)
+  {
+    const int distance = edit_distance(word, candidate);
+    if (distance < least)
+    {
+      least = distance;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+} // namespace squeal

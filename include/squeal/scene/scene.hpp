@@ -1,0 +1,200 @@
+#pragma once
+/// A scene: everything physical that a run needs, as plain data in SI units. No PETSc, no MPI.
+/// Algorithms are not here: they are PETSc options, one prefix per stage.
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace squeal
+{
+
+using Vec3 = std::array<double, 3>;
+/// x y z rx ry rz: which motions of a node or body are meant.
+using Motions = std::array<bool, 6>;
+
+struct Material
+{
+  double young = 0;   // [Pa]
+  double poisson = 0; // [-]
+  double density = 0; // [kg/m3]
+};
+
+/// C = alpha M + beta K
+struct RayleighDamping
+{
+  double alpha = 0; // [1/s]
+  double beta = 0;  // [s]
+};
+
+/// A named volume of the mesh, or a named surface when it has a thickness (a shell).
+struct Part
+{
+  std::string name;
+  Material material;
+  double thickness = 0;                   // [m]; 0: a solid
+  std::optional<RayleighDamping> damping; // the scene's own when absent
+};
+
+/// A node of its own: a point mass, or where springs meet.
+struct Point
+{
+  std::string name;
+  Vec3 at{};       // [m]
+  double mass = 0; // [kg]
+  Motions free{};
+};
+
+/// A named surface (or several) that moves as one rigid body: u(x) = u_ref + theta x (x - at). An exact constraint.
+struct RigidBody
+{
+  std::string name;
+  std::vector<std::string> surfaces;
+  Vec3 at{};                       // [m] reference point
+  double mass = 0;                 // [kg], at the reference point
+  std::array<double, 6> inertia{}; // [kg m2] xx yy zz xy yz zx about the reference point
+  Motions free{};
+};
+
+/// Spring and dashpot in parallel along one direction, between two points or rigid bodies, or from one to "ground".
+struct Spring
+{
+  std::string from, to;
+  Vec3 direction{};     // unit
+  double stiffness = 0; // [N/m]
+  double damping = 0;   // [N s/m]
+};
+
+/// Nodes of a named group held still in the given motions.
+struct Support
+{
+  std::string on;
+  Motions fixed{};
+};
+
+struct Force
+{
+  std::string on; // point or rigid body, or a named node group (the whole force shared equally by its nodes)
+  Vec3 vector{};  // [N]
+};
+
+struct Pressure
+{
+  std::string on;   // named surface
+  double value = 0; // [Pa], positive presses onto the solid
+};
+
+struct Rotation
+{
+  Vec3 axis{};     // unit
+  Vec3 centre{};   // [m]
+  double rate = 0; // [rad/s]
+};
+
+/// Pairs of coincident nodes of two named surfaces of matching meshes, or one pair of two named points.
+/// Normal: out of the rotor into the stator. Sliding velocity: s = B_t v - v_d.
+struct Contact
+{
+  std::string rotor, stator;
+  double gap = 0;                   // [m] initial, positive open
+  std::optional<Vec3> normal;       // unit; needed for points, else from the rotor's surface
+  std::vector<Vec3> tangents;       // one: plane friction along it; two; empty: two, chosen from the normal
+  std::optional<Rotation> rotation; // of the rotor: v_d = rate axis x (x - centre), its tangential part
+  Vec3 velocity{};                  // [m/s] of the rotor's surface when there is no rotation
+};
+
+struct FrictionLaw
+{
+  double coefficient = 0;        // [-]
+  bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (method: C_f)
+};
+
+struct MeshSource
+{
+  std::filesystem::path file;               // .geo .msh .unv … ; absolute once read
+  std::map<std::string, double> parameters; // DefineConstant overrides of a .geo
+  double scale = 1;                         // [m] per length unit of the file
+};
+
+/// What one stage needs to know. A stage runs when enabled, or when a later enabled stage needs it.
+struct ModesSettings
+{
+  bool enabled = true;
+  std::string method = "both"; // "projection" (paper), "full" (sparse quadratic problem), "both" (full judges)
+  int real_modes = 100;        // of the projection
+  int residual_passes = 3;     // of the projection
+  double band = 20000;         // [Hz] report every mode below
+};
+
+struct EstimateSettings
+{
+  bool enabled = true;
+};
+
+struct TransientSettings
+{
+  bool enabled = false;
+  std::string start = "estimate"; // "mode", "estimate" or a state file (PETSc binary: Vec u, then Vec v)
+  double amplitude = 0;           // largest displacement of the mode at "mode" [m]; 0: a tenth of first lift-off
+  double periods = 20;            // of the followed mode, with steps_per_period; or:
+  double steps_per_period = 100;
+  long steps = 0;       // with step_size, when > 0 overrides periods
+  double step_size = 0; // [s]
+  double theta = 0.5;
+  std::filesystem::path save_state; // written at the end when not empty
+};
+
+struct CycleSettings
+{
+  bool enabled = false;
+  int steps_per_period = 100;
+  double tolerance = 1e-5; // on the full-space residual
+  int free_periods = 20;
+  double theta = 0.5;
+  std::filesystem::path save_state;
+};
+
+/// What is watched in time: a node of a named point, rigid body or group nearest to `at`, and a direction; or "dof:N".
+struct Probe
+{
+  std::string name;
+  std::string on; // "dof:N" on a matrix scene
+  std::optional<Vec3> at;
+  Vec3 direction{};
+};
+
+struct Scene
+{
+  std::string title;
+  std::filesystem::path file; // absolute
+  std::optional<MeshSource> mesh;
+  std::optional<std::filesystem::path> matrices; // folder; absolute
+  std::vector<Part> parts;
+  std::vector<Point> points;
+  std::vector<RigidBody> rigid_bodies;
+  std::vector<Spring> springs;
+  std::vector<Support> supports;
+  std::vector<Force> forces;
+  std::vector<Pressure> pressures;
+  std::vector<Contact> contacts;
+  FrictionLaw friction;
+  RayleighDamping damping;
+  ModesSettings modes;
+  EstimateSettings estimate;
+  TransientSettings transient;
+  CycleSettings cycle;
+  std::vector<Probe> probes;
+};
+
+/// Reads a scene file (TOML) and applies `overrides` ("table.key=value", TOML values; a bare word is a string;
+/// "part.NAME.key" and the like reach the entry of that name in a list, "contact.0.key" the entry of that index).
+/// Checks every key, type, sign and range: Error names file, line, key, value, remedy, and the nearest known key.
+/// Paths become absolute, relative to the scene file.
+Scene read_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides);
+
+/// The scene as TOML with every default written out; read_scene of it gives the same scene.
+std::string resolved_scene(const Scene& scene);
+
+} // namespace squeal

@@ -1,0 +1,42 @@
+#pragma once
+/// Element kernels: pure functions on arrays, no library.
+///
+/// hex8: Wilson-Taylor incompatible modes with Taylor's correction (passes the patch test, does not lock in bending);
+/// wedge6, hex20, tet10: isoparametric; shell4, shell3: flat facets, Mindlin with assumed transverse shear
+/// (MITC4/DSG3), membrane with drilling rotations, six degrees of freedom a node, warping handled by rigid offsets.
+/// Sources are named at each kernel. Mass is consistent.
+#include "squeal/mesh/mesh.hpp"
+
+#include <span>
+#include <vector>
+
+namespace squeal
+{
+
+/// Degrees of freedom a node of this shape carries: 3 (solid) or 6 (shell: x y z rx ry rz, global axes).
+int dofs_per_node(Shape shape);
+
+/// Dense symmetric matrices, row-major, size = node_count * dofs_per_node; dof = node * dofs_per_node + component.
+struct ElementMatrices
+{
+  std::vector<double> stiffness; // [N/m, N, N m]
+  std::vector<double> mass;      // [kg, kg m, kg m2]
+};
+
+/// `x`: the element's node coordinates [m]; `thickness` [m] used by shells only.
+/// Throws std::runtime_error naming the Jacobian if it is not positive at an integration point.
+ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Material& material, double thickness);
+
+/// Stress at the integration points, xx yy zz xy yz zx [Pa], of solids under nodal displacements u (3 per node).
+std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec3> x, const Material& material,
+                                                std::span<const double> u);
+
+/// Shell resultants at the integration points, in the element's local frame rotated to `axis1` projected on its plane:
+/// membrane forces Nx Ny Nxy [N/m], moments Mx My Mxy [N], of nodal displacements u (6 per node, global axes).
+std::vector<std::array<double, 6>> shell_resultants(Shape shape, std::span<const Vec3> x, const Material& material,
+                                                    double thickness, const Vec3& axis1, std::span<const double> u);
+
+/// Consistent nodal weights of a face, integral of N_i dA times unit normal [m2], outward for outward-ordered faces.
+std::vector<Vec3> face_weights(FaceShape shape, std::span<const Vec3> x);
+
+} // namespace squeal

@@ -1,0 +1,51 @@
+#include "squeal/base/progress.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <unistd.h>
+
+namespace squeal
+{
+
+Progress::Progress(MPI_Comm comm, std::string stage, double total)
+    : stage_(std::move(stage)), total_(std::max(total, 1e-300)), start_(std::chrono::steady_clock::now()), last_(start_)
+{
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  speaks_ = rank == 0;
+  terminal_ = speaks_ && isatty(STDOUT_FILENO);
+}
+
+Progress::~Progress()
+{
+  if (open_line_) std::fputs("\n", stdout);
+  if (speaks_) std::fflush(stdout);
+}
+
+void Progress::update(double done, const std::string& note)
+{
+  if (!speaks_) return;
+  const auto now = std::chrono::steady_clock::now();
+  const double fraction = std::clamp(done / total_, 0., 1.);
+  const double elapsed = std::chrono::duration<double>(now - start_).count();
+  const double left = fraction > 0 ? elapsed * (1 - fraction) / fraction : 0;
+  const int tenth = static_cast<int>(10 * fraction + 1e-9);
+  if (terminal_)
+  {
+    if (now - last_ < std::chrono::milliseconds(100) && fraction < 1) return;
+    const int filled = static_cast<int>(24 * fraction);
+    std::printf("\r  %-11s [%.*s%*s] %3.0f %%  %4.0f s left  %s\033[K", stage_.c_str(), filled,
+                "========================", 24 - filled, "", 100 * fraction, left, note.c_str());
+    open_line_ = true;
+  }
+  else
+  {
+    if (tenth == tenth_) return;
+    std::printf("  %-11s %3.0f %%  %6.1f s  %s\n", stage_.c_str(), 100 * fraction, elapsed, note.c_str());
+  }
+  tenth_ = tenth;
+  last_ = now;
+  std::fflush(stdout);
+}
+
+} // namespace squeal
