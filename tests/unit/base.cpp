@@ -17,7 +17,8 @@ TEST_CASE("a problem on one rank is thrown with its text on every rank")
 
 TEST_CASE("a failed library call throws PETSc's own text")
 {
-  CHECK_THROWS_AS(check(VecSet(nullptr, 1)), Error);
+  Owned<PetscViewer> viewer;
+  CHECK_THROWS_AS(check(PetscViewerBinaryOpen(PETSC_COMM_WORLD, "/no/such/file", FILE_MODE_READ, viewer.put())), Error);
 }
 
 TEST_CASE("the nearest word is the misspelt one, and a far word has none")
