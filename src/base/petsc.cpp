@@ -45,9 +45,9 @@ void check(PetscErrorCode code, std::source_location where)
   (void)PetscErrorMessage(code, &kind, nullptr);
   std::string text = std::exchange(last_failure(), {});
   if (text.empty()) text = "no detail given";
-  throw Error(std::string("PETSc error ") + std::to_string(static_cast<int>(code)) +
-              (kind ? std::string(", ") + kind : "") + ": " + text + "; called from " + where.file_name() + ":" +
-              std::to_string(where.line()));
+  throw LibraryError(std::string("PETSc error ") + std::to_string(static_cast<int>(code)) +
+                     (kind ? std::string(", ") + kind : "") + ": " + text + "; called from " + where.file_name() + ":" +
+                     std::to_string(where.line()));
 }
 
 Owned<Vec> zeros_like(Vec pattern)

@@ -16,6 +16,12 @@ struct Error : std::runtime_error
   using std::runtime_error::runtime_error;
 };
 
+/// A library call failed, perhaps on this rank alone: the program cannot go on, and must take the other ranks with it.
+struct LibraryError : Error
+{
+  using Error::Error;
+};
+
 /// Collective. Throws Error on every rank, with the text of the lowest rank that brings one, unless all are empty.
 void agree(MPI_Comm comm, const std::string& problem);
 

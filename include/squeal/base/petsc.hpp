@@ -15,7 +15,7 @@
 namespace squeal
 {
 
-/// Starts MPI, PETSc and SLEPc, and ends them. Library errors become a squeal::Error with PETSc's own text.
+/// Starts MPI, PETSc and SLEPc, and ends them. Library errors become a squeal::LibraryError with PETSc's own text.
 class Session
 {
 public:
@@ -25,7 +25,7 @@ public:
   Session& operator=(const Session&) = delete;
 };
 
-/// Throws Error with PETSc's text, the file and the line if a library call failed.
+/// Throws LibraryError with PETSc's text, the file and the line if a library call failed.
 void check(PetscErrorCode code, std::source_location where = std::source_location::current());
 
 inline PetscErrorCode destroy(Vec* object)

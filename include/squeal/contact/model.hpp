@@ -1,0 +1,28 @@
+#pragma once
+/// The model of a scene: from a mesh, from points and springs, or from matrices; everything after it is the same.
+#include "squeal/contact/interface.hpp"
+
+namespace squeal
+{
+
+struct Model
+{
+  Mesh mesh;   // empty on a matrix scene
+  DofMap dofs; // empty on a matrix scene
+  Structure structure;
+  Interface interface;
+  Owned<Mat> probes; // a row per probe of the scene
+};
+
+/// Collective.
+Model build_model(const Scene& scene, MPI_Comm comm);
+
+/// What the run would hold in memory, from the symbolic factorisation of K and the size of W. [bytes], all ranks.
+struct MemoryForecast
+{
+  double matrices = 0, factor = 0, condensed_operator = 0;
+};
+
+MemoryForecast forecast_memory(const Model& model);
+
+} // namespace squeal

@@ -1,0 +1,121 @@
+#include "squeal/options.hpp"
+
+#include "squeal/base/petsc.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <sstream>
+
+namespace squeal
+{
+
+namespace
+{
+
+struct Option
+{
+  const char *name, *standard, *meaning;
+};
+
+// The one list of squeal's own options: help and nearest-name messages read it, each stage queries its own.
+constexpr std::array options = {
+    Option{"-equilibrium_max_it", "100", "status iterations before giving up"},
+};
+
+constexpr std::array stages = {"equilibrium_", "modes_", "transient_", "cycle_", "estimate_"};
+
+// What a stage hands on to a solver object, which checks the rest itself.
+constexpr std::array solver_parts = {"snes_", "ksp_", "pc_", "pep_", "eps_", "st_",
+                                     "mat_",  "bv_",  "ds_", "rg_",  "vec_"};
+
+// PETSc's and SLEPc's own, about the session rather than a solver.
+constexpr std::array session_options = {
+    "log_",         "info",     "options_", "malloc",       "memory_",   "mat_",
+    "vec_",         "is_",      "blas_",    "sf_",          "fp_trap",   "on_error",
+    "no_signal",    "debugger", "start_in", "error_output", "get_total", "version",
+    "citations",    "history",  "mpi",      "saws",         "device_",   "checkstack",
+    "objects_",     "petsc",    "slepc",    "matmatmult",   "matptap",   "mattransposematmult",
+    "vecscatter",   "viewer_",  "test",     "nox",          "display",   "use_gpu",
+    "check_pointer"};
+
+bool begins(const std::string& name, const char* prefix)
+{
+  return name.rfind(prefix, 0) == 0;
+}
+
+template <class Prefixes> bool begins_with_one_of(const std::string& name, const Prefixes& prefixes)
+{
+  return std::any_of(prefixes.begin(), prefixes.end(), [&](const char* prefix) { return begins(name, prefix); });
+}
+
+std::string suggestion(const std::string& option)
+{
+  std::vector<std::string> known;
+  for (const Option& candidate : options) known.emplace_back(candidate.name);
+  for (const char* stage : stages)
+    for (const char* part : solver_parts) known.push_back(std::string("-") + stage + part + "…");
+  const std::string nearest = nearest_word(option, known);
+  return nearest.empty() ? "squeal -help lists the options" : "did you mean " + nearest + "?";
+}
+
+/// Empty if the option may exist. `name` without its dash.
+std::string problem_with(const std::string& name)
+{
+  const std::string option = "-" + name;
+  if (std::any_of(options.begin(), options.end(), [&](const Option& known) { return option == known.name; })) return {};
+  if (begins_with_one_of(name, session_options)) return {};
+  for (const char* stage : stages)
+    if (begins(name, stage) && begins_with_one_of(name.substr(std::string(stage).size()), solver_parts)) return {};
+  return "unknown option " + option + "; " + suggestion(option);
+}
+
+} // namespace
+
+std::string option_reference()
+{
+  std::ostringstream text;
+  for (const Option& option : options)
+  {
+    text << "  " << option.name;
+    for (std::size_t column = std::string(option.name).size(); column < 36; ++column) text << ' ';
+    text << option.meaning << " (" << option.standard << ")\n";
+  }
+  return text.str();
+}
+
+void check_option_names(MPI_Comm comm)
+{
+  char* all = nullptr;
+  check(PetscOptionsGetAll(nullptr, &all));
+  std::istringstream words(all ? all : "");
+  check(PetscFree(all));
+  std::string problem;
+  for (std::string word; problem.empty() && words >> word;)
+    if (word.size() > 1 && word[0] == '-' && std::isalpha(static_cast<unsigned char>(word[1])))
+      problem = problem_with(word.substr(1));
+  agree(comm, problem);
+}
+
+void check_options_used(const std::vector<std::string>& stages_run, MPI_Comm comm)
+{
+  PetscInt count = 0;
+  char **names = nullptr, **values = nullptr;
+  check(PetscOptionsLeftGet(nullptr, &count, &names, &values));
+  std::string problem;
+  for (PetscInt i = 0; i < count; ++i)
+  {
+    const std::string name = names[i];
+    if (begins_with_one_of(name, session_options)) continue;
+    const auto stage =
+        std::find_if(stages.begin(), stages.end(), [&](const char* prefix) { return begins(name, prefix); });
+    const bool ran = stage == stages.end() || std::any_of(stages_run.begin(), stages_run.end(),
+                                                          [&](const std::string& run) { return run + "_" == *stage; });
+    if (ran)
+      problem += (problem.empty() ? "" : "; ") + ("option -" + name + " was never used, ") + suggestion("-" + name);
+  }
+  check(PetscOptionsLeftRestore(nullptr, &count, &names, &values));
+  agree(comm, problem);
+}
+
+} // namespace squeal
