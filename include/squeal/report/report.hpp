@@ -1,0 +1,36 @@
+#pragma once
+/// What a run leaves behind: report.json, fields.h5 + fields.xdmf, history.h5, scene.toml (resolved), options.txt, and
+/// the printed table. Every number comes with its unit and with what it is worth (residual, backward error, defect).
+#include "squeal/analysis/cycle.hpp"
+#include "squeal/contact/model.hpp"
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace squeal
+{
+
+/// All results of a run. A stage that did not run has outcome "off" (by the scene) or "skipped", with the reason.
+struct Report
+{
+  PetscInt dofs = 0;
+  long elements = 0;
+  int pairs = 0, ranks = 1;
+  Equilibrium equilibrium;
+  Modes modes;
+  Estimate estimate;
+  Trajectory transient;
+  LimitCycle cycle;
+  std::vector<std::pair<std::string, double>> timings; // stage, wall seconds, in order
+};
+
+/// Rank 0 prints the table a person reads.
+void print_summary(const Report& report, const Scene& scene, MPI_Comm comm);
+
+/// Collective. Writes everything into `output`, each file whole or not at all. Error: what could not be written.
+void write_results(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
+                   MPI_Comm comm);
+
+} // namespace squeal
