@@ -14,8 +14,8 @@ struct CondensedOperator
 };
 
 /// Factors A (symmetric) and forms W from blocks of sparse right-hand sides. Collective.
-/// Error: A singular, naming `owner` of the offending degree of freedom.
-CondensedOperator condense(Mat A, const Interface& interface, double scale, const std::vector<std::string>& owner);
+/// Error: A singular, naming (`describe`) the offending degree of freedom.
+CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names);
 
 /// x = A^-1 b with the factor.
 void solve(const CondensedOperator& condensed, Vec b, Vec x);

@@ -17,6 +17,18 @@ struct DofTerm
   double factor = 0;
 };
 
+/// What each free degree of freedom is, for messages: told when asked, since a model has a quarter million of them.
+struct DofNames
+{
+  std::vector<std::string> bodies; // "part disc", "point tip", "rigid body carrier"
+  std::vector<int> body;           // of each node
+  std::vector<Vec3> at;            // [m] of each node
+  std::vector<int> motion;         // of each free dof: 6 * node + component; empty on a matrix scene
+};
+
+/// "part disc, node 12 at (x, y, z), direction ry", or "dof 12" on a matrix scene.
+std::string describe(const DofNames& names, PetscInt dof);
+
 /// u of node k, component c (0..2 translations, 3..5 rotations) = sum of factor * u[dof]; no terms: held still, or the
 /// node has no such motion. The same on every rank; a pair of contact nodes and its degrees of freedom share a rank.
 struct DofMap
@@ -25,7 +37,7 @@ struct DofMap
   PetscInt first = 0, last = 0;  // this rank owns [first, last)
   std::vector<PetscInt> offsets; // 6 * nodes + 1, into terms
   std::vector<DofTerm> terms;
-  std::vector<std::string> owner; // of each free dof: "part disc, node 12 at (x, y, z), direction ry", for messages
+  DofNames names;
 
   std::span<const DofTerm> of(int node, int component) const;
 };
@@ -42,7 +54,7 @@ struct Structure
   Owned<Mat> M, C, K; // [kg, N s/m, N/m]
   Owned<Vec> load;    // [N]
   long elements = 0;
-  std::vector<std::string> owner; // of each free dof, for messages (DofMap::owner; "dof N" on a matrix scene)
+  DofNames names;
 };
 
 Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partition, const DofMap& dofs, MPI_Comm comm);
