@@ -61,7 +61,7 @@ struct RigidBody
 /// Spring and dashpot in parallel along one direction, between two points or rigid bodies, or from one to "ground".
 struct Spring
 {
-  std::string from, to;
+  std::string from, to = "ground";
   Vec3 direction{};     // unit
   double stiffness = 0; // [N/m]
   double damping = 0;   // [N s/m]
@@ -162,7 +162,7 @@ struct Probe
   std::string name;
   std::string on; // "dof:N" on a matrix scene
   std::optional<Vec3> at;
-  Vec3 direction{};
+  Vec3 direction{}; // unit
 };
 
 struct Scene
@@ -196,5 +196,8 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
 
 /// The scene as TOML with every default written out; read_scene of it gives the same scene.
 std::string resolved_scene(const Scene& scene);
+
+/// Every key of a scene file with its unit, default and meaning.
+std::string scene_reference();
 
 } // namespace squeal

@@ -1,0 +1,198 @@
+/// What no single key can tell: tables that exclude each other, names that are not defined or doubled, numbers that
+/// contradict each other.
+#include "squeal/base/error.hpp"
+#include "squeal/scene/toml.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace squeal
+{
+
+namespace
+{
+
+double dot(const Vec3& a, const Vec3& b)
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+class Checker
+{
+public:
+  Checker(const Scene& scene, const Places& places) : scene_(scene), places_(places)
+  {
+    for (const Point& point : scene.points) points_.push_back(point.name);
+    nodes_ = points_;
+    for (const RigidBody& body : scene.rigid_bodies) nodes_.push_back(body.name);
+  }
+
+  void check_all() const
+  {
+    check_source();
+    check_names();
+    check_motions();
+    for (const Spring& spring : scene_.springs) check_spring(spring);
+    if (!scene_.mesh)
+    {
+      for (const Support& support : scene_.supports) need_known(support.on, points_, &support.on, "[[support]] on");
+      for (const Force& force : scene_.forces) need_known(force.on, points_, &force.on, "[[force]] on");
+    }
+    for (const Contact& contact : scene_.contacts) check_contact(contact);
+    for (const Probe& probe : scene_.probes) check_probe(probe);
+    check_transient();
+  }
+
+private:
+  [[noreturn]] void fail(const void* member, const std::string& text) const
+  {
+    throw Error(places_.at(member) + ": " + text);
+  }
+
+  template <class T> void refuse(const std::vector<T>& list, const std::string& key, const std::string& why) const
+  {
+    if (!list.empty()) fail(&list.front(), "[[" + key + "]] " + why);
+  }
+
+  void check_source() const
+  {
+    const Scene& s = scene_;
+    if (s.mesh && s.matrices) fail(&*s.matrices, "[mesh] and [matrices] exclude each other: keep one");
+    if (!s.mesh && !s.matrices && s.points.empty())
+      throw Error(places_.file + ": the scene has no structure: give [mesh], [matrices] or [[point]]");
+    if (s.matrices) check_matrix_scene();
+    if (s.mesh && s.parts.empty())
+      fail(&*s.mesh, "a mesh needs at least one [[part]] that gives a named group its material");
+    if (s.mesh || s.matrices) return;
+    refuse(s.parts, "part", "needs a [mesh]");
+    refuse(s.rigid_bodies, "rigid_body", "needs a [mesh] with its surfaces; without one use a [[point]] with a mass");
+    refuse(s.pressures, "pressure", "needs a [mesh] with its surface; without one use a [[force]]");
+  }
+
+  void check_matrix_scene() const
+  {
+    const std::string why = "belongs to mesh and point scenes; in a matrix scene the folder's files hold it";
+    const Scene& s = scene_;
+    refuse(s.parts, "part", why);
+    refuse(s.points, "point", why);
+    refuse(s.rigid_bodies, "rigid_body", why);
+    refuse(s.springs, "spring", why);
+    refuse(s.supports, "support", why);
+    refuse(s.forces, "force", why);
+    refuse(s.pressures, "pressure", why);
+    refuse(s.contacts, "contact", why);
+    if (places_.given.count(&s.damping)) fail(&s.damping, "[damping] " + why);
+  }
+
+  template <class T>
+  void need_different(const std::vector<T>& list, const std::string& key, std::set<std::string>& seen) const
+  {
+    for (const T& entry : list)
+      if (!seen.insert(entry.name).second)
+        fail(&entry.name, "[[" + key + "]] name = \"" + entry.name + "\" is taken; give another name");
+  }
+
+  void check_names() const
+  {
+    std::set<std::string> parts, nodes = {"ground"}, probes; // "ground" is what springs hang on
+    need_different(scene_.parts, "part", parts);
+    need_different(scene_.points, "point", nodes);
+    need_different(scene_.rigid_bodies, "rigid_body", nodes);
+    need_different(scene_.probes, "probe", probes);
+  }
+
+  void need_known(const std::string& name, const std::vector<std::string>& known, const void* member,
+                  const std::string& key) const
+  {
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      fail(member, key + " = \"" + name + "\" is not defined" + suggestion(name, known));
+  }
+
+  void check_motions() const
+  {
+    for (const Support& support : scene_.supports)
+      if (support.fixed == Motions{}) fail(&support.fixed, "[[support]] " + support.on + " fixed holds nothing still");
+  }
+
+  void check_spring(const Spring& spring) const
+  {
+    std::vector<std::string> ends = nodes_;
+    ends.push_back("ground");
+    need_known(spring.from, ends, &spring.from, "[[spring]] from");
+    need_known(spring.to, ends, &spring.to, "[[spring]] to");
+    if (spring.from == spring.to)
+      fail(&spring.from, "[[spring]] from and to are both \"" + spring.from + "\"; it would do nothing");
+    if (spring.stiffness == 0 && spring.damping == 0)
+      fail(&spring.from, "[[spring]] " + spring.from + " has neither stiffness nor damping");
+  }
+
+  bool is_point(const std::string& name) const
+  {
+    return std::find(points_.begin(), points_.end(), name) != points_.end();
+  }
+
+  void check_contact(const Contact& contact) const
+  {
+    if (contact.rotor == contact.stator)
+      fail(&contact.stator, "[[contact]] rotor and stator are both \"" + contact.rotor + "\"; name two surfaces");
+    if (!scene_.mesh || is_point(contact.rotor) != is_point(contact.stator))
+    {
+      need_known(contact.rotor, points_, &contact.rotor, "[[contact]] rotor");
+      need_known(contact.stator, points_, &contact.stator, "[[contact]] stator");
+    }
+    if (is_point(contact.rotor) && !contact.normal)
+      fail(&contact.rotor, "[[contact]] between points needs the key 'normal', out of the rotor into the stator");
+    if (contact.rotation && contact.velocity != Vec3{})
+      fail(&contact.velocity, "[[contact]] rotation and velocity exclude each other: keep one");
+    if (!contact.rotation && contact.velocity == Vec3{} && scene_.friction.coefficient > 0)
+      fail(&contact.rotor, "[[contact]] needs a rotation or a velocity that drives the rotor where there is friction");
+    check_frame(contact);
+  }
+
+  void check_frame(const Contact& contact) const
+  {
+    constexpr double square = 1e-6; // cosine; hand-written unit vectors carry a few digits
+    const auto& tangents = contact.tangents;
+    if (contact.normal)
+      for (const Vec3& tangent : tangents)
+        if (std::abs(dot(tangent, *contact.normal)) > square)
+          fail(&contact.tangents, "[[contact]] tangents must be square to the normal");
+    if (tangents.size() == 2 && std::abs(dot(tangents[0], tangents[1])) > square)
+      fail(&contact.tangents, "[[contact]] the two tangents must be square to each other");
+  }
+
+  void check_probe(const Probe& probe) const
+  {
+    const std::string label = "[[probe]] " + probe.name + " ";
+    const bool number = probe.on.rfind("dof:", 0) == 0 && probe.on.size() > 4 && probe.on.size() < 14 &&
+                        probe.on.find_first_not_of("0123456789", 4) == std::string::npos;
+    if (scene_.matrices && !number)
+      fail(&probe.on, label + "on = \"" + probe.on + "\": a matrix scene knows degrees of freedom only; write dof:N");
+    if (scene_.matrices) return;
+    if (number) fail(&probe.on, label + "on = \"" + probe.on + "\": dof:N is for matrix scenes; name a point or group");
+    if (!scene_.mesh) need_known(probe.on, points_, &probe.on, label + "on");
+    if (probe.direction == Vec3{}) fail(&probe.name, label + "needs the key 'direction': x, y, z or a vector");
+  }
+
+  void check_transient() const
+  {
+    const TransientSettings& t = scene_.transient;
+    if ((t.steps > 0) != (t.step_size > 0))
+      fail(t.steps > 0 ? static_cast<const void*>(&t.steps) : &t.step_size,
+           "[transient] steps and step_size go together: give both, or periods and steps_per_period");
+  }
+
+  const Scene& scene_;
+  const Places& places_;
+  std::vector<std::string> points_, nodes_;
+};
+
+} // namespace
+
+void check_scene(const Scene& scene, const Places& places)
+{
+  Checker(scene, places).check_all();
+}
+
+} // namespace squeal

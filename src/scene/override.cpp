@@ -1,0 +1,128 @@
+/// Overrides from the command line: --set table.key=value.
+#include "squeal/base/error.hpp"
+#include "squeal/scene/toml.hpp"
+
+#include <sstream>
+
+namespace squeal
+{
+
+namespace
+{
+
+constexpr const char* override_mark = "--set ";
+
+/// "a.b=v" as the table { a = { b = v } }; what is not a TOML value is a string.
+toml::table parse_override(const std::string& text)
+{
+  const auto equals = text.find('=');
+  const std::string source = override_mark + text;
+  if (equals == std::string::npos || equals == 0)
+    throw Error(source + ": expected KEY=VALUE, such as friction.coefficient=0.3");
+  const std::string key = text.substr(0, equals) + " = ";
+  const std::string value = text.substr(equals + 1);
+  try
+  {
+    return toml::parse(key + value, source);
+  }
+  catch (const toml::parse_error&)
+  {
+  }
+  std::string quoted;
+  for (const char c : value) quoted += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
+  try
+  {
+    return toml::parse(key + '"' + quoted + '"', source);
+  }
+  catch (const toml::parse_error& error)
+  {
+    throw Error(source + ": " + std::string(error.description()) + "; expected KEY=VALUE, KEY such as part.disc.young");
+  }
+}
+
+void merge(toml::table& into, toml::table& from);
+
+/// Entries of a list are reached by name, else by index.
+void merge_list(const std::string& key, toml::array& list, toml::table& from)
+{
+  for (auto&& [selector, value] : from)
+  {
+    const std::string wanted(selector.str());
+    std::vector<std::string> known;
+    toml::table* entry = nullptr;
+    for (std::size_t i = 0; i < list.size(); ++i)
+    {
+      toml::table* candidate = list.get(i)->as_table();
+      const std::string index = std::to_string(i);
+      const std::string name = candidate ? (*candidate)["name"].value_or(index) : index;
+      known.push_back(name);
+      if (wanted == name || (!entry && wanted == index)) entry = candidate;
+    }
+    if (!entry)
+      throw Error(place_of(value) + ": no [[" + key + "]] is called '" + wanted + "'" + suggestion(wanted, known));
+    if (!value.is_table()) throw Error(place_of(value) + ": expected " + key + "." + wanted + ".KEY=VALUE");
+    merge(*entry, *value.as_table());
+  }
+}
+
+void merge(toml::table& into, toml::table& from)
+{
+  for (auto&& [key, value] : from)
+  {
+    toml::node* present = into.get(key.str());
+    if (value.is_table() && present && present->is_table())
+      merge(*present->as_table(), *value.as_table());
+    else if (value.is_table() && present && present->is_array_of_tables())
+      merge_list(std::string(key.str()), *present->as_array(), *value.as_table());
+    else
+      value.visit([&](auto& typed) { into.insert_or_assign(key.str(), std::move(typed)); });
+  }
+}
+
+} // namespace
+
+std::string place_of(const toml::node& node)
+{
+  const auto& source = node.source();
+  const std::string path = source.path ? *source.path : "scene";
+  if (path.rfind(override_mark, 0) == 0) return path;
+  return path + ", line " + std::to_string(source.begin.line);
+}
+
+std::string kind_of(const toml::node& node)
+{
+  if (node.is_string()) return "text";
+  if (node.is_number()) return "a number";
+  if (node.is_boolean()) return "true or false";
+  if (node.is_array()) return "a list";
+  return node.is_table() ? "a table" : "a date";
+}
+
+std::string text_of(const toml::node& node)
+{
+  if (node.is_array() || node.is_table()) return kind_of(node);
+  std::ostringstream text;
+  text << toml::node_view<const toml::node>(node);
+  return text.str();
+}
+
+std::string joined(const std::vector<std::string>& words)
+{
+  std::string text;
+  for (const auto& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::string suggestion(const std::string& word, const std::vector<std::string>& known)
+{
+  const std::string near = nearest_word(word, known);
+  return near.empty() ? "; known: " + joined(known) : "; did you mean '" + near + "'?";
+}
+
+void apply_override(toml::table& root, const std::string& text)
+{
+  toml::table change = parse_override(text);
+  merge(root, change);
+}
+
+} // namespace squeal

@@ -1,0 +1,332 @@
+/// Scene files: TOML tables into the members that fields.cpp binds to their keys.
+#include "squeal/base/error.hpp"
+#include "squeal/scene/toml.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+namespace squeal
+{
+
+namespace
+{
+
+struct Bounds
+{
+  double least, greatest;
+  bool open; // the bounds themselves are excluded
+  const char* text;
+};
+
+Bounds bounds_of(Rule rule)
+{
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  switch (rule)
+  {
+  case Rule::positive:
+    return {0, infinity, true, "a positive number"};
+  case Rule::not_negative:
+    return {0, infinity, false, "zero or a positive number"};
+  case Rule::poisson:
+    return {-1, 0.5, true, "a number above -1 and below 0.5"};
+  case Rule::fraction:
+    return {0, 1, false, "a number from 0 to 1"};
+  default:
+    return {-infinity, infinity, false, "a finite number"};
+  }
+}
+
+class Reader
+{
+public:
+  Reader(Places& places, std::filesystem::path folder) : places_(places), folder_(std::move(folder)) {}
+
+  void read_scene(const toml::table& root, Scene& scene)
+  {
+    std::vector<std::string> known;
+    for (const Field& field : fields(scene)) known.push_back(field.key);
+    for_each_table(scene, [&](const std::string& key, auto&, const char*) { known.push_back(key); });
+    for (const auto& [key, node] : root)
+      if (std::find(known.begin(), known.end(), key.str()) == known.end())
+        throw Error(place_of(node) + ": unknown key '" + std::string(key.str()) + "'" +
+                    suggestion(std::string(key.str()), known));
+    for (const Field& field : fields(scene))
+      if (const toml::node* node = root.get(field.key)) read_field(field, *node, "");
+    for_each_table(scene,
+                   [&](const std::string& key, auto& member, const char*)
+                   {
+                     if (const toml::node* node = root.get(key)) read_member(key, *node, member);
+                   });
+  }
+
+private:
+  template <class T> void read_member(const std::string& key, const toml::node& node, std::vector<T>& list)
+  {
+    const toml::array* array = node.as_array();
+    if (!array) throw Error(place_of(node) + ": '" + key + "' is a list; write [[" + key + "]]");
+    list.resize(array->size()); // whole, so that the addresses in places_ stay
+    for (std::size_t i = 0; i < array->size(); ++i)
+    {
+      const toml::node& entry = *array->get(i);
+      std::string label = "[[" + key + "]] ";
+      if (const toml::table* table = entry.as_table(); table && (*table)["name"].is_string())
+        label += (*table)["name"].template value_or<std::string>("") + " ";
+      read_table(entry, list[i], label);
+    }
+  }
+
+  template <class T> void read_member(const std::string& key, const toml::node& node, std::optional<T>& table)
+  {
+    read_table(node, table.emplace(), "[" + key + "] ");
+  }
+
+  template <class T> void read_member(const std::string& key, const toml::node& node, T& table)
+  {
+    if constexpr (requires { table.enabled; }) table.enabled = true;
+    read_table(node, table, "[" + key + "] ");
+  }
+
+  template <class T> void read_table(const toml::node& node, T& target, const std::string& label)
+  {
+    const toml::table* table = node.as_table();
+    if (!table) throw Error(place_of(node) + ": " + label + "is a table, not " + kind_of(node));
+    places_.given[&target] = place_of(node);
+    const Fields list = fields(target);
+    std::vector<std::string> known;
+    for (const Field& field : list) known.push_back(field.key);
+    for (const auto& [key, value] : *table)
+      if (std::find(known.begin(), known.end(), key.str()) == known.end())
+        throw Error(place_of(value) + ": " + label + "unknown key '" + std::string(key.str()) + "'" +
+                    suggestion(std::string(key.str()), known));
+    for (const Field& field : list)
+    {
+      if (const toml::node* value = table->get(field.key))
+        read_field(field, *value, label);
+      else if (field.need == Need::required)
+        throw Error(place_of(node) + ": " + label + "needs the key '" + field.key + "' [" + field.unit +
+                    "]: " + field.meaning);
+    }
+  }
+
+  void read_field(const Field& field, const toml::node& node, const std::string& label)
+  {
+    field_ = &field;
+    label_ = label;
+    std::visit(
+        [&](auto target)
+        {
+          if constexpr (std::is_pointer_v<decltype(target)>)
+          {
+            read(node, *target);
+            places_.given[target] = place_of(node);
+          }
+          else
+            read(node, target);
+        },
+        field.target);
+  }
+
+  [[noreturn]] void fail(const toml::node& node, const std::string& expected) const
+  {
+    const std::string unit = has_unit(field_->unit) ? " [" + field_->unit + "]" : "";
+    throw Error(place_of(node) + ": " + label_ + field_->key + " = " + text_of(node) + ": expected " + expected + unit);
+  }
+
+  double number(const toml::node& node) const
+  {
+    const Bounds bounds = bounds_of(field_->rule);
+    if (!node.is_number()) fail(node, std::string(bounds.text) + ", not " + kind_of(node));
+    const double value = *node.value<double>();
+    const bool inside = bounds.open ? value > bounds.least && value < bounds.greatest
+                                    : value >= bounds.least && value <= bounds.greatest;
+    if (!inside || !std::isfinite(value)) fail(node, bounds.text);
+    return value;
+  }
+
+  template <class Integer> Integer whole_number(const toml::node& node) const
+  {
+    number(node);
+    const auto value = node.value<std::int64_t>();
+    if (!value || *value > std::numeric_limits<Integer>::max() || *value < std::numeric_limits<Integer>::min())
+      fail(node, "a whole number");
+    return static_cast<Integer>(*value);
+  }
+
+  std::string text(const toml::node& node) const
+  {
+    if (!node.is_string()) fail(node, "text in quotes, not " + kind_of(node));
+    return *node.value<std::string>();
+  }
+
+  std::vector<double> numbers(const toml::node& node, const std::string& expected) const
+  {
+    const toml::array* array = node.as_array();
+    if (!array) fail(node, expected + ", not " + kind_of(node));
+    std::vector<double> values;
+    for (const toml::node& entry : *array)
+    {
+      if (!entry.is_number() || !std::isfinite(*entry.value<double>())) fail(entry, "finite numbers in the list");
+      values.push_back(*entry.value<double>());
+    }
+    return values;
+  }
+
+  /// "x", "-y", … or a list of three numbers; a direction is made a unit vector.
+  Vec3 vector(const toml::node& node) const
+  {
+    Vec3 v{};
+    if (field_->rule == Rule::direction && node.is_string())
+    {
+      std::string axis = text(node);
+      const double sign = axis.rfind('-', 0) == 0 ? -1 : 1;
+      if (sign < 0) axis.erase(0, 1);
+      if (axis != "x" && axis != "y" && axis != "z") fail(node, "x, y, z, -x, -y, -z or a list of three numbers");
+      v[static_cast<std::size_t>(axis[0] - 'x')] = sign;
+      return v;
+    }
+    const auto values = numbers(node, "a list of three numbers");
+    if (values.size() != 3) fail(node, "a list of three numbers, not of " + std::to_string(values.size()));
+    std::copy(values.begin(), values.end(), v.begin());
+    if (field_->rule != Rule::direction) return v;
+    const double length = std::hypot(v[0], v[1], v[2]);
+    if (length == 0) fail(node, "a direction, not the zero vector");
+    if (std::abs(length - 1) > 1e-15) // a unit vector stays as it was written
+      for (double& x : v) x /= length;
+    return v;
+  }
+
+  std::filesystem::path absolute(const std::string& text) const
+  {
+    return text.empty() ? std::filesystem::path() : (folder_ / text).lexically_normal();
+  }
+
+  void read(const toml::node& node, double& target) const { target = number(node); }
+  void read(const toml::node& node, int& target) const { target = whole_number<int>(node); }
+  void read(const toml::node& node, long& target) const { target = whole_number<long>(node); }
+  void read(const toml::node& node, Vec3& target) const { target = vector(node); }
+  void read(const toml::node& node, std::optional<Vec3>& target) const { target = vector(node); }
+
+  void read(const toml::node& node, bool& target) const
+  {
+    if (!node.is_boolean()) fail(node, "true or false, not " + kind_of(node));
+    target = *node.value<bool>();
+  }
+
+  void read(const toml::node& node, std::string& target) const
+  {
+    target = text(node);
+    const auto& words = field_->words;
+    const bool listed = std::find(words.begin(), words.end(), target) != words.end();
+    if (field_->rule == Rule::word && !listed)
+      throw Error(place_of(node) + ": " + label_ + field_->key + " = '" + target + "' is none of " + joined(words) +
+                  suggestion(target, words));
+    if (field_->rule == Rule::word_or_file && !listed)
+    {
+      const auto file = absolute(target);
+      if (!std::filesystem::is_regular_file(file))
+        throw Error(place_of(node) + ": " + label_ + field_->key + " = '" + target + "' is none of " + joined(words) +
+                    ", and there is no file " + file.string());
+      target = file.string();
+    }
+    if (field_->need == Need::required && target.empty()) fail(node, "a name that is not empty");
+  }
+
+  void read(const toml::node& node, std::filesystem::path& target) const
+  {
+    target = absolute(text(node));
+    const std::string what = field_->rule == Rule::folder ? "folder" : "file";
+    const bool exists = field_->rule == Rule::folder ? std::filesystem::is_directory(target)
+                        : field_->rule == Rule::file ? std::filesystem::is_regular_file(target)
+                                                     : true;
+    if (!exists)
+      throw Error(place_of(node) + ": " + label_ + field_->key + " = " + text_of(node) + ": there is no " + what + " " +
+                  target.string() + " (paths are relative to the scene file)");
+  }
+
+  void read(const toml::node& node, std::vector<Vec3>& target) const
+  {
+    const toml::array* array = node.as_array();
+    target.clear();
+    if (!array || (!array->empty() && array->get(0)->is_number()))
+      target.push_back(vector(node));
+    else
+      for (const toml::node& entry : *array) target.push_back(vector(entry));
+    if (target.empty() || target.size() > 2) fail(node, "one or two directions");
+  }
+
+  void read(const toml::node& node, std::vector<std::string>& target) const
+  {
+    const toml::array* array = node.as_array();
+    target.clear();
+    if (!array)
+      target.push_back(text(node));
+    else
+      for (const toml::node& entry : *array) target.push_back(text(entry));
+    if (target.empty()) fail(node, "at least one name");
+  }
+
+  void read(const toml::node& node, std::array<double, 6>& target) const
+  {
+    const auto values = numbers(node, "a list of three or six numbers");
+    if (values.size() != 3 && values.size() != 6) fail(node, "a list of three or six numbers");
+    if (std::min({values[0], values[1], values[2]}) < 0) fail(node, "no negative xx, yy or zz");
+    target.fill(0);
+    std::copy(values.begin(), values.end(), target.begin());
+  }
+
+  void read(const toml::node& node, Motions& target) const
+  {
+    static const std::vector<std::string> names = {"x", "y", "z", "rx", "ry", "rz"};
+    target.fill(false);
+    std::istringstream words(text(node));
+    for (std::string word; words >> word;)
+    {
+      const auto found = std::find(names.begin(), names.end(), word);
+      if (word == "all")
+        target.fill(true);
+      else if (found != names.end())
+        target[static_cast<std::size_t>(found - names.begin())] = true;
+      else if (word != "none")
+        fail(node, "some of x y z rx ry rz with blanks between, all, or none");
+    }
+  }
+
+  void read(const toml::node& node, std::map<std::string, double>& target) const
+  {
+    const toml::table* table = node.as_table();
+    if (!table) fail(node, "a table of numbers, such as { size = 4000 }");
+    for (const auto& [key, value] : *table)
+    {
+      if (!value.is_number() || !std::isfinite(*value.value<double>())) fail(value, "finite numbers in the table");
+      target[std::string(key.str())] = *value.value<double>();
+    }
+  }
+
+  void read(const toml::node& node, std::optional<Rotation>& target)
+  {
+    const std::string label = label_;
+    read_table(node, target.emplace(), label + field_->key + " ");
+  }
+
+  void read(const toml::node& node, const DampingTarget& target) const
+  {
+    if (!*target.damping) target.damping->emplace();
+    (**target.damping).*target.member = number(node);
+  }
+
+  Places& places_;
+  std::filesystem::path folder_;
+  const Field* field_ = nullptr; // being read, for messages
+  std::string label_;            // of its table
+};
+
+} // namespace
+
+void read_tables(const toml::table& root, Scene& scene, Places& places)
+{
+  Reader(places, scene.file.parent_path()).read_scene(root, scene);
+}
+
+} // namespace squeal

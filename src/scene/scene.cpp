@@ -1,0 +1,46 @@
+/// From a scene file and overrides to a checked Scene.
+#include "squeal/base/error.hpp"
+#include "squeal/scene/toml.hpp"
+
+namespace squeal
+{
+
+namespace
+{
+
+toml::table parse_file(const std::filesystem::path& file)
+{
+  if (!std::filesystem::is_regular_file(file)) throw Error("there is no scene file " + file.string());
+  try
+  {
+    return toml::parse_file(file.string());
+  }
+  catch (const toml::parse_error& error)
+  {
+    const auto& begin = error.source().begin;
+    throw Error(file.string() + ", line " + std::to_string(begin.line) + ", column " + std::to_string(begin.column) +
+                ": " + std::string(error.description()));
+  }
+}
+
+} // namespace
+
+std::string Places::at(const void* member) const
+{
+  const auto found = given.find(member);
+  return found == given.end() ? file : found->second;
+}
+
+Scene read_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides)
+{
+  toml::table root = parse_file(file);
+  for (const std::string& text : overrides) apply_override(root, text);
+  Scene scene;
+  scene.file = std::filesystem::absolute(file).lexically_normal();
+  Places places{file.string(), {}};
+  read_tables(root, scene, places);
+  check_scene(scene, places);
+  return scene;
+}
+
+} // namespace squeal

@@ -1,0 +1,379 @@
+// ranks: 1
+#include "squeal/scene/scene.hpp"
+#include "squeal/base/petsc.hpp"
+
+#include <cstdlib>
+#include <doctest/doctest.h>
+#include <fstream>
+#include <unistd.h>
+
+using namespace squeal;
+namespace fs = std::filesystem;
+
+namespace
+{
+
+/// A folder of its own for the scene files of one test.
+struct Folder
+{
+  fs::path path;
+  Folder()
+  {
+    std::string pattern = (fs::temp_directory_path() / "squeal-scene-XXXXXX").string();
+    path = mkdtemp(pattern.data());
+  }
+  ~Folder() { fs::remove_all(path); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  fs::path write(const std::string& name, const std::string& text) const
+  {
+    std::ofstream(path / name) << text;
+    return path / name;
+  }
+};
+
+const std::string brake = R"(title = "a \"small\" brake"
+[mesh]
+file = "brake.geo"
+scale = 1e-3
+parameters = { size = 4000, "pin height" = 0.04 }
+[[part]]
+name = "disc"
+young = 210e9
+poisson = 0.3
+density = 7800
+[[part]]
+name = "hub"
+young = 2.1e11
+poisson = 0.3
+density = 7800
+thickness = 0.008
+beta = 1e-7
+[[point]]
+name = "eye"
+at = [0.1, 0, 0]
+mass = 0.25
+free = "x rz"
+[[rigid_body]]
+name = "carrier"
+surfaces = "backs"
+at = [0, 0, 0.1]
+mass = 5
+inertia = [1, 2, 3]
+free = "z"
+[[spring]]
+from = "carrier"
+direction = [0, 0, -2]
+stiffness = 1e6
+damping = 3
+[[support]]
+on = "bore"
+fixed = "all"
+[[force]]
+on = "carrier"
+vector = [0, 0, -500]
+[[pressure]]
+on = "backs"
+value = 1e5
+[[contact]]
+rotor = "disc_top"
+stator = "pins"
+gap = -0.1
+tangents = ["x", [0, 1, 0]]
+rotation = { axis = "z", rate = 20 }
+[friction]
+coefficient = 0.2
+direction_damping = false
+[damping]
+alpha = 1
+beta = 1.1e-6
+[modes]
+method = "full"
+band = 5000
+[transient]
+start = "state.bin"
+steps = 10
+step_size = 1e-6
+[cycle]
+tolerance = 1e-8
+save_state = "out/cycle.bin"
+[[probe]]
+name = "rim"
+on = "disc"
+at = [0.3, 0, 0]
+direction = "-y"
+)";
+
+const std::string points = R"([[point]]
+name = "disc"
+at = [0, 0, 0]
+mass = 0.5
+free = "y"
+[[point]]
+name = "pad"
+at = [0, 0, 0]
+mass = 1
+free = "x y"
+[[contact]]
+rotor = "disc"
+stator = "pad"
+normal = "y"
+velocity = [1, 0, 0]
+[friction]
+coefficient = 0.3
+)";
+
+/// The text of the error that reading `text` gives; empty if it is read.
+std::string error_of(const std::string& text, const std::vector<std::string>& overrides)
+{
+  const Folder folder;
+  folder.write("brake.geo", "");
+  folder.write("state.bin", "");
+  fs::create_directory(folder.path / "matrices");
+  try
+  {
+    read_scene(folder.write("scene.toml", text), overrides);
+  }
+  catch (const Error& error)
+  {
+    return error.what();
+  }
+  return "";
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to)
+{
+  const auto at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+/// Every piece stands in the message, which is one line.
+void check_message(const std::string& message, const std::vector<std::string>& pieces)
+{
+  CAPTURE(message);
+  CHECK(message.find('\n') == std::string::npos);
+  for (const auto& piece : pieces)
+  {
+    CAPTURE(piece);
+    CHECK(message.find(piece) != std::string::npos);
+  }
+}
+
+} // namespace
+
+TEST_CASE("every key reaches its member, in SI units, with unit directions and absolute paths")
+{
+  const Folder folder;
+  folder.write("brake.geo", "");
+  folder.write("state.bin", "");
+  const Scene s = read_scene(folder.write("scene.toml", brake), {});
+  CHECK(s.title == "a \"small\" brake");
+  CHECK(s.file == folder.path / "scene.toml");
+  CHECK(s.mesh->file == folder.path / "brake.geo");
+  CHECK(s.mesh->scale == 1e-3);
+  CHECK(s.mesh->parameters == std::map<std::string, double>{{"size", 4000}, {"pin height", 0.04}});
+  REQUIRE(s.parts.size() == 2);
+  CHECK(s.parts[0].material.young == 210e9);
+  CHECK_FALSE(s.parts[0].damping);
+  CHECK(s.parts[1].thickness == 0.008);
+  CHECK(s.parts[1].damping->beta == 1e-7);
+  CHECK(s.parts[1].damping->alpha == 0);
+  CHECK(s.points[0].free == Motions{true, false, false, false, false, true});
+  CHECK(s.rigid_bodies[0].surfaces == std::vector<std::string>{"backs"});
+  CHECK(s.rigid_bodies[0].inertia == std::array<double, 6>{1, 2, 3, 0, 0, 0});
+  CHECK(s.springs[0].to == "ground");
+  CHECK(s.springs[0].direction == Vec3{0, 0, -1});
+  CHECK(s.springs[0].damping == 3);
+  CHECK(s.supports[0].fixed == Motions{true, true, true, true, true, true});
+  CHECK(s.forces[0].vector == Vec3{0, 0, -500});
+  CHECK(s.pressures[0].value == 1e5);
+  CHECK(s.contacts[0].gap == -0.1);
+  CHECK(s.contacts[0].tangents == std::vector<Vec3>{{1, 0, 0}, {0, 1, 0}});
+  CHECK(s.contacts[0].rotation->rate == 20);
+  CHECK(s.contacts[0].rotation->axis == Vec3{0, 0, 1});
+  CHECK(s.friction.coefficient == 0.2);
+  CHECK_FALSE(s.friction.direction_damping);
+  CHECK(s.damping.beta == 1.1e-6);
+  CHECK(s.modes.method == "full");
+  CHECK(s.modes.enabled);
+  CHECK(s.transient.enabled);
+  CHECK(s.transient.start == (folder.path / "state.bin").string());
+  CHECK(s.transient.steps == 10);
+  CHECK(s.cycle.enabled);
+  CHECK(s.cycle.tolerance == 1e-8);
+  CHECK(s.cycle.save_state == folder.path / "out/cycle.bin");
+  CHECK(s.probes[0].direction == Vec3{0, -1, 0});
+  CHECK(s.probes[0].at == Vec3{0.3, 0, 0});
+}
+
+TEST_CASE("the resolved text of a scene reads back as the same scene")
+{
+  const Folder folder, elsewhere; // paths are absolute, so the resolved scene may lie anywhere
+  folder.write("brake.geo", "");
+  folder.write("state.bin", "");
+  fs::create_directory(folder.path / "matrices");
+  const std::string matrix = "[matrices]\nfolder = \"matrices\"\n[[probe]]\nname = \"p\"\non = \"dof:3\"\n";
+  for (const std::string& text : {brake, points, matrix})
+  {
+    const std::string once = resolved_scene(read_scene(folder.write("scene.toml", text), {"modes.real_modes=7"}));
+    const Scene again = read_scene(elsewhere.write("scene.toml", once), {});
+    CHECK(resolved_scene(again) == once);
+    CHECK(again.modes.real_modes == 7);
+  }
+}
+
+TEST_CASE("stages after the estimate run when their table is there, unless it says otherwise")
+{
+  const Folder folder;
+  const Scene plain = read_scene(folder.write("a.toml", points), {});
+  CHECK(plain.modes.enabled);
+  CHECK(plain.estimate.enabled);
+  CHECK_FALSE(plain.transient.enabled);
+  CHECK_FALSE(plain.cycle.enabled);
+  const Scene off = read_scene(folder.write("b.toml", points + "[transient]\nenabled = false\n[cycle]\n"), {});
+  CHECK_FALSE(off.transient.enabled);
+  CHECK(off.cycle.enabled);
+}
+
+TEST_CASE("an override reaches any key: by table, by name in a list, by index, as a bare word")
+{
+  const Folder folder;
+  folder.write("brake.geo", "");
+  folder.write("state.bin", "");
+  const Scene s = read_scene(folder.write("scene.toml", brake),
+                             {"friction.coefficient=0.25", "part.disc.density=7000", "contact.0.gap=1e-6",
+                              "mesh.parameters.size=32000", "transient.start=mode", "contact.0.tangents=[[1,0,0]]",
+                              "contact.0.rotation.rate=-3", "title=\"quoted\"", "part.hub.thickness = 0.01"});
+  CHECK(s.friction.coefficient == 0.25);
+  CHECK(s.parts[0].material.density == 7000);
+  CHECK(s.parts[1].thickness == 0.01);
+  CHECK(s.contacts[0].gap == 1e-6);
+  CHECK(s.contacts[0].tangents.size() == 1);
+  CHECK(s.contacts[0].rotation->rate == -3);
+  CHECK(s.mesh->parameters.at("size") == 32000);
+  CHECK(s.mesh->parameters.at("pin height") == 0.04);
+  CHECK(s.transient.start == "mode");
+  CHECK(s.title == "quoted");
+}
+
+TEST_CASE("a wrong override says which one and what is near")
+{
+  check_message(error_of(points, {"friction.coeficient=0.3"}),
+                {"--set friction.coeficient=0.3", "unknown key 'coeficient'", "did you mean 'coefficient'"});
+  check_message(error_of(points, {"fricton.coefficient=0.3"}), {"--set", "'fricton'", "'friction'"});
+  check_message(error_of(points, {"point.dics.mass=1"}), {"--set", "'dics'", "'disc'"});
+  check_message(error_of(points, {"contact.1.gap=0"}), {"--set", "[[contact]]", "'1'"});
+  check_message(error_of(points, {"friction.coefficient"}), {"--set", "KEY=VALUE"});
+  check_message(error_of(points, {"a..b=1"}), {"--set", "KEY"});
+  check_message(error_of(points, {"friction.coefficient=much"}), {"--set", "much", "not text"});
+  check_message(error_of(points, {"friction.coefficient=nan"}), {"--set", "coefficient = nan"});
+  check_message(error_of(points, {"point=3"}), {"--set point=3", "[[point]]"});
+}
+
+TEST_CASE("a syntax error gives file, line and column")
+{
+  check_message(error_of("title = \"a\"\n[mesh\n", {}), {"scene.toml", "line 2", "column"});
+  CHECK_THROWS_WITH_AS(read_scene("/no/such.toml", {}), "there is no scene file /no/such.toml", Error);
+}
+
+TEST_CASE("an unknown key gives file, line, table and the nearest key")
+{
+  check_message(error_of(replaced(brake, "density = 7800", "densty = 7800"), {}),
+                {"scene.toml, line 10", "[[part]] disc", "'densty'", "did you mean 'density'"});
+  check_message(error_of(replaced(brake, "axis = \"z\"", "axes = \"z\""), {}), {"rotation", "'axes'", "'axis'"});
+  check_message(error_of("fooooooooooooo = 1\n" + points, {}), {"line 1", "known: title, mesh"});
+}
+
+TEST_CASE("wrong types, signs and ranges are refused with key, value and what is expected")
+{
+  const std::vector<std::array<std::string, 3>> cases = {
+      {"density = 7800", "density = -7800", "density = -7800"},
+      {"density = 7800", "density = 0", "positive"},
+      {"density = 7800", "density = \"heavy\"", "not text"},
+      {"young = 210e9", "young = inf", "young = inf"},
+      {"poisson = 0.3", "poisson = 0.5", "below 0.5"},
+      {"poisson = 0.3", "poisson = -1", "above -1"},
+      {"thickness = 0.008", "thickness = -1", "thickness"},
+      {"coefficient = 0.2", "coefficient = nan", "coefficient = nan"},
+      {"coefficient = 0.2", "coefficient = -0.1", "zero or a positive number"},
+      {"direction_damping = false", "direction_damping = 0", "true or false"},
+      {"scale = 1e-3", "scale = 0", "scale = 0"},
+      {"steps = 10", "steps = 10.5", "a whole number"},
+      {"steps = 10", "steps = -1", "steps = -1"},
+      {"method = \"full\"", "method = \"fulll\"", "did you mean 'full'"},
+      {"tolerance = 1e-8", "tolerance = 0", "positive"},
+      {"tolerance = 1e-8", "theta = 1.5", "from 0 to 1"},
+      {"direction = [0, 0, -2]", "direction = [0, 0, 0]", "zero vector"},
+      {"direction = [0, 0, -2]", "direction = \"w\"", "x, y, z"},
+      {"vector = [0, 0, -500]", "vector = [0, -500]", "three numbers"},
+      {"vector = [0, 0, -500]", "vector = [0, 0, nan]", "finite"},
+      {"free = \"z\"", "free = \"q\"", "x y z rx ry rz"},
+      {"inertia = [1, 2, 3]", "inertia = [1, 2]", "three or six"},
+      {"inertia = [1, 2, 3]", "inertia = [1, -2, 3]", "negative"},
+      {"surfaces = \"backs\"", "surfaces = []", "at least one"},
+      {"name = \"hub\"", "name = \"\"", "not empty"},
+      {"size = 4000", "size = \"big\"", "finite numbers"},
+      {"tangents = [\"x\", [0, 1, 0]]", "tangents = [\"x\", \"y\", \"z\"]", "one or two"},
+      {"band = 5000", "band = 5000\nreal_modes = 0", "real_modes = 0"},
+      {"[friction]", "[[friction]]", "is a table"},
+      {"start = \"state.bin\"", "start = \"stat.bin\"", "there is no file"},
+      {"file = \"brake.geo\"", "file = \"brek.geo\"", "there is no file"},
+  };
+  for (const auto& [from, to, expected] : cases)
+    check_message(error_of(replaced(brake, from, to), {}), {"scene.toml, line ", expected});
+  CHECK(error_of(brake, {}).empty()); // each case fails for its one change alone
+}
+
+TEST_CASE("a missing key is named with its unit")
+{
+  check_message(error_of(replaced(brake, "density = 7800\n", ""), {}),
+                {"line 6", "[[part]] disc", "'density' [kg/m3]"});
+  check_message(error_of(replaced(points, "mass = 0.5\nfree = \"y\"\n", ""), {}), {"[[point]] disc", "'free'"});
+}
+
+TEST_CASE("a scene has one structure: a mesh, matrices or points")
+{
+  check_message(error_of("title = \"empty\"\n", {}), {"scene.toml", "[mesh], [matrices] or [[point]]"});
+  check_message(error_of(brake + "[matrices]\nfolder = \"matrices\"\n", {}), {"exclude each other"});
+  check_message(error_of("[matrices]\nfolder = \"none\"\n", {}), {"line 2", "there is no folder"});
+  check_message(error_of("[matrices]\nfolder = \"matrices\"\n" + points, {}), {"[[point]]", "matrix scene"});
+  check_message(error_of("[matrices]\nfolder = \"matrices\"\n[damping]\n", {}), {"[damping]", "matrix scene"});
+  check_message(error_of("[mesh]\nfile = \"brake.geo\"\n", {}), {"[[part]]"});
+  check_message(error_of(points + "[[pressure]]\non = \"a\"\nvalue = 1\n", {}), {"[[pressure]]", "[mesh]"});
+}
+
+TEST_CASE("names that are doubled or not defined are refused")
+{
+  check_message(error_of(replaced(brake, "name = \"hub\"", "name = \"disc\""), {}), {"[[part]]", "\"disc\"", "taken"});
+  check_message(error_of(replaced(brake, "name = \"eye\"", "name = \"ground\""), {}), {"\"ground\"", "taken"});
+  check_message(error_of(replaced(brake, "name = \"eye\"", "name = \"carrier\""), {}), {"\"carrier\"", "taken"});
+  check_message(error_of(replaced(brake, "from = \"carrier\"", "from = \"carier\""), {}), {"'carrier'"});
+  check_message(error_of(replaced(brake, "from = \"carrier\"", "from = \"ground\""), {}), {"both"});
+  check_message(error_of(replaced(points, "rotor = \"disc\"", "rotor = \"disk\""), {}), {"rotor", "'disc'"});
+  check_message(error_of(points + "[[probe]]\nname = \"p\"\non = \"pda\"\ndirection = \"x\"\n", {}), {"'pad'"});
+  check_message(error_of(points + "[[force]]\non = \"pda\"\nvector = [0, 1, 0]\n", {}), {"[[force]]", "'pad'"});
+}
+
+TEST_CASE("contradictions between keys are refused")
+{
+  check_message(error_of(replaced(points, "normal = \"y\"\n", ""), {}), {"'normal'"});
+  check_message(error_of(replaced(points, "velocity = [1, 0, 0]\n", ""), {}), {"rotation or a velocity"});
+  check_message(error_of(replaced(points, "stator = \"pad\"", "stator = \"disc\""), {}), {"both"});
+  check_message(error_of(replaced(points, "normal = \"y\"", "normal = \"y\"\ntangents = \"y\""), {}), {"square"});
+  check_message(error_of(replaced(brake, "rotation = {", "velocity = [1, 0, 0]\nrotation = {"), {}), {"exclude"});
+  check_message(error_of(replaced(brake, "step_size = 1e-6", ""), {}), {"step_size", "together"});
+  check_message(error_of(replaced(brake, "stiffness = 1e6\ndamping = 3", ""), {}), {"neither"});
+  check_message(error_of(replaced(brake, "fixed = \"all\"", "fixed = \"none\""), {}), {"nothing"});
+  check_message(error_of(replaced(brake, "direction = \"-y\"\n", ""), {}), {"'direction'"});
+  check_message(error_of(replaced(brake, "on = \"disc\"\nat", "on = \"dof:3\"\nat"), {}), {"dof:N"});
+}
+
+TEST_CASE("the reference lists every key of the resolved scene")
+{
+  const std::string reference = scene_reference();
+  for (const char* key : {"coefficient", "steps_per_period", "free_periods", "step_size", "theta", "surfaces", "axis",
+                          "direction_damping", "kg/m3", "default"})
+    CHECK(reference.find(key) != std::string::npos);
+}
