@@ -21,6 +21,12 @@ struct Option
 // The one list of squeal's own options: help and nearest-name messages read it, each stage queries its own.
 constexpr std::array options = {
     Option{"-equilibrium_max_it", "100", "status iterations before giving up"},
+    Option{"-transient_contact_law", "displacement", "contact on displacements, or on velocities (velocity)"},
+    Option{"-transient_contact_solver", "gauss_seidel", "block Gauss-Seidel, or projection fixed point (fixed_point)"},
+    Option{"-transient_contact_tolerance", "1e-10", "largest natural map of a pair over the largest reaction"},
+    Option{"-transient_contact_max_it", "1000", "contact iterations (sweeps) allowed a step"},
+    Option{"-transient_contact_rho", "0", "of the fixed point, over 1/lambda_max(W); 0: chosen"},
+    Option{"-transient_contact_extrapolate", "true", "warm start extrapolated from the last two steps"},
 };
 
 constexpr std::array stages = {"equilibrium_", "modes_", "transient_", "cycle_", "estimate_"};

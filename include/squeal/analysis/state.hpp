@@ -2,6 +2,8 @@
 /// State of the structure, and the outcome that every result carries.
 #include "squeal/contact/interface.hpp"
 
+#include <filesystem>
+
 namespace squeal
 {
 
@@ -18,7 +20,7 @@ struct State
 {
   Owned<Vec> u, v;               // [m, m/s]
   double time = 0;               // [s]
-  std::vector<double> reactions; // [N] of the last step (impulse / h); warm start of the next
+  std::vector<double> reactions; // [N] of the last step (impulse / h); warm start of the next; empty: none known
 };
 
 State copy_of(const State& state);
@@ -27,8 +29,13 @@ State copy_of(const State& state);
 double kinetic_energy(const Structure& structure, Vec v);   // v'Mv/2 [J]
 double potential_energy(const Structure& structure, Vec u); // u'Ku/2 [J]
 
-/// Vec u, then Vec v, PETSc binary.
+/// Vec u, then Vec v, PETSc binary. Collective; written beside and renamed, so that the file is whole or absent.
+/// Entries are in the order of the degrees of freedom: of a matrix scene at any number of ranks; of a mesh scene at the
+/// number of ranks that wrote it, since the partition numbers them.
 void write_state(const State& state, const std::filesystem::path& file);
+
+/// Error: the file is missing, is not two PETSc vectors, is cut short, has another size than the structure, or holds
+/// an entry that is not finite.
 State read_state(const std::filesystem::path& file, const Structure& structure);
 
 } // namespace squeal

@@ -2,24 +2,58 @@
 /// Exact-contact transient by the modified theta-method (method, section 4):
 ///     A v+ = [M - h(1-theta) C - h^2 theta(1-theta) K] v - h K u + h F + h B'r+,   A = M + h theta C + h^2 theta^2 K,
 ///     0 <= gap + B_n ut + h B_n v+  _|_  r_n+ >= 0,   ut = u + h(1-theta) v,   r_t+ in the Coulomb disc, opposing s+.
+/// Reactions are implicit, an impulse h r+ of the whole step; theta = 1/2 adds no damping of its own.
 #include "squeal/analysis/estimate.hpp"
 #include "squeal/contact/condensed.hpp"
+#include "squeal/contact/solver.hpp"
 
 #include <functional>
 
 namespace squeal
 {
 
-/// Everything that depends on h: factored A and W = h B A^-1 B'. Built once per h.
-struct ThetaStep
+/// displacement: the law above. velocity (Moreau-Jean): where gap + B_n ut <= 0, 0 <= B_n v+ _|_ r_n >= 0, elsewhere
+/// r = 0; the gap then drifts by O(h).
+enum class ContactLaw
 {
-  double h = 0, theta = 0.5;   // [s], [-]
-  Owned<Mat> A, P;             // P: the explicit matrix in brackets above
-  CondensedOperator condensed; // factor of A, W
-  double factor_seconds = 0, condensed_seconds = 0;
+  displacement,
+  velocity,
 };
 
-/// What one step tells: the terms of the energy identity and the contact.
+/// Everything that depends on h: factored A and W = h B A^-1 B', so that contact solves w = W r + b for r in N.
+/// Built once per h.
+struct ThetaStep
+{
+  double h = 0, theta = 0.5; // [s], [-]
+  Owned<Mat> A;
+  CondensedOperator condensed; // factor of A, W
+  ContactLaw law = ContactLaw::displacement;
+  ContactSettings contact;
+  bool extrapolate = true; // warm start from both last reactions instead of the last
+  double seconds = 0;      // to factor A and form W
+};
+
+/// Options, prefix -transient_: contact_law (displacement | velocity), contact_solver (gauss_seidel | fixed_point),
+/// contact_tolerance, contact_max_it, contact_rho, contact_extrapolate. Error: h not above 0, theta not in (0, 1].
+ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta);
+
+/// The products of a state that a step starts from and leaves behind for the next one (two multiplications and two
+/// solves a step), and its work vectors. Belongs to one state and one ThetaStep.
+struct StepWork
+{
+  Owned<Vec> Mv, Av, Ku;                 // of the state at hand
+  Owned<Vec> Mv_next, Av_next, Ku_next;  // of the one being computed
+  Owned<Vec> v_free, v_next, v_theta, f; // f: h B'r
+  std::vector<double> r_before;          // [N] reactions of the last step but one
+  double energy = 0;                     // [J]
+};
+
+/// Must be called again after the state was changed by anything but `advance`.
+StepWork begin_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state);
+
+/// What one step tells: the terms of the energy identity
+///     E+ - E = (1/2 - theta)(dv'M dv + du'K du) - damping_work + contact_work + load_work   (+ defect),
+/// and the contact.
 struct StepReport
 {
   double energy = 0;                 // [J] v'Mv/2 + u'Ku/2 at the end
@@ -30,34 +64,59 @@ struct StepReport
   int open = 0, stick = 0, slip = 0; // pairs
   int contact_iterations = 0;
   double contact_residual = 0; // natural map, relative
+  bool contact_converged = true;
 };
-
-/// Options, prefix -transient_: contact_law (displacement | velocity), contact_solver (gauss_seidel | fixed_point),
-/// contact_tolerance, contact_max_it, contact_rho.
-ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta);
 
 /// One step in place.
-StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state);
+StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
+                   State& state);
 
-/// Called after every step (and once before the first, with an empty report).
-using Monitor = std::function<void(const State&, const StepReport&)>;
+/// A closed pair sticks where its friction stays inside the Coulomb disc by more than 1e-8 of the largest reaction.
+std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions);
 
-/// History of a run, one entry a step; energies as above.
+/// The period map of the shooting: `steps` steps in place. `rate`, when not null, receives the derivative of the end
+/// state in time to O(h^2): u' = v, v' = the acceleration, extrapolated from the last two steps. Needs steps >= 2.
+/// Returns the number of steps whose contact did not converge.
+int flow(const ThetaStep& step, const Structure& structure, const Interface& interface, int steps, State& state,
+         State* rate);
+
+/// Called after every step.
+using Monitor = std::function<void(const State&, const StepReport&, const StepWork&)>;
+
+/// History of a run, one entry a step, at the end of the step; powers are the step's work over h.
 struct History
 {
-  std::vector<double> time, energy, fluctuating_energy, damping_power, contact_power, load_power;
+  std::vector<double> time;                                     // [s]
+  std::vector<double> energy, fluctuating_energy;               // [J]; fluctuating: with u - u0
+  std::vector<double> damping_power, contact_power, load_power; // [W]
   std::vector<int> open, stick, slip;
-  std::vector<std::vector<double>> probes; // [probe][step]
+  std::vector<std::vector<double>> probes; // [probe][step] [m]
 };
 
-/// outcome: "completed", "refused" (theta and N make the followed mode look stable), "not converged" (contact).
-/// residual: the largest contact residual.
+/// What `march` counted.
+struct MarchSummary
+{
+  long steps = 0; // fewer than asked when the energy stopped being finite
+  long unconverged = 0;
+  double first_unconverged = 0; // [s]
+  double contact_residual_max = 0;
+  double energy_defect_max = 0; // over the energy of its step
+  double contact_iterations_mean = 0;
+};
+
+/// `steps` steps in place, recorded: appends to `history` (energies, powers, counts, rows of `probes`: may be null).
+MarchSummary march(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                   const Equilibrium& equilibrium, Mat probes, long steps, State& state, History& history,
+                   const Monitor& monitor);
+
+/// outcome: "completed", "refused" (theta and N make the followed mode look stable), "not converged" (contact, or an
+/// energy that is no longer finite). residual: the largest contact residual; iterations: contact iterations in all.
 struct Trajectory
 {
   Outcome outcome;
   double theta = 0, step_size = 0, periods = 0;
   long steps = 0;
-  double growth_rate_fit = 0;       // [1/s] of the fluctuating energy's amplitude before first lift-off; NaN: too short
+  double growth_rate_fit = 0;       // [1/s] of the followed mode's amplitude before the first event; NaN: too short
   double growth_rate_predicted = 0; // [1/s] discrete, of the followed mode
   double energy_defect_max = 0;     // of the energy, largest over the steps
   double seconds_per_step = 0, contact_iterations_mean = 0;
@@ -68,7 +127,8 @@ struct Trajectory
 /// ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h
 std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h);
 
-/// Integrates from `start`; `mode` is the followed mode (null: no growth is fitted).
+/// Integrates from `start`; `mode` is the followed mode (null: no growth is fitted, and the settings must give steps
+/// and step_size).
 Trajectory integrate(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                      const ComplexMode* mode, const TransientSettings& settings, State start, Mat probes);
 

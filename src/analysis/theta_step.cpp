@@ -1,0 +1,262 @@
+/// One step of the modified theta-method (Charroyer, Chiello, Sinou 2017; header: the equations).
+///
+/// With M v and A v of the current state at hand, the explicit matrix needs no product of its own,
+///     M - h(1-theta) C - h^2 theta(1-theta) K = [M - (1-theta) A]/theta,
+/// and A v+ is the right-hand side just solved for: a step multiplies by M and K once each. The same vectors give the
+/// energies and, from (A - M) v_theta = h theta C v_theta + theta^2 h (K u+ - K u), the damping work.
+#include "squeal/analysis/transient.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// What the options mean is said in the program's option table.
+void read_options(ThetaStep& step)
+{
+  const std::array<const char*, 2> laws = {"displacement", "velocity"};
+  const std::array<const char*, 2> solvers = {"gauss_seidel", "fixed_point"};
+  PetscInt law = 0, solver = 0, max_it = step.contact.max_iterations;
+  PetscBool extrapolate = step.extrapolate ? PETSC_TRUE : PETSC_FALSE;
+  const char* prefix = "transient_";
+  check(PetscOptionsGetEList(nullptr, prefix, "-contact_law", laws.data(), 2, &law, nullptr));
+  check(PetscOptionsGetEList(nullptr, prefix, "-contact_solver", solvers.data(), 2, &solver, nullptr));
+  check(PetscOptionsGetReal(nullptr, prefix, "-contact_tolerance", &step.contact.tolerance, nullptr));
+  check(PetscOptionsGetInt(nullptr, prefix, "-contact_max_it", &max_it, nullptr));
+  check(PetscOptionsGetReal(nullptr, prefix, "-contact_rho", &step.contact.rho, nullptr));
+  check(PetscOptionsGetBool(nullptr, prefix, "-contact_extrapolate", &extrapolate, nullptr));
+  if (!(step.contact.tolerance > 0)) throw Error("-transient_contact_tolerance must be above 0");
+  if (max_it < 1) throw Error("-transient_contact_max_it must be at least 1");
+  if (!(step.contact.rho >= 0)) throw Error("-transient_contact_rho must not be below 0");
+  step.law = law == 0 ? ContactLaw::displacement : ContactLaw::velocity;
+  step.contact.solver = solvers[static_cast<std::size_t>(solver)];
+  step.contact.max_iterations = static_cast<int>(max_it);
+  step.extrapolate = extrapolate == PETSC_TRUE;
+}
+
+/// b of w = W r + b, from the free velocity: normal rows are gap rates (g + B_n ut)/h + B_n v, tangential ones s.
+std::vector<double> free_contact_velocity(const ThetaStep& step, const Interface& interface, const State& state,
+                                          StepWork& work)
+{
+  check(VecWAXPY(work.v_theta, step.h * (1 - step.theta), state.v, state.u)); // ut, for a moment
+  const std::vector<double> position = relative(interface, work.v_theta);
+  std::vector<double> b = relative(interface, work.v_free);
+  // A gap at rounding is closed; displacements are what it was rounded from.
+  double rounding = 0;
+  if (step.law == ContactLaw::velocity)
+  {
+    check(VecNorm(work.v_theta, NORM_INFINITY, &rounding));
+    rounding *= 1e-10;
+  }
+  const double never = 1e100; // an opening rate no reaction can close: r = 0
+  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
+  for (std::size_t i = 0; i < interface.gap.size(); ++i)
+  {
+    const double gap = interface.gap[i] + position[i * block];
+    if (step.law == ContactLaw::displacement)
+      b[i * block] += gap / step.h;
+    else if (gap > rounding)
+      b[i * block] = never;
+    for (std::size_t k = 0; k < directions; ++k) b[i * block + 1 + k] -= interface.drive[i * directions + k];
+  }
+  return b;
+}
+
+/// Solves contact on rank 0, where W is, and hands r to every rank.
+ContactResult find_reactions(const ThetaStep& step, const Interface& interface, const std::vector<double>& b,
+                             StepWork& work, std::vector<double>& r, MPI_Comm comm)
+{
+  std::vector<double> guess = r;
+  if (step.extrapolate && work.r_before.size() == r.size())
+    for (std::size_t i = 0; i < r.size(); ++i) guess[i] = 2 * r[i] - work.r_before[i];
+  std::swap(work.r_before, r);
+  r = std::move(guess);
+
+  std::array<double, 3> told{};
+  on_rank_zero(comm,
+               [&]
+               {
+                 const ContactResult result = solve_contact(step.condensed.W, b, interface.pairs, interface.directions,
+                                                            interface.friction, step.contact, r);
+                 told = {static_cast<double>(result.iterations), result.residual, result.converged ? 1. : 0.};
+               });
+  MPI_Bcast(told.data(), 3, MPI_DOUBLE, 0, comm);
+  MPI_Bcast(r.data(), static_cast<int>(r.size()), MPI_DOUBLE, 0, comm);
+  return {static_cast<int>(told[0]), told[1], told[2] > 0};
+}
+
+/// Works of the step from the products at both ends; reductions are gathered into one message.
+void account(const ThetaStep& step, const Structure& structure, const State& state, StepWork& work, StepReport& report)
+{
+  const double h = step.h, theta = step.theta;
+  double kinetic = 0, potential = 0, contact = 0, load = 0, damping = 0, dMd = 0, dKd = 0;
+  check(VecDotBegin(work.v_next, work.Mv_next, &kinetic));
+  check(VecDotBegin(state.u, work.Ku_next, &potential));
+  check(VecDotBegin(work.v_theta, work.f, &contact));
+  check(VecDotBegin(work.v_theta, structure.load, &load));
+
+  // v_free is no longer needed, nor are M v, A v and K u of the start once their part is taken.
+  Vec dv = work.v_free, change = work.Ku, d = work.Mv;
+  check(VecWAXPY(dv, -1, state.v, work.v_next));
+  check(VecAYPX(change, -1, work.Ku_next)); // K du
+  // theta h C v_theta = A v_theta - M v_theta - theta^2 K du
+  check(VecAXPBYPCZ(work.Av, theta, -theta, 1 - theta, work.Av_next, work.Mv_next));
+  check(VecAXPY(work.Av, theta - 1, work.Mv));
+  check(VecAXPY(work.Av, -theta * theta, change));
+  check(VecAYPX(d, -1, work.Mv_next)); // M dv
+  check(VecDotBegin(work.v_theta, work.Av, &damping));
+  check(VecDotBegin(dv, d, &dMd));
+  check(VecDotBegin(work.v_theta, change, &dKd));
+
+  check(VecDotEnd(work.v_next, work.Mv_next, &kinetic));
+  check(VecDotEnd(state.u, work.Ku_next, &potential));
+  check(VecDotEnd(work.v_theta, work.f, &contact));
+  check(VecDotEnd(work.v_theta, structure.load, &load));
+  check(VecDotEnd(work.v_theta, work.Av, &damping));
+  check(VecDotEnd(dv, d, &dMd));
+  check(VecDotEnd(work.v_theta, change, &dKd));
+
+  report.energy = (kinetic + potential) / 2;
+  report.damping_work = damping / theta;
+  report.contact_work = contact;
+  report.load_work = h * load;
+  report.energy_defect =
+      report.energy - work.energy - (0.5 - theta) * (dMd + h * dKd) + report.damping_work - contact - report.load_work;
+}
+
+} // namespace
+
+ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta)
+{
+  if (!(h > 0) || !std::isfinite(h)) throw Error("the time step must be above 0, not " + std::to_string(h) + " s");
+  if (!(theta > 0 && theta <= 1)) throw Error("theta must be in (0, 1], not " + std::to_string(theta));
+  const double start = MPI_Wtime();
+  ThetaStep step;
+  step.h = h;
+  step.theta = theta;
+  read_options(step);
+  check(MatDuplicate(structure.M, MAT_COPY_VALUES, step.A.put()));
+  check(MatAXPY(step.A, h * theta, structure.C, SAME_NONZERO_PATTERN));
+  check(MatAXPY(step.A, h * h * theta * theta, structure.K, SAME_NONZERO_PATTERN));
+  check(MatSetOption(step.A, MAT_SYMMETRIC, PETSC_TRUE));
+  step.condensed = condense(step.A, interface, h, structure.names);
+  step.seconds = MPI_Wtime() - start;
+  return step;
+}
+
+StepWork begin_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state)
+{
+  StepWork work;
+  for (Owned<Vec>* x : {&work.Mv, &work.Av, &work.Ku, &work.Mv_next, &work.Av_next, &work.Ku_next, &work.v_free,
+                        &work.v_next, &work.v_theta, &work.f})
+    *x = zeros_like(structure.load);
+  check(MatMult(structure.M, state.v, work.Mv));
+  check(MatMult(step.A, state.v, work.Av));
+  check(MatMult(structure.K, state.u, work.Ku));
+  double kinetic = 0, potential = 0;
+  check(VecDot(state.v, work.Mv, &kinetic));
+  check(VecDot(state.u, work.Ku, &potential));
+  work.energy = (kinetic + potential) / 2;
+  state.reactions.resize(interface.size(), 0);
+  return work;
+}
+
+StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
+                   State& state)
+{
+  const double h = step.h, theta = step.theta;
+  StepReport report;
+
+  // A v_free = [M v - (1-theta) A v]/theta - h K u + h F
+  check(VecCopy(work.Mv, work.Av_next));
+  check(VecAXPBYPCZ(work.Av_next, (theta - 1) / theta, -h, 1 / theta, work.Av, work.Ku));
+  check(VecAXPY(work.Av_next, h, structure.load));
+  solve(step.condensed, work.Av_next, work.v_free);
+
+  check(VecSet(work.f, 0));
+  if (interface.pairs > 0)
+  {
+    const std::vector<double> b = free_contact_velocity(step, interface, state, work);
+    const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
+    const ContactResult contact = find_reactions(step, interface, b, work, state.reactions, comm);
+    report.contact_iterations = contact.iterations;
+    report.contact_residual = contact.residual;
+    report.contact_converged = contact.converged;
+    add_reactions(interface, state.reactions, work.f);
+    check(VecScale(work.f, h));
+  }
+  for (const ContactStatus status : contact_status(interface, state.reactions))
+    ++(status == ContactStatus::open ? report.open : status == ContactStatus::stick ? report.stick : report.slip);
+
+  if (report.open == interface.pairs)
+    check(VecCopy(work.v_free, work.v_next)); // free flight: already solved
+  else
+  {
+    check(VecAXPY(work.Av_next, 1, work.f));
+    solve(step.condensed, work.Av_next, work.v_next);
+  }
+
+  check(VecAXPBYPCZ(work.v_theta, theta, 1 - theta, 0, work.v_next, state.v));
+  check(VecAXPY(state.u, h, work.v_theta));
+  check(MatMult(structure.M, work.v_next, work.Mv_next));
+  check(MatMult(structure.K, state.u, work.Ku_next));
+  account(step, structure, state, work, report);
+
+  check(VecCopy(work.v_next, state.v));
+  std::swap(work.Mv, work.Mv_next);
+  std::swap(work.Av, work.Av_next);
+  std::swap(work.Ku, work.Ku_next);
+  work.energy = report.energy;
+  state.time += h;
+  return report;
+}
+
+std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions)
+{
+  const auto block = static_cast<std::size_t>(interface.block());
+  double largest = 0;
+  for (std::size_t i = 0; i < reactions.size(); i += block) largest = std::max(largest, reactions[i]);
+  std::vector<ContactStatus> status(static_cast<std::size_t>(interface.pairs), ContactStatus::open);
+  for (std::size_t i = 0; i < status.size(); ++i)
+  {
+    const double* r = &reactions[i * block];
+    if (r[0] <= 0) continue;
+    const double friction = block == 2 ? std::abs(r[1]) : std::hypot(r[1], r[2]);
+    status[i] = interface.friction * r[0] - friction > 1e-8 * largest ? ContactStatus::stick : ContactStatus::slip;
+  }
+  return status;
+}
+
+int flow(const ThetaStep& step, const Structure& structure, const Interface& interface, int steps, State& state,
+         State* rate)
+{
+  if (steps < 2) throw Error("a period needs at least 2 steps, not " + std::to_string(steps));
+  StepWork work = begin_steps(step, structure, interface, state);
+  if (rate) *rate = {zeros_like(state.u), zeros_like(state.v), 0, {}};
+  int unconverged = 0;
+  // v'(end) = [3 v_N - 4 v_(N-1) + v_(N-2)]/(2h)
+  const auto add = [&](double factor)
+  {
+    if (rate) check(VecAXPY(rate->v, factor / (2 * step.h), state.v));
+  };
+  for (int i = 0; i < steps; ++i)
+  {
+    if (i == steps - 2) add(1);
+    if (i == steps - 1) add(-4);
+    if (!advance(step, structure, interface, work, state).contact_converged) ++unconverged;
+  }
+  add(3);
+  if (rate)
+  {
+    check(VecCopy(state.v, rate->u));
+    rate->time = state.time;
+  }
+  return unconverged;
+}
+
+} // namespace squeal
