@@ -1,0 +1,170 @@
+#include "squeal/solid/binary.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+
+namespace squeal
+{
+
+namespace
+{
+
+// PETSc writes indices in its own width: a file of a 64-bit-index build differs from one of a 32-bit-index build.
+using Index = std::conditional_t<sizeof(PetscInt) == 8, std::int64_t, std::int32_t>;
+
+template <class Number> std::vector<Number> read_big_endian(std::istream& stream, std::int64_t count)
+{
+  std::vector<Number> values(static_cast<std::size_t>(count));
+  auto* bytes = reinterpret_cast<char*>(values.data());
+  stream.read(bytes, static_cast<std::streamsize>(values.size() * sizeof(Number)));
+  if constexpr (std::endian::native == std::endian::little)
+    for (std::size_t i = 0; i < values.size(); ++i)
+      std::reverse(bytes + i * sizeof(Number), bytes + (i + 1) * sizeof(Number));
+  return values;
+}
+
+std::ifstream open(const std::filesystem::path& file)
+{
+  if (!std::filesystem::is_regular_file(file)) throw Error(file.string() + ": no such file");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw Error(file.string() + ": cannot be read");
+  return stream;
+}
+
+/// The header's first `count` indices after the class id.
+std::vector<Index> read_header(std::istream& stream, const std::filesystem::path& file, Index class_id,
+                               const std::string& kind, std::int64_t count)
+{
+  const auto id = read_big_endian<Index>(stream, 1);
+  if (!stream || id[0] != class_id)
+    throw Error(file.string() + ": not a " + kind + " in PETSc's binary format with " +
+                std::to_string(8 * sizeof(Index)) + "-bit indices; tools/matrices writes one");
+  auto header = read_big_endian<Index>(stream, count);
+  if (!stream) throw Error(file.string() + ": truncated within its header");
+  return header;
+}
+
+void check_length(const std::filesystem::path& file, std::int64_t expected)
+{
+  const auto found = static_cast<std::int64_t>(std::filesystem::file_size(file));
+  if (found == expected) return;
+  throw Error(file.string() + ": " + (found < expected ? "truncated: " : "too long: ") + std::to_string(found) +
+              " bytes where its header announces " + std::to_string(expected) + " (real double precision)");
+}
+
+void check_columns(std::istream& stream, const std::filesystem::path& file, const std::vector<Index>& counts,
+                   Index columns)
+{
+  for (std::size_t row = 0; row < counts.size(); ++row)
+  {
+    const auto column = read_big_endian<Index>(stream, counts[row]);
+    Index previous = -1;
+    for (const Index j : column)
+    {
+      if (j <= previous || j >= columns)
+        throw Error(file.string() + ": row " + std::to_string(row) + " has column " + std::to_string(j) + " after " +
+                    std::to_string(previous) + " of " + std::to_string(columns) +
+                    "; columns must ascend and lie within the matrix");
+      previous = j;
+    }
+  }
+}
+
+MatrixSize checked_size(const std::filesystem::path& file)
+{
+  auto stream = open(file);
+  const auto header = read_header(stream, file, MAT_FILE_CLASSID, "matrix", 3);
+  const std::int64_t rows = header[0], columns = header[1], entries = header[2];
+  if (entries < 0) throw Error(file.string() + ": a dense matrix; write it as a sparse one (AIJ)");
+  if (rows < 1 || columns < 1)
+    throw Error(file.string() + ": a matrix of " + std::to_string(rows) + " x " + std::to_string(columns));
+  const std::int64_t width = sizeof(Index);
+  check_length(file, (4 + rows + entries) * width + entries * 8);
+  const auto counts = read_big_endian<Index>(stream, rows);
+  std::int64_t sum = 0;
+  for (const Index count : counts)
+  {
+    if (count < 0 || count > columns) throw Error(file.string() + ": a row of " + std::to_string(count) + " entries");
+    sum += count;
+  }
+  if (sum != entries)
+    throw Error(file.string() + ": rows hold " + std::to_string(sum) + " entries, the header announces " +
+                std::to_string(entries));
+  check_columns(stream, file, counts, header[1]);
+  return {static_cast<PetscInt>(rows), static_cast<PetscInt>(columns)};
+}
+
+/// Text for the first entry of this rank's rows that is not finite.
+std::string not_finite(Mat A, const std::filesystem::path& file)
+{
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(A, &first, &last));
+  std::string problem;
+  for (PetscInt row = first; row < last && problem.empty(); ++row)
+  {
+    PetscInt count = 0;
+    const PetscInt* columns = nullptr;
+    const PetscScalar* values = nullptr;
+    check(MatGetRow(A, row, &count, &columns, &values));
+    const auto* bad = std::find_if_not(values, values + count, [](double value) { return std::isfinite(value); });
+    if (bad != values + count)
+      problem = file.string() + ": entry (" + std::to_string(row) + ", " + std::to_string(columns[bad - values]) +
+                ") is " + std::to_string(*bad);
+    check(MatRestoreRow(A, row, &count, &columns, &values));
+  }
+  return problem;
+}
+
+} // namespace
+
+MatrixSize check_matrix_file(const std::filesystem::path& file, MPI_Comm comm)
+{
+  MatrixSize size;
+  on_rank_zero(comm, [&] { size = checked_size(file); });
+  PetscInt both[2] = {size.rows, size.columns};
+  MPI_Bcast(both, 2, MPIU_INT, 0, comm);
+  return {both[0], both[1]};
+}
+
+Owned<Mat> load_matrix(const std::filesystem::path& file, MatrixSize size, MatrixSize local, MPI_Comm comm)
+{
+  Owned<PetscViewer> viewer;
+  check(PetscViewerBinaryOpen(comm, file.c_str(), FILE_MODE_READ, viewer.put()));
+  Owned<Mat> A;
+  check(MatCreate(comm, A.put()));
+  check(MatSetSizes(A, local.rows, local.columns, size.rows, size.columns));
+  check(MatSetType(A, MATAIJ));
+  check(MatLoad(A, viewer));
+  agree(comm, not_finite(A, file));
+  return A;
+}
+
+std::vector<double> read_vector(const std::filesystem::path& file, MPI_Comm comm)
+{
+  std::vector<double> values;
+  on_rank_zero(comm,
+               [&]
+               {
+                 auto stream = open(file);
+                 const std::int64_t length = read_header(stream, file, VEC_FILE_CLASSID, "vector", 1)[0];
+                 if (length < 0) throw Error(file.string() + ": a vector of " + std::to_string(length));
+                 check_length(file, 2 * static_cast<std::int64_t>(sizeof(Index)) + length * 8);
+                 values = read_big_endian<double>(stream, length);
+                 const auto bad =
+                     std::find_if_not(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+                 if (bad != values.end())
+                   throw Error(file.string() + ": entry " + std::to_string(bad - values.begin()) + " is " +
+                               std::to_string(*bad));
+               });
+  auto length = static_cast<int>(values.size());
+  MPI_Bcast(&length, 1, MPI_INT, 0, comm);
+  values.resize(static_cast<std::size_t>(length));
+  MPI_Bcast(values.data(), length, MPI_DOUBLE, 0, comm);
+  return values;
+}
+
+} // namespace squeal

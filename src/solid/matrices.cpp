@@ -1,0 +1,160 @@
+/// Structures that come as matrices: M C K F of a folder, PETSc binary.
+#include "matrices.hpp"
+
+#include "squeal/solid/binary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+namespace squeal
+{
+
+namespace
+{
+
+// Exported matrices carry the round-off of the program that wrote them; a genuine error is orders above this.
+constexpr double symmetry_tolerance = 1e-9;
+
+struct Entry
+{
+  double size = -1;
+  PetscInt row = 0, column = 0;
+};
+
+Entry largest_entry(Mat A)
+{
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(A, &first, &last));
+  Entry largest;
+  for (PetscInt row = first; row < last; ++row)
+  {
+    PetscInt count = 0;
+    const PetscInt* columns = nullptr;
+    const PetscScalar* values = nullptr;
+    check(MatGetRow(A, row, &count, &columns, &values));
+    for (PetscInt k = 0; k < count; ++k)
+      if (std::abs(values[k]) > largest.size) largest = {std::abs(values[k]), row, columns[k]};
+    check(MatRestoreRow(A, row, &count, &columns, &values));
+  }
+  return largest;
+}
+
+double largest_of_all(double mine, MPI_Comm comm)
+{
+  double largest = 0;
+  MPI_Allreduce(&mine, &largest, 1, MPI_DOUBLE, MPI_MAX, comm);
+  return largest;
+}
+
+void check_symmetric(Mat A, const std::filesystem::path& file, MPI_Comm comm)
+{
+  Owned<Mat> difference;
+  check(MatTranspose(A, MAT_INITIAL_MATRIX, difference.put()));
+  check(MatAXPY(difference, -1, A, DIFFERENT_NONZERO_PATTERN));
+  const Entry worst = largest_entry(difference);
+  const double scale = largest_of_all(largest_entry(A).size, comm);
+  const double overall = largest_of_all(worst.size, comm);
+  std::string problem;
+  if (overall > symmetry_tolerance * scale && worst.size == overall)
+  {
+    std::ostringstream text;
+    text << file.string() << ": not symmetric: entries (" << worst.row << ", " << worst.column << ") and ("
+         << worst.column << ", " << worst.row << ") differ by " << worst.size << ", the largest entry is " << scale;
+    problem = text.str();
+  }
+  agree(comm, problem);
+}
+
+Owned<Mat> with_pattern(Mat pattern, Mat A)
+{
+  Owned<Mat> result;
+  check(MatDuplicate(pattern, MAT_COPY_VALUES, result.put()));
+  check(MatAXPY(result, 1, A, SUBSET_NONZERO_PATTERN));
+  check(MatSetOption(result, MAT_SYMMETRIC, PETSC_TRUE));
+  check(MatSetOption(result, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  check(MatSetOption(result, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
+  return result;
+}
+
+Owned<Mat> load_square(const std::filesystem::path& file, PetscInt& size, MPI_Comm comm)
+{
+  const auto found = check_matrix_file(file, comm);
+  std::string problem;
+  const auto shape = std::to_string(found.rows) + " x " + std::to_string(found.columns);
+  if (found.rows != found.columns) problem = file.string() + ": " + shape + ", must be square";
+  if (problem.empty() && size >= 0 && found.rows != size)
+    problem = file.string() + ": " + shape + ", but M.petsc beside it is " + std::to_string(size) + " x " +
+              std::to_string(size);
+  agree(comm, problem);
+  size = found.rows;
+  auto A = load_matrix(file, found, {PETSC_DECIDE, PETSC_DECIDE}, comm);
+  check_symmetric(A, file, comm);
+  return A;
+}
+
+void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
+{
+  Owned<Vec> diagonal;
+  check(MatCreateVecs(M, nullptr, diagonal.put()));
+  check(MatGetDiagonal(M, diagonal));
+  PetscInt place = 0;
+  PetscReal least = 0;
+  check(VecMin(diagonal, &place, &least));
+  if (least < 0)
+    agree(comm, file.string() + ": diagonal entry " + std::to_string(place) + " is " + std::to_string(least) +
+                    "; a mass matrix has none below zero");
+}
+
+} // namespace
+
+std::string describe(const DofNames& names, PetscInt dof)
+{
+  if (names.motion.empty()) return "dof " + std::to_string(dof);
+  static const char* const directions[] = {"x", "y", "z", "rx", "ry", "rz"};
+  const int motion = names.motion.at(static_cast<std::size_t>(dof));
+  const auto node = static_cast<std::size_t>(motion / 6);
+  const Vec3& at = names.at[node];
+  std::ostringstream text;
+  text << names.bodies[static_cast<std::size_t>(names.body[node])] << ", node " << node << " at (" << at[0] << ", "
+       << at[1] << ", " << at[2] << "), direction " << directions[motion % 6];
+  return text.str();
+}
+
+void share_pattern(Structure& structure)
+{
+  Owned<Mat> pattern;
+  check(MatDuplicate(structure.M, MAT_COPY_VALUES, pattern.put()));
+  check(MatAXPY(pattern, 1, structure.C, DIFFERENT_NONZERO_PATTERN));
+  check(MatAXPY(pattern, 1, structure.K, DIFFERENT_NONZERO_PATTERN));
+  check(MatShift(pattern, 1)); // adds the diagonal entries that are missing
+  check(MatZeroEntries(pattern));
+  structure.M = with_pattern(pattern, structure.M);
+  structure.C = with_pattern(pattern, structure.C);
+  structure.K = with_pattern(pattern, structure.K);
+}
+
+Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
+{
+  Structure structure;
+  PetscInt size = -1;
+  structure.M = load_square(folder / "M.petsc", size, comm);
+  structure.C = load_square(folder / "C.petsc", size, comm);
+  structure.K = load_square(folder / "K.petsc", size, comm);
+  check_mass(structure.M, folder / "M.petsc", comm);
+  share_pattern(structure);
+  const auto force = read_vector(folder / "F.petsc", comm);
+  if (static_cast<PetscInt>(force.size()) != size)
+    throw Error((folder / "F.petsc").string() + ": length " + std::to_string(force.size()) + ", but M.petsc is " +
+                std::to_string(size) + " x " + std::to_string(size));
+  check(MatCreateVecs(structure.K, nullptr, structure.load.put()));
+  PetscInt first = 0, last = 0;
+  check(VecGetOwnershipRange(structure.load, &first, &last));
+  PetscScalar* entries = nullptr;
+  check(VecGetArrayWrite(structure.load, &entries));
+  std::copy(force.begin() + first, force.begin() + last, entries);
+  check(VecRestoreArrayWrite(structure.load, &entries));
+  return structure;
+}
+
+} // namespace squeal
