@@ -53,7 +53,7 @@ struct Mesh
 {
   std::vector<Vec3> nodes; // [m]; the mesh's own, then the scene's points, then the rigid bodies' reference points
   std::vector<Element> elements;
-  std::map<std::string, std::vector<Face>> surfaces;   // named surfaces that are not shells
+  std::map<std::string, std::vector<Face>> surfaces;   // named surfaces, those of shells too
   std::map<std::string, std::vector<int>> node_groups; // nodes of every named group of any dimension, ascending
   std::map<std::string, int> points;                   // node of every scene point and rigid body
 };

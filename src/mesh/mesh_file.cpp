@@ -1,0 +1,221 @@
+#include "squeal/mesh/mesh_file.hpp"
+
+#include "squeal/base/error.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <limits>
+#include <regex>
+#ifdef SQUEAL_WITH_GMSH
+#include <gmsh.h>
+#endif
+
+namespace squeal
+{
+
+namespace
+{
+
+std::string text_of(const std::filesystem::path& file)
+{
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+// Without comments, and without what stands in braces or quotes: what is left are the names themselves.
+std::string bare(const std::string& text)
+{
+  static const std::regex comments(R"(//[^\n]*|/\*[^]*?\*/)"), strings("\"[^\"\\n]*\""), braces(R"(\{[^{}]*\})");
+  std::string result = std::regex_replace(std::regex_replace(text, comments, " "), strings, " ");
+  for (std::string before; before != result;)
+  {
+    before = result;
+    result = std::regex_replace(before, braces, "0");
+  }
+  return result;
+}
+
+} // namespace
+
+std::vector<std::string> geometry_parameters(const std::filesystem::path& file)
+{
+  static const std::regex include("Include\\s+\"([^\"]+)\""), list(R"(DefineConstant\s*\[([^\]]*)\])"),
+      entry(R"((?:^|,)\s*([A-Za-z_]\w*)\s*(?==|,|$))");
+  std::vector<std::string> names;
+  const std::string text = text_of(file);
+  for (std::sregex_iterator it(text.begin(), text.end(), include), end; it != end; ++it)
+    for (std::string& name : geometry_parameters(file.parent_path() / (*it)[1].str())) names.push_back(std::move(name));
+  const std::string definitions = bare(text);
+  for (std::sregex_iterator it(definitions.begin(), definitions.end(), list), end; it != end; ++it)
+  {
+    const std::string inside = (*it)[1];
+    for (std::sregex_iterator e(inside.begin(), inside.end(), entry), last; e != last; ++e) names.push_back((*e)[1]);
+  }
+  return names;
+}
+
+#ifdef SQUEAL_WITH_GMSH
+
+namespace
+{
+
+void check_parameters(const MeshSource& source)
+{
+  if (source.parameters.empty()) return;
+  if (source.file.extension() != ".geo")
+    throw Error(source.file.string() + ": [mesh.parameters] need a .geo geometry; a mesh file has none. Remove them");
+  const std::vector<std::string> known = geometry_parameters(source.file);
+  for (const auto& [name, value] : source.parameters)
+  {
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    const std::string nearest = nearest_word(name, known);
+    throw Error(source.file.string() + ": no parameter '" + name + "' in its DefineConstant lists" +
+                (nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
+  }
+}
+
+// libgmsh lives from here to the end of the read, mute. It keeps -setnumber values as long as the process lives, which
+// is harmless to a program that reads one mesh.
+class GmshSession
+{
+public:
+  explicit GmshSession(const std::map<std::string, double>& parameters)
+  {
+    std::vector<std::string> words = {"squeal"};
+    for (const auto& [name, value] : parameters)
+    {
+      char digits[32];
+      std::snprintf(digits, sizeof digits, "%.17g", value);
+      words.insert(words.end(), {"-setnumber", name, digits});
+    }
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    gmsh::initialize(static_cast<int>(argv.size()), argv.data(), false);
+    gmsh::option::setNumber("General.Terminal", 0);
+  }
+  ~GmshSession()
+  {
+    try
+    {
+      gmsh::finalize();
+    }
+    catch (...)
+    {
+    }
+  }
+  GmshSession(const GmshSession&) = delete;
+  GmshSession& operator=(const GmshSession&) = delete;
+};
+
+std::vector<int> read_nodes(double scale, FileMesh& mesh)
+{
+  std::vector<std::size_t> tags;
+  std::vector<double> coordinates, parametric;
+  gmsh::model::mesh::getNodes(tags, coordinates, parametric);
+  std::vector<int> index_of(tags.empty() ? 0 : *std::max_element(tags.begin(), tags.end()) + 1, -1);
+  for (std::size_t i = 0; i < tags.size(); ++i)
+  {
+    index_of[tags[i]] = static_cast<int>(i);
+    mesh.nodes.push_back({scale * coordinates[3 * i], scale * coordinates[3 * i + 1], scale * coordinates[3 * i + 2]});
+  }
+  return index_of;
+}
+
+std::vector<std::string> groups_of(int dimension, int entity)
+{
+  std::vector<int> tags;
+  gmsh::model::getPhysicalGroupsForEntity(dimension, entity, tags);
+  std::vector<std::string> names;
+  for (const int tag : tags)
+  {
+    std::string name;
+    gmsh::model::getPhysicalName(dimension, std::abs(tag), name);
+    names.push_back(name.empty() ? std::to_string(std::abs(tag)) : name);
+  }
+  return names;
+}
+
+void read_blocks(const std::vector<int>& index_of, FileMesh& mesh)
+{
+  gmsh::vectorpair entities;
+  gmsh::model::getEntities(entities);
+  for (const auto& [dimension, entity] : entities)
+  {
+    std::vector<int> types;
+    std::vector<std::vector<std::size_t>> elements, nodes;
+    gmsh::model::mesh::getElements(types, elements, nodes, dimension, entity);
+    for (std::size_t k = 0; k < types.size(); ++k)
+    {
+      FileBlock block{dimension, types[k], {}, 0, {}, groups_of(dimension, entity)};
+      int order = 0, primary = 0, d = 0;
+      std::vector<double> local;
+      gmsh::model::mesh::getElementProperties(types[k], block.type_name, d, order, block.nodes_per_element, local,
+                                              primary);
+      for (const std::size_t tag : nodes[k]) block.nodes.push_back(index_of[tag]);
+      mesh.blocks.push_back(std::move(block));
+    }
+  }
+}
+
+bool has_elements()
+{
+  for (const int dimension : {2, 3})
+  {
+    std::vector<int> types;
+    std::vector<std::vector<std::size_t>> elements, nodes;
+    gmsh::model::mesh::getElements(types, elements, nodes, dimension);
+    if (!types.empty()) return true;
+  }
+  return false;
+}
+
+FileMesh read_with_gmsh(const MeshSource& source)
+{
+  const GmshSession session(source.parameters);
+  gmsh::open(source.file.string());
+  if (!has_elements()) gmsh::model::mesh::generate(3);
+  std::string problem;
+  gmsh::logger::getLastError(problem);
+  if (!problem.empty()) throw Error(problem);
+  FileMesh mesh;
+  read_blocks(read_nodes(source.scale, mesh), mesh);
+  return mesh;
+}
+
+} // namespace
+
+FileMesh read_mesh_file(const MeshSource& source)
+{
+  const std::string name = source.file.string();
+  if (!std::filesystem::is_regular_file(source.file)) throw Error(name + ": no such mesh file");
+  check_parameters(source);
+  std::string problem;
+  try
+  {
+    return read_with_gmsh(source);
+  }
+  catch (const std::string& text) // libgmsh before 4.9 throws strings
+  {
+    problem = text;
+  }
+  catch (const std::exception& error)
+  {
+    problem = error.what();
+  }
+  throw Error(name + ": gmsh cannot read or mesh it: " + problem);
+}
+
+#else
+
+FileMesh read_mesh_file(const MeshSource& source)
+{
+  throw Error(source.file.string() + ": this squeal was built without libgmsh and reads no meshes; rebuild with "
+                                     "-DSQUEAL_GMSH=ON, or bring matrices or points");
+}
+
+#endif
+
+} // namespace squeal
