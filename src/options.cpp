@@ -27,11 +27,23 @@ constexpr std::array options = {
     Option{"-transient_contact_max_it", "1000", "contact iterations (sweeps) allowed a step"},
     Option{"-transient_contact_rho", "0", "of the fixed point, over 1/lambda_max(W); 0: chosen"},
     Option{"-transient_contact_extrapolate", "true", "warm start extrapolated from the last two steps"},
-    Option{"-modes_dense_limit", "200", "eigenproblems up to this size are solved whole by LAPACK"},
-    Option{"-modes_candidates", "20", "pairs that each residual pass of the projection corrects"},
+    Option{"-cycle_lift_off_multiple", "2", "start at this many times first lift-off when the estimate has no balance"},
+    Option{"-cycle_reduced_newtons", "10", "iterations of the reduced system on the mode's shapes; 0: not tried"},
+    Option{"-cycle_base_growths", "1", "times the reduced base may grow by what it missed"},
+    Option{"-cycle_rank_tolerance", "1e-7", "relative, of the reduced base and of its least-squares solve"},
+    Option{"-cycle_difference", "1e-6", "difference step over the fluctuation, in the energy norm"},
+    Option{"-cycle_finish", "multisecant", "full-space finish: multisecant, newton_krylov or none"},
+    Option{"-cycle_band_factor", "4", "real modes of the preconditioner reach this many times the mode's frequency"},
+    Option{"-cycle_secants", "20", "secants kept by the finish"},
+    Option{"-cycle_secant_drop", "1e-4", "a secant is dropped when less than this part of it is new"},
+    Option{"-cycle_clamp", "0.3", "longest step of the finish over the fluctuation"},
+    Option{"-cycle_stall", "30", "iterations without progress before the finish starts again, or falls back"},
+    Option{"-cycle_max_periods", "400", "periods that may be integrated in all"},
+    Option{"-cycle_multipliers", "-1", "Floquet multipliers' Krylov dimension; -1: all up to 25 dofs, else none"},
+    Option{"-cycle_samples", "32", "displacements kept over the last period, for the fields file"},
 };
 
-constexpr std::array stages = {"equilibrium_", "modes_", "transient_", "cycle_", "estimate_"};
+constexpr std::array stages = {"equilibrium_", "modes_", "transient_", "cycle_", "cycle_full_", "estimate_"};
 
 // What a stage hands on to a solver object, which checks the rest itself.
 constexpr std::array solver_parts = {"snes_", "ksp_", "pc_", "pep_", "eps_", "st_",

@@ -1,20 +1,19 @@
 #pragma once
-/// The limit cycle by shooting (method, section 6): Phi_T(x0) = x0 for the period T and the initial state.
+/// The limit cycle by shooting (method, section 6): Phi_T(x0) = x0 for the period T and the initial state x0 = (u, v).
 ///
 /// The solver sees a flow only, so that any model with a period map can be shot at: the brake's exact-contact theta
-/// step, or a smooth oscillator in a test.
+/// step, or a smooth oscillator in a test. States are compared in the energy norm sqrt(u'K u + v'M v) only.
 #include "squeal/analysis/transient.hpp"
 
 namespace squeal
 {
 
-/// Flow of an autonomous system over one period, in fixed N steps, on states (u, v).
+/// Flow of an autonomous system over one period. States are VecNest (u, v).
 struct Flow
 {
-  /// end = Phi_period(start); returns the derivative of the end state in the period through `rate` (u', v' at the end).
-  std::function<void(double period, const State& start, State& end, State& rate)> integrate;
-  /// Energy norm squared of a state difference (du, dv): du'K du + dv'M dv; products for the inner product.
-  Mat M = nullptr, K = nullptr;
+  /// end = Phi_period(start); unless `rate` is null, rate = dPhi/dperiod at the end.
+  std::function<void(double period, Vec start, Vec end, Vec rate)> integrate;
+  Mat M = nullptr, K = nullptr; // of the energy norm
 };
 
 struct NewtonRecord
@@ -26,16 +25,17 @@ struct NewtonRecord
   double residual_projected = 0, residual_full = 0;
 };
 
-/// outcome: "converged", "collapsed to equilibrium", "not converged", "not periodic", "skipped".
+/// outcome: "converged", "collapsed to equilibrium", "not converged", "not periodic" (T left [T0/2, 2 T0]), "skipped".
 /// residual: the full-space one, |Phi_T(x0) - x0| / |x0 - equilibrium| in the energy norm.
 struct LimitCycle
 {
   Outcome outcome;
   double period = 0; // [s]
   int steps_per_period = 0;
-  double residual_projected = 0, residual_full = 0;
+  double residual_projected = 0; // of the reduced (grown) system when it was left; NaN if it was not tried
+  double residual_full = 0;
   int newton_iterations = 0;
-  long periods_integrated = 0;
+  long periods_integrated = 0; // every evaluation of the flow, differences and the last period included
   State start;
   std::vector<NewtonRecord> records;
   // over the last period
@@ -46,6 +46,67 @@ struct LimitCycle
   History history;                                  // of one period
   std::vector<Owned<Vec>> displacements;            // samples of u over the period, for fields.h5
   std::vector<std::vector<ContactStatus>> statuses; // [step][pair]
+  // Floquet multipliers, largest first; empty when they were not asked for
+  std::vector<std::complex<double>> multipliers;
+  std::string stability;       // "stable", "unstable", "undecided", or "" without multipliers
+  double trivial_error = 0;    // distance of the multiplier nearest 1 from 1: the error bar of the verdict
+  long multiplier_periods = 0; // integrated for them, not in periods_integrated
 };
+
+/// Where shooting starts, and what its reduced space is made of.
+struct ShootingStart
+{
+  Vec equilibrium = nullptr; // u0 [m]
+  Vec u = nullptr, v = nullptr;
+  double period = 0;       // [s]
+  std::vector<Vec> shapes; // the paper's phi_r, phi_i, phi_e: of the displacements and of the velocities alike
+};
+
+/// Approximate inverse of dPhi/dx - I from the frictionless bilateral real modes (method, section 6):
+///     P^-1 x = -x + E D E^+ x,   D_i = (G_i^N - I)^-1 + I,   G_i the 2 x 2 theta step of mode i.
+struct RealModePreconditioner
+{
+  Owned<Mat> shapes, weighted;        // Phi and M Phi, dofs x modes; null: no modes, P = -I
+  std::vector<double> omega, damping; // [rad/s], [1/s] of the modes this rank owns
+  int steps = 0;
+  double theta = 0.5;
+};
+
+RealModePreconditioner make_preconditioner(const Structure& structure, const RealModes& modes, int steps, double theta);
+
+/// y = P^-1 x at this period; states are nests.
+void apply(const RealModePreconditioner& preconditioner, double period, Vec x, Vec y);
+
+/// Free periods, the reduced system, the growing base and the full-space finish, on any flow; fills everything of the
+/// cycle but what is measured on the brake's last period.
+///
+/// Options, prefix -cycle_: those of the reduced SNES (-cycle_snes_..., dense, at most seven unknowns and what the base
+/// grows by); those of the fallback, -cycle_full_snes_..., -cycle_full_ksp_...; and base_growths, finish (multisecant |
+/// newton_krylov | none), difference, rank_tolerance, history, drop, clamp, stall, max_periods, multipliers.
+LimitCycle shoot(const Flow& flow, const ShootingStart& start, const RealModePreconditioner& preconditioner,
+                 double tolerance, int free_periods);
+
+/// The brake's period map in `steps` theta steps. Keeps A and W of the last period: one factoring per period length,
+/// none for difference columns. The derivative in the period is (x_(N+1) - x_(N-1))/2h, exact for theta = 1/2 and a
+/// linear structure, stiff modes included.
+struct PeriodMap
+{
+  const Structure& structure;
+  const Interface& interface;
+  int steps = 0;
+  double theta = 0.5;
+  ThetaStep step{};
+  std::vector<double> reactions{};      // warm start: at the end of the last period integrated with its rate
+  long factorings = 0, unconverged = 0; // unconverged: steps whose contact did not converge
+};
+
+/// Borrows the map.
+Flow flow_of(PeriodMap& map);
+
+/// From the energy estimate, or from -cycle_lift_off_multiple (2) times first lift-off when it has no balance. Further
+/// options: -cycle_band_factor (4), the preconditioner's real modes reach this many times the mode's frequency;
+/// -cycle_samples (32), displacements kept over the last period.
+LimitCycle find_cycle(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                      const ComplexMode& mode, const Estimate& estimate, const CycleSettings& settings, Mat probes);
 
 } // namespace squeal

@@ -1,0 +1,106 @@
+#pragma once
+/// The stages of the shooting solver (method, section 6), on states x = (u, v) held as VecNest:
+///     F(x, T) = Phi_T(x) - x = 0,   <f, dx> = 0,
+/// f the flow's direction: a correction along the orbit would only move the time origin. Products are energy products,
+/// <a, b> = a_u'K b_u + a_v'M b_v. Each stage returns the best candidate it met.
+#include "squeal/analysis/cycle.hpp"
+
+namespace squeal
+{
+
+struct ShootingOptions
+{
+  std::string finish = "multisecant";
+  PetscInt reduced_newtons = 10; // iterations of the reduced system; 0: not tried
+  PetscInt base_growths = 1;
+  PetscReal difference = 1e-6;     // of the fluctuation: difference columns
+  PetscReal rank_tolerance = 1e-7; // of the base, and of the reduced least-squares solve
+  PetscInt secants = 20;           // kept
+  PetscReal drop = 1e-4;           // a secant is dropped when less than this part of it is new
+  PetscReal clamp = 0.3;           // of the fluctuation: longest step
+  PetscInt stall = 30;             // iterations without progress
+  PetscInt max_periods = 400;
+  PetscInt multipliers = -1; // Krylov dimension; -1: all of a system of at most 25 degrees of freedom, else none
+};
+
+/// A candidate and what one evaluation of the flow says about it.
+struct Orbit
+{
+  Owned<Vec> state;
+  double period = 0;      // [s]
+  Owned<Vec> defect;      // Phi_T(x) - x
+  Owned<Vec> rate;        // dPhi_T/dT
+  double fluctuation = 0; // |x - equilibrium|
+  double residual = 0;    // |defect| / fluctuation
+};
+
+/// What the stages share.
+struct Shooting
+{
+  const Flow& flow;
+  const RealModePreconditioner& preconditioner;
+  ShootingOptions options{};
+  Owned<Vec> equilibrium{}; // (u0, 0)
+  double first_period = 0;
+  double tolerance = 0;
+  double least_fluctuation = 0; // below: the candidate is falling onto the equilibrium
+  long periods = 0;
+  int iterations = 0;
+  std::vector<NewtonRecord> records{};
+  double residual_projected = 0;
+  std::function<void(const NewtonRecord&)> announce{};
+};
+
+/// States as nests.
+Owned<Vec> state_of(Vec u, Vec v); // of copies
+Vec displacement(Vec state);
+Vec velocity(Vec state);
+
+void energy_image(const Flow& flow, Vec x, Vec image); // (K u, M v)
+double energy_product(const Flow& flow, Vec a, Vec b);
+double energy_norm(const Flow& flow, Vec a);
+
+Orbit evaluate(Shooting& shooting, Vec state, double period);
+Orbit copy_of(const Orbit& orbit);
+void record(Shooting& shooting, const std::string& stage, int unknowns, double projected, const Orbit& orbit);
+bool admissible_period(const Shooting& shooting, double period); // within a factor of two of the first
+bool vanishing(const Shooting& shooting, const Orbit& orbit);    // energy below a tenth of the start's
+
+/// `count` free periods from the orbit's state, then its evaluation with the period of the best recurrence.
+Orbit free_periods(Shooting& shooting, Vec state, double period, int count);
+
+/// Energy-orthonormal base, dependent vectors dropped; `base` holds what is there already.
+void extend_base(const Shooting& shooting, std::vector<Owned<Vec>>& base, Vec candidate);
+
+/// Damped Newton on T and the base's coordinates about the orbit.
+Orbit shoot_reduced(Shooting& shooting, const Orbit& start, const std::vector<Owned<Vec>>& base,
+                    const std::string& stage);
+
+enum class Ending
+{
+  converged,
+  stalled,
+  vanished,
+  not_periodic,
+};
+
+struct Finish
+{
+  Orbit orbit;
+  Ending ending = Ending::stalled;
+};
+
+Finish shoot_multisecant(Shooting& shooting, const Orbit& start);
+Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start);
+
+/// Makes the fallback's options known to the library even when it never runs.
+void declare_fallback_options();
+
+/// x = P^-1 b - t P^-1 d and t of the bordered system [J d; f' 0] (x, t) = (b, border), J replaced by P.
+/// `phase` is the energy image of f.
+double solve_bordered(const Shooting& shooting, const Orbit& orbit, Vec phase, Vec b, double border, Vec x);
+
+/// Multipliers by Arnoldi on difference quotients, in the energy product.
+void find_multipliers(Shooting& shooting, const Orbit& orbit, LimitCycle& cycle);
+
+} // namespace squeal
