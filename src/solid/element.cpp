@@ -25,9 +25,8 @@ double positive(double determinant, std::size_t point)
 
 ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Material& material, double thickness)
 {
-  if (dofs_per_node(shape) == 6) throw std::runtime_error("shell elements are not on offer yet");
-  (void)thickness;
-  return solid_matrices(shape, columns_of(x), material);
+  const NodePositions X = columns_of(x);
+  return dofs_per_node(shape) == 6 ? shell_matrices(shape, X, material, thickness) : solid_matrices(shape, X, material);
 }
 
 /// n dA = (dx/dxi x dx/deta) dxi deta

@@ -208,6 +208,12 @@ Quadrature three_point_triangle()
   return {{{1. / 6, 1. / 6, 0}, 1. / 6}, {{2. / 3, 1. / 6, 0}, 1. / 6}, {{1. / 6, 2. / 3, 0}, 1. / 6}};
 }
 
+/// Degree 2, as the three inner points; sides in the order 01, 12, 20.
+Quadrature mid_side_triangle()
+{
+  return {{{.5, 0, 0}, 1. / 6}, {{.5, .5, 0}, 1. / 6}, {{0, .5, 0}, 1. / 6}};
+}
+
 /// Degree 2 (Hammer and Stroud 1956).
 Quadrature four_point_tetrahedron()
 {
@@ -259,7 +265,7 @@ const Quadrature& stiffness_rule(Shape shape)
 {
   static const Quadrature box2 = swept(square(2), 2), box3 = swept(square(3), 3),
                           tetrahedron = four_point_tetrahedron(), prism = swept(three_point_triangle(), 2),
-                          quad = square(2), triangle = three_point_triangle();
+                          quad = square(2), triangle = mid_side_triangle();
   switch (shape)
   {
   case Shape::hex8:
@@ -280,7 +286,7 @@ const Quadrature& stiffness_rule(Shape shape)
 const Quadrature& mass_rule(Shape shape)
 {
   static const Quadrature box = swept(square(3), 3), tetrahedron = collapsed_tetrahedron(4),
-                          prism = swept(collapsed_triangle(3), 3), quad = square(2), triangle = three_point_triangle();
+                          prism = swept(collapsed_triangle(3), 3), quad = square(2), triangle = mid_side_triangle();
   switch (shape)
   {
   case Shape::hex8:

@@ -3,10 +3,10 @@
 /// hex8 and wedge6 carry incompatible modes, or they would lock in bending (Wilson, Taylor, Doherty, Ghaboussi 1973):
 ///     u = sum N_i u_i + sum (1 - xi_k^2) a_k,   k = xi, eta, zeta for hex8, zeta alone for wedge6,
 /// with Taylor's correction (Taylor, Beresford, Wilson 1976): their gradient is  det(J0)/det(J) J0^-1 dM, J0 at the
-/// centre, so that it integrates to zero over any shape and the patch test holds. The parameters a are condensed out:
-///     a = -H^-1 G u,   H = int Ba' D Ba dV,   G = int Ba' D B dV,   B <- B - Ba H^-1 G.
-/// They carry no mass. Caveat: wedge6 bends well along zeta only; across its triangles it is the stiff linear triangle.
+/// centre, so that it integrates to zero over any shape and the patch test holds. The parameters a are condensed out
+/// and carry no mass. Caveat: wedge6 bends well along zeta only; across its triangles it is the stiff linear triangle.
 /// Caveat: hex8 is exact in bending as a parallelepiped and stiffens when tapered (MacNeal 1987), as all 8-node bricks.
+#include "condensation.hpp"
 #include "kernels.hpp"
 
 namespace squeal
@@ -17,14 +17,6 @@ namespace
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Strains = Columns<6, 60>;
-using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 60, 60>;
-
-struct StrainPoint
-{
-  Strains B;
-  double volume = 0; // [m3]
-};
-
 Matrix6 elasticity(const Material& material)
 {
   const double nu = material.poisson, mu = material.young / (2 * (1 + nu)), lambda = 2 * mu * nu / (1 - 2 * nu);
@@ -55,28 +47,13 @@ Columns<3, 20> incompatible_gradients(Shape shape, const Eigen::Vector3d& xi)
   return g;
 }
 
-/// Replaces B by the strains left after the incompatible modes have relaxed.
-void condense(std::vector<StrainPoint>& points, const std::vector<Strains>& incompatible, const Matrix6& D)
-{
-  const auto modes = incompatible.front().cols();
-  Square H = Square::Zero(modes, modes), G = Square::Zero(modes, points.front().B.cols());
-  for (std::size_t p = 0; p < points.size(); ++p)
-  {
-    const Strains stress = points[p].volume * D * incompatible[p];
-    H += stress.transpose() * incompatible[p];
-    G += stress.transpose() * points[p].B;
-  }
-  const Square a = H.ldlt().solve(G);
-  for (std::size_t p = 0; p < points.size(); ++p) points[p].B -= incompatible[p] * a;
-}
-
-std::vector<StrainPoint> strain_points(Shape shape, const NodePositions& X, const Matrix6& D)
+std::vector<StrainPoint<Strains>> strain_points(Shape shape, const NodePositions& X, const Matrix6& D)
 {
   const Quadrature& rule = stiffness_rule(shape);
   const bool enriched = shape == Shape::hex8 || shape == Shape::wedge6;
   const Eigen::Vector3d centre = shape == Shape::wedge6 ? Eigen::Vector3d(1. / 3, 1. / 3, 0) : Eigen::Vector3d(0, 0, 0);
   const Eigen::Matrix3d J0 = interpolate(shape, centre).dN * X.transpose();
-  std::vector<StrainPoint> points(rule.size());
+  std::vector<StrainPoint<Strains>> points(rule.size());
   std::vector<Strains> incompatible(enriched ? rule.size() : 0);
   for (std::size_t p = 0; p < rule.size(); ++p)
   {
@@ -94,7 +71,7 @@ std::vector<StrainPoint> strain_points(Shape shape, const NodePositions& X, cons
   return points;
 }
 
-Square solid_mass(Shape shape, const NodePositions& X, double density)
+Eigen::MatrixXd solid_mass(Shape shape, const NodePositions& X, double density)
 {
   const Quadrature& rule = mass_rule(shape);
   const auto nodes = X.cols();
@@ -106,7 +83,7 @@ Square solid_mass(Shape shape, const NodePositions& X, double density)
     const double determinant = positive((at.dN * X.transpose()).determinant(), p);
     m += density * determinant * rule[p].weight * at.N * at.N.transpose();
   }
-  Square M = Square::Zero(3 * nodes, 3 * nodes);
+  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(3 * nodes, 3 * nodes);
   for (Eigen::Index i = 0; i < nodes; ++i)
     for (Eigen::Index j = 0; j < nodes; ++j) M.block<3, 3>(3 * i, 3 * j).diagonal().setConstant(m(i, j));
   return M;
@@ -117,13 +94,7 @@ Square solid_mass(Shape shape, const NodePositions& X, double density)
 ElementMatrices solid_matrices(Shape shape, const NodePositions& X, const Material& material)
 {
   const Matrix6 D = elasticity(material);
-  Square K = Square::Zero(3 * X.cols(), 3 * X.cols());
-  for (const auto& [B, volume] : strain_points(shape, X, D))
-  {
-    const Strains stress = volume * D * B;
-    K += B.transpose() * stress;
-  }
-  K = (.5 * (K + K.transpose())).eval(); // exactly symmetric, whatever the order of the sums
+  const Eigen::MatrixXd K = stiffness_of(strain_points(shape, X, D), D);
   return {entries(K), entries(solid_mass(shape, X, material.density))};
 }
 
@@ -133,10 +104,10 @@ std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec
   const Matrix6 D = elasticity(material);
   const Eigen::Map<const Eigen::VectorXd> displacement(u.data(), static_cast<Eigen::Index>(u.size()));
   std::vector<std::array<double, 6>> stress;
-  for (const auto& [B, volume] : strain_points(shape, columns_of(x), D))
+  for (const auto& point : strain_points(shape, columns_of(x), D))
   {
     std::array<double, 6>& s = stress.emplace_back();
-    Eigen::Map<Eigen::Matrix<double, 6, 1>>(s.data()) = D * (B * displacement);
+    Eigen::Map<Eigen::Matrix<double, 6, 1>>(s.data()) = D * (point.B * displacement);
   }
   return stress;
 }

@@ -1,10 +1,10 @@
 #pragma once
 /// Element kernels: pure functions on arrays, no library.
 ///
-/// hex8: Wilson-Taylor incompatible modes with Taylor's correction (passes the patch test, does not lock in bending);
-/// wedge6, hex20, tet10: isoparametric; shell4, shell3: flat facets, Mindlin with assumed transverse shear
-/// (MITC4/DSG3), membrane with drilling rotations, six degrees of freedom a node, warping handled by rigid offsets.
-/// Sources are named at each kernel. Mass is consistent.
+/// hex8, wedge6: with incompatible modes in Taylor's corrected form (patch test on any shape, no locking in bending);
+/// hex20, tet10: isoparametric, fully integrated; shell4, shell3: flat facets with transverse shear (DKMQ, DKMT) and
+/// drilling rotations, six degrees of freedom a node, warped quadrilaterals on rigid offsets.
+/// Sources and caveats stand at each kernel. Mass is consistent.
 #include "squeal/mesh/mesh.hpp"
 
 #include <span>
@@ -31,8 +31,9 @@ ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Mat
 std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec3> x, const Material& material,
                                                 std::span<const double> u);
 
-/// Shell resultants at the integration points, in the element's local frame rotated to `axis1` projected on its plane:
-/// membrane forces Nx Ny Nxy [N/m], moments Mx My Mxy [N], of nodal displacements u (6 per node, global axes).
+/// Shell resultants at the integration points, x along `axis1` projected on the element, z along its normal (its nodes
+/// counter-clockwise): membrane forces Nx Ny Nxy = int stress dz [N/m], moments Mx My Mxy = int z stress dz [N], of
+/// nodal displacements u (6 per node, global axes). Throws std::runtime_error if axis1 is normal to the element.
 std::vector<std::array<double, 6>> shell_resultants(Shape shape, std::span<const Vec3> x, const Material& material,
                                                     double thickness, const Vec3& axis1, std::span<const double> u);
 
