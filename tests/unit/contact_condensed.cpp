@@ -1,0 +1,150 @@
+// ranks: 1 2 3
+#include "../support/small_models.hpp"
+#include "squeal/contact/condensed.hpp"
+
+#include <cmath>
+#include <doctest/doctest.h>
+
+using namespace squeal;
+
+namespace
+{
+
+/// A X = B' by Gauss elimination with pivoting; W = scale B X, row-major.
+std::vector<double> dense_condensed(test::Rows A, const test::Rows& B, double scale)
+{
+  const std::size_t n = A.size(), m = B.size();
+  test::Rows X = test::zeros(n, m);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < m; ++j) X[i][j] = B[j][i];
+  for (std::size_t k = 0; k < n; ++k)
+  {
+    std::size_t pivot = k;
+    for (std::size_t i = k; i < n; ++i)
+      if (std::abs(A[i][k]) > std::abs(A[pivot][k])) pivot = i;
+    std::swap(A[k], A[pivot]);
+    std::swap(X[k], X[pivot]);
+    for (std::size_t i = 0; i < n; ++i)
+    {
+      if (i == k) continue;
+      const double factor = A[i][k] / A[k][k];
+      for (std::size_t j = k; j < n; ++j) A[i][j] -= factor * A[k][j];
+      for (std::size_t j = 0; j < m; ++j) X[i][j] -= factor * X[k][j];
+    }
+  }
+  std::vector<double> W(m * m, 0.);
+  for (std::size_t i = 0; i < m; ++i)
+    for (std::size_t j = 0; j < m; ++j)
+      for (std::size_t k = 0; k < n; ++k) W[i * m + j] += scale * B[i][k] * X[k][j] / A[k][k];
+  return W;
+}
+
+/// An uneven chain with springs to ground at every third mass.
+test::Rows chain_stiffness(std::size_t n)
+{
+  test::Rows K = test::diagonal(std::vector<double>(n, 1e-3));
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    if (i % 3 == 0) K[i][i] += 2;
+    if (i + 1 == n) break;
+    const double k = 1 + .1 * static_cast<double>(i % 7);
+    K[i][i] += k;
+    K[i + 1][i + 1] += k;
+    K[i][i + 1] -= k;
+    K[i + 1][i] -= k;
+  }
+  return K;
+}
+
+double largest_difference(const std::vector<double>& a, const std::vector<double>& b)
+{
+  double largest = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
+  return largest;
+}
+
+void check_condensed(const test::Rows& K, const test::Rows& B, int directions)
+{
+  const auto structure = test::make_structure(K, K, K, std::vector<double>(K.size(), 1.));
+  const std::size_t pairs = B.size() / static_cast<std::size_t>(1 + directions);
+  const auto interface =
+      test::make_interface(B, directions, std::vector<double>(pairs, 0.),
+                           std::vector<double>(pairs * static_cast<std::size_t>(directions), 1.), .3, structure.K);
+  const auto condensed = condense(structure.K, interface, 2.5, {});
+  CHECK(condensed.size == static_cast<int>(B.size()));
+  if (rank_of(PETSC_COMM_WORLD) == 0)
+  {
+    REQUIRE(condensed.W.size() == B.size() * B.size());
+    const auto exact = dense_condensed(K, B, 2.5);
+    double scale = 0;
+    for (const double value : exact) scale = std::max(scale, std::abs(value));
+    CHECK(largest_difference(condensed.W, exact) <= 1e-12 * scale); // rounding of two direct solvers
+    auto transposed = condensed.W;
+    for (std::size_t i = 0; i < B.size(); ++i)
+      for (std::size_t j = 0; j < B.size(); ++j) transposed[i * B.size() + j] = condensed.W[j * B.size() + i];
+    CHECK(transposed == condensed.W);
+  }
+  else
+    CHECK(condensed.W.empty());
+  const auto x = zeros_like(structure.load), residual = zeros_like(structure.load);
+  solve(condensed, structure.load, x);
+  check(MatMult(structure.K, x, residual));
+  check(VecAXPY(residual, -1, structure.load));
+  double defect = 0;
+  check(VecNorm(residual, NORM_INFINITY, &defect));
+  CHECK(defect < 1e-12);
+}
+
+} // namespace
+
+TEST_CASE("W of a chain is B K^-1 B', over several blocks of right-hand sides")
+{
+  const std::size_t n = 400, pairs = 95; // 285 rows: three blocks, the last one short
+  test::Rows B = test::zeros(3 * pairs, n);
+  for (std::size_t p = 0; p < pairs; ++p)
+  {
+    B[3 * p][(4 * p + 7) % n] = 1;
+    B[3 * p][(4 * p + 201) % n] = -1;
+    B[3 * p + 1][(3 * p + 2) % n] = .5;
+    if (p % 10 != 0) B[3 * p + 2][p] = 1; // else immovable
+  }
+  check_condensed(chain_stiffness(n), B, 2);
+}
+
+TEST_CASE("W of three degrees of freedom, and of pairs that cannot move at all")
+{
+  check_condensed({{1.1, -.1, 0}, {-.1, .5, 0}, {0, 0, 1.2}}, {{0, 1, -1}, {1, 0, 0}}, 1);
+  check_condensed({{1.1, -.1, 0}, {-.1, .5, 0}, {0, 0, 1.2}}, test::zeros(2, 3), 1);
+}
+
+TEST_CASE("a structure that nothing holds is refused, and the loose part is named")
+{
+  for (const bool other_body : {false, true})
+  {
+    auto K = test::zeros(9, 9);
+    const auto held = chain_stiffness(5);
+    for (std::size_t i = 0; i < 5; ++i)
+      for (std::size_t j = 0; j < 5; ++j) K[i][j] = held[i][j];
+    for (std::size_t i = 5; i < 8; ++i) // a free chain, or a free node alone
+    {
+      const double k = other_body ? 1e3 / 3 : 0;
+      K[i][i] += k;
+      K[i + 1][i + 1] += k;
+      K[i][i + 1] -= k;
+      K[i + 1][i] -= k;
+    }
+    if (!other_body) K[5][5] = K[6][6] = K[8][8] = 1;
+    const auto structure = test::make_structure(K, K, K, std::vector<double>(9, 1.));
+    const auto factored = factor_positive(structure.K);
+    REQUIRE(factored.loose);
+    CHECK((other_body ? *factored.loose >= 5 : *factored.loose == 7));
+    const auto interface = test::make_interface(test::zeros(2, 9), 1, {0}, {1}, .3, structure.K);
+    CHECK_THROWS_AS(condense(structure.K, interface, 1, {}), Error);
+  }
+}
+
+TEST_CASE("a soft support is a support: twelve decades between springs still factor")
+{
+  test::Rows K = {{1e12, -1e12}, {-1e12, 1e12 + 1}};
+  CHECK(factor_positive(test::make_structure(K, K, K, {0, 0}).K).loose.has_value() == false);
+}
