@@ -1,6 +1,8 @@
 #include "squeal/contact/interface.hpp"
 
+#include "squeal/mesh/vector.hpp"
 #include "squeal/solid/binary.hpp"
+#include "squeal/solid/rows.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,11 +13,44 @@ namespace squeal
 namespace
 {
 
-/// Rows of whole pairs on this rank.
-PetscInt local_rows(PetscInt pairs, int block, MPI_Comm comm)
+/// Of the rotor's surface, by its rotation or as given; zero on the axis itself, round-off aside.
+Vec3 drive_velocity(const Contact& contact, const Vec3& at)
 {
-  const PetscInt ranks = ranks_of(comm), rank = rank_of(comm);
-  return block * (pairs / ranks + (rank < pairs % ranks ? 1 : 0));
+  if (!contact.rotation) return contact.velocity;
+  const Rotation& rotation = *contact.rotation;
+  const Vec3 arm = cross(rotation.axis, at - rotation.centre);
+  return norm(arm) > 1e-12 * (norm(at) + norm(rotation.centre)) ? rotation.rate * arm : Vec3{};
+}
+
+/// The part of `v` in the tangent plane; zero when only round-off of the normal part is left.
+Vec3 tangential(const Vec3& v, const Vec3& normal)
+{
+  const Vec3 t = v - dot(v, normal) * normal;
+  return norm(t) > 1e-12 * norm(v) ? t : Vec3{};
+}
+
+/// The scene's tangents made unit and square to the normal; without them along the drive, then square to it; without
+/// a drive along the axis that is farthest from the normal.
+std::vector<Vec3> tangent_axes(const Contact& contact, const Vec3& normal, const Vec3& velocity)
+{
+  std::vector<Vec3> wanted = contact.tangents;
+  if (wanted.empty() && norm(velocity) > 0) wanted.push_back(velocity);
+  if (wanted.empty())
+  {
+    const auto along = [&](std::size_t axis) { return std::abs(normal[axis]); };
+    Vec3 axis{};
+    axis[along(0) <= along(1) && along(0) <= along(2) ? 0 : along(1) <= along(2) ? 1 : 2] = 1;
+    wanted.push_back(axis);
+  }
+  const Vec3 t = tangential(wanted[0], normal);
+  if (norm(t) == 0)
+    throw Error("contact of " + contact.rotor + " and " + contact.stator + ": its first tangent is along the normal");
+  std::vector<Vec3> axes{(1 / norm(t)) * t};
+  if (contact.tangents.size() == 1) return axes;
+  const Vec3 second = cross(normal, axes[0]);
+  const bool reversed = wanted.size() > 1 && dot(wanted[1], second) < 0;
+  axes.push_back((reversed ? -1. : 1.) * second);
+  return axes;
 }
 
 std::string where(const Interface& interface, int pair)
@@ -57,6 +92,43 @@ void check_interface(const Interface& interface, const std::string& source, MPI_
 
 } // namespace
 
+Interface make_interface(const Mesh& mesh, const std::vector<NodePair>& pairs, const Scene& scene, const DofMap& dofs,
+                         MPI_Comm comm)
+{
+  Interface interface;
+  interface.pairs = static_cast<int>(pairs.size());
+  interface.friction = scene.friction.coefficient;
+  interface.direction_damping = scene.friction.direction_damping;
+  interface.directions = 1;
+  for (const Contact& contact : scene.contacts)
+    if (contact.tangents.size() != 1) interface.directions = 2;
+  std::vector<Row> rows;
+  const auto [first, last] = share_of(interface.pairs, comm);
+  for (PetscInt i = 0; i < interface.pairs; ++i)
+  {
+    const NodePair& pair = pairs[static_cast<std::size_t>(i)];
+    const Contact& contact = scene.contacts[static_cast<std::size_t>(pair.contact)];
+    const Vec3& at = mesh.nodes[static_cast<std::size_t>(pair.a)];
+    const Vec3 velocity = tangential(drive_velocity(contact, at), pair.normal);
+    std::vector<Vec3> axes = tangent_axes(contact, pair.normal, velocity);
+    axes.resize(static_cast<std::size_t>(interface.directions)); // a plane contact beside spatial ones: no second row
+    for (const Vec3& axis : axes) interface.drive.push_back(dot(velocity, axis));
+    interface.position.push_back(at);
+    interface.gap.push_back(contact.gap);
+    if (i < first || i >= last) continue;
+    axes.insert(axes.begin(), pair.normal);
+    for (const Vec3& axis : axes)
+    {
+      rows.emplace_back();
+      add_motion(dofs, pair.b, axis, rows.back());
+      add_motion(dofs, pair.a, -1 * axis, rows.back());
+    }
+  }
+  interface.B = matrix_of_rows(rows, dofs.last - dofs.first, comm);
+  check_interface(interface, "contact", comm);
+  return interface;
+}
+
 Interface read_interface(const std::filesystem::path& folder, const Structure& structure, const FrictionLaw& friction,
                          MPI_Comm comm)
 {
@@ -81,7 +153,8 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
     throw Error((folder / "drive.petsc").string() + ": length " + std::to_string(interface.drive.size()) + " for " +
                 std::to_string(interface.pairs) + " pairs with " + std::to_string(interface.directions) +
                 " tangential row(s) each in B.petsc");
-  interface.B = load_matrix(B, size, {local_rows(interface.pairs, interface.block(), comm), local_dofs}, comm);
+  const auto [first, last] = share_of(interface.pairs, comm);
+  interface.B = load_matrix(B, size, {interface.block() * (last - first), local_dofs}, comm);
   check_interface(interface, folder.string(), comm);
   return interface;
 }

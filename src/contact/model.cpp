@@ -21,7 +21,7 @@ Model model_of_mesh(const Scene& scene, MPI_Comm comm)
   model.mesh = read_mesh(scene, comm);
   const std::vector<NodePair> pairs = match_pairs(model.mesh, scene.contacts);
   const Partition partition = partition_mesh(model.mesh, pairs, comm);
-  model.dofs = number_dofs(model.mesh, pairs, scene, partition, comm);
+  model.dofs = number_dofs(model.mesh, scene, partition, comm);
   model.structure = assemble(model.mesh, scene, partition, model.dofs, comm);
   model.interface = make_interface(model.mesh, pairs, scene, model.dofs, comm);
   model.probes = probe_rows(scene.probes, model.mesh, model.dofs, comm);

@@ -71,9 +71,7 @@ Owned<Mat> with_pattern(Mat pattern, Mat A)
   Owned<Mat> result;
   check(MatDuplicate(pattern, MAT_COPY_VALUES, result.put()));
   check(MatAXPY(result, 1, A, SUBSET_NONZERO_PATTERN));
-  check(MatSetOption(result, MAT_SYMMETRIC, PETSC_TRUE));
-  check(MatSetOption(result, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
-  check(MatSetOption(result, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
+  mark_symmetric(result);
   return result;
 }
 
@@ -119,6 +117,13 @@ std::string describe(const DofNames& names, PetscInt dof)
   text << names.bodies[static_cast<std::size_t>(names.body[node])] << ", node " << node << " at (" << at[0] << ", "
        << at[1] << ", " << at[2] << "), direction " << directions[motion % 6];
   return text.str();
+}
+
+void mark_symmetric(Mat A)
+{
+  check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
+  check(MatSetOption(A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  check(MatSetOption(A, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
 }
 
 void share_pattern(Structure& structure)

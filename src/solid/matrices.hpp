@@ -9,4 +9,7 @@ namespace squeal
 /// values, and marks them symmetric.
 void share_pattern(Structure& structure);
 
+/// Tells the library that A is symmetric for good, and that its pattern is complete.
+void mark_symmetric(Mat A);
+
 } // namespace squeal

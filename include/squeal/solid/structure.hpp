@@ -44,9 +44,8 @@ struct DofMap
 
 /// Supports and rigid bodies are eliminated exactly. A node shared by shells and solids: its rotation follows the
 /// least-squares rotation of the solid nodes around it, so that the shell's moments enter the solid as couples.
-/// Errors: a support, rigid body or spring that contradicts another (which node, which two), nothing free.
-DofMap number_dofs(const Mesh& mesh, const std::vector<NodePair>& pairs, const Scene& scene, const Partition& partition,
-                   MPI_Comm comm);
+/// Errors: a support or rigid body that contradicts another (which node, which two), nothing free.
+DofMap number_dofs(const Mesh& mesh, const Scene& scene, const Partition& partition, MPI_Comm comm);
 
 /// AIJ matrices of one common non-zero pattern, symmetric flags set.
 struct Structure
