@@ -27,6 +27,8 @@ constexpr std::array options = {
     Option{"-transient_contact_max_it", "1000", "contact iterations (sweeps) allowed a step"},
     Option{"-transient_contact_rho", "0", "of the fixed point, over 1/lambda_max(W); 0: chosen"},
     Option{"-transient_contact_extrapolate", "true", "warm start extrapolated from the last two steps"},
+    Option{"-modes_dense_limit", "200", "eigenproblems up to this size are solved whole by LAPACK"},
+    Option{"-modes_candidates", "20", "pairs that each residual pass of the projection corrects"},
     Option{"-cycle_lift_off_multiple", "2", "start at this many times first lift-off when the estimate has no balance"},
     Option{"-cycle_reduced_newtons", "10", "iterations of the reduced system on the mode's shapes; 0: not tried"},
     Option{"-cycle_base_growths", "1", "times the reduced base may grow by what it missed"},

@@ -11,8 +11,8 @@ namespace squeal
 {
 
 /// Errors are backward errors in the full problem, whichever route found the mode:
-///     eta = |Q(lambda) phi| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |phi|), Frobenius or 1-norms of the projected
-///     matrices.
+///     eta = |Q(lambda) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|), phi = Z y, Q and 1-norms of the matrices
+///     Y'.Z, 2-norms of the vectors.
 struct ComplexMode
 {
   std::complex<double> lambda;                 // [1/s]
@@ -26,8 +26,10 @@ struct ComplexMode
 };
 
 /// Frictionless undamped modes with closed pairs kept closed, M-normalised, ascending.
+/// outcome: "converged", or "not converged": fewer than asked, or fewer than the inertia of K - omega^2 M counts.
 struct RealModes
 {
+  Outcome outcome;                // residual: largest |K x - omega^2 M x| / (|K| |x|)
   std::vector<double> omega;      // [rad/s]
   std::vector<Owned<Vec>> shapes; // in the structure's dofs
 };
@@ -45,6 +47,7 @@ struct Modes
   std::string count_check; // how the count of unstable modes was confirmed by a second means, or why it was not
 };
 
+/// Options, prefix -modes_real_: the solver's own eps_, st_; and -modes_dense_limit as below.
 RealModes find_real_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                           int count);
 
@@ -52,7 +55,8 @@ RealModes find_real_modes(const Structure& structure, const Interface& interface
 RealModes find_real_modes_below(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                                 double band);
 
-/// Options, prefix -modes_.
+/// Options, prefix -modes_: dense_limit (200, problems up to this size are solved whole by LAPACK), candidates (20,
+/// pairs a residual pass of the projection corrects), and the sparse solver's own, pep_ and st_.
 Modes find_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                  const ModesSettings& settings);
 

@@ -1,0 +1,85 @@
+#pragma once
+/// The quadratic eigenproblem of real unsymmetric sparse matrices, (lambda^2 M + lambda C + K) y = 0.
+///
+/// Small problems are solved whole: on the companion matrix of mu = 1/(lambda - shift), which bears a singular M or K,
+/// by LAPACK's QR. Large ones by SLEPc's two-level Arnoldi (TOAR; Lu, Su, Bai 2016), shift-inverted near zero; time is
+/// scaled by the band, lambda = 2 pi band nu, without which growth rates lose their third digit.
+///
+/// Backward error of a pair (Tisseur 2000), in 1-norms of the matrices and 2-norms of the vectors:
+///     eta = |(lambda^2 M + lambda C + K) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|)
+#include "squeal/analysis/state.hpp"
+
+#include <complex>
+
+namespace squeal
+{
+
+struct QuadraticProblem
+{
+  Owned<Mat> M, C, K; // AIJ, of one layout
+};
+
+struct Eigenpair
+{
+  std::complex<double> lambda; // [1/s]
+  Owned<Vec> real, imaginary;  // of y; 2-norm of y is 1
+  double backward_error = 0;
+};
+
+/// The solver's own options have the prefix -modes_: -modes_pep_tol, -modes_st_…
+struct QuadraticSettings
+{
+  double band = 0;  // [Hz] every pair with |lambda| <= 2 pi band
+  double shift = 0; // of large problems: real, near zero, in parts of 2 pi band, not an eigenvalue; 0 if K is regular
+  int expected = 0; // pairs in the band, for a start
+  int dense_limit = 0; // up to which size a problem is solved whole
+};
+
+/// outcome: "converged" or "not converged" (the band was not covered); residual: the largest backward error.
+struct QuadraticSolution
+{
+  Outcome outcome;
+  std::vector<Eigenpair> pairs; // Im > 0 in the band, and real positive ones; largest real part first
+};
+
+/// Motions of a free body (|lambda|^2 below 1e-12 |K|/|M|) are no vibration and are left out, as are real negative
+/// lambda.
+QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings);
+
+/// Real part large enough to call unstable: rounding shows up to 1e-8 |lambda| on a mode without damping.
+bool is_unstable(std::complex<double> lambda);
+
+struct QuadraticNorms
+{
+  double M = 0, C = 0, K = 0; // 1-norms
+};
+
+QuadraticNorms norms_of(const QuadraticProblem& problem);
+double backward_error(const QuadraticProblem& problem, const QuadraticNorms& norms, const Eigenpair& pair);
+
+/// real, imaginary = (lambda^2 M + lambda C + K) (y_r + i y_i)
+void quadratic_residual(Mat M, Mat C, Mat K, std::complex<double> lambda, Vec y_r, Vec y_i, Vec real, Vec imaginary);
+
+// Dense kernels, on one rank; matrices n x n column-major.
+
+struct DenseEigenpair
+{
+  std::complex<double> lambda;
+  std::vector<std::complex<double>> y;
+};
+
+/// All pairs with Im >= 0 and finite lambda; the collective form works on rank 0 and tells the others.
+std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, int n, const std::vector<double>& M,
+                                                         const std::vector<double>& C, const std::vector<double>& K);
+std::vector<DenseEigenpair> solve_dense_quadratic(int n, const std::vector<double>& M, const std::vector<double>& C,
+                                                  const std::vector<double>& K);
+
+/// Symmetric K y = lambda M y with M positive semidefinite and K - shift M positive definite, shift < 0: ascending
+/// finite lambda, and M-normalised y one after the other.
+void solve_dense_symmetric(int n, const std::vector<double>& M, const std::vector<double>& K, double shift,
+                           std::vector<double>& lambda, std::vector<double>& y);
+
+/// The whole matrix, column-major, on every rank. Collective.
+std::vector<double> dense_copy(Mat A);
+
+} // namespace squeal

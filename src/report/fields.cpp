@@ -1,0 +1,261 @@
+/// fields.h5 with fields.xdmf for ParaView: the mesh and what moves on it. Nodal displacements are u_nodes = T u.
+///
+/// One temporal collection, a grid per sample of the cycle; the equilibrium and the modes are the same data in each.
+/// Without a cycle it has one grid. XDMF lists an element as its code and then its nodes, in VTK's order.
+#include "squeal/report/files.hpp"
+#include "squeal/report/parts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <sstream>
+
+namespace squeal
+{
+
+namespace
+{
+
+struct XdmfShape
+{
+  int code;
+  std::vector<int> order; // of gmsh's nodes
+};
+
+XdmfShape xdmf_shape(Shape shape)
+{
+  switch (shape)
+  {
+  case Shape::hex8:
+    return {9, {0, 1, 2, 3, 4, 5, 6, 7}};
+  case Shape::wedge6:
+    return {8, {0, 1, 2, 3, 4, 5}};
+  case Shape::hex20:
+    return {48, {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15}};
+  case Shape::tet10:
+    return {38, {0, 1, 2, 3, 4, 5, 6, 7, 9, 8}};
+  case Shape::shell4:
+    return {5, {0, 1, 2, 3}};
+  case Shape::shell3:
+    return {4, {0, 1, 2}};
+  }
+  throw Error("an element shape that XDMF is not told of");
+}
+
+constexpr int polyvertex = 1; // followed by its number of nodes
+
+struct Attribute
+{
+  std::string name, data, center; // center: "Node" or "Cell"
+  int components = 1;
+};
+
+/// Where each field of the file stands, for the XDMF text.
+struct Layout
+{
+  std::size_t nodes = 0, cells = 0, topology = 0; // topology: integers
+  std::vector<Attribute> still;                   // the same at every time
+  std::vector<double> time;                       // [s]
+};
+
+void write_mesh(Hdf5File& file, const Mesh& mesh, Layout& layout)
+{
+  std::vector<int> topology, part;
+  for (const Element& element : mesh.elements)
+  {
+    const XdmfShape shape = xdmf_shape(element.shape);
+    topology.push_back(shape.code);
+    for (const int k : shape.order) topology.push_back(element.nodes[static_cast<std::size_t>(k)]);
+    part.push_back(element.part);
+  }
+  for (const auto& [name, node] : mesh.points)
+  {
+    topology.insert(topology.end(), {polyvertex, 1, node});
+    part.push_back(-1);
+  }
+  std::vector<double> position;
+  for (const Vec3& x : mesh.nodes) position.insert(position.end(), x.begin(), x.end());
+  layout.nodes = mesh.nodes.size();
+  layout.cells = part.size();
+  layout.topology = topology.size();
+  file.write("mesh/nodes", {layout.nodes, 3}, position, "m");
+  file.write("mesh/topology", {topology.size()}, topology, "XDMF mixed topology");
+  file.write("mesh/part", {part.size()}, part, "index of the scene's part; -1: a point");
+  layout.still.push_back({"part", "mesh/part", "Cell", 1});
+}
+
+/// Brings vectors of degrees of freedom to rank 0 as nodal displacements.
+class Gather
+{
+public:
+  Gather(const Model& model) : model_(model)
+  {
+    check(VecScatterCreateToZero(model.structure.load, scatter_.put(), whole_.put()));
+  }
+
+  /// Collective. x y z of every node [m] on rank 0, empty elsewhere.
+  std::vector<double> nodal(Vec u) const
+  {
+    check(VecScatterBegin(scatter_, u, whole_, INSERT_VALUES, SCATTER_FORWARD));
+    check(VecScatterEnd(scatter_, u, whole_, INSERT_VALUES, SCATTER_FORWARD));
+    PetscInt size = 0;
+    check(VecGetLocalSize(whole_, &size));
+    if (size == 0) return {};
+    const PetscScalar* values = nullptr;
+    check(VecGetArrayRead(whole_, &values));
+    std::vector<double> displacement;
+    displacement.reserve(3 * model_.mesh.nodes.size());
+    for (std::size_t node = 0; node < model_.mesh.nodes.size(); ++node)
+      for (int component = 0; component < 3; ++component)
+      {
+        double sum = 0;
+        for (const DofTerm& term : model_.dofs.of(static_cast<int>(node), component))
+          sum += term.factor * values[term.dof];
+        displacement.push_back(sum);
+      }
+    check(VecRestoreArrayRead(whole_, &values));
+    return displacement;
+  }
+
+private:
+  const Model& model_;
+  Owned<VecScatter> scatter_;
+  Owned<Vec> whole_;
+};
+
+/// Reactions of the equilibrium at the nodes of the pairs; a node of several pairs has their sum.
+void write_contact(Hdf5File& file, const Report& report, const Scene& scene, const Mesh& mesh, Layout& layout)
+{
+  const Equilibrium& equilibrium = report.equilibrium;
+  const auto pairs = match_pairs(mesh, scene.contacts);
+  if (pairs.empty() || equilibrium.closed.size() != pairs.size()) return;
+  const std::size_t block = equilibrium.reactions.size() / pairs.size();
+  std::vector<double> normal(mesh.nodes.size(), 0), friction(mesh.nodes.size(), 0);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+  {
+    const double* r = &equilibrium.reactions[i * block];
+    for (const int node : {pairs[i].a, pairs[i].b})
+    {
+      normal[static_cast<std::size_t>(node)] += r[0];
+      friction[static_cast<std::size_t>(node)] += block > 2 ? std::hypot(r[1], r[2]) : std::abs(r[1]);
+    }
+  }
+  file.write("equilibrium/normal_reaction", {normal.size()}, normal, "N");
+  file.write("equilibrium/friction_reaction", {friction.size()}, friction, "N");
+  layout.still.push_back({"normal reaction at equilibrium [N]", "equilibrium/normal_reaction", "Node", 1});
+  layout.still.push_back({"friction at equilibrium [N]", "equilibrium/friction_reaction", "Node", 1});
+}
+
+std::string data_item(const std::string& data, const std::string& dimensions, const char* type)
+{
+  return "<DataItem Dimensions=\"" + dimensions + "\" " + type + " Format=\"HDF\">fields.h5:/" + data + "</DataItem>";
+}
+
+constexpr const char* integers = "NumberType=\"Int\" Precision=\"4\"";
+constexpr const char* reals = "NumberType=\"Float\" Precision=\"8\"";
+
+std::string attribute_text(const Attribute& attribute, const Layout& layout)
+{
+  const bool vector = attribute.components == 3;
+  const bool cell = attribute.center == "Cell";
+  const std::string size = std::to_string(cell ? layout.cells : layout.nodes) + (vector ? " 3" : "");
+  return "        <Attribute Name=\"" + attribute.name + "\" AttributeType=\"" + (vector ? "Vector" : "Scalar") +
+         "\" Center=\"" + attribute.center + "\">" + data_item(attribute.data, size, cell ? integers : reals) +
+         "</Attribute>\n";
+}
+
+std::string cycle_data(std::size_t sample)
+{
+  return "cycle/displacement_" + std::to_string(sample);
+}
+
+std::string xdmf_text(const Layout& layout)
+{
+  std::ostringstream text;
+  text.precision(17);
+  text << "<?xml version=\"1.0\"?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" []>\n<Xdmf Version=\"2.0\">\n  <Domain>\n"
+       << "    <Grid Name=\"squeal\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+  const std::size_t samples = std::max<std::size_t>(layout.time.size(), 1);
+  for (std::size_t i = 0; i < samples; ++i)
+  {
+    text << "      <Grid Name=\"brake\" GridType=\"Uniform\">\n        <Time Value=\""
+         << (layout.time.empty() ? 0. : layout.time[i]) << "\"/>\n        <Topology TopologyType=\"Mixed\" "
+         << "NumberOfElements=\"" << layout.cells << "\">"
+         << data_item("mesh/topology", std::to_string(layout.topology), integers) << "</Topology>\n"
+         << "        <Geometry GeometryType=\"XYZ\">"
+         << data_item("mesh/nodes", std::to_string(layout.nodes) + " 3", reals) << "</Geometry>\n";
+    for (const Attribute& attribute : layout.still) text << attribute_text(attribute, layout);
+    if (!layout.time.empty())
+      text << attribute_text({"displacement in the cycle [m]", cycle_data(i), "Node", 3}, layout);
+    text << "      </Grid>\n";
+  }
+  text << "    </Grid>\n  </Domain>\n</Xdmf>\n";
+  return text.str();
+}
+
+/// Collective. One nodal vector field into the file of rank 0.
+void write_displacement(std::optional<Hdf5File>& file, const Gather& gather, Vec u, const std::string& data,
+                        MPI_Comm comm)
+{
+  const std::vector<double> displacement = gather.nodal(u);
+  on_rank_zero(comm, [&] { file->write(data, {displacement.size() / 3, 3}, displacement, "m"); });
+}
+
+void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Modes& modes, Layout& layout, MPI_Comm comm)
+{
+  int number = 0;
+  for (const ComplexMode& mode : modes.modes)
+  {
+    if (mode.growth_rate() <= 0) continue;
+    const std::string data = "modes/" + std::to_string(++number) + "/";
+    std::ostringstream name;
+    name << "unstable mode " << number << ", " << std::lround(mode.frequency_hz()) << " Hz, ";
+    write_displacement(file, gather, mode.real, data + "real", comm);
+    write_displacement(file, gather, mode.imaginary, data + "imaginary", comm);
+    layout.still.push_back({name.str() + "real part", data + "real", "Node", 3});
+    layout.still.push_back({name.str() + "imaginary part", data + "imaginary", "Node", 3});
+  }
+}
+
+} // namespace
+
+void write_fields(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
+                  MPI_Comm comm)
+{
+  const auto place = output / "fields.h5", xdmf = output / "fields.xdmf";
+  if (scene.matrices)
+  {
+    on_rank_zero(comm,
+                 [&]
+                 {
+                   std::filesystem::remove(place); // of an earlier run: they would be taken for this one's
+                   std::filesystem::remove(xdmf);
+                 });
+    return;
+  }
+  Layout layout;
+  std::optional<Hdf5File> file; // on rank 0
+  on_rank_zero(comm, [&] { write_mesh(file.emplace(place), model.mesh, layout); });
+  const Gather gather(model);
+  if (report.equilibrium.u.get())
+  {
+    write_displacement(file, gather, report.equilibrium.u, "equilibrium/displacement", comm);
+    layout.still.push_back({"displacement at equilibrium [m]", "equilibrium/displacement", "Node", 3});
+    on_rank_zero(comm, [&] { write_contact(*file, report, scene, model.mesh, layout); });
+  }
+  write_modes(file, gather, report.modes, layout, comm);
+  const auto& samples = report.cycle.displacements;
+  for (std::size_t i = 0; i < samples.size(); ++i)
+  {
+    write_displacement(file, gather, samples[i], cycle_data(i), comm);
+    layout.time.push_back(static_cast<double>(i) * report.cycle.period / static_cast<double>(samples.size()));
+  }
+  on_rank_zero(comm,
+               [&]
+               {
+                 file->keep();
+                 write_text(xdmf, xdmf_text(layout));
+               });
+}
+
+} // namespace squeal

@@ -1,0 +1,62 @@
+/// history.h5: what happened in time. Groups "transient" and "cycle" (one period) of data sets against "time".
+#include "squeal/report/files.hpp"
+#include "squeal/report/parts.hpp"
+
+#include <algorithm>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// HDF5 reads a slash in a name as a group.
+std::string without_slash(std::string name)
+{
+  std::replace(name.begin(), name.end(), '/', '_');
+  return name;
+}
+
+void write_group(Hdf5File& file, const std::string& group, const History& history, const Scene& scene)
+{
+  const auto write = [&](const std::string& name, const auto& data, const std::string& unit)
+  { file.write(group + "/" + name, {data.size()}, data, unit); };
+  write("time", history.time, "s");
+  write("energy", history.energy, "J");
+  write("fluctuating_energy", history.fluctuating_energy, "J");
+  write("damping_power", history.damping_power, "W");
+  write("contact_power", history.contact_power, "W");
+  write("load_power", history.load_power, "W");
+  write("open", history.open, "pairs");
+  write("stick", history.stick, "pairs");
+  write("slip", history.slip, "pairs");
+  const std::size_t probes = std::min(scene.probes.size(), history.probes.size());
+  for (std::size_t i = 0; i < probes; ++i)
+    write("probes/" + without_slash(scene.probes[i].name), history.probes[i], "m");
+}
+
+/// Steps in rows, pairs in columns; 0 open, 1 stick, 2 slip.
+void write_statuses(Hdf5File& file, const std::vector<std::vector<ContactStatus>>& statuses)
+{
+  if (statuses.empty()) return;
+  std::vector<unsigned char> flat;
+  for (const auto& step : statuses)
+    for (const ContactStatus status : step) flat.push_back(static_cast<unsigned char>(status));
+  file.write("cycle/status", {statuses.size(), statuses.front().size()}, flat, "0 open, 1 stick, 2 slip");
+}
+
+} // namespace
+
+void write_history(const Report& report, const Scene& scene, const std::filesystem::path& place)
+{
+  Hdf5File file(place);
+  if (ran(report.transient.outcome)) write_group(file, "transient", report.transient.history, scene);
+  if (ran(report.cycle.outcome))
+  {
+    write_group(file, "cycle", report.cycle.history, scene);
+    write_statuses(file, report.cycle.statuses);
+  }
+  file.keep();
+}
+
+} // namespace squeal

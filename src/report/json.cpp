@@ -1,0 +1,182 @@
+/// report.json: the run in numbers, SI units. NaN and infinity become null.
+#include "squeal/report/parts.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Json = nlohmann::ordered_json;
+
+/// The outcome of a stage, the start of its entry.
+Json entry_of(const Outcome& outcome)
+{
+  Json entry = {{"outcome", outcome.word.empty() ? "skipped" : outcome.word}};
+  if (!outcome.reason.empty()) entry["reason"] = outcome.reason;
+  return entry;
+}
+
+Json equilibrium_entry(const Equilibrium& equilibrium)
+{
+  Json entry = entry_of(equilibrium.outcome);
+  if (!ran(equilibrium.outcome)) return entry;
+  const NormalForces normal = normal_forces(equilibrium);
+  entry["iterations"] = equilibrium.outcome.iterations;
+  entry["closed"] = normal.closed;
+  entry["normal_force_sum"] = normal.sum;
+  entry["normal_force_min"] = normal.least;
+  entry["normal_force_max"] = normal.greatest;
+  entry["residual"] = equilibrium.outcome.residual;
+  entry["force_residual"] = equilibrium.force_residual;
+  entry["check_residual"] = equilibrium.check_residual;
+  return entry;
+}
+
+Json mode_list(const std::vector<ComplexMode>& modes)
+{
+  Json list = Json::array();
+  for (const ComplexMode& mode : modes)
+    list.push_back({{"frequency_hz", mode.frequency_hz()},
+                    {"growth_rate", mode.growth_rate()},
+                    {"damping_ratio", mode.damping_ratio()},
+                    {"backward_error", mode.backward_error}});
+  return list;
+}
+
+Json modes_entry(const Modes& modes)
+{
+  Json entry = entry_of(modes.outcome);
+  if (!ran(modes.outcome)) return entry;
+  entry["method"] = modes.method;
+  entry["iterations"] = modes.outcome.iterations;
+  entry["residual"] = modes.outcome.residual;
+  entry["band_hz"] = modes.band;
+  entry["unstable_count"] = modes.unstable_count;
+  entry["count_check"] = modes.count_check;
+  entry["modes"] = mode_list(modes.modes);
+  if (!modes.projected.empty()) entry["projected"] = mode_list(modes.projected);
+  return entry;
+}
+
+Json estimate_entry(const Estimate& estimate)
+{
+  Json entry = entry_of(estimate.outcome);
+  if (!ran(estimate.outcome)) return entry;
+  const bool balance = estimate.outcome.word == "balance";
+  entry["amplitude"] = balance ? Json(estimate.amplitude) : Json(nullptr); // no balance is no amplitude of zero
+  entry["lift_off_amplitude"] = estimate.lift_off_amplitude;
+  entry["reversal_amplitude"] = estimate.reversal_amplitude;
+  entry["damping_rate"] = estimate.damping_rate;
+  entry["friction_rate_linear"] = estimate.friction_rate_linear;
+  entry["phase"] = estimate.phase;
+  entry["residual"] = estimate.outcome.residual;
+  entry["curve"] = {{"amplitude", estimate.curve_amplitude}, {"friction_rate", estimate.curve_rate}};
+  return entry;
+}
+
+Json transient_entry(const Trajectory& transient)
+{
+  Json entry = entry_of(transient.outcome);
+  if (!ran(transient.outcome)) return entry;
+  entry["theta"] = transient.theta;
+  entry["steps"] = transient.steps;
+  entry["step_size"] = transient.step_size;
+  entry["periods"] = transient.periods;
+  entry["growth_rate_fit"] = transient.growth_rate_fit;
+  entry["growth_rate_predicted"] = transient.growth_rate_predicted;
+  entry["energy_defect_max"] = transient.energy_defect_max;
+  entry["residual"] = transient.outcome.residual;
+  entry["contact_iterations_mean"] = transient.contact_iterations_mean;
+  entry["seconds_per_step"] = transient.seconds_per_step;
+  return entry;
+}
+
+Json newton_list(const std::vector<NewtonRecord>& records)
+{
+  Json list = Json::array();
+  for (const NewtonRecord& record : records)
+    list.push_back({{"stage", record.stage},
+                    {"unknowns", record.unknowns},
+                    {"periods", record.periods},
+                    {"period", record.period},
+                    {"residual_projected", record.residual_projected},
+                    {"residual_full", record.residual_full}});
+  return list;
+}
+
+Json cycle_entry(const LimitCycle& cycle, const Scene& scene)
+{
+  Json entry = entry_of(cycle.outcome);
+  if (!ran(cycle.outcome)) return entry;
+  entry["period"] = cycle.period;
+  entry["frequency_hz"] = 1 / cycle.period;
+  entry["steps_per_period"] = cycle.steps_per_period;
+  entry["tolerance"] = scene.cycle.tolerance;
+  entry["residual_projected"] = cycle.residual_projected;
+  entry["residual_full"] = cycle.residual_full;
+  entry["newton_iterations"] = cycle.newton_iterations;
+  entry["periods_integrated"] = cycle.periods_integrated;
+  entry["mean_energy"] = cycle.mean_energy;
+  entry["mean_fluctuating_energy"] = cycle.mean_fluctuating_energy;
+  entry["open_pairs_mean"] = cycle.open_pairs_mean;
+  entry["open_pairs_max"] = cycle.open_pairs_max;
+  entry["stick_pairs_max"] = cycle.stick_pairs_max;
+  Json swings = Json::object();
+  const std::size_t probes = std::min(scene.probes.size(), cycle.peak_to_peak.size());
+  for (std::size_t i = 0; i < probes; ++i) swings[scene.probes[i].name] = cycle.peak_to_peak[i];
+  entry["peak_to_peak"] = swings;
+  entry["newton"] = newton_list(cycle.records);
+  return entry;
+}
+
+} // namespace
+
+bool ran(const Outcome& outcome)
+{
+  return !outcome.word.empty() && outcome.word != "off" && outcome.word != "skipped";
+}
+
+NormalForces normal_forces(const Equilibrium& equilibrium)
+{
+  NormalForces forces;
+  const std::size_t pairs = equilibrium.closed.size();
+  const std::size_t block = pairs > 0 ? equilibrium.reactions.size() / pairs : 0;
+  for (std::size_t i = 0; i < pairs; ++i)
+  {
+    if (!equilibrium.closed[i] || block == 0) continue;
+    const double force = equilibrium.reactions[i * block];
+    forces.least = forces.closed > 0 ? std::min(forces.least, force) : force;
+    forces.greatest = forces.closed > 0 ? std::max(forces.greatest, force) : force;
+    forces.sum += force;
+    ++forces.closed;
+  }
+  return forces;
+}
+
+std::string report_json(const Report& report, const Scene& scene)
+{
+  Json json;
+  json["title"] = scene.title;
+  json["scene"] = scene.file.string();
+  json["model"] = {
+      {"dofs", report.dofs}, {"pairs", report.pairs}, {"elements", report.elements}, {"ranks", report.ranks}};
+  json["equilibrium"] = equilibrium_entry(report.equilibrium);
+  json["modes"] = modes_entry(report.modes);
+  json["estimate"] = estimate_entry(report.estimate);
+  json["transient"] = transient_entry(report.transient);
+  json["cycle"] = cycle_entry(report.cycle, scene);
+  Json timings = Json::object();
+  for (const auto& [stage, seconds] : report.timings) timings[stage] = seconds;
+  json["timings"] = timings;
+  Json libraries = Json::object();
+  for (const auto& [name, version] : versions()) libraries[name] = version;
+  json["versions"] = libraries;
+  // Text from files of any encoding must not stop the report.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+} // namespace squeal

@@ -1,0 +1,75 @@
+/// Everything a run leaves in its folder.
+#include "squeal/report/files.hpp"
+#include "squeal/report/parts.hpp"
+
+#include <cctype>
+#include <dmumps_c.h>
+#ifdef SQUEAL_WITH_GMSH
+#include <gmsh.h>
+#endif
+
+namespace squeal
+{
+
+namespace
+{
+
+/// The options of this run in the form that -options_file reads.
+std::string option_text()
+{
+  char* list = nullptr;
+  check(PetscOptionsGetAll(nullptr, &list));
+  std::string text = list;
+  check(PetscFree(list));
+  for (std::size_t at = 0; (at = text.find(" -", at)) != std::string::npos;)
+    if (const char next = at + 2 < text.size() ? text[at + 2] : ' '; std::isalpha(static_cast<unsigned char>(next)))
+      text[at] = '\n'; // an option, not a negative number
+    else
+      ++at;
+  return text + "\n";
+}
+
+std::string provenance()
+{
+  std::string text = "# as run by";
+  for (const auto& [name, version] : versions()) text += " " + name + " " + version + ",";
+  text.back() = '\n';
+  return text;
+}
+
+} // namespace
+
+std::vector<std::pair<std::string, std::string>> versions()
+{
+  char petsc[256], slepc[256];
+  check(PetscGetVersion(petsc, sizeof petsc));
+  check(SlepcGetVersion(slepc, sizeof slepc));
+  unsigned major = 0, minor = 0, release = 0;
+  H5get_libversion(&major, &minor, &release);
+  const std::string hdf5 = std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(release);
+  // "Petsc Release Version 3.18.5, Feb 28, 2023 " tells more than its number.
+  std::vector<std::pair<std::string, std::string>> list = {
+      {"squeal", SQUEAL_VERSION}, {"petsc", petsc}, {"slepc", slepc}, {"mumps", MUMPS_VERSION}, {"hdf5", hdf5}};
+#ifdef SQUEAL_WITH_GMSH
+  list.emplace_back("gmsh", GMSH_API_VERSION);
+#endif
+  return list;
+}
+
+void write_results(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
+                   MPI_Comm comm)
+{
+  on_rank_zero(comm,
+               [&]
+               {
+                 std::filesystem::create_directories(output);
+                 write_text(output / "scene.toml", provenance() + resolved_scene(scene));
+                 write_text(output / "options.txt", provenance() + option_text());
+                 write_history(report, scene, output / "history.h5");
+               });
+  write_fields(report, scene, model, output, comm);
+  // Last: where there is a report, the rest is there too.
+  on_rank_zero(comm, [&] { write_text(output / "report.json", report_json(report, scene)); });
+}
+
+} // namespace squeal

@@ -1,0 +1,162 @@
+/// The table a person reads at the end of a run.
+#include "squeal/report/parts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+
+namespace squeal
+{
+
+namespace
+{
+
+constexpr std::size_t modes_shown = 12;
+
+/// printf into text.
+[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...)
+{
+  char text[512];
+  std::va_list arguments;
+  va_start(arguments, pattern);
+  std::vsnprintf(text, sizeof text, pattern, arguments);
+  va_end(arguments);
+  return text;
+}
+
+std::string row(const std::string& head, const std::string& text)
+{
+  return format("  %-12s ", head.c_str()) + text + "\n";
+}
+
+/// "converged", "NOT CONVERGED: reason": what is not a success must not look like one.
+std::string outcome_text(const Outcome& outcome)
+{
+  if (outcome.word.empty()) return "skipped";
+  std::string word = outcome.word;
+  const bool good = word == "converged" || word == "balance" || word == "completed" || !ran(outcome);
+  if (!good) std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::toupper(c); });
+  return word + (outcome.reason.empty() ? "" : ": " + outcome.reason);
+}
+
+std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
+{
+  std::string text = row("equilibrium", outcome_text(equilibrium.outcome));
+  if (!ran(equilibrium.outcome)) return text;
+  const NormalForces normal = normal_forces(equilibrium);
+  text += row(
+      "", format("%d of %d pairs closed after %d iterations", normal.closed, pairs, equilibrium.outcome.iterations));
+  text +=
+      row("", format("normal force %.9g N in all, %.4g to %.4g N a pair", normal.sum, normal.least, normal.greatest));
+  text += row("", format("force residual %.1e, contact residual %.1e, by the fixed point %.1e",
+                         equilibrium.force_residual, equilibrium.outcome.residual, equilibrium.check_residual));
+  return text;
+}
+
+std::string mode_line(const ComplexMode& mode)
+{
+  return row("", format("%12.2f %14.5g %12.5f %16.1e  %s", mode.frequency_hz(), mode.growth_rate(),
+                        100 * mode.damping_ratio(), mode.backward_error, mode.growth_rate() > 0 ? "unstable" : ""));
+}
+
+std::string modes_text(const Modes& modes)
+{
+  std::string text = row("modes", outcome_text(modes.outcome));
+  if (!ran(modes.outcome)) return text;
+  text += row("", format("%d unstable of %zu modes below %.5g Hz, method \"%s\", largest backward error %.1e",
+                         modes.unstable_count, modes.modes.size(), modes.band, modes.method.c_str(),
+                         modes.outcome.residual));
+  if (!modes.count_check.empty()) text += row("", "count of unstable modes: " + modes.count_check);
+  text += row("", format("%12s %14s %12s %16s", "frequency", "growth rate", "damping", "backward error"));
+  text += row("", format("%12s %14s %12s %16s", "[Hz]", "[1/s]", "[%]", "[-]"));
+  const std::size_t unstable = static_cast<std::size_t>(std::max(modes.unstable_count, 0));
+  const std::size_t shown = std::min(modes.modes.size(), std::max(modes_shown, unstable));
+  for (std::size_t i = 0; i < shown; ++i) text += mode_line(modes.modes[i]);
+  if (shown < modes.modes.size())
+    text += row("", format("%zu more, all less unstable, are in report.json", modes.modes.size() - shown));
+  return text;
+}
+
+std::string estimate_text(const Estimate& estimate)
+{
+  std::string text = row("estimate", outcome_text(estimate.outcome));
+  if (!ran(estimate.outcome)) return text;
+  if (estimate.outcome.word == "balance") text += row("", format("amplitude %.5g m", estimate.amplitude));
+  text += row("", format("first lift-off at %.5g m, first slip reversal at %.5g m", estimate.lift_off_amplitude,
+                         estimate.reversal_amplitude));
+  text += row("", format("friction injects %.5g 1/s, damping takes %.5g 1/s of the energy",
+                         estimate.friction_rate_linear, estimate.damping_rate));
+  return text;
+}
+
+std::string transient_text(const Trajectory& transient)
+{
+  std::string text = row("transient", outcome_text(transient.outcome));
+  if (!ran(transient.outcome)) return text;
+  text += row("", format("%ld steps of %.5g s, %.5g periods, theta %.4g", transient.steps, transient.step_size,
+                         transient.periods, transient.theta));
+  const std::string fit = std::isfinite(transient.growth_rate_fit) ? format("%.6g 1/s", transient.growth_rate_fit)
+                                                                   : std::string("too short to fit");
+  text += row("", "growth rate before first lift-off: " + fit +
+                      format(", predicted %.6g 1/s", transient.growth_rate_predicted));
+  text += row("", format("energy defect %.1e of the energy, contact residual %.1e", transient.energy_defect_max,
+                         transient.outcome.residual));
+  return text;
+}
+
+std::string cycle_text(const LimitCycle& cycle, const Scene& scene)
+{
+  std::string text = row("cycle", outcome_text(cycle.outcome));
+  if (!ran(cycle.outcome)) return text;
+  text += row("", format("residual: full space %.2e (tolerance %.0e), projected %.2e", cycle.residual_full,
+                         scene.cycle.tolerance, cycle.residual_projected));
+  text += row("", format("%d Newton steps, %ld periods integrated, %d steps a period", cycle.newton_iterations,
+                         cycle.periods_integrated, cycle.steps_per_period));
+  if (cycle.outcome.word != "converged") return text; // the figures of no cycle would mislead
+  text += row("", format("period %.10g s, frequency %.8g Hz", cycle.period, 1 / cycle.period));
+  text += row("", format("mean energy %.7g J, fluctuating %.7g J", cycle.mean_energy, cycle.mean_fluctuating_energy));
+  text += row("", format("open pairs: %.2f on average, %d at most; sticking: %d at most", cycle.open_pairs_mean,
+                         cycle.open_pairs_max, cycle.stick_pairs_max));
+  const std::size_t probes = std::min(scene.probes.size(), cycle.peak_to_peak.size());
+  for (std::size_t i = 0; i < probes; ++i)
+    text += row("", format("probe %s: %.6g m peak to peak", scene.probes[i].name.c_str(), cycle.peak_to_peak[i]));
+  return text;
+}
+
+std::string timings_text(const Report& report)
+{
+  double total = 0;
+  std::string text;
+  for (const auto& [stage, seconds] : report.timings)
+  {
+    text += row(text.empty() ? "time" : "", format("%10.2f s  %s", seconds, stage.c_str()));
+    total += seconds;
+  }
+  return text + row("", format("%10.2f s  in all", total));
+}
+
+} // namespace
+
+std::string summary(const Report& report, const Scene& scene)
+{
+  std::string text = "\n" + (scene.title.empty() ? scene.file.filename().string() : scene.title) + "\n";
+  text += row("model", format("%lld degrees of freedom, %ld elements, %d contact pairs, %d rank%s",
+                              static_cast<long long>(report.dofs), report.elements, report.pairs, report.ranks,
+                              report.ranks == 1 ? "" : "s"));
+  text += equilibrium_text(report.equilibrium, report.pairs);
+  text += modes_text(report.modes);
+  text += estimate_text(report.estimate);
+  text += transient_text(report.transient);
+  text += cycle_text(report.cycle, scene);
+  return text + timings_text(report);
+}
+
+void print_summary(const Report& report, const Scene& scene, MPI_Comm comm)
+{
+  if (rank_of(comm) != 0) return;
+  std::fputs(summary(report, scene).c_str(), stdout);
+  std::fflush(stdout);
+}
+
+} // namespace squeal

@@ -1,0 +1,22 @@
+#pragma once
+/// The unilateral oscillator in steady sliding, its equilibrium solved by hand.
+#include "small_models.hpp"
+#include "squeal/analysis/equilibrium.hpp"
+
+namespace squeal::test
+{
+
+/// Closed pair: y1 = y2 = y, r_n = -1.2 y, r_t = mu r_n:  1.1 x - .1 y = mu r_n,  -.1 x + .5 y = r_n - 1.
+inline Equilibrium sliding_equilibrium(const SmallModel& oscillator)
+{
+  const double mu = oscillator.interface.friction;
+  const double y = -1 / (1.7 - .1 * (.1 - 1.2 * mu) / 1.1), x = (.1 - 1.2 * mu) * y / 1.1, r = -1.2 * y;
+  Equilibrium equilibrium;
+  equilibrium.outcome.word = "converged";
+  equilibrium.u = vector_like(oscillator.structure.K, {x, y, y});
+  equilibrium.reactions = {r, mu * r};
+  equilibrium.closed = {1};
+  return equilibrium;
+}
+
+} // namespace squeal::test

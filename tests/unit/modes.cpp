@@ -1,0 +1,203 @@
+// ranks: 1 2 3
+#include "squeal/analysis/modes.hpp"
+#include "../support/sliding_oscillator.hpp"
+#include "squeal/analysis/closed_contact.hpp"
+#include "squeal/analysis/quadratic.hpp"
+
+#include <cmath>
+#include <doctest/doctest.h>
+#include <random>
+
+using namespace squeal;
+using namespace squeal::test;
+using Complex = std::complex<double>;
+
+namespace
+{
+
+double largest_entry(Mat A)
+{
+  double norm = 0;
+  check(MatNorm(A, NORM_INFINITY, &norm));
+  return norm;
+}
+
+// A dense elastic body on `pairs` planar contact pairs whose rows overlap, as those of a rigid body do.
+SmallModel crowded_model(int dofs, int pairs)
+{
+  std::mt19937 generator(7);
+  std::uniform_real_distribution<double> random(-1, 1);
+  const auto n = static_cast<std::size_t>(dofs);
+  Rows K = zeros(n, n), C = zeros(n, n), B = zeros(3 * static_cast<std::size_t>(pairs), n);
+  std::vector<double> mass(n);
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    mass[i] = 1.5 + random(generator);
+    K[i][i] = 10. + 10. * static_cast<double>(i);
+    C[i][i] = .01 * mass[i] + 1e-4 * K[i][i];
+    if (i > 0) K[i][i - 1] = K[i - 1][i] = -3;
+    if (i > 0) C[i][i - 1] = C[i - 1][i] = -3e-4;
+  }
+  for (std::vector<double>& row : B)
+    for (std::size_t j = 0; j < 5; ++j) row[j] = random(generator);
+  std::vector<double> drive;
+  for (int i = 0; i < pairs; ++i) drive.insert(drive.end(), {.6, .8});
+  SmallModel model;
+  model.structure = make_structure(diagonal(mass), C, K, std::vector<double>(n, 0.));
+  model.interface =
+      make_interface(B, 2, std::vector<double>(static_cast<std::size_t>(pairs), 0.), drive, .3, model.structure.K);
+  return model;
+}
+
+Equilibrium all_closed(const SmallModel& model)
+{
+  Equilibrium equilibrium;
+  equilibrium.outcome.word = "converged";
+  equilibrium.u = zeros_like(model.structure.load);
+  for (int i = 0; i < model.interface.pairs; ++i)
+    equilibrium.reactions.insert(equilibrium.reactions.end(), {2, .36, .48});
+  equilibrium.closed.assign(static_cast<std::size_t>(model.interface.pairs), 1);
+  return equilibrium;
+}
+
+ModesSettings settings_of(const char* method)
+{
+  ModesSettings settings;
+  settings.method = method;
+  settings.band = 10;
+  settings.real_modes = 1000;
+  settings.residual_passes = 0;
+  return settings;
+}
+
+} // namespace
+
+TEST_CASE("B_n Z = 0 and (B_n + mu e.B_t) Y = 0, though every pair shares its degrees of freedom with the others")
+{
+  const SmallModel model = crowded_model(12, 3);
+  const ClosedContact closed = eliminate_closed_pairs(model.structure, model.interface, all_closed(model));
+  Owned<Mat> BZ, BY;
+  check(MatMatMult(model.interface.B, closed.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
+  check(MatMatMult(model.interface.B, closed.Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BY.put()));
+  const std::vector<double> Z = dense_copy(BZ), Y = dense_copy(BY);
+  REQUIRE(Z.size() == 9 * 9); // three rows a pair, and three of twelve degrees of freedom are gone
+  const double mu = model.interface.friction;
+  for (std::size_t column = 0; column < 9; ++column)
+    for (std::size_t pair = 0; pair < 3; ++pair)
+    {
+      const std::size_t i = 9 * column + 3 * pair;
+      CHECK(std::abs(Z[i]) < 1e-13);
+      CHECK(std::abs(Y[i] + mu * (.6 * Y[i + 1] + .8 * Y[i + 2])) < 1e-13);
+    }
+}
+
+TEST_CASE("the equations of the structure hold with the reactions of each mode, which stays closed")
+{
+  const SmallModel model = crowded_model(12, 3);
+  const Equilibrium equilibrium = all_closed(model);
+  const Modes modes = find_modes(model.structure, model.interface, equilibrium, settings_of("full"));
+  Owned<Mat> C;
+  check(MatDuplicate(model.structure.C, MAT_COPY_VALUES, C.put()));
+  check(MatAXPY(C, 1, direction_damping(model.interface, equilibrium), UNKNOWN_NONZERO_PATTERN));
+  REQUIRE(modes.modes.size() == 9);
+  for (const ComplexMode& mode : modes.modes)
+  {
+    Owned<Vec> real = zeros_like(mode.real), imaginary = zeros_like(mode.real);
+    quadratic_residual(model.structure.M, C, model.structure.K, mode.lambda, mode.real, mode.imaginary, real,
+                       imaginary);
+    std::vector<double> r, s;
+    for (const Complex rho : mode.reactions)
+    {
+      r.insert(r.end(), {-rho.real(), -.3 * .6 * rho.real(), -.3 * .8 * rho.real()});
+      s.insert(s.end(), {-rho.imag(), -.3 * .6 * rho.imag(), -.3 * .8 * rho.imag()});
+    }
+    add_reactions(model.interface, r, real);
+    add_reactions(model.interface, s, imaginary);
+    double norms[2];
+    check(VecNorm(real, NORM_INFINITY, &norms[0]));
+    check(VecNorm(imaginary, NORM_INFINITY, &norms[1]));
+    CHECK(std::hypot(norms[0], norms[1]) < 1e-11 * largest_entry(model.structure.K)); // solver's rounding
+    const std::vector<double> gap = relative(model.interface, mode.real);
+    for (std::size_t i = 0; i < gap.size(); i += 3) CHECK(std::abs(gap[i]) < 1e-13);
+  }
+}
+
+TEST_CASE("C_f resists turning of the friction force and nothing else")
+{
+  const SmallModel model = crowded_model(12, 1);
+  const Owned<Mat> Cf = direction_damping(model.interface, all_closed(model));
+  const Owned<Vec> v = vector_like(model.structure.K, {1, -2, .5, 3, 1, 0, 0, 0, 0, 0, 0, 0}), force = zeros_like(v);
+  check(MatMult(Cf, v, force));
+  double power = 0;
+  check(VecDot(v, force, &power));
+  const std::vector<double> s = relative(model.interface, v);
+  const double across = -.8 * s[1] + .6 * s[2]; // speed across the drive, |v_d| = 1
+  CHECK(power == doctest::Approx(.3 * 2 * across * across).epsilon(1e-13));
+}
+
+TEST_CASE("a pair that the others already hold is an error that names it")
+{
+  SmallModel model = crowded_model(12, 2);
+  const Rows one = {
+      {0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, {0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0}};
+  Rows twice = one;
+  twice.insert(twice.end(), one.begin(), one.end());
+  model.interface = make_interface(twice, 2, {0, 0}, {1, 0, 1, 0}, .3, model.structure.K);
+  CHECK_THROWS_WITH_AS(eliminate_closed_pairs(model.structure, model.interface, all_closed(model)),
+                       doctest::Contains("contact pair 1"), Error);
+}
+
+TEST_CASE("projection on all real modes is the full problem")
+{
+  const SmallModel model = crowded_model(30, 3);
+  const Modes modes = find_modes(model.structure, model.interface, all_closed(model), settings_of("both"));
+  REQUIRE(modes.modes.size() == 27);
+  REQUIRE(modes.projected.size() == 27);
+  for (std::size_t i = 0; i < modes.modes.size(); ++i)
+  {
+    CHECK(std::abs(modes.modes[i].lambda - modes.projected[i].lambda) < 1e-11 * std::abs(modes.modes[i].lambda));
+    CHECK(modes.projected[i].backward_error < 1e-13);
+  }
+  CHECK(modes.count_check.starts_with("confirmed"));
+}
+
+TEST_CASE("residual passes bring the growth rate of a truncated basis to that of the full problem")
+{
+  const SmallModel model = crowded_model(60, 3);
+  ModesSettings settings = settings_of("both");
+  settings.band = 2; // lower part of the spectrum
+  settings.real_modes = 20;
+  double before = INFINITY;
+  for (const int passes : {0, 1, 2, 3})
+  {
+    settings.residual_passes = passes;
+    const Modes modes = find_modes(model.structure, model.interface, all_closed(model), settings);
+    REQUIRE(modes.projected.size() == modes.modes.size());
+    double error = 0;
+    for (const ComplexMode& mode : modes.projected) error = std::max(error, mode.backward_error);
+    CHECK((error < .3 * before || error < 1e-13)); // each pass divides by (omega/omega_20)^2 or better
+    before = error;
+  }
+  CHECK(before < 1e-7);
+}
+
+TEST_CASE("Krylov and LAPACK find the same real modes, M-normalised and closed")
+{
+  const SmallModel model = crowded_model(60, 3);
+  const RealModes all = find_real_modes(model.structure, model.interface, all_closed(model), 10);
+  check(PetscOptionsSetValue(nullptr, "-modes_dense_limit", "0"));
+  const RealModes krylov = find_real_modes(model.structure, model.interface, all_closed(model), 10);
+  const RealModes below =
+      find_real_modes_below(model.structure, model.interface, all_closed(model), (all.omega[9] + 1e-6) / (2 * M_PI));
+  check(PetscOptionsClearValue(nullptr, "-modes_dense_limit"));
+  REQUIRE(krylov.omega.size() == 10);
+  CHECK(krylov.outcome.word == "converged");
+  CHECK(below.omega.size() == 10);
+  for (std::size_t k = 0; k < 10; ++k)
+  {
+    CHECK(krylov.omega[k] == doctest::Approx(all.omega[k]).epsilon(1e-11));
+    CHECK(2 * kinetic_energy(model.structure, krylov.shapes[k]) == doctest::Approx(1).epsilon(1e-11));
+    const std::vector<double> gap = relative(model.interface, krylov.shapes[k]);
+    CHECK(std::abs(gap[0]) < 1e-12);
+  }
+}

@@ -1,0 +1,153 @@
+// ranks: 1 2 3
+// Published and exact eigenvalues of sliding systems.
+#include "../support/sliding_oscillator.hpp"
+#include "squeal/analysis/modes.hpp"
+#include "squeal/analysis/quadratic.hpp"
+
+#include <cmath>
+#include <doctest/doctest.h>
+
+using namespace squeal;
+using namespace squeal::test;
+using Complex = std::complex<double>;
+
+namespace
+{
+
+QuadraticProblem problem_of(const Rows& M, const Rows& C, const Rows& K)
+{
+  Rows pattern = diagonal(std::vector<double>(M.size(), 1.));
+  for (std::size_t i = 0; i < M.size(); ++i)
+    for (std::size_t j = 0; j < M.size(); ++j)
+      if (M[i][j] != 0 || C[i][j] != 0 || K[i][j] != 0) pattern[i][j] = 1;
+  return {sparse(M, pattern), sparse(C, pattern), sparse(K, pattern)};
+}
+
+constexpr int by_lapack = 1000, by_arnoldi = 0; // dense limits
+
+QuadraticSolution solve(const QuadraticProblem& problem, int dense_limit)
+{
+  return solve_quadratic(problem, {10, 0, 5, dense_limit});
+}
+
+int count_unstable(const QuadraticSolution& solution)
+{
+  int count = 0;
+  for (const Eigenpair& pair : solution.pairs) count += is_unstable(pair.lambda);
+  return count;
+}
+
+// Two modes coupled by friction (Hoffmann et al. 2002).
+int unstable_modes_of_two(double mu, double c1, double c2)
+{
+  const double k = 3.897114317029974;
+  const QuadraticProblem problem = problem_of(diagonal({1, 1}), diagonal({c1, c2}), {{23.25, k - 11 * mu}, {k, 18.75}});
+  return count_unstable(solve(problem, by_lapack));
+}
+
+// M = [3 1; 1 1], follower force P, damping b
+int unstable_modes_of_ziegler(double P, double b)
+{
+  const QuadraticProblem problem = problem_of({{3, 1}, {1, 1}}, {{2 * b, -b}, {-b, b}}, {{2 - P, P - 1}, {-1, 1}});
+  return count_unstable(solve(problem, by_lapack));
+}
+
+QuadraticProblem chain(int cells, double mu)
+{
+  const double k = 4.5 * std::sqrt(3.) / 2;
+  const auto n = 2 * static_cast<std::size_t>(cells);
+  Rows K = zeros(n, n);
+  for (std::size_t i = 0; i < n; i += 2)
+  {
+    K[i][i] = 2 + 17;
+    K[i][i + 1] = k - 11 * mu;
+    K[i + 1][i] = k;
+    K[i + 1][i + 1] = 18.75;
+    if (i + 2 < n) K[i][i + 2] = K[i + 2][i] = -1;
+  }
+  return problem_of(diagonal(std::vector<double>(n, 1.)), diagonal(std::vector<double>(n, .02)), K);
+}
+
+double distance(const QuadraticSolution& solution, Complex lambda)
+{
+  double nearest = INFINITY;
+  for (const Eigenpair& pair : solution.pairs) nearest = std::min(nearest, std::abs(pair.lambda - lambda));
+  return nearest;
+}
+
+} // namespace
+
+// At the threshold the undamped pair is defective: it leaves the axis like the square root of the distance, so 1e-9 of
+// distance shows as 1e-5 of growth, and a bracket is the sharpest test there is.
+TEST_CASE("two coupled modes flutter from the exact friction coefficient on, with and without damping")
+{
+  const struct
+  {
+    double mu, c1, c2;
+  } thresholds[] = {
+      {.472377492973330, 0, 0}, {.395110300148, .2, .02}, {.395453847416, .02, .2}, {.473602175363, .05, .05}};
+  for (const auto& [mu, c1, c2] : thresholds)
+  {
+    CAPTURE(mu);
+    // Undamped below the threshold, rounding of the nearly double pair is of order 1e-16/1e-5.
+    const double margin = c1 == 0 ? 1e-9 : 1e-6;
+    CHECK(unstable_modes_of_two(mu - margin, c1, c2) == 0);
+    CHECK(unstable_modes_of_two(mu + margin, c1, c2) == 1);
+  }
+  const QuadraticProblem problem =
+      problem_of(diagonal({1, 1}), diagonal({0, 0}), {{23.25, 3.897114317029974 - 5.5}, {3.897114317029974, 18.75}});
+  CHECK(distance(solve(problem, by_lapack), {.118690019, 4.584112490}) < 1e-8); // all the digits that are given
+}
+
+TEST_CASE("the Ziegler column loses stability at its exact loads, sooner with vanishing damping")
+{
+  const double flutter = 3.5 - std::sqrt(2.), damped = 41. / 28 + .1 * .1 / 2;
+  CHECK(unstable_modes_of_ziegler(flutter - 1e-8, 0) == 0);
+  CHECK(unstable_modes_of_ziegler(flutter + 1e-8, 0) == 1);
+  CHECK(unstable_modes_of_ziegler(damped - 1e-6, .1) == 0);
+  CHECK(unstable_modes_of_ziegler(damped + 1e-6, .1) == 1);
+}
+
+TEST_CASE("no unstable mode of a chain of cells is missed, solved whole or by Arnoldi")
+{
+  for (const int limit : {by_lapack, by_arnoldi})
+  {
+    const QuadraticSolution many = solve(chain(50, .38), limit), fewer = solve(chain(50, .36), limit);
+    CHECK(many.outcome.word == "converged");
+    CHECK(many.pairs.size() == 100);
+    CHECK(count_unstable(many) == 44);
+    CHECK(count_unstable(fewer) == 17);
+    CHECK(std::abs(many.pairs[0].lambda - Complex(.111240406422, 4.328534114602)) < 1e-11);
+    CHECK(many.outcome.residual < 1e-12); // rounding of a companion matrix of order 200
+  }
+}
+
+TEST_CASE("the wing of the NLEVP collection has its published eigenvalues")
+{
+  const QuadraticProblem wing = problem_of({{17.6, 1.28, 2.89}, {1.28, .824, .413}, {2.89, .413, .725}},
+                                           {{7.66, 2.45, 2.1}, {.23, 1.04, .223}, {.6, .756, .658}},
+                                           {{121, 18.9, 15.9}, {0, 2.7, .145}, {11.9, 3.64, 15.5}});
+  const QuadraticSolution solution = solve(wing, by_lapack);
+  REQUIRE(solution.pairs.size() == 3);
+  for (const Complex lambda :
+       {Complex(.09472173, 2.52287659), Complex(-.88483025, 8.44151216), Complex(-.91799817, 1.76058420)})
+    CHECK(distance(solution, lambda) < 1e-8); // all the digits that are given
+}
+
+TEST_CASE("the unilateral oscillator slides into flutter at the exact friction coefficient")
+{
+  ModesSettings settings;
+  settings.band = 1;
+  const auto modes_at = [&](double mu)
+  {
+    const SmallModel oscillator = unilateral_oscillator(mu, 1);
+    return find_modes(oscillator.structure, oscillator.interface, sliding_equilibrium(oscillator), settings);
+  };
+  const Modes modes = modes_at(.3);
+  REQUIRE(modes.modes.size() == 2);
+  CHECK(std::abs(modes.modes[0].lambda - Complex(.024503265987, 1.059820289428)) < 1e-12);
+  CHECK(modes.unstable_count == 1);
+  CHECK(modes.outcome.residual < 1e-14);
+  CHECK(modes_at(.17649336676940 - 1e-8).unstable_count == 0);
+  CHECK(modes_at(.17649336676940 + 1e-7).unstable_count == 1);
+}
