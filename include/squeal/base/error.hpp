@@ -25,34 +25,38 @@ struct LibraryError : Error
 /// Collective. Throws Error on every rank, with the text of the lowest rank that brings one, unless all are empty.
 void agree(MPI_Comm comm, const std::string& problem);
 
+/// Collective. Runs `work`, which must not communicate, on every rank; if it throws on any, all throw Error together.
+template <class Work> void on_every_rank(MPI_Comm comm, Work work)
+{
+  std::string problem;
+  try
+  {
+    work();
+  }
+  catch (const std::exception& error)
+  {
+    problem = *error.what() ? error.what() : "unknown failure";
+  }
+  agree(comm, problem);
+}
+
 /// Collective. Runs `work` on rank 0 alone; an exception it throws there becomes an Error with the same text
 /// everywhere.
 template <class Work> void on_rank_zero(MPI_Comm comm, Work work)
 {
   int rank = 0;
   MPI_Comm_rank(comm, &rank);
-  std::string problem;
-  if (rank == 0)
-  {
-    try
-    {
-      work();
-    }
-    catch (const std::exception& error)
-    {
-      problem = error.what();
-      if (problem.empty()) problem = "unknown failure on rank 0";
-    }
-  }
-  agree(comm, problem);
+  on_every_rank(comm,
+                [&]
+                {
+                  if (rank == 0) work();
+                });
 }
-
-/// Of `known`, the word with the smallest edit distance to `word`, for "did you mean" messages; empty if none is near.
-template <class Words> std::string nearest_word(const std::string& word, const Words& known);
 
 /// Number of single-character insertions, deletions and substitutions that turn `a` into `b` (Levenshtein 1966).
 int edit_distance(const std::string& a, const std::string& b);
 
+/// Of `known`, the word with the smallest edit distance to `word`, for "did you mean" messages; empty if none is near.
 template <class Words> std::string nearest_word(const std::string& word, const Words& known)
 {
   std::string best;
