@@ -28,30 +28,11 @@ SlidingProblem make_problem(const Structure& structure, const Interface& interfa
   SlidingProblem problem;
   problem.contact = eliminate_closed_pairs(structure, interface, equilibrium);
   const Mat Y = problem.contact.Y, Z = problem.contact.Z;
-  check(MatDuplicate(structure.C, MAT_COPY_VALUES, problem.C.put()));
-  if (interface.direction_damping)
-    if (const Owned<Mat> Cf = direction_damping(interface, equilibrium); Cf.get())
-      check(MatAXPY(problem.C, 1, Cf, UNKNOWN_NONZERO_PATTERN));
+  problem.C = sliding_damping(structure, interface, equilibrium);
   problem.reduced = {project(structure.M, Y, Z), project(problem.C, Y, Z), project(structure.K, Y, Z)};
   problem.M = project_symmetric(structure.M, Z);
   problem.K = project_symmetric(structure.K, Z);
   return problem;
-}
-
-std::vector<double> whole(Vec distributed)
-{
-  Owned<VecScatter> scatter;
-  Owned<Vec> local;
-  check(VecScatterCreateToAll(distributed, scatter.put(), local.put()));
-  check(VecScatterBegin(scatter, distributed, local, INSERT_VALUES, SCATTER_FORWARD));
-  check(VecScatterEnd(scatter, distributed, local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscInt size = 0;
-  const PetscScalar* entries = nullptr;
-  check(VecGetSize(local, &size));
-  check(VecGetArrayRead(local, &entries));
-  std::vector<double> result(entries, entries + size);
-  check(VecRestoreArrayRead(local, &entries));
-  return result;
 }
 
 // The entry of phi of largest modulus; of nearly equal ones the first, so that every rank count turns phi alike.
@@ -95,23 +76,6 @@ void set_shape(ComplexMode& mode, const ClosedContact& contact, const Eigenpair&
   check(VecAXPBY(mode.imaginary, turn.imag(), turn.real(), real));
 }
 
-// (lambda^2 M + lambda C + K) phi = R' lambda_n, in the rows that Y removed.
-std::vector<std::complex<double>> reactions_of(const ComplexMode& mode, const Structure& structure,
-                                               const SlidingProblem& problem)
-{
-  const Owned<Vec> force_r = zeros_like(mode.real), force_i = zeros_like(mode.real);
-  quadratic_residual(structure.M, problem.C, structure.K, mode.lambda, mode.real, mode.imaginary, force_r, force_i);
-  Owned<Vec> reaction;
-  check(MatCreateVecs(problem.contact.reaction, nullptr, reaction.put()));
-  check(MatMult(problem.contact.reaction, force_r, reaction));
-  const std::vector<double> real = whole(reaction);
-  check(MatMult(problem.contact.reaction, force_i, reaction));
-  const std::vector<double> imaginary = whole(reaction);
-  std::vector<std::complex<double>> result;
-  for (std::size_t i = 0; i < real.size(); ++i) result.emplace_back(real[i], imaginary[i]);
-  return result;
-}
-
 std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const Structure& structure,
                                   const SlidingProblem& problem)
 {
@@ -122,7 +86,7 @@ std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const Struc
     mode.lambda = pair.lambda;
     mode.backward_error = pair.backward_error;
     set_shape(mode, problem.contact, pair);
-    mode.reactions = reactions_of(mode, structure, problem);
+    mode.reactions = normal_reactions(problem.contact, structure, problem.C, mode.lambda, mode.real, mode.imaginary);
     modes.push_back(std::move(mode));
   }
   return modes;

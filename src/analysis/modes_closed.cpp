@@ -1,5 +1,7 @@
 #include "squeal/analysis/closed_contact.hpp"
 
+#include "squeal/analysis/quadratic.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -77,7 +79,7 @@ PetscInt choose_pivot(const Row& row, const std::map<PetscInt, int>& holders, Pe
     if (column >= dofs) continue;
     const double score = std::min(std::abs(value.normal) / largest_normal, std::abs(value.sliding) / largest_sliding) *
                          (holders.at(column) == 1 ? 1 : 0.1);
-    if (score <= best_score * (1 + 1e-9)) continue; // of equals the first, whatever the rounding
+    if (score < best_score * (1 - 1e-9)) continue; // of equals the last, whatever the rounding
     best = column;
     best_score = score;
   }
@@ -220,6 +222,22 @@ Owned<Mat> assemble_reaction(const std::vector<Row>& rows, const std::vector<Pet
   return result;
 }
 
+std::vector<double> whole(Vec distributed)
+{
+  Owned<VecScatter> scatter;
+  Owned<Vec> local;
+  check(VecScatterCreateToAll(distributed, scatter.put(), local.put()));
+  check(VecScatterBegin(scatter, distributed, local, INSERT_VALUES, SCATTER_FORWARD));
+  check(VecScatterEnd(scatter, distributed, local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscInt size = 0;
+  const PetscScalar* entries = nullptr;
+  check(VecGetSize(local, &size));
+  check(VecGetArrayRead(local, &entries));
+  std::vector<double> result(entries, entries + size);
+  check(VecRestoreArrayRead(local, &entries));
+  return result;
+}
+
 } // namespace
 
 ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface& interface,
@@ -289,6 +307,32 @@ Owned<Mat> direction_damping(const Interface& interface, const Equilibrium& equi
   check(MatMatMult(across, interface.B, MAT_INITIAL_MATRIX, PETSC_DEFAULT, S.put()));
   check(MatTransposeMatMult(S, S, MAT_INITIAL_MATRIX, PETSC_DEFAULT, Cf.put()));
   return Cf;
+}
+
+Owned<Mat> sliding_damping(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium)
+{
+  Owned<Mat> C;
+  check(MatDuplicate(structure.C, MAT_COPY_VALUES, C.put()));
+  if (!interface.direction_damping) return C;
+  const Owned<Mat> Cf = direction_damping(interface, equilibrium);
+  if (Cf.get()) check(MatAXPY(C, 1, Cf, UNKNOWN_NONZERO_PATTERN));
+  return C;
+}
+
+std::vector<std::complex<double>> normal_reactions(const ClosedContact& contact, const Structure& structure, Mat C,
+                                                   std::complex<double> s, Vec real, Vec imaginary)
+{
+  const Owned<Vec> force_r = zeros_like(real), force_i = zeros_like(real);
+  quadratic_residual(structure.M, C, structure.K, s, real, imaginary, force_r, force_i);
+  Owned<Vec> reaction;
+  check(MatCreateVecs(contact.reaction, nullptr, reaction.put()));
+  check(MatMult(contact.reaction, force_r, reaction));
+  const std::vector<double> first = whole(reaction);
+  check(MatMult(contact.reaction, force_i, reaction));
+  const std::vector<double> second = whole(reaction);
+  std::vector<std::complex<double>> result;
+  for (std::size_t i = 0; i < first.size(); ++i) result.emplace_back(first[i], second[i]);
+  return result;
 }
 
 } // namespace squeal

@@ -127,7 +127,7 @@ Owned<KSP> static_solver(Mat A)
   check(KSPGetPC(solver, &factor));
   check(PCSetType(factor, PCCHOLESKY));
   check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
-  check(KSPSetOptionsPrefix(solver, "modes_static_"));
+  check(KSPSetOptionsPrefix(solver, "modes_"));
   check(KSPSetFromOptions(solver));
   return solver;
 }

@@ -106,7 +106,7 @@ Owned<EPS> make_solver(Mat M, Mat K, int count, double shift)
   check(KSPGetPC(solver, &factor));
   check(PCSetType(factor, PCCHOLESKY));
   check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
-  check(EPSSetOptionsPrefix(eps, "modes_real_"));
+  check(EPSSetOptionsPrefix(eps, "modes_"));
   check(EPSSetFromOptions(eps));
   return eps;
 }

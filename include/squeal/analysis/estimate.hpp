@@ -1,26 +1,37 @@
 #pragma once
-/// Energy estimate of the cycle's amplitude (paper, eqs. 9-19; method, section 5): U = u0 + q Re(phi exp(i omega t)),
-/// P_C(q)/E(q) = P_R(q)/E(q) with an interface force that saturates by lift-off and by slip reversal.
+/// Energy estimate of the cycle's amplitude (paper, eqs. 9-19; method, section 5): the motion is taken to be
+///     u = u0 + q Re(phi e^{i w t}),  w = Im(lambda),
+/// and q is sought for which the interface gives what the damping takes, P_R(q)/E = P_C/E, means over a period:
+///     P_C = mean u'.C u',   P_R = mean sum w.(r_t - r_t0),  w = B_t u',
+///     r_n = max(0, r_n0 + q Re(rho e^{i w t})),   r_t = -mu r_n s/|s|,   s = w - v_d:
+/// the interface force saturates by lift-off and by reversal of the sliding. rho is what this motion takes in the rows
+/// of the eliminated degrees of freedom at s = i w: it differs from the mode's own reaction, at lambda, by
+/// Re(lambda)/w.
+///
+/// E is twice the mean kinetic energy, which is the mean energy of a free vibration (friction makes the mean potential
+/// energy of the mode differ). Then (P_R - P_C)/E -> 2 Re(lambda) as q -> 0, up to that difference of rho, provided the
+/// modes have the damping of the friction direction, which the law above always has.
+/// The balance over-estimates the cycle, as a rule by 1.3 to 2.7.
 #include "squeal/analysis/modes.hpp"
 
 namespace squeal
 {
 
-/// outcome: "balance", "no balance" (the curve has no root; never a number that is not one), "skipped".
-/// residual: |P_R - P_C| / P_C at the root.
+/// outcome: "balance", "no balance" (the curve has no root; never a number that is not one), "skipped" (the mode does
+/// not vibrate). residual: |P_R - P_C| over the larger of P_C and the linear P_R, at the root; iterations: of the root.
 struct Estimate
 {
   Outcome outcome;
   double amplitude = 0;            // q [m], the mode's largest entry being 1; 0 without balance
-  double lift_off_amplitude = 0;   // [m] min r_n0/|rho|
-  double reversal_amplitude = 0;   // [m] first slip reversal
+  double lift_off_amplitude = 0;   // [m] min r_n0/|rho|; infinite where no reaction fluctuates
+  double reversal_amplitude = 0;   // [m] first q at which some pair's sliding along the drive stops; or infinite
   double damping_rate = 0;         // P_C/E [1/s], independent of q
   double friction_rate_linear = 0; // P_R/E as q -> 0 [1/s]; friction - damping = 2 Re(lambda)
   double phase = 0;                // [rad] turn of phi for which the smallest normal reaction at t = 0 is largest
   std::vector<double> curve_amplitude, curve_rate; // q [m] and P_R/E [1/s]
 };
 
-/// Options, prefix -estimate_: starting multiple of lift-off without balance is the user's of the result.
+/// No options. The phase is that of the amplitude found, or of first lift-off without balance.
 Estimate estimate_amplitude(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                             const ComplexMode& mode);
 

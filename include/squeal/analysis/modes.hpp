@@ -47,7 +47,7 @@ struct Modes
   std::string count_check; // how the count of unstable modes was confirmed by a second means, or why it was not
 };
 
-/// Options, prefix -modes_real_: the solver's own eps_, st_; and -modes_dense_limit as below.
+/// Options, prefix -modes_: dense_limit as below, and the solver's own eps_ and st_.
 RealModes find_real_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                           int count);
 

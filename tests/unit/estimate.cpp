@@ -1,0 +1,92 @@
+// ranks: 1 2 3
+#include "squeal/analysis/estimate.hpp"
+#include "../support/sliding_oscillator.hpp"
+
+#include <cmath>
+#include <doctest/doctest.h>
+
+using namespace squeal;
+using namespace squeal::test;
+
+namespace
+{
+
+struct Found
+{
+  Estimate estimate;
+  ComplexMode mode;
+  Equilibrium equilibrium;
+  double per_y = 0; // |phi| of y: the published amplitudes are those of y
+};
+
+Found estimate_of(double mu, double belt_speed)
+{
+  const SmallModel oscillator = unilateral_oscillator(mu, belt_speed);
+  Found found;
+  found.equilibrium = sliding_equilibrium(oscillator);
+  ModesSettings settings;
+  settings.band = 1;
+  Modes modes = find_modes(oscillator.structure, oscillator.interface, found.equilibrium, settings);
+  found.mode = std::move(modes.modes.at(0));
+  found.per_y = std::hypot(whole(found.mode.real)[1], whole(found.mode.imaginary)[1]);
+  found.estimate = estimate_amplitude(oscillator.structure, oscillator.interface, found.equilibrium, found.mode);
+  return found;
+}
+
+} // namespace
+
+// Exact: roots of the same balance by SciPy's adaptive quadrature between events. Published: the force jumps where
+// sliding reverses, and the published roots are 2e-5 off, as those of an equidistant rule are.
+TEST_CASE("the energy balance of the unilateral oscillator has its exact roots")
+{
+  const struct
+  {
+    double V, exact, published;
+  } cases[] = {{.6, .471991674487, .471996196}, {1, .796805571968, .796797853}, {2, 1.612609298722, 1.612637123}};
+  for (const auto& [V, exact, published] : cases)
+  {
+    const Found found = estimate_of(.3, V);
+    CHECK(found.estimate.outcome.word == "balance");
+    CHECK(found.estimate.amplitude * found.per_y == doctest::Approx(exact).epsilon(1e-10));
+    CHECK(found.estimate.amplitude * found.per_y == doctest::Approx(published).epsilon(2e-5));
+    CHECK(found.estimate.outcome.residual < 1e-11);
+  }
+}
+
+// A belt so fast that the sliding never reverses within the six decades leaves lift-off alone.
+TEST_CASE("lift-off alone balances weak friction and not strong friction")
+{
+  const Found weak = estimate_of(.18, 1e9), strong = estimate_of(.3, 1e9);
+  CHECK(weak.estimate.amplitude * weak.per_y == doctest::Approx(1.574918604).epsilon(2e-9));
+  CHECK(strong.estimate.outcome.word == "no balance");
+  CHECK(strong.estimate.amplitude == 0);
+}
+
+TEST_CASE("at small amplitude the interface and the damping make the mode's growth")
+{
+  for (const double mu : {.3, .18})
+  {
+    const Found found = estimate_of(mu, 1);
+    const Estimate& estimate = found.estimate;
+    const double growth = 2 * found.mode.growth_rate();
+    // The reaction is taken at i w instead of lambda, which leaves the inertia of one row times the growth: 1 % here.
+    CHECK(estimate.friction_rate_linear - estimate.damping_rate == doctest::Approx(growth).epsilon(.015));
+    // Two decades below the first event, where the curve starts, the force is linear: quadrature and rounding only.
+    CHECK(estimate.curve_rate[0] == doctest::Approx(estimate.friction_rate_linear).epsilon(1e-10));
+  }
+}
+
+TEST_CASE("the start has its reaction at the largest, and is the mode's own motion")
+{
+  const Found found = estimate_of(.3, 1);
+  const std::complex<double> rho = found.mode.reactions[0] * std::polar(1., found.estimate.phase);
+  CHECK(rho.real() == doctest::Approx(std::abs(rho)).epsilon(1e-12));
+  const double q = .01, h = 1e-4;
+  const State start = mode_state(found.equilibrium, found.mode, q, found.estimate.phase);
+  const std::complex<double> later = std::exp(found.mode.lambda * h);
+  const State next =
+      mode_state(found.equilibrium, found.mode, q * std::abs(later), found.estimate.phase + std::arg(later));
+  const std::vector<double> u = whole(start.u), v = whole(start.v), u_next = whole(next.u), v_next = whole(next.v);
+  for (std::size_t i = 0; i < 3; ++i) // trapezoidal rule, error h^3/12 of a motion of size q
+    CHECK(std::abs(u_next[i] - u[i] - h * (v[i] + v_next[i]) / 2) < 1e-12 * q);
+}
