@@ -217,6 +217,13 @@ void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Mode
   }
 }
 
+/// Samples are spread evenly over the steps of the period and end with its last one [s].
+double sample_time(const LimitCycle& cycle, std::size_t sample)
+{
+  const double steps = cycle.steps_per_period, samples = static_cast<double>(cycle.displacements.size());
+  return std::ceil(static_cast<double>(sample + 1) * steps / samples) * cycle.period / steps;
+}
+
 } // namespace
 
 void write_fields(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
@@ -248,7 +255,7 @@ void write_fields(const Report& report, const Scene& scene, const Model& model, 
   for (std::size_t i = 0; i < samples.size(); ++i)
   {
     write_displacement(file, gather, samples[i], cycle_data(i), comm);
-    layout.time.push_back(static_cast<double>(i) * report.cycle.period / static_cast<double>(samples.size()));
+    layout.time.push_back(sample_time(report.cycle, i));
   }
   on_rank_zero(comm,
                [&]

@@ -108,6 +108,17 @@ Json newton_list(const std::vector<NewtonRecord>& records)
   return list;
 }
 
+Json multiplier_entry(const LimitCycle& cycle)
+{
+  Json list = Json::array();
+  for (const std::complex<double>& multiplier : cycle.multipliers)
+    list.push_back({{"real", multiplier.real()}, {"imaginary", multiplier.imag()}});
+  return {{"stability", cycle.stability},
+          {"trivial_error", cycle.trivial_error},
+          {"periods_integrated", cycle.multiplier_periods},
+          {"values", list}};
+}
+
 Json cycle_entry(const LimitCycle& cycle, const Scene& scene)
 {
   Json entry = entry_of(cycle.outcome);
@@ -129,6 +140,7 @@ Json cycle_entry(const LimitCycle& cycle, const Scene& scene)
   const std::size_t probes = std::min(scene.probes.size(), cycle.peak_to_peak.size());
   for (std::size_t i = 0; i < probes; ++i) swings[scene.probes[i].name] = cycle.peak_to_peak[i];
   entry["peak_to_peak"] = swings;
+  if (!cycle.multipliers.empty()) entry["multipliers"] = multiplier_entry(cycle);
   entry["newton"] = newton_list(cycle.records);
   return entry;
 }

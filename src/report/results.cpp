@@ -41,15 +41,18 @@ std::string provenance()
 
 std::vector<std::pair<std::string, std::string>> versions()
 {
-  char petsc[256], slepc[256];
-  check(PetscGetVersion(petsc, sizeof petsc));
-  check(SlepcGetVersion(slepc, sizeof slepc));
-  unsigned major = 0, minor = 0, release = 0;
-  H5get_libversion(&major, &minor, &release);
-  const std::string hdf5 = std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(release);
-  // "Petsc Release Version 3.18.5, Feb 28, 2023 " tells more than its number.
-  std::vector<std::pair<std::string, std::string>> list = {
-      {"squeal", SQUEAL_VERSION}, {"petsc", petsc}, {"slepc", slepc}, {"mumps", MUMPS_VERSION}, {"hdf5", hdf5}};
+  const auto number = [](auto major, auto minor, auto release)
+  { return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(release); };
+  PetscInt major = 0, minor = 0, release = 0;
+  unsigned hdf5_major = 0, hdf5_minor = 0, hdf5_release = 0;
+  std::vector<std::pair<std::string, std::string>> list = {{"squeal", SQUEAL_VERSION}};
+  check(PetscGetVersionNumber(&major, &minor, &release, nullptr));
+  list.emplace_back("petsc", number(major, minor, release));
+  check(SlepcGetVersionNumber(&major, &minor, &release, nullptr));
+  list.emplace_back("slepc", number(major, minor, release));
+  list.emplace_back("mumps", MUMPS_VERSION);
+  H5get_libversion(&hdf5_major, &hdf5_minor, &hdf5_release);
+  list.emplace_back("hdf5", number(hdf5_major, hdf5_minor, hdf5_release));
 #ifdef SQUEAL_WITH_GMSH
   list.emplace_back("gmsh", GMSH_API_VERSION);
 #endif

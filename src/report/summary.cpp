@@ -2,6 +2,7 @@
 #include "squeal/report/parts.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
@@ -35,7 +36,8 @@ std::string outcome_text(const Outcome& outcome)
 {
   if (outcome.word.empty()) return "skipped";
   std::string word = outcome.word;
-  const bool good = word == "converged" || word == "balance" || word == "completed" || !ran(outcome);
+  const bool good =
+      word == "converged" || word == "balance" || word == "completed" || word == "no balance" || !ran(outcome);
   if (!good) std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::toupper(c); });
   return word + (outcome.reason.empty() ? "" : ": " + outcome.reason);
 }
@@ -109,8 +111,11 @@ std::string cycle_text(const LimitCycle& cycle, const Scene& scene)
 {
   std::string text = row("cycle", outcome_text(cycle.outcome));
   if (!ran(cycle.outcome)) return text;
-  text += row("", format("residual: full space %.2e (tolerance %.0e), projected %.2e", cycle.residual_full,
-                         scene.cycle.tolerance, cycle.residual_projected));
+  const std::string projected =
+      std::isfinite(cycle.residual_projected) ? format("%.2e", cycle.residual_projected) : std::string("not tried");
+  text += row(
+      "", format("residual: full space %.2e (tolerance %.0e), projected ", cycle.residual_full, scene.cycle.tolerance) +
+              projected);
   text += row("", format("%d Newton steps, %ld periods integrated, %d steps a period", cycle.newton_iterations,
                          cycle.periods_integrated, cycle.steps_per_period));
   if (cycle.outcome.word != "converged") return text; // the figures of no cycle would mislead
@@ -118,6 +123,9 @@ std::string cycle_text(const LimitCycle& cycle, const Scene& scene)
   text += row("", format("mean energy %.7g J, fluctuating %.7g J", cycle.mean_energy, cycle.mean_fluctuating_energy));
   text += row("", format("open pairs: %.2f on average, %d at most; sticking: %d at most", cycle.open_pairs_mean,
                          cycle.open_pairs_max, cycle.stick_pairs_max));
+  if (!cycle.multipliers.empty())
+    text += row("", format("%s: largest multiplier %.6f, error bar %.1e", cycle.stability.c_str(),
+                           std::abs(cycle.multipliers.front()), cycle.trivial_error));
   const std::size_t probes = std::min(scene.probes.size(), cycle.peak_to_peak.size());
   for (std::size_t i = 0; i < probes; ++i)
     text += row("", format("probe %s: %.6g m peak to peak", scene.probes[i].name.c_str(), cycle.peak_to_peak[i]));
