@@ -22,6 +22,7 @@ struct FullSpace
   Orbit orbit; // evaluated last, at state `at`
   Owned<Vec> at, phase, anchor;
   Orbit best;
+  int vanished = 0; // points met whose fluctuation is next to nothing
   std::exception_ptr failure;
 };
 
@@ -118,6 +119,7 @@ PetscErrorCode function(SNES, Vec z, Vec R, void* context)
                    if (!same)
                    {
                      Orbit orbit = evaluate(full.shooting, state, period);
+                     if (vanishing(full.shooting, orbit)) ++full.vanished;
                      if (!std::isfinite(orbit.residual) || vanishing(full.shooting, orbit)) return;
                      full.orbit = std::move(orbit);
                      check(VecCopy(z, full.at));
@@ -210,6 +212,8 @@ PetscErrorCode converged(SNES, PetscInt iteration, PetscReal, PetscReal, PetscRe
                    *reason = SNES_CONVERGED_ITERATING;
                    if (full.orbit.residual <= shooting.tolerance)
                      *reason = SNES_CONVERGED_FNORM_ABS;
+                   else if (full.vanished > 1)
+                     *reason = SNES_DIVERGED_FUNCTION_DOMAIN; // Newton leads to rest
                    else if (shooting.periods >= shooting.options.max_periods)
                      *reason = SNES_DIVERGED_FUNCTION_COUNT;
                  });
@@ -244,6 +248,9 @@ void set_up(SNES snes, FullSpace& full, Mat J, Vec R)
   PC pc = nullptr;
   check(SNESGetKSP(snes, &ksp));
   check(KSPGetPC(ksp, &pc));
+  PetscBool standard = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &standard));
+  if (!standard) return; // the user's choice
   check(PCShellSetContext(pc, &full));
   check(PCShellSetName(pc, "real modes, bordered"));
   check(PCShellSetApply(pc, precondition));
@@ -266,6 +273,7 @@ Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start)
                  zeros_like(start.rate),
                  copy_of(start.state),
                  copy_of(start),
+                 0,
                  {}};
   const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(displacement(start.state)));
   PetscInt local = 0;
@@ -288,7 +296,8 @@ Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start)
   if (full.failure) std::rethrow_exception(full.failure);
   check(code);
   const bool done = full.best.residual <= shooting.tolerance;
-  return {std::move(full.best), done ? Ending::converged : Ending::stalled};
+  const Ending other = full.vanished > 1 ? Ending::vanished : Ending::stalled;
+  return {std::move(full.best), done ? Ending::converged : other};
 }
 
 } // namespace squeal

@@ -194,37 +194,44 @@ PetscErrorCode solve_least_squares(PC pc, Vec b, Vec x)
                  });
 }
 
-PetscErrorCode monitor(SNES, PetscInt iteration, PetscReal norm, void* context)
+/// Stops, besides the usual reasons, when the iterate falls onto the equilibrium (where any residual vanishes), and
+/// when what is left lies outside the base and a full-space finish follows.
+PetscErrorCode converged(SNES snes, PetscInt iteration, PetscReal step, PetscReal change, PetscReal norm,
+                         SNESConvergedReason* reason, void* context)
 {
   Reduced& reduced = *static_cast<Reduced*>(context);
+  PetscCall(SNESConvergedDefault(snes, iteration, step, change, norm, reason, nullptr));
   return guarded(reduced,
                  [&]
                  {
-                   record(reduced.shooting, reduced.stage, static_cast<int>(reduced.size()), norm, reduced.orbit);
-                   reduced.shooting.residual_projected = norm;
-                   if (iteration > 0) ++reduced.shooting.iterations;
+                   Shooting& shooting = reduced.shooting;
+                   const double projected = norm * reduced.scale / reduced.orbit.fluctuation;
+                   record(shooting, reduced.stage, static_cast<int>(reduced.size()), projected, reduced.orbit);
+                   shooting.residual_projected = projected;
+                   if (iteration > 0) ++shooting.iterations;
+                   if (*reason != SNES_CONVERGED_ITERATING) return;
+                   if (vanishing(shooting, reduced.orbit))
+                     *reason = SNES_DIVERGED_DTOL;
+                   else if (shooting.periods >= shooting.options.max_periods)
+                     *reason = SNES_DIVERGED_FUNCTION_COUNT;
+                   else if (shooting.options.finish != "none" && projected < 0.1 * reduced.orbit.residual)
+                     *reason = SNES_CONVERGED_FNORM_RELATIVE;
                  });
 }
 
-Owned<SNES> make_solver(Reduced& reduced, Mat J, Vec R)
+/// The solver with its defaults and the user's options.
+Owned<SNES> make_solver(const ShootingOptions& options, double tolerance)
 {
   Owned<SNES> snes;
   check(SNESCreate(PETSC_COMM_SELF, snes.put()));
   check(SNESSetOptionsPrefix(snes, "cycle_"));
-  check(SNESSetFunction(snes, R, function, &reduced));
-  check(SNESSetJacobian(snes, J, J, jacobian, &reduced));
-  check(SNESMonitorSet(snes, monitor, &reduced, nullptr));
-  check(
-      SNESSetTolerances(snes, 0.1 * reduced.shooting.tolerance, 0, 0, reduced.shooting.options.reduced_newtons, 1000));
+  check(SNESSetTolerances(snes, 0.1 * tolerance, 0, 0, options.reduced_newtons, 1000));
   KSP ksp = nullptr;
   PC pc = nullptr;
   check(SNESGetKSP(snes, &ksp));
   check(KSPSetType(ksp, KSPPREONLY));
   check(KSPGetPC(ksp, &pc));
   check(PCSetType(pc, PCSHELL));
-  check(PCShellSetContext(pc, &reduced));
-  check(PCShellSetName(pc, "least squares by singular values"));
-  check(PCShellSetApply(pc, solve_least_squares));
   SNESLineSearch search = nullptr;
   check(SNESGetLineSearch(snes, &search));
   check(SNESLineSearchSetType(search, SNESLINESEARCHBT));
@@ -233,7 +240,29 @@ Owned<SNES> make_solver(Reduced& reduced, Mat J, Vec R)
   return snes;
 }
 
+void set_up(SNES snes, Reduced& reduced, Mat J, Vec R)
+{
+  check(SNESSetFunction(snes, R, function, &reduced));
+  check(SNESSetJacobian(snes, J, J, jacobian, &reduced));
+  check(SNESSetConvergenceTest(snes, converged, &reduced, nullptr));
+  KSP ksp = nullptr;
+  PC pc = nullptr;
+  PetscBool standard = PETSC_FALSE;
+  check(SNESGetKSP(snes, &ksp));
+  check(KSPGetPC(ksp, &pc));
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &standard));
+  if (!standard) return; // the user's choice
+  check(PCShellSetContext(pc, &reduced));
+  check(PCShellSetName(pc, "least squares by singular values"));
+  check(PCShellSetApply(pc, solve_least_squares));
+}
+
 } // namespace
+
+void declare_reduced_options()
+{
+  (void)make_solver({}, 0);
+}
 
 Orbit shoot_reduced(Shooting& shooting, const Orbit& start, const std::vector<Owned<Vec>>& base,
                     const std::string& stage)
@@ -253,7 +282,8 @@ Orbit shoot_reduced(Shooting& shooting, const Orbit& start, const std::vector<Ow
   check(MatCreateSeqDense(PETSC_COMM_SELF, reduced.size(), reduced.size(), nullptr, J.put()));
   check(MatCreateVecs(J, y.put(), R.put()));
   check(VecSet(y, 0));
-  const Owned<SNES> snes = make_solver(reduced, J, R);
+  const Owned<SNES> snes = make_solver(shooting.options, shooting.tolerance);
+  set_up(snes, reduced, J, R);
   const PetscErrorCode code = SNESSolve(snes, nullptr, y);
   if (reduced.failure) std::rethrow_exception(reduced.failure);
   check(code);

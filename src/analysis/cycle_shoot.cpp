@@ -134,6 +134,7 @@ LimitCycle shoot(const Flow& flow, const ShootingStart& start, const RealModePre
   shooting.first_period = start.period;
   shooting.tolerance = tolerance;
   shooting.residual_projected = std::nan("");
+  declare_reduced_options();
   declare_fallback_options();
   Progress progress(PetscObjectComm(reinterpret_cast<PetscObject>(start.u)), "cycle", free + 60.);
   shooting.announce = [&](const NewtonRecord& entry)

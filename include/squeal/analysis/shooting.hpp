@@ -93,7 +93,8 @@ struct Finish
 Finish shoot_multisecant(Shooting& shooting, const Orbit& start);
 Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start);
 
-/// Makes the fallback's options known to the library even when it never runs.
+/// Make the solvers' options known to the library even when they never run.
+void declare_reduced_options();
 void declare_fallback_options();
 
 /// x = P^-1 b - t P^-1 d and t of the bordered system [J d; f' 0] (x, t) = (b, border), J replaced by P.
