@@ -190,9 +190,13 @@ void symmetrise(std::vector<double>& W, std::size_t n)
 
 Factored factor_positive(Mat A)
 {
-  check(MatSetOption(A, MAT_SPD, PETSC_TRUE));
+  PetscBool known = PETSC_FALSE, positive = PETSC_FALSE;
+  check(MatIsSPDKnown(A, &known, &positive));
+  check(MatSetOption(A, MAT_SPD, PETSC_TRUE)); // MUMPS then takes L L'
   Factored result;
   result.factor = factor_by_mumps(A);
+  // whether it is true is only known now, and a copy of A may be shifted: leave no claim behind
+  if (!(known && positive)) check(MatSetOption(A, MAT_SPD, PETSC_FALSE));
   Owned<Vec> D;
   check(MatCreateVecs(A, D.put(), nullptr));
   check(MatGetDiagonal(A, D));

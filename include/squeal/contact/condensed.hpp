@@ -22,8 +22,9 @@ CondensedOperator condense(Mat A, const Interface& interface, double scale, cons
 /// x = A^-1 b with the factor.
 void solve(const CondensedOperator& condensed, Vec b, Vec x);
 
-/// The parts of `condense`. A is marked symmetric positive definite; `loose`: the degree of freedom that moves most in
-/// a motion that A resists with less than rounding of its diagonal, if there is one (the factor is then of no use).
+/// The parts of `condense`, for A symmetric and meant to be positive definite; `loose`: the degree of freedom that
+/// moves most in a motion that A resists with less than rounding of its diagonal, if there is one (the factor is then
+/// of no use).
 struct Factored
 {
   Owned<Mat> factor;

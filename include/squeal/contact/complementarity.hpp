@@ -1,0 +1,58 @@
+#pragma once
+/// Unilateral contact with friction of known direction, as a linear complementarity problem in gaps and reactions:
+///     N g = q + M r,   0 <= g _|_ r >= 0.
+/// N is the identity, unless the structure is held by contact only (analysis/equilibrium.hpp says how it arises).
+///
+/// Status iteration: with the pairs split into closed (g = 0) and open (r = 0) the problem is linear; every pair whose
+/// sign is wrong changes status. When that stops reducing their number, only the last one does: block principal
+/// pivoting (Judice and Pires 1994), finite when M is a P-matrix, that is as long as friction is not too large. Beyond,
+/// a split met twice ends it.
+#include <string>
+#include <vector>
+
+namespace squeal
+{
+
+struct ComplementarityProblem
+{
+  std::vector<double> N, M; // row-major; N empty: identity
+  std::vector<double> q;    // [m] gaps without reactions
+  double compliance = 0;    // [m/N] typical of M: reactions times it are compared with gaps
+};
+
+struct SplitSolution
+{
+  std::vector<double> gap, reaction; // [m, N], zero by the split where they are not unknown
+  double defect = 0;                 // of the linear equations, relative: not small if the split is singular
+};
+
+/// N g - M r = rhs with g = 0 on closed pairs and r = 0 on open ones; least squares where that is singular.
+SplitSolution solve_split(const ComplementarityProblem& problem, const std::vector<char>& closed,
+                          const std::vector<double>& rhs);
+
+/// outcome: "converged", "cycles", "singular" (a split whose signs fit does not balance), "not converged".
+struct StatusSolution
+{
+  std::string outcome;
+  int iterations = 0;
+  std::vector<char> closed;
+  std::vector<double> gap, reaction; // [m, N]
+};
+
+StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, int max_iterations);
+
+/// r <- max(0, r - rho g), g = q + M r; N must be the identity. `rho` is halved when the residual grows.
+struct ProjectionSolution
+{
+  int iterations = 0;
+  double residual = 0; // |r - max(0, r - g/compliance)| over the largest reaction
+  std::vector<double> reaction;
+};
+
+ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
+                                       int max_iterations);
+
+/// Largest eigenvalue of a square matrix with non-negative spectrum, by power iteration [a lower bound].
+double largest_eigenvalue(const std::vector<double>& matrix, std::size_t n);
+
+} // namespace squeal

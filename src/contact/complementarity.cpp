@@ -1,0 +1,210 @@
+#include "squeal/contact/complementarity.hpp"
+
+#include "squeal/base/petsc.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <petscblaslapack.h>
+#include <set>
+
+namespace squeal
+{
+
+namespace
+{
+
+constexpr double sign_tolerance = 1e-10; // of the largest unknown: what rounding leaves of a grazing pair
+constexpr double defect_tolerance = 1e-9;
+
+using Dense = std::vector<double>; // column-major, as LAPACK wants it
+
+Dense split_matrix(const ComplementarityProblem& problem, const std::vector<char>& closed)
+{
+  const std::size_t n = problem.q.size();
+  Dense matrix(n * n, 0.);
+  for (std::size_t j = 0; j < n; ++j)
+    for (std::size_t i = 0; i < n; ++i)
+    {
+      const double open_entry = problem.N.empty() ? (i == j ? 1. : 0.) : problem.N[i * n + j];
+      matrix[j * n + i] = closed[j] ? -problem.M[i * n + j] / problem.compliance : open_entry;
+    }
+  return matrix;
+}
+
+double relative_defect(const Dense& matrix, const Dense& x, const std::vector<double>& rhs)
+{
+  const std::size_t n = rhs.size();
+  Dense residual = rhs;
+  double scale = 0, defect = 0;
+  for (std::size_t j = 0; j < n; ++j)
+    for (std::size_t i = 0; i < n; ++i) residual[i] -= matrix[j * n + i] * x[j];
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    scale = std::max({scale, std::abs(rhs[i]), std::abs(x[i])});
+    defect = std::max(defect, std::abs(residual[i]));
+  }
+  return scale > 0 ? defect / scale : 0;
+}
+
+/// False if a pivot is lost in rounding.
+bool solve_by_lu(Dense matrix, std::vector<double>& x)
+{
+  PetscBLASInt n = 0, one = 1, info = 0;
+  check(PetscBLASIntCast(static_cast<PetscInt>(x.size()), &n));
+  std::vector<PetscBLASInt> pivots(x.size());
+  LAPACKgetrf_(&n, &n, matrix.data(), &n, pivots.data(), &info);
+  if (info != 0) return false;
+  double least = std::abs(matrix[0]), largest = 0;
+  for (std::size_t i = 0; i < x.size(); ++i)
+  {
+    least = std::min(least, std::abs(matrix[i * x.size() + i]));
+    largest = std::max(largest, std::abs(matrix[i * x.size() + i]));
+  }
+  if (!(least > 1e-13 * largest)) return false;
+  LAPACKgetrs_("N", &n, &one, matrix.data(), &n, pivots.data(), x.data(), &n, &info);
+  return info == 0;
+}
+
+/// The shortest of the least-squares solutions: pairs that share a rigid face share its load evenly.
+void solve_by_svd(Dense matrix, std::vector<double>& x)
+{
+  PetscBLASInt n = 0, one = 1, rank = 0, info = 0;
+  check(PetscBLASIntCast(static_cast<PetscInt>(x.size()), &n));
+  PetscBLASInt length = 10 * n + 64;
+  const PetscReal cut = 1e-12;
+  std::vector<PetscReal> singular(x.size()), work(static_cast<std::size_t>(length));
+  LAPACKgelss_(&n, &n, &one, matrix.data(), &n, x.data(), &n, singular.data(), &cut, &rank, work.data(), &length,
+               &info);
+  if (info != 0) throw Error("LAPACK gelss: the singular values of a contact matrix did not converge");
+}
+
+std::vector<double> gaps(const ComplementarityProblem& problem, const std::vector<double>& r)
+{
+  const std::size_t n = problem.q.size();
+  std::vector<double> g = problem.q;
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j) g[i] += problem.M[i * n + j] * r[j];
+  return g;
+}
+
+} // namespace
+
+SplitSolution solve_split(const ComplementarityProblem& problem, const std::vector<char>& closed,
+                          const std::vector<double>& rhs)
+{
+  const std::size_t n = problem.q.size();
+  SplitSolution solution;
+  solution.gap.assign(n, 0.);
+  solution.reaction.assign(n, 0.);
+  if (n == 0) return solution;
+  const Dense matrix = split_matrix(problem, closed);
+  std::vector<double> x = rhs;
+  // LAPACK's singular values do not come to an end on what is not a number
+  const auto finite = [](double value) { return std::isfinite(value); };
+  if (!std::all_of(matrix.begin(), matrix.end(), finite) || !std::all_of(x.begin(), x.end(), finite))
+    throw Error("contact at rest: the compliance of the pairs is not a finite number");
+  if (!solve_by_lu(matrix, x))
+  {
+    x = rhs;
+    solve_by_svd(matrix, x);
+  }
+  solution.defect = relative_defect(matrix, x, rhs);
+  for (std::size_t i = 0; i < n; ++i)
+    if (closed[i])
+      solution.reaction[i] = x[i] / problem.compliance;
+    else
+      solution.gap[i] = x[i];
+  return solution;
+}
+
+StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, int max_iterations)
+{
+  const std::size_t n = problem.q.size();
+  constexpr int patience = 10;
+  StatusSolution result;
+  std::size_t fewest = n + 1;
+  int tries = patience;
+  std::set<std::vector<char>> met; // while pairs change one at a time
+  for (result.iterations = 1; result.iterations <= max_iterations; ++result.iterations)
+  {
+    const SplitSolution split = solve_split(problem, closed, problem.q);
+    double scale = 0;
+    for (std::size_t i = 0; i < n; ++i)
+      scale = std::max({scale, std::abs(split.gap[i]), problem.compliance * std::abs(split.reaction[i])});
+    std::vector<std::size_t> wrong;
+    for (std::size_t i = 0; i < n; ++i)
+      if (std::min(split.gap[i], problem.compliance * split.reaction[i]) < -sign_tolerance * scale) wrong.push_back(i);
+    if (wrong.empty())
+    {
+      result.outcome = split.defect <= defect_tolerance ? "converged" : "singular";
+      result.gap = split.gap;
+      result.reaction = split.reaction;
+      for (double& value : result.gap) value = std::max(0., value);
+      for (double& value : result.reaction) value = std::max(0., value);
+      result.closed = std::move(closed);
+      return result;
+    }
+    tries = wrong.size() < fewest ? patience : tries - 1;
+    fewest = std::min(fewest, wrong.size());
+    if (tries == patience) met.clear();
+    if (tries < 0)
+    {
+      if (!met.insert(closed).second) break;
+      wrong = {wrong.back()};
+    }
+    for (const std::size_t i : wrong) closed[i] = !closed[i];
+  }
+  result.outcome = result.iterations <= max_iterations ? "cycles" : "not converged";
+  result.closed = std::move(closed);
+  return result;
+}
+
+ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
+                                       int max_iterations)
+{
+  const std::size_t n = problem.q.size();
+  ProjectionSolution result;
+  result.reaction.assign(n, 0.);
+  double best = HUGE_VAL;
+  for (;; ++result.iterations)
+  {
+    const auto g = gaps(problem, result.reaction);
+    double error = 0, scale = 0, pull = 0;
+    for (std::size_t i = 0; i < n; ++i)
+    {
+      const double r = result.reaction[i], shift = g[i] / problem.compliance;
+      error = std::max(error, std::abs(r - std::max(0., r - shift)));
+      scale = std::max(scale, r);
+      pull = std::max(pull, std::abs(problem.q[i]) / problem.compliance);
+    }
+    result.residual = error == 0 ? 0 : error / (scale > 0 ? scale : pull);
+    best = std::min(best, result.residual);
+    if (result.residual <= tolerance || !std::isfinite(result.residual) || result.iterations >= max_iterations)
+      return result;
+    if (result.iterations % 50 == 49 && result.residual > 10 * best) rho /= 2;
+    for (std::size_t i = 0; i < n; ++i) result.reaction[i] = std::max(0., result.reaction[i] - rho * g[i]);
+  }
+}
+
+double largest_eigenvalue(const std::vector<double>& matrix, std::size_t n)
+{
+  std::vector<double> x(n), y(n);
+  for (std::size_t i = 0; i < n; ++i) x[i] = 1 + .5 * std::sin(7. * static_cast<double>(i) + 1);
+  double size = 0;
+  for (int iteration = 0; iteration < 30; ++iteration)
+  {
+    size = 0;
+    for (const double value : x) size = std::hypot(size, value);
+    if (size == 0) return 0;
+    for (double& value : x) value /= size;
+    for (std::size_t i = 0; i < n; ++i)
+    {
+      y[i] = 0;
+      for (std::size_t j = 0; j < n; ++j) y[i] += matrix[i * n + j] * x[j];
+    }
+    x.swap(y);
+  }
+  return size;
+}
+
+} // namespace squeal

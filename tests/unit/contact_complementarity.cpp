@@ -1,0 +1,132 @@
+// ranks: 1
+#include "squeal/contact/complementarity.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <doctest/doctest.h>
+#include <random>
+
+using namespace squeal;
+
+namespace
+{
+
+double uniform(std::mt19937& random)
+{
+  return std::uniform_real_distribution<double>(-1, 1)(random);
+}
+
+/// D + mu E: a symmetric positive definite part and a friction part of any sign.
+ComplementarityProblem random_problem(std::size_t n, double mu, std::mt19937& random)
+{
+  std::vector<double> H(n * n);
+  for (double& value : H) value = uniform(random);
+  ComplementarityProblem problem;
+  problem.M.assign(n * n, 0.);
+  problem.q.resize(n);
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    problem.q[i] = uniform(random);
+    for (std::size_t j = 0; j < n; ++j)
+    {
+      for (std::size_t k = 0; k < n; ++k) problem.M[i * n + j] += H[i * n + k] * H[j * n + k] / static_cast<double>(n);
+      problem.M[i * n + j] += (i == j ? .1 : 0.) + mu * uniform(random);
+    }
+    problem.compliance = std::max(problem.compliance, std::abs(problem.M[i * n + i]));
+  }
+  return problem;
+}
+
+/// Every split, one after the other: those whose signs fit.
+std::vector<std::vector<double>> all_solutions(const ComplementarityProblem& problem)
+{
+  const std::size_t n = problem.q.size();
+  std::vector<std::vector<double>> found;
+  for (std::size_t bits = 0; bits < (std::size_t{1} << n); ++bits)
+  {
+    std::vector<char> closed(n);
+    for (std::size_t i = 0; i < n; ++i) closed[i] = (bits >> i) & 1;
+    const auto split = solve_split(problem, closed, problem.q);
+    const double least = std::min(*std::min_element(split.gap.begin(), split.gap.end()),
+                                  *std::min_element(split.reaction.begin(), split.reaction.end()));
+    if (least >= 0 && split.defect < 1e-9) found.push_back(split.reaction);
+  }
+  return found;
+}
+
+double difference(const std::vector<double>& a, const std::vector<double>& b)
+{
+  double largest = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
+  return largest;
+}
+
+} // namespace
+
+TEST_CASE("the status iteration finds what trying every split finds")
+{
+  std::mt19937 random(5);
+  for (int trial = 0; trial < 200; ++trial)
+  {
+    const auto problem = random_problem(1 + static_cast<std::size_t>(trial % 8), trial % 2 == 0 ? 0 : .02, random);
+    const auto truth = all_solutions(problem);
+    const auto found = solve_by_status(problem, std::vector<char>(problem.q.size(), trial % 3 == 0), 200);
+    REQUIRE(truth.size() == 1); // little friction: one solution
+    CHECK(found.outcome == "converged");
+    CHECK(difference(found.reaction, truth[0]) < 1e-9); // condition below 1e5
+    const auto projected =
+        solve_by_projection(problem, .5 / largest_eigenvalue(problem.M, problem.q.size()), 1e-12, 100000);
+    CHECK(projected.residual <= 1e-12);
+    CHECK(difference(projected.reaction, truth[0]) < 1e-8);
+  }
+}
+
+TEST_CASE("much friction: a converged status iteration is one of the solutions, and where there is none it says so")
+{
+  std::mt19937 random(9);
+  int none = 0, several = 0;
+  for (int trial = 0; trial < 300; ++trial)
+  {
+    const auto problem = random_problem(5, 2, random);
+    const auto truth = all_solutions(problem);
+    const auto found = solve_by_status(problem, std::vector<char>(5, 1), 200);
+    if (found.outcome == "converged")
+    {
+      double nearest = HUGE_VAL;
+      for (const auto& solution : truth) nearest = std::min(nearest, difference(found.reaction, solution));
+      CHECK(nearest < 1e-6);
+    }
+    else
+      CHECK(found.outcome == "cycles");
+    none += truth.empty() ? 1 : 0;
+    several += truth.size() > 1 ? 1 : 0;
+  }
+  CHECK(std::min(none, several) > 10); // both were met
+}
+
+TEST_CASE("a gap at rounding counts as closed, whatever the unit of force")
+{
+  for (const double factor : {1., 1e-6, 1e6})
+  {
+    ComplementarityProblem problem;
+    problem.M = {2 / factor, 1 / factor, 1 / factor, 2 / factor};
+    problem.q = {-3, -1.5 + 1e-16}; // the second pair just touches under the first one's reaction
+    problem.compliance = 2 / factor;
+    const auto found = solve_by_status(problem, {1, 1}, 10);
+    CHECK(found.outcome == "converged");
+    CHECK(found.iterations == 1);
+    CHECK(std::abs(found.reaction[0] / factor - 1.5) < 1e-15);
+    CHECK(std::abs(found.reaction[1] / factor) < 1e-15);
+  }
+}
+
+TEST_CASE("pairs that share a rigid face share its load evenly")
+{
+  ComplementarityProblem problem;
+  problem.M = std::vector<double>(9, 1.);
+  problem.q = {-6, -6, -6};
+  problem.compliance = 1;
+  const auto found = solve_by_status(problem, {1, 1, 1}, 10);
+  CHECK(found.outcome == "converged");
+  for (const double r : found.reaction) CHECK(std::abs(r - 2) < 1e-13);
+}

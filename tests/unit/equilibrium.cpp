@@ -1,0 +1,167 @@
+// ranks: 1 2 3
+#include "squeal/analysis/equilibrium.hpp"
+
+#include "../support/small_models.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <doctest/doctest.h>
+#include <numeric>
+#include <random>
+
+using namespace squeal;
+
+namespace
+{
+
+/// A rigid block (x, y, theta of a point at the load's height h above the middle of its feet), width b, weight W,
+/// held along the belt's motion by a spring at that height; nothing but contact holds y and theta.
+test::SmallModel overturning_block(double friction, double weight)
+{
+  const double b = .2, h = .15;
+  test::SmallModel model;
+  const test::Rows K = test::diagonal({1e6, 0, 0});
+  model.structure = test::make_structure(test::diagonal({1, 1, 1}), K, K, {0, -weight, 0});
+  model.interface = test::make_interface({{0, 1, b / 2}, {1, 0, h}, {0, 1, -b / 2}, {1, 0, h}}, 1, {0, 0}, {1, 1},
+                                         friction, model.structure.K);
+  return model;
+}
+
+/// A row of pads on springs of their own, joined by weaker ones, above a rigid disc with gaps; two tangential
+/// directions. Plenty of them lift off.
+test::SmallModel random_pads(std::size_t pairs, double friction, double load)
+{
+  std::mt19937 random(4);
+  const auto draw = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const std::size_t n = 3 * pairs;
+  test::Rows K = test::diagonal(std::vector<double>(n, 0.)), B = test::zeros(n, n);
+  const auto join = [&](std::size_t i, std::size_t j, double k)
+  {
+    K[i][i] += k;
+    K[j][j] += k;
+    K[i][j] -= k;
+    K[j][i] -= k;
+  };
+  std::vector<double> force(n, 0.), gap(pairs), drive(2 * pairs);
+  for (std::size_t p = 0; p < pairs; ++p)
+  {
+    for (std::size_t k = 0; k < 3; ++k)
+    {
+      K[3 * p + k][3 * p + k] += draw(1e6, 2e6);
+      B[3 * p + k][3 * p + k] = 1;
+      if (p > 0) join(3 * p + k, 3 * p + k - 3, draw(1e5, 1e6));
+    }
+    join(3 * p, 3 * p + 1, draw(1e5, 5e5)); // sliding couples into pressure
+    force[3 * p] = load * draw(-3, 1);
+    gap[p] = p % 3 == 0 ? 0 : load * draw(-2e-7, 3e-7);
+    drive[2 * p] = draw(-1, 1);
+    drive[2 * p + 1] = draw(.1, 1);
+  }
+  test::SmallModel model;
+  model.structure = test::make_structure(test::diagonal(std::vector<double>(n, 1.)), K, K, force);
+  model.interface = test::make_interface(B, 2, gap, drive, friction, model.structure.K);
+  return model;
+}
+
+} // namespace
+
+TEST_CASE("an overturning block: the feet share the weight as statics says, and it tips above mu = b/(2h)")
+{
+  // moments: r_1 - r_2 = 2 mu W h/b
+  for (const double weight : {100., 1e8, 1e-4})
+    for (const double friction : {0., .2, .4, .6})
+    {
+      const auto model = overturning_block(friction, weight);
+      const auto result = find_equilibrium(model.structure, model.interface);
+      CHECK(result.outcome.word == "converged");
+      const double small = (.5 - friction * .75) * weight, large = weight - small;
+      const std::vector<double>& r = result.reactions;
+      CHECK(std::abs(std::min(r[0], r[2]) - small) < 1e-12 * weight);
+      CHECK(std::abs(std::max(r[0], r[2]) - large) < 1e-12 * weight);
+      CHECK(r[1] == friction * r[0]);
+      CHECK(r[3] == friction * r[2]);
+      CHECK(result.force_residual < 1e-12);
+      CHECK(result.outcome.residual < 1e-12);
+      CHECK(result.closed == std::vector<char>{1, 1});
+    }
+  for (const double friction : {.68, .7, 1., 5.})
+  {
+    const auto model = overturning_block(friction, 100);
+    const auto result = find_equilibrium(model.structure, model.interface);
+    CHECK(result.outcome.word == "no equilibrium");
+    CHECK_FALSE(result.outcome.reason.empty());
+  }
+}
+
+TEST_CASE("pads that partly lift off: every law of the equilibrium, the fixed point's reactions, at any scale of force")
+{
+  std::vector<double> reference;
+  for (const double load : {1., 1e6, 1e-6})
+  {
+    const auto model = random_pads(40, .3, load);
+    const auto result = find_equilibrium(model.structure, model.interface);
+    CHECK(result.outcome.word == "converged");
+    CHECK(result.outcome.residual < 1e-12); // rounding, after settling
+    CHECK(result.check_residual < 1e-12);
+    CHECK(result.force_residual < 1e-13);
+    CHECK(result.check_iterations > 0);
+    CHECK(result.check_difference < 1e-9); // residual 1e-12 times the condition of the compliance
+    const auto motion = test::whole(result.u);
+    const auto e = drive_directions(model.interface);
+    int open = 0;
+    for (std::size_t p = 0; p < 40; ++p)
+    {
+      const double r_n = result.reactions[3 * p], gap = model.interface.gap[p] + motion[3 * p];
+      CHECK(r_n >= 0);
+      CHECK(gap > -1e-20 * load);
+      CHECK((result.closed[p] != 0) == (r_n > 0));
+      CHECK((r_n == 0 || std::abs(gap) < 1e-20 * load)); // gaps of open pairs are 1e-7 load
+      CHECK(result.reactions[3 * p + 1] == .3 * r_n * e[2 * p]);
+      CHECK(result.reactions[3 * p + 2] == .3 * r_n * e[2 * p + 1]);
+      open += result.closed[p] ? 0 : 1;
+    }
+    CHECK(open > 5);
+    CHECK(open < 35);
+    auto relative_reactions = result.reactions;
+    for (double& value : relative_reactions) value /= load;
+    if (reference.empty()) reference = relative_reactions;
+    for (std::size_t i = 0; i < reference.size(); ++i) CHECK(std::abs(relative_reactions[i] - reference[i]) < 1e-12);
+  }
+}
+
+TEST_CASE("the oscillator at rest: closed, with the reaction of both springs")
+{
+  // y: 1.7 y - 0.1 x = -1 and x: 1.1 x - 0.1 y = mu r, r = -1.2 y
+  const double mu = .3, y = -1 / (1.7 - .1 * (.1 - 1.2 * mu) / 1.1), r = -1.2 * y;
+  const auto model = test::unilateral_oscillator(mu, .6);
+  const auto result = find_equilibrium(model.structure, model.interface);
+  CHECK(result.outcome.word == "converged");
+  CHECK(std::abs(result.reactions[0] - r) < 1e-14);
+  CHECK(std::abs(result.reactions[1] - mu * r) < 1e-14);
+  CHECK(std::abs(test::whole(result.u)[1] - y) < 1e-14);
+}
+
+TEST_CASE("a chain that stands on the ground alone carries its weight; lifted, it has no equilibrium")
+{
+  const auto standing = test::mass_spring_chain(9, 2, 1e9, 1e-3, -9.81);
+  const auto result = find_equilibrium(standing.structure, standing.interface);
+  CHECK(result.outcome.word == "converged");
+  CHECK(std::abs(result.reactions[0] - 16 * 9.81) < 1e-9); // 8 masses in all; mass times 1e-12
+  CHECK(std::abs(test::whole(result.u)[0] + 1e-3) < 1e-15);
+  const auto lifted = test::mass_spring_chain(9, 2, 1e9, 1e-3, 9.81);
+  CHECK(find_equilibrium(lifted.structure, lifted.interface).outcome.word == "no equilibrium");
+}
+
+TEST_CASE("far from contact nothing is closed, and a body that nothing can hold is named")
+{
+  const test::Rows K = {{3, -1, 0}, {-1, 2, 0}, {0, 0, 0}}, held = {{3, -1, 0}, {-1, 2, 0}, {0, 0, 1}};
+  const test::Rows B = {{1, 0, 0}, {0, 1, 0}};
+  const auto open = test::make_structure(held, held, held, {-1, -2, 0});
+  const auto result = find_equilibrium(open, test::make_interface(B, 1, {5}, {1}, .3, open.K));
+  CHECK(result.outcome.word == "converged");
+  CHECK(result.closed == std::vector<char>{0});
+  CHECK(result.outcome.residual == 0);
+  const auto loose = test::make_structure(held, held, K, {-1, -2, 0});
+  const auto interface = test::make_interface(B, 1, {0}, {1}, .3, loose.K);
+  CHECK_THROWS_WITH_AS(find_equilibrium(loose, interface), doctest::Contains("dof 2"), Error);
+}
