@@ -128,6 +128,15 @@ void check_held_slave(const MotionTable& table, const Mesh& mesh, const Scene& s
                   "; take the node out of the support, or put the support on the body");
 }
 
+void check_holds_something(MotionTable& table, const Mesh& mesh, const Support& support)
+{
+  for (const int node : nodes_named(mesh, support.on, "support"))
+    for (int c = 0; c < 6; ++c)
+      if (support.fixed[static_cast<std::size_t>(c)] && kind_of(table, node, c) != Kind::absent) return;
+  throw Error("support on " + support.on +
+              ": none of its nodes has a motion that it fixes (nodes of solids have x y z, of shells rx ry rz too)");
+}
+
 void hold_supports(MotionTable& table, const Mesh& mesh, const Scene& scene)
 {
   const auto each = [&](auto work)
@@ -137,6 +146,7 @@ void hold_supports(MotionTable& table, const Mesh& mesh, const Scene& scene)
         for (int c = 0; c < 6; ++c)
           if (support.fixed[static_cast<std::size_t>(c)]) work(support.on, 6 * node + c);
   };
+  for (const Support& support : scene.supports) check_holds_something(table, mesh, support);
   each(
       [&](const std::string&, int motion)
       {

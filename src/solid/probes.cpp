@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
 namespace squeal
 {
@@ -61,7 +62,7 @@ Owned<Mat> matrix_of_rows(const std::vector<Row>& rows, PetscInt local_columns, 
   {
     for (const auto& [column, value] : row)
     {
-      if (value == 0) continue;
+      if (std::abs(value) < 1e-14) continue; // direction cosines and lever arms [m]: what is left of a cancellation
       columns.push_back(column);
       values.push_back(value);
     }

@@ -169,4 +169,8 @@ TEST_CASE("friction without a drive, and a pair that cannot part, are refused")
   CHECK_NOTHROW(join(s));
   s.scene.supports = {{"disc", all}, {"pad:z-", {false, false, true}}};
   CHECK_THROWS_WITH_AS(join(s), doctest::Contains("cannot move along its normal"), Error);
+  s.scene.supports.clear();
+  s.scene.rigid_bodies = {{"both", {"disc:z+", "pad:z-"}, {.7, .1, .3}, 1, {}, all}}; // one body on both sides
+  add_points(s.mesh, s.scene);
+  CHECK_THROWS_WITH_AS(join(s), doctest::Contains("cannot move along its normal"), Error);
 }

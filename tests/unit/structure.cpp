@@ -296,6 +296,11 @@ TEST_CASE("contradictions name the node and both sides")
     scene.supports = {{"block", all}};
     says(scene, "nothing is free");
   }
+  SUBCASE("a support that holds nothing")
+  {
+    scene.supports = {{"block:x-", {false, false, false, true}}};
+    says(scene, "support on block:x-: none of its nodes has a motion that it fixes");
+  }
   SUBCASE("an element turned inside out")
   {
     std::swap(mesh.elements[4].nodes[0], mesh.elements[4].nodes[6]);
