@@ -106,7 +106,7 @@ Complex along_drive(const ShakenPair& pair)
 }
 
 // Mean power over a period, over q^2. Between its kinks, at lift-off and where the sliding reverses, it is smooth.
-double mean_power(const ShakenPair& pair, double q, double scale)
+double mean_power(const ShakenPair& pair, double q, double tolerance)
 {
   std::vector<double> angles = {0, 2 * std::numbers::pi};
   add_sign_changes(pair.reaction0, q, pair.reaction, angles);
@@ -114,7 +114,7 @@ double mean_power(const ShakenPair& pair, double q, double scale)
   std::sort(angles.begin(), angles.end());
   double sum = 0;
   for (std::size_t i = 0; i + 1 < angles.size(); ++i)
-    if (angles[i + 1] > angles[i]) sum += integrate_between(pair, q, angles[i], angles[i + 1], 1e-12 * scale, 20);
+    if (angles[i + 1] > angles[i]) sum += integrate_between(pair, q, angles[i], angles[i + 1], tolerance, 20);
   return sum / (2 * std::numbers::pi);
 }
 
@@ -185,9 +185,14 @@ double best_phase(const std::vector<ShakenPair>& pairs, double q)
     return least;
   };
   constexpr int count = 720;
-  double best = 0;
+  double best = 0, highest = smallest(0);
   for (int i = 1; i < count; ++i)
-    if (const double phase = 2 * std::numbers::pi * i / count; smallest(phase) > smallest(best)) best = phase;
+  {
+    const double phase = 2 * std::numbers::pi * i / count, height = smallest(phase);
+    if (height <= highest + 1e-6 * std::abs(highest)) continue; // of equals, as a symmetric brake has, the first
+    best = phase;
+    highest = height;
+  }
   double from = best - 2 * std::numbers::pi / count, to = best + 2 * std::numbers::pi / count;
   while (to - from > 1e-10)
   {
@@ -197,11 +202,39 @@ double best_phase(const std::vector<ShakenPair>& pairs, double q)
   return (from + to) / 2;
 }
 
-// The least q at which the interface stops giving more than the damping takes, sought over six decades; by bisection,
-// since the curve may have kinks.
+// Root of a continuous f, positive at `low` and not at `high`: false position that halves the value of an end kept
+// twice (Illinois; Dowell and Jarratt 1971), to |f| <= small.
+template <class Function> double find_root(const Function& f, double low, double high, double small, Outcome& outcome)
+{
+  double at = low, value = infinity, at_low = f(low), at_high = f(high);
+  int kept = 0;
+  for (outcome.iterations = 0; std::abs(value) > small && outcome.iterations < 100; ++outcome.iterations)
+  {
+    at = (low * at_high - high * at_low) / (at_high - at_low);
+    value = f(at);
+    if (value > 0)
+    {
+      low = at;
+      at_low = value;
+      if (kept == 1) at_high /= 2;
+      kept = 1;
+    }
+    else
+    {
+      high = at;
+      at_high = value;
+      if (kept == -1) at_low /= 2;
+      kept = -1;
+    }
+  }
+  outcome.residual = std::abs(value);
+  return at;
+}
+
+// The least q of six decades at which the interface stops giving more than the damping takes.
 template <class Rate> void find_balance(Estimate& result, const Rate& rate, double first_event)
 {
-  constexpr int per_decade = 20, decades_below = 2, decades_above = 4;
+  constexpr int per_decade = 10, decades_below = 2, decades_above = 4;
   for (int i = -decades_below * per_decade; i <= decades_above * per_decade; ++i)
   {
     result.curve_amplitude.push_back(first_event * std::pow(10., static_cast<double>(i) / per_decade));
@@ -219,16 +252,11 @@ template <class Rate> void find_balance(Estimate& result, const Rate& rate, doub
                       0, 0};
     return;
   }
-  double low = std::log(result.curve_amplitude[above - 1]), high = std::log(result.curve_amplitude[above]);
-  int iterations = 0;
-  for (; high - low > 1e-13 && iterations < 60; ++iterations)
-  {
-    const double middle = (low + high) / 2;
-    (rate(std::exp(middle)) > damping ? low : high) = middle;
-  }
-  result.amplitude = std::exp((low + high) / 2);
   const double larger = std::max(damping, std::abs(result.friction_rate_linear));
-  result.outcome = {"balance", "", iterations, std::abs(rate(result.amplitude) - damping) / larger};
+  result.outcome.word = "balance";
+  result.amplitude = std::exp(find_root([&](double log_q) { return (rate(std::exp(log_q)) - damping) / larger; },
+                                        std::log(result.curve_amplitude[above - 1]),
+                                        std::log(result.curve_amplitude[above]), 1e-13, result.outcome));
 }
 
 double first_amplitude(double level, double size)
@@ -270,12 +298,15 @@ Estimate estimate_amplitude(const Structure& structure, const Interface& interfa
     result.outcome = {"no balance", "nothing saturates the interface force", 0, 0};
     return result;
   }
-  // Absolute tolerance of each pair's quadrature; a pair that gives no linear power may give some later.
-  scale = std::max(scale, energy * result.damping_rate) / static_cast<double>(pairs.size());
+  // Each pair's share of an absolute tolerance; the rule's finer half is far better than the difference it is held to.
+  const double tolerance = 1e-9 * std::max(scale, energy * result.damping_rate) / static_cast<double>(pairs.size());
+  MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.K.get()));
+  const auto rank = static_cast<std::size_t>(rank_of(comm)), ranks = static_cast<std::size_t>(ranks_of(comm));
   const auto rate = [&](double q)
   {
     double power = 0;
-    for (const ShakenPair& pair : pairs) power += mean_power(pair, q, scale);
+    for (std::size_t i = rank; i < pairs.size(); i += ranks) power += mean_power(pairs[i], q, tolerance);
+    MPI_Allreduce(MPI_IN_PLACE, &power, 1, MPI_DOUBLE, MPI_SUM, comm);
     return power / energy;
   };
   find_balance(result, rate, first_event);
