@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <string>
 
 namespace squeal
 {
@@ -46,14 +48,15 @@ std::vector<double> free_contact_velocity(const ThetaStep& step, const Interface
   check(VecWAXPY(work.v_theta, step.h * (1 - step.theta), state.v, state.u)); // ut, for a moment
   const std::vector<double> position = relative(interface, work.v_theta);
   std::vector<double> b = relative(interface, work.v_free);
-  // A gap at rounding is closed; displacements are what it was rounded from.
+  // A gap at rounding is closed: against the displacements it was rounded from, or a free step's own motion.
   double rounding = 0;
   if (step.law == ContactLaw::velocity)
   {
     check(VecNorm(work.v_theta, NORM_INFINITY, &rounding));
+    for (std::size_t i = 0; i < b.size(); i += static_cast<std::size_t>(interface.block()))
+      rounding = std::max(rounding, step.h * std::abs(b[i]));
     rounding *= 1e-10;
   }
-  const double never = 1e100; // an opening rate no reaction can close: r = 0
   const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
   for (std::size_t i = 0; i < interface.gap.size(); ++i)
   {
@@ -61,10 +64,37 @@ std::vector<double> free_contact_velocity(const ThetaStep& step, const Interface
     if (step.law == ContactLaw::displacement)
       b[i * block] += gap / step.h;
     else if (gap > rounding)
-      b[i * block] = never;
+      b[i * block] = std::numeric_limits<double>::infinity(); // takes no part: r = 0
     for (std::size_t k = 0; k < directions; ++k) b[i * block + 1 + k] -= interface.drive[i * directions + k];
   }
   return b;
+}
+
+/// Contact among the pairs whose b is finite; the others open.
+ContactResult solve_active(const ThetaStep& step, const Interface& interface, const std::vector<double>& b,
+                           std::vector<double>& r)
+{
+  const auto block = static_cast<std::size_t>(interface.block());
+  std::vector<std::size_t> active;
+  for (std::size_t i = 0; i < b.size(); ++i)
+    if (std::isfinite(b[i - i % block])) active.push_back(i);
+  const std::vector<double>& W = step.condensed.W;
+  if (active.size() == b.size())
+    return solve_contact(W, b, interface.pairs, interface.directions, interface.friction, step.contact, r);
+
+  const std::size_t n = active.size();
+  std::vector<double> W_active(n * n), b_active(n), r_active(n);
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    b_active[i] = b[active[i]];
+    r_active[i] = r[active[i]];
+    for (std::size_t j = 0; j < n; ++j) W_active[i * n + j] = W[active[i] * b.size() + active[j]];
+  }
+  const ContactResult result = solve_contact(W_active, b_active, static_cast<int>(n / block), interface.directions,
+                                             interface.friction, step.contact, r_active);
+  std::fill(r.begin(), r.end(), 0.);
+  for (std::size_t i = 0; i < n; ++i) r[active[i]] = r_active[i];
+  return result;
 }
 
 /// Solves contact on rank 0, where W is, and hands r to every rank.
@@ -77,16 +107,26 @@ ContactResult find_reactions(const ThetaStep& step, const Interface& interface, 
   std::swap(work.r_before, r);
   r = std::move(guess);
 
-  std::array<double, 3> told{};
-  on_rank_zero(comm,
-               [&]
-               {
-                 const ContactResult result = solve_contact(step.condensed.W, b, interface.pairs, interface.directions,
-                                                            interface.friction, step.contact, r);
-                 told = {static_cast<double>(result.iterations), result.residual, result.converged ? 1. : 0.};
-               });
-  MPI_Bcast(told.data(), 3, MPI_DOUBLE, 0, comm);
-  MPI_Bcast(r.data(), static_cast<int>(r.size()), MPI_DOUBLE, 0, comm);
+  // One message: iterations, residual, converged, r. Latency counts on small models.
+  ContactResult result;
+  std::string problem;
+  std::vector<double> told(r.size() + 3, -1);
+  if (rank_of(comm) == 0)
+  {
+    try
+    {
+      result = solve_active(step, interface, b, r);
+      told = {static_cast<double>(result.iterations), result.residual, result.converged ? 1. : 0.};
+      told.insert(told.end(), r.begin(), r.end());
+    }
+    catch (const std::exception& error)
+    {
+      problem = error.what();
+    }
+  }
+  MPI_Bcast(told.data(), static_cast<int>(told.size()), MPI_DOUBLE, 0, comm);
+  if (told[0] < 0) agree(comm, problem);
+  std::copy(told.begin() + 3, told.end(), r.begin());
   return {static_cast<int>(told[0]), told[1], told[2] > 0};
 }
 
@@ -104,10 +144,10 @@ void account(const ThetaStep& step, const Structure& structure, const State& sta
   Vec dv = work.v_free, change = work.Ku, d = work.Mv;
   check(VecWAXPY(dv, -1, state.v, work.v_next));
   check(VecAYPX(change, -1, work.Ku_next)); // K du
-  // theta h C v_theta = A v_theta - M v_theta - theta^2 K du
+  // theta h C v_theta = A v_theta - M v_theta - theta^2 h K du
   check(VecAXPBYPCZ(work.Av, theta, -theta, 1 - theta, work.Av_next, work.Mv_next));
   check(VecAXPY(work.Av, theta - 1, work.Mv));
-  check(VecAXPY(work.Av, -theta * theta, change));
+  check(VecAXPY(work.Av, -theta * theta * step.h, change));
   check(VecAYPX(d, -1, work.Mv_next)); // M dv
   check(VecDotBegin(work.v_theta, work.Av, &damping));
   check(VecDotBegin(dv, d, &dMd));
@@ -230,33 +270,6 @@ std::vector<ContactStatus> contact_status(const Interface& interface, const std:
     status[i] = interface.friction * r[0] - friction > 1e-8 * largest ? ContactStatus::stick : ContactStatus::slip;
   }
   return status;
-}
-
-int flow(const ThetaStep& step, const Structure& structure, const Interface& interface, int steps, State& state,
-         State* rate)
-{
-  if (steps < 2) throw Error("a period needs at least 2 steps, not " + std::to_string(steps));
-  StepWork work = begin_steps(step, structure, interface, state);
-  if (rate) *rate = {zeros_like(state.u), zeros_like(state.v), 0, {}};
-  int unconverged = 0;
-  // v'(end) = [3 v_N - 4 v_(N-1) + v_(N-2)]/(2h)
-  const auto add = [&](double factor)
-  {
-    if (rate) check(VecAXPY(rate->v, factor / (2 * step.h), state.v));
-  };
-  for (int i = 0; i < steps; ++i)
-  {
-    if (i == steps - 2) add(1);
-    if (i == steps - 1) add(-4);
-    if (!advance(step, structure, interface, work, state).contact_converged) ++unconverged;
-  }
-  add(3);
-  if (rate)
-  {
-    check(VecCopy(state.v, rate->u));
-    rate->time = state.time;
-  }
-  return unconverged;
 }
 
 } // namespace squeal

@@ -181,7 +181,8 @@ MarchSummary march(const ThetaStep& step, const Structure& structure, const Inte
     summary.contact_residual_max = std::max(summary.contact_residual_max, report.contact_residual);
     iterations += report.contact_iterations;
     const double defect = std::abs(report.energy_defect);
-    if (defect > 0) summary.energy_defect_max = std::max(summary.energy_defect_max, defect / report.energy);
+    const double scale = std::max({report.energy, std::abs(report.contact_work), std::abs(report.load_work)});
+    if (defect > 0) summary.energy_defect_max = std::max(summary.energy_defect_max, defect / scale);
     update(fluctuation, state, work);
     record(report, step.h, state, probes, probe_values, history);
     history.fluctuating_energy.push_back(energy(fluctuation, state, work));

@@ -74,12 +74,6 @@ StepReport advance(const ThetaStep& step, const Structure& structure, const Inte
 /// A closed pair sticks where its friction stays inside the Coulomb disc by more than 1e-8 of the largest reaction.
 std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions);
 
-/// The period map of the shooting: `steps` steps in place. `rate`, when not null, receives the derivative of the end
-/// state in time to O(h^2): u' = v, v' = the acceleration, extrapolated from the last two steps. Needs steps >= 2.
-/// Returns the number of steps whose contact did not converge.
-int flow(const ThetaStep& step, const Structure& structure, const Interface& interface, int steps, State& state,
-         State* rate);
-
 /// Called after every step.
 using Monitor = std::function<void(const State&, const StepReport&, const StepWork&)>;
 
@@ -100,7 +94,7 @@ struct MarchSummary
   long unconverged = 0;
   double first_unconverged = 0; // [s]
   double contact_residual_max = 0;
-  double energy_defect_max = 0; // over the energy of its step
+  double energy_defect_max = 0; // over the energy of its step, or its works where they are larger
   double contact_iterations_mean = 0;
 };
 

@@ -1,0 +1,131 @@
+// ranks: 1 2 3
+#include "squeal/analysis/transient.hpp"
+#include "../support/oscillator_mode.hpp"
+
+#include <cmath>
+#include <doctest/doctest.h>
+#include <fstream>
+
+using namespace squeal;
+using test::state_of;
+
+namespace
+{
+
+/// A folder of this program's own at this number of ranks.
+std::filesystem::path scratch()
+{
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("squeal_transient_" + std::to_string(ranks_of(PETSC_COMM_WORLD)));
+  on_rank_zero(PETSC_COMM_WORLD, [&] { std::filesystem::create_directories(folder); });
+  return folder;
+}
+
+/// An error whose text holds `part`, on every rank.
+template <class Work> void check_error(Work work, const std::string& part)
+{
+  std::string text;
+  try
+  {
+    work();
+  }
+  catch (const Error& error)
+  {
+    text = error.what();
+  }
+  CHECK_MESSAGE(text.find(part) != std::string::npos, text);
+}
+
+void cut(const std::filesystem::path& file, std::uintmax_t size)
+{
+  on_rank_zero(PETSC_COMM_WORLD, [&] { std::filesystem::resize_file(file, size); });
+}
+
+} // namespace
+
+TEST_CASE("a state read back is the state that was written, to the bit")
+{
+  const auto model = test::unilateral_oscillator(.3, .6);
+  const State state = state_of(model.structure, {.1, 1. / 3, -2e-20}, {1e300, -7, .3});
+  const auto file = scratch() / "state.petsc";
+  write_state(state, file);
+  const State back = read_state(file, model.structure);
+  CHECK(test::whole(back.u) == test::whole(state.u));
+  CHECK(test::whole(back.v) == test::whole(state.v));
+  CHECK(!std::filesystem::exists(file.string() + ".part"));
+  CHECK(!std::filesystem::exists(file.string() + ".info"));
+}
+
+TEST_CASE("a state file that cannot be used says why on every rank")
+{
+  const auto model = test::unilateral_oscillator(.3, .6);
+  const auto larger = test::mass_spring_chain(4, 1, 1, 0, 0);
+  const State state = state_of(model.structure, {1, 2, 3}, {4, 5, 6});
+  const auto file = scratch() / "broken.petsc";
+  const auto read = [&] { (void)read_state(file, model.structure); };
+
+  write_state(state, file);
+  check_error([&] { (void)read_state(file, larger.structure); }, "has 3 entries, the structure has 4");
+  const auto whole = std::filesystem::file_size(file);
+  MPI_Barrier(PETSC_COMM_WORLD); // all have seen the size before it changes
+  cut(file, whole - 8);
+  check_error(read, "cut short");
+  cut(file, whole / 2);
+  check_error(read, "must hold two vectors");
+  cut(file, 5);
+  check_error(read, "not a PETSc binary vector");
+  check_error([&] { (void)read_state(scratch() / "absent.petsc", model.structure); }, "cannot be read");
+  check_error([&] { write_state(state, scratch() / "no such folder" / "state.petsc"); }, "cannot be written");
+
+  write_state(state_of(model.structure, {1, std::nan(""), 3}, {4, 5, 6}), file);
+  check_error(read, "not finite");
+}
+
+TEST_CASE("a step size or theta without meaning is an error")
+{
+  const auto model = test::unilateral_oscillator(.3, .6);
+  check_error([&] { (void)make_theta_step(model.structure, model.interface, 0, .5); }, "time step");
+  check_error([&] { (void)make_theta_step(model.structure, model.interface, std::nan(""), .5); }, "time step");
+  check_error([&] { (void)make_theta_step(model.structure, model.interface, .1, 0); }, "theta");
+  check_error([&] { (void)make_theta_step(model.structure, model.interface, .1, 1.5); }, "theta");
+}
+
+TEST_CASE(
+    "the discrete eigenvalue loses (omega h)^2/4 of the growth and (omega h)^2/12 of the frequency at theta = 1/2")
+{
+  const std::complex<double> lambda(1e-3, 1);
+  const double h = .01;
+  const auto discrete = discrete_eigenvalue(lambda, .5, h);
+  // next terms: (omega h)^4 = 1e-8 of the value
+  CHECK(discrete.real() / lambda.real() - 1 == doctest::Approx(-h * h / 4).epsilon(1e-3));
+  CHECK(discrete.imag() / lambda.imag() - 1 == doctest::Approx(-h * h / 12).epsilon(1e-3));
+  CHECK(discrete_eigenvalue(lambda, .51, h).real() == doctest::Approx(1e-3 - .01 * h).epsilon(1e-3));
+}
+
+TEST_CASE("in free flight every theta follows its discrete eigenvalue exactly")
+{
+  // two masses far above the ground, joined by a spring: relative motion at omega = 2 with damping
+  for (const double theta : {.5, .6, 1.})
+  {
+    auto model = test::mass_spring_chain(2, 2, 2, 100, 0); // end masses of 1 kg
+    check(MatAXPY(model.structure.C, .05, model.structure.K, SAME_NONZERO_PATTERN));
+    const double h = .1;
+    const std::complex<double> lambda(-.1, std::sqrt(4 - .01)); // lambda^2 + .05 * 4 lambda + 4 = 0
+    const std::complex<double> end = std::exp(discrete_eigenvalue(lambda, theta, h) * 7. * h);
+    State state = state_of(model.structure, {1, -1}, {lambda.real(), -lambda.real()});
+    const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta);
+    CHECK(test::run_steps(model, step, 7, state) == 0);
+    CHECK(test::whole(state.u)[0] == doctest::Approx(end.real()).epsilon(1e-13));
+    CHECK(test::whole(state.v)[1] == doctest::Approx(-(lambda * end).real()).epsilon(1e-13));
+  }
+}
+
+TEST_CASE("status of pairs: open without reaction, stick inside the Coulomb disc, slip on its rim")
+{
+  Interface interface;
+  interface.pairs = 3;
+  interface.directions = 2;
+  interface.friction = .5;
+  const auto status = contact_status(interface, {0, 0, 0, 10, 3, -4, 10, 3, 3.9});
+  CHECK(status == std::vector<ContactStatus>{ContactStatus::open, ContactStatus::slip, ContactStatus::stick});
+}
