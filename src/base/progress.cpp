@@ -2,10 +2,25 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <unistd.h>
 
 namespace squeal
 {
+
+namespace
+{
+
+/// mpirun hands every rank a terminal of its own whatever it does with their output, so mpirun's output counts too.
+bool writes_to_terminal()
+{
+  if (!isatty(STDOUT_FILENO)) return false;
+  std::error_code none;
+  const auto parent = std::filesystem::read_symlink("/proc/" + std::to_string(getppid()) + "/fd/1", none);
+  return parent.string().rfind("/dev/pts/", 0) == 0 || parent.string().rfind("/dev/tty", 0) == 0;
+}
+
+} // namespace
 
 Progress::Progress(MPI_Comm comm, std::string stage, double total)
     : stage_(std::move(stage)), total_(std::max(total, 1e-300)), start_(std::chrono::steady_clock::now()), last_(start_)
@@ -13,7 +28,7 @@ Progress::Progress(MPI_Comm comm, std::string stage, double total)
   int rank = 0;
   MPI_Comm_rank(comm, &rank);
   speaks_ = rank == 0;
-  terminal_ = speaks_ && isatty(STDOUT_FILENO);
+  terminal_ = speaks_ && writes_to_terminal();
 }
 
 Progress::~Progress()

@@ -117,13 +117,15 @@ Partition partition_mesh(const Mesh& mesh, const std::vector<NodePair>& pairs, M
   MPI_Comm_size(comm, &ranks);
   Partition partition{std::vector<int>(mesh.nodes.size()), std::vector<int>(mesh.elements.size())};
   if (ranks == 1) return partition;
+  const std::size_t nodes = mesh.nodes.size();
+  if (nodes < static_cast<std::size_t>(ranks))
+    throw Error(std::to_string(ranks) + " ranks are too many for a model of " + std::to_string(nodes) +
+                " nodes: use at most " + std::to_string(nodes));
   int vertices = 0;
-  const std::vector<int> vertex = merge_pairs(mesh.nodes.size(), pairs, vertices);
-  if (vertices < ranks)
-    throw Error(std::to_string(ranks) + " ranks are too many for a model of " + std::to_string(vertices) +
-                " nodes (a contact pair counts as one): use at most " + std::to_string(vertices));
+  const std::vector<int> vertex = merge_pairs(nodes, pairs, vertices);
   std::vector<int> vertex_rank(vertices);
-  on_rank_zero(comm, [&] { vertex_rank = split(node_graph(mesh, vertex, vertices), ranks); });
+  std::iota(vertex_rank.begin(), vertex_rank.end(), 0); // stands where pairs leave fewer vertices than ranks
+  if (vertices >= ranks) on_rank_zero(comm, [&] { vertex_rank = split(node_graph(mesh, vertex, vertices), ranks); });
   MPI_Bcast(vertex_rank.data(), vertices, MPI_INT, 0, comm);
   for (std::size_t i = 0; i < vertex.size(); ++i) partition.node_rank[i] = vertex_rank[vertex[i]];
   for (std::size_t e = 0; e < mesh.elements.size(); ++e)

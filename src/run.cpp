@@ -1,0 +1,198 @@
+#include "squeal/run.hpp"
+
+#include "squeal/options.hpp"
+#include "squeal/report/report.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Runs one stage under its -log_view name, times it, and tells a person which one is at work.
+template <class Work> auto timed(Report& report, const char* name, MPI_Comm comm, Work work)
+{
+  const LogStage log(name);
+  if (rank_of(comm) == 0) std::printf("%s …\n", name), std::fflush(stdout);
+  const double start = MPI_Wtime();
+  auto result = work();
+  report.timings.emplace_back(name, MPI_Wtime() - start);
+  return result;
+}
+
+Outcome not_run(const char* word, const std::string& reason)
+{
+  Outcome outcome;
+  outcome.word = word;
+  outcome.reason = reason;
+  return outcome;
+}
+
+/// Why a stage that follows an unstable mode cannot run; empty if it can.
+std::string no_mode_to_follow(const Report& report)
+{
+  if (report.equilibrium.outcome.word != "converged") return "there is no equilibrium to start from";
+  if (report.modes.modes.empty()) return "no mode was found in the band";
+  if (report.modes.modes.front().growth_rate() <= 0) return "the equilibrium is stable: no mode grows in the band";
+  if (report.modes.modes.front().frequency_hz() == 0) return "the equilibrium diverges without oscillating";
+  return {};
+}
+
+/// The estimate's amplitude, or twice the first lift-off where friction and damping have no balance: shooting converges
+/// from well above the cycle and falls onto the equilibrium from below.
+double start_amplitude(const Estimate& estimate)
+{
+  return estimate.outcome.word == "balance" ? estimate.amplitude : 2 * estimate.lift_off_amplitude;
+}
+
+State transient_start(const Scene& scene, const Model& model, const Report& report)
+{
+  const TransientSettings& settings = scene.transient;
+  if (settings.start == "estimate")
+    return mode_state(report.equilibrium, report.modes.modes.front(), start_amplitude(report.estimate),
+                      report.estimate.phase);
+  if (settings.start == "mode")
+  {
+    const double amplitude = settings.amplitude > 0 ? settings.amplitude : 0.1 * report.estimate.lift_off_amplitude;
+    return mode_state(report.equilibrium, report.modes.modes.front(), amplitude, report.estimate.phase);
+  }
+  return read_state(settings.start, model.structure);
+}
+
+Estimate run_estimate(const Scene& scene, const Model& model, const Report& report)
+{
+  Estimate estimate;
+  const bool needed = scene.estimate.enabled || scene.cycle.enabled || scene.transient.enabled;
+  const std::string reason = no_mode_to_follow(report);
+  if (!needed)
+    estimate.outcome = not_run("off", "the scene turns it off");
+  else if (!reason.empty())
+    estimate.outcome = not_run("skipped", reason);
+  else
+    return estimate_amplitude(model.structure, model.interface, report.equilibrium, report.modes.modes.front());
+  return estimate;
+}
+
+Trajectory run_transient(const Scene& scene, const Model& model, const Report& report)
+{
+  Trajectory trajectory;
+  const bool from_file = scene.transient.start != "mode" && scene.transient.start != "estimate";
+  const std::string reason = no_mode_to_follow(report);
+  if (!scene.transient.enabled)
+    trajectory.outcome = not_run("off", "the scene has no [transient]");
+  else if (report.equilibrium.outcome.word != "converged" || (!reason.empty() && !from_file))
+    trajectory.outcome = not_run("skipped", reason);
+  else
+    return integrate(model.structure, model.interface, report.equilibrium,
+                     reason.empty() ? &report.modes.modes.front() : nullptr, scene.transient,
+                     transient_start(scene, model, report), model.probes);
+  return trajectory;
+}
+
+LimitCycle run_cycle(const Scene& scene, const Model& model, const Report& report)
+{
+  LimitCycle cycle;
+  const std::string reason = no_mode_to_follow(report);
+  if (!scene.cycle.enabled)
+    cycle.outcome = not_run("off", "the scene has no [cycle]");
+  else if (!reason.empty())
+    cycle.outcome = not_run("skipped", reason);
+  else
+    return find_cycle(model.structure, model.interface, report.equilibrium, report.modes.modes.front(), report.estimate,
+                      scene.cycle, model.probes);
+  return cycle;
+}
+
+Modes run_modes(const Scene& scene, const Model& model, const Report& report)
+{
+  Modes modes;
+  if (report.equilibrium.outcome.word != "converged")
+    modes.outcome = not_run("skipped", "there is no equilibrium to linearise about");
+  else if (!scene.modes.enabled && !scene.transient.enabled && !scene.cycle.enabled)
+    modes.outcome = not_run("off", "the scene turns it off");
+  else
+    return find_modes(model.structure, model.interface, report.equilibrium, scene.modes);
+  return modes;
+}
+
+/// What the model is, as far as it is known before anything is solved.
+void describe_model(const Model& model, Report& report, MPI_Comm comm)
+{
+  check(MatGetSize(model.structure.K, &report.dofs, nullptr));
+  report.elements = model.structure.elements;
+  report.pairs = model.interface.pairs;
+  report.ranks = ranks_of(comm);
+  if (rank_of(comm) == 0)
+    std::printf("  %d degrees of freedom, %d contact pairs, %ld elements, %d ranks\n", static_cast<int>(report.dofs),
+                report.pairs, report.elements, report.ranks);
+}
+
+std::vector<std::string> stages_run(const Report& report)
+{
+  std::vector<std::string> stages;
+  const auto add = [&](const char* name, const Outcome& outcome)
+  {
+    if (outcome.word != "off" && outcome.word != "skipped") stages.emplace_back(name);
+  };
+  add("equilibrium", report.equilibrium.outcome);
+  add("modes", report.modes.outcome);
+  add("estimate", report.estimate.outcome);
+  add("transient", report.transient.outcome);
+  add("cycle", report.cycle.outcome);
+  return stages;
+}
+
+/// A skipped stage is no failure by itself: the stage it waited for answers for it.
+Verdict verdict_of(const Report& report)
+{
+  const auto good = [](const Outcome& outcome)
+  {
+    for (const char* word : {"off", "skipped", "converged", "completed", "balance", "no balance"})
+      if (outcome.word == word) return true;
+    return false;
+  };
+  const bool all_good = good(report.equilibrium.outcome) && good(report.modes.outcome) &&
+                        good(report.estimate.outcome) && good(report.transient.outcome) && good(report.cycle.outcome);
+  return all_good ? Verdict::converged : Verdict::not_converged;
+}
+
+} // namespace
+
+Verdict run(const Scene& scene, const std::filesystem::path& output, MPI_Comm comm)
+{
+  Report report;
+  const Model model = timed(report, "model", comm, [&] { return build_model(scene, comm); });
+  describe_model(model, report, comm);
+
+  report.equilibrium =
+      timed(report, "equilibrium", comm, [&] { return find_equilibrium(model.structure, model.interface); });
+  report.modes = timed(report, "modes", comm, [&] { return run_modes(scene, model, report); });
+  report.estimate = timed(report, "estimate", comm, [&] { return run_estimate(scene, model, report); });
+  report.transient = timed(report, "transient", comm, [&] { return run_transient(scene, model, report); });
+  report.cycle = timed(report, "cycle", comm, [&] { return run_cycle(scene, model, report); });
+
+  write_results(report, scene, model, output, comm);
+  print_summary(report, scene, comm);
+  if (rank_of(comm) == 0) std::printf("results are in %s\n", output.c_str());
+  check_options_used(stages_run(report), comm);
+  return verdict_of(report);
+}
+
+void dry_run(const Scene& scene, MPI_Comm comm)
+{
+  Report report;
+  const Model model = build_model(scene, comm);
+  if (rank_of(comm) == 0)
+    std::printf("# the scene, every default written out\n%s\n# the model\n", resolved_scene(scene).c_str());
+  describe_model(model, report, comm);
+  const MemoryForecast memory = forecast_memory(model);
+  if (rank_of(comm) == 0)
+    std::printf("  memory forecast, all ranks together: matrices %.0f MB, one factorisation %.0f MB, condensed contact "
+                "operator %.0f MB\n",
+                1e-6 * memory.matrices, 1e-6 * memory.factor, 1e-6 * memory.condensed_operator);
+}
+
+} // namespace squeal

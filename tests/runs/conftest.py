@@ -1,0 +1,72 @@
+"""Runs the squeal program as a user does: mpirun, a scene file, its output folder."""
+
+import json
+import os
+import re
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+INPUTS = ROOT / "inputs"
+
+
+class Run:
+    """One finished run: exit code, what it printed, and report.json when there is one."""
+
+    def __init__(self, arguments, ranks, folder):
+        command = [os.environ.get("MPIEXEC", "mpirun"), "-n", str(ranks), os.environ["SQUEAL"], *map(str, arguments)]
+        self.output = Path(folder)
+        done = subprocess.run([*command, "--output", str(folder)], capture_output=True, text=True, timeout=500)
+        self.code, self.printed, self.errors = done.returncode, done.stdout, done.stderr
+
+    @property
+    def report(self):
+        return json.loads((self.output / "report.json").read_text())
+
+    @property
+    def messages(self):
+        """squeal's own error messages, one line each (mpirun adds lines of its own when a rank fails)."""
+        return re.findall(r"^squeal: .*$", self.errors, re.M)
+
+
+@pytest.fixture
+def squeal(tmp_path):
+    count = 0
+
+    def run(*arguments, ranks=2):
+        nonlocal count
+        count += 1
+        return Run(arguments, ranks, tmp_path / f"results{count}")
+
+    return run
+
+
+@pytest.fixture
+def converged(squeal):
+    """Runs and insists on exit code 0."""
+
+    def run(*arguments, ranks=2):
+        done = squeal(*arguments, ranks=ranks)
+        assert done.code == 0, done.printed[-2000:] + done.errors[-2000:]
+        return done
+
+    return run
+
+
+@pytest.fixture
+def oscillator_scene(tmp_path):
+    """Arguments that run inputs/oscillator at a belt speed, from its points or from its matrices."""
+
+    def arguments(form, speed):
+        if form == "points":
+            return [INPUTS / "oscillator" / "scene.toml", "--set", f"contact.0.velocity=[{speed},0,0]"]
+        folder = tmp_path / f"matrices{speed}"
+        shutil.copytree(INPUTS / "oscillator" / "matrices", folder)
+        (folder / "drive.petsc").write_bytes(struct.pack(">iid", 1211214, 1, speed))  # class id of a Vec, length, entry
+        return [INPUTS / "oscillator" / "matrices.toml", "--set", f"matrices.folder={folder}"]
+
+    return arguments

@@ -1,0 +1,161 @@
+"""Bad input: one clear message, a non-zero exit code, no results, no hang."""
+
+import struct
+
+import pytest
+from conftest import INPUTS
+
+OSCILLATOR = (INPUTS / "oscillator" / "scene.toml").read_text()
+
+BLOCKS_GEO = """
+SetFactory("OpenCASCADE");
+DefineConstant[ shift = {0, Name "shift"} ];
+Box(1) = {0, 0, 0, 1, 1, 1}; Box(2) = {shift, 0, 1, 1, 1, 1};
+MeshSize{ PointsOf{ Volume{1, 2}; } } = 1;
+Transfinite Curve{:} = 3; Transfinite Surface{:}; Recombine Surface{:}; Transfinite Volume{:};
+Physical Volume("lower") = {1}; Physical Volume("upper") = {2};
+Physical Surface("floor") = {5}; Physical Surface("under") = {6}; Physical Surface("over") = {11};
+Physical Surface("roof") = {12};
+"""
+
+BLOCKS = """
+[mesh]
+file = "blocks.geo"
+[[part]]
+name = "lower"
+young = 1e9
+poisson = 0.3
+density = 1000
+[[part]]
+name = "upper"
+young = 1e9
+poisson = 0.3
+density = 1000
+[[support]]
+on = "floor"
+fixed = "x y z"
+[[support]]
+on = "roof"
+fixed = "x y"
+[[pressure]]
+on = "roof"
+value = 1000.0
+[[contact]]
+rotor = "under"
+stator = "over"
+velocity = [1, 0, 0]
+[friction]
+coefficient = 0.2
+[modes]
+band = 100
+real_modes = 10
+"""
+
+
+def point_scene(old, new):
+    def write(folder):
+        assert old in OSCILLATOR
+        (folder / "scene.toml").write_text(OSCILLATOR.replace(old, new, 1))
+        return [folder / "scene.toml"]
+
+    return write
+
+
+def block_scene(old, new, geo_old="", geo_new="", arguments=()):
+    def write(folder):
+        assert old in BLOCKS and geo_old in BLOCKS_GEO
+        (folder / "scene.toml").write_text(BLOCKS.replace(old, new, 1))
+        (folder / "blocks.geo").write_text(BLOCKS_GEO.replace(geo_old, geo_new, 1))
+        return [folder / "scene.toml", *arguments]
+
+    return write
+
+
+def matrix_scene(spoil):
+    def write(folder):
+        for source in (INPUTS / "oscillator" / "matrices").glob("*.petsc"):
+            (folder / source.name).write_bytes(source.read_bytes())
+        spoil(folder)
+        (folder / "scene.toml").write_text('[matrices]\nfolder = "."\n[friction]\ncoefficient = 0.3\n')
+        return [folder / "scene.toml"]
+
+    return write
+
+
+def truncate(folder):
+    data = (folder / "K.petsc").read_bytes()
+    (folder / "K.petsc").write_bytes(data[: len(data) // 2])
+
+
+def not_petsc(folder):
+    (folder / "M.petsc").write_text("this is no matrix")
+
+
+def wrong_size(folder):
+    (folder / "F.petsc").write_bytes(struct.pack(">ii", 1211214, 2) + struct.pack(">2d", 0, -1))
+
+
+def missing(folder):
+    (folder / "B.petsc").unlink()
+
+
+def with_nan(folder):
+    (folder / "F.petsc").write_bytes(struct.pack(">ii", 1211214, 3) + struct.pack(">3d", 0, float("nan"), 0))
+
+
+# name: how to write it, what the message must speak of
+CASES = {
+    "missing scene file": (lambda folder: [folder / "absent.toml"], ["absent.toml"]),
+    "broken TOML": (point_scene("mass = 1\n", "mass = = 1\n"), ["line", "scene.toml"]),
+    "unknown key": (point_scene("stiffness = 1.0", "stifness = 1.0"), ["stifness", "stiffness"]),
+    "negative mass": (point_scene("mass = 1\n", "mass = -1\n"), ["mass", "-1"]),
+    "mu not a number": (point_scene("coefficient = 0.3", "coefficient = nan"), ["friction.coefficient", "nan"]),
+    "negative mu": (point_scene("coefficient = 0.3", "coefficient = -0.3"), ["friction.coefficient", "-0.3"]),
+    "text for a number": (point_scene("coefficient = 0.3", 'coefficient = "much"'), ["friction.coefficient"]),
+    "contact with no such point": (point_scene('stator = "pad"', 'stator = "padd"'), ["padd", "pad"]),
+    "unknown override": (lambda folder: [INPUTS / "oscillator" / "scene.toml", "--set", "friction.coeficient=1"],
+                         ["coeficient", "coefficient"]),
+    "unknown option": (lambda folder: [INPUTS / "oscillator" / "scene.toml", "-cycel_snes_monitor"], ["-cycel_snes_monitor"]),
+    "unknown argument": (lambda folder: [INPUTS / "oscillator" / "scene.toml", "--dry-rnu"], ["--dry-rnu", "--dry-run"]),
+    "no scene": (lambda folder: [], ["scene"]),
+    "negative density": (block_scene("density = 1000", "density = -1000"), ["density", "-1000"]),
+    "missing part": (block_scene('name = "upper"', 'name = "uper"'), ["uper", "upper"]),
+    "missing group": (block_scene('on = "floor"', 'on = "flor"'), ["flor", "floor"]),
+    "missing mesh file": (block_scene("blocks.geo", "blokcs.geo"), ["blokcs.geo"]),
+    "empty mesh": (block_scene("", "", BLOCKS_GEO, "Point(1) = {0, 0, 0};\n"), ["blocks.geo"]),
+    "surfaces that do not match": (block_scene("", "", "{0, Name", "{0.25, Name"), ["under", "over"]),
+    "singular stiffness": (block_scene('[[support]]\non = "floor"\nfixed = "x y z"\n', ""), ["lower"]),
+    "truncated matrix": (matrix_scene(truncate), ["K.petsc"]),
+    "not a PETSc file": (matrix_scene(not_petsc), ["M.petsc"]),
+    "sizes that disagree": (matrix_scene(wrong_size), ["F.petsc", "2", "3"]),
+    "missing matrix": (matrix_scene(missing), ["B.petsc"]),
+    "entry not finite": (matrix_scene(with_nan), ["F.petsc"]),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_one_clear_message(squeal, tmp_path, name):
+    write, words = CASES[name]
+    run = squeal(*write(tmp_path))
+    assert run.code == 1, run.printed + run.errors
+    assert len(run.messages) == 1, run.errors
+    for word in words:
+        assert word in run.messages[0]
+    assert not list(run.output.glob("*")), "results of a run that failed"
+
+
+def test_more_ranks_than_nodes(squeal):
+    run = squeal(INPUTS / "oscillator" / "scene.toml", ranks=4)
+    assert run.code == 1 and len(run.messages) == 1 and "ranks" in run.messages[0]
+
+
+def test_unwritable_output(squeal, tmp_path):
+    (tmp_path / "taken").write_text("a file, not a folder")
+    run = squeal(INPUTS / "oscillator" / "scene.toml", "--output", tmp_path / "taken" / "results")
+    assert run.code == 1 and len(run.messages) == 1 and "--output" in run.messages[0]
+
+
+def test_an_unused_option_is_named(squeal):
+    """Known by its shape, but no solver asks for it: only the run can tell, so the results stand."""
+    run = squeal(INPUTS / "oscillator" / "scene.toml", "-cycle_snes_monitr")
+    assert run.code == 1 and len(run.messages) == 1 and "-cycle_snes_monitr" in run.messages[0]
