@@ -58,7 +58,7 @@ std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
 
 std::string mode_line(const ComplexMode& mode)
 {
-  return row("", format("%12.2f %14.5g %12.5f %16.1e  %s", mode.frequency_hz(), mode.growth_rate(),
+  return row("", format("%12.7g %14.5g %12.5f %16.1e  %s", mode.frequency_hz(), mode.growth_rate(),
                         100 * mode.damping_ratio(), mode.backward_error, mode.growth_rate() > 0 ? "unstable" : ""));
 }
 
