@@ -94,8 +94,9 @@ void refresh(const Problem& problem, const std::vector<double>& r, std::vector<d
       add_rows(problem.row(i), problem.n, problem.block, &r[i], w.data());
 }
 
-/// One sweep of block Gauss-Seidel; returns the sum of the changes of r, which bounds the rounding that w gathers.
-double sweep(const Problem& problem, std::vector<double>& r, std::vector<double>& w)
+/// One sweep of block Gauss-Seidel; a change below `negligible` is not made, which spares reading its rows. Returns the
+/// sum of the changes, which bounds the rounding that w gathers.
+double sweep(const Problem& problem, double negligible, std::vector<double>& r, std::vector<double>& w)
 {
   double moved = 0;
   for (std::size_t i = 0; i < problem.n; i += problem.block)
@@ -110,15 +111,12 @@ double sweep(const Problem& problem, std::vector<double>& r, std::vector<double>
         q[k] -= A[k][l] * last[l];
       }
     const PairVector next = solve_pair(A, q, problem.directions, problem.friction, last);
-    if (next == last) continue;
-    double change[3];
-    for (std::size_t k = 0; k < problem.block; ++k)
-    {
-      change[k] = next[k] - last[k];
-      r[i + k] = next[k];
-      moved += std::abs(change[k]);
-    }
-    add_rows(problem.row(i), problem.n, problem.block, change, w.data());
+    const PairVector change = {next[0] - last[0], next[1] - last[1], next[2] - last[2]};
+    const double size = std::abs(change[0]) + std::abs(change[1]) + std::abs(change[2]);
+    if (size <= negligible) continue;
+    moved += size;
+    for (std::size_t k = 0; k < problem.block; ++k) r[i + k] = next[k];
+    add_rows(problem.row(i), problem.n, problem.block, change.data(), w.data());
   }
   return moved;
 }
@@ -133,9 +131,10 @@ ContactResult gauss_seidel(const Problem& problem, const ContactSettings& settin
   for (std::size_t i = 0; i < problem.n; ++i) largest_W = std::max(largest_W, problem.diagonal(i));
   for (std::size_t pair = 0; pair < problem.rho_n.size(); ++pair)
     largest_rho = std::max({largest_rho, problem.rho_n[pair], problem.rho_t[pair]});
+  double negligible = 0;
   while (!(result.residual <= settings.tolerance) && result.iterations < settings.max_iterations)
   {
-    const double change = sweep(problem, r, w);
+    const double change = sweep(problem, negligible, r, w);
     ++result.iterations;
     moved += change;
     result.residual = residual_of(problem, w, r);
@@ -143,11 +142,14 @@ ContactResult gauss_seidel(const Problem& problem, const ContactSettings& settin
     const double scale = *std::max_element(r.begin(), r.end());
     const double rounding = std::numeric_limits<double>::epsilon() * largest_rho * largest_W * moved;
     const bool due = result.iterations % 50 == 0 || result.residual <= settings.tolerance || change == 0;
-    if (!due || rounding <= .01 * settings.tolerance * scale) continue;
-    refresh(problem, r, w);
-    moved = 0;
-    result.residual = residual_of(problem, w, r);
-    if (change == 0) break; // no pair moves any more: this is what rounding allows
+    if (due && rounding > .01 * settings.tolerance * scale)
+    {
+      refresh(problem, r, w);
+      moved = 0;
+      result.residual = residual_of(problem, w, r);
+    }
+    if (change == 0 && negligible == 0) break; // no pair moves any more: this is what rounding allows
+    negligible = change == 0 ? 0 : .02 * settings.tolerance * scale;
   }
   result.converged = result.residual <= settings.tolerance;
   return result;
