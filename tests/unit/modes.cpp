@@ -201,3 +201,31 @@ TEST_CASE("Krylov and LAPACK find the same real modes, M-normalised and closed")
     CHECK(std::abs(gap[0]) < 1e-12);
   }
 }
+
+// omega_k = 2 sqrt(k/m) sin(k pi / 2(N - 1)) of a free bar with lumped mass.
+TEST_CASE("a free body moves at no cost: its real mode is 0, and no complex mode is made of it")
+{
+  const SmallModel bar = mass_spring_chain(30, 1, 100, 1, 0);
+  Equilibrium apart;
+  apart.outcome.word = "converged";
+  apart.u = zeros_like(bar.structure.load);
+  apart.reactions = {0, 0};
+  apart.closed = {0};
+  for (const char* limit : {"200", "0"})
+  {
+    check(PetscOptionsSetValue(nullptr, "-modes_dense_limit", limit));
+    const RealModes real = find_real_modes(bar.structure, bar.interface, apart, 5);
+    ModesSettings settings = settings_of("both");
+    settings.band = 3;
+    settings.real_modes = 10;
+    const Modes modes = find_modes(bar.structure, bar.interface, apart, settings);
+    check(PetscOptionsClearValue(nullptr, "-modes_dense_limit"));
+    REQUIRE(real.omega.size() == 5);
+    CHECK(real.omega[0] < 1e-5); // square root of rounding
+    for (std::size_t k = 1; k < 5; ++k)
+      CHECK(real.omega[k] == doctest::Approx(20 * std::sin(static_cast<double>(k) * M_PI / 58)).epsilon(1e-9));
+    CHECK(modes.modes.size() == 22); // 20 sin(k pi/58) < 6 pi from k = 1 to 22
+    CHECK(modes.unstable_count == 0);
+    CHECK(modes.count_check.starts_with("confirmed"));
+  }
+}
