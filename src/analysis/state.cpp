@@ -1,8 +1,10 @@
 /// States: energies, copies, and files. A file is two PETSc binary vectors: class id, length, entries, all big-endian.
 #include "squeal/analysis/state.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <numeric>
 #include <system_error>
 
 namespace squeal
@@ -57,6 +59,28 @@ void check_state_file(const std::filesystem::path& file, PetscInt size)
   }
 }
 
+/// Between a vector and the same one in the order of a file; the partition numbers the degrees of freedom of a mesh.
+Owned<VecScatter> to_file_order(const Structure& structure, Vec x, Vec in_file)
+{
+  PetscInt first = 0, last = 0, size = 0;
+  check(VecGetOwnershipRange(x, &first, &last));
+  check(VecGetSize(x, &size));
+  std::vector<PetscInt> order(static_cast<std::size_t>(size));
+  std::iota(order.begin(), order.end(), 0);
+  const std::vector<int>& motion = structure.names.motion;
+  if (!motion.empty())
+    std::sort(order.begin(), order.end(),
+              [&](PetscInt a, PetscInt b)
+              { return motion[static_cast<std::size_t>(a)] < motion[static_cast<std::size_t>(b)]; });
+  Owned<IS> from, to;
+  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(x));
+  check(ISCreateGeneral(comm, last - first, order.data() + first, PETSC_COPY_VALUES, from.put()));
+  check(ISCreateStride(comm, last - first, first, 1, to.put()));
+  Owned<VecScatter> scatter;
+  check(VecScatterCreate(x, from, in_file, to, scatter.put()));
+  return scatter;
+}
+
 Owned<PetscViewer> open_binary(MPI_Comm comm, const std::filesystem::path& file, PetscFileMode mode)
 {
   Owned<PetscViewer> viewer;
@@ -92,7 +116,7 @@ double potential_energy(const Structure& structure, Vec u)
   return half_quadratic_form(structure.K, u);
 }
 
-void write_state(const State& state, const std::filesystem::path& file)
+void write_state(const State& state, const Structure& structure, const std::filesystem::path& file)
 {
   const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(state.u.get()));
   std::filesystem::path draft = file;
@@ -106,8 +130,14 @@ void write_state(const State& state, const std::filesystem::path& file)
                });
   {
     const Owned<PetscViewer> viewer = open_binary(comm, draft, FILE_MODE_WRITE);
-    check(VecView(state.u, viewer));
-    check(VecView(state.v, viewer));
+    const Owned<Vec> in_file = zeros_like(state.u);
+    const Owned<VecScatter> scatter = to_file_order(structure, state.u, in_file);
+    for (Vec x : {state.u.get(), state.v.get()})
+    {
+      check(VecScatterBegin(scatter, x, in_file, INSERT_VALUES, SCATTER_FORWARD));
+      check(VecScatterEnd(scatter, x, in_file, INSERT_VALUES, SCATTER_FORWARD));
+      check(VecView(in_file, viewer));
+    }
   }
   on_rank_zero(comm,
                [&]
@@ -129,8 +159,14 @@ State read_state(const std::filesystem::path& file, const Structure& structure)
 
   State state{zeros_like(structure.load), zeros_like(structure.load), 0, {}};
   const Owned<PetscViewer> viewer = open_binary(comm, file, FILE_MODE_READ);
-  check(VecLoad(state.u, viewer));
-  check(VecLoad(state.v, viewer));
+  const Owned<Vec> in_file = zeros_like(state.u);
+  const Owned<VecScatter> scatter = to_file_order(structure, state.u, in_file);
+  for (Vec x : {state.u.get(), state.v.get()})
+  {
+    check(VecLoad(in_file, viewer));
+    check(VecScatterBegin(scatter, in_file, x, INSERT_VALUES, SCATTER_REVERSE));
+    check(VecScatterEnd(scatter, in_file, x, INSERT_VALUES, SCATTER_REVERSE));
+  }
   require_finite(state.u, "state file " + file.string() + ": the displacement");
   require_finite(state.v, "state file " + file.string() + ": the velocity");
   return state;

@@ -235,7 +235,7 @@ Trajectory integrate(const Structure& structure, const Interface& interface, con
     trajectory.growth_rate_fit = growth_rate(amplitude, two_pi / std::abs(omega));
   }
   conclude(trajectory, summary, steps);
-  if (!settings.save_state.empty()) write_state(trajectory.end, settings.save_state);
+  if (!settings.save_state.empty()) write_state(trajectory.end, structure, settings.save_state);
   return trajectory;
 }
 

@@ -48,12 +48,24 @@ TEST_CASE("a state read back is the state that was written, to the bit")
   const auto model = test::unilateral_oscillator(.3, .6);
   const State state = state_of(model.structure, {.1, 1. / 3, -2e-20}, {1e300, -7, .3});
   const auto file = scratch() / "state.petsc";
-  write_state(state, file);
+  write_state(state, model.structure, file);
   const State back = read_state(file, model.structure);
   CHECK(test::whole(back.u) == test::whole(state.u));
   CHECK(test::whole(back.v) == test::whole(state.v));
   CHECK(!std::filesystem::exists(file.string() + ".part"));
   CHECK(!std::filesystem::exists(file.string() + ".info"));
+}
+
+TEST_CASE("a state file is in the order of the mesh, whichever the partition numbered first")
+{
+  auto model = test::unilateral_oscillator(.3, .6);
+  const auto file = scratch() / "ordered.petsc";
+  model.structure.names.motion = {7, 0, 3};
+  write_state(state_of(model.structure, {7, 0, 3}, {70, 0, 30}), model.structure, file);
+  model.structure.names.motion = {0, 3, 7}; // as another number of ranks would number them
+  const State back = read_state(file, model.structure);
+  CHECK(test::whole(back.u) == std::vector<double>{0, 3, 7});
+  CHECK(test::whole(back.v) == std::vector<double>{0, 30, 70});
 }
 
 TEST_CASE("a state file that cannot be used says why on every rank")
@@ -64,7 +76,7 @@ TEST_CASE("a state file that cannot be used says why on every rank")
   const auto file = scratch() / "broken.petsc";
   const auto read = [&] { (void)read_state(file, model.structure); };
 
-  write_state(state, file);
+  write_state(state, model.structure, file);
   check_error([&] { (void)read_state(file, larger.structure); }, "has 3 entries, the structure has 4");
   const auto whole = std::filesystem::file_size(file);
   MPI_Barrier(PETSC_COMM_WORLD); // all have seen the size before it changes
@@ -75,9 +87,10 @@ TEST_CASE("a state file that cannot be used says why on every rank")
   cut(file, 5);
   check_error(read, "not a PETSc binary vector");
   check_error([&] { (void)read_state(scratch() / "absent.petsc", model.structure); }, "cannot be read");
-  check_error([&] { write_state(state, scratch() / "no such folder" / "state.petsc"); }, "cannot be written");
+  check_error([&] { write_state(state, model.structure, scratch() / "no such folder" / "state.petsc"); },
+              "cannot be written");
 
-  write_state(state_of(model.structure, {1, std::nan(""), 3}, {4, 5, 6}), file);
+  write_state(state_of(model.structure, {1, std::nan(""), 3}, {4, 5, 6}), model.structure, file);
   check_error(read, "not finite");
 }
 
