@@ -1,0 +1,50 @@
+// What shooting must do on the three-degree unilateral oscillator, on any number of ranks.
+#include "../support/small_models.hpp"
+#include "squeal/analysis/shooting.hpp"
+
+#include <cmath>
+#include <doctest/doctest.h>
+
+using namespace squeal;
+using namespace squeal::test;
+
+namespace
+{
+
+LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance)
+{
+  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface);
+  REQUIRE(equilibrium.outcome.word == "converged");
+  ModesSettings modes_settings;
+  modes_settings.method = "full";
+  const Modes modes = find_modes(model.structure, model.interface, equilibrium, modes_settings);
+  REQUIRE(!modes.modes.empty());
+  const ComplexMode& mode = modes.modes.front();
+  const Estimate estimate = estimate_amplitude(model.structure, model.interface, equilibrium, mode);
+  CycleSettings settings;
+  settings.steps_per_period = steps;
+  settings.free_periods = free;
+  settings.tolerance = tolerance;
+  return find_cycle(model.structure, model.interface, equilibrium, mode, estimate, settings, nullptr);
+}
+
+} // namespace
+
+TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
+{
+  const SmallModel once = unilateral_oscillator(.3, 1);
+  SmallModel twice = unilateral_oscillator(.3, 2);
+  check(VecScale(twice.structure.load, 2));
+  const LimitCycle a = cycle_of(once, 100, 5, 1e-12), b = cycle_of(twice, 100, 5, 1e-12);
+  REQUIRE(a.outcome.word == "converged");
+  REQUIRE(b.outcome.word == "converged");
+  CHECK(b.period == doctest::Approx(a.period).epsilon(1e-10));
+  CHECK(b.mean_energy == doctest::Approx(4 * a.mean_energy).epsilon(1e-10));
+}
+
+TEST_CASE("without instability the oscillator falls back to rest: collapsed, not converged")
+{
+  // mu_c = .1765: at .1 every motion decays
+  const LimitCycle cycle = cycle_of(unilateral_oscillator(.1, 1), 100, 5, 1e-8);
+  CHECK(cycle.outcome.word == "collapsed to equilibrium");
+}

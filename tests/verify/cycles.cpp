@@ -1,0 +1,87 @@
+// ranks: 1
+// Limit cycles of the three-degree unilateral oscillator against exact ones (matrix exponentials between events).
+#include "../support/small_models.hpp"
+#include "squeal/analysis/shooting.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <doctest/doctest.h>
+
+using namespace squeal;
+using namespace squeal::test;
+
+namespace
+{
+
+/// The option as given, for as long as it lives.
+struct Option
+{
+  const char* name;
+  Option(const char* key, const char* value) : name(key) { check(PetscOptionsSetValue(nullptr, key, value)); }
+  ~Option() { (void)PetscOptionsClearValue(nullptr, name); }
+};
+
+LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance)
+{
+  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface);
+  REQUIRE(equilibrium.outcome.word == "converged");
+  ModesSettings modes_settings;
+  modes_settings.method = "full";
+  const Modes modes = find_modes(model.structure, model.interface, equilibrium, modes_settings);
+  REQUIRE(!modes.modes.empty());
+  const ComplexMode& mode = modes.modes.front();
+  const Estimate estimate = estimate_amplitude(model.structure, model.interface, equilibrium, mode);
+  CycleSettings settings;
+  settings.steps_per_period = steps;
+  settings.free_periods = free;
+  settings.tolerance = tolerance;
+  return find_cycle(model.structure, model.interface, equilibrium, mode, estimate, settings, nullptr);
+}
+
+struct Row
+{
+  double friction, belt, period, mean_energy, multiplier;
+};
+
+// period, mean energy, largest non-trivial multiplier: exact to the digits given
+constexpr Row rows[] = {{.3, .3, 5.938028240916, .77336848489, .9241873},
+                        {.3, .6, 5.954461004653, 1.77650678461, .71516819},
+                        {.3, 1, 5.984555109780, 2.44704680486, .65000242},
+                        {.3, 2, 5.993768001880, 4.62721318386, .63739061}};
+
+std::complex<double> nearest(const std::vector<std::complex<double>>& multipliers, double value)
+{
+  return *std::min_element(multipliers.begin(), multipliers.end(),
+                           [=](auto a, auto b) { return std::abs(a - value) < std::abs(b - value); });
+}
+
+} // namespace
+
+TEST_CASE("exact limit cycles: stick, lift-off, touch, backward slip")
+{
+  for (const Row& row : rows)
+  {
+    CAPTURE(row.belt);
+    const LimitCycle cycle = cycle_of(unilateral_oscillator(row.friction, row.belt), 400, 0, 1e-8);
+    CHECK(cycle.outcome.word == "converged");
+    CHECK(cycle.residual_full < 1e-8);
+    // the theta step is of second order in the period: 400 steps a period leave 1e-5 to 1e-4, whatever the events
+    CHECK(cycle.period == doctest::Approx(row.period).epsilon(1e-4));
+    CHECK(cycle.mean_energy == doctest::Approx(row.mean_energy).epsilon(0.01));
+    CHECK(cycle.stability == "stable");
+    // the trivial multiplier comes out between .990 and 1.001 here: so good are the others
+    CHECK(std::abs(nearest(cycle.multipliers, 1.) - 1.) < 0.01);
+    CHECK(std::abs(nearest(cycle.multipliers, row.multiplier) - row.multiplier) < 0.01);
+    CHECK((cycle.open_pairs_max == 1) == (row.belt > .3));
+    CHECK(cycle.stick_pairs_max == (row.belt < 2 ? 1 : cycle.stick_pairs_max));
+  }
+}
+
+TEST_CASE("the paper's base is rank-deficient here, and the reduced system is solved all the same")
+{
+  const Option finish("-cycle_finish", "none");
+  const LimitCycle cycle = cycle_of(unilateral_oscillator(.3, 1), 400, 0, 1e-8);
+  CHECK(cycle.outcome.word == "converged"); // the contact space has two dimensions, and the base spans it
+  CHECK(cycle.records.front().unknowns == 5);
+  CHECK(cycle.period == doctest::Approx(5.984555109780).epsilon(1e-4));
+}
