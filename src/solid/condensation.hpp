@@ -15,12 +15,13 @@ template <class Operator> struct StrainPoint
   double measure = 0;
 };
 
-template <class Operator, class Elasticity>
-void condense(std::vector<StrainPoint<Operator>>& points, const std::vector<Operator>& Ba, const Elasticity& D)
+/// Returns -H^-1 G: the internal parameters of unit displacements, one displacement a column.
+template <class Operator, class Elasticity> Eigen::MatrixXd
+condense(std::vector<StrainPoint<Operator>>& points, const std::vector<Operator>& Ba, const Elasticity& D)
 {
   const auto parameters = Ba.front().cols(), dofs = points.front().B.cols();
-  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 9, 9>;
-  using Rectangle = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 9, 60>;
+  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 12, 12>;
+  using Rectangle = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 12, 60>;
   Square H = Square::Zero(parameters, parameters);
   Rectangle G = Rectangle::Zero(parameters, dofs);
   for (std::size_t p = 0; p < points.size(); ++p)
@@ -29,8 +30,9 @@ void condense(std::vector<StrainPoint<Operator>>& points, const std::vector<Oper
     H += stress.transpose() * Ba[p];
     G += stress.transpose() * points[p].B;
   }
-  const Rectangle a = H.ldlt().solve(G);
-  for (std::size_t p = 0; p < points.size(); ++p) points[p].B -= Ba[p] * a;
+  const Rectangle a = -H.ldlt().solve(G);
+  for (std::size_t p = 0; p < points.size(); ++p) points[p].B += Ba[p] * a;
+  return a;
 }
 
 /// K = int B' D B, exactly symmetric whatever the order of the sums.

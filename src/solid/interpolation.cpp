@@ -286,7 +286,7 @@ const Quadrature& stiffness_rule(Shape shape)
 const Quadrature& mass_rule(Shape shape)
 {
   static const Quadrature box = swept(square(3), 3), tetrahedron = collapsed_tetrahedron(4),
-                          prism = swept(collapsed_triangle(3), 3), quad = square(2), triangle = mid_side_triangle();
+                          prism = swept(collapsed_triangle(3), 3), quad = square(3), triangle = collapsed_triangle(3);
   switch (shape)
   {
   case Shape::hex8:

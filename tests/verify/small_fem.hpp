@@ -4,6 +4,8 @@
 #include "squeal/solid/element.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <doctest/doctest.h>
 #include <Eigen/Dense>
 #include <Eigen/Sparse>
 #include <functional>
@@ -12,6 +14,12 @@
 
 namespace small_fem
 {
+
+/// Relative tolerance and nothing else: doctest's own adds epsilon times one, vacuous for a displacement of 1e-5.
+inline doctest::Approx about(double exact, double relative)
+{
+  return doctest::Approx(exact).epsilon(relative).scale(0);
+}
 
 using squeal::Shape;
 using squeal::Vec3;
@@ -66,6 +74,26 @@ inline Mesh quads(int nx, int ny, const std::function<Vec3(double, double)>& pla
       mesh.elements.push_back({a, a + 1, b + 1, b});
     }
   return mesh;
+}
+
+/// One mesh of several, coincident nodes made one; of one mesh, closes a ring.
+inline Mesh joined(const std::vector<Mesh>& meshes)
+{
+  Mesh whole{meshes.front().shape, {}, {}};
+  std::map<std::array<long, 3>, int> known;
+  for (const auto& mesh : meshes)
+    for (const auto& element : mesh.elements)
+    {
+      auto& nodes = whole.elements.emplace_back();
+      for (const auto& x : positions(mesh, element))
+      {
+        const std::array<long, 3> key = {std::lround(x[0] * 1e7), std::lround(x[1] * 1e7), std::lround(x[2] * 1e7)};
+        const auto [place, is_new] = known.try_emplace(key, static_cast<int>(whole.x.size()));
+        if (is_new) whole.x.push_back(x);
+        nodes.push_back(place->second);
+      }
+    }
+  return whole;
 }
 
 /// The same nodes with other elements, `cuts` naming the old element's corners of each new one.
