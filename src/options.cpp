@@ -21,7 +21,7 @@ struct Option
 // The one list of squeal's own options: help and nearest-name messages read it, each stage queries its own.
 constexpr std::array options = {
     Option{"-equilibrium_max_it", "100", "status iterations before giving up"},
-    Option{"-equilibrium_check_max_it", "-1", "of the fixed point run as a check; -1: 20000 up to 200 pairs, else 0"},
+    Option{"-equilibrium_check_max_it", "-1", "of the fixed point run as a check; -1: 20000 up to 600 pairs, else 0"},
     Option{"-transient_contact_law", "displacement", "contact on displacements, or on velocities (velocity)"},
     Option{"-transient_contact_solver", "gauss_seidel", "block Gauss-Seidel, or projection fixed point (fixed_point)"},
     Option{"-transient_contact_tolerance", "1e-10", "largest natural map of a pair over the largest reaction"},

@@ -3,6 +3,7 @@
 #include "squeal/base/petsc.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <petscblaslapack.h>
 #include <set>
@@ -83,7 +84,16 @@ std::vector<double> gaps(const ComplementarityProblem& problem, const std::vecto
   const std::size_t n = problem.q.size();
   std::vector<double> g = problem.q;
   for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < n; ++j) g[i] += problem.M[i * n + j] * r[j];
+  {
+    // four sums, since the compiler may not reorder one
+    const double* row = problem.M.data() + i * n;
+    std::array<double, 4> sum{};
+    std::size_t j = 0;
+    for (; j + 4 <= n; j += 4)
+      for (std::size_t k = 0; k < 4; ++k) sum[k] += row[j + k] * r[j + k];
+    for (; j < n; ++j) sum[0] += row[j] * r[j];
+    g[i] += sum[0] + sum[1] + sum[2] + sum[3];
+  }
   return g;
 }
 

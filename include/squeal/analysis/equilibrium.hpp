@@ -27,10 +27,10 @@ struct Equilibrium
   double force_residual = 0;     // |K u - F - B'r| / |F|
   double check_residual = 0;     // the natural map with the fixed point's rho = 1/lambda_max(D_nn)
   int check_iterations = 0;      // of an independent run of the fixed point; 0: not run
-  double check_difference = 0;   // of its reactions, over the largest; meaningless unless it ran
+  double check_difference = 0;   // of its reactions, over the largest; NaN if it did not converge
 };
 
-/// Options, prefix -equilibrium_: max_it (100), check_max_it (of the fixed point; -1: 20000 up to 200 pairs, else 0).
+/// Options, prefix -equilibrium_: max_it (100), check_max_it (of the fixed point; -1: 20000 up to 600 pairs, else 0).
 /// Errors: K singular on a body that contact does not hold either (which body).
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface);
 
