@@ -1,10 +1,12 @@
 #pragma once
 /// Element kernels: pure functions on arrays, no library.
 ///
-/// hex8, wedge6: with incompatible modes in Taylor's corrected form (patch test on any shape, no locking in bending);
+/// hex8, wedge6: with incompatible modes in Taylor's corrected form (patch test on any shape; hex8 does not lock in
+/// bending, wedge6 does and is for filling);
 /// hex20, tet10: isoparametric, fully integrated; shell4, shell3: flat facets with transverse shear (DKMQ, DKMT) and
 /// drilling rotations, six degrees of freedom a node, warped quadrilaterals on rigid offsets.
-/// Sources and caveats stand at each kernel. Mass is consistent.
+/// Sources and caveats stand at each kernel. Mass is consistent with the motion that the stiffness implies: it includes
+/// the incompatible modes, and the bow of shell sides between rotated ends.
 #include "squeal/mesh/mesh.hpp"
 
 #include <span>
