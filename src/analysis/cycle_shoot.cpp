@@ -36,6 +36,7 @@ ShootingOptions read_options()
   check(PetscOptionsGetInt(nullptr, prefix, "-stall", &options.stall, nullptr));
   check(PetscOptionsGetInt(nullptr, prefix, "-max_periods", &options.max_periods, nullptr));
   check(PetscOptionsGetInt(nullptr, prefix, "-multipliers", &options.multipliers, nullptr));
+  if (options.base_growths < 0) options.base_growths = options.finish == "none" ? 4 : 0;
   require(options.difference > 0, "-cycle_difference must be above 0");
   require(options.clamp > 0, "-cycle_clamp must be above 0");
   require(options.secants >= 0, "-cycle_secants must not be below 0");

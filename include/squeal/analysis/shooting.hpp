@@ -11,8 +11,8 @@ namespace squeal
 struct ShootingOptions
 {
   std::string finish = "multisecant";
-  PetscInt reduced_newtons = 10; // iterations of the reduced system; 0: not tried
-  PetscInt base_growths = 1;
+  PetscInt reduced_newtons = 10;   // iterations of the reduced system; 0: not tried
+  PetscInt base_growths = -1;      // -1: 4 without a finish; none with one, which is cheaper
   PetscReal difference = 1e-6;     // of the fluctuation: difference columns
   PetscReal rank_tolerance = 1e-7; // of the base, and of the reduced least-squares solve
   PetscInt secants = 20;           // kept
