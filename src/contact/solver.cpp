@@ -94,9 +94,10 @@ void refresh(const Problem& problem, const std::vector<double>& r, std::vector<d
       add_rows(problem.row(i), problem.n, problem.block, &r[i], w.data());
 }
 
-/// One sweep of block Gauss-Seidel; a change below `negligible` is not made, which spares reading its rows. Returns the
-/// sum of the changes, which bounds the rounding that w gathers.
-double sweep(const Problem& problem, double negligible, std::vector<double>& r, std::vector<double>& w)
+/// One sweep of block Gauss-Seidel, each change times `relaxation`; a change below `negligible` is not made, which
+/// spares reading its rows. Returns the sum of the changes, which bounds the rounding that w gathers.
+double sweep(const Problem& problem, double relaxation, double negligible, std::vector<double>& r,
+             std::vector<double>& w)
 {
   double moved = 0;
   for (std::size_t i = 0; i < problem.n; i += problem.block)
@@ -110,7 +111,9 @@ double sweep(const Problem& problem, double negligible, std::vector<double>& r, 
         A[k][l] = problem.row(i + k)[i + l];
         q[k] -= A[k][l] * last[l];
       }
-    const PairVector next = solve_pair(A, q, problem.directions, problem.friction, last);
+    PairVector next = solve_pair(A, q, problem.directions, problem.friction, last);
+    if (relaxation < 1) // stays admissible: the cone is convex
+      for (std::size_t k = 0; k < problem.block; ++k) next[k] = last[k] + relaxation * (next[k] - last[k]);
     const PairVector change = {next[0] - last[0], next[1] - last[1], next[2] - last[2]};
     const double size = std::abs(change[0]) + std::abs(change[1]) + std::abs(change[2]);
     if (size <= negligible) continue;
@@ -131,10 +134,10 @@ ContactResult gauss_seidel(const Problem& problem, const ContactSettings& settin
   for (std::size_t i = 0; i < problem.n; ++i) largest_W = std::max(largest_W, problem.diagonal(i));
   for (std::size_t pair = 0; pair < problem.rho_n.size(); ++pair)
     largest_rho = std::max({largest_rho, problem.rho_n[pair], problem.rho_t[pair]});
-  double negligible = 0;
+  double negligible = 0, relaxation = 1, earlier = result.residual;
   while (!(result.residual <= settings.tolerance) && result.iterations < settings.max_iterations)
   {
-    const double change = sweep(problem, negligible, r, w);
+    const double change = sweep(problem, relaxation, negligible, r, w);
     ++result.iterations;
     moved += change;
     result.residual = residual_of(problem, w, r);
@@ -149,6 +152,12 @@ ContactResult gauss_seidel(const Problem& problem, const ContactSettings& settin
       result.residual = residual_of(problem, w, r);
     }
     if (change == 0 && negligible == 0) break; // no pair moves any more: this is what rounding allows
+    if (result.iterations % 50 == 0)
+    {
+      // strong friction makes sweeps go round in circles, which shorter changes often end
+      if (result.residual > .5 * earlier) relaxation = std::max(.25, relaxation / 2);
+      earlier = result.residual;
+    }
     negligible = change == 0 ? 0 : .02 * settings.tolerance * scale;
   }
   result.converged = result.residual <= settings.tolerance;

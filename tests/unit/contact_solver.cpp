@@ -158,7 +158,7 @@ TEST_CASE("a converged answer satisfies the residual when w is formed afresh, or
     if (result.converged) CHECK(truth < 2e-10); // another order of summation
     solved += result.converged ? 1 : 0;
   }
-  CHECK(solved > 20);
+  CHECK(solved > 50); // 20 of these have mu = 5
 }
 
 TEST_CASE("forces a million times larger or smaller give the same relative answer")

@@ -5,7 +5,8 @@
 /// largest reaction.
 ///
 /// gauss_seidel: one exact local solve a pair and sweep; w follows each change of a reaction, so that a sweep reads W
-/// once at most, and is formed afresh before the residual is believed where rounding could matter.
+/// once at most, and is formed afresh before the residual is believed where rounding could matter. Under-relaxed when
+/// 50 sweeps bring nothing.
 /// fixed_point: the paper's r_n <- max(0, r_n - rho w_n), r_t <- proj_disc(mu r_n)(r_t - rho w_t); contracts without
 /// friction for 0 < rho < 2/lambda_max(W), at a rate set by cond(W).
 ///
