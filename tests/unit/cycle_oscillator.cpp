@@ -35,11 +35,22 @@ TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
   const SmallModel once = unilateral_oscillator(.3, 1);
   SmallModel twice = unilateral_oscillator(.3, 2);
   check(VecScale(twice.structure.load, 2));
-  const LimitCycle a = cycle_of(once, 100, 5, 1e-12), b = cycle_of(twice, 100, 5, 1e-12);
+  const LimitCycle a = cycle_of(once, 100, 5, 1e-11);
   REQUIRE(a.outcome.word == "converged");
+  // The doubled state must return after the same period. A cycle found anew would do for its period only: a discrete
+  // orbit depends a little on where between the events its steps fall.
+  const Owned<Vec> start = state_of(a.start.u, a.start.v), end = zeros_like(start);
+  check(VecScale(displacement(start), 2));
+  check(VecScale(velocity(start), 2));
+  PeriodMap map{twice.structure, twice.interface, 100, 0.5};
+  const Flow flow = flow_of(map);
+  flow.integrate(a.period, start, end, nullptr);
+  check(VecAXPY(end, -1, start));
+  CHECK(energy_norm(flow, end) < 1e-10 * energy_norm(flow, start));
+  const LimitCycle b = cycle_of(twice, 100, 5, 1e-11);
   REQUIRE(b.outcome.word == "converged");
-  CHECK(b.period == doctest::Approx(a.period).epsilon(1e-10));
-  CHECK(b.mean_energy == doctest::Approx(4 * a.mean_energy).epsilon(1e-10));
+  CHECK(b.period == doctest::Approx(a.period).epsilon(1e-6));
+  CHECK(b.mean_energy == doctest::Approx(4 * a.mean_energy).epsilon(1e-6));
 }
 
 TEST_CASE("without instability the oscillator falls back to rest: collapsed, not converged")
