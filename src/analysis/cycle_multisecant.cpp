@@ -113,7 +113,7 @@ Finish shoot_multisecant(Shooting& shooting, const Orbit& start)
     check(VecAXPY(moved, 1, step.step));
     Orbit next = evaluate(shooting, moved, orbit.period + step.period);
     ++shooting.iterations;
-    record(shooting, "multisecant", 0, std::nan(""), next);
+    record(shooting, "multisecant", full_unknowns(next), std::nan(""), next);
     if (vanishing(shooting, next) || !std::isfinite(next.residual))
     {
       finish.ending = Ending::vanished;

@@ -207,7 +207,7 @@ PetscErrorCode converged(SNES, PetscInt iteration, PetscReal, PetscReal, PetscRe
   return guarded(full,
                  [&]
                  {
-                   record(shooting, "newton-krylov", 0, std::nan(""), full.orbit);
+                   record(shooting, "newton-krylov", full_unknowns(full.orbit), std::nan(""), full.orbit);
                    if (iteration > 0) ++shooting.iterations;
                    *reason = SNES_CONVERGED_ITERATING;
                    if (full.orbit.residual <= shooting.tolerance)

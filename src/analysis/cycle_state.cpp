@@ -86,6 +86,13 @@ void record(Shooting& shooting, const std::string& stage, int unknowns, double p
   if (shooting.announce) shooting.announce(shooting.records.back());
 }
 
+int full_unknowns(const Orbit& orbit)
+{
+  PetscInt dofs = 0;
+  check(VecGetSize(displacement(orbit.state), &dofs));
+  return static_cast<int>(2 * dofs + 1);
+}
+
 bool admissible_period(const Shooting& shooting, double period)
 {
   return period > shooting.first_period / 2 && period < shooting.first_period * 2;

@@ -63,6 +63,7 @@ double energy_norm(const Flow& flow, Vec a);
 Orbit evaluate(Shooting& shooting, Vec state, double period);
 Orbit copy_of(const Orbit& orbit);
 void record(Shooting& shooting, const std::string& stage, int unknowns, double projected, const Orbit& orbit);
+int full_unknowns(const Orbit& orbit);                           // u, v and T
 bool admissible_period(const Shooting& shooting, double period); // within a factor of two of the first
 bool vanishing(const Shooting& shooting, const Orbit& orbit);    // energy below a tenth of the start's
 
