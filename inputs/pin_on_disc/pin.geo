@@ -11,7 +11,7 @@ DefineConstant[
   pin_inner = {0.08, Name "Pin/inner radius of its section [m]"},
   pin_outer = {0.1, Name "Pin/outer radius of its section [m]"},
   pin_angle = {14, Name "Pin/angle of its section [degree]"},
-  pin_height = {0.03, Name "Pin/height [m]"}
+  pin_height = {0.025, Name "Pin/height [m]"}
 ];
 
 If (inner_radius >= pin_inner || pin_inner >= pin_outer || pin_outer >= outer_radius || pin_angle >= 180)

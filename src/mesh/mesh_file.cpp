@@ -4,10 +4,9 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
-#include <functional>
 #include <iterator>
-#include <limits>
 #include <regex>
 #ifdef SQUEAL_WITH_GMSH
 #include <gmsh.h>
@@ -25,15 +24,28 @@ std::string text_of(const std::filesystem::path& file)
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-// Without comments, and without what stands in braces or quotes: what is left are the names themselves.
+// Without comments, strings, and what stands in braces: what is left of a DefineConstant list are names and "=". One
+// pass by hand, since std::regex recurses once a character and a long comment would exhaust the stack.
 std::string bare(const std::string& text)
 {
-  static const std::regex comments(R"(//[^\n]*|/\*[^]*?\*/)"), strings("\"[^\"\\n]*\""), braces(R"(\{[^{}]*\})");
-  std::string result = std::regex_replace(std::regex_replace(text, comments, " "), strings, " ");
-  for (std::string before; before != result;)
+  std::string result;
+  int depth = 0;
+  for (std::size_t i = 0; i < text.size(); ++i)
   {
-    before = result;
-    result = std::regex_replace(before, braces, "0");
+    const auto skip_to = [&](const char* end, std::size_t from)
+    { i = std::min(text.find(end, from), text.size()) + std::strlen(end) - 1; };
+    if (text.compare(i, 2, "//") == 0)
+      skip_to("\n", i);
+    else if (text.compare(i, 2, "/*") == 0)
+      skip_to("*/", i + 2);
+    else if (text[i] == '"')
+      skip_to("\"", i + 1);
+    else if (text[i] == '{')
+      ++depth;
+    else if (text[i] == '}')
+      --depth;
+    else if (depth == 0)
+      result += text[i];
   }
   return result;
 }
@@ -42,17 +54,18 @@ std::string bare(const std::string& text)
 
 std::vector<std::string> geometry_parameters(const std::filesystem::path& file)
 {
-  static const std::regex include("Include\\s+\"([^\"]+)\""), list(R"(DefineConstant\s*\[([^\]]*)\])"),
-      entry(R"((?:^|,)\s*([A-Za-z_]\w*)\s*(?==|,|$))");
+  static const std::regex include("Include\\s+\"([^\"\\n]+)\""), entry(R"((?:^|,)\s*([A-Za-z_]\w*)\s*(?==|,|$))");
   std::vector<std::string> names;
   const std::string text = text_of(file);
   for (std::sregex_iterator it(text.begin(), text.end(), include), end; it != end; ++it)
     for (std::string& name : geometry_parameters(file.parent_path() / (*it)[1].str())) names.push_back(std::move(name));
-  const std::string definitions = bare(text);
-  for (std::sregex_iterator it(definitions.begin(), definitions.end(), list), end; it != end; ++it)
+  const std::string definitions = bare(text), word = "DefineConstant";
+  for (std::size_t at = definitions.find(word); at != std::string::npos; at = definitions.find(word, at + 1))
   {
-    const std::string inside = (*it)[1];
-    for (std::sregex_iterator e(inside.begin(), inside.end(), entry), last; e != last; ++e) names.push_back((*e)[1]);
+    const std::size_t first = definitions.find('[', at), last = definitions.find(']', at);
+    if (last == std::string::npos || first > last) break;
+    const std::string list = definitions.substr(first + 1, last - first - 1);
+    for (std::sregex_iterator e(list.begin(), list.end(), entry), end; e != end; ++e) names.push_back((*e)[1]);
   }
   return names;
 }

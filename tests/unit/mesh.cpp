@@ -281,7 +281,8 @@ TEST_CASE("parameters are found in lists, with braces, comments and includes")
 {
   const TemporaryFile inner("DefineConstant[ deep = 1 ];", ".geo");
   const TemporaryFile outer("Include \"" + inner.path().filename().string() +
-                                "\";\nDefineConstant[ a = {1, Min 0, Name \"b = 2\"} // c = 3\n, d, e=4*(1+2) ];",
+                                "\";\nDefineConstant[ a = {1, Min 0, Name \"b = 2\"} // c = 3\n, d, e=4*(1+2) ]; /*" +
+                                std::string(1000000, 'x') + "*/",
                             ".geo");
   if (rank_of(comm) != 0) return; // the file is rank 0's
   CHECK(geometry_parameters(outer.path()) == std::vector<std::string>{"deep", "a", "d", "e"});
