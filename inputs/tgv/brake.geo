@@ -11,7 +11,7 @@ DefineConstant[
   outer_radius = {0.32, Name "Disc/outer radius [m]"},
   thickness = {0.045, Name "Disc/thickness [m]"},
   hub_radius = {0.06, Name "Hub/clamped inner radius [m]"},
-  pin_radius = {0.0195, Name "Pins/radius [m]"},
+  pin_radius = {0.02, Name "Pins/radius [m]"},
   pin_height = {0.038, Name "Pins/height [m]"},
   pin_rings = {3, Min 1, Step 1, Name "Pins/rings a side"},
   pin_columns = {3, Min 1, Step 1, Name "Pins/columns a side"},
