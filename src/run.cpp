@@ -130,6 +130,23 @@ void describe_model(const Model& model, Report& report, MPI_Comm comm)
                 report.pairs, report.elements, report.ranks);
 }
 
+/// What the report tells of the equilibrium beside its own result: each contact's clamp force and the probes.
+void describe_equilibrium(const Model& model, Report& report)
+{
+  if (report.equilibrium.outcome.word != "converged") return;
+  const Interface& interface = model.interface;
+  for (std::size_t i = 0; i < interface.contact.size(); ++i)
+  {
+    const auto contact = static_cast<std::size_t>(interface.contact[i]);
+    if (report.contact_forces.size() <= contact) report.contact_forces.resize(contact + 1);
+    report.contact_forces[contact] += report.equilibrium.reactions[i * static_cast<std::size_t>(interface.block())];
+  }
+  Owned<Vec> values;
+  check(MatCreateVecs(model.probes, nullptr, values.put()));
+  check(MatMult(model.probes, report.equilibrium.u, values));
+  report.equilibrium_probes = whole(values);
+}
+
 std::vector<std::string> stages_run(const Report& report)
 {
   std::vector<std::string> stages;
@@ -169,6 +186,7 @@ Verdict run(const Scene& scene, const std::filesystem::path& output, MPI_Comm co
 
   report.equilibrium =
       timed(report, "equilibrium", comm, [&] { return find_equilibrium(model.structure, model.interface); });
+  describe_equilibrium(model, report);
   report.modes = timed(report, "modes", comm, [&] { return run_modes(scene, model, report); });
   report.estimate = timed(report, "estimate", comm, [&] { return run_estimate(scene, model, report); });
   report.transient = timed(report, "transient", comm, [&] { return run_transient(scene, model, report); });

@@ -222,22 +222,6 @@ Owned<Mat> assemble_reaction(const std::vector<Row>& rows, const std::vector<Pet
   return result;
 }
 
-std::vector<double> whole(Vec distributed)
-{
-  Owned<VecScatter> scatter;
-  Owned<Vec> local;
-  check(VecScatterCreateToAll(distributed, scatter.put(), local.put()));
-  check(VecScatterBegin(scatter, distributed, local, INSERT_VALUES, SCATTER_FORWARD));
-  check(VecScatterEnd(scatter, distributed, local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscInt size = 0;
-  const PetscScalar* entries = nullptr;
-  check(VecGetSize(local, &size));
-  check(VecGetArrayRead(local, &entries));
-  std::vector<double> result(entries, entries + size);
-  check(VecRestoreArrayRead(local, &entries));
-  return result;
-}
-
 } // namespace
 
 ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface& interface,

@@ -61,15 +61,7 @@ void record(const StepReport& report, double h, const State& state, Mat probes, 
   history.slip.push_back(report.slip);
   if (!probes) return;
   check(MatMult(probes, state.u, probe_values));
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(probe_values, &first, &last));
-  const double* local = nullptr;
-  check(VecGetArrayRead(probe_values, &local));
-  std::vector<double> values(history.probes.size(), 0);
-  std::copy(local, local + (last - first), values.begin() + first);
-  check(VecRestoreArrayRead(probe_values, &local));
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(probe_values));
-  MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_SUM, comm);
+  const std::vector<double> values = whole(probe_values);
   for (std::size_t i = 0; i < values.size(); ++i) history.probes[i].push_back(values[i]);
 }
 

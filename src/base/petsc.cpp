@@ -66,6 +66,27 @@ Owned<Vec> copy_of(Vec source)
   return result;
 }
 
+std::vector<double> whole(Vec x)
+{
+  const auto comm = PetscObjectComm(reinterpret_cast<PetscObject>(x));
+  const PetscInt* ranges = nullptr;
+  check(VecGetOwnershipRanges(x, &ranges));
+  const auto ranks = static_cast<std::size_t>(ranks_of(comm));
+  std::vector<int> counts(ranks), starts(ranks);
+  for (std::size_t rank = 0; rank < ranks; ++rank)
+  {
+    starts[rank] = static_cast<int>(ranges[rank]);
+    counts[rank] = static_cast<int>(ranges[rank + 1] - ranges[rank]);
+  }
+  std::vector<double> result(static_cast<std::size_t>(ranges[ranks]));
+  const PetscScalar* mine = nullptr;
+  check(VecGetArrayRead(x, &mine));
+  MPI_Allgatherv(mine, counts[static_cast<std::size_t>(rank_of(comm))], MPI_DOUBLE, result.data(), counts.data(),
+                 starts.data(), MPI_DOUBLE, comm);
+  check(VecRestoreArrayRead(x, &mine));
+  return result;
+}
+
 LogStage::LogStage(const char* name)
 {
   PetscLogStage stage = -1;

@@ -114,6 +114,7 @@ Interface make_interface(const Mesh& mesh, const std::vector<NodePair>& pairs, c
     axes.resize(static_cast<std::size_t>(interface.directions)); // a plane contact beside spatial ones: no second row
     for (const Vec3& axis : axes) interface.drive.push_back(dot(velocity, axis));
     interface.position.push_back(at);
+    interface.contact.push_back(pair.contact);
     interface.gap.push_back(contact.gap);
     if (i < first || i >= last) continue;
     axes.insert(axes.begin(), pair.normal);
@@ -164,23 +165,7 @@ std::vector<double> relative(const Interface& interface, Vec x)
   Owned<Vec> rows;
   check(MatCreateVecs(interface.B, nullptr, rows.put()));
   check(MatMult(interface.B, x, rows));
-  const auto comm = PetscObjectComm(reinterpret_cast<PetscObject>(interface.B.get()));
-  const PetscInt* ranges = nullptr;
-  check(MatGetOwnershipRanges(interface.B, &ranges));
-  const auto ranks = static_cast<std::size_t>(ranks_of(comm));
-  std::vector<int> counts(ranks), starts(ranks);
-  for (std::size_t rank = 0; rank < ranks; ++rank)
-  {
-    starts[rank] = static_cast<int>(ranges[rank]);
-    counts[rank] = static_cast<int>(ranges[rank + 1] - ranges[rank]);
-  }
-  std::vector<double> result(interface.size());
-  const PetscScalar* mine = nullptr;
-  check(VecGetArrayRead(rows, &mine));
-  MPI_Allgatherv(mine, counts[static_cast<std::size_t>(rank_of(comm))], MPI_DOUBLE, result.data(), counts.data(),
-                 starts.data(), MPI_DOUBLE, comm);
-  check(VecRestoreArrayRead(rows, &mine));
-  return result;
+  return whole(rows);
 }
 
 void add_reactions(const Interface& interface, const std::vector<double>& r, Vec y)

@@ -20,8 +20,9 @@ Json entry_of(const Outcome& outcome)
   return entry;
 }
 
-Json equilibrium_entry(const Equilibrium& equilibrium)
+Json equilibrium_entry(const Report& report, const Scene& scene)
 {
+  const Equilibrium& equilibrium = report.equilibrium;
   Json entry = entry_of(equilibrium.outcome);
   if (!ran(equilibrium.outcome)) return entry;
   const NormalForces normal = normal_forces(equilibrium);
@@ -33,6 +34,12 @@ Json equilibrium_entry(const Equilibrium& equilibrium)
   entry["residual"] = equilibrium.outcome.residual;
   entry["force_residual"] = equilibrium.force_residual;
   entry["check_residual"] = equilibrium.check_residual;
+  for (std::size_t i = 0; i < report.contact_forces.size(); ++i)
+    entry["contacts"].push_back({{"rotor", scene.contacts[i].rotor},
+                                 {"stator", scene.contacts[i].stator},
+                                 {"normal_force_sum", report.contact_forces[i]}});
+  for (std::size_t i = 0; i < report.equilibrium_probes.size(); ++i)
+    entry["probes"][scene.probes[i].name] = report.equilibrium_probes[i];
   return entry;
 }
 
@@ -176,7 +183,7 @@ std::string report_json(const Report& report, const Scene& scene)
   json["scene"] = scene.file.string();
   json["model"] = {
       {"dofs", report.dofs}, {"pairs", report.pairs}, {"elements", report.elements}, {"ranks", report.ranks}};
-  json["equilibrium"] = equilibrium_entry(report.equilibrium);
+  json["equilibrium"] = equilibrium_entry(report, scene);
   json["modes"] = modes_entry(report.modes);
   json["estimate"] = estimate_entry(report.estimate);
   json["transient"] = transient_entry(report.transient);

@@ -63,23 +63,6 @@ inline Owned<Vec> vector_like(Mat matrix, const std::vector<double>& values)
   return result;
 }
 
-/// Entries of a distributed vector, whole on every rank.
-inline std::vector<double> whole(Vec distributed)
-{
-  Owned<VecScatter> scatter;
-  Owned<Vec> local;
-  check(VecScatterCreateToAll(distributed, scatter.put(), local.put()));
-  check(VecScatterBegin(scatter, distributed, local, INSERT_VALUES, SCATTER_FORWARD));
-  check(VecScatterEnd(scatter, distributed, local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscInt size = 0;
-  check(VecGetLocalSize(local, &size));
-  const double* values = nullptr;
-  check(VecGetArrayRead(local, &values));
-  std::vector<double> result(values, values + size);
-  check(VecRestoreArrayRead(local, &values));
-  return result;
-}
-
 /// M, C and K on one common pattern, which always holds the diagonal.
 inline Structure make_structure(const Rows& M, const Rows& C, const Rows& K, const std::vector<double>& load)
 {

@@ -50,8 +50,8 @@ TEST_CASE("a state read back is the state that was written, to the bit")
   const auto file = scratch() / "state.petsc";
   write_state(state, model.structure, file);
   const State back = read_state(file, model.structure);
-  CHECK(test::whole(back.u) == test::whole(state.u));
-  CHECK(test::whole(back.v) == test::whole(state.v));
+  CHECK(whole(back.u) == whole(state.u));
+  CHECK(whole(back.v) == whole(state.v));
   CHECK(!std::filesystem::exists(file.string() + ".part"));
   CHECK(!std::filesystem::exists(file.string() + ".info"));
 }
@@ -64,8 +64,8 @@ TEST_CASE("a state file is in the order of the mesh, whichever the partition num
   write_state(state_of(model.structure, {7, 0, 3}, {70, 0, 30}), model.structure, file);
   model.structure.names.motion = {0, 3, 7}; // as another number of ranks would number them
   const State back = read_state(file, model.structure);
-  CHECK(test::whole(back.u) == std::vector<double>{0, 3, 7});
-  CHECK(test::whole(back.v) == std::vector<double>{0, 30, 70});
+  CHECK(whole(back.u) == std::vector<double>{0, 3, 7});
+  CHECK(whole(back.v) == std::vector<double>{0, 30, 70});
 }
 
 TEST_CASE("a state file that cannot be used says why on every rank")
@@ -128,8 +128,8 @@ TEST_CASE("in free flight every theta follows its discrete eigenvalue exactly")
     State state = state_of(model.structure, {1, -1}, {lambda.real(), -lambda.real()});
     const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta);
     CHECK(test::run_steps(model, step, 7, state) == 0);
-    CHECK(test::whole(state.u)[0] == doctest::Approx(end.real()).epsilon(1e-13));
-    CHECK(test::whole(state.v)[1] == doctest::Approx(-(lambda * end).real()).epsilon(1e-13));
+    CHECK(whole(state.u)[0] == doctest::Approx(end.real()).epsilon(1e-13));
+    CHECK(whole(state.v)[1] == doctest::Approx(-(lambda * end).real()).epsilon(1e-13));
   }
 }
 

@@ -59,7 +59,7 @@ TEST_CASE("a falling mass meets the ground in the step of its impact, and stays"
     if (first > 0 && state.time > first + 2.5 * h) // an inelastic shock takes two steps
     {
       CHECK(std::abs(height) < 1e-10 * 9.81 * h * h); // the contact tolerance, over a step
-      CHECK(std::abs(test::whole(state.v)[0]) < 1e-12);
+      CHECK(std::abs(whole(state.v)[0]) < 1e-12);
       CHECK(std::abs(state.reactions[0] - 2 * 9.81) < 1e-9 * 19.62); // contact tolerance
     }
   }
@@ -116,7 +116,7 @@ Bounce bouncing_bar(int elements)
     if (state.time > 1.2 && state.time <= 1.4) impulse += step.h * state.reactions[0];
     bounce.gain = std::max(bounce.gain, report.contact_work / report.energy);
     // what the law keeps open is u + h v/2
-    const auto u = test::whole(state.u), v = test::whole(state.v);
+    const auto u = whole(state.u), v = whole(state.v);
     bounce.gap_min = std::min(bounce.gap_min, 5 + u[0] + step.h * v[0] / 2);
     if (i == 2 * steps_per_second)
     {
@@ -183,9 +183,9 @@ TEST_CASE("a sliding brick stops where and when Coulomb says")
     if (stopped > 0) CHECK(report.stick == 1);
   }
   CHECK(std::abs(stopped - stop) <= h);
-  CHECK(std::abs(test::whole(state.v)[1]) < 1e-12);
+  CHECK(std::abs(whole(state.v)[1]) < 1e-12);
   // exact up to the step of the stop, which is travelled at half speed: at most (mu g h) h/8
-  CHECK(std::abs(test::whole(state.u)[1] - v0 * stop / 2) < mu * g * h * h / 8 + 1e-10);
+  CHECK(std::abs(whole(state.u)[1] - v0 * stop / 2) < mu * g * h * h / 8 + 1e-10);
 }
 
 TEST_CASE("the energy identity holds in every step: lift-off, touch, stick and slip, any theta, both laws")
@@ -315,7 +315,7 @@ TEST_CASE("the two contact solvers give one trajectory")
     const ThetaStep step = make_theta_step(model.structure, model.interface, .03, .5);
     State state = state_of(model.structure, {-.5, 1, -.3}, {.3, -.2, .6});
     CHECK(test::run_steps(model, step, 200, state) == 0);
-    return test::whole(state.u);
+    return whole(state.u);
   };
   const auto a = end("gauss_seidel"), b = end("fixed_point");
   for (std::size_t i = 0; i < 3; ++i) CHECK(std::abs(a[i] - b[i]) < 1e-8); // contact tolerance, piled up

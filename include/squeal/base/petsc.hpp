@@ -7,6 +7,7 @@
 #include <slepc.h>
 #include <source_location>
 #include <utility>
+#include <vector>
 
 #ifndef PETSC_SUCCESS
 #define PETSC_SUCCESS 0
@@ -108,6 +109,9 @@ Owned<Vec> zeros_like(Vec pattern);
 
 /// A vector of the same layout and entries.
 Owned<Vec> copy_of(Vec source);
+
+/// The entries of a small distributed vector, whole on every rank. Collective.
+std::vector<double> whole(Vec x);
 
 /// Registers (once) and enters a -log_view stage for as long as it lives.
 class LogStage

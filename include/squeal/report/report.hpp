@@ -19,6 +19,8 @@ struct Report
   long elements = 0;
   int pairs = 0, ranks = 1;
   Equilibrium equilibrium;
+  std::vector<double> contact_forces;     // [N] sum of r_n of each contact of the scene; empty on a matrix scene
+  std::vector<double> equilibrium_probes; // [m] at the equilibrium, one a probe
   Modes modes;
   Estimate estimate;
   Trajectory transient;
