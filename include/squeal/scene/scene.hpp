@@ -151,7 +151,7 @@ struct CycleSettings
   bool enabled = false;
   int steps_per_period = 100;
   double tolerance = 1e-5; // on the full-space residual
-  int free_periods = 20;
+  int free_periods = 10;
   double theta = 0.5;
   std::filesystem::path save_state;
 };
