@@ -103,7 +103,7 @@ std::string option_reference()
   {
     text << "  " << option.name;
     for (std::size_t column = std::string(option.name).size(); column < 36; ++column) text << ' ';
-    text << option.meaning << " (" << option.standard << ")\n";
+    text << option.meaning << " [" << option.standard << "]\n";
   }
   return text.str();
 }

@@ -208,8 +208,8 @@ void dry_run(const Scene& scene, MPI_Comm comm)
   describe_model(model, report, comm);
   const MemoryForecast memory = forecast_memory(model);
   if (rank_of(comm) == 0)
-    std::printf("  memory forecast, all ranks together: matrices %.0f MB, one factorisation %.0f MB, condensed contact "
-                "operator %.0f MB\n",
+    std::printf("  memory forecast, all ranks together: matrices %.3g MB, one factorisation %.3g MB, condensed contact "
+                "operator %.3g MB\n",
                 1e-6 * memory.matrices, 1e-6 * memory.factor, 1e-6 * memory.condensed_operator);
 }
 

@@ -125,6 +125,7 @@ LimitCycle find_cycle(const Structure& structure, const Interface& interface, co
   if (map.unconverged > 0)
     cycle.outcome.reason += (cycle.outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) +
                             " steps left the contact unconverged (-transient_contact_max_it)";
+  if (!settings.save_state.empty()) write_state(cycle.start, structure, settings.save_state);
   return cycle;
 }
 

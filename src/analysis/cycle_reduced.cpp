@@ -237,6 +237,7 @@ Owned<SNES> make_solver(const ShootingOptions& options, double tolerance)
   check(SNESLineSearchSetType(search, SNESLINESEARCHBT));
   check(SNESLineSearchSetTolerances(search, 1e-6, 0.5, 1e-8, 1e-15, 1e-8, 8)); // longest step: half the fluctuation
   check(SNESSetFromOptions(snes));
+  if (rank_of(PETSC_COMM_WORLD) > 0) check(SNESMonitorCancel(snes)); // every rank solves the same: one speaks
   return snes;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 namespace squeal
@@ -305,11 +306,13 @@ void judge(const Structure& structure, const Interface& interface, const Search&
 Outcome failure(const StatusSolution& solution, double friction)
 {
   Outcome outcome{"no equilibrium", "", solution.iterations, 1};
-  const std::string at = " at mu = " + std::to_string(friction);
+  std::array<char, 32> at{};
+  std::snprintf(at.data(), at.size(), " at mu = %g", friction);
   if (solution.outcome == "cycles")
-    outcome.reason = "the sets of closed pairs repeat without end" + at + ": friction is too large";
+    outcome.reason = "the sets of closed pairs repeat without end" + std::string(at.data()) + ": friction is too large";
   else if (solution.outcome == "singular")
-    outcome.reason = "no set of closed pairs balances the load" + at + ": the structure tips, slides away or lifts off";
+    outcome.reason = "no set of closed pairs balances the load" + std::string(at.data()) +
+                     ": the structure tips, slides away or lifts off";
   else
     outcome = {"not converged", "no fitting set of closed pairs within -equilibrium_max_it", solution.iterations, 1};
   return outcome;

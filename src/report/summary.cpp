@@ -45,7 +45,7 @@ std::string outcome_text(const Outcome& outcome)
 std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
 {
   std::string text = row("equilibrium", outcome_text(equilibrium.outcome));
-  if (!ran(equilibrium.outcome)) return text;
+  if (!ran(equilibrium.outcome) || equilibrium.outcome.word == "no equilibrium") return text;
   const NormalForces normal = normal_forces(equilibrium);
   text += row(
       "", format("%d of %d pairs closed after %d iterations", normal.closed, pairs, equilibrium.outcome.iterations));

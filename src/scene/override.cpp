@@ -2,6 +2,8 @@
 #include "squeal/base/error.hpp"
 #include "squeal/scene/toml.hpp"
 
+#include <charconv>
+#include <cmath>
 #include <sstream>
 
 namespace squeal
@@ -101,6 +103,11 @@ std::string kind_of(const toml::node& node)
 std::string text_of(const toml::node& node)
 {
   if (node.is_array() || node.is_table()) return kind_of(node);
+  if (const auto number = node.value_exact<double>(); number && std::isfinite(*number))
+  {
+    char digits[32]; // shortest text that reads back as the same number: -0.3, not -0.29999999999999999
+    return {digits, std::to_chars(digits, digits + sizeof digits, *number).ptr};
+  }
   std::ostringstream text;
   text << toml::node_view<const toml::node>(node);
   return text.str();

@@ -18,9 +18,11 @@ class Run:
     """One finished run: exit code, what it printed, and report.json when there is one."""
 
     def __init__(self, arguments, ranks, folder):
-        command = [os.environ.get("MPIEXEC", "mpirun"), "-n", str(ranks), os.environ["SQUEAL"], *map(str, arguments)]
+        command = [os.environ.get("MPIEXEC", "mpirun"), "-n", str(ranks), os.environ["SQUEAL"]]
         self.output = Path(folder)
-        done = subprocess.run([*command, "--output", str(folder)], capture_output=True, text=True, timeout=500)
+        # The caller's arguments come last, so that its own --output wins.
+        command += ["--output", str(folder), *map(str, arguments)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=500)
         self.code, self.printed, self.errors = done.returncode, done.stdout, done.stderr
 
     @property

@@ -1,5 +1,6 @@
 // ranks: 1 2 3
 #include "squeal/analysis/estimate.hpp"
+#include "../support/about.hpp"
 #include "../support/sliding_oscillator.hpp"
 
 #include <cmath>
@@ -70,9 +71,9 @@ TEST_CASE("at small amplitude the interface and the damping make the mode's grow
     const Estimate& estimate = found.estimate;
     const double growth = 2 * found.mode.growth_rate();
     // The reaction is taken at i w instead of lambda, which leaves the inertia of one row times the growth: 1 % here.
-    CHECK(estimate.friction_rate_linear - estimate.damping_rate == doctest::Approx(growth).epsilon(.015));
+    CHECK(estimate.friction_rate_linear - estimate.damping_rate == about(growth, .015));
     // Two decades below the first event, where the curve starts, the force is linear: quadrature and rounding only.
-    CHECK(estimate.curve_rate[0] == doctest::Approx(estimate.friction_rate_linear).epsilon(1e-10));
+    CHECK(estimate.curve_rate[0] == about(estimate.friction_rate_linear, 1e-10));
   }
 }
 

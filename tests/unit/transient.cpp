@@ -1,5 +1,6 @@
 // ranks: 1 2 3
 #include "squeal/analysis/transient.hpp"
+#include "../support/about.hpp"
 #include "../support/oscillator_mode.hpp"
 
 #include <cmath>
@@ -110,9 +111,9 @@ TEST_CASE(
   const double h = .01;
   const auto discrete = discrete_eigenvalue(lambda, .5, h);
   // next terms: (omega h)^4 = 1e-8 of the value
-  CHECK(discrete.real() / lambda.real() - 1 == doctest::Approx(-h * h / 4).epsilon(1e-3));
-  CHECK(discrete.imag() / lambda.imag() - 1 == doctest::Approx(-h * h / 12).epsilon(1e-3));
-  CHECK(discrete_eigenvalue(lambda, .51, h).real() == doctest::Approx(1e-3 - .01 * h).epsilon(1e-3));
+  CHECK(discrete.real() / lambda.real() - 1 == about(-h * h / 4, 1e-3));
+  CHECK(discrete.imag() / lambda.imag() - 1 == about(-h * h / 12, 1e-3));
+  CHECK(discrete_eigenvalue(lambda, .51, h).real() == about(1e-3 - .01 * h, 1e-3));
 }
 
 TEST_CASE("in free flight every theta follows its discrete eigenvalue exactly")
@@ -128,8 +129,8 @@ TEST_CASE("in free flight every theta follows its discrete eigenvalue exactly")
     State state = state_of(model.structure, {1, -1}, {lambda.real(), -lambda.real()});
     const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta);
     CHECK(test::run_steps(model, step, 7, state) == 0);
-    CHECK(whole(state.u)[0] == doctest::Approx(end.real()).epsilon(1e-13));
-    CHECK(whole(state.v)[1] == doctest::Approx(-(lambda * end).real()).epsilon(1e-13));
+    CHECK(whole(state.u)[0] == about(end.real(), 1e-13));
+    CHECK(whole(state.v)[1] == about(-(lambda * end).real(), 1e-13));
   }
 }
 

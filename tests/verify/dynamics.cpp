@@ -1,5 +1,6 @@
 // ranks: 1 2 3
 // Exact-contact dynamics against exact answers, on models small enough to have them.
+#include "../support/about.hpp"
 #include "../support/oscillator_mode.hpp"
 #include "squeal/analysis/growth.hpp"
 #include "squeal/analysis/transient.hpp"
@@ -237,8 +238,8 @@ TEST_CASE("a mode grows in persistent sliding at its discrete rate, fitted over 
 {
   const auto model = test::unilateral_oscillator(.3, 1);
   const Sliding sliding = persistent_sliding(model, at_three_tenths);
-  CHECK(sliding.mode.lambda.real() == doctest::Approx(.024503265987).epsilon(1e-10));
-  CHECK(sliding.mode.lambda.imag() == doctest::Approx(1.059820289428).epsilon(1e-11));
+  CHECK(sliding.mode.lambda.real() == about(.024503265987, 1e-10));
+  CHECK(sliding.mode.lambda.imag() == about(1.059820289428, 1e-11));
   TransientSettings settings;
   settings.periods = 5.2;
   settings.steps_per_period = 50;
@@ -247,7 +248,7 @@ TEST_CASE("a mode grows in persistent sliding at its discrete rate, fitted over 
   CHECK(run.outcome.word == "completed");
   CHECK(run.steps == 260);
   CHECK(run.history.open.back() + run.history.stick.back() == 0);
-  CHECK(run.growth_rate_fit == doctest::Approx(run.growth_rate_predicted).epsilon(1e-6));
+  CHECK(run.growth_rate_fit == about(run.growth_rate_predicted, 1e-6));
   CHECK(run.growth_rate_predicted < sliding.mode.lambda.real() * .998); // what 50 steps a period lose is seen
   CHECK(run.energy_defect_max < 1e-12);
 }
@@ -281,7 +282,7 @@ TEST_CASE("theta = .51 with 50 steps a period hides a weak instability, as predi
         { observe(amplitude, now.time, work.Ku, work.Mv); });
   const double predicted = discrete_eigenvalue(sliding.mode.lambda, .51, step.h).real();
   CHECK(predicted < 0);
-  CHECK(growth_rate(amplitude, 2 * std::numbers::pi / omega) == doctest::Approx(predicted).epsilon(1e-6));
+  CHECK(growth_rate(amplitude, 2 * std::numbers::pi / omega) == about(predicted, 1e-6));
 }
 
 TEST_CASE("between events the trajectory converges with the square of the step")

@@ -1,6 +1,7 @@
 #pragma once
 /// A finite element program of a page, to hold the kernels to exact answers: meshes by formula, one material, sparse
 /// matrices on one process, prescribed displacements by elimination, eigenpairs by subspace iteration.
+#include "../support/about.hpp"
 #include "squeal/solid/element.hpp"
 
 #include <algorithm>
@@ -14,12 +15,6 @@
 
 namespace small_fem
 {
-
-/// Relative tolerance and nothing else: doctest's own adds epsilon times one, vacuous for a displacement of 1e-5.
-inline doctest::Approx about(double exact, double relative)
-{
-  return doctest::Approx(exact).epsilon(relative).scale(0);
-}
 
 using squeal::Shape;
 using squeal::Vec3;

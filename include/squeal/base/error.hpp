@@ -37,6 +37,14 @@ template <class Work> void on_every_rank(MPI_Comm comm, Work work)
   {
     problem = *error.what() ? error.what() : "unknown failure";
   }
+  catch (const std::string& text) // libgmsh before 4.9 throws strings
+  {
+    problem = text.empty() ? "unknown failure" : text;
+  }
+  catch (...)
+  {
+    problem = "unknown failure";
+  }
   agree(comm, problem);
 }
 
