@@ -23,7 +23,7 @@ struct Interface
   Owned<Mat> B;               // (pairs * block) x dofs, AIJ; row i * block + k
   std::vector<double> gap;    // [m] per pair
   std::vector<double> drive;  // [m/s] pairs * directions: v_d
-  std::vector<int> contact;    // per pair, index in Scene::contacts; empty on a matrix scene
+  std::vector<int> contact;   // per pair, index in Scene::contacts; empty on a matrix scene
   std::vector<Vec3> position; // [m] per pair; empty on a matrix scene
   double friction = 0;        // mu
   bool direction_damping = true;
