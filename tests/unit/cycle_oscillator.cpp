@@ -1,4 +1,5 @@
 // What shooting must do on the three-degree unilateral oscillator, on any number of ranks.
+#include "../support/about.hpp"
 #include "../support/small_models.hpp"
 #include "squeal/analysis/shooting.hpp"
 
@@ -49,8 +50,8 @@ TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
   CHECK(energy_norm(flow, end) < 1e-10 * energy_norm(flow, start));
   const LimitCycle b = cycle_of(twice, 100, 5, 1e-11);
   REQUIRE(b.outcome.word == "converged");
-  CHECK(b.period == doctest::Approx(a.period).epsilon(1e-6));
-  CHECK(b.mean_energy == doctest::Approx(4 * a.mean_energy).epsilon(1e-6));
+  CHECK(b.period == about(a.period, 1e-6));
+  CHECK(b.mean_energy == about(4 * a.mean_energy, 1e-6));
 }
 
 TEST_CASE("without instability the oscillator falls back to rest: collapsed, not converged")
