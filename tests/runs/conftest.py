@@ -72,3 +72,15 @@ def oscillator_scene(tmp_path):
         return [INPUTS / "oscillator" / "matrices.toml", "--set", f"matrices.folder={folder}"]
 
     return arguments
+
+
+@pytest.fixture(scope="module")
+def module_run(tmp_path_factory):
+    """Reports of runs that several tests of a file look at."""
+
+    def run(*arguments, ranks):
+        done = Run(arguments, ranks, tmp_path_factory.mktemp("results"))
+        assert done.code == 0, done.printed[-2000:] + done.errors[-2000:]
+        return done.report
+
+    return run

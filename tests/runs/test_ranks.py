@@ -1,0 +1,51 @@
+"""The same answer on 1, 2 and 3 ranks, to solver tolerance, on the small brake and on the pin."""
+
+import pytest
+from conftest import INPUTS
+
+BRAKE = [INPUTS / "tgv" / "scene.toml", "--set", "mesh.parameters.size=4000", "--set", "modes.band=4500",
+         "--set", "cycle.enabled=false"]
+
+
+@pytest.fixture(scope="module")
+def brakes(module_run):
+    start = ["--set", "transient.enabled=true", "--set", "transient.start=mode", "--set", "transient.periods=2",
+             "--set", "transient.steps_per_period=50"]
+    return [module_run(*BRAKE, *start, ranks=ranks) for ranks in (1, 2, 3)]
+
+
+def test_brake_reactions(brakes):
+    """1e-8: the equilibrium is solved to about 1e-12 of the clamp force."""
+    first = brakes[0]["equilibrium"]
+    for other in brakes[1:]:
+        for key in ("normal_force_sum", "normal_force_min", "normal_force_max"):
+            assert other["equilibrium"][key] == pytest.approx(first[key], rel=1e-8)
+
+
+def test_brake_eigenvalues(brakes):
+    """1e-8 of |lambda|: backward errors are below 1e-12, and the pairs that coalesce are well apart at mu = 0.2."""
+    first = brakes[0]["modes"]
+    assert first["unstable_count"] == 1
+    for other in brakes[1:]:
+        assert other["modes"]["unstable_count"] == 1
+        size = 2 * 3.14159265358979 * first["modes"][0]["frequency_hz"]
+        assert abs(other["modes"]["modes"][0]["growth_rate"] - first["modes"][0]["growth_rate"]) < 1e-8 * size
+        assert other["modes"]["modes"][0]["frequency_hz"] == pytest.approx(first["modes"][0]["frequency_hz"], rel=1e-8)
+
+
+def test_brake_transient(brakes):
+    """Growth fitted over two periods of exact contact: 1e-6, the contact tolerance seen through the fit."""
+    for run in brakes:
+        transient = run["transient"]
+        assert transient["energy_defect_max"] < 1e-10
+        assert transient["growth_rate_fit"] == pytest.approx(transient["growth_rate_predicted"], rel=1e-3)
+        assert transient["growth_rate_fit"] == pytest.approx(brakes[0]["transient"]["growth_rate_fit"], rel=1e-6)
+
+
+def test_brake_carries_its_clamp_force(brakes):
+    """A side's reactions and its carrier's spring (1e6 N/m) together carry 1000 N, to 1e-9."""
+    for run in brakes:
+        equilibrium = run["equilibrium"]
+        for contact, carrier, sign in zip(equilibrium["contacts"], ("carrier_top", "carrier_bottom"), (-1, 1)):
+            spring = sign * 1e6 * equilibrium["probes"][carrier]
+            assert contact["normal_force_sum"] + spring == pytest.approx(1000, rel=1e-9)
