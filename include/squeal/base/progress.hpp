@@ -1,5 +1,6 @@
 #pragma once
-/// Progress of a long stage on rank 0: a bar with the time left on a terminal, a plain line every tenth in a batch log.
+/// Progress of a long stage on rank 0: a bar with the time left on a terminal, a plain line every tenth or
+/// half minute in a batch log.
 #include <chrono>
 #include <mpi.h>
 #include <string>
