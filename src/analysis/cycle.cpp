@@ -91,7 +91,7 @@ Flow flow_of(PeriodMap& map)
 LimitCycle find_cycle(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                       const ComplexMode& mode, const Estimate& estimate, const CycleSettings& settings, Mat probes)
 {
-  double lift_off_multiple = 2, band_factor = 4;
+  double lift_off_multiple = 2, band_factor = 3;
   PetscInt samples = 32;
   check(PetscOptionsGetReal(nullptr, "cycle_", "-lift_off_multiple", &lift_off_multiple, nullptr));
   check(PetscOptionsGetReal(nullptr, "cycle_", "-band_factor", &band_factor, nullptr));

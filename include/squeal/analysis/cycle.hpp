@@ -104,7 +104,7 @@ struct PeriodMap
 Flow flow_of(PeriodMap& map);
 
 /// From the energy estimate, or from -cycle_lift_off_multiple (2) times first lift-off when it has no balance. Further
-/// options: -cycle_band_factor (4), the preconditioner's real modes reach this many times the mode's frequency;
+/// options: -cycle_band_factor (3), the preconditioner's real modes reach this many times the mode's frequency;
 /// -cycle_samples (32), displacements kept over the last period.
 LimitCycle find_cycle(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                       const ComplexMode& mode, const Estimate& estimate, const CycleSettings& settings, Mat probes);

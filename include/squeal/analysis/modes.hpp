@@ -51,7 +51,7 @@ struct Modes
 RealModes find_real_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                           int count);
 
-/// Real modes with frequency below `band` [Hz].
+/// Real modes with frequency below `band` [Hz], as many as there are; of a cluster one may be a mode above instead.
 RealModes find_real_modes_below(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                                 double band);
 
