@@ -38,7 +38,7 @@ constexpr std::array options = {
     Option{"-cycle_difference", "1e-6", "difference step over the fluctuation, in the energy norm"},
     Option{"-cycle_finish", "multisecant", "full-space finish: multisecant, newton_krylov or none"},
     Option{"-cycle_band_factor", "3", "real modes of the preconditioner reach this many times the mode's frequency"},
-    Option{"-cycle_secants", "20", "secants kept by the finish"},
+    Option{"-cycle_secants", "60", "secants kept by the finish"},
     Option{"-cycle_secant_drop", "1e-4", "a secant is dropped when less than this part of it is new"},
     Option{"-cycle_clamp", "0.3", "longest step of the finish over the fluctuation"},
     Option{"-cycle_stall", "30", "iterations without progress before the finish starts again, or falls back"},

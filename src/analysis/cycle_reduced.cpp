@@ -195,7 +195,7 @@ PetscErrorCode solve_least_squares(PC pc, Vec b, Vec x)
 }
 
 /// Stops, besides the usual reasons, when the iterate falls onto the equilibrium (where any residual vanishes), and
-/// when what is left lies outside the base and a full-space finish follows.
+/// when what is left lies outside the base, or hardly shrinks, and a full-space finish follows.
 PetscErrorCode converged(SNES snes, PetscInt iteration, PetscReal step, PetscReal change, PetscReal norm,
                          SNESConvergedReason* reason, void* context)
 {
@@ -206,6 +206,7 @@ PetscErrorCode converged(SNES snes, PetscInt iteration, PetscReal step, PetscRea
                  {
                    Shooting& shooting = reduced.shooting;
                    const double projected = norm * reduced.scale / reduced.orbit.fluctuation;
+                   const double before = iteration > 0 ? shooting.records.back().residual_full : HUGE_VAL;
                    record(shooting, reduced.stage, static_cast<int>(reduced.size()), projected, reduced.orbit);
                    shooting.residual_projected = projected;
                    if (iteration > 0) ++shooting.iterations;
@@ -214,7 +215,8 @@ PetscErrorCode converged(SNES snes, PetscInt iteration, PetscReal step, PetscRea
                      *reason = SNES_DIVERGED_DTOL;
                    else if (shooting.periods >= shooting.options.max_periods)
                      *reason = SNES_DIVERGED_FUNCTION_COUNT;
-                   else if (shooting.options.finish != "none" && projected < 0.1 * reduced.orbit.residual)
+                   else if (shooting.options.finish != "none" &&
+                            (projected < 0.1 * reduced.orbit.residual || reduced.orbit.residual > 0.5 * before))
                      *reason = SNES_CONVERGED_FNORM_RELATIVE;
                  });
 }

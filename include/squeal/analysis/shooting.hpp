@@ -15,7 +15,7 @@ struct ShootingOptions
   PetscInt base_growths = -1;      // -1: 4 without a finish; none with one, which is cheaper
   PetscReal difference = 1e-6;     // of the fluctuation: difference columns
   PetscReal rank_tolerance = 1e-7; // of the base, and of the reduced least-squares solve
-  PetscInt secants = 20;           // kept
+  PetscInt secants = 60;           // kept
   PetscReal drop = 1e-4;           // a secant is dropped when less than this part of it is new
   PetscReal clamp = 0.3;           // of the fluctuation: longest step
   PetscInt stall = 30;             // iterations without progress
