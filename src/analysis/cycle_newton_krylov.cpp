@@ -226,6 +226,7 @@ Owned<SNES> make_solver(MPI_Comm comm)
   check(SNESCreate(comm, snes.put()));
   check(SNESSetOptionsPrefix(snes, "cycle_full_"));
   check(SNESSetTolerances(snes, 0, 0, 0, 30, 10000));
+  check(SNESSetMaxLinearSolveFailures(snes, 30)); // an inexact step is still one down the residual
   KSP ksp = nullptr;
   PC pc = nullptr;
   check(SNESGetKSP(snes, &ksp));
