@@ -1,5 +1,6 @@
 // What shooting must do on the three-degree unilateral oscillator, on any number of ranks.
 #include "../support/about.hpp"
+#include "../support/cycle_of.hpp"
 #include "../support/small_models.hpp"
 #include "squeal/analysis/shooting.hpp"
 
@@ -8,28 +9,6 @@
 
 using namespace squeal;
 using namespace squeal::test;
-
-namespace
-{
-
-LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance)
-{
-  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface);
-  REQUIRE(equilibrium.outcome.word == "converged");
-  ModesSettings modes_settings;
-  modes_settings.method = "full";
-  const Modes modes = find_modes(model.structure, model.interface, equilibrium, modes_settings);
-  REQUIRE(!modes.modes.empty());
-  const ComplexMode& mode = modes.modes.front();
-  const Estimate estimate = estimate_amplitude(model.structure, model.interface, equilibrium, mode);
-  CycleSettings settings;
-  settings.steps_per_period = steps;
-  settings.free_periods = free;
-  settings.tolerance = tolerance;
-  return find_cycle(model.structure, model.interface, equilibrium, mode, estimate, settings, nullptr);
-}
-
-} // namespace
 
 TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
 {

@@ -1,6 +1,7 @@
 // ranks: 1
 // Limit cycles of the three-degree unilateral oscillator against exact ones (matrix exponentials between events).
 #include "../support/about.hpp"
+#include "../support/cycle_of.hpp"
 #include "../support/small_models.hpp"
 #include "squeal/analysis/shooting.hpp"
 
@@ -21,23 +22,6 @@ struct Option
   Option(const char* key, const char* value) : name(key) { check(PetscOptionsSetValue(nullptr, key, value)); }
   ~Option() { (void)PetscOptionsClearValue(nullptr, name); }
 };
-
-LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance)
-{
-  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface);
-  REQUIRE(equilibrium.outcome.word == "converged");
-  ModesSettings modes_settings;
-  modes_settings.method = "full";
-  const Modes modes = find_modes(model.structure, model.interface, equilibrium, modes_settings);
-  REQUIRE(!modes.modes.empty());
-  const ComplexMode& mode = modes.modes.front();
-  const Estimate estimate = estimate_amplitude(model.structure, model.interface, equilibrium, mode);
-  CycleSettings settings;
-  settings.steps_per_period = steps;
-  settings.free_periods = free;
-  settings.tolerance = tolerance;
-  return find_cycle(model.structure, model.interface, equilibrium, mode, estimate, settings, nullptr);
-}
 
 struct Row
 {

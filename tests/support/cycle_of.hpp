@@ -1,0 +1,28 @@
+#pragma once
+/// The chain from equilibrium to cycle on a small model, as the program runs it.
+#include "small_models.hpp"
+#include "squeal/analysis/cycle.hpp"
+
+#include <doctest/doctest.h>
+
+namespace squeal::test
+{
+
+inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance)
+{
+  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface);
+  REQUIRE(equilibrium.outcome.word == "converged");
+  ModesSettings modes_settings;
+  modes_settings.method = "full";
+  const Modes modes = find_modes(model.structure, model.interface, equilibrium, modes_settings);
+  REQUIRE(!modes.modes.empty());
+  const ComplexMode& mode = modes.modes.front();
+  const Estimate estimate = estimate_amplitude(model.structure, model.interface, equilibrium, mode);
+  CycleSettings settings;
+  settings.steps_per_period = steps;
+  settings.free_periods = free;
+  settings.tolerance = tolerance;
+  return find_cycle(model.structure, model.interface, equilibrium, mode, estimate, settings, nullptr);
+}
+
+} // namespace squeal::test
