@@ -28,6 +28,7 @@ constexpr std::array options = {
     Option{"-transient_contact_max_it", "1000", "contact iterations (sweeps) allowed a step"},
     Option{"-transient_contact_rho", "0", "of the fixed point, over 1/lambda_max(W); 0: chosen"},
     Option{"-transient_contact_extrapolate", "true", "warm start extrapolated from the last two steps"},
+    Option{"-transient_refuse", "true", "false: march even where theta and the step make growth rates lie"},
     Option{"-modes_dense_limit", "200", "eigenproblems up to this size are solved whole by LAPACK"},
     Option{"-modes_candidates", "20", "pairs that each residual pass of the projection corrects"},
     Option{"-cycle_lift_off_multiple", "2", "start at this many times first lift-off when the estimate has no balance"},

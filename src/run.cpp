@@ -1,10 +1,12 @@
 #include "squeal/run.hpp"
 
+#include "squeal/analysis/step_guards.hpp"
 #include "squeal/options.hpp"
 #include "squeal/report/report.hpp"
 
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 
 namespace squeal
 {
@@ -92,6 +94,14 @@ Trajectory run_transient(const Scene& scene, const Model& model, const Report& r
   return trajectory;
 }
 
+/// Of the shooting's own theta and steps a period.
+std::string cycle_refusal(const Scene& scene, const Model& model, const Report& report)
+{
+  const ComplexMode& mode = report.modes.modes.front();
+  const double period = 2 * std::numbers::pi / std::abs(mode.lambda.imag());
+  return step_refusal(model.structure, &mode, scene.cycle.theta, period / scene.cycle.steps_per_period);
+}
+
 LimitCycle run_cycle(const Scene& scene, const Model& model, const Report& report)
 {
   LimitCycle cycle;
@@ -100,6 +110,8 @@ LimitCycle run_cycle(const Scene& scene, const Model& model, const Report& repor
     cycle.outcome = not_run("off", "the scene has no [cycle]");
   else if (!reason.empty())
     cycle.outcome = not_run("skipped", reason);
+  else if (const std::string lie = cycle_refusal(scene, model, report); !lie.empty())
+    cycle.outcome = not_run("refused", lie);
   else
     return find_cycle(model.structure, model.interface, report.equilibrium, report.modes.modes.front(), report.estimate,
                       scene.cycle, model.probes);

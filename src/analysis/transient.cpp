@@ -89,21 +89,9 @@ std::string number(double value)
   return text.data();
 }
 
-/// The rule of the header's theta > 1/2: empty, or the sentence that refuses.
-std::string refusal(const ComplexMode& mode, double theta, double h)
-{
-  const double sigma = mode.lambda.real(), omega = std::abs(mode.lambda.imag());
-  if (theta <= 0.5 || sigma <= 0) return {};
-  const double steps = two_pi / (omega * h);
-  const double needed = two_pi * (theta - 0.5) * omega / sigma;
-  if (steps > needed) return {};
-  return "with theta = " + number(theta) + " and " + number(steps) +
-         " steps a period the mode that grows at sigma = " + number(sigma) + " /s would look stable: more than " +
-         "2 pi (theta - 1/2) omega/sigma = " + number(needed) + " steps a period are needed, or theta = 1/2";
-}
-
 /// Step size and number of steps; refuses where the rule does.
-long plan(Trajectory& trajectory, const ComplexMode* mode, const TransientSettings& settings)
+long plan(Trajectory& trajectory, const Structure& structure, const ComplexMode* mode,
+          const TransientSettings& settings)
 {
   const bool explicit_steps = settings.steps > 0 && settings.step_size > 0;
   if (!mode && !explicit_steps)
@@ -114,11 +102,9 @@ long plan(Trajectory& trajectory, const ComplexMode* mode, const TransientSettin
       explicit_steps ? settings.step_size : two_pi / (std::abs(mode->lambda.imag()) * settings.steps_per_period);
   trajectory.growth_rate_fit = trajectory.growth_rate_predicted = std::numeric_limits<double>::quiet_NaN();
   if (mode)
-  {
     trajectory.growth_rate_predicted = discrete_eigenvalue(mode->lambda, settings.theta, trajectory.step_size).real();
-    trajectory.outcome.reason = refusal(*mode, settings.theta, trajectory.step_size);
-    if (!trajectory.outcome.reason.empty()) trajectory.outcome.word = "refused";
-  }
+  trajectory.outcome.reason = step_refusal(structure, mode, settings.theta, trajectory.step_size);
+  if (!trajectory.outcome.reason.empty()) trajectory.outcome.word = "refused";
   return explicit_steps ? settings.steps : std::lround(settings.periods * settings.steps_per_period);
 }
 
@@ -126,10 +112,7 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
 {
   Outcome& outcome = trajectory.outcome;
   outcome.word = "completed";
-  if (trajectory.theta < 0.5)
-    outcome.reason =
-        "theta below 1/2 amplifies what the step does not resolve: it adds (1/2 - theta) h omega^2 to every "
-        "growth rate";
+  if (trajectory.theta < 0.5) outcome.reason = "theta below 1/2 adds (1/2 - theta) h omega^2 to every growth rate";
   if (summary.unconverged > 0)
   {
     outcome.word = "not converged";
@@ -185,16 +168,11 @@ MarchSummary march(const ThetaStep& step, const Structure& structure, const Inte
   return summary;
 }
 
-std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h)
-{
-  return std::log((1. + (1 - theta) * h * lambda) / (1. - theta * h * lambda)) / h;
-}
-
 Trajectory integrate(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                      const ComplexMode* mode, const TransientSettings& settings, State start, Mat probes)
 {
   Trajectory trajectory;
-  const long steps = plan(trajectory, mode, settings);
+  const long steps = plan(trajectory, structure, mode, settings);
   trajectory.end = std::move(start);
   if (trajectory.outcome.word == "refused") return trajectory;
 

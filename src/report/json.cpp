@@ -129,7 +129,7 @@ Json multiplier_entry(const LimitCycle& cycle)
 Json cycle_entry(const LimitCycle& cycle, const Scene& scene)
 {
   Json entry = entry_of(cycle.outcome);
-  if (!ran(cycle.outcome)) return entry;
+  if (!ran(cycle.outcome) || cycle.outcome.word == "refused") return entry;
   entry["period"] = cycle.period;
   entry["frequency_hz"] = 1 / cycle.period;
   entry["steps_per_period"] = cycle.steps_per_period;

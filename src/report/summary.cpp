@@ -110,7 +110,7 @@ std::string transient_text(const Trajectory& transient)
 std::string cycle_text(const LimitCycle& cycle, const Scene& scene)
 {
   std::string text = row("cycle", outcome_text(cycle.outcome));
-  if (!ran(cycle.outcome)) return text;
+  if (!ran(cycle.outcome) || cycle.outcome.word == "refused") return text;
   const std::string projected =
       std::isfinite(cycle.residual_projected) ? format("%.2e", cycle.residual_projected) : std::string("not tried");
   text += row(

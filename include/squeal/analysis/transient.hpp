@@ -4,6 +4,7 @@
 ///     0 <= gap + B_n ut + h B_n v+  _|_  r_n+ >= 0,   ut = u + h(1-theta) v,   r_t+ in the Coulomb disc, opposing s+.
 /// Reactions are implicit, an impulse h r+ of the whole step; theta = 1/2 adds no damping of its own.
 #include "squeal/analysis/estimate.hpp"
+#include "squeal/analysis/step_guards.hpp"
 #include "squeal/contact/condensed.hpp"
 #include "squeal/contact/solver.hpp"
 
@@ -103,7 +104,7 @@ MarchSummary march(const ThetaStep& step, const Structure& structure, const Inte
                    const Equilibrium& equilibrium, Mat probes, long steps, State& state, History& history,
                    const Monitor& monitor);
 
-/// outcome: "completed", "refused" (theta and N make the followed mode look stable), "not converged" (contact, or an
+/// outcome: "completed", "refused" (step_guards.hpp: theta and h would tell a lie), "not converged" (contact, or an
 /// energy that is no longer finite). residual: the largest contact residual; iterations: contact iterations in all.
 struct Trajectory
 {
@@ -117,9 +118,6 @@ struct Trajectory
   State end;
   History history;
 };
-
-/// ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h
-std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h);
 
 /// Integrates from `start`; `mode` is the followed mode (null: no growth is fitted, and the settings must give steps
 /// and step_size).

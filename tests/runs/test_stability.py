@@ -1,0 +1,25 @@
+"""What a user meets where a method would fail: a refusal, a warning with the remedy, or a remedy that is named."""
+
+from conftest import INPUTS
+
+OSCILLATOR = INPUTS / "oscillator" / "scene.toml"
+WEAK = ["--set", "friction.coefficient=0.1785"]  # grows at .07 % of its angular frequency
+
+
+def test_a_step_that_hides_the_instability_is_refused_for_transient_and_cycle(squeal):
+    run = squeal(OSCILLATOR, *WEAK, "--set", "transient.theta=0.51", "--set", "cycle.theta=0.51", "--set",
+                 "transient.steps_per_period=50", "--set", "cycle.steps_per_period=50", ranks=1)
+    assert run.code == 2
+    for stage in ("transient", "cycle"):
+        assert run.report[stage]["outcome"] == "refused"
+        assert "would look stable" in run.report[stage]["reason"] and "or theta = 1/2" in run.report[stage]["reason"]
+    assert run.printed.count("REFUSED") == 2
+
+
+def test_enough_steps_are_not_refused_and_the_refusal_can_be_lifted(squeal):
+    short = [OSCILLATOR, *WEAK, "--set", "cycle.enabled=false", "--set", "transient.theta=0.51", "--set",
+             "transient.amplitude=0.05", "--set", "transient.periods=3"]
+    fine = squeal(*short, "--set", "transient.steps_per_period=100", ranks=1)
+    assert fine.code == 0 and 0 < fine.report["transient"]["growth_rate_fit"]
+    coarse = squeal(*short, "--set", "transient.steps_per_period=50", "-transient_refuse", "false", ranks=1)
+    assert coarse.code == 0 and coarse.report["transient"]["growth_rate_fit"] < 0
