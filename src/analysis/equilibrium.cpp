@@ -332,6 +332,14 @@ void share(StatusSolution& solution, std::size_t pairs, MPI_Comm comm)
   broadcast(solution.reaction, pairs, comm);
 }
 
+/// What nothing touches and nothing loads stays where it is, held or free: the modes of a free body need no support.
+bool stays_at_rest(const Structure& structure, const Interface& interface)
+{
+  double load = 0;
+  check(VecNorm(structure.load, NORM_INFINITY, &load));
+  return interface.pairs == 0 && load == 0;
+}
+
 } // namespace
 
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface)
@@ -339,10 +347,15 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
   const Options options = read_options(interface.pairs);
   const auto pairs = static_cast<std::size_t>(interface.pairs);
-  const Held held = hold(structure, interface);
 
   Equilibrium equilibrium;
   equilibrium.u = zeros_like(structure.load);
+  if (stays_at_rest(structure, interface))
+  {
+    equilibrium.outcome = {"converged", "", 0, 0};
+    return equilibrium;
+  }
+  const Held held = hold(structure, interface);
   const std::vector<double> nothing(pairs, 0.);
   displace(held, structure, interface, pair_forces(interface, nothing, nothing, held.kappa), equilibrium.u);
   const std::vector<double> q = gaps_of(interface, equilibrium.u);

@@ -1,0 +1,122 @@
+"""Models of the tests, written as a user would bring them: gmsh meshes, matrix folders, states, scene files."""
+
+import json
+import struct
+
+import numpy as np
+
+STEEL = {"young": 210e9, "poisson": 0.3, "density": 7850}
+
+# gmsh's element types: number and dimension
+KINDS = {"point": (15, 0), "triangle": (2, 2), "quad": (3, 2), "brick": (5, 3), "wedge": (6, 3), "brick20": (17, 3),
+         "quad8": (16, 2)}
+
+
+class Mesh:
+    """Nodes and named groups of elements, written in gmsh's format 2.2. Coincident nodes stay apart."""
+
+    def __init__(self):
+        self.nodes, self.groups = [], {}
+
+    def add_nodes(self, positions):
+        """Appends an array (..., 3) of positions and returns the array (...) of their numbers."""
+        positions = np.asarray(positions, float)
+        first, shape = len(self.nodes), positions.shape[:-1]
+        self.nodes.extend(positions.reshape(-1, 3))
+        return first + np.arange(np.prod(shape, dtype=int)).reshape(shape)
+
+    def add(self, name, kind, elements):
+        self.groups.setdefault((name, kind), []).extend(np.atleast_2d(elements))
+
+    def add_points(self, name, nodes):
+        self.add(name, "point", np.reshape(nodes, (-1, 1)))
+
+    def write(self, file):
+        lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(self.groups))]
+        for tag, (name, kind) in enumerate(self.groups, 1):
+            lines.append(f'{KINDS[kind][1]} {tag} "{name}"')
+        lines += ["$EndPhysicalNames", "$Nodes", str(len(self.nodes))]
+        lines += [f"{i} {x!r} {y!r} {z!r}" for i, (x, y, z) in enumerate(np.array(self.nodes).tolist(), 1)]
+        lines += ["$EndNodes", "$Elements", str(sum(map(len, self.groups.values())))]
+        number = 0
+        for tag, ((_, kind), elements) in enumerate(self.groups.items(), 1):
+            for element in elements:
+                number += 1
+                lines.append(f"{number} {KINDS[kind][0]} 2 {tag} {tag} " + " ".join(str(n + 1) for n in element))
+        file.write_text("\n".join(lines + ["$EndElements", ""]))
+
+
+def lattice(divisions, place):
+    """Positions place(a, b, …) of the points a/n, b/m, … of the unit square or cube, as an array (n+1, m+1, …, 3)."""
+    unit = np.meshgrid(*[np.linspace(0, 1, n + 1) for n in divisions], indexing="ij")
+    return np.stack(np.broadcast_arrays(*place(*unit)), axis=-1)
+
+
+def quads(nodes):
+    """4-node cells of a lattice (n+1, m+1) of node numbers; a lattice of more dimensions gives as many layers."""
+    return np.stack([nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]], axis=-1).reshape(-1, 4)
+
+
+def bricks(nodes):
+    """8-node cells of a lattice (n+1, m+1, l+1) of node numbers."""
+    return np.hstack([quads(nodes[:, :, :-1]), quads(nodes[:, :, 1:])])
+
+
+def bricks20(nodes):
+    """20-node cells, gmsh's order of mid-sides, of a lattice of twice as many divisions; some of its nodes are unused."""
+    corners = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]
+    edges = [(0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)]
+    places = corners + [tuple((np.array(corners[a]) + corners[b]) // 2) for a, b in edges]
+    n = [size - 2 for size in nodes.shape]
+    return np.stack([nodes[i:n[0] + i:2, j:n[1] + j:2, k:n[2] + k:2].ravel() for i, j, k in places], axis=-1)
+
+
+def closed(nodes):
+    """A lattice whose last row is its first: a ring."""
+    return np.concatenate([nodes[:-1], nodes[:1]])
+
+
+def _value(value):
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_value(entry)}" for key, entry in value.items()) + " }"
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return "[" + ", ".join(_value(entry) for entry in value) + "]"
+    return json.dumps(value.item() if isinstance(value, np.generic) else value)
+
+
+def write_scene(folder, **tables):
+    """scene.toml of tables: a dict is a table, a list of dicts a list of tables, anything else a value."""
+    values = [f"{name} = {_value(table)}" for name, table in tables.items() if not isinstance(table, (dict, list))]
+    text = ["\n".join(values)]
+    for name, table in tables.items():
+        if isinstance(table, (dict, list)):
+            for head, entry in [(f"[{name}]", table)] if isinstance(table, dict) else [(f"[[{name}]]", t) for t in table]:
+                text.append("\n".join([head] + [f"{key} = {_value(value)}" for key, value in entry.items()]))
+    file = folder / "scene.toml"
+    file.write_text("\n\n".join(text) + "\n")
+    return file
+
+
+def _vector(values):
+    values = np.atleast_1d(np.asarray(values, float))
+    return struct.pack(">ii", 1211214, len(values)) + values.astype(">f8").tobytes()
+
+
+def write_state(file, u, v):
+    """Displacements and velocities to start a transient from."""
+    file.write_bytes(_vector(u) + _vector(v))
+    return file
+
+
+def write_matrices(folder, B, gap, drive, F, **matrices):
+    """The folder of a matrix scene: M, C and K by name."""
+    folder.mkdir()
+    for name, A in dict(matrices, B=B).items():
+        A = np.atleast_2d(np.asarray(A, float))
+        rows = [np.flatnonzero(row) for row in A]
+        data = struct.pack(">iiii", 1211216, *A.shape, sum(map(len, rows)))
+        data += np.array([len(row) for row in rows], ">i4").tobytes() + np.concatenate(rows).astype(">i4").tobytes()
+        (folder / f"{name}.petsc").write_bytes(data + A[A != 0].astype(">f8").tobytes())
+    for name, values in {"gap": gap, "drive": drive, "F": F}.items():
+        (folder / f"{name}.petsc").write_bytes(_vector(values))
+    return folder
