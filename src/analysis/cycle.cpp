@@ -109,11 +109,12 @@ LimitCycle find_cycle(const Structure& structure, const Interface& interface, co
   }
   const State first = mode_state(equilibrium, mode, amplitude, estimate.phase);
   const double frequency_hz = mode.frequency_hz();
-  RealModePreconditioner preconditioner;
+  SlidingPreconditioner preconditioner;
   if (band_factor > 0)
-    preconditioner = make_preconditioner(
-        structure, find_real_modes_below(structure, interface, equilibrium, band_factor * frequency_hz),
-        settings.steps_per_period, settings.theta);
+    preconditioner =
+        make_preconditioner(structure, interface, equilibrium,
+                            find_real_modes_below(structure, interface, equilibrium, band_factor * frequency_hz),
+                            settings.steps_per_period, settings.theta);
   PeriodMap map{structure, interface, settings.steps_per_period, settings.theta};
   map.reactions = equilibrium.reactions;
   const Flow flow = flow_of(map);

@@ -1,7 +1,9 @@
-/// Full-space finish by secants (Anderson 1965; Eyert 1996) about the real-mode preconditioner: one period a step, no
-/// difference columns. With the last steps X and residual changes Y = Q R,
-///     dx = X R^-1 Q'b + P^-1 (b - Q Q'b),   b = -(F, 0),
-/// where states are bordered by T (in X) and by the phase row <f, dx> (in Y), and P^-1 solves its border exactly.
+/// Full-space finish by secants (Anderson 1965; Eyert 1996) about the preconditioner: one period a step, no difference
+/// columns. States are bordered by T and by the phase row <f, dx>; B is the bordered P, G = B^-1 (F, 0) the
+/// preconditioned defect. With the last steps X and their changes of G, Y = Q R,
+///     dx = -X R^-1 Q'G - (1 - Q Q') G.
+/// Q is orthogonal in the energy norm of G, not of F: there the slow motions weigh what they are worth, and what the
+/// next period forgets anyhow does not drown them.
 /// Caveat: no globalisation. It is clamped and guarded, and gives up rather than wander.
 #include "squeal/analysis/shooting.hpp"
 
@@ -17,42 +19,45 @@ namespace
 
 struct Secant
 {
-  Owned<Vec> step, change; // dx and dF
+  Owned<Vec> step, change; // dx; P^-1 dF
   double period = 0;       // dT
 };
 
-/// A column of Q with its energy image, and the combination of secants it is.
+/// A preconditioned change (x, t) with its energy image, and the combination of secants (dx, dT) it answers to.
 struct Direction
 {
   Owned<Vec> change, image, step;
-  double border = 0, period = 0;
+  double change_period = 0, period = 0;
 };
 
-/// Newest first: Gram-Schmidt on the changes, the same combinations applied to the steps, so that X R^-1 is at hand.
-std::vector<Direction> orthonormalise(const Shooting& shooting, const std::deque<Secant>& secants, Vec phase)
+/// Newest first: Gram-Schmidt on the preconditioned changes, the same combinations applied to the steps.
+std::vector<Direction> orthonormalise(const Shooting& shooting, const std::deque<Secant>& secants, const Border& border)
 {
+  const double weight = border.speed * border.speed;
   std::vector<Direction> directions;
   for (const Secant& secant : secants)
   {
     Direction fresh{copy_of(secant.change), zeros_like(secant.change), copy_of(secant.step), 0, secant.period};
-    check(VecDot(phase, secant.step, &fresh.border));
-    const double before = energy_norm(shooting.flow, fresh.change);
+    double row = 0;
+    check(VecDot(border.phase, secant.step, &row));
+    fresh.change_period = close_border(border, fresh.change, row);
+    const double before = std::hypot(energy_norm(shooting.flow, fresh.change), border.speed * fresh.change_period);
     for (int pass = 0; pass < 2; ++pass)
       for (const Direction& old : directions)
       {
         double along = 0;
         check(VecDot(old.image, fresh.change, &along));
-        along += old.border * fresh.border;
+        along += weight * old.change_period * fresh.change_period;
         check(VecAXPY(fresh.change, -along, old.change));
         check(VecAXPY(fresh.step, -along, old.step));
-        fresh.border -= along * old.border;
+        fresh.change_period -= along * old.change_period;
         fresh.period -= along * old.period;
       }
-    const double left = std::hypot(energy_norm(shooting.flow, fresh.change), fresh.border);
+    const double left = std::hypot(energy_norm(shooting.flow, fresh.change), border.speed * fresh.change_period);
     if (!(left > shooting.options.drop * before)) continue;
     check(VecScale(fresh.change, 1 / left));
     check(VecScale(fresh.step, 1 / left));
-    fresh.border /= left;
+    fresh.change_period /= left;
     fresh.period /= left;
     energy_image(shooting.flow, fresh.change, fresh.image);
     directions.push_back(std::move(fresh));
@@ -60,32 +65,28 @@ std::vector<Direction> orthonormalise(const Shooting& shooting, const std::deque
   return directions;
 }
 
-/// The step and its dT from the orbit's defect.
-Secant next_step(const Shooting& shooting, const Orbit& orbit, const std::deque<Secant>& secants)
+/// The step and its dT from the orbit's defect, preconditioned.
+Secant next_step(const Shooting& shooting, const Orbit& orbit, Vec defect, const std::deque<Secant>& secants)
 {
-  const Owned<Vec> phase = zeros_like(orbit.rate);
-  energy_image(shooting.flow, orbit.rate, phase);
-  check(VecScale(phase, 1 / energy_norm(shooting.flow, orbit.rate)));
-  const std::vector<Direction> directions = orthonormalise(shooting, secants, phase);
-  const Owned<Vec> rest = copy_of(orbit.defect);
+  const Border border = border_at(shooting, orbit);
+  const std::vector<Direction> directions = orthonormalise(shooting, secants, border);
+  const Owned<Vec> rest = copy_of(defect);
   check(VecScale(rest, -1));
-  double border = 0;
+  double rest_period = close_border(border, rest, 0);
   Secant step{zeros_like(orbit.state), {}, 0};
   for (const Direction& direction : directions)
   {
     double along = 0;
     check(VecDot(direction.image, rest, &along));
-    along += direction.border * border;
+    along += border.speed * border.speed * direction.change_period * rest_period;
     check(VecAXPY(rest, -along, direction.change));
-    border -= along * direction.border;
+    rest_period -= along * direction.change_period;
     check(VecAXPY(step.step, along, direction.step));
     step.period += along * direction.period;
   }
-  const Owned<Vec> outside = zeros_like(rest);
-  step.period += solve_bordered(shooting, orbit, phase, rest, border, outside);
-  check(VecAXPY(step.step, 1, outside));
-  const double speed = energy_norm(shooting.flow, orbit.rate);
-  const double length = std::max(energy_norm(shooting.flow, step.step), std::abs(step.period) * speed);
+  step.period += rest_period;
+  check(VecAXPY(step.step, 1, rest));
+  const double length = std::max(energy_norm(shooting.flow, step.step), std::abs(step.period) * border.speed);
   const double factor = std::min(1., shooting.options.clamp * orbit.fluctuation / length);
   check(VecScale(step.step, factor));
   step.period *= factor;
@@ -98,12 +99,14 @@ Finish shoot_multisecant(Shooting& shooting, const Orbit& start)
 {
   Finish finish{copy_of(start), Ending::stalled};
   Orbit orbit = copy_of(start);
+  Owned<Vec> defect = zeros_like(orbit.defect); // preconditioned
+  apply(shooting.preconditioner, orbit.period, orbit.defect, defect);
   std::deque<Secant> secants; // newest first
   int since_best = 0;
   while (finish.orbit.residual > shooting.tolerance)
   {
     if (shooting.periods >= shooting.options.max_periods || since_best >= shooting.options.stall) return finish;
-    Secant step = next_step(shooting, orbit, secants);
+    Secant step = next_step(shooting, orbit, defect, secants);
     if (!admissible_period(shooting, orbit.period + step.period))
     {
       finish.ending = Ending::not_periodic;
@@ -119,8 +122,10 @@ Finish shoot_multisecant(Shooting& shooting, const Orbit& start)
       finish.ending = Ending::vanished;
       return finish;
     }
-    step.change = copy_of(next.defect);
-    check(VecAXPY(step.change, -1, orbit.defect));
+    step.change = zeros_like(defect);
+    apply(shooting.preconditioner, next.period, next.defect, step.change);
+    std::swap(step.change, defect);
+    check(VecAYPX(step.change, -1, defect));
     secants.push_front(std::move(step));
     if (static_cast<PetscInt>(secants.size()) > shooting.options.secants) secants.pop_back();
     ++since_best;

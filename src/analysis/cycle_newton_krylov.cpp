@@ -1,5 +1,5 @@
 /// Fallback of the finish: Newton with a line search on the bordered system, GMRES on directional differences,
-/// preconditioned from the right by the real modes (options -cycle_full_snes_..., -cycle_full_ksp_...).
+/// preconditioned from the right by the sliding modes (options -cycle_full_snes_..., -cycle_full_ksp_...).
 /// The unknown is one Vec z = (omega sqrt(m) u, sqrt(m) v, speed T) with m the diagonal of M: its plain norm, which
 /// PETSc's solvers take, then stands for the energy norm. Convergence is judged in the energy norm itself.
 #include "squeal/analysis/shooting.hpp"
@@ -20,7 +20,8 @@ struct FullSpace
   Owned<Vec> scale; // (omega sqrt(m), sqrt(m))
   double speed = 0;
   Orbit orbit; // evaluated last, at state `at`
-  Owned<Vec> at, phase, anchor;
+  Owned<Vec> at, anchor;
+  Border border;
   Orbit best;
   int vanished = 0; // points met whose fluctuation is next to nothing
   std::exception_ptr failure;
@@ -128,7 +129,7 @@ PetscErrorCode function(SNES, Vec z, Vec R, void* context)
                    double along = 0;
                    const Owned<Vec> moved = copy_of(state);
                    check(VecAXPY(moved, -1, full.anchor));
-                   check(VecDot(full.phase, moved, &along));
+                   check(VecDot(full.border.phase, moved, &along));
                    pack(full, full.orbit.defect, along / full.speed, R);
                  });
 }
@@ -150,8 +151,7 @@ PetscErrorCode jacobian(SNES, Vec z, Mat, Mat, void* context)
                      check(VecCopy(z, full.at));
                    }
                    full.anchor = copy_of(full.orbit.state);
-                   energy_image(full.shooting.flow, full.orbit.rate, full.phase);
-                   check(VecScale(full.phase, 1 / energy_norm(full.shooting.flow, full.orbit.rate)));
+                   full.border = border_at(full.shooting, full.orbit);
                  });
 }
 
@@ -168,7 +168,7 @@ PetscErrorCode multiply(Mat J, Vec dz, Vec product)
                    const double period = unpack(*full, dz, direction);
                    const double length = energy_norm(flow, direction);
                    double along = 0;
-                   check(VecDot(full->phase, direction, &along));
+                   check(VecDot(full->border.phase, direction, &along));
                    if (length > 0)
                    {
                      const double step = full->shooting.options.difference * full->orbit.fluctuation / length;
@@ -193,8 +193,9 @@ PetscErrorCode precondition(PC pc, Vec b, Vec z)
                  [&]
                  {
                    const Owned<Vec> rhs = zeros_like(full->orbit.state), x = zeros_like(full->orbit.state);
-                   const double border = unpack(*full, b, rhs) * full->speed;
-                   const double period = solve_bordered(full->shooting, full->orbit, full->phase, rhs, border, x);
+                   const double row = unpack(*full, b, rhs) * full->speed;
+                   apply(full->shooting.preconditioner, full->orbit.period, rhs, x);
+                   const double period = close_border(full->border, x, row);
                    pack(*full, x, period, z);
                  });
 }
@@ -253,7 +254,7 @@ void set_up(SNES snes, FullSpace& full, Mat J, Vec R)
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &standard));
   if (!standard) return; // the user's choice
   check(PCShellSetContext(pc, &full));
-  check(PCShellSetName(pc, "real modes, bordered"));
+  check(PCShellSetName(pc, "sliding modes, bordered"));
   check(PCShellSetApply(pc, precondition));
 }
 
@@ -271,8 +272,8 @@ Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start)
                  energy_norm(shooting.flow, start.rate),
                  copy_of(start),
                  {},
-                 zeros_like(start.rate),
                  copy_of(start.state),
+                 border_at(shooting, start),
                  copy_of(start),
                  0,
                  {}};
@@ -284,8 +285,6 @@ Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start)
   check(VecCreateMPI(comm, local, PETSC_DETERMINE, z.put()));
   R = zeros_like(z);
   full.at = zeros_like(z);
-  energy_image(shooting.flow, start.rate, full.phase);
-  check(VecScale(full.phase, 1 / full.speed));
   pack(full, start.state, start.period, z);
   check(VecCopy(z, full.at));
   Owned<Mat> J;

@@ -1,12 +1,20 @@
-/// P^-1 x = -x + E D E^+ x: the bulk of the period map is linear and known. A state outside the modes' span is taken as
-/// forgotten within a period (dPhi/dx = 0, inverse -1); inside it the theta step of each mode is a 2 x 2 matrix,
-///     u+ = u + h (theta v+ + (1-theta) v),   a v+ = [1 - h(1-theta) c - h^2 theta(1-theta) w^2] v - h w^2 u,
-///     a = 1 + h theta c + h^2 theta^2 w^2,   c = phi'C phi.
-/// It holds no friction and no unstable pair: at the cycle that pair has become {1, a contraction}.
+/// P^-1 x = -x + E D E^+ x: the bulk of the period map is linear and known. A state outside the span of the real modes
+/// Phi is taken as forgotten within a period (dPhi/dx = 0, inverse -1); inside it motion is sliding about equilibrium,
+///     u = u0 + Phi q,   Mc q'' + Cc q' + Kc q = 0,
+///     Xc = Phi'X Phi - mu (e.B_t Phi)' L X Phi   for X = M, C + C_f, K;   L: reactions lambda_n of a force,
+/// friction on the reactions that the motion takes. N theta steps multiply the eigenvectors (y, lambda y) of it by
+///     m = [(1 + (1-theta) lambda h)/(1 - theta lambda h)]^N,   D: 1/(m - 1) + 1.
+/// At the cycle the unstable pair has become {1, a contraction}: it is taken to decay at three times the rate of its
+/// growth, the followed one in step with the cycle. Near the onset of the instability, where the square of the
+/// amplitude limits the growth, the rate is twice; too slow a decay makes the steps too long.
+#include "squeal/analysis/closed_contact.hpp"
+#include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/shooting.hpp"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <petscblaslapack.h>
 
 namespace squeal
 {
@@ -14,111 +22,209 @@ namespace squeal
 namespace
 {
 
-using Matrix2 = std::array<double, 4>; // row-major
+using Complex = std::complex<double>;
+using Index = std::size_t;
 
-Matrix2 product(const Matrix2& a, const Matrix2& b)
+Owned<Mat> dense(Vec layout, PetscInt columns)
 {
-  return {a[0] * b[0] + a[1] * b[2], a[0] * b[1] + a[1] * b[3], a[2] * b[0] + a[3] * b[2], a[2] * b[1] + a[3] * b[3]};
-}
-
-Matrix2 modal_step(double omega, double damping, double h, double theta)
-{
-  const double w2 = omega * omega, a = 1 + h * theta * damping + h * h * theta * theta * w2;
-  const double from_v = (1 - h * (1 - theta) * damping - h * h * theta * (1 - theta) * w2) / a, from_u = -h * w2 / a;
-  return {1 + h * theta * from_u, h * (theta * from_v + 1 - theta), from_u, from_v};
-}
-
-/// (G^N - 1)^-1 + 1; zero where G^N - 1 cannot be inverted (a rigid-body motion, or a resonance without damping).
-Matrix2 correction(Matrix2 power, int steps)
-{
-  Matrix2 map = {1, 0, 0, 1};
-  for (; steps > 0; steps /= 2, power = product(power, power))
-    if (steps % 2 == 1) map = product(map, power);
-  const double a = map[0] - 1, b = map[1], c = map[2], d = map[3] - 1, determinant = a * d - b * c;
-  if (std::abs(determinant) < 1e-8) return {};
-  return {d / determinant + 1, -b / determinant, -c / determinant, a / determinant + 1};
-}
-
-} // namespace
-
-RealModePreconditioner make_preconditioner(const Structure& structure, const RealModes& modes, int steps, double theta)
-{
-  RealModePreconditioner result;
-  result.steps = steps;
-  result.theta = theta;
-  const PetscInt count = static_cast<PetscInt>(modes.shapes.size());
-  if (count == 0) return result;
+  Owned<Mat> result;
   PetscInt rows = 0;
-  check(VecGetLocalSize(structure.load, &rows));
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
-  check(MatCreateDense(comm, rows, PETSC_DECIDE, PETSC_DETERMINE, count, nullptr, result.shapes.put()));
-  check(MatCreateDense(comm, rows, PETSC_DECIDE, PETSC_DETERMINE, count, nullptr, result.weighted.put()));
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRangeColumn(result.shapes, &first, &last));
-  const Owned<Vec> damped = zeros_like(structure.load);
-  for (PetscInt i = 0; i < count; ++i)
+  check(VecGetLocalSize(layout, &rows));
+  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(layout));
+  check(MatCreateDense(comm, rows, PETSC_DECIDE, PETSC_DETERMINE, columns, nullptr, result.put()));
+  return result;
+}
+
+/// Phi, or M Phi.
+Owned<Mat> columns_of(const std::vector<Owned<Vec>>& shapes, Mat M)
+{
+  Owned<Mat> result = dense(shapes[0], static_cast<PetscInt>(shapes.size()));
+  for (Index i = 0; i < shapes.size(); ++i)
   {
-    const Vec shape = modes.shapes[static_cast<std::size_t>(i)];
     Vec column = nullptr;
-    check(MatDenseGetColumnVecWrite(result.shapes, i, &column));
-    check(VecCopy(shape, column));
-    check(MatDenseRestoreColumnVecWrite(result.shapes, i, &column));
-    check(MatDenseGetColumnVecWrite(result.weighted, i, &column));
-    check(MatMult(structure.M, shape, column));
-    check(MatDenseRestoreColumnVecWrite(result.weighted, i, &column));
-    double damping = 0;
-    check(MatMult(structure.C, shape, damped));
-    check(VecDot(shape, damped, &damping));
-    if (i < first || i >= last) continue;
-    result.omega.push_back(modes.omega[static_cast<std::size_t>(i)]);
-    result.damping.push_back(damping);
+    check(MatDenseGetColumnVecWrite(result, static_cast<PetscInt>(i), &column));
+    check(M ? MatMult(M, shapes[i], column) : VecCopy(shapes[i], column));
+    check(MatDenseRestoreColumnVecWrite(result, static_cast<PetscInt>(i), &column));
   }
-  for (const Mat matrix : {result.shapes.get(), result.weighted.get()})
+  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
+  return result;
+}
+
+/// mu e.B_t Phi, one mode after the other.
+std::vector<std::vector<double>> friction_of(const Interface& interface, const std::vector<Owned<Vec>>& shapes)
+{
+  const Index directions = static_cast<Index>(interface.directions), block = directions + 1;
+  const std::vector<double> e = drive_directions(interface);
+  std::vector<std::vector<double>> result;
+  for (const Owned<Vec>& shape : shapes)
   {
-    check(MatAssemblyBegin(matrix, MAT_FINAL_ASSEMBLY));
-    check(MatAssemblyEnd(matrix, MAT_FINAL_ASSEMBLY));
+    const std::vector<double> motion = relative(interface, shape);
+    std::vector<double>& along = result.emplace_back(static_cast<Index>(interface.pairs));
+    for (Index i = 0; i < along.size(); ++i)
+      for (Index k = 0; k < directions; ++k)
+        along[i] += interface.friction * e[i * directions + k] * motion[i * block + 1 + k];
   }
   return result;
 }
 
-void apply(const RealModePreconditioner& preconditioner, double period, Vec x, Vec y)
+/// Xc, column-major.
+std::vector<double> on_modes(const std::vector<Owned<Vec>>& shapes, const std::vector<std::vector<double>>& friction,
+                             const ClosedContact& contact, Mat X)
+{
+  const Index n = shapes.size();
+  std::vector<double> result(n * n);
+  const std::vector<Vec> all(shapes.begin(), shapes.end());
+  const Owned<Vec> force = zeros_like(shapes[0]);
+  Owned<Vec> reactions;
+  check(MatCreateVecs(contact.reaction, nullptr, reactions.put()));
+  for (Index j = 0; j < n; ++j)
+  {
+    check(MatMult(X, shapes[j], force));
+    check(VecMDot(force, static_cast<PetscInt>(n), all.data(), &result[j * n]));
+    check(MatMult(contact.reaction, force, reactions));
+    const std::vector<double> lambda = whole(reactions);
+    for (Index i = 0; i < n; ++i)
+      for (Index pair = 0; pair < lambda.size(); ++pair) result[i + j * n] -= friction[i][pair] * lambda[pair];
+  }
+  return result;
+}
+
+/// The columns Re and Im of (y, lambda y) of every pair, the real vector alone of a real one.
+std::vector<double> real_columns(const std::vector<DenseEigenpair>& pairs)
+{
+  std::vector<double> result;
+  for (const DenseEigenpair& pair : pairs)
+    for (int part = 0; part < (pair.lambda.imag() > 0 ? 2 : 1); ++part)
+      for (const Complex factor : {Complex(1), pair.lambda})
+        for (const Complex entry : pair.y)
+          result.push_back(part == 0 ? (factor * entry).real() : (factor * entry).imag());
+  return result;
+}
+
+std::vector<double> inverse(std::vector<double> A, Index size)
+{
+  std::vector<double> result(size * size);
+  for (Index i = 0; i < size; ++i) result[i * (size + 1)] = 1;
+  PetscBLASInt n = static_cast<PetscBLASInt>(size), columns = n, info = 0;
+  std::vector<PetscBLASInt> pivots(size);
+  LAPACKgesv_(&n, &columns, A.data(), &n, pivots.data(), result.data(), &n, &info);
+  if (info != 0) throw Error("cycle: the sliding modes of the preconditioner depend on each other");
+  return result;
+}
+
+/// 1/(m - 1) + 1 of an eigenvalue; zero where m is 1 (a motion of a free body, or a resonance without damping).
+Complex correction(Complex lambda, bool followed, const SlidingPreconditioner& preconditioner, double period)
+{
+  if (lambda.real() > 0) lambda = {-3 * lambda.real(), followed ? 2 * std::numbers::pi / period : lambda.imag()};
+  const double h = period / preconditioner.steps, theta = preconditioner.theta;
+  const Complex m = std::pow((1. + (1 - theta) * h * lambda) / (1. - theta * h * lambda), preconditioner.steps);
+  return std::abs(m - 1.) < 1e-4 ? 0 : 1. / (m - 1.) + 1.;
+}
+
+/// V^-1 (q, q') of every mode, each pair's two coordinates turned by its correction; then V of that.
+std::vector<double> corrected(const SlidingPreconditioner& preconditioner, double period, const std::vector<double>& z)
+{
+  const std::vector<double>&left = preconditioner.left, &right = preconditioner.right;
+  const Index n = z.size();
+  std::vector<double> along(n), result(n);
+  for (Index j = 0; j < n; ++j)
+    for (Index i = 0; i < n; ++i) along[i] += left[i + j * n] * z[j];
+  Index at = 0;
+  for (Index k = 0; k < preconditioner.lambda.size(); ++k)
+  {
+    const Complex lambda = preconditioner.lambda[k];
+    const Complex D = correction(lambda, k == preconditioner.followed, preconditioner, period);
+    if (lambda.imag() > 0)
+    {
+      const Complex turned = D * Complex(along[at], -along[at + 1]);
+      along[at++] = turned.real();
+      along[at++] = -turned.imag();
+    }
+    else
+      along[at++] *= D.real();
+  }
+  for (Index j = 0; j < n; ++j)
+    for (Index i = 0; i < n; ++i) result[i] += right[i + j * n] * along[j];
+  return result;
+}
+
+} // namespace
+
+SlidingPreconditioner make_preconditioner(const Structure& structure, const Interface& interface,
+                                          const Equilibrium& equilibrium, const RealModes& modes, int steps,
+                                          double theta)
+{
+  SlidingPreconditioner result;
+  result.steps = steps;
+  result.theta = theta;
+  const Index m = modes.shapes.size();
+  if (m == 0) return result;
+  const ClosedContact contact = eliminate_closed_pairs(structure, interface, equilibrium);
+  const auto friction = friction_of(interface, modes.shapes);
+  const Owned<Mat> C = sliding_damping(structure, interface, equilibrium);
+  const auto reduced = [&](Mat X) { return on_modes(modes.shapes, friction, contact, X); };
+  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
+  const std::vector<DenseEigenpair> pairs =
+      solve_dense_quadratic_shared(comm, static_cast<int>(m), reduced(structure.M), reduced(C), reduced(structure.K));
+  for (const DenseEigenpair& pair : pairs)
+  {
+    result.lambda.push_back(pair.lambda);
+    if (pair.lambda.real() > result.lambda[result.followed].real()) result.followed = result.lambda.size() - 1;
+  }
+  result.right = real_columns(pairs);
+  if (result.right.size() != 4 * m * m) throw Error("cycle: sliding modes are missing from the preconditioner");
+  result.left = inverse(result.right, 2 * m);
+  result.shapes = columns_of(modes.shapes, nullptr);
+  result.weighted = columns_of(modes.shapes, structure.M);
+  return result;
+}
+
+void apply(const SlidingPreconditioner& preconditioner, double period, Vec x, Vec y)
 {
   check(VecCopy(x, y));
   check(VecScale(y, -1));
   if (!preconditioner.shapes.get()) return;
-  Owned<Vec> u, v;
-  check(MatCreateVecs(preconditioner.weighted, u.put(), nullptr));
-  check(VecDuplicate(u, v.put()));
-  check(MatMultTranspose(preconditioner.weighted, displacement(x), u));
-  check(MatMultTranspose(preconditioner.weighted, velocity(x), v));
-  double *mode_u = nullptr, *mode_v = nullptr;
-  check(VecGetArray(u, &mode_u));
-  check(VecGetArray(v, &mode_v));
-  for (std::size_t i = 0; i < preconditioner.omega.size(); ++i)
+  Owned<Vec> part;
+  check(MatCreateVecs(preconditioner.weighted, part.put(), nullptr));
+  std::vector<double> z;
+  for (const Vec half : {displacement(x), velocity(x)})
   {
-    const Matrix2 step = modal_step(preconditioner.omega[i], preconditioner.damping[i], period / preconditioner.steps,
-                                    preconditioner.theta);
-    const Matrix2 D = correction(step, preconditioner.steps);
-    const double old_u = mode_u[i], old_v = mode_v[i];
-    mode_u[i] = D[0] * old_u + D[1] * old_v;
-    mode_v[i] = D[2] * old_u + D[3] * old_v;
+    check(MatMultTranspose(preconditioner.weighted, half, part));
+    const std::vector<double> entries = whole(part);
+    z.insert(z.end(), entries.begin(), entries.end());
   }
-  check(VecRestoreArray(u, &mode_u));
-  check(VecRestoreArray(v, &mode_v));
-  check(MatMultAdd(preconditioner.shapes, u, displacement(y), displacement(y)));
-  check(MatMultAdd(preconditioner.shapes, v, velocity(y), velocity(y)));
+  const std::vector<double> sum = corrected(preconditioner, period, z);
+  PetscInt first = 0, last = 0;
+  check(VecGetOwnershipRange(part, &first, &last));
+  auto from = sum.begin();
+  for (const Vec half : {displacement(y), velocity(y)})
+  {
+    double* entries = nullptr;
+    check(VecGetArray(part, &entries));
+    std::copy(from + first, from + last, entries);
+    check(VecRestoreArray(part, &entries));
+    check(MatMultAdd(preconditioner.shapes, part, half, half));
+    from += static_cast<std::ptrdiff_t>(sum.size() / 2);
+  }
 }
 
-double solve_bordered(const Shooting& shooting, const Orbit& orbit, Vec phase, Vec b, double border, Vec x)
+Border border_at(const Shooting& shooting, const Orbit& orbit)
 {
-  const Owned<Vec> column = zeros_like(b);
-  apply(shooting.preconditioner, orbit.period, b, x);
-  apply(shooting.preconditioner, orbit.period, orbit.rate, column);
-  double along_x = 0, along_column = 0;
-  check(VecDot(phase, x, &along_x));
-  check(VecDot(phase, column, &along_column));
-  const double t = (border - along_x) / -along_column;
-  check(VecAXPY(x, -t, column));
+  Border border{zeros_like(orbit.rate), zeros_like(orbit.rate), energy_norm(shooting.flow, orbit.rate), 0};
+  energy_image(shooting.flow, orbit.rate, border.phase);
+  check(VecScale(border.phase, 1 / border.speed));
+  apply(shooting.preconditioner, orbit.period, orbit.rate, border.column);
+  check(VecDot(border.phase, border.column, &border.along));
+  return border;
+}
+
+double close_border(const Border& border, Vec y, double row)
+{
+  double along = 0;
+  check(VecDot(border.phase, y, &along));
+  const double t = (along - row) / border.along;
+  check(VecAXPY(y, -t, border.column));
   return t;
 }
 

@@ -126,7 +126,7 @@ std::string note_of(const NewtonRecord& record)
 
 } // namespace
 
-LimitCycle shoot(const Flow& flow, const ShootingStart& start, const RealModePreconditioner& preconditioner,
+LimitCycle shoot(const Flow& flow, const ShootingStart& start, const SlidingPreconditioner& preconditioner,
                  double tolerance, int free)
 {
   Shooting shooting{flow, preconditioner, read_options()};

@@ -241,7 +241,7 @@ TEST_CASE("a decaying oscillation has no cycle: collapsed, not converged")
 TEST_CASE("dependent vectors do not enter the base")
 {
   const SmoothModel model = make_model(coupled, {1, 2});
-  const RealModePreconditioner none;
+  const SlidingPreconditioner none;
   Shooting shooting{model.flow, none};
   std::vector<Owned<Vec>> base;
   const Owned<Vec> a = state_of(model.axes[0], model.zero), b = state_of(model.axes[1], model.zero);

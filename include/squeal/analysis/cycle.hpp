@@ -62,20 +62,24 @@ struct ShootingStart
   std::vector<Vec> shapes; // the paper's phi_r, phi_i, phi_e: of the displacements and of the velocities alike
 };
 
-/// Approximate inverse of dPhi/dx - I from the frictionless bilateral real modes (method, section 6):
-///     P^-1 x = -x + E D E^+ x,   D_i = (G_i^N - I)^-1 + I,   G_i the 2 x 2 theta step of mode i.
-struct RealModePreconditioner
+/// Approximate inverse of dPhi/dx - I from sliding motion about equilibrium on the frictionless bilateral real modes
+/// (method, section 6): P^-1 x = -x + E D E^+ x, D of the sliding modes' multipliers over N theta steps.
+struct SlidingPreconditioner
 {
-  Owned<Mat> shapes, weighted;        // Phi and M Phi, dofs x modes; null: no modes, P = -I
-  std::vector<double> omega, damping; // [rad/s], [1/s] of the modes this rank owns
+  Owned<Mat> shapes, weighted;              // Phi and M Phi, dofs x modes; null: no modes, P = -I
+  std::vector<std::complex<double>> lambda; // [1/s] of the sliding modes, Im >= 0
+  std::size_t followed = 0;                 // the one that grows most
+  std::vector<double> right, left;          // Re and Im of its (y, lambda y) a pair, column-major, and the inverse
   int steps = 0;
   double theta = 0.5;
 };
 
-RealModePreconditioner make_preconditioner(const Structure& structure, const RealModes& modes, int steps, double theta);
+SlidingPreconditioner make_preconditioner(const Structure& structure, const Interface& interface,
+                                          const Equilibrium& equilibrium, const RealModes& modes, int steps,
+                                          double theta);
 
 /// y = P^-1 x at this period; states are nests.
-void apply(const RealModePreconditioner& preconditioner, double period, Vec x, Vec y);
+void apply(const SlidingPreconditioner& preconditioner, double period, Vec x, Vec y);
 
 /// Free periods, the reduced system, the growing base and the full-space finish, on any flow; fills everything of the
 /// cycle but what is measured on the brake's last period.
@@ -83,7 +87,7 @@ void apply(const RealModePreconditioner& preconditioner, double period, Vec x, V
 /// Options, prefix -cycle_: those of the reduced SNES (-cycle_snes_..., dense, at most seven unknowns and what the base
 /// grows by); those of the fallback, -cycle_full_snes_..., -cycle_full_ksp_...; and base_growths, finish (multisecant |
 /// newton_krylov | none), difference, rank_tolerance, history, drop, clamp, stall, max_periods, multipliers.
-LimitCycle shoot(const Flow& flow, const ShootingStart& start, const RealModePreconditioner& preconditioner,
+LimitCycle shoot(const Flow& flow, const ShootingStart& start, const SlidingPreconditioner& preconditioner,
                  double tolerance, int free_periods);
 
 /// The brake's period map in `steps` theta steps. Keeps A and W of the last period: one factoring per period length,

@@ -38,7 +38,7 @@ struct Orbit
 struct Shooting
 {
   const Flow& flow;
-  const RealModePreconditioner& preconditioner;
+  const SlidingPreconditioner& preconditioner;
   ShootingOptions options{};
   Owned<Vec> equilibrium{}; // (u0, 0)
   double first_period = 0;
@@ -98,9 +98,17 @@ Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start);
 void declare_reduced_options();
 void declare_fallback_options();
 
-/// x = P^-1 b - t P^-1 d and t of the bordered system [J d; f' 0] (x, t) = (b, border), J replaced by P.
-/// `phase` is the energy image of f.
-double solve_bordered(const Shooting& shooting, const Orbit& orbit, Vec phase, Vec b, double border, Vec x);
+/// The bordered system [J d; f' 0] (x, t) = (b, row) at an orbit, J replaced by P: x = P^-1 b - t P^-1 d.
+struct Border
+{
+  Owned<Vec> phase, column;    // energy image of f, the unit flow; P^-1 d
+  double speed = 0, along = 0; // |d|; <f, P^-1 d>
+};
+
+Border border_at(const Shooting& shooting, const Orbit& orbit);
+
+/// Turns y = P^-1 b into x; returns t.
+double close_border(const Border& border, Vec y, double row);
 
 /// Multipliers by Arnoldi on difference quotients, in the energy product.
 void find_multipliers(Shooting& shooting, const Orbit& orbit, LimitCycle& cycle);
