@@ -142,16 +142,22 @@ void describe_model(const Model& model, Report& report, MPI_Comm comm)
                 report.pairs, report.elements, report.ranks);
 }
 
-/// What the report tells of the equilibrium beside its own result: each contact's clamp force and the probes.
-void describe_equilibrium(const Model& model, Report& report)
+/// What the report tells of the equilibrium beside its own result: each contact's clamp force, its torque, the probes.
+void describe_equilibrium(const Scene& scene, const Model& model, Report& report)
 {
   if (report.equilibrium.outcome.word != "converged") return;
   const Interface& interface = model.interface;
+  const auto directions = static_cast<std::size_t>(interface.directions);
+  report.contact_forces.assign(scene.contacts.size(), 0);
+  report.contact_torques.assign(scene.contacts.size(), 0);
   for (std::size_t i = 0; i < interface.contact.size(); ++i)
   {
     const auto contact = static_cast<std::size_t>(interface.contact[i]);
-    if (report.contact_forces.size() <= contact) report.contact_forces.resize(contact + 1);
-    report.contact_forces[contact] += report.equilibrium.reactions[i * static_cast<std::size_t>(interface.block())];
+    const double* r = &report.equilibrium.reactions[i * (1 + directions)];
+    report.contact_forces[contact] += r[0];
+    if (const auto& rotation = scene.contacts[contact].rotation; rotation && rotation->rate != 0)
+      for (std::size_t k = 0; k < directions; ++k)
+        report.contact_torques[contact] += r[1 + k] * interface.drive[i * directions + k] / rotation->rate;
   }
   Owned<Vec> values;
   check(MatCreateVecs(model.probes, nullptr, values.put()));
@@ -198,7 +204,7 @@ Verdict run(const Scene& scene, const std::filesystem::path& output, MPI_Comm co
 
   report.equilibrium =
       timed(report, "equilibrium", comm, [&] { return find_equilibrium(model.structure, model.interface); });
-  describe_equilibrium(model, report);
+  describe_equilibrium(scene, model, report);
   report.modes = timed(report, "modes", comm, [&] { return run_modes(scene, model, report); });
   report.estimate = timed(report, "estimate", comm, [&] { return run_estimate(scene, model, report); });
   report.transient = timed(report, "transient", comm, [&] { return run_transient(scene, model, report); });

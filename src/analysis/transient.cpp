@@ -49,13 +49,17 @@ double energy(const Fluctuation& fluctuation, const State& state, const StepWork
   return (kinetic + potential) / 2;
 }
 
-void record(const StepReport& report, double h, const State& state, Mat probes, Vec probe_values, History& history)
+void record(const StepReport& report, double h, const State& state, std::size_t block, Mat probes, Vec probe_values,
+            History& history)
 {
   history.time.push_back(state.time);
   history.energy.push_back(report.energy);
   history.damping_power.push_back(report.damping_work / h);
   history.contact_power.push_back(report.contact_work / h);
   history.load_power.push_back(report.load_work / h);
+  double normal_force = 0;
+  for (std::size_t i = 0; i < state.reactions.size(); i += block) normal_force += state.reactions[i];
+  history.normal_force.push_back(normal_force);
   history.open.push_back(report.open);
   history.stick.push_back(report.stick);
   history.slip.push_back(report.slip);
@@ -159,7 +163,7 @@ MarchSummary march(const ThetaStep& step, const Structure& structure, const Inte
     const double scale = std::max({report.energy, std::abs(report.contact_work), std::abs(report.load_work)});
     if (defect > 0) summary.energy_defect_max = std::max(summary.energy_defect_max, defect / scale);
     update(fluctuation, state, work);
-    record(report, step.h, state, probes, probe_values, history);
+    record(report, step.h, state, static_cast<std::size_t>(interface.block()), probes, probe_values, history);
     history.fluctuating_energy.push_back(energy(fluctuation, state, work));
     if (monitor) monitor(state, report, work);
     if (!std::isfinite(report.energy)) break;

@@ -35,9 +35,12 @@ Json equilibrium_entry(const Report& report, const Scene& scene)
   entry["force_residual"] = equilibrium.force_residual;
   entry["check_residual"] = equilibrium.check_residual;
   for (std::size_t i = 0; i < report.contact_forces.size(); ++i)
+  {
     entry["contacts"].push_back({{"rotor", scene.contacts[i].rotor},
                                  {"stator", scene.contacts[i].stator},
                                  {"normal_force_sum", report.contact_forces[i]}});
+    if (scene.contacts[i].rotation) entry["contacts"].back()["torque"] = report.contact_torques[i];
+  }
   for (std::size_t i = 0; i < report.equilibrium_probes.size(); ++i)
     entry["probes"][scene.probes[i].name] = report.equilibrium_probes[i];
   return entry;

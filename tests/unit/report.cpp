@@ -114,7 +114,7 @@ History history_of(std::size_t steps)
 {
   History history;
   for (auto* series : {&history.time, &history.energy, &history.fluctuating_energy, &history.damping_power,
-                       &history.contact_power, &history.load_power})
+                       &history.contact_power, &history.load_power, &history.normal_force})
     series->assign(steps, 0.5);
   for (auto* counts : {&history.open, &history.stick, &history.slip}) counts->assign(steps, 1);
   history.probes = {std::vector<double>(steps, 0.25)};

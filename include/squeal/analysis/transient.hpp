@@ -84,6 +84,7 @@ struct History
   std::vector<double> time;                                     // [s]
   std::vector<double> energy, fluctuating_energy;               // [J]; fluctuating: with u - u0
   std::vector<double> damping_power, contact_power, load_power; // [W]
+  std::vector<double> normal_force;                             // [N] sum of r_n
   std::vector<int> open, stick, slip;
   std::vector<std::vector<double>> probes; // [probe][step] [m]
 };

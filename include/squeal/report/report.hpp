@@ -20,6 +20,7 @@ struct Report
   int pairs = 0, ranks = 1;
   Equilibrium equilibrium;
   std::vector<double> contact_forces;     // [N] sum of r_n of each contact of the scene; empty on a matrix scene
+  std::vector<double> contact_torques;    // [N m] with which each brakes its rotation: sum of r_t.v_d over the rate
   std::vector<double> equilibrium_probes; // [m] at the equilibrium, one a probe
   Modes modes;
   Estimate estimate;
