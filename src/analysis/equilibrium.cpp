@@ -18,6 +18,7 @@ namespace
 struct Options
 {
   int max_iterations = 100, check_iterations = 0;
+  double check_rho = 1.5; // over 1/lambda_max
 };
 
 /// What the options mean is said in the program's option table.
@@ -26,9 +27,13 @@ Options read_options(int pairs)
   PetscInt max_it = 100, check_max_it = -1;
   check(PetscOptionsGetInt(nullptr, "equilibrium_", "-max_it", &max_it, nullptr));
   check(PetscOptionsGetInt(nullptr, "equilibrium_", "-check_max_it", &check_max_it, nullptr));
+  PetscReal check_rho = 1.5;
+  check(PetscOptionsGetReal(nullptr, "equilibrium_", "-check_rho", &check_rho, nullptr));
   if (max_it < 1) throw Error("-equilibrium_max_it must be at least 1");
+  if (!(check_rho > 0 && check_rho < 2))
+    throw Error("-equilibrium_check_rho must be between 0 and 2: the fixed point contracts nowhere else");
   if (check_max_it < 0) check_max_it = pairs <= 600 ? 20000 : 0;
-  return {static_cast<int>(max_it), static_cast<int>(check_max_it)};
+  return {static_cast<int>(max_it), static_cast<int>(check_max_it), check_rho};
 }
 
 /// K, or K + kappa B_n' B_n where contact alone holds a body, factored.
@@ -268,13 +273,13 @@ void settle(const Held& held, const Structure& structure, const Interface& inter
   }
 }
 
-void judge(const Structure& structure, const Interface& interface, const Search& search, int check_iterations,
+void judge(const Structure& structure, const Interface& interface, const Search& search, const Options& options,
            Equilibrium& equilibrium, MPI_Comm comm)
 {
   const bool balanced = balances(structure, interface, equilibrium);
   const auto gap = gaps_of(interface, equilibrium.u);
   const std::vector<double>& reaction = search.solution.reaction;
-  std::array<double, 4> told{};
+  std::array<double, 5> told{};
   on_rank_zero(comm,
                [&]
                {
@@ -284,19 +289,22 @@ void judge(const Structure& structure, const Interface& interface, const Search&
                  for (std::size_t i = 0; i < pairs; ++i)
                    if (search.D_nn[i * pairs + i] > 0) rho[i] = 1 / search.D_nn[i * pairs + i];
                  told[0] = natural_map(reaction, gap, rho);
-                 if (check_iterations == 0 || pairs == 0 || !search.problem.N.empty()) return;
-                 const auto run = solve_by_projection(search.problem, 1.5 * search.rho, 1e-12, check_iterations);
+                 if (search.problem.N.empty()) told[4] = has_one_solution(search.problem) ? 1 : 2;
+                 if (options.check_iterations == 0 || pairs == 0 || !search.problem.N.empty()) return;
+                 const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12,
+                                                      options.check_iterations);
                  told[2] = run.iterations;
                  const double largest = *std::max_element(reaction.begin(), reaction.end());
                  for (std::size_t i = 0; i < pairs && largest > 0; ++i)
                    told[3] = std::max(told[3], std::abs(run.reaction[i] - reaction[i]) / largest);
                  if (!(run.residual <= 1e-12)) told[3] = std::numeric_limits<double>::quiet_NaN();
                });
-  MPI_Bcast(told.data(), 4, MPI_DOUBLE, 0, comm);
+  MPI_Bcast(told.data(), 5, MPI_DOUBLE, 0, comm);
   equilibrium.outcome.residual = told[0];
   equilibrium.check_residual = told[1];
   equilibrium.check_iterations = static_cast<int>(told[2]);
   equilibrium.check_difference = told[3];
+  equilibrium.uniqueness = told[4] == 0 ? "not checked" : told[4] == 1 ? "assured" : "not assured";
   const bool good = told[0] <= 1e-9 && balanced;
   equilibrium.outcome.word = good ? "converged" : "not converged";
   if (!good) equilibrium.outcome.reason = "the closed set was found, but rounding leaves residuals above 1e-9";
@@ -386,7 +394,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   }
   settle(held, structure, interface, search, equilibrium, comm);
   equilibrium.reactions = pair_forces(interface, search.solution.reaction, interface.gap, 0);
-  judge(structure, interface, search, options.check_iterations, equilibrium, comm);
+  judge(structure, interface, search, options, equilibrium, comm);
   equilibrium.outcome.iterations = search.solution.iterations;
   return equilibrium;
 }

@@ -34,7 +34,8 @@ void read_options(ThetaStep& step)
   check(PetscOptionsGetBool(nullptr, prefix, "-contact_extrapolate", &extrapolate, nullptr));
   if (!(step.contact.tolerance > 0)) throw Error("-transient_contact_tolerance must be above 0");
   if (max_it < 1) throw Error("-transient_contact_max_it must be at least 1");
-  if (!(step.contact.rho >= 0)) throw Error("-transient_contact_rho must not be below 0");
+  if (!(step.contact.rho >= 0 && step.contact.rho < 2))
+    throw Error("-transient_contact_rho must be at least 0 and below 2: the fixed point contracts nowhere else");
   step.law = law == 0 ? ContactLaw::displacement : ContactLaw::velocity;
   step.contact.solver = solvers[static_cast<std::size_t>(solver)];
   step.contact.max_iterations = static_cast<int>(max_it);

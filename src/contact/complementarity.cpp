@@ -169,6 +169,18 @@ StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vecto
   return result;
 }
 
+bool has_one_solution(const ComplementarityProblem& problem)
+{
+  const std::size_t n = problem.q.size();
+  Dense symmetric(n * n);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j) symmetric[j * n + i] = (problem.M[i * n + j] + problem.M[j * n + i]) / 2;
+  PetscBLASInt size = 0, info = 0;
+  check(PetscBLASIntCast(static_cast<PetscInt>(n), &size));
+  if (n > 0) LAPACKpotrf_("L", &size, symmetric.data(), &size, &info);
+  return info == 0;
+}
+
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
                                        int max_iterations)
 {

@@ -22,6 +22,15 @@ struct Problem
   double friction;
   std::size_t block, n;
   std::vector<double> rho_n, rho_t; // per pair, of the natural map
+  double speed = 0;                 // the largest free velocity
+
+  /// What a pair's error is compared with, where `largest` is the largest reaction: also the force that would give the
+  /// pair the largest free velocity, so that a light pair beside heavy ones is not passed over.
+  double force_scale(std::size_t pair, double largest) const
+  {
+    const double own = speed * std::min(rho_n[pair], rho_t[pair]);
+    return own == 0 ? largest : largest == 0 ? own : std::min(own, largest);
+  }
 
   const double* row(std::size_t i) const { return W.data() + i * n; }
   double diagonal(std::size_t i) const { return W[i * n + i]; }
@@ -36,6 +45,7 @@ Problem make_problem(const std::vector<double>& W, const std::vector<double>& b,
     throw Error("contact: " + std::to_string(pairs) + " pairs of " + std::to_string(block) + " rows need " +
                 std::to_string(n * n) + " entries of W, not " + std::to_string(W.size()));
   Problem problem{W, b, pairs, directions, friction, block, n, {}, {}};
+  for (const double velocity : b) problem.speed = std::max(problem.speed, std::abs(velocity));
   double largest = 0;
   for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, problem.diagonal(i));
   for (std::size_t i = 0; i < n; i += block)
@@ -55,21 +65,27 @@ PairVector pair_of(const std::vector<double>& values, std::size_t i, std::size_t
   return {values[i], values[i + 1], block == 3 ? values[i + 2] : 0.};
 }
 
+/// Largest entry of the reactions.
+double largest_reaction(const std::vector<double>& r)
+{
+  double largest = 0;
+  for (const double value : r) largest = std::max(largest, std::abs(value));
+  return largest;
+}
+
 double residual_of(const Problem& problem, const std::vector<double>& w, const std::vector<double>& r)
 {
-  double error = 0, scale = 0, pull = 0;
+  const double largest = largest_reaction(r);
+  double residual = 0;
   for (std::size_t pair = 0; pair < problem.rho_n.size(); ++pair)
   {
     const std::size_t i = pair * problem.block;
     const PairVector mine = pair_of(r, i, problem.block), sliding = pair_of(w, i, problem.block);
     const double defect = natural_map(mine, sliding, problem.friction, problem.rho_n[pair], problem.rho_t[pair]);
     if (!std::isfinite(defect + sliding[0] + sliding[1] + sliding[2])) return std::numeric_limits<double>::infinity();
-    error = std::max(error, defect);
-    scale = std::max({scale, std::abs(mine[0]), std::abs(mine[1]), std::abs(mine[2])});
-    pull = std::max(pull, problem.rho_n[pair] * std::abs(problem.b[i]));
+    if (defect > 0) residual = std::max(residual, defect / problem.force_scale(pair, largest));
   }
-  if (error == 0) return 0;
-  return error / (scale > 0 ? scale : pull);
+  return residual;
 }
 
 /// target += sum of `count` rows of W, each times its change; contiguous, so that the compiler vectorises it.
@@ -94,11 +110,13 @@ void refresh(const Problem& problem, const std::vector<double>& r, std::vector<d
       add_rows(problem.row(i), problem.n, problem.block, &r[i], w.data());
 }
 
-/// One sweep of block Gauss-Seidel, each change times `relaxation`; a change below `negligible` is not made, which
-/// spares reading its rows. Returns the sum of the changes, which bounds the rounding that w gathers.
+/// One sweep of block Gauss-Seidel, each change times `relaxation`; a change below `negligible` of the pair's force
+/// scale is not made, which spares reading its rows. Returns the sum of the changes, which bounds the rounding that w
+/// gathers.
 double sweep(const Problem& problem, double relaxation, double negligible, std::vector<double>& r,
              std::vector<double>& w)
 {
+  const double largest = negligible > 0 ? largest_reaction(r) : 0;
   double moved = 0;
   for (std::size_t i = 0; i < problem.n; i += problem.block)
   {
@@ -116,7 +134,7 @@ double sweep(const Problem& problem, double relaxation, double negligible, std::
       for (std::size_t k = 0; k < problem.block; ++k) next[k] = last[k] + relaxation * (next[k] - last[k]);
     const PairVector change = {next[0] - last[0], next[1] - last[1], next[2] - last[2]};
     const double size = std::abs(change[0]) + std::abs(change[1]) + std::abs(change[2]);
-    if (size <= negligible) continue;
+    if (size == 0 || size <= negligible * problem.force_scale(i / problem.block, largest)) continue;
     moved += size;
     for (std::size_t k = 0; k < problem.block; ++k) r[i + k] = next[k];
     add_rows(problem.row(i), problem.n, problem.block, change.data(), w.data());
@@ -158,7 +176,7 @@ ContactResult gauss_seidel(const Problem& problem, const ContactSettings& settin
       if (result.residual > .5 * earlier) relaxation = std::max(.25, relaxation / 2);
       earlier = result.residual;
     }
-    negligible = change == 0 ? 0 : .02 * settings.tolerance * scale;
+    negligible = change == 0 ? 0 : .02 * settings.tolerance;
   }
   result.converged = result.residual <= settings.tolerance;
   return result;
@@ -232,7 +250,10 @@ std::vector<double> relative_velocity(const std::vector<double>& W, const std::v
 double contact_residual(const std::vector<double>& W, const std::vector<double>& w, int pairs, int directions,
                         double friction, const std::vector<double>& r)
 {
-  return residual_of(make_problem(W, w, pairs, directions, friction), w, r);
+  std::vector<double> opposite = r;
+  for (double& value : opposite) value = -value;
+  const std::vector<double> b = relative_velocity(W, w, opposite);
+  return residual_of(make_problem(W, b, pairs, directions, friction), w, r);
 }
 
 ContactResult solve_contact(const std::vector<double>& W, const std::vector<double>& b, int pairs, int directions,

@@ -34,6 +34,9 @@ Json equilibrium_entry(const Report& report, const Scene& scene)
   entry["residual"] = equilibrium.outcome.residual;
   entry["force_residual"] = equilibrium.force_residual;
   entry["check_residual"] = equilibrium.check_residual;
+  entry["check_iterations"] = equilibrium.check_iterations;
+  entry["check_difference"] = equilibrium.check_difference;
+  entry["uniqueness"] = equilibrium.uniqueness;
   for (std::size_t i = 0; i < report.contact_forces.size(); ++i)
   {
     entry["contacts"].push_back({{"rotor", scene.contacts[i].rotor},

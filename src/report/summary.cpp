@@ -31,6 +31,12 @@ std::string row(const std::string& head, const std::string& text)
   return format("  %-12s ", head.c_str()) + text + "\n";
 }
 
+/// Where a number would otherwise mislead.
+std::string warning(const std::string& sentence)
+{
+  return row("", "WARNING: " + sentence);
+}
+
 /// "converged", "NOT CONVERGED: reason": what is not a success must not look like one.
 std::string outcome_text(const Outcome& outcome)
 {
@@ -53,6 +59,8 @@ std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
       row("", format("normal force %.9g N in all, %.4g to %.4g N a pair", normal.sum, normal.least, normal.greatest));
   text += row("", format("force residual %.1e, contact residual %.1e, by the fixed point %.1e",
                          equilibrium.force_residual, equilibrium.outcome.residual, equilibrium.check_residual));
+  if (equilibrium.uniqueness == "not assured")
+    text += warning("with this much friction other equilibria may exist beside this one");
   return text;
 }
 

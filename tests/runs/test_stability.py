@@ -23,3 +23,19 @@ def test_enough_steps_are_not_refused_and_the_refusal_can_be_lifted(squeal):
     assert fine.code == 0 and 0 < fine.report["transient"]["growth_rate_fit"]
     coarse = squeal(*short, "--set", "transient.steps_per_period=50", "-transient_refuse", "false", ranks=1)
     assert coarse.code == 0 and coarse.report["transient"]["growth_rate_fit"] < 0
+
+
+def test_fixed_points_beyond_their_bound_are_refused(squeal):
+    run = squeal(OSCILLATOR, "--set", "cycle.enabled=false", "-transient_contact_rho", "2", ranks=1)
+    assert run.code == 1 and "-transient_contact_rho" in run.messages[0] and "below 2" in run.messages[0]
+    run = squeal(OSCILLATOR, "--set", "cycle.enabled=false", "-equilibrium_check_rho", "2.5", ranks=2)
+    assert run.code == 1 and len(run.messages) == 1 and "-equilibrium_check_rho" in run.messages[0]
+
+
+def test_much_friction_warns_that_the_equilibrium_may_not_be_the_only_one(squeal):
+    pin = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
+           "cycle.enabled=false", "--set", "modes.band=3000", "--set", "modes.method=full"]
+    for friction, uniqueness in ((0.3, "assured"), (5, "not assured")):
+        run = squeal(*pin, "--set", f"friction.coefficient={friction}")
+        assert run.code == 0 and run.report["equilibrium"]["uniqueness"] == uniqueness
+        assert ("other equilibria may exist" in run.printed) == (uniqueness == "not assured")

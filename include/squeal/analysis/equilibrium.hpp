@@ -8,8 +8,9 @@
 /// off again: with K' = K + kappa B_n' B_n and its compliance D', exactly,
 ///     (1 - kappa D'_nn) g = q' + (D'_nn + mu D'_nt e) r_n.
 ///
-/// Caveat: at large mu an equilibrium may not exist, or not be the only one; the one found is said to be neither
-/// unique nor stable.
+/// Caveat: at large mu an equilibrium may not exist, or not be the only one. It is the only one if the symmetric part
+/// of D_nn + mu D_nt e is positive definite, which is checked where K alone is regular; whether it is stable, modes
+/// say.
 #include "squeal/analysis/state.hpp"
 
 namespace squeal
@@ -28,6 +29,7 @@ struct Equilibrium
   double check_residual = 0;     // the natural map with the fixed point's rho = 1/lambda_max(D_nn)
   int check_iterations = 0;      // of an independent run of the fixed point; 0: not run
   double check_difference = 0;   // of its reactions, over the largest; NaN if it did not converge
+  std::string uniqueness;        // "assured", "not assured", "not checked"
 };
 
 /// Options, prefix -equilibrium_: max_it (100), check_max_it (of the fixed point; -1: 20000 up to 600 pairs, else 0).

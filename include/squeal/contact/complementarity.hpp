@@ -41,6 +41,9 @@ struct StatusSolution
 
 StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, int max_iterations);
 
+/// Whether the symmetric part of M is positive definite, N being the identity: then there is one solution and no other.
+bool has_one_solution(const ComplementarityProblem& problem);
+
 /// r <- max(0, r - rho g), g = q + M r; N must be the identity. `rho` is halved when the residual grows.
 struct ProjectionSolution
 {

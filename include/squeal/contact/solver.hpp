@@ -2,7 +2,7 @@
 /// Contact with Coulomb friction on the condensed operator (method, section 4): find r with w = W r + b,
 ///     0 <= w_n _|_ r_n >= 0,   |r_t| <= mu r_n,   r_t opposes w_t.
 /// Residual, one measure for every solver: the natural map per pair, |r - proj(r - rho w)| with rho = 1/W_ii, over the
-/// largest reaction.
+/// largest reaction, or over rho max|b| where that is smaller.
 ///
 /// gauss_seidel: one exact local solve a pair and sweep; w follows each change of a reaction, so that a sweep reads W
 /// once at most, and is formed afresh before the residual is believed where rounding could matter. Under-relaxed when
