@@ -40,7 +40,7 @@ Options read_options(int pairs)
 struct Held
 {
   Owned<Mat> augmented; // null when kappa = 0
-  Owned<Mat> factor;
+  Factor factor;
   double kappa = 0; // [N/m]
 };
 
@@ -78,7 +78,7 @@ double typical_stiffness(Mat K)
 Held hold(const Structure& structure, const Interface& interface)
 {
   Held held;
-  auto [factor, loose] = factor_positive(structure.K);
+  auto [factor, loose] = factor_positive(structure.K, interface);
   if (!loose)
   {
     held.factor = std::move(factor);
@@ -90,7 +90,7 @@ Held hold(const Structure& structure, const Interface& interface)
     check(MatDuplicate(structure.K, MAT_COPY_VALUES, held.augmented.put()));
     check(MatAXPY(held.augmented, held.kappa, normal_springs(interface), DIFFERENT_NONZERO_PATTERN));
     check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
-    auto [second, still_loose] = factor_positive(held.augmented);
+    auto [second, still_loose] = factor_positive(held.augmented, interface);
     if (!still_loose)
     {
       held.factor = std::move(second);
@@ -126,10 +126,10 @@ void displace(const Held& held, const Structure& structure, const Interface& int
   if (interface.pairs > 0) add_reactions(interface, forces, rhs);
   const auto residual = zeros_like(rhs), correction = zeros_like(rhs);
   Mat K = held.augmented ? held.augmented.get() : structure.K.get();
-  check(MatSolve(held.factor, rhs, u));
+  solve(held.factor, rhs, u);
   check(MatMult(K, u, residual));
   check(VecAYPX(residual, -1, rhs));
-  check(MatSolve(held.factor, residual, correction));
+  solve(held.factor, residual, correction);
   check(VecAXPY(u, 1, correction));
 }
 
@@ -173,6 +173,8 @@ ComplementarityProblem problem_of(const std::vector<double>& D, const std::vecto
   problem.N.resize(pairs * pairs);
   for (std::size_t i = 0; i < pairs * pairs; ++i) problem.N[i] = -kappa * D_nn[i];
   for (std::size_t i = 0; i < pairs; ++i) problem.N[i * pairs + i] += 1;
+  for (double& value : problem.N)
+    if (std::abs(value) < 1e-12) value = 0; // rounding of 1 - 1: the pair alone holds its body
   return problem;
 }
 
@@ -363,7 +365,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
     equilibrium.outcome = {"converged", "", 0, 0};
     return equilibrium;
   }
-  const Held held = hold(structure, interface);
+  Held held = hold(structure, interface);
   const std::vector<double> nothing(pairs, 0.);
   displace(held, structure, interface, pair_forces(interface, nothing, nothing, held.kappa), equilibrium.u);
   const std::vector<double> q = gaps_of(interface, equilibrium.u);
@@ -372,7 +374,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   search.solution.outcome = "converged";
   if (pairs > 0)
   {
-    const std::vector<double> D = condensed_matrix(held.factor, interface, 1);
+    const std::vector<double> D = held.factor.condensed(1);
     on_rank_zero(comm,
                  [&]
                  {

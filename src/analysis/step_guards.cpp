@@ -1,6 +1,6 @@
 #include "squeal/analysis/step_guards.hpp"
 
-#include "squeal/contact/condensed.hpp"
+#include "squeal/contact/factor.hpp"
 
 #include <array>
 #include <cmath>
@@ -42,7 +42,7 @@ struct FreeStep
   const Structure& structure;
   double theta, h;
   Owned<Mat> A;
-  Owned<Mat> factor;
+  Factor factor;
   Owned<Vec> u, v, next, rhs, image;
 
   void advance()
@@ -52,7 +52,7 @@ struct FreeStep
     check(VecAXPBY(rhs, (theta - 1) / theta, 1 / theta, image));
     check(MatMult(structure.K, u, image));
     check(VecAXPY(rhs, -h, image));
-    check(MatSolve(factor, rhs, next));
+    solve(factor, rhs, next);
     check(VecAXPY(u, h * (1 - theta), v));
     check(VecAXPY(u, h * theta, next));
     std::swap(v, next);
@@ -88,7 +88,7 @@ double free_growth(const Structure& structure, double theta, double h)
   check(MatAXPY(step.A, h * theta, structure.C, SAME_NONZERO_PATTERN));
   check(MatAXPY(step.A, h * h * theta * theta, structure.K, SAME_NONZERO_PATTERN));
   check(MatSetOption(step.A, MAT_SYMMETRIC, PETSC_TRUE));
-  step.factor = factor_positive(step.A).factor;
+  step.factor = Factor(step.A, nullptr, Factor::Kind::automatic);
   for (Owned<Vec>* x : {&step.u, &step.v, &step.next, &step.rhs, &step.image}) *x = zeros_like(structure.load);
   PetscInt first = 0, last = 0;
   check(VecGetOwnershipRange(step.u, &first, &last));

@@ -42,23 +42,20 @@ void read_options(ThetaStep& step)
   step.extrapolate = extrapolate == PETSC_TRUE;
 }
 
-/// b of w = W r + b, from the free velocity: normal rows are gap rates (g + B_n ut)/h + B_n v, tangential ones s.
+/// b of w = W r + b, from the free velocity's B v: normal rows are gap rates (g + B_n ut)/h + B_n v, tangential ones s.
+/// Collective; the result is on rank 0.
 std::vector<double> free_contact_velocity(const ThetaStep& step, const Interface& interface, const State& state,
-                                          StepWork& work)
+                                          StepWork& work, std::vector<double> b)
 {
   check(VecWAXPY(work.v_theta, step.h * (1 - step.theta), state.v, state.u)); // ut, for a moment
   const std::vector<double> position = relative(interface, work.v_theta);
-  std::vector<double> b = relative(interface, work.v_free);
-  // A gap at rounding is closed: against the displacements it was rounded from, or a free step's own motion.
   double rounding = 0;
-  if (step.law == ContactLaw::velocity)
-  {
-    check(VecNorm(work.v_theta, NORM_INFINITY, &rounding));
-    for (std::size_t i = 0; i < b.size(); i += static_cast<std::size_t>(interface.block()))
-      rounding = std::max(rounding, step.h * std::abs(b[i]));
-    rounding *= 1e-10;
-  }
+  if (step.law == ContactLaw::velocity) check(VecNorm(work.v_theta, NORM_INFINITY, &rounding));
+  if (b.empty()) return b;
   const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
+  // A gap at rounding is closed: against the displacements it was rounded from, or a free step's own motion.
+  for (std::size_t i = 0; i < b.size(); i += block) rounding = std::max(rounding, step.h * std::abs(b[i]));
+  rounding *= 1e-10;
   for (std::size_t i = 0; i < interface.gap.size(); ++i)
   {
     const double gap = interface.gap[i] + position[i * block];
@@ -141,8 +138,8 @@ void account(const ThetaStep& step, const Structure& structure, const State& sta
   check(VecDotBegin(work.v_theta, work.f, &contact));
   check(VecDotBegin(work.v_theta, structure.load, &load));
 
-  // v_free is no longer needed, nor are M v, A v and K u of the start once their part is taken.
-  Vec dv = work.v_free, change = work.Ku, d = work.Mv;
+  // M v, A v and K u of the start are no longer needed once their part is taken
+  Vec dv = work.dv, change = work.Ku, d = work.Mv;
   check(VecWAXPY(dv, -1, state.v, work.v_next));
   check(VecAYPX(change, -1, work.Ku_next)); // K du
   // theta h C v_theta = A v_theta - M v_theta - theta^2 h K du
@@ -193,7 +190,7 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
 StepWork begin_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state)
 {
   StepWork work;
-  for (Owned<Vec>* x : {&work.Mv, &work.Av, &work.Ku, &work.Mv_next, &work.Av_next, &work.Ku_next, &work.v_free,
+  for (Owned<Vec>* x : {&work.Mv, &work.Av, &work.Ku, &work.Mv_next, &work.Av_next, &work.Ku_next, &work.dv,
                         &work.v_next, &work.v_theta, &work.f})
     *x = zeros_like(structure.load);
   check(MatMult(structure.M, state.v, work.Mv));
@@ -217,12 +214,13 @@ StepReport advance(const ThetaStep& step, const Structure& structure, const Inte
   check(VecCopy(work.Mv, work.Av_next));
   check(VecAXPBYPCZ(work.Av_next, (theta - 1) / theta, -h, 1 / theta, work.Av, work.Ku));
   check(VecAXPY(work.Av_next, h, structure.load));
-  solve(step.condensed, work.Av_next, work.v_free);
+  const Factor& factor = step.condensed.factor;
+  std::vector<double> b = factor.forward(std::array<Vec, 1>{work.Av_next}), lambda; // B v_free
 
   check(VecSet(work.f, 0));
   if (interface.pairs > 0)
   {
-    const std::vector<double> b = free_contact_velocity(step, interface, state, work);
+    b = free_contact_velocity(step, interface, state, work, std::move(b));
     const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
     const ContactResult contact = find_reactions(step, interface, b, work, state.reactions, comm);
     report.contact_iterations = contact.iterations;
@@ -230,17 +228,13 @@ StepReport advance(const ThetaStep& step, const Structure& structure, const Inte
     report.contact_converged = contact.converged;
     add_reactions(interface, state.reactions, work.f);
     check(VecScale(work.f, h));
+    lambda = state.reactions;
+    for (double& value : lambda) value *= -h;
   }
   for (const ContactStatus status : contact_status(interface, state.reactions))
     ++(status == ContactStatus::open ? report.open : status == ContactStatus::stick ? report.stick : report.slip);
-
-  if (report.open == interface.pairs)
-    check(VecCopy(work.v_free, work.v_next)); // free flight: already solved
-  else
-  {
-    check(VecAXPY(work.Av_next, 1, work.f));
-    solve(step.condensed, work.Av_next, work.v_next);
-  }
+  factor.backward(lambda, std::array<Vec, 1>{work.v_next});
+  check(VecAXPY(work.Av_next, 1, work.f));
 
   check(VecAXPBYPCZ(work.v_theta, theta, 1 - theta, 0, work.v_next, state.v));
   check(VecAXPY(state.u, h, work.v_theta));

@@ -2,6 +2,7 @@
 #include "../support/small_models.hpp"
 #include "squeal/contact/condensed.hpp"
 
+#include <array>
 #include <cmath>
 #include <doctest/doctest.h>
 
@@ -87,7 +88,7 @@ void check_condensed(const test::Rows& K, const test::Rows& B, int directions)
   else
     CHECK(condensed.W.empty());
   const auto x = zeros_like(structure.load), residual = zeros_like(structure.load);
-  solve(condensed, structure.load, x);
+  solve(condensed.factor, structure.load, x);
   check(MatMult(structure.K, x, residual));
   check(VecAXPY(residual, -1, structure.load));
   double defect = 0;
@@ -135,10 +136,10 @@ TEST_CASE("a structure that nothing holds is refused, and the loose part is name
     }
     if (!other_body) K[5][5] = K[6][6] = K[8][8] = 1;
     const auto structure = test::make_structure(K, K, K, std::vector<double>(9, 1.));
-    const auto factored = factor_positive(structure.K);
+    const auto interface = test::make_interface(test::zeros(2, 9), 1, {0}, {1}, .3, structure.K);
+    const auto factored = factor_positive(structure.K, interface);
     REQUIRE(factored.loose);
     CHECK((other_body ? *factored.loose >= 5 : *factored.loose == 7));
-    const auto interface = test::make_interface(test::zeros(2, 9), 1, {0}, {1}, .3, structure.K);
     CHECK_THROWS_AS(condense(structure.K, interface, 1, {}), Error);
   }
 }
@@ -146,5 +147,52 @@ TEST_CASE("a structure that nothing holds is refused, and the loose part is name
 TEST_CASE("a soft support is a support: twelve decades between springs still factor")
 {
   test::Rows K = {{1e12, -1e12}, {-1e12, 1e12 + 1}};
-  CHECK(factor_positive(test::make_structure(K, K, K, {0, 0}).K).loose.has_value() == false);
+  const auto structure = test::make_structure(K, K, K, {0, 0});
+  CHECK(factor_positive(structure.K, Interface{}).loose.has_value() == false);
+}
+
+TEST_CASE("sparse and dense factors agree: the condensed operator, both halves of a solve, several columns at once")
+{
+  const std::size_t n = 60, rows = 6;
+  const auto K = chain_stiffness(n);
+  test::Rows B = test::zeros(rows, n);
+  for (std::size_t i = 0; i < rows; ++i) B[i][7 * i + 3] = 1, B[i][n - 1 - i] = -.7;
+  const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
+  const auto interface = test::make_interface(B, 1, {0, 0, 0}, {1, 1, 1}, .3, structure.K);
+  Factor sparse(structure.K, interface.B, Factor::Kind::sparse), dense(structure.K, interface.B, Factor::Kind::dense);
+  CHECK(!sparse.failed());
+  CHECK(!dense.failed());
+  CHECK(largest_difference(sparse.condensed(2), dense.condensed(2)) < 1e-12);
+
+  const auto other = copy_of(structure.load);
+  check(VecSetValue(other, 11, 5, INSERT_VALUES));
+  check(VecAssemblyBegin(other));
+  check(VecAssemblyEnd(other));
+  const std::array<Vec, 2> b = {structure.load, other};
+  const auto seen = sparse.forward(b);
+  CHECK(largest_difference(seen, dense.forward(b)) < 1e-12);
+  std::vector<double> lambda(seen.size());
+  for (std::size_t i = 0; i < lambda.size(); ++i) lambda[i] = 1 + static_cast<double>(i % 5);
+  const auto x = zeros_like(other), y = zeros_like(other), z = zeros_like(other), w = zeros_like(other);
+  const std::array<Vec, 2> by_sparse = {x, y}, by_dense = {z, w};
+  sparse.backward(lambda, by_sparse);
+  dense.backward(lambda, by_dense);
+  for (std::size_t i = 0; i < 2; ++i)
+  {
+    // A x + B' lambda = b, the lambda of this column
+    const auto residual = copy_of(b[i]);
+    check(VecScale(residual, -1));
+    check(MatMultAdd(structure.K, by_sparse[i], residual, residual));
+    const std::size_t here = lambda.size() / 2;
+    std::vector<double> mine(rows);
+    for (std::size_t k = 0; k < rows; ++k) mine[k] = here > 0 ? lambda[i * here + k] : 0;
+    MPI_Bcast(mine.data(), static_cast<int>(rows), MPI_DOUBLE, 0, PETSC_COMM_WORLD);
+    add_reactions(interface, mine, residual);
+    double defect = 0, distance = 0;
+    check(VecNorm(residual, NORM_INFINITY, &defect));
+    CHECK(defect < 1e-12); // entries of order one: rounding
+    check(VecAXPY(by_sparse[i], -1, by_dense[i]));
+    check(VecNorm(by_sparse[i], NORM_INFINITY, &distance));
+    CHECK(distance < 1e-12);
+  }
 }

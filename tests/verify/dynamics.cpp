@@ -59,8 +59,8 @@ TEST_CASE("a falling mass meets the ground in the step of its impact, and stays"
     if (first == 0 && report.open == 0) first = state.time;
     if (first > 0 && state.time > first + 2.5 * h) // an inelastic shock takes two steps
     {
-      CHECK(std::abs(height) < 1e-10 * 9.81 * h * h); // the contact tolerance, over a step
-      CHECK(std::abs(whole(state.v)[0]) < 1e-12);
+      CHECK(std::abs(height) < 1e-10 * 9.81 * h * h);                // the contact tolerance, over a step
+      CHECK(std::abs(whole(state.v)[0]) < 1e-10 * 9.81 * h);         // the same, of W r = 9.81 h
       CHECK(std::abs(state.reactions[0] - 2 * 9.81) < 1e-9 * 19.62); // contact tolerance
     }
   }

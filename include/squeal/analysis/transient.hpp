@@ -38,15 +38,15 @@ struct ThetaStep
 /// contact_tolerance, contact_max_it, contact_rho, contact_extrapolate. Error: h not above 0, theta not in (0, 1].
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta);
 
-/// The products of a state that a step starts from and leaves behind for the next one (two multiplications and two
-/// solves a step), and its work vectors. Belongs to one state and one ThetaStep.
+/// The products of a state that a step starts from and leaves behind for the next one (two multiplications and one
+/// solve a step), and its work vectors. Belongs to one state and one ThetaStep.
 struct StepWork
 {
-  Owned<Vec> Mv, Av, Ku;                 // of the state at hand
-  Owned<Vec> Mv_next, Av_next, Ku_next;  // of the one being computed
-  Owned<Vec> v_free, v_next, v_theta, f; // f: h B'r
-  std::vector<double> r_before;          // [N] reactions of the last step but one
-  double energy = 0;                     // [J]
+  Owned<Vec> Mv, Av, Ku;                // of the state at hand
+  Owned<Vec> Mv_next, Av_next, Ku_next; // of the one being computed
+  Owned<Vec> v_next, v_theta, dv, f;    // f: h B'r
+  std::vector<double> r_before;         // [N] reactions of the last step but one
+  double energy = 0;                    // [J]
 };
 
 /// Must be called again after the state was changed by anything but `advance`.

@@ -1,6 +1,7 @@
 #pragma once
 /// The condensed contact operator W = scale B A^-1 B' (dense, symmetric, whole on rank 0) and the factor of A it came
-/// from (MUMPS, L L').
+/// with.
+#include "squeal/contact/factor.hpp"
 #include "squeal/contact/interface.hpp"
 
 #include <optional>
@@ -10,30 +11,24 @@ namespace squeal
 
 struct CondensedOperator
 {
-  Owned<Mat> factor;     // of A, by MUMPS, all ranks
+  Factor factor;         // of A bordered by B
   std::vector<double> W; // row-major, size x size; on rank 0 only, empty elsewhere
   int size = 0;          // pairs * block
 };
 
-/// Factors A (symmetric) and forms W from blocks of sparse right-hand sides. Collective.
+/// Factors A (symmetric) and forms W. Collective.
 /// Error: A singular, naming (`describe`) the offending degree of freedom.
 CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names);
 
-/// x = A^-1 b with the factor.
-void solve(const CondensedOperator& condensed, Vec b, Vec x);
-
-/// The parts of `condense`, for A symmetric and meant to be positive definite; `loose`: the degree of freedom that
-/// moves most in a motion that A resists with less than rounding of its diagonal, if there is one (the factor is then
-/// of no use).
+/// A factor for A symmetric and meant to be positive definite, bordered by the interface's B; `loose`: the degree of
+/// freedom that moves most in a motion that A resists with less than rounding of its diagonal, if there is one (the
+/// factor is then of no use).
 struct Factored
 {
-  Owned<Mat> factor;
+  Factor factor;
   std::optional<PetscInt> loose;
 };
 
-Factored factor_positive(Mat A);
-
-/// scale B A^-1 B' on rank 0; empty elsewhere.
-std::vector<double> condensed_matrix(Mat factor, const Interface& interface, double scale);
+Factored factor_positive(Mat A, const Interface& interface);
 
 } // namespace squeal

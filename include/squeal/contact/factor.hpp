@@ -1,0 +1,61 @@
+#pragma once
+/// Direct factor of A (symmetric, meant to be positive definite) bordered by rows B that are never eliminated:
+///     [A  B'] [x     ]   [b]
+///     [B  0 ] [lambda] = [*]     leaves  -B A^-1 B'  in the corner (Schur complement),
+/// and splits a solve in two halves: `forward` turns b into B A^-1 b, `backward` then gives x = A^-1 (b - B' lambda)
+/// for a lambda chosen in between. Both together cost less than two solves with A alone.
+///
+/// By MUMPS (L D L' without pivoting, METIS ordering), or dense (L L' by LAPACK) where that is quicker: small or full
+/// A. Right-hand sides, several at once at will, pass through rank 0.
+#include "squeal/base/petsc.hpp"
+
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace squeal
+{
+
+class Factor
+{
+public:
+  enum class Kind
+  {
+    automatic,
+    sparse,
+    dense,
+  };
+
+  Factor();
+  Factor(Factor&&) noexcept;
+  Factor& operator=(Factor&&) noexcept;
+  ~Factor();
+
+  /// Collective. `B` may be null: no border.
+  Factor(Mat A, Mat B, Kind kind);
+
+  /// A pivot was zero or negative: A is not positive definite and the factor is of no use.
+  bool failed() const;
+
+  /// scale B A^-1 B', row-major, symmetric to the bit; on rank 0 only, empty elsewhere. Once: it gives its storage
+  /// away.
+  std::vector<double> condensed(double scale);
+
+  /// B A^-1 b for each b, one after the other; on rank 0 only. `backward` must follow before the next `forward`.
+  std::vector<double> forward(std::span<const Vec> b) const;
+
+  /// x = A^-1 (b - B' lambda) for the b of the last `forward`; lambda as `forward` returns, read on rank 0.
+  void backward(const std::vector<double>& lambda, std::span<const Vec> x) const;
+
+  /// [bytes] of this rank: what the factor occupies.
+  double memory() const;
+
+private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// x = A^-1 b.
+void solve(const Factor& factor, Vec b, Vec x);
+
+} // namespace squeal

@@ -1,0 +1,31 @@
+#pragma once
+/// Entries of a distributed matrix as (row, column, value), numbered from one: what MUMPS takes.
+#include "squeal/base/petsc.hpp"
+
+#include <vector>
+
+namespace squeal
+{
+
+struct Triplets
+{
+  enum class Part
+  {
+    pattern, // no values
+    everything,
+  };
+
+  std::vector<int> row, column;
+  std::vector<double> value;
+};
+
+/// This rank's share of the lower triangle, diagonal included.
+Triplets lower_triangle(Mat symmetric);
+
+/// This rank's rows of B, below row `offset`.
+void append_rows(Mat B, int offset, Triplets& mine);
+
+/// The entries of all ranks on rank 0; nothing elsewhere. Collective.
+Triplets gathered(const Triplets& mine, Triplets::Part part, MPI_Comm comm);
+
+} // namespace squeal
