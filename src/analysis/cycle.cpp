@@ -118,8 +118,12 @@ LimitCycle find_cycle(const Structure& structure, const Interface& interface, co
   PeriodMap map{structure, interface, settings.steps_per_period, settings.theta};
   map.reactions = equilibrium.reactions;
   const Flow flow = flow_of(map);
+  const double event = std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude) / amplitude;
+  const Owned<Vec> moved = copy_of(first.u.get());
+  check(VecAXPY(moved, -1, equilibrium.u));
+  const double size = std::sqrt(2 * (potential_energy(structure, moved) + kinetic_energy(structure, first.v)));
   const ShootingStart start{
-      equilibrium.u, first.u, first.v, 1 / frequency_hz, {mode.real, mode.imaginary, equilibrium.u}};
+      equilibrium.u, first.u, first.v, 1 / frequency_hz, {mode.real, mode.imaginary, equilibrium.u}, event * size};
   LimitCycle cycle = shoot(flow, start, preconditioner, settings.tolerance, settings.free_periods);
   cycle.steps_per_period = settings.steps_per_period;
   measure(map, equilibrium, probes, static_cast<int>(samples), cycle);

@@ -102,7 +102,8 @@ Outcome outcome_of(const Shooting& shooting, const Finish& finish)
   if (finish.ending == Ending::vanished)
   {
     outcome.word = "collapsed to equilibrium";
-    outcome.reason = "the fluctuation fell below a tenth of the start's energy";
+    outcome.reason =
+        "the fluctuation fell below a tenth of the energy at the start and at first lift-off or slip reversal";
   }
   else if (finish.ending == Ending::converged)
     outcome.word = "converged";
@@ -143,7 +144,8 @@ LimitCycle shoot(const Flow& flow, const ShootingStart& start, const SlidingPrec
 
   const Owned<Vec> first = state_of(start.u, start.v);
   Orbit orbit = free_periods(shooting, first, start.period, free);
-  shooting.least_fluctuation = orbit.fluctuation * std::sqrt(0.1);
+  // Below the first event nothing limits a vibration; above it a start may be ten times too large and still find one.
+  shooting.least_fluctuation = std::min(orbit.fluctuation, start.first_event) * std::sqrt(0.1);
   if (orbit.residual > tolerance && shooting.options.reduced_newtons != 0)
     orbit = reduce(shooting, std::move(orbit), start.shapes);
   const Finish finish = finish_in_full_space(shooting, std::move(orbit));

@@ -310,6 +310,7 @@ Estimate estimate_amplitude(const Structure& structure, const Interface& interfa
     return power / energy;
   };
   find_balance(result, rate, first_event);
+  result.mean_energy = energy * result.amplitude * result.amplitude;
   const double q = result.outcome.word == "balance" ? result.amplitude : result.lift_off_amplitude;
   if (q < infinity) result.phase = best_phase(pairs, q);
   return result;

@@ -81,6 +81,7 @@ Json estimate_entry(const Estimate& estimate)
   if (!ran(estimate.outcome)) return entry;
   const bool balance = estimate.outcome.word == "balance";
   entry["amplitude"] = balance ? Json(estimate.amplitude) : Json(nullptr); // no balance is no amplitude of zero
+  entry["mean_energy"] = balance ? Json(estimate.mean_energy) : Json(nullptr);
   entry["lift_off_amplitude"] = estimate.lift_off_amplitude;
   entry["reversal_amplitude"] = estimate.reversal_amplitude;
   entry["damping_rate"] = estimate.damping_rate;

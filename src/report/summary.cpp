@@ -97,6 +97,16 @@ std::string estimate_text(const Estimate& estimate)
                          estimate.reversal_amplitude));
   text += row("", format("friction injects %.5g 1/s, damping takes %.5g 1/s of the energy",
                          estimate.friction_rate_linear, estimate.damping_rate));
+  const double lift_off = estimate.lift_off_amplitude, reversal = estimate.reversal_amplitude;
+  if (estimate.outcome.word == "no balance")
+    return text + warning(format("no amplitude is predicted; shooting starts from first lift-off times "
+                                 "-cycle_lift_off_multiple, %.5g m by default",
+                                 2 * lift_off));
+  if (estimate.outcome.word == "balance" && estimate.amplitude > 3 * lift_off)
+    text += warning(format("%.2g times first lift-off: the cycle itself may be far smaller, down to that",
+                           estimate.amplitude / lift_off));
+  if (estimate.outcome.word == "balance" && reversal < lift_off)
+    text += warning("slip reverses before anything lifts off: pairs will stick, and the cycle may be twice as large");
   return text;
 }
 

@@ -39,3 +39,30 @@ def test_much_friction_warns_that_the_equilibrium_may_not_be_the_only_one(squeal
         run = squeal(*pin, "--set", f"friction.coefficient={friction}")
         assert run.code == 0 and run.report["equilibrium"]["uniqueness"] == uniqueness
         assert ("other equilibria may exist" in run.printed) == (uniqueness == "not assured")
+
+
+def oscillator_cycle(squeal, friction, speed):
+    return squeal(OSCILLATOR, "--set", f"friction.coefficient={friction}", "--set", f"contact.0.velocity=[{speed},0,0]",
+                  "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=100", "--set",
+                  "cycle.tolerance=1e-6", ranks=1)
+
+
+def test_the_estimate_is_below_a_cycle_that_sticks_and_far_above_one_that_only_reversal_would_hold(squeal):
+    """Amplitudes from mean energies: a quarter of the cycle's energy, ten times it, 90 000 times it. 5 %: 100 steps."""
+    for friction, speed, ratio, words in ((0.3, 0.6, 0.502, "pairs will stick"), (0.2, 10, 3.14, "times first lift-off"),
+                                          (0.25, 1000, 298, "times first lift-off")):
+        run = oscillator_cycle(squeal, friction, speed)
+        assert run.code == 0 and run.report["cycle"]["outcome"] == "converged"  # even from 298 times too far
+        found = (run.report["estimate"]["mean_energy"] / run.report["cycle"]["mean_fluctuating_energy"]) ** 0.5
+        assert abs(found / ratio - 1) < 0.05
+        assert words in run.printed
+
+
+def test_without_a_balance_no_amplitude_is_claimed_and_the_start_is_named(squeal):
+    run = oscillator_cycle(squeal, 0.3, 1e5)
+    estimate = run.report["estimate"]
+    assert run.code == 0 and estimate["outcome"] == "no balance" and estimate["amplitude"] is None
+    assert "-cycle_lift_off_multiple" in run.printed
+    fast = oscillator_cycle(squeal, 0.3, 1000).report  # a balance, but the cycle never notices so fast a belt either
+    assert fast["estimate"]["outcome"] == "balance"
+    assert abs(run.report["cycle"]["period"] / fast["cycle"]["period"] - 1) < 1e-4

@@ -5,6 +5,8 @@
 /// step, or a smooth oscillator in a test. States are compared in the energy norm sqrt(u'K u + v'M v) only.
 #include "squeal/analysis/transient.hpp"
 
+#include <limits>
+
 namespace squeal
 {
 
@@ -60,6 +62,7 @@ struct ShootingStart
   Vec u = nullptr, v = nullptr;
   double period = 0;       // [s]
   std::vector<Vec> shapes; // the paper's phi_r, phi_i, phi_e: of the displacements and of the velocities alike
+  double first_event = std::numeric_limits<double>::infinity(); // energy norm at which lift-off or reversal begins
 };
 
 /// Approximate inverse of dPhi/dx - I from sliding motion about equilibrium on the frictionless bilateral real modes

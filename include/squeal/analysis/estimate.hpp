@@ -11,7 +11,8 @@
 /// E is twice the mean kinetic energy, which is the mean energy of a free vibration (friction makes the mean potential
 /// energy of the mode differ). Then (P_R - P_C)/E -> 2 Re(lambda) as q -> 0, up to that difference of rho, provided the
 /// modes have the damping of the friction direction, which the law above always has.
-/// The balance over-estimates the cycle, as a rule by 1.3 to 2.7.
+/// Caveat: a start for the shooting, not a prediction. On the oscillator of inputs/oscillator it is .4 of the cycle
+/// where pairs stick, 1.1 to 4 of it otherwise, and 300 where slip reversal alone holds it far above first lift-off.
 #include "squeal/analysis/modes.hpp"
 
 namespace squeal
@@ -23,6 +24,7 @@ struct Estimate
 {
   Outcome outcome;
   double amplitude = 0;            // q [m], the mode's largest entry being 1; 0 without balance
+  double mean_energy = 0;          // [J] E at that amplitude; compare with the cycle's mean fluctuating energy
   double lift_off_amplitude = 0;   // [m] min r_n0/|rho|; infinite where no reaction fluctuates
   double reversal_amplitude = 0;   // [m] first q at which some pair's sliding along the drive stops; or infinite
   double damping_rate = 0;         // P_C/E [1/s], independent of q

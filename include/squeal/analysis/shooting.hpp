@@ -65,7 +65,8 @@ Orbit copy_of(const Orbit& orbit);
 void record(Shooting& shooting, const std::string& stage, int unknowns, double projected, const Orbit& orbit);
 int full_unknowns(const Orbit& orbit);                           // u, v and T
 bool admissible_period(const Shooting& shooting, double period); // within a factor of two of the first
-bool vanishing(const Shooting& shooting, const Orbit& orbit);    // energy below a tenth of the start's
+bool vanishing(const Shooting& shooting,
+               const Orbit& orbit); // energy below a tenth of the start's and of the first event's
 
 /// `count` free periods from the orbit's state, then its evaluation with the period of the best recurrence.
 Orbit free_periods(Shooting& shooting, Vec state, double period, int count);
