@@ -64,10 +64,21 @@ State transient_start(const Scene& scene, const Model& model, const Report& repo
   return read_state(settings.start, model.structure);
 }
 
+bool starts_on_a_mode(const TransientSettings& settings)
+{
+  return settings.start == "mode" || settings.start == "estimate";
+}
+
+/// From a state file for so many steps, the transient needs no mode.
+bool follows_a_mode(const TransientSettings& settings)
+{
+  return settings.enabled && (starts_on_a_mode(settings) || settings.steps == 0);
+}
+
 Estimate run_estimate(const Scene& scene, const Model& model, const Report& report)
 {
   Estimate estimate;
-  const bool needed = scene.estimate.enabled || scene.cycle.enabled || scene.transient.enabled;
+  const bool needed = scene.estimate.enabled || scene.cycle.enabled || follows_a_mode(scene.transient);
   const std::string reason = no_mode_to_follow(report);
   if (!needed)
     estimate.outcome = not_run("off", "the scene turns it off");
@@ -81,7 +92,7 @@ Estimate run_estimate(const Scene& scene, const Model& model, const Report& repo
 Trajectory run_transient(const Scene& scene, const Model& model, const Report& report)
 {
   Trajectory trajectory;
-  const bool from_file = scene.transient.start != "mode" && scene.transient.start != "estimate";
+  const bool from_file = !starts_on_a_mode(scene.transient);
   const std::string reason = no_mode_to_follow(report);
   if (!scene.transient.enabled)
     trajectory.outcome = not_run("off", "the scene has no [transient]");
@@ -123,7 +134,7 @@ Modes run_modes(const Scene& scene, const Model& model, const Report& report)
   Modes modes;
   if (report.equilibrium.outcome.word != "converged")
     modes.outcome = not_run("skipped", "there is no equilibrium to linearise about");
-  else if (!scene.modes.enabled && !scene.transient.enabled && !scene.cycle.enabled)
+  else if (!scene.modes.enabled && !scene.cycle.enabled && !follows_a_mode(scene.transient))
     modes.outcome = not_run("off", "the scene turns it off");
   else
     return find_modes(model.structure, model.interface, report.equilibrium, scene.modes);

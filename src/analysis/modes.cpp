@@ -173,6 +173,14 @@ Modes find_modes(const Structure& structure, const Interface& interface, const E
   Modes modes;
   modes.method = settings.method;
   modes.band = settings.band;
+  PetscInt free = 0;
+  check(MatGetSize(problem.K, &free, nullptr));
+  if (free == 0)
+  {
+    modes.outcome = {"converged", "closed contact leaves nothing free to vibrate", 0, 0};
+    modes.count_check = "confirmed: there is no mode to count";
+    return modes;
+  }
   QuadraticSolution projected;
   if (settings.method != "full")
   {
