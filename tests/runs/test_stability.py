@@ -66,3 +66,52 @@ def test_without_a_balance_no_amplitude_is_claimed_and_the_start_is_named(squeal
     fast = oscillator_cycle(squeal, 0.3, 1000).report  # a balance, but the cycle never notices so fast a belt either
     assert fast["estimate"]["outcome"] == "balance"
     assert abs(run.report["cycle"]["period"] / fast["cycle"]["period"] - 1) < 1e-4
+
+
+def oscillator_in_units(mass, length, time, load):
+    """Arguments that give the oscillator in other units, or under a load and a belt `load` times as large."""
+    stiffness, damping = mass / time**2, mass / time
+    values = {"point.0.mass": mass, "point.1.mass": 0.5 * mass, "spring.0.damping": 0.02 * damping,
+              "spring.1.damping": 0.02 * damping, "spring.3.damping": 0.02 * damping,
+              "force.0.vector": f"[0,{-mass * length / time**2 * load},0]",
+              "contact.0.velocity": f"[{0.6 * length / time * load},0,0]", "transient.amplitude": 0.01 * length * load,
+              "modes.band": 1 / time, "cycle.steps_per_period": 100}
+    values |= {f"spring.{i}.stiffness": k * stiffness for i, k in enumerate((1.0, 0.4, 0.2, 1.2))}
+    return [OSCILLATOR, *(word for key, value in values.items() for word in ("--set", f"{key}={value}"))]
+
+
+def test_the_oscillator_is_the_same_in_any_unit_and_under_any_load(squeal):
+    """To rounding; the cycle to its tolerance of 1e-8. Under a times the load and the belt, a times the cycle."""
+    def answers(mass, length, time, load):
+        report = squeal(*oscillator_in_units(mass, length, time, load), ranks=1).report
+        force, energy = mass * length / time**2 * load, mass * (length / time * load) ** 2
+        return [(report["equilibrium"]["normal_force_sum"] / force, 1e-12),
+                (report["modes"]["modes"][0]["growth_rate"] * time, 1e-10),
+                (report["estimate"]["amplitude"] / length / load, 1e-10),
+                (report["transient"]["growth_rate_fit"] * time, 1e-9),
+                (report["cycle"]["period"] / time, 1e-8), (report["cycle"]["mean_energy"] / energy, 1e-7)]
+
+    once = answers(1, 1, 1, 1)
+    for scales in ((1e-3, 1e3, 1, 1), (1, 1, 1, 1e-6), (1, 1, 1, 1e6), (1e-9, 1e-3, 1e-4, 1e-12)):
+        for (value, _), (other, tolerance) in zip(once, answers(*scales)):
+            assert abs(other / value - 1) < tolerance, scales
+
+
+def test_the_pin_is_the_same_in_millimetres_and_under_a_millionth_of_the_load(converged):
+    """mm, t, s on 2 ranks against SI: equilibrium, modes, estimate, transient, cycle."""
+    common = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
+              "damping.beta=6e-7", "--set", "transient.enabled=true", "--set", "transient.start=mode", "--set",
+              "transient.periods=3", "--set", "cycle.steps_per_period=40", "--set", "cycle.tolerance=1e-7"]
+    small = {"mesh.scale": 1000, "part.disc.young": 210e3, "part.pin.young": 5e3, "part.disc.density": 7.85e-9,
+             "part.pin.density": 5e-9, "rigid_body.holder.mass": 0.5e-3, "rigid_body.holder.at": "[90.0,0.0,25.0]",
+             "spring.0.stiffness": 1e3, "probe.pin.at": "[90.0,0.0,0.0]", "force.0.vector": "[0,0,-1e-4]",
+             "contact.0.rotation": '{axis="z",rate=2e-5}'}
+    one = converged(*common).report
+    two = converged(*common, *(word for key, value in small.items() for word in ("--set", f"{key}={value}"))).report
+    for stage, key, factor, tolerance in (
+            ("equilibrium", "normal_force_max", 1e-6, 1e-9), ("estimate", "amplitude", 1e-3, 1e-8),
+            ("transient", "growth_rate_fit", 1, 1e-8), ("cycle", "period", 1, 1e-7), ("cycle", "mean_energy", 1e-9, 1e-7)):
+        assert abs(two[stage][key] / one[stage][key] / factor - 1) < tolerance, (stage, key)
+    for a, b in zip(one["modes"]["modes"][:5], two["modes"]["modes"][:5]):
+        assert abs(b["frequency_hz"] / a["frequency_hz"] - 1) < 1e-9
+        assert abs(b["growth_rate"] / a["growth_rate"] - 1) < 1e-8
