@@ -148,6 +148,10 @@ void describe_model(const Model& model, Report& report, MPI_Comm comm)
   report.elements = model.structure.elements;
   report.pairs = model.interface.pairs;
   report.ranks = ranks_of(comm);
+  double stiffness = 0, mass = 0;
+  check(MatNorm(model.structure.K, NORM_1, &stiffness));
+  check(MatNorm(model.structure.M, NORM_1, &mass));
+  if (mass > 0) report.rounding_hz = 1e-6 * std::sqrt(stiffness / mass) / (2 * std::numbers::pi);
   if (rank_of(comm) == 0)
     std::printf("  %d degrees of freedom, %d contact pairs, %ld elements, %d ranks\n", static_cast<int>(report.dofs),
                 report.pairs, report.elements, report.ranks);

@@ -77,29 +77,30 @@ double typical_stiffness(Mat K)
 
 Held hold(const Structure& structure, const Interface& interface)
 {
-  Held held;
-  auto [factor, loose] = factor_positive(structure.K, interface);
-  if (!loose)
+  // Springs this soft beside the rest lose the digits of the reactions, which contact would hold.
+  constexpr double soft = 1e-10;
+  auto [factor, loose, resistance] = factor_positive(structure.K, interface);
+  if (interface.pairs > 0 && (loose || resistance < soft))
   {
-    held.factor = std::move(factor);
-    return held;
-  }
-  if (interface.pairs > 0)
-  {
+    Held held;
     held.kappa = typical_stiffness(structure.K);
     check(MatDuplicate(structure.K, MAT_COPY_VALUES, held.augmented.put()));
     check(MatAXPY(held.augmented, held.kappa, normal_springs(interface), DIFFERENT_NONZERO_PATTERN));
     check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
-    auto [second, still_loose] = factor_positive(held.augmented, interface);
-    if (!still_loose)
+    auto second = factor_positive(held.augmented, interface);
+    if (!second.loose && second.resistance > 10 * resistance)
     {
-      held.factor = std::move(second);
+      held.factor = std::move(second.factor);
       return held;
     }
-    loose = still_loose;
+    if (loose) loose = second.loose;
   }
-  throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
-              describe(structure.names, *loose) + "; give it a support or a spring");
+  if (loose)
+    throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
+                describe(structure.names, *loose) + "; give it a support or a spring");
+  Held held;
+  held.factor = std::move(factor);
+  return held;
 }
 
 /// Block entries of every pair: normal r_n + kappa (g - g0), tangential mu r_n e.
@@ -366,6 +367,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
     return equilibrium;
   }
   Held held = hold(structure, interface);
+  equilibrium.auxiliary_stiffness = held.kappa;
   const std::vector<double> nothing(pairs, 0.);
   displace(held, structure, interface, pair_forces(interface, nothing, nothing, held.kappa), equilibrium.u);
   const std::vector<double> q = gaps_of(interface, equilibrium.u);

@@ -87,13 +87,14 @@ Factored factor_positive(Mat A, const Interface& interface)
   }
   // a singular matrix often factors without complaint; rounding leaves it this much resistance and no more
   const auto x = uneven_vector(A);
-  if (!(least_resistance(result.factor, D, x) > 1e-14)) result.loose = largest_entry(x);
+  result.resistance = least_resistance(result.factor, D, x);
+  if (!(result.resistance > 1e-14)) result.loose = largest_entry(x);
   return result;
 }
 
 CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names)
 {
-  auto [factor, loose] = factor_positive(A, interface);
+  auto [factor, loose, resistance] = factor_positive(A, interface);
   if (loose)
     throw Error("singular: nothing resists a motion that is largest at " + describe(names, *loose) +
                 "; give it a support, a spring or mass");

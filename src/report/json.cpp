@@ -36,6 +36,7 @@ Json equilibrium_entry(const Report& report, const Scene& scene)
   entry["check_residual"] = equilibrium.check_residual;
   entry["check_iterations"] = equilibrium.check_iterations;
   entry["check_difference"] = equilibrium.check_difference;
+  entry["auxiliary_stiffness"] = equilibrium.auxiliary_stiffness;
   entry["uniqueness"] = equilibrium.uniqueness;
   for (std::size_t i = 0; i < report.contact_forces.size(); ++i)
   {
@@ -188,8 +189,11 @@ std::string report_json(const Report& report, const Scene& scene)
   Json json;
   json["title"] = scene.title;
   json["scene"] = scene.file.string();
-  json["model"] = {
-      {"dofs", report.dofs}, {"pairs", report.pairs}, {"elements", report.elements}, {"ranks", report.ranks}};
+  json["model"] = {{"dofs", report.dofs},
+                   {"pairs", report.pairs},
+                   {"elements", report.elements},
+                   {"ranks", report.ranks},
+                   {"rounding_hz", report.rounding_hz}};
   json["equilibrium"] = equilibrium_entry(report, scene);
   json["modes"] = modes_entry(report.modes);
   json["estimate"] = estimate_entry(report.estimate);

@@ -59,6 +59,9 @@ std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
       row("", format("normal force %.9g N in all, %.4g to %.4g N a pair", normal.sum, normal.least, normal.greatest));
   text += row("", format("force residual %.1e, contact residual %.1e, by the fixed point %.1e",
                          equilibrium.force_residual, equilibrium.outcome.residual, equilibrium.check_residual));
+  if (equilibrium.auxiliary_stiffness > 0)
+    text +=
+        row("", "a body is held by contact: solved with springs across the pairs, whose force is taken off exactly");
   if (equilibrium.uniqueness == "not assured")
     text += warning("with this much friction other equilibria may exist beside this one");
   return text;
@@ -70,13 +73,17 @@ std::string mode_line(const ComplexMode& mode)
                         100 * mode.damping_ratio(), mode.backward_error, mode.growth_rate() > 0 ? "unstable" : ""));
 }
 
-std::string modes_text(const Modes& modes)
+std::string modes_text(const Modes& modes, double rounding_hz)
 {
   std::string text = row("modes", outcome_text(modes.outcome));
   if (!ran(modes.outcome)) return text;
   text += row("", format("%d unstable of %zu modes below %.5g Hz, method \"%s\", largest backward error %.1e",
                          modes.unstable_count, modes.modes.size(), modes.band, modes.method.c_str(),
                          modes.outcome.residual));
+  if (rounding_hz > .001 * modes.band)
+    text += warning(format("modes below %.3g Hz are lost in rounding beside the stiffest entry of K: make what is "
+                           "rigid a rigid body, not a stiff spring",
+                           rounding_hz));
   if (!modes.count_check.empty()) text += row("", "count of unstable modes: " + modes.count_check);
   text += row("", format("%12s %14s %12s %16s", "frequency", "growth rate", "damping", "backward error"));
   text += row("", format("%12s %14s %12s %16s", "[Hz]", "[1/s]", "[%]", "[-]"));
@@ -171,7 +178,7 @@ std::string summary(const Report& report, const Scene& scene)
                               static_cast<long long>(report.dofs), report.elements, report.pairs, report.ranks,
                               report.ranks == 1 ? "" : "s"));
   text += equilibrium_text(report.equilibrium, report.pairs);
-  text += modes_text(report.modes);
+  text += modes_text(report.modes, report.rounding_hz);
   text += estimate_text(report.estimate);
   text += transient_text(report.transient);
   text += cycle_text(report.cycle, scene);

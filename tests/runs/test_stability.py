@@ -115,3 +115,19 @@ def test_the_pin_is_the_same_in_millimetres_and_under_a_millionth_of_the_load(co
     for a, b in zip(one["modes"]["modes"][:5], two["modes"]["modes"][:5]):
         assert abs(b["frequency_hz"] / a["frequency_hz"] - 1) < 1e-9
         assert abs(b["growth_rate"] / a["growth_rate"] - 1) < 1e-8
+
+
+def test_springs_of_any_softness_are_carried_by_contact_and_too_stiff_ones_are_warned_of(squeal):
+    """Between a soft spring and none the reactions lost digits; now springs across the pairs take over, and say so."""
+    def pin(stiffness):
+        return squeal(INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
+                      "cycle.enabled=false", "--set", "modes.band=8000", "--set", "modes.method=full", "--set",
+                      f"spring.0.stiffness={stiffness}", ranks=1)
+
+    for stiffness, helped in ((1e-30, True), (1e-4, True), (1e6, False)):
+        run = pin(stiffness)
+        equilibrium = run.report["equilibrium"]
+        assert run.code == 0 and equilibrium["residual"] < 1e-12
+        assert (equilibrium["auxiliary_stiffness"] > 0) == helped == ("held by contact" in run.printed)
+    for stiffness, warned in ((1e12, False), (1e18, True)):  # 1e12 is rigid already: a thousand times the pin
+        assert ("are lost in rounding" in pin(stiffness).printed) == warned

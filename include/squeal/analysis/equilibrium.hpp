@@ -8,6 +8,8 @@
 /// off again: with K' = K + kappa B_n' B_n and its compliance D', exactly,
 ///     (1 - kappa D'_nn) g = q' + (D'_nn + mu D'_nt e) r_n.
 ///
+/// Springs so soft that rounding would spoil the reactions are treated in the same way.
+///
 /// Caveat: at large mu an equilibrium may not exist, or not be the only one. It is the only one if the symmetric part
 /// of D_nn + mu D_nt e is positive definite, which is checked where K alone is regular; whether it is stable, modes
 /// say.
@@ -22,14 +24,15 @@ namespace squeal
 struct Equilibrium
 {
   Outcome outcome;
-  Owned<Vec> u;                  // [m]
-  std::vector<double> reactions; // [N] block entries a pair
-  std::vector<char> closed;      // per pair
-  double force_residual = 0;     // |K u - F - B'r| / |F|
-  double check_residual = 0;     // the natural map with the fixed point's rho = 1/lambda_max(D_nn)
-  int check_iterations = 0;      // of an independent run of the fixed point; 0: not run
-  double check_difference = 0;   // of its reactions, over the largest; NaN if it did not converge
-  std::string uniqueness;        // "assured", "not assured", "not checked"
+  Owned<Vec> u;                   // [m]
+  std::vector<double> reactions;  // [N] block entries a pair
+  std::vector<char> closed;       // per pair
+  double force_residual = 0;      // |K u - F - B'r| / |F|
+  double check_residual = 0;      // the natural map with the fixed point's rho = 1/lambda_max(D_nn)
+  int check_iterations = 0;       // of an independent run of the fixed point; 0: not run
+  double check_difference = 0;    // of its reactions, over the largest; NaN if it did not converge
+  double auxiliary_stiffness = 0; // kappa [N/m]; 0: K holds the structure by itself
+  std::string uniqueness;         // "assured", "not assured", "not checked"
 };
 
 /// Options, prefix -equilibrium_: max_it (100), check_max_it (of the fixed point; -1: 20000 up to 600 pairs, else 0).
