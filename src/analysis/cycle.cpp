@@ -126,7 +126,11 @@ LimitCycle find_cycle(const Structure& structure, const Interface& interface, co
       equilibrium.u, first.u, first.v, 1 / frequency_hz, {mode.real, mode.imaginary, equilibrium.u}, event * size};
   LimitCycle cycle = shoot(flow, start, preconditioner, settings.tolerance, settings.free_periods);
   cycle.steps_per_period = settings.steps_per_period;
+  cycle.theta = settings.theta;
   measure(map, equilibrium, probes, static_cast<int>(samples), cycle);
+  if (map.step.law == ContactLaw::velocity && cycle.outcome.word != "converged")
+    cycle.outcome.reason += "; by the velocity law the period map jumps where a step begins open or closed: "
+                            "-transient_contact_law displacement";
   if (map.unconverged > 0)
     cycle.outcome.reason += (cycle.outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) +
                             " steps left the contact unconverged (-transient_contact_max_it)";

@@ -200,6 +200,7 @@ Trajectory integrate(const Structure& structure, const Interface& interface, con
       march(step, structure, interface, equilibrium, probes, steps, trajectory.end, trajectory.history, watch);
   trajectory.seconds_per_step = (MPI_Wtime() - wall) / static_cast<double>(std::max(summary.steps, 1L));
   trajectory.steps = summary.steps;
+  trajectory.law = step.law;
   trajectory.energy_defect_max = summary.energy_defect_max;
   trajectory.contact_iterations_mean = summary.contact_iterations_mean;
   if (mode)

@@ -93,8 +93,9 @@ Json estimate_entry(const Estimate& estimate)
   return entry;
 }
 
-Json transient_entry(const Trajectory& transient)
+Json transient_entry(const Report& report)
 {
+  const Trajectory& transient = report.transient;
   Json entry = entry_of(transient.outcome);
   if (!ran(transient.outcome)) return entry;
   entry["theta"] = transient.theta;
@@ -103,6 +104,9 @@ Json transient_entry(const Trajectory& transient)
   entry["periods"] = transient.periods;
   entry["growth_rate_fit"] = transient.growth_rate_fit;
   entry["growth_rate_predicted"] = transient.growth_rate_predicted;
+  entry["growth_rate_bias"] = transient_bias(report).growth;
+  entry["frequency_bias"] = transient_bias(report).frequency;
+  entry["contact_law"] = transient.law == ContactLaw::velocity ? "velocity" : "displacement";
   entry["energy_defect_max"] = transient.energy_defect_max;
   entry["residual"] = transient.outcome.residual;
   entry["contact_iterations_mean"] = transient.contact_iterations_mean;
@@ -134,8 +138,9 @@ Json multiplier_entry(const LimitCycle& cycle)
           {"values", list}};
 }
 
-Json cycle_entry(const LimitCycle& cycle, const Scene& scene)
+Json cycle_entry(const Report& report, const Scene& scene)
 {
+  const LimitCycle& cycle = report.cycle;
   Json entry = entry_of(cycle.outcome);
   if (!ran(cycle.outcome) || cycle.outcome.word == "refused") return entry;
   entry["period"] = cycle.period;
@@ -144,6 +149,8 @@ Json cycle_entry(const LimitCycle& cycle, const Scene& scene)
   entry["tolerance"] = scene.cycle.tolerance;
   entry["residual_projected"] = cycle.residual_projected;
   entry["residual_full"] = cycle.residual_full;
+  entry["growth_rate_bias"] = cycle_bias(report).growth;
+  entry["frequency_bias"] = cycle_bias(report).frequency;
   entry["newton_iterations"] = cycle.newton_iterations;
   entry["periods_integrated"] = cycle.periods_integrated;
   entry["mean_energy"] = cycle.mean_energy;
@@ -197,8 +204,18 @@ std::string report_json(const Report& report, const Scene& scene)
   json["equilibrium"] = equilibrium_entry(report, scene);
   json["modes"] = modes_entry(report.modes);
   json["estimate"] = estimate_entry(report.estimate);
-  json["transient"] = transient_entry(report.transient);
-  json["cycle"] = cycle_entry(report.cycle, scene);
+  json["transient"] = transient_entry(report);
+  json["cycle"] = cycle_entry(report, scene);
+  const Verdicts verdicts = verdicts_of(report);
+  const auto warn = [&json](const char* stage, const std::vector<std::string>& sentences)
+  {
+    if (!sentences.empty()) json[stage]["warnings"] = sentences;
+  };
+  warn("equilibrium", verdicts.equilibrium);
+  warn("modes", verdicts.modes);
+  warn("estimate", verdicts.estimate);
+  warn("transient", verdicts.transient);
+  warn("cycle", verdicts.cycle);
   Json timings = Json::object();
   for (const auto& [stage, seconds] : report.timings) timings[stage] = seconds;
   json["timings"] = timings;

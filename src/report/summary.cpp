@@ -15,26 +15,16 @@ namespace
 
 constexpr std::size_t modes_shown = 12;
 
-/// printf into text.
-[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...)
-{
-  char text[512];
-  std::va_list arguments;
-  va_start(arguments, pattern);
-  std::vsnprintf(text, sizeof text, pattern, arguments);
-  va_end(arguments);
-  return text;
-}
-
 std::string row(const std::string& head, const std::string& text)
 {
   return format("  %-12s ", head.c_str()) + text + "\n";
 }
 
-/// Where a number would otherwise mislead.
-std::string warning(const std::string& sentence)
+std::string warnings(const std::vector<std::string>& sentences)
 {
-  return row("", "WARNING: " + sentence);
+  std::string text;
+  for (const std::string& sentence : sentences) text += row("", "WARNING: " + sentence);
+  return text;
 }
 
 /// "converged", "NOT CONVERGED: reason": what is not a success must not look like one.
@@ -62,8 +52,6 @@ std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
   if (equilibrium.auxiliary_stiffness > 0)
     text +=
         row("", "a body is held by contact: solved with springs across the pairs, whose force is taken off exactly");
-  if (equilibrium.uniqueness == "not assured")
-    text += warning("with this much friction other equilibria may exist beside this one");
   return text;
 }
 
@@ -73,17 +61,13 @@ std::string mode_line(const ComplexMode& mode)
                         100 * mode.damping_ratio(), mode.backward_error, mode.growth_rate() > 0 ? "unstable" : ""));
 }
 
-std::string modes_text(const Modes& modes, double rounding_hz)
+std::string modes_text(const Modes& modes)
 {
   std::string text = row("modes", outcome_text(modes.outcome));
   if (!ran(modes.outcome)) return text;
   text += row("", format("%d unstable of %zu modes below %.5g Hz, method \"%s\", largest backward error %.1e",
                          modes.unstable_count, modes.modes.size(), modes.band, modes.method.c_str(),
                          modes.outcome.residual));
-  if (rounding_hz > .001 * modes.band)
-    text += warning(format("modes below %.3g Hz are lost in rounding beside the stiffest entry of K: make what is "
-                           "rigid a rigid body, not a stiff spring",
-                           rounding_hz));
   if (!modes.count_check.empty()) text += row("", "count of unstable modes: " + modes.count_check);
   text += row("", format("%12s %14s %12s %16s", "frequency", "growth rate", "damping", "backward error"));
   text += row("", format("%12s %14s %12s %16s", "[Hz]", "[1/s]", "[%]", "[-]"));
@@ -104,21 +88,12 @@ std::string estimate_text(const Estimate& estimate)
                          estimate.reversal_amplitude));
   text += row("", format("friction injects %.5g 1/s, damping takes %.5g 1/s of the energy",
                          estimate.friction_rate_linear, estimate.damping_rate));
-  const double lift_off = estimate.lift_off_amplitude, reversal = estimate.reversal_amplitude;
-  if (estimate.outcome.word == "no balance")
-    return text + warning(format("no amplitude is predicted; shooting starts from first lift-off times "
-                                 "-cycle_lift_off_multiple, %.5g m by default",
-                                 2 * lift_off));
-  if (estimate.outcome.word == "balance" && estimate.amplitude > 3 * lift_off)
-    text += warning(format("%.2g times first lift-off: the cycle itself may be far smaller, down to that",
-                           estimate.amplitude / lift_off));
-  if (estimate.outcome.word == "balance" && reversal < lift_off)
-    text += warning("slip reverses before anything lifts off: pairs will stick, and the cycle may be twice as large");
   return text;
 }
 
-std::string transient_text(const Trajectory& transient)
+std::string transient_text(const Report& report)
 {
+  const Trajectory& transient = report.transient;
   std::string text = row("transient", outcome_text(transient.outcome));
   if (!ran(transient.outcome)) return text;
   text += row("", format("%ld steps of %.5g s, %.5g periods, theta %.4g", transient.steps, transient.step_size,
@@ -127,13 +102,17 @@ std::string transient_text(const Trajectory& transient)
                                                                    : std::string("too short to fit");
   text += row("", "growth rate before first lift-off: " + fit +
                       format(", predicted %.6g 1/s", transient.growth_rate_predicted));
+  const StepBias bias = transient_bias(report);
+  if (std::isfinite(bias.growth))
+    text += row("", format("the step's own error: growth rate %+.1e, frequency %+.1e", bias.growth, bias.frequency));
   text += row("", format("energy defect %.1e of the energy, contact residual %.1e", transient.energy_defect_max,
                          transient.outcome.residual));
   return text;
 }
 
-std::string cycle_text(const LimitCycle& cycle, const Scene& scene)
+std::string cycle_text(const Report& report, const Scene& scene)
 {
+  const LimitCycle& cycle = report.cycle;
   std::string text = row("cycle", outcome_text(cycle.outcome));
   if (!ran(cycle.outcome) || cycle.outcome.word == "refused") return text;
   const std::string projected =
@@ -145,6 +124,7 @@ std::string cycle_text(const LimitCycle& cycle, const Scene& scene)
                          cycle.periods_integrated, cycle.steps_per_period));
   if (cycle.outcome.word != "converged") return text; // the figures of no cycle would mislead
   text += row("", format("period %.10g s, frequency %.8g Hz", cycle.period, 1 / cycle.period));
+  text += row("", format("the step's own error of the period: about %+.1e", -cycle_bias(report).frequency));
   text += row("", format("mean energy %.7g J, fluctuating %.7g J", cycle.mean_energy, cycle.mean_fluctuating_energy));
   text += row("", format("open pairs: %.2f on average, %d at most; sticking: %d at most", cycle.open_pairs_mean,
                          cycle.open_pairs_max, cycle.stick_pairs_max));
@@ -171,17 +151,28 @@ std::string timings_text(const Report& report)
 
 } // namespace
 
+std::string format(const char* pattern, ...)
+{
+  char text[512];
+  std::va_list arguments;
+  va_start(arguments, pattern);
+  std::vsnprintf(text, sizeof text, pattern, arguments);
+  va_end(arguments);
+  return text;
+}
+
 std::string summary(const Report& report, const Scene& scene)
 {
   std::string text = "\n" + (scene.title.empty() ? scene.file.filename().string() : scene.title) + "\n";
   text += row("model", format("%lld degrees of freedom, %ld elements, %d contact pairs, %d rank%s",
                               static_cast<long long>(report.dofs), report.elements, report.pairs, report.ranks,
                               report.ranks == 1 ? "" : "s"));
-  text += equilibrium_text(report.equilibrium, report.pairs);
-  text += modes_text(report.modes, report.rounding_hz);
-  text += estimate_text(report.estimate);
-  text += transient_text(report.transient);
-  text += cycle_text(report.cycle, scene);
+  const Verdicts verdicts = verdicts_of(report);
+  text += equilibrium_text(report.equilibrium, report.pairs) + warnings(verdicts.equilibrium);
+  text += modes_text(report.modes) + warnings(verdicts.modes);
+  text += estimate_text(report.estimate) + warnings(verdicts.estimate);
+  text += transient_text(report) + warnings(verdicts.transient);
+  text += cycle_text(report, scene) + warnings(verdicts.cycle);
   return text + timings_text(report);
 }
 

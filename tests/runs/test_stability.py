@@ -131,3 +131,23 @@ def test_springs_of_any_softness_are_carried_by_contact_and_too_stiff_ones_are_w
         assert (equilibrium["auxiliary_stiffness"] > 0) == helped == ("held by contact" in run.printed)
     for stiffness, warned in ((1e12, False), (1e18, True)):  # 1e12 is rigid already: a thousand times the pin
         assert ("are lost in rounding" in pin(stiffness).printed) == warned
+
+
+def test_every_stage_says_what_its_numbers_are_worth(squeal):
+    """The step's own error is the discrete theory's: -(omega h)^2/4 of the growth rate, -(omega h)^2/12 of the frequency."""
+    run = squeal(OSCILLATOR, "--set", "transient.steps_per_period=50", "--set", "cycle.steps_per_period=200", ranks=1)
+    report = run.report
+    for stage, keys in {"equilibrium": ["residual", "force_residual", "check_difference", "uniqueness"],
+                        "modes": ["residual", "count_check"], "estimate": ["residual"],
+                        "transient": ["growth_rate_bias", "frequency_bias", "energy_defect_max", "residual"],
+                        "cycle": ["residual_full", "residual_projected", "growth_rate_bias", "frequency_bias"]}.items():
+        assert not [key for key in keys if report[stage].get(key) is None], stage
+    square = (2 * 3.14159265 / 50) ** 2
+    assert abs(report["transient"]["growth_rate_bias"] / (-square / 4) - 1) < 0.02
+    assert abs(report["transient"]["frequency_bias"] / (-square / 12) - 1) < 0.02
+    assert "warnings" not in report["transient"] and "warnings" not in report["modes"]
+
+    biased = squeal(OSCILLATOR, "--set", "cycle.enabled=false", "--set", "transient.theta=0.7", ranks=1)
+    assert "change the growth rate by" in biased.printed and biased.report["transient"]["warnings"]
+    edge = squeal(OSCILLATOR, "--set", "cycle.enabled=false", "--set", "friction.coefficient=0.17651", ranks=1)
+    assert "within 0.01 % of the threshold" in edge.printed

@@ -34,6 +34,7 @@ struct LimitCycle
   Outcome outcome;
   double period = 0; // [s]
   int steps_per_period = 0;
+  double theta = 0.5;
   double residual_projected = 0; // of the reduced (grown) system when it was left; NaN if it was not tried
   double residual_full = 0;
   int newton_iterations = 0;

@@ -110,6 +110,7 @@ MarchSummary march(const ThetaStep& step, const Structure& structure, const Inte
 struct Trajectory
 {
   Outcome outcome;
+  ContactLaw law = ContactLaw::displacement;
   double theta = 0, step_size = 0, periods = 0;
   long steps = 0;
   double growth_rate_fit = 0;       // [1/s] of the followed mode's amplitude before the first event; NaN: too short

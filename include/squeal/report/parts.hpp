@@ -2,6 +2,8 @@
 /// The files of a run, one writer each; all but write_fields run on rank 0 alone.
 #include "squeal/report/report.hpp"
 
+#include <limits>
+
 namespace squeal
 {
 
@@ -29,6 +31,27 @@ struct NormalForces
 };
 
 NormalForces normal_forces(const Equilibrium& equilibrium);
+
+/// What theta and the step do to the followed mode by the theory of the scheme, relative; NaN without a mode.
+struct StepBias
+{
+  double growth = std::numeric_limits<double>::quiet_NaN();
+  double frequency = std::numeric_limits<double>::quiet_NaN();
+};
+
+StepBias transient_bias(const Report& report);
+StepBias cycle_bias(const Report& report);
+
+/// Sentences for whoever would be misled by a stage's numbers; none is the rule.
+struct Verdicts
+{
+  std::vector<std::string> equilibrium, modes, estimate, transient, cycle;
+};
+
+Verdicts verdicts_of(const Report& report);
+
+/// printf into text.
+[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
 
 /// A stage that was off or skipped has nothing but its reason.
 bool ran(const Outcome& outcome);

@@ -1,0 +1,129 @@
+/// What a reader would otherwise take a number for: one sentence each, in the table and in report.json alike.
+#include "squeal/report/parts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Sentences = std::vector<std::string>;
+
+Sentences of_equilibrium(const Report& report)
+{
+  Sentences said;
+  if (report.equilibrium.uniqueness == "not assured")
+    said.push_back("with this much friction other equilibria may exist beside this one");
+  return said;
+}
+
+Sentences of_modes(const Report& report)
+{
+  Sentences said;
+  const Modes& modes = report.modes;
+  if (report.rounding_hz > .001 * modes.band)
+    said.push_back(format("modes below %.3g Hz are lost in rounding beside the stiffest entry of K: make what is rigid "
+                          "a rigid body, not a stiff spring",
+                          report.rounding_hz));
+  constexpr double narrow = 1e-4; // of |lambda|: less than a mesh or a damping value is known to
+  const auto on_the_edge = std::count_if(modes.modes.begin(), modes.modes.end(),
+                                         [](const ComplexMode& mode)
+                                         { return std::abs(mode.growth_rate()) < narrow * std::abs(mode.lambda); });
+  if (on_the_edge > 0)
+    said.push_back(format("%ld of the modes are within 0.01 %% of the threshold: mesh and damping decide their sign",
+                          static_cast<long>(on_the_edge)));
+  if (modes.count_check.rfind("NOT confirmed", 0) == 0)
+    said.push_back("the two routes disagree on the number of unstable modes: raise modes.real_modes");
+  return said;
+}
+
+Sentences of_estimate(const Report& report)
+{
+  const Estimate& estimate = report.estimate;
+  const double lift_off = estimate.lift_off_amplitude;
+  if (estimate.outcome.word == "no balance" && std::isfinite(lift_off))
+    return {format("no amplitude is predicted; shooting starts from first lift-off times -cycle_lift_off_multiple, "
+                   "%.5g m by default",
+                   2 * lift_off)};
+  Sentences said;
+  if (estimate.outcome.word != "balance") return said;
+  if (estimate.amplitude > 3 * lift_off)
+    said.push_back(format("%.2g times first lift-off: the cycle itself may be far smaller, down to that",
+                          estimate.amplitude / lift_off));
+  if (estimate.reversal_amplitude < lift_off)
+    said.push_back("slip reverses before anything lifts off: pairs will stick, and the cycle may be twice as large");
+  return said;
+}
+
+Sentences of_transient(const Report& report)
+{
+  Sentences said;
+  const Trajectory& transient = report.transient;
+  const double bias = transient_bias(report).growth;
+  if (std::abs(bias) > .1)
+    said.push_back(format("theta and the step change the growth rate by %+.0f %%: more steps a period, or theta = 1/2",
+                          100 * bias));
+  const double fit = transient.growth_rate_fit, predicted = transient.growth_rate_predicted;
+  if (std::abs(fit - predicted) > .01 * std::abs(predicted))
+    said.push_back("the fitted growth rate is not the predicted one: other motion than the mode is in the start");
+  if (transient.law == ContactLaw::velocity)
+    said.push_back("by the velocity law the gap drifts, by up to what an impact covers in a step");
+  if (transient.energy_defect_max > 1e-8)
+    said.push_back("the energy identity of the scheme is missed: tighten -transient_contact_tolerance");
+  return said;
+}
+
+Sentences of_cycle(const Report& report)
+{
+  Sentences said;
+  const LimitCycle& cycle = report.cycle;
+  if (cycle.outcome.word != "converged") return said;
+  const StepBias bias = cycle_bias(report);
+  if (std::abs(bias.growth) > .1)
+    said.push_back(format("theta and the step change the growth rate by %+.0f %%: the cycle's amplitude suffers",
+                          100 * bias.growth));
+  if (cycle.residual_full > 1e-3) said.push_back("a residual this large is no proof of a periodic motion");
+  if (report.modes.unstable_count > 1)
+    said.push_back(format("%d modes are unstable, and this cycle started on one: others may grow from it",
+                          report.modes.unstable_count));
+  if (cycle.multipliers.empty())
+    said.push_back("whether this cycle attracts was not examined: -cycle_multipliers 20 does");
+  return said;
+}
+
+StepBias bias_of(const Report& report, double theta, double h)
+{
+  if (report.modes.modes.empty() || !(h > 0)) return {};
+  const std::complex<double> lambda = report.modes.modes.front().lambda;
+  if (lambda.imag() == 0) return {};
+  return {growth_bias(lambda, theta, h), discrete_eigenvalue(lambda, theta, h).imag() / lambda.imag() - 1};
+}
+
+} // namespace
+
+StepBias transient_bias(const Report& report)
+{
+  return bias_of(report, report.transient.theta, report.transient.step_size);
+}
+
+StepBias cycle_bias(const Report& report)
+{
+  return bias_of(report, report.cycle.theta, report.cycle.period / std::max(report.cycle.steps_per_period, 1));
+}
+
+Verdicts verdicts_of(const Report& report)
+{
+  Verdicts verdicts;
+  if (ran(report.equilibrium.outcome)) verdicts.equilibrium = of_equilibrium(report);
+  if (ran(report.modes.outcome)) verdicts.modes = of_modes(report);
+  if (ran(report.estimate.outcome)) verdicts.estimate = of_estimate(report);
+  if (ran(report.transient.outcome) && report.transient.outcome.word != "refused")
+    verdicts.transient = of_transient(report);
+  if (ran(report.cycle.outcome)) verdicts.cycle = of_cycle(report);
+  return verdicts;
+}
+
+} // namespace squeal
