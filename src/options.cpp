@@ -28,7 +28,7 @@ constexpr std::array options = {
     Option{"-transient_contact_tolerance", "1e-10", "largest natural map of a pair over the largest reaction"},
     Option{"-transient_contact_max_it", "1000", "contact iterations (sweeps) allowed a step"},
     Option{"-transient_contact_rho", "0", "of the fixed point, over 1/lambda_max(W); 0: chosen"},
-    Option{"-transient_contact_extrapolate", "true", "warm start extrapolated from the last two steps"},
+    Option{"-transient_contact_extrapolation", "2", "highest order in time of the warm start; the best one is taken"},
     Option{"-transient_refuse", "true", "false: march even where theta and the step make growth rates lie"},
     Option{"-modes_dense_limit", "200", "eigenproblems up to this size are solved whole by LAPACK"},
     Option{"-modes_candidates", "20", "pairs that each residual pass of the projection corrects"},

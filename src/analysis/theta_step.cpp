@@ -24,22 +24,23 @@ void read_options(ThetaStep& step)
   const std::array<const char*, 2> laws = {"displacement", "velocity"};
   const std::array<const char*, 2> solvers = {"gauss_seidel", "fixed_point"};
   PetscInt law = 0, solver = 0, max_it = step.contact.max_iterations;
-  PetscBool extrapolate = step.extrapolate ? PETSC_TRUE : PETSC_FALSE;
+  PetscInt order = step.contact.extrapolation;
   const char* prefix = "transient_";
   check(PetscOptionsGetEList(nullptr, prefix, "-contact_law", laws.data(), 2, &law, nullptr));
   check(PetscOptionsGetEList(nullptr, prefix, "-contact_solver", solvers.data(), 2, &solver, nullptr));
   check(PetscOptionsGetReal(nullptr, prefix, "-contact_tolerance", &step.contact.tolerance, nullptr));
   check(PetscOptionsGetInt(nullptr, prefix, "-contact_max_it", &max_it, nullptr));
   check(PetscOptionsGetReal(nullptr, prefix, "-contact_rho", &step.contact.rho, nullptr));
-  check(PetscOptionsGetBool(nullptr, prefix, "-contact_extrapolate", &extrapolate, nullptr));
+  check(PetscOptionsGetInt(nullptr, prefix, "-contact_extrapolation", &order, nullptr));
   if (!(step.contact.tolerance > 0)) throw Error("-transient_contact_tolerance must be above 0");
+  if (order < 0 || order > 2) throw Error("-transient_contact_extrapolation must be 0, 1 or 2");
   if (max_it < 1) throw Error("-transient_contact_max_it must be at least 1");
   if (!(step.contact.rho >= 0 && step.contact.rho < 2))
     throw Error("-transient_contact_rho must be at least 0 and below 2: the fixed point contracts nowhere else");
   step.law = law == 0 ? ContactLaw::displacement : ContactLaw::velocity;
   step.contact.solver = solvers[static_cast<std::size_t>(solver)];
   step.contact.max_iterations = static_cast<int>(max_it);
-  step.extrapolate = extrapolate == PETSC_TRUE;
+  step.contact.extrapolation = static_cast<int>(order);
 }
 
 /// b of w = W r + b, from the free velocity's B v: normal rows are gap rates (g + B_n ut)/h + B_n v, tangential ones s.
@@ -68,54 +69,36 @@ std::vector<double> free_contact_velocity(const ThetaStep& step, const Interface
   return b;
 }
 
-/// Contact among the pairs whose b is finite; the others open.
-ContactResult solve_active(const ThetaStep& step, const Interface& interface, const std::vector<double>& b,
-                           std::vector<double>& r)
+/// Solves contact on rank 0, where W is, and hands each r to every rank. `b`: one problem's after the other's.
+void find_reactions(const ThetaStep& step, const Interface& interface, const std::vector<double>& b,
+                    std::span<StepWork> works, std::span<State> states, std::span<StepReport> reports, MPI_Comm comm)
 {
-  const auto block = static_cast<std::size_t>(interface.block());
-  std::vector<std::size_t> active;
-  for (std::size_t i = 0; i < b.size(); ++i)
-    if (std::isfinite(b[i - i % block])) active.push_back(i);
-  const std::vector<double>& W = step.condensed.W;
-  if (active.size() == b.size())
-    return solve_contact(W, b, interface.pairs, interface.directions, interface.friction, step.contact, r);
-
-  const std::size_t n = active.size();
-  std::vector<double> W_active(n * n), b_active(n), r_active(n);
-  for (std::size_t i = 0; i < n; ++i)
-  {
-    b_active[i] = b[active[i]];
-    r_active[i] = r[active[i]];
-    for (std::size_t j = 0; j < n; ++j) W_active[i * n + j] = W[active[i] * b.size() + active[j]];
-  }
-  const ContactResult result = solve_contact(W_active, b_active, static_cast<int>(n / block), interface.directions,
-                                             interface.friction, step.contact, r_active);
-  std::fill(r.begin(), r.end(), 0.);
-  for (std::size_t i = 0; i < n; ++i) r[active[i]] = r_active[i];
-  return result;
-}
-
-/// Solves contact on rank 0, where W is, and hands r to every rank.
-ContactResult find_reactions(const ThetaStep& step, const Interface& interface, const std::vector<double>& b,
-                             StepWork& work, std::vector<double>& r, MPI_Comm comm)
-{
-  std::vector<double> guess = r;
-  if (step.extrapolate && work.r_before.size() == r.size())
-    for (std::size_t i = 0; i < r.size(); ++i) guess[i] = 2 * r[i] - work.r_before[i];
-  std::swap(work.r_before, r);
-  r = std::move(guess);
-
-  // One message: iterations, residual, converged, r. Latency counts on small models.
-  ContactResult result;
+  // One message: iterations, residual, converged, r of each. Latency counts on small models.
+  const std::size_t size = interface.size(), length = size + 3;
   std::string problem;
-  std::vector<double> told(r.size() + 3, -1);
+  std::vector<double> told(length * states.size(), -1);
+  const auto solve_all = [&]
+  {
+    std::vector<std::vector<double>> mine;
+    for (std::size_t k = 0; k < states.size(); ++k) mine.emplace_back(&b[k * size], &b[k * size] + size);
+    std::vector<ContactProblem> problems;
+    for (std::size_t k = 0; k < states.size(); ++k) problems.push_back({mine[k], states[k].reactions, works[k].memory});
+    const auto results = solve_contacts(step.W, interface.friction, step.contact, problems);
+    for (std::size_t k = 0; k < states.size(); ++k)
+    {
+      const auto& [iterations, residual, converged] = results[k];
+      double* const entries = &told[k * length];
+      entries[0] = iterations;
+      entries[1] = residual;
+      entries[2] = converged ? 1 : 0;
+      std::copy(states[k].reactions.begin(), states[k].reactions.end(), entries + 3);
+    }
+  };
   if (rank_of(comm) == 0)
   {
     try
     {
-      result = solve_active(step, interface, b, r);
-      told = {static_cast<double>(result.iterations), result.residual, result.converged ? 1. : 0.};
-      told.insert(told.end(), r.begin(), r.end());
+      solve_all();
     }
     catch (const std::exception& error)
     {
@@ -124,21 +107,22 @@ ContactResult find_reactions(const ThetaStep& step, const Interface& interface, 
   }
   MPI_Bcast(told.data(), static_cast<int>(told.size()), MPI_DOUBLE, 0, comm);
   if (told[0] < 0) agree(comm, problem);
-  std::copy(told.begin() + 3, told.end(), r.begin());
-  return {static_cast<int>(told[0]), told[1], told[2] > 0};
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    const double* const entries = &told[k * length];
+    reports[k].contact_iterations = static_cast<int>(entries[0]);
+    reports[k].contact_residual = entries[1];
+    reports[k].contact_converged = entries[2] > 0;
+    std::copy(entries + 3, entries + length, states[k].reactions.begin());
+  }
 }
 
-/// Works of the step from the products at both ends; reductions are gathered into one message.
-void account(const ThetaStep& step, const Structure& structure, const State& state, StepWork& work, StepReport& report)
-{
-  const double h = step.h, theta = step.theta;
-  double kinetic = 0, potential = 0, contact = 0, load = 0, damping = 0, dMd = 0, dKd = 0;
-  check(VecDotBegin(work.v_next, work.Mv_next, &kinetic));
-  check(VecDotBegin(state.u, work.Ku_next, &potential));
-  check(VecDotBegin(work.v_theta, work.f, &contact));
-  check(VecDotBegin(work.v_theta, structure.load, &load));
+/// The products whose sums over the ranks make up the works. Overwrites M v, A v and K u of the start.
+using Factors = std::array<std::pair<Vec, Vec>, 7>;
 
-  // M v, A v and K u of the start are no longer needed once their part is taken
+Factors factors_of_works(const ThetaStep& step, const Structure& structure, const State& state, StepWork& work)
+{
+  const double theta = step.theta;
   Vec dv = work.dv, change = work.Ku, d = work.Mv;
   check(VecWAXPY(dv, -1, state.v, work.v_next));
   check(VecAYPX(change, -1, work.Ku_next)); // K du
@@ -147,24 +131,72 @@ void account(const ThetaStep& step, const Structure& structure, const State& sta
   check(VecAXPY(work.Av, theta - 1, work.Mv));
   check(VecAXPY(work.Av, -theta * theta * step.h, change));
   check(VecAYPX(d, -1, work.Mv_next)); // M dv
-  check(VecDotBegin(work.v_theta, work.Av, &damping));
-  check(VecDotBegin(dv, d, &dMd));
-  check(VecDotBegin(work.v_theta, change, &dKd));
+  return {{{work.v_next, work.Mv_next},
+           {state.u, work.Ku_next},
+           {work.v_theta, work.f},
+           {work.v_theta, structure.load},
+           {work.v_theta, work.Av},
+           {dv, d},
+           {work.v_theta, change}}};
+}
 
-  check(VecDotEnd(work.v_next, work.Mv_next, &kinetic));
-  check(VecDotEnd(state.u, work.Ku_next, &potential));
-  check(VecDotEnd(work.v_theta, work.f, &contact));
-  check(VecDotEnd(work.v_theta, structure.load, &load));
-  check(VecDotEnd(work.v_theta, work.Av, &damping));
-  check(VecDotEnd(dv, d, &dMd));
-  check(VecDotEnd(work.v_theta, change, &dKd));
+/// Works of each step from the products at both ends; all reductions in one message.
+void account(const ThetaStep& step, const Structure& structure, std::span<const State> states,
+             std::span<StepWork> works, std::span<StepReport> reports)
+{
+  std::vector<Factors> factors;
+  std::vector<std::array<double, 7>> products(states.size());
+  for (std::size_t k = 0; k < states.size(); ++k)
+    factors.push_back(factors_of_works(step, structure, states[k], works[k]));
+  for (std::size_t k = 0; k < states.size(); ++k)
+    for (std::size_t i = 0; i < 7; ++i) check(VecDotBegin(factors[k][i].first, factors[k][i].second, &products[k][i]));
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    for (std::size_t i = 0; i < 7; ++i) check(VecDotEnd(factors[k][i].first, factors[k][i].second, &products[k][i]));
+    const auto [kinetic, potential, contact, load, damping, dMd, dKd] = products[k];
+    StepReport& report = reports[k];
+    report.energy = (kinetic + potential) / 2;
+    report.damping_work = damping / step.theta;
+    report.contact_work = contact;
+    report.load_work = step.h * load;
+    report.energy_defect = report.energy - works[k].energy - (0.5 - step.theta) * (dMd + step.h * dKd) +
+                           report.damping_work - contact - report.load_work;
+  }
+}
 
-  report.energy = (kinetic + potential) / 2;
-  report.damping_work = damping / theta;
-  report.contact_work = contact;
-  report.load_work = h * load;
-  report.energy_defect =
-      report.energy - work.energy - (0.5 - theta) * (dMd + h * dKd) + report.damping_work - contact - report.load_work;
+/// The start of a step: A v_free = [M v - (1-theta) A v]/theta - h K u + h F, into A v_next.
+void load_free_step(const ThetaStep& step, const Structure& structure, StepWork& work)
+{
+  check(VecCopy(work.Mv, work.Av_next));
+  check(VecAXPBYPCZ(work.Av_next, (step.theta - 1) / step.theta, -step.h, 1 / step.theta, work.Av, work.Ku));
+  check(VecAXPY(work.Av_next, step.h, structure.load));
+}
+
+/// The contact of all of them: reactions into the states and reports, h B'r into f and A v_next; returns -h r.
+std::vector<double> push_apart(const ThetaStep& step, const Interface& interface, const std::vector<double>& Bv_free,
+                               std::span<StepWork> works, std::span<State> states, std::span<StepReport> reports,
+                               MPI_Comm comm)
+{
+  std::vector<double> b, lambda;
+  const std::size_t size = interface.size();
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    const auto first = Bv_free.begin() + static_cast<std::ptrdiff_t>(Bv_free.empty() ? 0 : k * size);
+    const auto mine =
+        free_contact_velocity(step, interface, states[k], works[k],
+                              {first, Bv_free.empty() ? first : first + static_cast<std::ptrdiff_t>(size)});
+    b.insert(b.end(), mine.begin(), mine.end());
+  }
+  find_reactions(step, interface, b, works, states, reports, comm);
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    check(VecSet(works[k].f, 0));
+    add_reactions(interface, states[k].reactions, works[k].f);
+    check(VecScale(works[k].f, step.h));
+    check(VecAXPY(works[k].Av_next, 1, works[k].f));
+    for (const double reaction : states[k].reactions) lambda.push_back(-step.h * reaction);
+  }
+  return lambda;
 }
 
 } // namespace
@@ -178,12 +210,16 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.h = h;
   step.theta = theta;
   read_options(step);
-  check(MatDuplicate(structure.M, MAT_COPY_VALUES, step.A.put()));
-  check(MatAXPY(step.A, h * theta, structure.C, SAME_NONZERO_PATTERN));
-  check(MatAXPY(step.A, h * h * theta * theta, structure.K, SAME_NONZERO_PATTERN));
-  check(MatSetOption(step.A, MAT_SYMMETRIC, PETSC_TRUE));
-  step.condensed = condense(step.A, interface, h, structure.names);
-  step.seconds = MPI_Wtime() - start;
+  Owned<Mat> A;
+  check(MatDuplicate(structure.M, MAT_COPY_VALUES, A.put()));
+  check(MatAXPY(A, h * theta, structure.C, SAME_NONZERO_PATTERN));
+  check(MatAXPY(A, h * h * theta * theta, structure.K, SAME_NONZERO_PATTERN));
+  CondensedOperator condensed = condense(A, interface, h, structure.names);
+  step.factor = std::move(condensed.factor);
+  step.factor_seconds = MPI_Wtime() - start;
+  if (rank_of(PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()))) == 0)
+    step.W = make_contact_operator(std::move(condensed.W), interface.pairs, interface.directions);
+  step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
   return step;
 }
 
@@ -194,7 +230,10 @@ StepWork begin_steps(const ThetaStep& step, const Structure& structure, const In
                         &work.v_next, &work.v_theta, &work.f})
     *x = zeros_like(structure.load);
   check(MatMult(structure.M, state.v, work.Mv));
-  check(MatMult(step.A, state.v, work.Av));
+  check(MatMult(structure.C, state.v, work.Av));
+  check(VecAYPX(work.Av, step.h * step.theta, work.Mv));
+  check(MatMult(structure.K, state.v, work.dv));
+  check(VecAXPY(work.Av, step.h * step.h * step.theta * step.theta, work.dv));
   check(MatMult(structure.K, state.u, work.Ku));
   double kinetic = 0, potential = 0;
   check(VecDot(state.v, work.Mv, &kinetic));
@@ -204,51 +243,53 @@ StepWork begin_steps(const ThetaStep& step, const Structure& structure, const In
   return work;
 }
 
+std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                                std::span<StepWork> works, std::span<State> states)
+{
+  const double h = step.h, theta = step.theta;
+  std::vector<StepReport> reports(states.size());
+  std::vector<Vec> right, next;
+  for (StepWork& work : works)
+  {
+    load_free_step(step, structure, work);
+    right.push_back(work.Av_next);
+    next.push_back(work.v_next);
+  }
+  const std::vector<double> Bv_free = step.factor.forward(right);
+  std::vector<double> lambda;
+  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
+  if (interface.pairs > 0) lambda = push_apart(step, interface, Bv_free, works, states, reports, comm);
+  step.factor.backward(lambda, next);
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    StepWork& work = works[k];
+    check(VecAXPBYPCZ(work.v_theta, theta, 1 - theta, 0, work.v_next, states[k].v));
+    check(VecAXPY(states[k].u, h, work.v_theta));
+    check(MatMult(structure.M, work.v_next, work.Mv_next));
+    check(MatMult(structure.K, states[k].u, work.Ku_next));
+  }
+  account(step, structure, states, works, reports);
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    StepWork& work = works[k];
+    for (const ContactStatus status : contact_status(interface, states[k].reactions))
+      ++(status == ContactStatus::open    ? reports[k].open
+         : status == ContactStatus::stick ? reports[k].stick
+                                          : reports[k].slip);
+    check(VecCopy(work.v_next, states[k].v));
+    std::swap(work.Mv, work.Mv_next);
+    std::swap(work.Av, work.Av_next);
+    std::swap(work.Ku, work.Ku_next);
+    work.energy = reports[k].energy;
+    states[k].time += h;
+  }
+  return reports;
+}
+
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
                    State& state)
 {
-  const double h = step.h, theta = step.theta;
-  StepReport report;
-
-  // A v_free = [M v - (1-theta) A v]/theta - h K u + h F
-  check(VecCopy(work.Mv, work.Av_next));
-  check(VecAXPBYPCZ(work.Av_next, (theta - 1) / theta, -h, 1 / theta, work.Av, work.Ku));
-  check(VecAXPY(work.Av_next, h, structure.load));
-  const Factor& factor = step.condensed.factor;
-  std::vector<double> b = factor.forward(std::array<Vec, 1>{work.Av_next}), lambda; // B v_free
-
-  check(VecSet(work.f, 0));
-  if (interface.pairs > 0)
-  {
-    b = free_contact_velocity(step, interface, state, work, std::move(b));
-    const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
-    const ContactResult contact = find_reactions(step, interface, b, work, state.reactions, comm);
-    report.contact_iterations = contact.iterations;
-    report.contact_residual = contact.residual;
-    report.contact_converged = contact.converged;
-    add_reactions(interface, state.reactions, work.f);
-    check(VecScale(work.f, h));
-    lambda = state.reactions;
-    for (double& value : lambda) value *= -h;
-  }
-  for (const ContactStatus status : contact_status(interface, state.reactions))
-    ++(status == ContactStatus::open ? report.open : status == ContactStatus::stick ? report.stick : report.slip);
-  factor.backward(lambda, std::array<Vec, 1>{work.v_next});
-  check(VecAXPY(work.Av_next, 1, work.f));
-
-  check(VecAXPBYPCZ(work.v_theta, theta, 1 - theta, 0, work.v_next, state.v));
-  check(VecAXPY(state.u, h, work.v_theta));
-  check(MatMult(structure.M, work.v_next, work.Mv_next));
-  check(MatMult(structure.K, state.u, work.Ku_next));
-  account(step, structure, state, work, report);
-
-  check(VecCopy(work.v_next, state.v));
-  std::swap(work.Mv, work.Mv_next);
-  std::swap(work.Av, work.Av_next);
-  std::swap(work.Ku, work.Ku_next);
-  work.energy = report.energy;
-  state.time += h;
-  return report;
+  return advance(step, structure, interface, std::span(&work, 1), std::span(&state, 1))[0];
 }
 
 std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions)

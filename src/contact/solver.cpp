@@ -1,63 +1,34 @@
 #include "squeal/contact/solver.hpp"
 
-#include "squeal/base/error.hpp"
-#include "squeal/contact/local.hpp"
+#include "squeal/base/petsc.hpp"
+#include "work.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <Eigen/Core>
 #include <limits>
+#include <numeric>
+#include <petscblaslapack.h>
 
 namespace squeal
 {
 
-namespace
+double ContactWork::force_scale(std::size_t pair, double largest) const
 {
+  const double own = speed * std::min(W.rho_n[pair], W.rho_t[pair]);
+  return own == 0 ? largest : largest == 0 ? own : std::min(own, largest);
+}
 
-/// The problem of one call: block = 1 + directions, n = pairs * block.
-struct Problem
+bool ContactWork::takes_part(std::size_t pair) const
 {
-  const std::vector<double>& W;
-  const std::vector<double>& b;
-  int pairs, directions;
-  double friction;
-  std::size_t block, n;
-  std::vector<double> rho_n, rho_t; // per pair, of the natural map
-  double speed = 0;                 // the largest free velocity
+  return b[pair * W.block()] != std::numeric_limits<double>::infinity();
+}
 
-  /// What a pair's error is compared with, where `largest` is the largest reaction: also the force that would give the
-  /// pair the largest free velocity, so that a light pair beside heavy ones is not passed over.
-  double force_scale(std::size_t pair, double largest) const
-  {
-    const double own = speed * std::min(rho_n[pair], rho_t[pair]);
-    return own == 0 ? largest : largest == 0 ? own : std::min(own, largest);
-  }
-
-  const double* row(std::size_t i) const { return W.data() + i * n; }
-  double diagonal(std::size_t i) const { return W[i * n + i]; }
-};
-
-Problem make_problem(const std::vector<double>& W, const std::vector<double>& b, int pairs, int directions,
-                     double friction)
+PairVector ContactWork::velocity(std::size_t i) const
 {
-  const auto block = static_cast<std::size_t>(1 + directions);
-  const std::size_t n = static_cast<std::size_t>(pairs) * block;
-  if (W.size() != n * n || b.size() != n)
-    throw Error("contact: " + std::to_string(pairs) + " pairs of " + std::to_string(block) + " rows need " +
-                std::to_string(n * n) + " entries of W, not " + std::to_string(W.size()));
-  Problem problem{W, b, pairs, directions, friction, block, n, {}, {}};
-  for (const double velocity : b) problem.speed = std::max(problem.speed, std::abs(velocity));
-  double largest = 0;
-  for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, problem.diagonal(i));
-  for (std::size_t i = 0; i < n; i += block)
-  {
-    // a pair that cannot move takes the scale of the others, so that a gap it cannot close is not passed over
-    const double normal = problem.diagonal(i) > 0 ? problem.diagonal(i) : largest;
-    const double tangential =
-        std::max(problem.diagonal(i + 1), directions == 2 ? problem.diagonal(i + 2) : problem.diagonal(i + 1));
-    problem.rho_n.push_back(normal > 0 ? 1 / normal : 1);
-    problem.rho_t.push_back(tangential > 0 ? 1 / tangential : problem.rho_n.back());
-  }
-  return problem;
+  PairVector w{};
+  for (std::size_t k = 0; k < W.block(); ++k) w[k] = b[i + k] + Wr[i + k];
+  return w;
 }
 
 PairVector pair_of(const std::vector<double>& values, std::size_t i, std::size_t block)
@@ -65,7 +36,6 @@ PairVector pair_of(const std::vector<double>& values, std::size_t i, std::size_t
   return {values[i], values[i + 1], block == 3 ? values[i + 2] : 0.};
 }
 
-/// Largest entry of the reactions.
 double largest_reaction(const std::vector<double>& r)
 {
   double largest = 0;
@@ -73,120 +43,48 @@ double largest_reaction(const std::vector<double>& r)
   return largest;
 }
 
-double residual_of(const Problem& problem, const std::vector<double>& w, const std::vector<double>& r)
+double residual_of(const ContactWork& work)
 {
-  const double largest = largest_reaction(r);
+  const ContactOperator& W = work.W;
+  const double largest = largest_reaction(work.r);
   double residual = 0;
-  for (std::size_t pair = 0; pair < problem.rho_n.size(); ++pair)
+  for (std::size_t pair = 0; pair < W.diagonal.size(); ++pair)
   {
-    const std::size_t i = pair * problem.block;
-    const PairVector mine = pair_of(r, i, problem.block), sliding = pair_of(w, i, problem.block);
-    const double defect = natural_map(mine, sliding, problem.friction, problem.rho_n[pair], problem.rho_t[pair]);
-    if (!std::isfinite(defect + sliding[0] + sliding[1] + sliding[2])) return std::numeric_limits<double>::infinity();
-    if (defect > 0) residual = std::max(residual, defect / problem.force_scale(pair, largest));
+    if (!work.takes_part(pair)) continue;
+    const std::size_t i = pair * W.block();
+    const PairVector r = pair_of(work.r, i, W.block()), w = work.velocity(i);
+    const double defect = natural_map(r, w, work.friction, W.rho_n[pair], W.rho_t[pair]);
+    if (!std::isfinite(defect + w[0] + w[1] + w[2])) return std::numeric_limits<double>::infinity();
+    if (defect > 0) residual = std::max(residual, defect / work.force_scale(pair, largest));
   }
   return residual;
 }
 
-/// target += sum of `count` rows of W, each times its change; contiguous, so that the compiler vectorises it.
-void add_rows(const double* __restrict rows, std::size_t n, std::size_t count, const double* change,
-              double* __restrict target)
+namespace
 {
-  const double x = change[0], y = count > 1 ? change[1] : 0, z = count > 2 ? change[2] : 0;
-  if (y == 0 && z == 0)
-    for (std::size_t j = 0; j < n; ++j) target[j] += x * rows[j];
-  else if (count == 2)
-    for (std::size_t j = 0; j < n; ++j) target[j] += x * rows[j] + y * rows[n + j];
-  else
-    for (std::size_t j = 0; j < n; ++j) target[j] += x * rows[j] + y * rows[n + j] + z * rows[2 * n + j];
-}
 
-void refresh(const Problem& problem, const std::vector<double>& r, std::vector<double>& w)
+/// y = W x by columns; one triangle of W is read, once for all of them.
+void multiply(const ContactOperator& W, const std::vector<double>& x, int columns, std::vector<double>& y)
 {
-  w = problem.b;
-  for (std::size_t i = 0; i < problem.n; i += problem.block)
-    if (std::any_of(r.begin() + static_cast<std::ptrdiff_t>(i),
-                    r.begin() + static_cast<std::ptrdiff_t>(i + problem.block), [](double x) { return x != 0; }))
-      add_rows(problem.row(i), problem.n, problem.block, &r[i], w.data());
-}
-
-/// One sweep of block Gauss-Seidel, each change times `relaxation`; a change below `negligible` of the pair's force
-/// scale is not made, which spares reading its rows. Returns the sum of the changes, which bounds the rounding that w
-/// gathers.
-double sweep(const Problem& problem, double relaxation, double negligible, std::vector<double>& r,
-             std::vector<double>& w)
-{
-  const double largest = negligible > 0 ? largest_reaction(r) : 0;
-  double moved = 0;
-  for (std::size_t i = 0; i < problem.n; i += problem.block)
+  y.resize(x.size());
+  if (columns == 1)
   {
-    const PairVector last = pair_of(r, i, problem.block);
-    PairBlock A{};
-    PairVector q = pair_of(w, i, problem.block);
-    for (std::size_t k = 0; k < problem.block; ++k)
-      for (std::size_t l = 0; l < problem.block; ++l)
-      {
-        A[k][l] = problem.row(i + k)[i + l];
-        q[k] -= A[k][l] * last[l];
-      }
-    PairVector next = solve_pair(A, q, problem.directions, problem.friction, last);
-    if (relaxation < 1) // stays admissible: the cone is convex
-      for (std::size_t k = 0; k < problem.block; ++k) next[k] = last[k] + relaxation * (next[k] - last[k]);
-    const PairVector change = {next[0] - last[0], next[1] - last[1], next[2] - last[2]};
-    const double size = std::abs(change[0]) + std::abs(change[1]) + std::abs(change[2]);
-    if (size == 0 || size <= negligible * problem.force_scale(i / problem.block, largest)) continue;
-    moved += size;
-    for (std::size_t k = 0; k < problem.block; ++k) r[i + k] = next[k];
-    add_rows(problem.row(i), problem.n, problem.block, change.data(), w.data());
+    const auto n = static_cast<Eigen::Index>(W.size());
+    const Eigen::Map<const Eigen::MatrixXd> matrix(W.W.data(), n, n);
+    const Eigen::Map<const Eigen::VectorXd> vector(x.data(), n);
+    Eigen::Map<Eigen::VectorXd>(y.data(), n).noalias() = matrix.selfadjointView<Eigen::Lower>() * vector;
+    return;
   }
-  return moved;
-}
-
-ContactResult gauss_seidel(const Problem& problem, const ContactSettings& settings, std::vector<double>& r)
-{
-  ContactResult result;
-  std::vector<double> w;
-  refresh(problem, r, w);
-  result.residual = residual_of(problem, w, r);
-  double largest_W = 0, largest_rho = 0, moved = 0;
-  for (std::size_t i = 0; i < problem.n; ++i) largest_W = std::max(largest_W, problem.diagonal(i));
-  for (std::size_t pair = 0; pair < problem.rho_n.size(); ++pair)
-    largest_rho = std::max({largest_rho, problem.rho_n[pair], problem.rho_t[pair]});
-  double negligible = 0, relaxation = 1, earlier = result.residual;
-  while (!(result.residual <= settings.tolerance) && result.iterations < settings.max_iterations)
-  {
-    const double change = sweep(problem, relaxation, negligible, r, w);
-    ++result.iterations;
-    moved += change;
-    result.residual = residual_of(problem, w, r);
-    if (!std::isfinite(result.residual)) break;
-    const double scale = *std::max_element(r.begin(), r.end());
-    const double rounding = std::numeric_limits<double>::epsilon() * largest_rho * largest_W * moved;
-    const bool due = result.iterations % 50 == 0 || result.residual <= settings.tolerance || change == 0;
-    if (due && rounding > .01 * settings.tolerance * scale)
-    {
-      refresh(problem, r, w);
-      moved = 0;
-      result.residual = residual_of(problem, w, r);
-    }
-    if (change == 0 && negligible == 0) break; // no pair moves any more: this is what rounding allows
-    if (result.iterations % 50 == 0)
-    {
-      // strong friction makes sweeps go round in circles, which shorter changes often end
-      if (result.residual > .5 * earlier) relaxation = std::max(.25, relaxation / 2);
-      earlier = result.residual;
-    }
-    negligible = change == 0 ? 0 : .02 * settings.tolerance;
-  }
-  result.converged = result.residual <= settings.tolerance;
-  return result;
+  const PetscBLASInt n = static_cast<PetscBLASInt>(W.size()), m = columns;
+  const double unit = 1, zero = 0;
+  BLASsymm_("L", "L", &n, &m, &unit, W.W.data(), &n, x.data(), &n, &zero, y.data(), &n);
 }
 
 /// Largest eigenvalue of W from a few power iterations: a lower bound, close enough for a step that adapts.
-double largest_eigenvalue(const Problem& problem)
+double largest_eigenvalue(const ContactOperator& W)
 {
-  std::vector<double> x(problem.n), y(problem.n);
-  for (std::size_t i = 0; i < problem.n; ++i) x[i] = 1 + .5 * std::sin(static_cast<double>(7 * i + 1));
+  std::vector<double> x(W.size()), y;
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] = 1 + .5 * std::sin(static_cast<double>(7 * i + 1));
   double eigenvalue = 0;
   for (int iteration = 0; iteration < 12; ++iteration)
   {
@@ -194,48 +92,155 @@ double largest_eigenvalue(const Problem& problem)
     for (const double value : x) size += value * value;
     if (size == 0) return eigenvalue;
     for (double& value : x) value /= std::sqrt(size);
-    std::fill(y.begin(), y.end(), 0.);
-    for (std::size_t i = 0; i < problem.n; i += problem.block)
-      add_rows(problem.row(i), problem.n, problem.block, &x[i], y.data());
-    eigenvalue = 0;
-    for (std::size_t i = 0; i < problem.n; ++i) eigenvalue += x[i] * y[i];
+    multiply(W, x, 1, y);
+    eigenvalue = std::inner_product(x.begin(), x.end(), y.begin(), 0.);
     x.swap(y);
   }
   return eigenvalue;
 }
 
-ContactResult fixed_point(const Problem& problem, const ContactSettings& settings, std::vector<double>& r)
+void fixed_point(ContactWork& work, const ContactSettings& settings)
 {
-  ContactResult result;
-  std::vector<double> w;
-  refresh(problem, r, w);
-  result.residual = residual_of(problem, w, r);
-  if (result.residual <= settings.tolerance) return {0, result.residual, true};
-  const double lambda = largest_eigenvalue(problem);
+  const std::size_t block = work.W.block();
+  ContactResult& result = work.result;
+  for (std::size_t pair = 0; pair < work.W.diagonal.size(); ++pair)
+    if (!work.takes_part(pair)) std::fill_n(work.r.begin() + static_cast<std::ptrdiff_t>(pair * block), block, 0.);
+  ContactWork* const alone[] = {&work};
+  refresh(alone);
+  result.residual = residual_of(work);
+  const double lambda = result.residual > settings.tolerance ? largest_eigenvalue(work.W) : 0;
   double rho = (settings.rho > 0 ? settings.rho : 1.5) / (lambda > 0 ? lambda : 1);
   double best = result.residual;
-  while (!(result.residual <= settings.tolerance) && result.iterations < settings.max_iterations)
+  while (result.residual > settings.tolerance && std::isfinite(result.residual) &&
+         result.iterations < settings.max_iterations)
   {
-    for (std::size_t i = 0; i < problem.n; i += problem.block)
+    for (std::size_t pair = 0; pair < work.W.diagonal.size(); ++pair)
     {
-      r[i] = std::max(0., r[i] - rho * w[i]);
-      PairVector next = pair_of(r, i, problem.block);
-      for (std::size_t k = 1; k < problem.block; ++k) next[k] -= rho * w[i + k];
-      project_on_disc(next, problem.friction);
-      for (std::size_t k = 1; k < problem.block; ++k) r[i + k] = next[k];
+      if (!work.takes_part(pair)) continue;
+      const PairVector w = work.velocity(pair * block);
+      PairVector next = pair_of(work.r, pair * block, block);
+      next[0] = std::max(0., next[0] - rho * w[0]);
+      for (std::size_t k = 1; k < block; ++k) next[k] -= rho * w[k];
+      project_on_disc(next, work.friction);
+      std::copy_n(next.begin(), block, work.r.begin() + static_cast<std::ptrdiff_t>(pair * block));
     }
-    refresh(problem, r, w);
+    refresh(alone);
     ++result.iterations;
-    result.residual = residual_of(problem, w, r);
-    if (!std::isfinite(result.residual)) break;
+    result.residual = residual_of(work);
     best = std::min(best, result.residual);
     if (settings.rho == 0 && result.iterations % 20 == 0 && !(result.residual < 10 * best)) rho /= 2;
   }
   result.converged = result.residual <= settings.tolerance;
-  return result;
+}
+
+ContactWork start(const ContactOperator& W, double friction, const ContactProblem& problem)
+{
+  if (problem.b.size() != W.size())
+    throw Error("contact: " + std::to_string(problem.b.size()) + " velocities for " + std::to_string(W.size()) +
+                " rows of W");
+  ContactWork work{W, friction, problem.b, problem.r, {}};
+  problem.r.resize(W.size(), 0.);
+  if (!std::all_of(work.r.begin(), work.r.end(), [](double value) { return std::isfinite(value); }))
+    std::fill(work.r.begin(), work.r.end(), 0.);
+  for (const double velocity : problem.b)
+    if (velocity != std::numeric_limits<double>::infinity()) work.speed = std::max(work.speed, std::abs(velocity));
+  return work;
+}
+
+/// r(t+h) = sum of c_k r(t - k h): constant, linear, quadratic in time.
+constexpr double extrapolation[3][3] = {{1, 0, 0}, {2, -1, 0}, {3, -3, 1}};
+constexpr int unread_at_most = 20; // extrapolated products gather rounding
+
+/// Puts the extrapolation of least residual into r and W r; false if nothing is remembered that belongs to r.
+bool start_warm(ContactWork& work, const ContactMemory& memory, int highest_order)
+{
+  if (memory.r.empty() || memory.r[0] != work.r || memory.unread >= unread_at_most) return false;
+  std::vector<double> best_r, best_Wr;
+  double least = std::numeric_limits<double>::infinity();
+  const auto orders = std::min(memory.r.size(), static_cast<std::size_t>(highest_order) + 1);
+  for (std::size_t order = 0; order < orders; ++order)
+  {
+    work.r.assign(work.b.size(), 0.);
+    work.Wr.assign(work.b.size(), 0.);
+    for (std::size_t k = 0; k <= order; ++k)
+      for (std::size_t i = 0; i < work.b.size(); ++i)
+      {
+        work.r[i] += extrapolation[order][k] * memory.r[k][i];
+        work.Wr[i] += extrapolation[order][k] * memory.Wr[k][i];
+      }
+    const double residual = residual_of(work);
+    if (order > 0 && !(residual < least)) continue;
+    least = residual;
+    best_r = work.r;
+    best_Wr = work.Wr;
+  }
+  work.r = best_r;
+  work.Wr = best_Wr;
+  return true;
+}
+
+void remember(const ContactWork& work, ContactMemory& memory)
+{
+  memory.unread = work.reads > 0 ? 0 : memory.unread + 1;
+  memory.r.insert(memory.r.begin(), work.r);
+  memory.Wr.insert(memory.Wr.begin(), work.Wr);
+  if (memory.r.size() > 3) memory.r.pop_back(), memory.Wr.pop_back();
 }
 
 } // namespace
+
+void refresh(std::span<ContactWork* const> works)
+{
+  if (works.empty()) return;
+  const std::size_t n = works.front()->W.size();
+  std::vector<double> r, Wr;
+  for (const ContactWork* work : works) r.insert(r.end(), work->r.begin(), work->r.end());
+  multiply(works.front()->W, r, static_cast<int>(works.size()), Wr);
+  for (std::size_t k = 0; k < works.size(); ++k)
+  {
+    const auto mine = Wr.begin() + static_cast<std::ptrdiff_t>(k * n);
+    works[k]->Wr.assign(mine, mine + static_cast<std::ptrdiff_t>(n));
+    ++works[k]->reads;
+  }
+}
+
+std::vector<ContactResult> solve_contacts(const ContactOperator& W, double friction, const ContactSettings& settings,
+                                          std::span<const ContactProblem> problems)
+{
+  std::vector<ContactWork> works;
+  for (const ContactProblem& problem : problems) works.push_back(start(W, friction, problem));
+  if (W.pairs == 0) return std::vector<ContactResult>(problems.size(), {0, 0, true});
+  if (settings.solver == "gauss_seidel")
+  {
+    std::vector<ContactWork*> all, cold;
+    for (std::size_t k = 0; k < works.size(); ++k)
+    {
+      all.push_back(&works[k]);
+      if (!start_warm(works[k], problems[k].memory, settings.extrapolation)) cold.push_back(&works[k]);
+    }
+    refresh(cold);
+    gauss_seidel(all, settings);
+  }
+  else if (settings.solver == "fixed_point")
+    for (ContactWork& work : works) fixed_point(work, settings);
+  else
+    throw Error("contact solver \"" + settings.solver + "\" is not known: gauss_seidel or fixed_point");
+  std::vector<ContactResult> results;
+  for (std::size_t k = 0; k < works.size(); ++k)
+  {
+    remember(works[k], problems[k].memory);
+    results.push_back(works[k].result);
+  }
+  return results;
+}
+
+ContactResult solve_contact(const std::vector<double>& W, const std::vector<double>& b, int pairs, int directions,
+                            double friction, const ContactSettings& settings, std::vector<double>& r)
+{
+  ContactMemory nothing;
+  const ContactProblem problem{b, r, nothing};
+  return solve_contacts(make_contact_operator(W, pairs, directions), friction, settings, std::span(&problem, 1))[0];
+}
 
 std::vector<double> relative_velocity(const std::vector<double>& W, const std::vector<double>& b,
                                       const std::vector<double>& r)
@@ -243,36 +248,22 @@ std::vector<double> relative_velocity(const std::vector<double>& W, const std::v
   const std::size_t n = b.size();
   std::vector<double> w = b;
   for (std::size_t i = 0; i < n; ++i)
-    if (r[i] != 0) add_rows(W.data() + i * n, n, 1, &r[i], w.data());
+    for (std::size_t j = 0; j < n; ++j) w[i] += W[i * n + j] * r[j];
   return w;
 }
 
 double contact_residual(const std::vector<double>& W, const std::vector<double>& w, int pairs, int directions,
                         double friction, const std::vector<double>& r)
 {
-  std::vector<double> opposite = r;
+  const ContactOperator op = make_contact_operator(W, pairs, directions);
+  std::vector<double> opposite = r, reactions = r;
   for (double& value : opposite) value = -value;
   const std::vector<double> b = relative_velocity(W, w, opposite);
-  return residual_of(make_problem(W, b, pairs, directions, friction), w, r);
-}
-
-ContactResult solve_contact(const std::vector<double>& W, const std::vector<double>& b, int pairs, int directions,
-                            double friction, const ContactSettings& settings, std::vector<double>& r)
-{
-  const Problem problem = make_problem(W, b, pairs, directions, friction);
-  r.resize(problem.n, 0.);
-  if (pairs == 0) return {0, 0, true};
-  for (std::size_t i = 0; i < problem.n; i += problem.block)
-  {
-    // a warm start need not be admissible, nor finite after a failed step
-    PairVector start = pair_of(r, i, problem.block);
-    if (!std::isfinite(start[0] + start[1] + start[2]) || start[0] < 0) start = {};
-    project_on_disc(start, friction);
-    for (std::size_t k = 0; k < problem.block; ++k) r[i + k] = start[k];
-  }
-  if (settings.solver == "gauss_seidel") return gauss_seidel(problem, settings, r);
-  if (settings.solver == "fixed_point") return fixed_point(problem, settings, r);
-  throw Error("contact solver \"" + settings.solver + "\" is not known: gauss_seidel or fixed_point");
+  ContactMemory nothing;
+  ContactWork work = start(op, friction, {b, reactions, nothing});
+  ContactWork* const alone[] = {&work};
+  refresh(alone);
+  return residual_of(work);
 }
 
 } // namespace squeal

@@ -9,6 +9,7 @@
 #include "squeal/contact/solver.hpp"
 
 #include <functional>
+#include <span>
 
 namespace squeal
 {
@@ -26,16 +27,15 @@ enum class ContactLaw
 struct ThetaStep
 {
   double h = 0, theta = 0.5; // [s], [-]
-  Owned<Mat> A;
-  CondensedOperator condensed; // factor of A, W
+  Factor factor;             // of A bordered by B
+  ContactOperator W;         // on rank 0
   ContactLaw law = ContactLaw::displacement;
   ContactSettings contact;
-  bool extrapolate = true; // warm start from both last reactions instead of the last
-  double seconds = 0;      // to factor A and form W
+  double factor_seconds = 0, condensed_seconds = 0; // to factor A with the corner that W is, to prepare W
 };
 
 /// Options, prefix -transient_: contact_law (displacement | velocity), contact_solver (gauss_seidel | fixed_point),
-/// contact_tolerance, contact_max_it, contact_rho, contact_extrapolate. Error: h not above 0, theta not in (0, 1].
+/// contact_tolerance, contact_max_it, contact_rho, contact_extrapolation. Error: h not above 0, theta not in (0, 1].
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta);
 
 /// The products of a state that a step starts from and leaves behind for the next one (two multiplications and one
@@ -45,7 +45,7 @@ struct StepWork
   Owned<Vec> Mv, Av, Ku;                // of the state at hand
   Owned<Vec> Mv_next, Av_next, Ku_next; // of the one being computed
   Owned<Vec> v_next, v_theta, dv, f;    // f: h B'r
-  std::vector<double> r_before;         // [N] reactions of the last step but one
+  ContactMemory memory;                 // of the reactions, on rank 0
   double energy = 0;                    // [J]
 };
 
@@ -68,7 +68,11 @@ struct StepReport
   bool contact_converged = true;
 };
 
-/// One step in place.
+/// One step in place of several trajectories: each reading of the factor and of W serves them all.
+std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                                std::span<StepWork> works, std::span<State> states);
+
+/// Of one.
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
                    State& state);
 

@@ -2,15 +2,22 @@
 /// Contact with Coulomb friction on the condensed operator (method, section 4): find r with w = W r + b,
 ///     0 <= w_n _|_ r_n >= 0,   |r_t| <= mu r_n,   r_t opposes w_t.
 /// Residual, one measure for every solver: the natural map per pair, |r - proj(r - rho w)| with rho = 1/W_ii, over the
-/// largest reaction, or over rho max|b| where that is smaller.
+/// largest reaction, or over rho max|b| where that is smaller. It is always that of W itself, in double precision.
 ///
-/// gauss_seidel: one exact local solve a pair and sweep; w follows each change of a reaction, so that a sweep reads W
-/// once at most, and is formed afresh before the residual is believed where rounding could matter. Under-relaxed when
-/// 50 sweeps bring nothing.
+/// gauss_seidel: one exact local solve a pair and sweep; w follows each change of a reaction, pairs that no longer move
+/// are passed over. A large W is swept over through its near field, in single precision, and one product with W
+/// between sweeps and the verdict closes the residual; where that does not help, the sweeps read W itself.
+/// Under-relaxed when 50 sweeps bring nothing.
 /// fixed_point: the paper's r_n <- max(0, r_n - rho w_n), r_t <- proj_disc(mu r_n)(r_t - rho w_t); contracts without
 /// friction for 0 < rho < 2/lambda_max(W), at a rate set by cond(W).
 ///
+/// Problems with the same W are solved together: each row of W that is read serves all of them.
+///
 /// Caveat: neither is sure to converge where mu couples sliding and pressure strongly; the result says so.
+#include "squeal/contact/local.hpp"
+
+#include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,7 +29,8 @@ struct ContactSettings
   std::string solver = "gauss_seidel"; // block Gauss-Seidel, or the paper's "fixed_point"
   double tolerance = 1e-10;            // on the residual
   int max_iterations = 1000;
-  double rho = 0; // of the fixed point, over 1/lambda_max(W); 0: chosen, and halved when the residual grows
+  double rho = 0;        // of the fixed point, over 1/lambda_max(W); 0: chosen, and halved when the residual grows
+  int extrapolation = 2; // highest order of the warm start's extrapolation in time
 };
 
 struct ContactResult
@@ -32,11 +40,56 @@ struct ContactResult
   bool converged = false;
 };
 
-/// `W` row-major symmetric (size x size, size = pairs * (1 + directions)); `r` warm start in, solution out.
+/// The entries of W that matter during sweeps, in single precision: row by row, runs of neighbouring pairs.
+struct NearField
+{
+  struct Run
+  {
+    std::size_t first, count; // of w's entries
+  };
+  std::vector<std::size_t> runs_of, values_of; // of each pair: where its runs and its values begin
+  std::vector<Run> runs;
+  std::vector<float> values; // run after run, the pair's rows of each run one after the other
+};
+
+/// W and what is known of it before any b. On one rank.
+struct ContactOperator
+{
+  int pairs = 0, directions = 0;
+  std::vector<double> W;            // row-major, symmetric, size x size, size = pairs * (1 + directions)
+  std::vector<PairBlock> diagonal;  // W_ii of each pair
+  std::vector<double> rho_n, rho_t; // of the natural map
+  NearField near;                   // empty: W is small
+
+  std::size_t block() const { return static_cast<std::size_t>(1 + directions); }
+  std::size_t size() const { return static_cast<std::size_t>(pairs) * block(); }
+};
+
+ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
+
+/// The last solutions of one trajectory, latest first, and W times them: a warm start then needs no product with W.
+struct ContactMemory
+{
+  std::vector<std::vector<double>> r, Wr;
+  int unread = 0; // solutions accepted since W was last read
+};
+
+/// One problem. An infinite b_n keeps its pair out: r = 0. `r`: start in, solution out.
+struct ContactProblem
+{
+  const std::vector<double>& b;
+  std::vector<double>& r;
+  ContactMemory& memory;
+};
+
+std::vector<ContactResult> solve_contacts(const ContactOperator& W, double friction, const ContactSettings& settings,
+                                          std::span<const ContactProblem> problems);
+
+/// One problem without a past.
 ContactResult solve_contact(const std::vector<double>& W, const std::vector<double>& b, int pairs, int directions,
                             double friction, const ContactSettings& settings, std::vector<double>& r);
 
-/// w = W r + b; rows of W whose reaction is zero are not read.
+/// w = W r + b.
 std::vector<double> relative_velocity(const std::vector<double>& W, const std::vector<double>& b,
                                       const std::vector<double>& r);
 

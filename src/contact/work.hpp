@@ -1,0 +1,40 @@
+#pragma once
+/// What the contact solvers share: one problem while it is being solved.
+#include "squeal/contact/solver.hpp"
+
+namespace squeal
+{
+
+struct ContactWork
+{
+  const ContactOperator& W;
+  double friction;
+  const std::vector<double>& b;
+  std::vector<double>& r;
+  std::vector<double> Wr; // at the last product with W
+  double speed = 0;       // the largest free velocity
+  int reads = 0;          // products with W
+  ContactResult result{};
+
+  /// What a pair's error is compared with, where `largest` is the largest reaction: also the force that would give the
+  /// pair the largest free velocity, so that a light pair beside heavy ones is not passed over.
+  double force_scale(std::size_t pair, double largest) const;
+
+  PairVector velocity(std::size_t i) const; // W r + b of the pair whose rows begin at i
+
+  bool takes_part(std::size_t pair) const; // b_n is not infinite
+};
+
+PairVector pair_of(const std::vector<double>& values, std::size_t i, std::size_t block);
+
+double largest_reaction(const std::vector<double>& r);
+
+double residual_of(const ContactWork& work);
+
+/// W r of each, reading W once.
+void refresh(std::span<ContactWork* const> works);
+
+/// Block Gauss-Seidel on all of them at once; W r must be fresh, and is in the end.
+void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& settings);
+
+} // namespace squeal

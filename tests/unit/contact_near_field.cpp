@@ -1,0 +1,121 @@
+// ranks: 1
+#include "squeal/contact/solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <doctest/doctest.h>
+#include <limits>
+#include <random>
+
+using namespace squeal;
+
+namespace
+{
+
+using Vector = std::vector<double>;
+
+constexpr int pairs = 120;
+constexpr std::size_t size = 3 * pairs;
+
+/// Decays with distance like the W of a short step, down to a tail that the near field leaves out. The tail's sum is
+/// 1e-6 of the diagonal: far above the tolerance of 1e-10.
+Vector decaying_compliance()
+{
+  Vector W(size * size);
+  for (std::size_t i = 0; i < size; ++i)
+    for (std::size_t j = 0; j < size; ++j)
+    {
+      const double distance = std::abs(static_cast<double>(i / 3) - static_cast<double>(j / 3));
+      const double along = i % 3 == j % 3 ? 1 : .2;
+      W[i * size + j] = along * std::exp(-1.5 * distance) + 4e-9 * std::cos(static_cast<double>(i % 7 + j % 7));
+    }
+  return W;
+}
+
+Vector velocity_at(double time)
+{
+  Vector b(size);
+  for (std::size_t i = 0; i < size; ++i)
+  {
+    const double phase = .7 * static_cast<double>(i);
+    b[i] = i % 3 == 0 ? -.5 + std::cos(phase + time) : 2 * std::sin(.3 * phase + 2 * time);
+  }
+  return b;
+}
+
+double difference(const Vector& a, const Vector& b)
+{
+  double largest = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
+  return largest;
+}
+
+double true_residual(const Vector& W, const Vector& b, const Vector& r)
+{
+  return contact_residual(W, relative_velocity(W, b, r), pairs, 2, .4, r);
+}
+
+} // namespace
+
+TEST_CASE("sweeps over the near field in single precision end at the answer of W in double")
+{
+  const Vector W = decaying_compliance(), b = velocity_at(0);
+  const ContactOperator op = make_contact_operator(W, pairs, 2);
+  CHECK(op.near.values.size() < W.size() / 4); // 25 of 120 neighbours
+  CHECK(!op.near.runs.empty());
+  Vector swept, projected;
+  const auto result = solve_contact(W, b, pairs, 2, .4, {}, swept);
+  CHECK(result.converged);
+  CHECK(true_residual(W, b, swept) < 1.01e-10); // another order of summation
+  CHECK(solve_contact(W, b, pairs, 2, .4, {"fixed_point", 1e-12, 20000, 0}, projected).converged);
+  CHECK(difference(swept, projected) < 1e-8 * *std::max_element(projected.begin(), projected.end())); // cond(W) < 100
+  CHECK(std::count_if(swept.begin(), swept.end(), [](double r) { return r == 0; }) > 30); // some pairs are open
+
+  Vector without_tail = W;
+  for (double& entry : without_tail)
+    if (std::abs(entry) < 1e-8) entry = 0;
+  Vector other;
+  CHECK(solve_contact(without_tail, b, pairs, 2, .4, {}, other).converged);
+  CHECK(true_residual(W, b, other) > 1e-8); // the tail counts
+}
+
+TEST_CASE("problems solved together have the answers of each alone, and what is remembered changes no answer")
+{
+  const Vector W = decaying_compliance();
+  const ContactOperator op = make_contact_operator(W, pairs, 2);
+  const int together = 5, steps = 8;
+  std::vector<Vector> r(together);
+  std::vector<ContactMemory> memory(together);
+  std::vector<int> sweeps;
+  for (int step = 0; step < steps; ++step)
+  {
+    std::vector<Vector> b;
+    for (int k = 0; k < together; ++k) b.push_back(velocity_at(.02 * step + .3 * k));
+    std::vector<ContactProblem> problems;
+    for (std::size_t k = 0; k < together; ++k) problems.push_back({b[k], r[k], memory[k]});
+    const auto results = solve_contacts(op, .4, {}, problems);
+    for (std::size_t k = 0; k < together; ++k)
+    {
+      CHECK(results[k].converged);
+      CHECK(true_residual(W, b[k], r[k]) < 1.01e-10);
+      Vector alone;
+      CHECK(solve_contact(W, b[k], pairs, 2, .4, {}, alone).converged);
+      CHECK(difference(r[k], alone) < 1e-8);
+    }
+    sweeps.push_back(results[0].iterations);
+  }
+  CHECK(sweeps.back() < sweeps.front()); // the extrapolated start is nearer
+}
+
+TEST_CASE("a pair of infinite free velocity takes no part")
+{
+  Vector W = decaying_compliance(), b = velocity_at(0), r, elsewhere;
+  const std::size_t out = 51;
+  b[out] = std::numeric_limits<double>::infinity();
+  CHECK(solve_contact(W, b, pairs, 2, .4, {}, r).converged);
+  CHECK(r[out] == 0);
+  CHECK(r[out + 1] == 0);
+  b[out] = 1e3; // so far open that nothing closes it
+  CHECK(solve_contact(W, b, pairs, 2, .4, {"gauss_seidel", 1e-13, 1000, 0}, elsewhere).converged);
+  CHECK(difference(r, elsewhere) < 1e-8);
+}
