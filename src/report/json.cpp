@@ -106,6 +106,7 @@ Json transient_entry(const Report& report)
   entry["growth_rate_predicted"] = transient.growth_rate_predicted;
   entry["growth_rate_bias"] = transient_bias(report).growth;
   entry["frequency_bias"] = transient_bias(report).frequency;
+  entry["normal_force_chatter"] = chatter(transient.history);
   entry["contact_law"] = transient.law == ContactLaw::velocity ? "velocity" : "displacement";
   entry["energy_defect_max"] = transient.energy_defect_max;
   entry["residual"] = transient.outcome.residual;
@@ -151,6 +152,7 @@ Json cycle_entry(const Report& report, const Scene& scene)
   entry["residual_full"] = cycle.residual_full;
   entry["growth_rate_bias"] = cycle_bias(report).growth;
   entry["frequency_bias"] = cycle_bias(report).frequency;
+  entry["normal_force_chatter"] = chatter(cycle.history);
   entry["newton_iterations"] = cycle.newton_iterations;
   entry["periods_integrated"] = cycle.periods_integrated;
   entry["mean_energy"] = cycle.mean_energy;

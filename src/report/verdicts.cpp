@@ -58,6 +58,16 @@ Sentences of_estimate(const Report& report)
   return said;
 }
 
+void add_chatter(const History& history, Sentences& said)
+{
+  const double share = chatter(history);
+  if (share > .1)
+    said.push_back(
+        format("the normal force jumps between steps by %.0f %% of its mean: impacts of the contact nodes' own "
+               "mass; average it over steps, or refine the contact surface",
+               100 * share));
+}
+
 Sentences of_transient(const Report& report)
 {
   Sentences said;
@@ -73,6 +83,7 @@ Sentences of_transient(const Report& report)
     said.push_back("by the velocity law the gap drifts, by up to what an impact covers in a step");
   if (transient.energy_defect_max > 1e-8)
     said.push_back("the energy identity of the scheme is missed: tighten -transient_contact_tolerance");
+  add_chatter(transient.history, said);
   return said;
 }
 
@@ -86,6 +97,7 @@ Sentences of_cycle(const Report& report)
     said.push_back(format("theta and the step change the growth rate by %+.0f %%: the cycle's amplitude suffers",
                           100 * bias.growth));
   if (cycle.residual_full > 1e-3) said.push_back("a residual this large is no proof of a periodic motion");
+  add_chatter(cycle.history, said);
   if (report.modes.unstable_count > 1)
     said.push_back(format("%d modes are unstable, and this cycle started on one: others may grow from it",
                           report.modes.unstable_count));
@@ -112,6 +124,19 @@ StepBias transient_bias(const Report& report)
 StepBias cycle_bias(const Report& report)
 {
   return bias_of(report, report.cycle.theta, report.cycle.period / std::max(report.cycle.steps_per_period, 1));
+}
+
+double chatter(const History& history)
+{
+  const std::vector<double>& force = history.normal_force;
+  double squares = 0, sum = 0;
+  for (std::size_t i = 1; i + 1 < force.size(); ++i)
+  {
+    const double bend = force[i - 1] - 2 * force[i] + force[i + 1];
+    squares += bend * bend;
+    sum += force[i];
+  }
+  return sum > 0 ? std::sqrt(squares * static_cast<double>(force.size() - 2)) / 4 / sum : 0;
 }
 
 Verdicts verdicts_of(const Report& report)

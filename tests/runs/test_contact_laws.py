@@ -68,3 +68,16 @@ def test_the_velocity_law_warns_of_what_it_cannot_do(squeal):
     assert run.report["cycle"]["outcome"] == "not converged" and "contact_law" in run.report["cycle"]["reason"]
     run = squeal(*scene, ranks=1)
     assert run.code == 0 and run.report["cycle"]["residual_full"] < 1e-8 and "the gap drifts" not in run.printed
+
+
+def test_many_impacts_never_gain_energy_by_the_modified_law_and_little_is_lost_on_a_fine_mesh():
+    """Six bounces: what the fall had was 500 J. The law on start displacements gains in single steps."""
+    def steps_of(law, elements):
+        h = 0.3 / (3 * elements)
+        energy = atlas.bouncing_bar(elements).march(law, h, int(16 / h))[2]
+        return np.diff(energy), energy[-1]
+
+    for elements in (15, 30):
+        assert steps_of("modified", elements)[0].max() < 1e-9
+    assert steps_of("start", 15)[0].max() > 1e-2
+    assert -steps_of("modified", 60)[1] < 0.6 * -steps_of("modified", 15)[1]

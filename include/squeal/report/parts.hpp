@@ -42,6 +42,9 @@ struct StepBias
 StepBias transient_bias(const Report& report);
 StepBias cycle_bias(const Report& report);
 
+/// The part of the normal force that alternates from step to step: rms of its second difference / 4, over its mean.
+double chatter(const History& history);
+
 /// Sentences for whoever would be misled by a stage's numbers; none is the rule.
 struct Verdicts
 {
