@@ -32,7 +32,10 @@ constexpr std::array options = {
     Option{"-transient_refuse", "true", "false: march even where theta and the step make growth rates lie"},
     Option{"-modes_dense_limit", "200", "eigenproblems up to this size are solved whole by LAPACK"},
     Option{"-modes_candidates", "20", "pairs that each residual pass of the projection corrects"},
-    Option{"-cycle_lift_off_multiple", "2", "start at this many times first lift-off when the estimate has no balance"},
+    Option{"-estimate_lift_off_multiple", "2", "of first lift-off: where vibrations start without an energy balance"},
+    Option{"-cycle_start_amplitude", "1", "multiple of the estimate's amplitude to start from"},
+    Option{"-cycle_start_phase", "0", "degrees, added to the estimate's phase of the start"},
+    Option{"-cycle_start_period", "1", "multiple of the mode's period to start from"},
     Option{"-cycle_reduced_newtons", "10", "iterations of the reduced system on the mode's shapes; 0: not tried"},
     Option{"-cycle_base_growths", "-1",
            "times the reduced base may grow by what it missed; -1: 4 without a finish, else 0"},
@@ -45,7 +48,9 @@ constexpr std::array options = {
     Option{"-cycle_clamp", "0.3", "longest step of the finish over the fluctuation"},
     Option{"-cycle_stall", "30", "iterations without progress before the finish starts again, or falls back"},
     Option{"-cycle_max_periods", "400", "periods that may be integrated in all"},
-    Option{"-cycle_multipliers", "-1", "Floquet multipliers' Krylov dimension; -1: all up to 25 dofs, else none"},
+    Option{
+        "-cycle_multipliers", "-1",
+        "Floquet multipliers' Krylov dimension, 0: none; -1: all up to 25 dofs, else 8 and 2 a further unstable mode"},
     Option{"-cycle_samples", "32", "displacements kept over the last period, for the fields file"},
 };
 

@@ -4,9 +4,11 @@
 #include "squeal/options.hpp"
 #include "squeal/report/report.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <span>
 
 namespace squeal
 {
@@ -41,13 +43,6 @@ std::string no_mode_to_follow(const Report& report)
   if (report.modes.modes.front().growth_rate() <= 0) return "the equilibrium is stable: no mode grows in the band";
   if (report.modes.modes.front().frequency_hz() == 0) return "the equilibrium diverges without oscillating";
   return {};
-}
-
-/// The estimate's amplitude, or twice the first lift-off where friction and damping have no balance: shooting converges
-/// from well above the cycle and falls onto the equilibrium from below.
-double start_amplitude(const Estimate& estimate)
-{
-  return estimate.outcome.word == "balance" ? estimate.amplitude : 2 * estimate.lift_off_amplitude;
 }
 
 State transient_start(const Scene& scene, const Model& model, const Report& report)
@@ -124,8 +119,10 @@ LimitCycle run_cycle(const Scene& scene, const Model& model, const Report& repor
   else if (const std::string lie = cycle_refusal(scene, model, report); !lie.empty())
     cycle.outcome = not_run("refused", lie);
   else
-    return find_cycle(model.structure, model.interface, report.equilibrium, report.modes.modes.front(), report.estimate,
-                      scene.cycle, model.probes);
+    return find_cycle(
+        model.structure, model.interface, report.equilibrium,
+        std::span(report.modes.modes).first(static_cast<std::size_t>(std::max(report.modes.unstable_count, 1))),
+        report.estimate, scene.cycle, model.probes);
   return cycle;
 }
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 namespace squeal
@@ -88,46 +89,95 @@ Flow flow_of(PeriodMap& map)
   return {integrate, map.structure.M, map.structure.K};
 }
 
-LimitCycle find_cycle(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                      const ComplexMode& mode, const Estimate& estimate, const CycleSettings& settings, Mat probes)
+namespace
 {
-  double lift_off_multiple = 2, band_factor = 3;
-  PetscInt samples = 32;
-  check(PetscOptionsGetReal(nullptr, "cycle_", "-lift_off_multiple", &lift_off_multiple, nullptr));
-  check(PetscOptionsGetReal(nullptr, "cycle_", "-band_factor", &band_factor, nullptr));
-  check(PetscOptionsGetInt(nullptr, "cycle_", "-samples", &samples, nullptr));
-  if (samples < 1) throw Error("-cycle_samples must be at least 1");
 
-  const bool balance = estimate.outcome.word == "balance";
-  const double amplitude = balance ? estimate.amplitude : lift_off_multiple * estimate.lift_off_amplitude;
-  if (!(amplitude > 0) || !std::isfinite(amplitude) || mode.lambda.imag() == 0)
+struct StartOptions
+{
+  PetscReal amplitude = 1, phase = 0, period = 1, band_factor = 3; // [-], degrees, [-], [-]
+  PetscInt samples = 32;
+};
+
+StartOptions read_options()
+{
+  StartOptions options;
+  check(PetscOptionsGetReal(nullptr, "cycle_", "-start_amplitude", &options.amplitude, nullptr));
+  check(PetscOptionsGetReal(nullptr, "cycle_", "-start_phase", &options.phase, nullptr));
+  check(PetscOptionsGetReal(nullptr, "cycle_", "-start_period", &options.period, nullptr));
+  check(PetscOptionsGetReal(nullptr, "cycle_", "-band_factor", &options.band_factor, nullptr));
+  check(PetscOptionsGetInt(nullptr, "cycle_", "-samples", &options.samples, nullptr));
+  if (!(options.amplitude > 0)) throw Error("-cycle_start_amplitude must be above 0");
+  if (!(options.period > 0)) throw Error("-cycle_start_period must be above 0");
+  if (options.samples < 1) throw Error("-cycle_samples must be at least 1");
+  return options;
+}
+
+bool usable(const ComplexMode& mode, double amplitude)
+{
+  return amplitude > 0 && std::isfinite(amplitude) && mode.lambda.imag() != 0;
+}
+
+/// Motion of one mode, and of the others that grow: their starts are added, their shapes noted as able to sleep.
+void wake(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+          std::span<const ComplexMode> others, const StartOptions& options, State& state, ShootingStart& start)
+{
+  for (const ComplexMode& mode : others)
+  {
+    const Estimate estimate = estimate_amplitude(structure, interface, equilibrium, mode);
+    const double amplitude = start_amplitude(estimate);
+    if (!usable(mode, amplitude)) continue;
+    State motion = mode_state(equilibrium, mode, options.amplitude * amplitude, estimate.phase);
+    check(VecAXPY(motion.u, -1, equilibrium.u));
+    check(VecAXPY(state.u, 1, motion.u));
+    check(VecAXPY(state.v, 1, motion.v));
+    start.asleep.push_back(state_of(motion.u, motion.v));
+  }
+}
+
+double fluctuation_norm(const Structure& structure, const Equilibrium& equilibrium, const State& state)
+{
+  const Owned<Vec> moved = copy_of(state.u.get());
+  check(VecAXPY(moved, -1, equilibrium.u));
+  return std::sqrt(2 * (potential_energy(structure, moved) + kinetic_energy(structure, state.v)));
+}
+
+} // namespace
+
+LimitCycle find_cycle(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                      std::span<const ComplexMode> unstable, const Estimate& estimate, const CycleSettings& settings,
+                      Mat probes)
+{
+  const StartOptions options = read_options();
+  const ComplexMode& mode = unstable.front();
+  const double amplitude = options.amplitude * start_amplitude(estimate);
+  if (!usable(mode, amplitude))
   {
     LimitCycle skipped;
     skipped.outcome = {"skipped", "no amplitude to start from: no energy balance and no lift-off, or no oscillation", 0,
                        std::nan("")};
     return skipped;
   }
-  const State first = mode_state(equilibrium, mode, amplitude, estimate.phase);
+  State first = mode_state(equilibrium, mode, amplitude, estimate.phase + options.phase * std::numbers::pi / 180);
   const double frequency_hz = mode.frequency_hz();
   SlidingPreconditioner preconditioner;
-  if (band_factor > 0)
-    preconditioner =
-        make_preconditioner(structure, interface, equilibrium,
-                            find_real_modes_below(structure, interface, equilibrium, band_factor * frequency_hz),
-                            settings.steps_per_period, settings.theta);
+  if (options.band_factor > 0)
+    preconditioner = make_preconditioner(
+        structure, interface, equilibrium,
+        find_real_modes_below(structure, interface, equilibrium, options.band_factor * frequency_hz),
+        settings.steps_per_period, settings.theta);
   PeriodMap map{structure, interface, settings.steps_per_period, settings.theta};
   map.reactions = equilibrium.reactions;
   const Flow flow = flow_of(map);
-  const double event = std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude) / amplitude;
-  const Owned<Vec> moved = copy_of(first.u.get());
-  check(VecAXPY(moved, -1, equilibrium.u));
-  const double size = std::sqrt(2 * (potential_energy(structure, moved) + kinetic_energy(structure, first.v)));
-  const ShootingStart start{
-      equilibrium.u, first.u, first.v, 1 / frequency_hz, {mode.real, mode.imaginary, equilibrium.u}, event * size};
+  const double first_event = std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude) / amplitude *
+                             fluctuation_norm(structure, equilibrium, first);
+  ShootingStart start{
+      equilibrium.u, first.u, first.v, options.period / frequency_hz, {mode.real, mode.imaginary, equilibrium.u}, {},
+      first_event};
+  wake(structure, interface, equilibrium, unstable.subspan(1), options, first, start);
   LimitCycle cycle = shoot(flow, start, preconditioner, settings.tolerance, settings.free_periods);
   cycle.steps_per_period = settings.steps_per_period;
   cycle.theta = settings.theta;
-  measure(map, equilibrium, probes, static_cast<int>(samples), cycle);
+  measure(map, equilibrium, probes, static_cast<int>(options.samples), cycle);
   if (map.step.law == ContactLaw::velocity && cycle.outcome.word != "converged")
     cycle.outcome.reason += "; by the velocity law the period map jumps where a step begins open or closed: "
                             "-transient_contact_law displacement";

@@ -1,6 +1,8 @@
 /// Floquet multipliers: eigenvalues of dPhi_T/dx at the cycle, by Arnoldi in the energy product on difference
-/// quotients of the flow. With as many steps as the state has entries it is the whole monodromy matrix.
-/// Caveat: one multiplier is 1 (a shift in time); how far from 1 it comes out is the error bar of the verdict.
+/// quotients of the flow. With as many steps as the state has entries it is the whole monodromy matrix. With fewer it
+/// starts from the motions that may grow, a change of amplitude and the unstable modes that the cycle leaves asleep,
+/// and the flow's own direction d is taken out along itself, so that the shift in time, whose multiplier is 1, is not
+/// found. Caveat: how far from 1 the shift in time itself comes out is the error bar of the verdict.
 #include "squeal/analysis/shooting.hpp"
 
 #include <algorithm>
@@ -26,10 +28,30 @@ Owned<Vec> monodromy(Shooting& shooting, const Orbit& orbit, Vec direction)
   return end;
 }
 
-/// The start holds every direction, reproducibly and whatever the number of ranks.
-Owned<Vec> starting_vector(const Shooting& shooting, const Orbit& orbit)
+/// The monodromy matrix, or what it does beside the flow.
+struct Tangent
 {
-  Owned<Vec> start = zeros_like(orbit.state);
+  Owned<Vec> phase;   // energy image of the unit flow f, divided by |d|; null: nothing is taken out
+  Vec rate = nullptr; // d
+
+  void project(Vec x) const
+  {
+    if (!phase.get()) return;
+    double along = 0;
+    check(VecDot(phase, x, &along));
+    check(VecAXPY(x, -along, rate));
+  }
+};
+
+void normalise(const Shooting& shooting, Vec x)
+{
+  check(VecScale(x, 1 / std::max(energy_norm(shooting.flow, x), 1e-300)));
+}
+
+/// Holds every direction, reproducibly and whatever the number of ranks.
+Owned<Vec> every_direction(const Shooting& shooting)
+{
+  Owned<Vec> start = zeros_like(shooting.equilibrium);
   int part = 0;
   for (const Vec vector : {displacement(start), velocity(start)})
   {
@@ -45,72 +67,146 @@ Owned<Vec> starting_vector(const Shooting& shooting, const Orbit& orbit)
     check(VecScale(vector, 1 / std::max(energy_norm(shooting.flow, alone), 1e-300)));
     ++part;
   }
-  check(VecScale(start, 1 / energy_norm(shooting.flow, start)));
   return start;
 }
 
-std::vector<std::complex<double>> eigenvalues(std::vector<double> H, int size)
+/// A change of amplitude, and what sleeps.
+Owned<Vec> suspects(const Shooting& shooting, const Orbit& orbit, const std::vector<Owned<Vec>>& asleep)
 {
-  const std::size_t n = static_cast<std::size_t>(size);
-  std::vector<double> real(n), imaginary(n), work(16 * n);
-  PetscBLASInt order = size, one = 1, work_size = 16 * size, info = 0;
+  Owned<Vec> start = copy_of(orbit.state);
+  check(VecAXPY(start, -1, shooting.equilibrium));
+  normalise(shooting, start);
+  for (const Owned<Vec>& motion : asleep) check(VecAXPY(start, 1 / energy_norm(shooting.flow, motion), motion));
+  return start;
+}
+
+struct Krylov
+{
+  std::vector<Owned<Vec>> base;
+  std::vector<double> H; // column-major, size x size
+  int size = 0;
+};
+
+Krylov arnoldi(Shooting& shooting, const Orbit& orbit, const Tangent& tangent, Owned<Vec> start, int steps)
+{
+  const auto n = static_cast<std::size_t>(steps);
+  Krylov krylov;
+  std::vector<double> all(n * n);
+  tangent.project(start);
+  normalise(shooting, start);
+  krylov.base.push_back(std::move(start));
+  while (krylov.size < steps)
+  {
+    const auto k = static_cast<std::size_t>(krylov.size++);
+    Owned<Vec> image = monodromy(shooting, orbit, krylov.base[k]);
+    tangent.project(image);
+    for (int pass = 0; pass < 2; ++pass)
+      for (std::size_t i = 0; i <= k; ++i)
+      {
+        const double along = energy_product(shooting.flow, krylov.base[i], image);
+        all[i + k * n] += along;
+        check(VecAXPY(image, -along, krylov.base[i]));
+      }
+    const double left = energy_norm(shooting.flow, image);
+    if (krylov.size == steps || left < 1e-6) break; // the rest is noise of the differences
+    all[k + 1 + k * n] = left;
+    check(VecScale(image, 1 / left));
+    krylov.base.push_back(std::move(image));
+  }
+  const auto m = static_cast<std::size_t>(krylov.size);
+  krylov.H.resize(m * m);
+  for (std::size_t i = 0; i < m; ++i)
+    for (std::size_t k = 0; k < m; ++k) krylov.H[i + k * m] = all[i + k * n];
+  return krylov;
+}
+
+struct Ritz
+{
+  std::complex<double> value;
+  std::vector<double> real; // part of the vector, in the Krylov base
+};
+
+/// Largest first.
+std::vector<Ritz> eigenvalues(const Krylov& krylov)
+{
+  const auto n = static_cast<std::size_t>(krylov.size);
+  std::vector<double> H = krylov.H, real(n), imaginary(n), vectors(n * n), work(16 * n);
+  PetscBLASInt order = krylov.size, one = 1, work_size = 16 * krylov.size, info = 0;
   double unused = 0;
-  LAPACKgeev_("N", "N", &order, H.data(), &order, real.data(), imaginary.data(), &unused, &one, &unused, &one,
+  LAPACKgeev_("N", "V", &order, H.data(), &order, real.data(), imaginary.data(), &unused, &one, vectors.data(), &order,
               work.data(), &work_size, &info);
   if (info != 0) throw Error("cycle: the eigenvalues of the monodromy matrix did not converge");
-  std::vector<std::complex<double>> result;
-  for (std::size_t i = 0; i < n; ++i) result.emplace_back(real[i], imaginary[i]);
-  std::sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return std::abs(a) > std::abs(b); });
+  std::vector<Ritz> result;
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    const auto column = vectors.begin() + static_cast<std::ptrdiff_t>((imaginary[i] < 0 ? i - 1 : i) * n);
+    result.push_back({{real[i], imaginary[i]}, {column, column + static_cast<std::ptrdiff_t>(n)}});
+  }
+  std::sort(result.begin(), result.end(),
+            [](const Ritz& a, const Ritz& b) { return std::abs(a.value) > std::abs(b.value); });
   return result;
+}
+
+/// The shift's own multiplier, in the middle of what the monodromy matrix makes of it.
+double shift_multiplier(Shooting& shooting, const Orbit& orbit)
+{
+  const Owned<Vec> shift = copy_of(orbit.rate.get());
+  normalise(shooting, shift);
+  const Owned<Vec> image = monodromy(shooting, orbit, shift);
+  return energy_product(shooting.flow, shift, image);
+}
+
+std::string verdict(double largest, double margin)
+{
+  return largest < 1 - margin ? "stable" : largest > 1 + margin ? "unstable" : "undecided";
 }
 
 } // namespace
 
-void find_multipliers(Shooting& shooting, const Orbit& orbit, LimitCycle& cycle)
+Owned<Vec> find_multipliers(Shooting& shooting, const Orbit& orbit, const std::vector<Owned<Vec>>& asleep,
+                            LimitCycle& cycle)
 {
   PetscInt dofs = 0;
   check(VecGetSize(displacement(orbit.state), &dofs));
   PetscInt wanted = shooting.options.multipliers;
-  if (wanted < 0) wanted = dofs <= 25 ? 2 * dofs : 0;
+  if (wanted < 0) wanted = dofs <= 25 ? 2 * dofs : 8 + 2 * static_cast<PetscInt>(asleep.size());
+  cycle.multipliers.clear();
+  cycle.stability.clear();
   const int steps = static_cast<int>(std::min(wanted, 2 * dofs));
-  if (steps == 0) return;
-  const std::size_t n = static_cast<std::size_t>(steps);
-  std::vector<Owned<Vec>> base;
-  std::vector<double> hessenberg(n * n); // column-major
-  base.push_back(starting_vector(shooting, orbit));
-  int done = 0;
-  while (done < steps)
+  if (steps == 0) return {};
+  const bool whole = steps == 2 * dofs;
+  Tangent tangent;
+  if (!whole)
   {
-    const std::size_t k = static_cast<std::size_t>(done++);
-    Owned<Vec> image = monodromy(shooting, orbit, base[k]);
-    ++cycle.multiplier_periods;
-    for (int pass = 0; pass < 2; ++pass)
-      for (std::size_t i = 0; i <= k; ++i)
-      {
-        const double along = energy_product(shooting.flow, base[i], image);
-        hessenberg[i + k * n] += along;
-        check(VecAXPY(image, -along, base[i]));
-      }
-    const double left = energy_norm(shooting.flow, image);
-    if (done == steps || left < 1e-6) break; // the rest is noise of the differences
-    hessenberg[k + 1 + k * n] = left;
-    check(VecScale(image, 1 / left));
-    base.push_back(std::move(image));
+    const double speed = energy_norm(shooting.flow, orbit.rate);
+    tangent = {zeros_like(orbit.rate), orbit.rate};
+    energy_image(shooting.flow, orbit.rate, tangent.phase);
+    check(VecScale(tangent.phase, 1 / (speed * speed)));
   }
-  const std::size_t m = static_cast<std::size_t>(done);
-  std::vector<double> H(m * m);
-  for (std::size_t i = 0; i < m; ++i)
-    for (std::size_t k = 0; k < m; ++k) H[i + k * m] = hessenberg[i + k * n];
-  cycle.multipliers = eigenvalues(std::move(H), done);
-  const auto distance = [](std::complex<double> multiplier) { return std::abs(multiplier - 1.); };
-  const auto trivial = std::min_element(cycle.multipliers.begin(), cycle.multipliers.end(),
-                                        [&](auto a, auto b) { return distance(a) < distance(b); });
-  cycle.trivial_error = distance(*trivial);
-  double largest = 0;
-  for (auto it = cycle.multipliers.begin(); it != cycle.multipliers.end(); ++it)
-    if (it != trivial) largest = std::max(largest, std::abs(*it));
-  const double margin = std::max(cycle.trivial_error, 1e-6);
-  cycle.stability = largest < 1 - margin ? "stable" : largest > 1 + margin ? "unstable" : "undecided";
+  const Krylov krylov =
+      arnoldi(shooting, orbit, tangent, whole ? every_direction(shooting) : suspects(shooting, orbit, asleep), steps);
+  std::vector<Ritz> found = eigenvalues(krylov);
+  cycle.multiplier_periods += krylov.size;
+  if (whole)
+  {
+    const auto shift =
+        std::min_element(found.begin(), found.end(),
+                         [](const Ritz& a, const Ritz& b) { return std::abs(a.value - 1.) < std::abs(b.value - 1.); });
+    cycle.trivial_error = std::abs(shift->value - 1.);
+    found.erase(shift);
+  }
+  else
+  {
+    cycle.trivial_error = std::abs(shift_multiplier(shooting, orbit) - 1);
+    ++cycle.multiplier_periods;
+  }
+  if (found.empty()) return {};
+  for (const Ritz& ritz : found) cycle.multipliers.push_back(ritz.value);
+  cycle.stability = verdict(std::abs(found.front().value), std::max(cycle.trivial_error, whole ? 1e-6 : 1e-2));
+  Owned<Vec> growing = zeros_like(orbit.state);
+  for (std::size_t i = 0; i < krylov.base.size(); ++i) check(VecAXPY(growing, found.front().real[i], krylov.base[i]));
+  normalise(shooting, growing);
+  return growing;
 }
 
 } // namespace squeal

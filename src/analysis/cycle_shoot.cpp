@@ -96,6 +96,55 @@ Finish finish_in_full_space(Shooting& shooting, Orbit start)
   return finish;
 }
 
+/// Off a cycle that repels, along what grows and first towards less energy, far enough that free periods lead
+/// elsewhere: another cycle, or the same one.
+Finish leave(Shooting& shooting, const Finish& found, Vec growing)
+{
+  const Orbit& orbit = found.orbit;
+  const Owned<Vec> fluctuation = copy_of(orbit.state);
+  check(VecAXPY(fluctuation, -1, shooting.equilibrium));
+  const double outwards = energy_product(shooting.flow, fluctuation, growing) > 0 ? 1 : -1;
+  for (const double side : {-outwards, outwards})
+  {
+    if (shooting.periods >= shooting.options.max_periods) break;
+    const Owned<Vec> start = copy_of(orbit.state);
+    check(VecAXPY(start, 0.1 * side * orbit.fluctuation, growing));
+    Finish other = finish_in_full_space(shooting, free_periods(shooting, start, orbit.period, 20));
+    if (other.ending == Ending::converged) return other;
+  }
+  return {copy_of(orbit), found.ending};
+}
+
+/// The multipliers' verdict on a converged cycle. One that repels is left for another that may not.
+Finish attracting(Shooting& shooting, Finish finish, const std::vector<Owned<Vec>>& asleep, LimitCycle& cycle)
+{
+  const Owned<Vec> growing = find_multipliers(shooting, finish.orbit, asleep, cycle);
+  if (cycle.stability != "unstable" || shooting.periods >= shooting.options.max_periods) return finish;
+  Finish other = leave(shooting, finish, growing);
+  LimitCycle second;
+  find_multipliers(shooting, other.orbit, asleep, second);
+  cycle.multiplier_periods += second.multiplier_periods;
+  if (second.stability == "unstable") return finish;
+  cycle.multipliers = std::move(second.multipliers);
+  cycle.stability = second.stability;
+  cycle.trivial_error = second.trivial_error;
+  return other;
+}
+
+/// A cycle that repels is no answer; with more than one unstable mode the motion need not be periodic at all.
+void judge(LimitCycle& cycle, std::size_t asleep)
+{
+  if (cycle.outcome.word != "converged" || cycle.stability != "unstable") return;
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(), "the cycle found repels: a small motion beside it grows %.4g times a period",
+                std::abs(cycle.multipliers.front()));
+  cycle.outcome.word = asleep == 0 ? "unstable cycle" : "not periodic";
+  cycle.outcome.reason = text.data();
+  cycle.outcome.reason += asleep == 0 ? "; try another start (-cycle_start_amplitude) or more free periods"
+                                      : "; " + std::to_string(asleep + 1) +
+                                            " modes are unstable and the motion may be quasi-periodic: integrate it";
+}
+
 Outcome outcome_of(const Shooting& shooting, const Finish& finish)
 {
   Outcome outcome{"not converged", "", shooting.iterations, finish.orbit.residual};
@@ -148,16 +197,17 @@ LimitCycle shoot(const Flow& flow, const ShootingStart& start, const SlidingPrec
   shooting.least_fluctuation = std::min(orbit.fluctuation, start.first_event) * std::sqrt(0.1);
   if (orbit.residual > tolerance && shooting.options.reduced_newtons != 0)
     orbit = reduce(shooting, std::move(orbit), start.shapes);
-  const Finish finish = finish_in_full_space(shooting, std::move(orbit));
+  Finish finish = finish_in_full_space(shooting, std::move(orbit));
 
   LimitCycle cycle;
+  if (finish.ending == Ending::converged) finish = attracting(shooting, std::move(finish), start.asleep, cycle);
   cycle.outcome = outcome_of(shooting, finish);
   cycle.period = finish.orbit.period;
   cycle.residual_projected = shooting.residual_projected;
   cycle.residual_full = finish.orbit.residual;
   cycle.newton_iterations = shooting.iterations;
   cycle.start = {copy_of(displacement(finish.orbit.state)), copy_of(velocity(finish.orbit.state)), 0, {}};
-  if (cycle.outcome.word == "converged") find_multipliers(shooting, finish.orbit, cycle);
+  judge(cycle, start.asleep.size());
   cycle.periods_integrated = shooting.periods;
   cycle.records = std::move(shooting.records);
   return cycle;

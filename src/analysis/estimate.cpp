@@ -316,6 +316,13 @@ Estimate estimate_amplitude(const Structure& structure, const Interface& interfa
   return result;
 }
 
+double start_amplitude(const Estimate& estimate)
+{
+  double multiple = 2;
+  check(PetscOptionsGetReal(nullptr, "estimate_", "-lift_off_multiple", &multiple, nullptr));
+  return estimate.outcome.word == "balance" ? estimate.amplitude : multiple * estimate.lift_off_amplitude;
+}
+
 State mode_state(const Equilibrium& equilibrium, const ComplexMode& mode, double amplitude, double phase)
 {
   const Complex shape = amplitude * std::polar(1.0, phase), speed = mode.lambda * shape;

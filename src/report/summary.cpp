@@ -129,8 +129,8 @@ std::string cycle_text(const Report& report, const Scene& scene)
   text += row("", format("open pairs: %.2f on average, %d at most; sticking: %d at most", cycle.open_pairs_mean,
                          cycle.open_pairs_max, cycle.stick_pairs_max));
   if (!cycle.multipliers.empty())
-    text += row("", format("%s: largest multiplier %.6f, error bar %.1e", cycle.stability.c_str(),
-                           std::abs(cycle.multipliers.front()), cycle.trivial_error));
+    text += row("", format("%s by %zu multipliers: the largest is %.6f, error bar %.1e", cycle.stability.c_str(),
+                           cycle.multipliers.size(), std::abs(cycle.multipliers.front()), cycle.trivial_error));
   const std::size_t probes = std::min(scene.probes.size(), cycle.peak_to_peak.size());
   for (std::size_t i = 0; i < probes; ++i)
     text += row("", format("probe %s: %.6g m peak to peak", scene.probes[i].name.c_str(), cycle.peak_to_peak[i]));

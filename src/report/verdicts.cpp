@@ -45,7 +45,7 @@ Sentences of_estimate(const Report& report)
   const Estimate& estimate = report.estimate;
   const double lift_off = estimate.lift_off_amplitude;
   if (estimate.outcome.word == "no balance" && std::isfinite(lift_off))
-    return {format("no amplitude is predicted; shooting starts from first lift-off times -cycle_lift_off_multiple, "
+    return {format("no amplitude is predicted; shooting starts from first lift-off times -estimate_lift_off_multiple, "
                    "%.5g m by default",
                    2 * lift_off)};
   Sentences said;
@@ -98,9 +98,9 @@ Sentences of_cycle(const Report& report)
                           100 * bias.growth));
   if (cycle.residual_full > 1e-3) said.push_back("a residual this large is no proof of a periodic motion");
   add_chatter(cycle.history, said);
-  if (report.modes.unstable_count > 1)
-    said.push_back(format("%d modes are unstable, and this cycle started on one: others may grow from it",
-                          report.modes.unstable_count));
+  if (cycle.stability == "undecided")
+    said.push_back(
+        "whether a vibration settles on this cycle is undecided: its largest multiplier is 1 to within its error");
   if (cycle.multipliers.empty())
     said.push_back("whether this cycle attracts was not examined: -cycle_multipliers 20 does");
   return said;

@@ -43,9 +43,7 @@ def test_brake_transient(brakes):
 
 
 def test_brake_carries_its_clamp_force(brakes):
-    """A side's reactions and its carrier's spring (1e6 N/m) together carry 1000 N, to 1e-9."""
+    """The reactions of each side sum to its carrier's 1000 N: nothing else holds the carriers along the normal."""
     for run in brakes:
-        equilibrium = run["equilibrium"]
-        for contact, carrier, sign in zip(equilibrium["contacts"], ("carrier_top", "carrier_bottom"), (-1, 1)):
-            spring = sign * 1e6 * equilibrium["probes"][carrier]
-            assert contact["normal_force_sum"] + spring == pytest.approx(1000, rel=1e-9)
+        for contact in run["equilibrium"]["contacts"]:
+            assert contact["normal_force_sum"] == pytest.approx(1000, rel=1e-9)

@@ -62,7 +62,7 @@ def test_without_a_balance_no_amplitude_is_claimed_and_the_start_is_named(squeal
     run = oscillator_cycle(squeal, 0.3, 1e5)
     estimate = run.report["estimate"]
     assert run.code == 0 and estimate["outcome"] == "no balance" and estimate["amplitude"] is None
-    assert "-cycle_lift_off_multiple" in run.printed
+    assert "-estimate_lift_off_multiple" in run.printed
     fast = oscillator_cycle(squeal, 0.3, 1000).report  # a balance, but the cycle never notices so fast a belt either
     assert fast["estimate"]["outcome"] == "balance"
     assert abs(run.report["cycle"]["period"] / fast["cycle"]["period"] - 1) < 1e-4

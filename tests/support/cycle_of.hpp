@@ -22,7 +22,7 @@ inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double 
   settings.steps_per_period = steps;
   settings.free_periods = free;
   settings.tolerance = tolerance;
-  return find_cycle(model.structure, model.interface, equilibrium, mode, estimate, settings, nullptr);
+  return find_cycle(model.structure, model.interface, equilibrium, {&mode, 1}, estimate, settings, nullptr);
 }
 
 } // namespace squeal::test

@@ -6,6 +6,7 @@
 #include "squeal/analysis/transient.hpp"
 
 #include <limits>
+#include <span>
 
 namespace squeal
 {
@@ -27,8 +28,9 @@ struct NewtonRecord
   double residual_projected = 0, residual_full = 0;
 };
 
-/// outcome: "converged", "collapsed to equilibrium", "not converged", "not periodic" (T left [T0/2, 2 T0]), "skipped".
-/// residual: the full-space one, |Phi_T(x0) - x0| / |x0 - equilibrium| in the energy norm.
+/// outcome: "converged", "collapsed to equilibrium", "not converged", "not periodic" (T left [T0/2, 2 T0], or several
+/// modes are unstable and every cycle found repels), "unstable cycle" (it repels: no vibration settles there),
+/// "skipped". residual: the full-space one, |Phi_T(x0) - x0| / |x0 - equilibrium| in the energy norm.
 struct LimitCycle
 {
   Outcome outcome;
@@ -49,10 +51,10 @@ struct LimitCycle
   History history;                                  // of one period
   std::vector<Owned<Vec>> displacements;            // samples of u over the period, for fields.h5
   std::vector<std::vector<ContactStatus>> statuses; // [step][pair]
-  // Floquet multipliers, largest first; empty when they were not asked for
+  // Floquet multipliers but the one of a shift in time, largest first; empty when they were not asked for
   std::vector<std::complex<double>> multipliers;
   std::string stability;       // "stable", "unstable", "undecided", or "" without multipliers
-  double trivial_error = 0;    // distance of the multiplier nearest 1 from 1: the error bar of the verdict
+  double trivial_error = 0;    // distance of the shift's own multiplier from 1: the error bar of the verdict
   long multiplier_periods = 0; // integrated for them, not in periods_integrated
 };
 
@@ -61,8 +63,9 @@ struct ShootingStart
 {
   Vec equilibrium = nullptr; // u0 [m]
   Vec u = nullptr, v = nullptr;
-  double period = 0;       // [s]
-  std::vector<Vec> shapes; // the paper's phi_r, phi_i, phi_e: of the displacements and of the velocities alike
+  double period = 0;                // [s]
+  std::vector<Vec> shapes;          // the paper's phi_r, phi_i, phi_e: of the displacements and of the velocities alike
+  std::vector<Owned<Vec>> asleep{}; // motions (u, v) of the other unstable modes, which a cycle may leave out
   double first_event = std::numeric_limits<double>::infinity(); // energy norm at which lift-off or reversal begins
 };
 
@@ -111,10 +114,12 @@ struct PeriodMap
 /// Borrows the map.
 Flow flow_of(PeriodMap& map);
 
-/// From the energy estimate, or from -cycle_lift_off_multiple (2) times first lift-off when it has no balance. Further
-/// options: -cycle_band_factor (3), the preconditioner's real modes reach this many times the mode's frequency;
-/// -cycle_samples (32), displacements kept over the last period.
+/// From the energy estimate of the first of the unstable modes, which the cycle follows, and those of the others on
+/// top: none may be left asleep. Options: -cycle_start_amplitude, -cycle_start_period (multiples of the estimate's, 1),
+/// -cycle_start_phase (degrees from the estimate's, 0); -cycle_band_factor (3), the preconditioner's real modes reach
+/// this many times the mode's frequency; -cycle_samples (32), displacements kept over the last period.
 LimitCycle find_cycle(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                      const ComplexMode& mode, const Estimate& estimate, const CycleSettings& settings, Mat probes);
+                      std::span<const ComplexMode> unstable, const Estimate& estimate, const CycleSettings& settings,
+                      Mat probes);
 
 } // namespace squeal

@@ -37,6 +37,10 @@ struct Estimate
 Estimate estimate_amplitude(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                             const ComplexMode& mode);
 
+/// Where vibrations start from: the balance, or -estimate_lift_off_multiple (2) times first lift-off without one [m].
+/// A start well above the cycle falls onto it; one below may fall onto the equilibrium.
+double start_amplitude(const Estimate& estimate);
+
 /// State u0 + q Re(phi e^{i phase}), v = q Re(lambda phi e^{i phase}) (paper, eqs. 18-19).
 State mode_state(const Equilibrium& equilibrium, const ComplexMode& mode, double amplitude, double phase);
 

@@ -20,7 +20,7 @@ struct ShootingOptions
   PetscReal clamp = 0.3;           // of the fluctuation: longest step
   PetscInt stall = 30;             // iterations without progress
   PetscInt max_periods = 400;
-  PetscInt multipliers = -1; // Krylov dimension; -1: all of a system of at most 25 degrees of freedom, else none
+  PetscInt multipliers = -1; // Krylov dimension; 0: none; -1: as many as the option table says
 };
 
 /// A candidate and what one evaluation of the flow says about it.
@@ -111,7 +111,9 @@ Border border_at(const Shooting& shooting, const Orbit& orbit);
 /// Turns y = P^-1 b into x; returns t.
 double close_border(const Border& border, Vec y, double row);
 
-/// Multipliers by Arnoldi on difference quotients, in the energy product.
-void find_multipliers(Shooting& shooting, const Orbit& orbit, LimitCycle& cycle);
+/// Multipliers by Arnoldi on difference quotients, in the energy product, into the cycle: all of a small system, else
+/// of the motions that may grow, those `asleep` among them. The motion of the largest; null if none was asked for.
+Owned<Vec> find_multipliers(Shooting& shooting, const Orbit& orbit, const std::vector<Owned<Vec>>& asleep,
+                            LimitCycle& cycle);
 
 } // namespace squeal

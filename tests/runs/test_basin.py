@@ -1,0 +1,46 @@
+"""Where shooting leads from a start: to the cycle heard, to another, or to the statement that the motion is no cycle."""
+
+import cmath
+import re
+
+import pytest
+from conftest import INPUTS
+
+SLOWER = 1.2720196495  # square root of the golden ratio: no common period within any number of turns that matters
+
+
+def two_oscillators(folder, damping=1.0):
+    """inputs/oscillator beside its own copy, slowed; the copy's dashpots `damping` times as strong."""
+    text = (INPUTS / "oscillator" / "scene.toml").read_text()
+    one = text[text.index("[[point]]"):text.index("[friction]")]
+    scaled = {"mass": SLOWER**2, "damping": SLOWER * damping}
+    two = re.sub(r"(mass|damping) = ([\d.]+)", lambda m: f"{m[1]} = {float(m[2]) * scaled[m[1]]!r}", one)
+    two = two.replace('"pad"', '"pad2"').replace('"disc"', '"disc2"')
+    two = two.replace("velocity = [0.6, 0, 0]", f"velocity = [{0.6 / SLOWER!r}, 0, 0]")
+    scene = folder / "scene.toml"
+    scene.write_text(text.replace(one, one + two))
+    return [scene, "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=100"]
+
+
+def test_a_torus_is_not_periodic(squeal, tmp_path):
+    """The cycle of either oscillator leaves the other at rest: it solves the equations and nothing ever settles there."""
+    run = squeal(*two_oscillators(tmp_path), ranks=1)
+    report = run.report
+    assert run.code == 2 and report["modes"]["unstable_count"] == 2
+    cycle = report["cycle"]
+    assert cycle["outcome"] == "not periodic"
+    assert "2 modes are unstable" in cycle["reason"] and "quasi-periodic" in cycle["reason"]
+    assert "NOT PERIODIC" in run.printed and "Hz\n" not in run.printed.split("cycle ")[-1]
+    # the motion that grows is the sleeping mode's own: 1e-3, what 100 steps a period leave of a growth of 12 %
+    largest = cycle["multipliers"]["values"][0]
+    rates = [mode["growth_rate"] for mode in report["modes"]["modes"][:2]]
+    grown = [cmath.exp(rate * cycle["period"]).real for rate in rates]
+    assert min(abs(abs(complex(largest["real"], largest["imaginary"])) - growth) for growth in grown) < 1e-3
+
+
+def test_beside_a_neighbour_that_is_stable_the_cycle_is_found(squeal, tmp_path):
+    run = squeal(*two_oscillators(tmp_path, damping=5), ranks=1)
+    assert run.code == 0 and run.report["modes"]["unstable_count"] == 1
+    cycle = run.report["cycle"]
+    assert cycle["outcome"] == "converged" and cycle["multipliers"]["stability"] == "stable"
+    assert cycle["period"] == pytest.approx(5.954461004653, rel=1e-3)  # exact; 100 steps a period leave 3e-4
