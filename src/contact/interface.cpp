@@ -115,7 +115,7 @@ Interface make_interface(const Mesh& mesh, const std::vector<NodePair>& pairs, c
     for (const Vec3& axis : axes) interface.drive.push_back(dot(velocity, axis));
     interface.position.push_back(at);
     interface.contact.push_back(pair.contact);
-    interface.gap.push_back(contact.gap);
+    interface.gap.push_back(contact.gap + pair.gap);
     if (i < first || i >= last) continue;
     axes.insert(axes.begin(), pair.normal);
     for (const Vec3& axis : axes)

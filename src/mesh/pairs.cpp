@@ -141,6 +141,29 @@ std::vector<int> partners(const std::vector<int>& from, const std::vector<int>& 
   throw Error(text.str());
 }
 
+// Where nodes are compared: with a reach, as they are seen along the normal.
+std::vector<Vec3> compared_at(const Mesh& mesh, const Contact& contact)
+{
+  std::vector<Vec3> x = mesh.nodes;
+  if (contact.reach > 0)
+    for (Vec3& at : x) at = at - dot(at, *contact.normal) * *contact.normal;
+  return x;
+}
+
+// By how much the partners stand apart along the normal.
+double distance_of(const Mesh& mesh, const Contact& contact, int a, int b)
+{
+  if (contact.reach == 0) return 0;
+  const double distance = dot(mesh.nodes[b] - mesh.nodes[a], *contact.normal);
+  if (distance >= -1e-6 * contact.reach && distance <= contact.reach) return std::max(0., distance);
+  std::ostringstream text;
+  text << "contact surfaces '" << contact.rotor << "' and '" << contact.stator << "': partners at (" << mesh.nodes[a][0]
+       << ", " << mesh.nodes[a][1] << ", " << mesh.nodes[a][2] << ") are " << distance << " m apart along the normal, "
+       << (distance < 0 ? "the stator inside the rotor: turn the normal or mend the mesh"
+                        : "farther than the contact's reach: raise it or make the surfaces smaller");
+  throw Error(text.str());
+}
+
 void match_surfaces(const Mesh& mesh, const Contact& contact, int index, std::vector<NodePair>& pairs)
 {
   const std::vector<Face>& faces = contact_surface(mesh, contact.rotor);
@@ -151,8 +174,9 @@ void match_surfaces(const Mesh& mesh, const Contact& contact, int index, std::ve
     throw Error("contact surfaces '" + contact.rotor + "' and '" + contact.stator + "' share " +
                 std::to_string(shared.size()) +
                 " nodes, so the bodies are joined there: give each body its own copy of the surface and its nodes");
-  const std::vector<int> of_a = partners(a, b, mesh.nodes, contact.rotor, contact.stator);
-  partners(b, a, mesh.nodes, contact.stator, contact.rotor);
+  const std::vector<Vec3> x = compared_at(mesh, contact);
+  const std::vector<int> of_a = partners(a, b, x, contact.rotor, contact.stator);
+  partners(b, a, x, contact.stator, contact.rotor);
 
   std::map<int, std::pair<Vec3, double>> weight; // vector area and area of each rotor node
   for (const Face& face : faces)
@@ -169,7 +193,8 @@ void match_surfaces(const Mesh& mesh, const Contact& contact, int index, std::ve
   {
     const auto& [vector, area] = weight.at(a[i]);
     const Vec3 normal = contact.normal ? *contact.normal : vector;
-    pairs.push_back({a[i], of_a[i], (1 / norm(normal)) * normal, area, index});
+    pairs.push_back(
+        {a[i], of_a[i], (1 / norm(normal)) * normal, area, index, distance_of(mesh, contact, a[i], of_a[i])});
   }
 }
 
@@ -193,7 +218,7 @@ std::vector<NodePair> match_pairs(const Mesh& mesh, const std::vector<Contact>& 
     if (!contact.normal)
       throw Error("contact between points '" + contact.rotor + "' and '" + contact.stator + "' needs a normal");
     pairs.push_back(
-        {rotor->second, stator->second, (1 / norm(*contact.normal)) * *contact.normal, 0, static_cast<int>(c)});
+        {rotor->second, stator->second, (1 / norm(*contact.normal)) * *contact.normal, 0, static_cast<int>(c), 0});
   }
   return pairs;
 }

@@ -132,6 +132,7 @@ Fields fields(Contact& c)
       {"rotor", &c.rotor, required, Rule::any, "text", "named surface or point that the drive moves", {}},
       {"stator", &c.stator, required, Rule::any, "text", "named surface or point that rubs on it", {}},
       {"gap", &c.gap, optional, Rule::any, "m", "initial gap, positive when open", {}},
+      {"reach", &c.reach, optional, Rule::not_negative, "m", "partners may be so far apart, which adds to the gap", {}},
       {"normal", &c.normal, optional, Rule::direction, "-", "out of the rotor; points need it, surfaces have it", {}},
       {"tangents", &c.tangents, optional, Rule::direction, "-", "one direction: plane friction along it; or two", {}},
       {"rotation", &c.rotation, optional, Rule::any, "table", "of the rotor: {axis, centre, rate}", {}},

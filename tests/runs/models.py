@@ -32,14 +32,17 @@ class Mesh:
         self.add(name, "point", np.reshape(nodes, (-1, 1)))
 
     def write(self, file):
-        lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(self.groups))]
-        for tag, (name, kind) in enumerate(self.groups, 1):
-            lines.append(f'{KINDS[kind][1]} {tag} "{name}"')
+        tags = {}  # of each name in each dimension
+        for name, kind in self.groups:
+            tags.setdefault((KINDS[kind][1], name), len(tags) + 1)
+        lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(tags))]
+        lines += [f'{dimension} {tag} "{name}"' for (dimension, name), tag in tags.items()]
         lines += ["$EndPhysicalNames", "$Nodes", str(len(self.nodes))]
         lines += [f"{i} {x!r} {y!r} {z!r}" for i, (x, y, z) in enumerate(np.array(self.nodes).tolist(), 1)]
         lines += ["$EndNodes", "$Elements", str(sum(map(len, self.groups.values())))]
         number = 0
-        for tag, ((_, kind), elements) in enumerate(self.groups.items(), 1):
+        for (name, kind), elements in self.groups.items():
+            tag = tags[KINDS[kind][1], name]
             for element in elements:
                 number += 1
                 lines.append(f"{number} {KINDS[kind][0]} 2 {tag} {tag} " + " ".join(str(n + 1) for n in element))

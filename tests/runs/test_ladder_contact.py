@@ -158,3 +158,67 @@ def test_every_scene_carries_its_clamp_force(converged, scene, clamp, springs, r
     # each pair counts at both of its nodes
     torque = mu * (r_n * np.hypot(x[:, 0], x[:, 1])).sum() / 2
     assert sum(contact["torque"] for contact in equilibrium["contacts"]) == pytest.approx(torque, rel=1e-9)
+
+
+def graded(size, n, ratio, end):
+    """n equal sizes, then growing ones up to the end."""
+    steps = [size] * n
+    while sum(steps) < end:
+        steps.append(steps[-1] * ratio)
+    return np.concatenate([[0], np.cumsum(steps)])
+
+
+def half_space(mesh, name, r, z, profile, segments=8):
+    """A quarter of a cylinder: wedges round the axis, bricks around them. Its circles are polygons of equal area."""
+    angle = np.linspace(0, np.pi / 2, segments + 1)
+    r = r / np.sqrt(np.sin(angle[1]) / angle[1])
+    depth = abs(z) / abs(z).max()
+
+    def at(radius, a, k):
+        return radius * np.cos(a), radius * np.sin(a), z[k] + (1 - depth[k]) * profile(radius)
+
+    levels = range(len(z))
+    axis = mesh.add_nodes([at(0, 0, k) for k in levels])
+    rings = mesh.add_nodes([[[at(radius, a, k) for k in levels] for a in angle] for radius in r[1:]])
+    mesh.add(name, "brick", bricks(rings))
+    inner = rings[0]
+    for j in range(segments):
+        below = np.stack([axis[:-1], inner[j, :-1], inner[j + 1, :-1]], axis=-1)
+        mesh.add(name, "wedge", np.hstack([below, np.stack([axis[1:], inner[j, 1:], inner[j + 1, 1:]], axis=-1)]))
+        mesh.add(f"{name}:end", "triangle", [[axis[-1], inner[j, -1], inner[j + 1, -1]]])
+    near = r[1:] < 2 * 6.8753e-4
+    faces = rings[near][:, :, 0]
+    mesh.add(f"{name}:face", "quad", quads(faces))
+    mesh.add(f"{name}:face", "triangle", [[axis[0], inner[j, 0], inner[j + 1, 0]] for j in range(segments)])
+    mesh.add(f"{name}:end", "quad", quads(rings[:, :, -1]))
+    mesh.add(f"{name}:side", "quad", quads(rings[-1]))
+    mesh.add_points("y=0", np.concatenate([axis, rings[:, 0].ravel()]))
+    mesh.add_points("x=0", np.concatenate([axis, rings[:, -1].ravel()]))
+    return np.concatenate([[axis[0]], faces.ravel()])
+
+
+@both
+def test_a_sphere_presses_as_hertz_says(converged, tmp_path, ranks):
+    """Steel, R = .05, 1000 N, ten bricks a contact radius, two half-spaces of 150 radii as in Hertz's theory. Approach
+    within 1 %: the far boundary, held, takes .4/150 of it, the mesh the rest. Radius within 3 %, from the second moment
+    of the reactions, 2 a^2/5: the circle itself is only known to a brick."""
+    radius, load, a, approach, p0 = .05, 1000.0, 6.8753e-4, 9.4541e-6, 1.01007e9
+    r, z = graded(a / 10, 13, 1.4, 110 * a), graded(a / 10, 6, 1.4, 110 * a)
+    mesh = Mesh()
+    half_space(mesh, "plane", r, -z, lambda s: 0)
+    face = half_space(mesh, "sphere", r, z, lambda s: min(s, 2.5 * a)**2 / (2 * radius))
+    run = at_rest(converged, tmp_path, ranks, mesh, part=[{"name": "plane", **STEEL}, {"name": "sphere", **STEEL}],
+                  rigid_body=[{"name": "holder", "surfaces": ["sphere:end", "sphere:side"], "at": [0, 0, .1], "free": "z"}],
+                  force=[{"on": "holder", "vector": [0, 0, -load / 4]}],
+                  contact=[{"rotor": "plane:face", "stator": "sphere:face", "normal": "z", "reach": 1e-4}],
+                  support=[{"on": "plane:end", "fixed": "all"}, {"on": "plane:side", "fixed": "all"},
+                           {"on": "x=0", "fixed": "x"}, {"on": "y=0", "fixed": "y"}],
+                  probe=[{"name": "holder", "on": "holder", "direction": "-z"}])
+    x = np.array(mesh.nodes)[face]
+    reaction, distance = normal_reactions(run, x), np.hypot(x[:, 0], x[:, 1])
+    assert 4 * reaction.sum() == pytest.approx(load, rel=1e-9)
+    found = np.sqrt(2.5 * (reaction * distance**2).sum() / reaction.sum())
+    assert found == pytest.approx(a, rel=0.03)
+    assert distance[reaction > 0].max() == pytest.approx(a, abs=a / 10)
+    assert run.report["equilibrium"]["probes"]["holder"] == pytest.approx(approach, rel=0.01)
+    assert 1.5 * load / (np.pi * found**2) == pytest.approx(p0, rel=0.06)  # twice that of the radius

@@ -213,6 +213,25 @@ TEST_CASE("surfaces that do not match say how many nodes, how far and where")
   CHECK(has(text, "0.25 m away, from (0, "));
 }
 
+TEST_CASE("with a reach, partners face each other along the normal, and their distance is the pair's gap")
+{
+  const TemporaryFile file(blocks, ".geo");
+  Scene scene = block_scene(file.path());
+  Mesh mesh = read_mesh(scene, comm);
+  Contact& contact = scene.contacts[0];
+  const Vec3 up = match_pairs(mesh, scene.contacts).front().normal;
+  for (const int node : mesh.node_groups.at(contact.stator)) mesh.nodes[node] = mesh.nodes[node] + 0.01 * up;
+  CHECK(has(problem_of([&] { match_pairs(mesh, scene.contacts); }), "do not match"));
+  contact.normal = up;
+  contact.reach = 0.02;
+  for (const NodePair& pair : match_pairs(mesh, scene.contacts))
+    CHECK(pair.gap == doctest::Approx(0.01).epsilon(1e-12));
+  contact.reach = 0.005;
+  CHECK(has(problem_of([&] { match_pairs(mesh, scene.contacts); }), "farther than the contact's reach"));
+  contact.normal = -1 * up;
+  CHECK(has(problem_of([&] { match_pairs(mesh, scene.contacts); }), "the stator inside the rotor"));
+}
+
 TEST_CASE("a finer stator is refused even where every rotor node has a partner")
 {
   const TemporaryFile file(std::string("n = 2; top_n = 4;\n") + blocks, ".geo");

@@ -71,11 +71,12 @@ struct NodePair
   Vec3 normal{};    // unit
   double area = 0;  // [m2] tributary; 0 for points
   int contact = 0;  // index in Scene::contacts
+  double gap = 0;   // [m] by which the nodes stand apart; 0 without a reach
 };
 
 /// Pairs in order of the scene's contacts. Errors: nodes of either surface without a partner within 1e-6 of the
-/// surface's size (how many, the farthest distance and where), faces whose consistent nodal weights are not all
-/// positive (6-node triangles, 8-node quads), a missing surface or point.
+/// surface's size (how many, the farthest distance and where), partners beyond the contact's reach, faces whose
+/// consistent nodal weights are not all positive (6-node triangles, 8-node quads), a missing surface or point.
 std::vector<NodePair> match_pairs(const Mesh& mesh, const std::vector<Contact>& contacts);
 
 /// Which rank owns each node and each element. METIS on the node graph with both nodes of a pair as one vertex, so

@@ -93,13 +93,15 @@ struct Rotation
   double rate = 0; // [rad/s]
 };
 
-/// Pairs of coincident nodes of two named surfaces of matching meshes, or one pair of two named points.
+/// Pairs of coincident nodes of two named surfaces of matching meshes, or one pair of two named points. With a reach,
+/// partners may stand apart along the normal, as on a curved face: their distance adds to the gap.
 /// Normal: out of the rotor into the stator. Sliding velocity: s = B_t v - v_d.
 struct Contact
 {
   std::string rotor, stator;
   double gap = 0;                   // [m] initial, positive open
-  std::optional<Vec3> normal;       // unit; needed for points, else from the rotor's surface
+  double reach = 0;                 // [m] how far apart along the normal partners may stand
+  std::optional<Vec3> normal;       // unit; needed for points and a reach, else from the rotor's surface
   std::vector<Vec3> tangents;       // one: plane friction along it; two; empty: two, chosen from the normal
   std::optional<Rotation> rotation; // of the rotor: v_d = rate axis x (x - centre), its tangential part
   Vec3 velocity{};                  // [m/s] of the rotor's surface when there is no rotation
