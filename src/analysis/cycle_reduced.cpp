@@ -123,6 +123,19 @@ PetscErrorCode function(SNES, Vec y, Vec R, void* context)
                  });
 }
 
+/// The columns are independent trajectories of one step size.
+void integrate_all(const Flow& flow, double period, const std::vector<Owned<Vec>>& starts,
+                   const std::vector<Owned<Vec>>& ends)
+{
+  if (flow.integrate_many)
+  {
+    const std::vector<Vec> from(starts.begin(), starts.end()), to(ends.begin(), ends.end());
+    flow.integrate_many(period, from, to);
+    return;
+  }
+  for (std::size_t i = 0; i < starts.size(); ++i) flow.integrate(period, starts[i], ends[i], nullptr);
+}
+
 void set_column(const Reduced& reduced, Mat J, PetscInt column, double first, const std::vector<double>& rest,
                 double factor)
 {
@@ -149,17 +162,23 @@ PetscErrorCode jacobian(SNES, Vec y, Mat J, Mat, void* context)
                    check(VecScale(reduced.phase, 1 / speed));
                    set_column(reduced, J, 0, 0, projections(reduced, orbit.rate), reduced.period_scale / reduced.scale);
                    const double step = reduced.shooting.options.difference * orbit.fluctuation;
-                   const Owned<Vec> moved = zeros_like(orbit.state), end = zeros_like(orbit.state);
-                   for (std::size_t i = 0; i < reduced.base.size(); ++i)
+                   std::vector<Owned<Vec>> moved, ends;
+                   for (const auto& member : reduced.base)
                    {
-                     check(VecWAXPY(moved, step, reduced.base[i], orbit.state));
-                     flow.integrate(orbit.period, moved, end, nullptr);
-                     ++reduced.shooting.periods;
-                     check(VecAXPY(end, -1, moved));
-                     check(VecAXPY(end, -1, orbit.defect));
+                     moved.push_back(copy_of(orbit.state));
+                     check(VecAXPY(moved.back(), step, member));
+                     ends.push_back(zeros_like(orbit.state));
+                   }
+                   integrate_all(flow, orbit.period, moved, ends);
+                   reduced.shooting.periods += static_cast<long>(ends.size());
+                   for (std::size_t i = 0; i < ends.size(); ++i)
+                   {
+                     check(VecAXPY(ends[i], -1, moved[i]));
+                     check(VecAXPY(ends[i], -1, orbit.defect));
                      double along = 0;
                      check(VecDot(reduced.phase, reduced.base[i], &along));
-                     set_column(reduced, J, static_cast<PetscInt>(i) + 1, along, projections(reduced, end), 1 / step);
+                     set_column(reduced, J, static_cast<PetscInt>(i) + 1, along, projections(reduced, ends[i]),
+                                1 / step);
                    }
                    check(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
                    check(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));

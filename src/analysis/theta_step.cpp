@@ -164,6 +164,48 @@ void account(const ThetaStep& step, const Structure& structure, std::span<const 
   }
 }
 
+double* column_of(double* values, PetscInt leading, std::size_t column)
+{
+  return values + static_cast<std::ptrdiff_t>(column) * leading;
+}
+
+/// y_k = A x_k for all k at one reading of A.
+void multiply(Mat A, std::span<const Vec> x, std::span<const Vec> y)
+{
+  if (x.size() == 1)
+  {
+    check(MatMult(A, x[0], y[0]));
+    return;
+  }
+  PetscInt rows = 0, leading = 0;
+  check(MatGetLocalSize(A, &rows, nullptr));
+  Owned<Mat> X, Y;
+  check(MatCreateDense(PetscObjectComm(reinterpret_cast<PetscObject>(A)), rows, PETSC_DECIDE, PETSC_DETERMINE,
+                       static_cast<PetscInt>(x.size()), nullptr, X.put()));
+  double* values = nullptr;
+  check(MatDenseGetLDA(X, &leading));
+  check(MatDenseGetArrayWrite(X, &values));
+  for (std::size_t k = 0; k < x.size(); ++k)
+  {
+    const double* mine = nullptr;
+    check(VecGetArrayRead(x[k], &mine));
+    std::copy_n(mine, rows, column_of(values, leading, k));
+    check(VecRestoreArrayRead(x[k], &mine));
+  }
+  check(MatDenseRestoreArrayWrite(X, &values));
+  check(MatMatMult(A, X, MAT_INITIAL_MATRIX, PETSC_DEFAULT, Y.put()));
+  check(MatDenseGetLDA(Y, &leading));
+  check(MatDenseGetArray(Y, &values));
+  for (std::size_t k = 0; k < y.size(); ++k)
+  {
+    double* mine = nullptr;
+    check(VecGetArrayWrite(y[k], &mine));
+    std::copy_n(column_of(values, leading, k), rows, mine);
+    check(VecRestoreArrayWrite(y[k], &mine));
+  }
+  check(MatDenseRestoreArray(Y, &values));
+}
+
 /// The start of a step: A v_free = [M v - (1-theta) A v]/theta - h K u + h F, into A v_next.
 void load_free_step(const ThetaStep& step, const Structure& structure, StepWork& work)
 {
@@ -260,14 +302,18 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
   const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
   if (interface.pairs > 0) lambda = push_apart(step, interface, Bv_free, works, states, reports, comm);
   step.factor.backward(lambda, next);
+  std::vector<Vec> u, Mv, Ku;
   for (std::size_t k = 0; k < states.size(); ++k)
   {
     StepWork& work = works[k];
     check(VecAXPBYPCZ(work.v_theta, theta, 1 - theta, 0, work.v_next, states[k].v));
     check(VecAXPY(states[k].u, h, work.v_theta));
-    check(MatMult(structure.M, work.v_next, work.Mv_next));
-    check(MatMult(structure.K, states[k].u, work.Ku_next));
+    u.push_back(states[k].u);
+    Mv.push_back(work.Mv_next);
+    Ku.push_back(work.Ku_next);
   }
+  multiply(structure.M, next, Mv);
+  multiply(structure.K, u, Ku);
   account(step, structure, states, works, reports);
   for (std::size_t k = 0; k < states.size(); ++k)
   {

@@ -17,6 +17,8 @@ struct Flow
   /// end = Phi_period(start); unless `rate` is null, rate = dPhi/dperiod at the end.
   std::function<void(double period, Vec start, Vec end, Vec rate)> integrate;
   Mat M = nullptr, K = nullptr; // of the energy norm
+  /// end_k = Phi_period(start_k), all at once; empty: one after the other.
+  std::function<void(double period, std::span<const Vec> starts, std::span<const Vec> ends)> integrate_many{};
 };
 
 struct NewtonRecord
