@@ -45,12 +45,27 @@ std::string no_mode_to_follow(const Report& report)
   return {};
 }
 
+/// The mode to follow, and every other one that grows: none may be left asleep.
+std::span<const ComplexMode> growing_modes(const Report& report)
+{
+  return std::span(report.modes.modes).first(static_cast<std::size_t>(std::max(report.modes.unstable_count, 1)));
+}
+
 State transient_start(const Scene& scene, const Model& model, const Report& report)
 {
   const TransientSettings& settings = scene.transient;
   if (settings.start == "estimate")
-    return mode_state(report.equilibrium, report.modes.modes.front(), start_amplitude(report.estimate),
-                      report.estimate.phase);
+  {
+    State start = mode_state(report.equilibrium, report.modes.modes.front(), start_amplitude(report.estimate),
+                             report.estimate.phase);
+    for (const State& other :
+         estimated_motions(model.structure, model.interface, report.equilibrium, growing_modes(report).subspan(1)))
+    {
+      check(VecAXPY(start.u, 1, other.u));
+      check(VecAXPY(start.v, 1, other.v));
+    }
+    return start;
+  }
   if (settings.start == "mode")
   {
     const double amplitude = settings.amplitude > 0 ? settings.amplitude : 0.1 * report.estimate.lift_off_amplitude;
@@ -119,10 +134,8 @@ LimitCycle run_cycle(const Scene& scene, const Model& model, const Report& repor
   else if (const std::string lie = cycle_refusal(scene, model, report); !lie.empty())
     cycle.outcome = not_run("refused", lie);
   else
-    return find_cycle(
-        model.structure, model.interface, report.equilibrium,
-        std::span(report.modes.modes).first(static_cast<std::size_t>(std::max(report.modes.unstable_count, 1))),
-        report.estimate, scene.cycle, model.probes);
+    return find_cycle(model.structure, model.interface, report.equilibrium, growing_modes(report), report.estimate,
+                      scene.cycle, model.probes);
   return cycle;
 }
 

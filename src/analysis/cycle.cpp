@@ -144,24 +144,13 @@ StartOptions read_options()
   return options;
 }
 
-bool usable(const ComplexMode& mode, double amplitude)
+/// The starts of the other modes that grow are added, their motions noted as able to sleep.
+void wake(const std::vector<State>& others, double amplitude, State& state, ShootingStart& start)
 {
-  return amplitude > 0 && std::isfinite(amplitude) && mode.lambda.imag() != 0;
-}
-
-/// Motion of one mode, and of the others that grow: their starts are added, their shapes noted as able to sleep.
-void wake(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-          std::span<const ComplexMode> others, const StartOptions& options, State& state, ShootingStart& start)
-{
-  for (const ComplexMode& mode : others)
+  for (const State& motion : others)
   {
-    const Estimate estimate = estimate_amplitude(structure, interface, equilibrium, mode);
-    const double amplitude = start_amplitude(estimate);
-    if (!usable(mode, amplitude)) continue;
-    State motion = mode_state(equilibrium, mode, options.amplitude * amplitude, estimate.phase);
-    check(VecAXPY(motion.u, -1, equilibrium.u));
-    check(VecAXPY(state.u, 1, motion.u));
-    check(VecAXPY(state.v, 1, motion.v));
+    check(VecAXPY(state.u, amplitude, motion.u));
+    check(VecAXPY(state.v, amplitude, motion.v));
     start.asleep.push_back(state_of(motion.u, motion.v));
   }
 }
@@ -182,7 +171,7 @@ LimitCycle find_cycle(const Structure& structure, const Interface& interface, co
   const StartOptions options = read_options();
   const ComplexMode& mode = unstable.front();
   const double amplitude = options.amplitude * start_amplitude(estimate);
-  if (!usable(mode, amplitude))
+  if (!(amplitude > 0) || !std::isfinite(amplitude) || mode.lambda.imag() == 0)
   {
     LimitCycle skipped;
     skipped.outcome = {"skipped", "no amplitude to start from: no energy balance and no lift-off, or no oscillation", 0,
@@ -205,7 +194,7 @@ LimitCycle find_cycle(const Structure& structure, const Interface& interface, co
   ShootingStart start{
       equilibrium.u, first.u, first.v, options.period / frequency_hz, {mode.real, mode.imaginary, equilibrium.u}, {},
       first_event};
-  wake(structure, interface, equilibrium, unstable.subspan(1), options, first, start);
+  wake(estimated_motions(structure, interface, equilibrium, unstable.subspan(1)), options.amplitude, first, start);
   LimitCycle cycle = shoot(flow, start, preconditioner, settings.tolerance, settings.free_periods);
   cycle.steps_per_period = settings.steps_per_period;
   cycle.theta = settings.theta;

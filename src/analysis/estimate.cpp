@@ -323,6 +323,21 @@ double start_amplitude(const Estimate& estimate)
   return estimate.outcome.word == "balance" ? estimate.amplitude : multiple * estimate.lift_off_amplitude;
 }
 
+std::vector<State> estimated_motions(const Structure& structure, const Interface& interface,
+                                     const Equilibrium& equilibrium, std::span<const ComplexMode> modes)
+{
+  std::vector<State> motions;
+  for (const ComplexMode& mode : modes)
+  {
+    const Estimate estimate = estimate_amplitude(structure, interface, equilibrium, mode);
+    const double amplitude = start_amplitude(estimate);
+    if (!(amplitude > 0) || !std::isfinite(amplitude) || mode.lambda.imag() == 0) continue;
+    motions.push_back(mode_state(equilibrium, mode, amplitude, estimate.phase));
+    check(VecAXPY(motions.back().u, -1, equilibrium.u));
+  }
+  return motions;
+}
+
 State mode_state(const Equilibrium& equilibrium, const ComplexMode& mode, double amplitude, double phase)
 {
   const Complex shape = amplitude * std::polar(1.0, phase), speed = mode.lambda * shape;

@@ -15,6 +15,8 @@
 /// where pairs stick, 1.1 to 4 of it otherwise, and 300 where slip reversal alone holds it far above first lift-off.
 #include "squeal/analysis/modes.hpp"
 
+#include <span>
+
 namespace squeal
 {
 
@@ -43,5 +45,10 @@ double start_amplitude(const Estimate& estimate);
 
 /// State u0 + q Re(phi e^{i phase}), v = q Re(lambda phi e^{i phase}) (paper, eqs. 18-19).
 State mode_state(const Equilibrium& equilibrium, const ComplexMode& mode, double amplitude, double phase);
+
+/// What each mode that oscillates adds to a start, from its own estimate: q Re(phi e^{i phase}) and its velocity,
+/// without u0.
+std::vector<State> estimated_motions(const Structure& structure, const Interface& interface,
+                                     const Equilibrium& equilibrium, std::span<const ComplexMode> modes);
 
 } // namespace squeal
