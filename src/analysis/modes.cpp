@@ -4,9 +4,11 @@
 #include "squeal/analysis/projection.hpp"
 #include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/real_modes.hpp"
+#include "squeal/analysis/slices.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 namespace squeal
@@ -95,38 +97,74 @@ std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const Struc
 struct ModesOptions
 {
   PetscInt dense_limit = 200, candidates = 20;
+  std::string solver = "slices";
 };
 
 ModesOptions read_options()
 {
   ModesOptions options;
+  char solver[16] = "slices";
   options.dense_limit = dense_limit_option();
   check(PetscOptionsGetInt(nullptr, "modes_", "-candidates", &options.candidates, nullptr));
+  check(PetscOptionsGetString(nullptr, "modes_", "-solver", solver, sizeof solver, nullptr));
+  options.solver = solver;
+  if (options.solver != "slices" && options.solver != "toar")
+    throw Error("option -modes_solver is \"" + options.solver + "\": it takes slices or toar");
   return options;
 }
 
-QuadraticSolution solve_full(const SlidingProblem& problem, const ModesSettings& settings, const ModesOptions& options)
+// The real modes a little beyond the band, by which slices are planned and pairs are counted.
+struct RealSpectrum
+{
+  RealModes modes;
+  double reach = 0; // [Hz]: all below are there
+};
+
+RealSpectrum find_spectrum(const SlidingProblem& problem, const ModesSettings& settings, int dense_limit)
+{
+  RealSpectrum spectrum;
+  spectrum.reach = 1.05 * settings.band;
+  spectrum.modes = solve_real_modes_below(problem.M, problem.K, spectrum.reach, dense_limit);
+  return spectrum;
+}
+
+PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution& solution,
+                        const RealSpectrum& spectrum, double band)
+{
+  const double floor = std::sqrt(vibration_floor(norms_of(problem))), edge = 2 * std::numbers::pi * band;
+  const auto expected = std::count_if(spectrum.modes.omega.begin(), spectrum.modes.omega.end(),
+                                      [&](double omega) { return omega >= floor && omega < edge; });
+  return {band, static_cast<int>(expected), static_cast<int>(solution.pairs.size())};
+}
+
+CountedSolution solve_full(const SlidingProblem& problem, const RealSpectrum& spectrum, const ModesSettings& settings,
+                           const ModesOptions& options)
 {
   const int limit = static_cast<int>(options.dense_limit);
   PetscInt n = 0;
   check(MatGetSize(problem.K, &n, nullptr));
-  QuadraticSettings quadratic{settings.band, 0, 0, limit};
-  if (n > options.dense_limit)
-  {
-    // Friction moves few eigenvalues across the band: the real modes say how many to ask for.
-    quadratic.expected = count_real_modes(problem.M, problem.K, 1.05 * settings.band, limit);
+  CountedSolution result;
+  if (n > limit && options.solver == "slices")
+    return solve_by_slices(problem.reduced, spectrum.modes.omega, settings.band, spectrum.reach);
+  QuadraticSettings quadratic{settings.band, 0, static_cast<int>(spectrum.modes.omega.size()), limit};
+  if (n > limit)
     quadratic.shift = std::sqrt(-shift_below_zero(problem.M, problem.K)) / (2 * std::numbers::pi * settings.band);
-  }
-  return solve_quadratic(problem.reduced, quadratic);
+  result.solution = solve_quadratic(problem.reduced, quadratic);
+  result.count = count_in_band(problem.reduced, result.solution, spectrum, settings.band);
+  return result;
 }
 
-QuadraticSolution solve_by_projection(const SlidingProblem& problem, const ModesSettings& settings,
-                                      const ModesOptions& options)
+// As many real modes as the scene says, or those of the spectrum, at least twenty.
+QuadraticSolution solve_by_projection(const SlidingProblem& problem, const RealSpectrum& spectrum,
+                                      const ModesSettings& settings, const ModesOptions& options)
 {
-  const RealModes basis =
-      solve_real_modes(problem.M, problem.K, settings.real_modes, static_cast<int>(options.dense_limit));
-  return solve_projected(problem.reduced, problem.M, problem.K, basis,
-                         {settings.band, settings.residual_passes, static_cast<int>(options.candidates)});
+  constexpr int fewest = 20;
+  const int known = static_cast<int>(spectrum.modes.omega.size());
+  const int wanted = settings.real_modes > 0 ? settings.real_modes : std::max(fewest, known);
+  const ProjectionSettings projection{settings.band, settings.residual_passes, static_cast<int>(options.candidates)};
+  if (wanted == known) return solve_projected(problem.reduced, problem.M, problem.K, spectrum.modes, projection);
+  const RealModes basis = solve_real_modes(problem.M, problem.K, wanted, static_cast<int>(options.dense_limit));
+  return solve_projected(problem.reduced, problem.M, problem.K, basis, projection);
 }
 
 int unstable_in(const std::vector<ComplexMode>& modes)
@@ -135,12 +173,27 @@ int unstable_in(const std::vector<ComplexMode>& modes)
       std::count_if(modes.begin(), modes.end(), [](const ComplexMode& mode) { return is_unstable(mode.lambda); }));
 }
 
-std::string compare_counts(const Modes& modes)
+std::string text_of(const ModeCount& count)
 {
-  const int other = unstable_in(modes.projected);
-  const std::string counts = std::to_string(modes.unstable_count) + " by the full problem, " + std::to_string(other) +
-                             " by projection on real modes";
-  return (other == modes.unstable_count ? "confirmed: " : "NOT confirmed: ") + counts;
+  char text[200];
+  std::snprintf(text, sizeof text, "%d pairs below %.6g Hz, %d expected by the inertia of the frictionless structure",
+                count.found, count.frequency, count.expected);
+  return text;
+}
+
+// Unstable modes by either route; all modes by inertia.
+std::string count_check(const Modes& modes)
+{
+  const bool counted = !modes.count.certified_by.empty();
+  std::string text = counted ? "confirmed: " : "NOT confirmed: ";
+  if (modes.method == "both")
+  {
+    const int other = unstable_in(modes.projected);
+    if (other != modes.unstable_count) text = "NOT confirmed: ";
+    text += std::to_string(modes.unstable_count) + " unstable by the full problem, " + std::to_string(other) +
+            " by projection on real modes; ";
+  }
+  return text + text_of(modes.count);
 }
 
 void judge(Modes& modes)
@@ -148,9 +201,26 @@ void judge(Modes& modes)
   for (const ComplexMode& mode : modes.modes)
     modes.outcome.residual = std::max(modes.outcome.residual, mode.backward_error);
   modes.unstable_count = unstable_in(modes.modes);
+  modes.count_check = count_check(modes);
   if (modes.outcome.residual <= 1e-8 || modes.outcome.word != "converged") return;
   modes.outcome.word = "not converged";
   modes.outcome.reason = "a backward error exceeds 1e-8";
+}
+
+ModeCount certificate(const PairCount& count, const RealSpectrum& spectrum)
+{
+  const bool good = count.expected == count.found && spectrum.modes.outcome.word == "converged";
+  return {good ? "inertia" : "", count.frequency, count.expected, count.found};
+}
+
+// Pairs that were found beyond the band, for the count, are told by their frequency only.
+void keep_band(Modes& modes)
+{
+  const auto beyond = std::stable_partition(modes.modes.begin(), modes.modes.end(),
+                                            [&](const ComplexMode& mode)
+                                            { return std::abs(mode.lambda) < 2 * std::numbers::pi * modes.band; });
+  for (auto mode = beyond; mode != modes.modes.end(); ++mode) modes.beyond_band.push_back(mode->frequency_hz());
+  modes.modes.erase(beyond, modes.modes.end());
 }
 
 } // namespace
@@ -181,29 +251,25 @@ Modes find_modes(const Structure& structure, const Interface& interface, const E
     modes.count_check = "confirmed: there is no mode to count";
     return modes;
   }
-  QuadraticSolution projected;
+  const RealSpectrum spectrum = find_spectrum(problem, settings, static_cast<int>(options.dense_limit));
+  CountedSolution found;
   if (settings.method != "full")
   {
-    projected = solve_by_projection(problem, settings, options);
-    modes.projected = modes_of(projected, structure, problem);
+    found.solution = solve_by_projection(problem, spectrum, settings, options);
+    found.count = count_in_band(problem.reduced, found.solution, spectrum, settings.band);
+    modes.projected = modes_of(found.solution, structure, problem);
   }
   if (settings.method == "projection")
+    modes.modes = std::exchange(modes.projected, {});
+  else
   {
-    modes.outcome = projected.outcome;
-    modes.modes = std::move(modes.projected);
-    modes.projected.clear();
-    judge(modes);
-    modes.count_check =
-        "not confirmed: the projection alone was asked for; method \"both\" solves the full problem too";
-    return modes;
+    found = solve_full(problem, spectrum, settings, options);
+    modes.modes = modes_of(found.solution, structure, problem);
   }
-  const QuadraticSolution full = solve_full(problem, settings, options);
-  modes.outcome = full.outcome;
-  modes.modes = modes_of(full, structure, problem);
+  modes.outcome = found.solution.outcome;
+  modes.count = certificate(found.count, spectrum);
+  keep_band(modes);
   judge(modes);
-  modes.count_check = settings.method == "both"
-                          ? compare_counts(modes)
-                          : "not confirmed: the full problem alone was asked for; method \"both\" projects too";
   return modes;
 }
 

@@ -1,5 +1,7 @@
 #include "squeal/analysis/projection.hpp"
 
+#include "squeal/analysis/shift_invert.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -10,156 +12,174 @@ namespace squeal
 namespace
 {
 
-MPI_Comm comm_of(Mat A)
-{
-  return PetscObjectComm(reinterpret_cast<PetscObject>(A));
-}
+using Index = std::size_t;
 
-struct Basis
+// The problem's matrices and their projections on V, which grow with it.
+struct Projected
 {
-  Owned<BV> V; // M-orthonormal columns; room for more than `size`
-  PetscInt size = 0;
+  Owned<Mat> transposed;
+  Mat matrix = nullptr;
+  std::vector<double> entries; // V'A V
 };
 
-// Appends what is new in y; M-norms below 1e-8 of the vector's own are nothing new.
-void append(Basis& basis, Vec y, Mat M)
+Projected start_projection(Mat A)
 {
-  const Owned<Vec> My = zeros_like(y);
-  double square = 0;
-  check(MatMult(M, y, My));
-  check(VecDot(y, My, &square));
-  if (!(square > 0)) return;
-  check(VecScale(y, 1 / std::sqrt(square)));
-  check(BVInsertVec(basis.V, basis.size, y));
-  double norm = 0;
-  PetscBool dependent = PETSC_FALSE;
-  check(BVOrthogonalizeColumn(basis.V, basis.size, nullptr, &norm, &dependent));
-  if (dependent || norm < 1e-8) return;
-  check(BVScaleColumn(basis.V, basis.size, 1 / norm));
-  ++basis.size;
-}
-
-Basis make_basis(Mat M, const RealModes& modes, PetscInt room)
-{
-  Basis basis;
-  Owned<Vec> pattern;
-  PetscInt n = 0;
-  check(MatGetSize(M, &n, nullptr));
-  check(MatCreateVecs(M, pattern.put(), nullptr));
-  check(BVCreate(comm_of(M), basis.V.put()));
-  check(BVSetSizesFromVec(basis.V, pattern, std::min(n, static_cast<PetscInt>(modes.shapes.size()) + room) + 1));
-  check(BVSetOptionsPrefix(basis.V, "modes_"));
-  check(BVSetFromOptions(basis.V));
-  check(BVSetMatrix(basis.V, M, PETSC_FALSE));
-  for (const Owned<Vec>& shape : modes.shapes) append(basis, copy_of(shape), M);
-  return basis;
-}
-
-// V'A V, column-major, on every rank
-std::vector<double> on_basis(const Basis& basis, Mat A)
-{
-  Owned<Mat> small;
-  check(MatCreateSeqDense(PETSC_COMM_SELF, basis.size, basis.size, nullptr, small.put()));
-  check(BVSetActiveColumns(basis.V, 0, basis.size));
-  check(BVMatProject(basis.V, A, basis.V, small));
-  const PetscScalar* entries = nullptr;
-  check(MatDenseGetArrayRead(small, &entries));
-  std::vector<double> result(entries, entries + basis.size * basis.size);
-  check(MatDenseRestoreArrayRead(small, &entries));
+  Projected result;
+  result.matrix = A;
+  check(MatTranspose(A, MAT_INITIAL_MATRIX, result.transposed.put()));
   return result;
 }
 
-Owned<Vec> expand(const Basis& basis, std::vector<double> coefficients, Mat pattern)
+// V has gained its last columns, W: V'A V gains the columns V'(A W) and the rows W'A V = (V'(A'W))'.
+void extend(Projected& projected, const Block& V, PetscInt gained)
 {
-  Owned<Vec> y;
-  check(MatCreateVecs(pattern, y.put(), nullptr));
-  check(BVSetActiveColumns(basis.V, 0, basis.size));
-  check(BVMultVec(basis.V, 1, 0, y, coefficients.data()));
-  return y;
+  const Block W = columns_from(V, V.columns - gained);
+  const std::vector<double> right = inner(V, product(projected.matrix, W));
+  const std::vector<double> left = inner(V, product(projected.transposed, W));
+  const auto size = static_cast<Index>(V.columns), fresh = static_cast<Index>(gained), before = size - fresh;
+  std::vector<double> entries(size * size);
+  for (Index j = 0; j < before; ++j)
+  {
+    std::copy_n(projected.entries.begin() + static_cast<std::ptrdiff_t>(j * before), before,
+                entries.begin() + static_cast<std::ptrdiff_t>(j * size));
+    for (Index i = 0; i < fresh; ++i) entries[before + i + j * size] = left[j + i * size];
+  }
+  std::copy(right.begin(), right.end(), entries.begin() + static_cast<std::ptrdiff_t>(before * size));
+  projected.entries = std::move(entries);
 }
 
-// The pairs of the small problem in the band, largest growth ratio first.
-std::vector<DenseEigenpair> solve_on(const Basis& basis, const QuadraticProblem& problem, double band)
+struct Subspace
 {
-  std::vector<DenseEigenpair> found =
-      solve_dense_quadratic_shared(comm_of(problem.K), static_cast<int>(basis.size), on_basis(basis, problem.M),
-                                   on_basis(basis, problem.C), on_basis(basis, problem.K));
-  std::erase_if(found,
-                [&](const DenseEigenpair& pair)
-                {
-                  const bool vibrates = pair.lambda.imag() > 0 || pair.lambda.real() > 0;
-                  return !vibrates || std::abs(pair.lambda) > 2 * std::numbers::pi * band;
-                });
+  Block V;
+  Projected M, C, K;
+};
+
+void extend(Subspace& space, PetscInt gained)
+{
+  for (Projected* projected : {&space.M, &space.C, &space.K}) extend(*projected, space.V, gained);
+}
+
+// The pairs of the small problem in the window, largest growth ratio first.
+std::vector<DenseEigenpair> solve_on(const Subspace& space, const Window& window)
+{
+  std::vector<DenseEigenpair> found = solve_dense_quadratic_shared(space.V.comm, static_cast<int>(space.V.columns),
+                                                                   space.M.entries, space.C.entries, space.K.entries);
+  std::erase_if(found, [&](const DenseEigenpair& pair) { return !window.holds(pair.lambda); });
   std::sort(found.begin(), found.end(),
             [](const DenseEigenpair& a, const DenseEigenpair& b)
             { return a.lambda.real() * std::abs(b.lambda) > b.lambda.real() * std::abs(a.lambda); });
   return found;
 }
 
-Eigenpair in_problem(const Basis& basis, const QuadraticProblem& problem, const QuadraticNorms& norms,
-                     const DenseEigenpair& found)
+// y = V a of some pairs, of 2-norm 1, and their residuals and backward errors: real parts, then imaginary ones.
+struct Expanded
 {
-  std::vector<double> re, im;
-  double size = 0;
-  for (const std::complex<double>& a : found.y)
-  {
-    re.push_back(a.real());
-    im.push_back(a.imag());
-  }
-  Eigenpair pair{found.lambda, expand(basis, re, problem.K), expand(basis, im, problem.K), 0};
-  double squares[2];
-  check(VecNorm(pair.real, NORM_2, &squares[0]));
-  check(VecNorm(pair.imaginary, NORM_2, &squares[1]));
-  size = std::hypot(squares[0], squares[1]);
-  check(VecScale(pair.real, 1 / size));
-  check(VecScale(pair.imaginary, 1 / size));
-  pair.backward_error = backward_error(problem, norms, pair);
-  return pair;
-}
+  Block y, residual;
+  std::vector<double> backward_error;
+};
 
-Owned<KSP> static_solver(Mat A)
+// A y times the power of lambda that goes with A, added to the residuals
+void add_term(Block& residual, const Block& Ay, const std::vector<std::complex<double>>& factor)
 {
-  Owned<KSP> solver;
-  PC factor = nullptr;
-  check(KSPCreate(comm_of(A), solver.put()));
-  check(KSPSetOperators(solver, A, A));
-  check(KSPSetType(solver, KSPPREONLY));
-  check(KSPGetPC(solver, &factor));
-  check(PCSetType(factor, PCCHOLESKY));
-  check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
-  check(KSPSetOptionsPrefix(solver, "modes_"));
-  check(KSPSetFromOptions(solver));
-  return solver;
-}
-
-// Static answers to the residuals of the first pairs join the basis; true if it grew.
-bool correct(Basis& basis, const QuadraticProblem& problem, const std::vector<DenseEigenpair>& found, int candidates,
-             Mat M, KSP stiffness)
-{
-  const QuadraticNorms norms = norms_of(problem);
-  std::vector<Owned<Vec>> shapes;
-  for (std::size_t k = 0; k < std::min(found.size(), static_cast<std::size_t>(candidates)); ++k)
+  const auto pairs = static_cast<PetscInt>(factor.size());
+  for (PetscInt k = 0; k < pairs; ++k)
   {
-    const Eigenpair pair = in_problem(basis, problem, norms, found[k]);
-    if (pair.backward_error < 1e-15) continue; // solved to rounding
-    Owned<Vec> real = zeros_like(pair.real), imaginary = zeros_like(pair.real);
-    quadratic_residual(problem.M, problem.C, problem.K, pair.lambda, pair.real, pair.imaginary, real, imaginary);
-    for (Owned<Vec>* residual : {&real, &imaginary})
+    const double re = factor[static_cast<Index>(k)].real(), im = factor[static_cast<Index>(k)].imag();
+    const double *a = Ay.column(k), *b = Ay.column(pairs + k);
+    double *r = residual.column(k), *s = residual.column(pairs + k);
+    for (PetscInt i = 0; i < Ay.rows; ++i)
     {
-      Owned<Vec> shape = zeros_like(*residual);
-      check(KSPSolve(stiffness, *residual, shape));
-      shapes.push_back(std::move(shape));
+      r[i] += re * a[i] - im * b[i];
+      s[i] += im * a[i] + re * b[i];
     }
   }
-  const PetscInt before = basis.size;
+}
+
+Expanded expand(const QuadraticProblem& problem, const QuadraticNorms& norms, const Block& V,
+                const DenseEigenpair* pairs, Index count)
+{
+  std::vector<double> re, im;
+  std::vector<std::complex<double>> lambda, square;
+  for (const DenseEigenpair* pair = pairs; pair != pairs + count; ++pair)
+  {
+    double size = 0; // of a is that of y, V being orthonormal
+    for (const std::complex<double>& a : pair->y) size += std::norm(a);
+    for (const std::complex<double>& a : pair->y)
+    {
+      re.push_back(a.real() / std::sqrt(size));
+      im.push_back(a.imag() / std::sqrt(size));
+    }
+    lambda.push_back(pair->lambda);
+    square.push_back(pair->lambda * pair->lambda);
+  }
+  re.insert(re.end(), im.begin(), im.end());
+  Expanded result;
+  result.y = combination(V, re, static_cast<PetscInt>(2 * count));
+  result.residual = product(problem.K, result.y);
+  add_term(result.residual, product(problem.C, result.y), lambda);
+  add_term(result.residual, product(problem.M, result.y), square);
+  const std::vector<double> left = column_norms(result.residual), size = column_norms(result.y);
+  for (Index k = 0; k < count; ++k)
+  {
+    const double w = std::abs(lambda[k]), scale = w * w * norms.M + w * norms.C + norms.K;
+    result.backward_error.push_back(std::hypot(left[k], left[count + k]) /
+                                    (scale * std::hypot(size[k], size[count + k])));
+  }
+  return result;
+}
+
+constexpr Index at_once = 64; // pairs expanded at a time
+
+// Answers to the residuals of the first pairs join the space; false if nothing new came of them.
+bool correct(Subspace& space, const QuadraticProblem& problem, const QuadraticNorms& norms,
+             const std::vector<DenseEigenpair>& found, int most, Mat stiffness)
+{
+  Block residuals = empty_block(problem.K);
+  const Index candidates = std::min(found.size(), static_cast<Index>(most));
+  for (Index first = 0; first < candidates; first += at_once)
+  {
+    const Index count = std::min(at_once, candidates - first);
+    const Expanded pairs = expand(problem, norms, space.V, found.data() + first, count);
+    for (Index k = 0; k < count; ++k)
+      if (pairs.backward_error[k] > 1e-15) // not solved to rounding
+        for (const Index column : {k, count + k})
+        {
+          const double* r = pairs.residual.column(static_cast<PetscInt>(column));
+          residuals.entries.insert(residuals.entries.end(), r, r + residuals.rows);
+          ++residuals.columns;
+        }
+  }
+  if (residuals.columns == 0) return false;
   PetscInt n = 0;
-  check(MatGetSize(M, &n, nullptr));
-  for (const Owned<Vec>& shape : shapes)
-    if (basis.size < n) append(basis, shape, M);
-  return basis.size > before;
+  check(MatGetSize(problem.K, &n, nullptr));
+  if (space.V.columns >= n) return false;
+  const PetscInt gained = extend_orthonormal(space.V, solved(stiffness, residuals));
+  if (gained > 0) extend(space, gained);
+  return gained > 0;
 }
 
 } // namespace
+
+std::vector<Eigenpair> eigenpairs(const QuadraticProblem& problem, const Block& V,
+                                  const std::vector<DenseEigenpair>& found)
+{
+  const QuadraticNorms norms = norms_of(problem);
+  std::vector<Eigenpair> result;
+  for (Index first = 0; first < found.size(); first += at_once)
+  {
+    const Index count = std::min(at_once, found.size() - first);
+    const Expanded pairs = expand(problem, norms, V, found.data() + first, count);
+    for (Index k = 0; k < count; ++k)
+    {
+      Eigenpair pair{found[first + k].lambda, {}, {}, pairs.backward_error[k]};
+      check(MatCreateVecs(problem.K, pair.real.put(), pair.imaginary.put()));
+      copy_column(pairs.y, static_cast<PetscInt>(k), pair.real);
+      copy_column(pairs.y, static_cast<PetscInt>(count + k), pair.imaginary);
+      result.push_back(std::move(pair));
+    }
+  }
+  return result;
+}
 
 QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K, const RealModes& modes,
                                   const ProjectionSettings& settings)
@@ -167,27 +187,27 @@ QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K,
   QuadraticSolution result;
   result.outcome = modes.outcome;
   result.outcome.iterations = 0;
-  Basis basis = make_basis(M, modes, 2 * settings.passes * settings.candidates);
-  std::vector<DenseEigenpair> found = solve_on(basis, problem, settings.band);
-  if (settings.passes > 0)
-  {
-    const Owned<Mat> A = shifted(M, K, shift_below_zero(M, K));
-    const Owned<KSP> stiffness = static_solver(A);
-    for (int pass = 0; pass < settings.passes; ++pass)
-    {
-      if (!correct(basis, problem, found, settings.candidates, M, stiffness)) break;
-      found = solve_on(basis, problem, settings.band);
-      ++result.outcome.iterations;
-    }
-  }
+  result.outcome.residual = 0;
+  if (modes.shapes.empty()) return result;
   const QuadraticNorms norms = norms_of(problem);
-  const double omega_zero = norms.M > 0 ? 1e-6 * std::sqrt(norms.K / norms.M) : 0; // free bodies move, not vibrate
-  for (const DenseEigenpair& pair : found)
+  const double omega = 2 * std::numbers::pi * settings.band;
+  const Window window{vibration_floor(norms), omega * omega};
+  Subspace space{empty_block(K), start_projection(problem.M), start_projection(problem.C), start_projection(problem.K)};
+  Block shapes = empty_block(K);
+  for (const Owned<Vec>& shape : modes.shapes) append(shapes, shape);
+  extend(space, extend_orthonormal(space.V, std::move(shapes)));
+  ShiftInvert stiffness = make_shift_invert(K, M, Symmetry::symmetric);
+  if (settings.passes > 0) move_to(stiffness, shift_below_zero(M, K));
+  std::vector<DenseEigenpair> found = solve_on(space, window);
+  for (int pass = 0; pass < settings.passes; ++pass)
   {
-    if (std::abs(pair.lambda) <= omega_zero) continue;
-    result.pairs.push_back(in_problem(basis, problem, norms, pair));
-    result.outcome.residual = std::max(result.outcome.residual, result.pairs.back().backward_error);
+    if (!correct(space, problem, norms, found, settings.candidates, stiffness.factor)) break;
+    found = solve_on(space, window);
+    ++result.outcome.iterations;
   }
+  result.pairs = eigenpairs(problem, space.V, found);
+  for (const Eigenpair& pair : result.pairs)
+    result.outcome.residual = std::max(result.outcome.residual, pair.backward_error);
   std::stable_sort(result.pairs.begin(), result.pairs.end(),
                    [](const Eigenpair& a, const Eigenpair& b) { return a.lambda.real() > b.lambda.real(); });
   return result;

@@ -1,5 +1,7 @@
 #include "squeal/analysis/quadratic.hpp"
 
+#include "squeal/analysis/shift_invert.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -33,23 +35,7 @@ Owned<Mat> scaled(Mat A, double factor)
   return result;
 }
 
-// What is reported of the eigenvalues found.
-struct Wanted
-{
-  double omega_band, omega_zero; // [rad/s]
-  bool operator()(std::complex<double> lambda) const
-  {
-    const double size = std::abs(lambda);
-    return size <= omega_band && size > omega_zero && (lambda.imag() > 0 || (lambda.imag() == 0 && lambda.real() > 0));
-  }
-};
-
-Wanted wanted_in(const QuadraticNorms& norms, double band)
-{
-  return {2 * std::numbers::pi * band, norms.M > 0 ? 1e-6 * std::sqrt(norms.K / norms.M) : 0};
-}
-
-QuadraticSolution solve_whole(const QuadraticProblem& problem, const Wanted& wanted)
+QuadraticSolution solve_whole(const QuadraticProblem& problem, const Window& window)
 {
   PetscInt n = 0, first = 0, last = 0;
   check(MatGetSize(problem.K, &n, nullptr));
@@ -60,7 +46,7 @@ QuadraticSolution solve_whole(const QuadraticProblem& problem, const Wanted& wan
        solve_dense_quadratic_shared(comm_of(problem.K), static_cast<int>(n), dense_copy(problem.M),
                                     dense_copy(problem.C), dense_copy(problem.K)))
   {
-    if (!wanted(found.lambda)) continue;
+    if (!window.holds(found.lambda)) continue;
     Eigenpair pair;
     pair.lambda = found.lambda;
     check(MatCreateVecs(problem.K, pair.real.put(), pair.imaginary.put()));
@@ -92,22 +78,15 @@ Owned<PEP> make_solver(Mat M, Mat C, Mat K, PetscInt count, double shift)
   check(PEPSetDimensions(pep, count, PETSC_DEFAULT, PETSC_DEFAULT));
   check(PEPSetTolerances(pep, 1e-11, 200));
   ST transformation = nullptr;
-  KSP solver = nullptr;
-  PC factor = nullptr;
   check(PEPGetST(pep, &transformation));
-  check(STSetType(transformation, STSINVERT));
-  check(STGetKSP(transformation, &solver));
-  check(KSPSetType(solver, KSPPREONLY));
-  check(KSPGetPC(solver, &factor));
-  check(PCSetType(factor, PCLU));
-  check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
+  use_mumps(transformation);
   check(PEPSetOptionsPrefix(pep, "modes_"));
   check(PEPSetFromOptions(pep));
   return pep;
 }
 
 // Pairs of a solved PEP; returns the farthest |nu - shift| found.
-double collect(PEP pep, double omega, double shift, const Wanted& wanted, std::vector<Eigenpair>& pairs)
+double collect(PEP pep, double omega, double shift, const Window& window, std::vector<Eigenpair>& pairs)
 {
   PetscInt converged = 0;
   check(PEPGetConverged(pep, &converged));
@@ -122,16 +101,16 @@ double collect(PEP pep, double omega, double shift, const Wanted& wanted, std::v
     check(PEPGetEigenpair(pep, i, &re, &im, pair.real, pair.imaginary));
     farthest = std::max(farthest, std::hypot(re - shift, im));
     pair.lambda = omega * std::complex<double>(re, im);
-    if (wanted(pair.lambda)) pairs.push_back(std::move(pair));
+    if (window.holds(pair.lambda)) pairs.push_back(std::move(pair));
   }
   return farthest;
 }
 
-QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSettings& settings, const Wanted& wanted)
+QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSettings& settings, const Window& window)
 {
   PetscInt n = 0;
   check(MatGetSize(problem.K, &n, nullptr));
-  const double omega = wanted.omega_band;
+  const double omega = std::sqrt(window.limit);
   const Owned<Mat> M = scaled(problem.M, omega * omega), C = scaled(problem.C, omega);
   QuadraticSolution result;
   PetscInt count = std::min<PetscInt>(2 * settings.expected + 20, 2 * n);
@@ -143,7 +122,7 @@ QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSe
     check(PEPGetIterationNumber(pep, &iterations));
     check(PEPGetConverged(pep, &converged));
     result.pairs.clear();
-    const double farthest = collect(pep, omega, settings.shift, wanted, result.pairs);
+    const double farthest = collect(pep, omega, settings.shift, window, result.pairs);
     result.outcome.iterations += static_cast<int>(iterations);
     result.outcome.word = "converged";
     result.outcome.reason.clear();
@@ -159,14 +138,21 @@ QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSe
 
 } // namespace
 
+bool Window::holds(std::complex<double> lambda) const
+{
+  const double square = std::norm(lambda);
+  return square >= least && square < limit && (lambda.imag() > 0 || (lambda.imag() == 0 && lambda.real() > 0));
+}
+
 QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings)
 {
   PetscInt n = 0;
   check(MatGetSize(problem.K, &n, nullptr));
   const QuadraticNorms norms = norms_of(problem);
-  const Wanted wanted = wanted_in(norms, settings.band);
+  const double omega = 2 * std::numbers::pi * settings.band;
+  const Window window{vibration_floor(norms), omega * omega};
   QuadraticSolution result =
-      n <= settings.dense_limit ? solve_whole(problem, wanted) : solve_large(problem, settings, wanted);
+      n <= settings.dense_limit ? solve_whole(problem, window) : solve_large(problem, settings, window);
   for (Eigenpair& pair : result.pairs)
   {
     normalise(pair);
@@ -190,6 +176,11 @@ QuadraticNorms norms_of(const QuadraticProblem& problem)
   check(MatNorm(problem.C, NORM_1, &norms.C));
   check(MatNorm(problem.K, NORM_1, &norms.K));
   return norms;
+}
+
+double vibration_floor(const QuadraticNorms& norms)
+{
+  return norms.M > 0 ? 1e-12 * norms.K / norms.M : 0;
 }
 
 void quadratic_residual(Mat M, Mat C, Mat K, std::complex<double> lambda, Vec y_r, Vec y_i, Vec real, Vec imaginary)

@@ -1,7 +1,9 @@
 #include "squeal/analysis/real_modes.hpp"
 
+#include "squeal/analysis/block.hpp"
 #include "squeal/analysis/closed_contact.hpp"
 #include "squeal/analysis/quadratic.hpp"
+#include "squeal/analysis/shift_invert.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -25,42 +27,31 @@ double trace(Mat A)
   return result;
 }
 
-// Sylvester: as many eigenvalues lie below lambda as K - lambda M has negative pivots.
-int inertia_below(Mat M, Mat K, double lambda)
-{
-  const Owned<Mat> A = shifted(M, K, lambda);
-  Owned<Mat> factor;
-  MatFactorInfo settings;
-  check(MatFactorInfoInitialize(&settings));
-  check(MatGetFactor(A, MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, factor.put()));
-  check(MatCholeskyFactorSymbolic(factor, A, nullptr, &settings));
-  check(MatCholeskyFactorNumeric(factor, A, &settings));
-  PetscInt negative = 0;
-  check(MatMumpsGetInfog(factor, 12, &negative)); // MatGetInertia insists on null pivot detection, which is not wanted
-  return static_cast<int>(negative);
-}
-
 struct DenseModes
 {
   std::vector<double> lambda, y;
 };
 
+// On rank 0, told to all.
+DenseModes solve_dense_shared(MPI_Comm comm, int n, const std::vector<double>& M, const std::vector<double>& K,
+                              double shift)
+{
+  DenseModes modes;
+  on_rank_zero(comm, [&] { solve_dense_symmetric(n, M, K, shift, modes.lambda, modes.y); });
+  int count = static_cast<int>(modes.lambda.size());
+  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
+  modes.lambda.resize(static_cast<std::size_t>(count));
+  modes.y.resize(static_cast<std::size_t>(count) * static_cast<std::size_t>(n));
+  MPI_Bcast(modes.lambda.data(), count, MPI_DOUBLE, 0, comm);
+  MPI_Bcast(modes.y.data(), static_cast<int>(modes.y.size()), MPI_DOUBLE, 0, comm);
+  return modes;
+}
+
 DenseModes solve_whole(Mat M, Mat K)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  const double shift = shift_below_zero(M, K);
-  const std::vector<double> dense_M = dense_copy(M), dense_K = dense_copy(K);
-  DenseModes modes;
-  on_rank_zero(comm_of(K),
-               [&] { solve_dense_symmetric(static_cast<int>(n), dense_M, dense_K, shift, modes.lambda, modes.y); });
-  int count = static_cast<int>(modes.lambda.size());
-  MPI_Bcast(&count, 1, MPI_INT, 0, comm_of(K));
-  modes.lambda.resize(static_cast<std::size_t>(count));
-  modes.y.resize(static_cast<std::size_t>(count) * static_cast<std::size_t>(n));
-  MPI_Bcast(modes.lambda.data(), count, MPI_DOUBLE, 0, comm_of(K));
-  MPI_Bcast(modes.y.data(), static_cast<int>(modes.y.size()), MPI_DOUBLE, 0, comm_of(K));
-  return modes;
+  return solve_dense_shared(comm_of(K), static_cast<int>(n), dense_copy(M), dense_copy(K), shift_below_zero(M, K));
 }
 
 RealModes first_of(const DenseModes& all, Mat K, int count)
@@ -85,68 +76,183 @@ RealModes first_of(const DenseModes& all, Mat K, int count)
   return modes;
 }
 
-Owned<EPS> make_solver(Mat M, Mat K, int count, double shift)
+int inertia_below(Mat M, Mat K, double theta)
 {
-  Owned<EPS> eps;
-  check(EPSCreate(comm_of(K), eps.put()));
-  check(EPSSetOperators(eps, K, M));
-  check(EPSSetProblemType(eps, EPS_GHEP));
-  check(EPSSetType(eps, EPSKRYLOVSCHUR));
-  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
-  check(EPSSetTarget(eps, shift));
-  check(EPSSetDimensions(eps, count, PETSC_DEFAULT, PETSC_DEFAULT));
-  check(EPSSetTolerances(eps, 1e-10, 500));
-  ST transformation = nullptr;
-  KSP solver = nullptr;
-  PC factor = nullptr;
-  check(EPSGetST(eps, &transformation));
-  check(STSetType(transformation, STSINVERT));
-  check(STGetKSP(transformation, &solver));
-  check(KSPSetType(solver, KSPPREONLY));
-  check(KSPGetPC(solver, &factor));
-  check(PCSetType(factor, PCCHOLESKY));
-  check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
-  check(EPSSetOptionsPrefix(eps, "modes_"));
-  check(EPSSetFromOptions(eps));
-  return eps;
+  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric);
+  move_to(pencil, theta);
+  return negative_pivots(pencil);
 }
 
-RealModes solve_sparse(Mat M, Mat K, int count)
+// What a sweep looks for: all theta = omega^2 below a limit, or the first few.
+struct Sought
 {
-  const Owned<EPS> eps = make_solver(M, K, count, shift_below_zero(M, K));
-  check(EPSSolve(eps));
-  PetscInt converged = 0, iterations = 0;
-  check(EPSGetConverged(eps, &converged));
-  check(EPSGetIterationNumber(eps, &iterations));
-  RealModes modes;
-  modes.outcome = {"converged", "", static_cast<int>(iterations), 0};
-  double stiffness = 0;
-  check(MatNorm(K, NORM_1, &stiffness));
-  for (PetscInt k = 0; k < std::min<PetscInt>(converged, count); ++k)
+  double limit = 0; // [1/s2]
+  int count = 0;
+};
+
+struct Found
+{
+  std::vector<double> theta;
+  Block shapes;
+  double covered = -INFINITY; // every theta below is here
+  bool complete = false;      // by count
+  int iterations = 0;
+
+  int count() const { return static_cast<int>(theta.size()); }
+};
+
+// Between the last third of the ascending values, the middle of the widest gap: a cluster is not cut there.
+double widest_gap(const std::vector<double>& values)
+{
+  std::size_t best = values.size() - 1;
+  for (std::size_t k = best; 3 * k >= 2 * values.size() && k > 0; --k)
+    if (values[k] - values[k - 1] > values[best] - values[best - 1]) best = k;
+  return (values[best] + values[best - 1]) / 2;
+}
+
+// theta and M-normalised shapes of the symmetric problem on an invariant subspace
+DenseModes ritz_modes(const Nearest& nearest, Mat M, Mat K)
+{
+  const Block& space = nearest.space;
+  double largest = 0;
+  for (const std::complex<double> theta : nearest.theta) largest = std::max(largest, std::abs(theta));
+  return solve_dense_shared(space.comm, static_cast<int>(space.columns), inner(space, product(M, space)),
+                            inner(space, product(K, space)), -largest);
+}
+
+// Takes over what lies between found.covered and a gap before `end`.
+void take(Found& found, const DenseModes& ritz, const Block& space, double end, const Sought& sought)
+{
+  std::vector<double> values = {found.covered};
+  for (const double theta : ritz.lambda)
+    if (theta > found.covered && theta < end) values.push_back(theta);
+  values.push_back(end);
+  found.covered = end >= sought.limit ? sought.limit : widest_gap(values);
+  std::vector<double> chosen;
+  PetscInt count = 0;
+  for (std::size_t k = 0; k < ritz.lambda.size(); ++k)
   {
-    Owned<Vec> shape, residual;
-    check(MatCreateVecs(K, shape.put(), residual.put()));
-    double lambda = 0, size = 0, left = 0;
-    check(EPSGetEigenpair(eps, k, &lambda, nullptr, shape, nullptr));
-    const Owned<Vec> inertia = zeros_like(residual);
-    check(MatMult(K, shape, residual));
-    check(MatMult(M, shape, inertia));
-    check(VecAXPY(residual, -lambda, inertia));
-    check(VecNorm(residual, NORM_2, &left));
-    check(VecNorm(shape, NORM_2, &size));
-    modes.outcome.residual = std::max(modes.outcome.residual, left / (stiffness * size));
-    modes.omega.push_back(std::sqrt(std::max(0.0, lambda)));
+    if (ritz.lambda[k] <= values.front() || ritz.lambda[k] >= found.covered) continue;
+    const auto column = ritz.y.begin() + static_cast<std::ptrdiff_t>(k) * space.columns;
+    chosen.insert(chosen.end(), column, column + space.columns);
+    found.theta.push_back(ritz.lambda[k]);
+    ++count;
+  }
+  append(found.shapes, combination(space, chosen, count));
+}
+
+// The largest |K x - theta M x| / (|K| |x|)
+double largest_residual(const Found& found, Mat M, Mat K)
+{
+  Block residual = product(K, found.shapes), inertia = product(M, found.shapes);
+  for (PetscInt k = 0; k < residual.columns; ++k)
+    for (PetscInt i = 0; i < residual.rows; ++i)
+      residual.column(k)[i] -= found.theta[static_cast<std::size_t>(k)] * inertia.column(k)[i];
+  double stiffness = 0, largest = 0;
+  check(MatNorm(K, NORM_1, &stiffness));
+  const std::vector<double> left = column_norms(residual), size = column_norms(found.shapes);
+  for (std::size_t k = 0; k < left.size(); ++k) largest = std::max(largest, left[k] / (stiffness * size[k]));
+  return largest;
+}
+
+constexpr int ahead = 10, above = 30; // values from what is found to the next shift, and beyond it
+
+// Moves up until about `ahead` values lie between what is found and the shift; returns how many do.
+int climb(ShiftInvert& pencil, const Found& found, double step, double limit)
+{
+  int between = 0;
+  for (int attempt = 0; attempt < 6; ++attempt)
+  {
+    const double shift = std::min(found.covered + step, limit);
+    move_to(pencil, shift);
+    between = negative_pivots(pencil) - found.count();
+    if (between <= ahead + ahead / 4 && (2 * between >= ahead || shift == limit)) break;
+    step = (shift - found.covered) * std::min(3.0, ahead / std::max(1.0, static_cast<double>(between)));
+  }
+  return between;
+}
+
+// Forgets what no count has confirmed.
+void fall_back(Found& found, double verified)
+{
+  const auto kept = std::lower_bound(found.theta.begin(), found.theta.end(), verified) - found.theta.begin();
+  found.theta.resize(static_cast<std::size_t>(kept));
+  found.shapes.columns = static_cast<PetscInt>(kept);
+  found.shapes.entries.resize(static_cast<std::size_t>(kept) * static_cast<std::size_t>(found.shapes.rows));
+  found.covered = verified;
+}
+
+// What lies around the shift joins `found` if it is all there, by the shift's count of what lies below it.
+bool advance(Found& found, const ShiftInvert& pencil, PetscInt count, int between, const Sought& sought)
+{
+  const Nearest nearest = solve_nearest(pencil, count, pencil.shift - found.covered);
+  ++found.iterations;
+  if (!nearest.converged) return false;
+  const DenseModes ritz = ritz_modes(nearest, pencil.M, pencil.K);
+  const auto below = std::count_if(ritz.lambda.begin(), ritz.lambda.end(),
+                                   [&](double theta) { return theta > found.covered && theta < pencil.shift; });
+  if (below != between) return false;
+  take(found, ritz, nearest.space, pencil.shift + nearest.reach, sought);
+  return true;
+}
+
+// Shifts climb through the spectrum; the factor at each says how many values lie below it, and all must be there.
+Found sweep(Mat M, Mat K, const Sought& sought)
+{
+  PetscInt n = 0;
+  check(MatGetSize(K, &n, nullptr));
+  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric);
+  Found found;
+  found.shapes = empty_block(K);
+  double verified = shift_below_zero(M, K); // all below is found for sure
+  found.covered = verified;
+  move_to(pencil, verified);
+  for (int failures = 0, between = 0; failures < 4 && !found.complete;)
+  {
+    const int missing = std::clamp(sought.count - found.count() - between + 2, 5, above);
+    const double start = std::max(0.0, found.covered);
+    const int before = found.count();
+    const bool good =
+        advance(found, pencil, std::min<PetscInt>(n, between + missing * (1 + failures)), between, sought);
+    if (good && std::isinf(found.covered)) found.complete = true; // the whole spectrum
+    if (found.complete) break;
+    failures = good ? 0 : failures + 1;
+    if (good) verified = pencil.shift;
+    if (good && found.covered < sought.limit && found.count() < sought.count)
+    {
+      const double spacing = (found.covered - start) / std::max(1, found.count() - before);
+      between = climb(pencil, found, ahead * spacing, sought.limit);
+      continue;
+    }
+    // Done if the count says so; or what is missing lies below, and nearer shifts find it.
+    if (good) move_to(pencil, found.covered);
+    found.complete = good && negative_pivots(pencil) == found.count();
+    if (found.complete) break;
+    fall_back(found, verified);
+    if (!good) move_to(pencil, (verified + pencil.shift) / 2);
+    between = negative_pivots(pencil) - found.count();
+  }
+  return found;
+}
+
+RealModes to_modes(const Found& found, Mat M, Mat K, const Sought& sought)
+{
+  RealModes modes;
+  modes.outcome = {"converged", "", found.iterations, largest_residual(found, M, K)};
+  if (!found.complete)
+  {
+    modes.outcome.word = "not converged";
+    modes.outcome.reason = std::to_string(found.count()) + " real modes found, and more are missing";
+  }
+  for (int k = 0; k < std::min(found.count(), sought.count); ++k)
+  {
+    Owned<Vec> shape;
+    check(MatCreateVecs(K, shape.put(), nullptr));
+    copy_column(found.shapes, k, shape);
+    modes.omega.push_back(std::sqrt(std::max(0.0, found.theta[static_cast<std::size_t>(k)])));
     modes.shapes.push_back(std::move(shape));
   }
   return modes;
-}
-
-// A multiple frequency may be cut at the end, so the count is taken just below the last one.
-bool is_complete(Mat M, Mat K, const RealModes& modes)
-{
-  const double last = modes.omega.back(), limit = last * last * (1 - 1e-6);
-  const auto below = std::count_if(modes.omega.begin(), modes.omega.end(), [&](double w) { return w * w < limit; });
-  return below == inertia_below(M, K, limit);
 }
 
 struct BilateralProblem
@@ -208,20 +314,18 @@ RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit)
   check(MatGetSize(K, &n, nullptr));
   if (count <= 0) return {{"converged", "", 0, 0}, {}, {}};
   if (n <= dense_limit) return first_of(solve_whole(M, K), K, count);
-  count = std::min(count, static_cast<int>(n));
-  RealModes modes;
-  for (int asked = count; asked <= std::min(static_cast<int>(n), 2 * count + 20); asked += asked / 4 + 4)
-  {
-    modes = solve_sparse(M, K, asked);
-    if (modes.omega.empty() || !is_complete(M, K, modes)) continue;
-    if (static_cast<int>(modes.omega.size()) < count) break;
-    modes.omega.resize(static_cast<std::size_t>(count));
-    modes.shapes.resize(static_cast<std::size_t>(count));
-    return modes;
-  }
-  modes.outcome.word = "not converged";
-  modes.outcome.reason = std::to_string(modes.omega.size()) + " real modes found of " + std::to_string(count);
-  return modes;
+  const Sought sought{INFINITY, std::min(count, static_cast<int>(n))};
+  return to_modes(sweep(M, K, sought), M, K, sought);
+}
+
+RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit)
+{
+  PetscInt n = 0;
+  check(MatGetSize(K, &n, nullptr));
+  const double omega = 2 * std::numbers::pi * band;
+  if (n <= dense_limit) return first_of(solve_whole(M, K), K, count_real_modes(M, K, band, dense_limit));
+  const Sought sought{omega * omega, static_cast<int>(n)};
+  return to_modes(sweep(M, K, sought), M, K, sought);
 }
 
 int dense_limit_option()
@@ -244,12 +348,7 @@ RealModes find_real_modes_below(const Structure& structure, const Interface& int
                                 double band)
 {
   const BilateralProblem problem = make_bilateral(structure, interface, equilibrium);
-  const int limit = dense_limit_option(), count = count_real_modes(problem.M, problem.K, band, limit);
-  PetscInt n = 0;
-  check(MatGetSize(problem.K, &n, nullptr));
-  // A preconditioner can miss one mode of a cluster; looking for it again would cost more than all the others.
-  RealModes modes = n > limit && count > 0 ? solve_sparse(problem.M, problem.K, std::min(count, static_cast<int>(n)))
-                                           : solve_real_modes(problem.M, problem.K, count, limit);
+  RealModes modes = solve_real_modes_below(problem.M, problem.K, band, dense_limit_option());
   to_structure(modes, problem);
   return modes;
 }

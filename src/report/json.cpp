@@ -71,6 +71,11 @@ Json modes_entry(const Modes& modes)
   entry["band_hz"] = modes.band;
   entry["unstable_count"] = modes.unstable_count;
   entry["count_check"] = modes.count_check;
+  entry["count_certified_by"] = modes.count.certified_by.empty() ? Json(nullptr) : Json(modes.count.certified_by);
+  entry["count_expected"] = modes.count.expected;
+  entry["count_found"] = modes.count.found;
+  entry["count_frequency_hz"] = modes.count.frequency;
+  entry["beyond_band_hz"] = modes.beyond_band;
   entry["modes"] = mode_list(modes.modes);
   if (!modes.projected.empty()) entry["projected"] = mode_list(modes.projected);
   return entry;

@@ -68,7 +68,7 @@ std::string modes_text(const Modes& modes)
   text += row("", format("%d unstable of %zu modes below %.5g Hz, method \"%s\", largest backward error %.1e",
                          modes.unstable_count, modes.modes.size(), modes.band, modes.method.c_str(),
                          modes.outcome.residual));
-  if (!modes.count_check.empty()) text += row("", "count of unstable modes: " + modes.count_check);
+  if (!modes.count_check.empty()) text += row("", "count: " + modes.count_check);
   text += row("", format("%12s %14s %12s %16s", "frequency", "growth rate", "damping", "backward error"));
   text += row("", format("%12s %14s %12s %16s", "[Hz]", "[1/s]", "[%]", "[-]"));
   const std::size_t unstable = static_cast<std::size_t>(std::max(modes.unstable_count, 0));

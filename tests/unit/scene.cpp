@@ -316,7 +316,7 @@ TEST_CASE("wrong types, signs and ranges are refused with key, value and what is
       {"name = \"hub\"", "name = \"\"", "not empty"},
       {"size = 4000", "size = \"big\"", "finite numbers"},
       {"tangents = [\"x\", [0, 1, 0]]", "tangents = [\"x\", \"y\", \"z\"]", "one or two"},
-      {"band = 5000", "band = 5000\nreal_modes = 0", "real_modes = 0"},
+      {"band = 5000", "band = 5000\nreal_modes = -1", "real_modes = -1"},
       {"[friction]", "[[friction]]", "is a table"},
       {"start = \"state.bin\"", "start = \"stat.bin\"", "there is no file"},
       {"file = \"brake.geo\"", "file = \"brek.geo\"", "there is no file"},

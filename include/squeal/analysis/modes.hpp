@@ -34,7 +34,15 @@ struct RealModes
   std::vector<Owned<Vec>> shapes; // in the structure's dofs
 };
 
-/// outcome: "converged", "not converged" (fewer than asked, or backward errors above 1e-8), "skipped".
+/// How it is known that no mode is missing.
+struct ModeCount
+{
+  std::string certified_by;    // "inertia" of the frictionless structure; empty: not certified
+  double frequency = 0;        // [Hz], the band or just above, where no pair crossed the edge for friction
+  int expected = 0, found = 0; // pairs below it
+};
+
+/// outcome: "converged", "not converged" (fewer than expected, or backward errors above 1e-8), "skipped".
 /// residual: the largest backward error reported.
 struct Modes
 {
@@ -43,20 +51,22 @@ struct Modes
   double band = 0;                    // [Hz] covered: every mode below is here
   std::vector<ComplexMode> modes;     // Im(lambda) >= 0, largest growth first
   std::vector<ComplexMode> projected; // the other route's, when both ran
+  std::vector<double> beyond_band;    // [Hz] pairs between the band and count.frequency
   int unstable_count = 0;
-  std::string count_check; // how the count of unstable modes was confirmed by a second means, or why it was not
+  ModeCount count;
+  std::string count_check; // in words: unstable modes by either route, all modes by inertia
 };
 
-/// Options, prefix -modes_: dense_limit as below, and the solver's own eps_ and st_.
+/// Option: -modes_dense_limit, as below.
 RealModes find_real_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                           int count);
 
-/// Real modes with frequency below `band` [Hz], as many as there are; of a cluster one may be a mode above instead.
+/// Real modes with frequency below `band` [Hz], as many as there are.
 RealModes find_real_modes_below(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                                 double band);
 
 /// Options, prefix -modes_: dense_limit (200, problems up to this size are solved whole by LAPACK), candidates (20,
-/// pairs a residual pass of the projection corrects), and the sparse solver's own, pep_ and st_.
+/// pairs a residual pass of the projection corrects), solver (slices, or toar with the options of pep_ and st_).
 Modes find_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                  const ModesSettings& settings);
 

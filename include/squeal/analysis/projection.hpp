@@ -1,16 +1,21 @@
 #pragma once
-/// The quadratic eigenproblem on real modes, corrected by its own residuals (Brizard, Chiello, Sinou, Lorang 2011).
+/// The quadratic eigenproblem on a small subspace, corrected by its own residuals.
 ///
-/// On V, the first real modes, V'(lambda^2 M + lambda C + K) V a = 0 is small and dense. What V lacks shows in the
-/// residual r of each y = V a; its static answer, the shape K_s^-1 r with K_s the symmetric stiffness without friction,
-/// joins V, and so on for some passes. Only the pairs of largest growth (Re/|lambda|) in the band are corrected: those
-/// decide. Caveat: an unstable pair that the first basis shows as well damped may be left out; judge by the full
-/// problem.
+/// On an orthonormal V, V'(lambda^2 M + lambda C + K) V a = 0 is small and dense. What V, the first real modes, lacks
+/// shows in the residual r of each y = V a; its static answer K_s^-1 r, K_s the symmetric stiffness without friction,
+/// joins V, and so on for some passes (Brizard, Chiello, Sinou, Lorang 2011). Only the pairs of largest growth
+/// (Re/|lambda|) in the band are corrected: those decide. Caveat: an unstable pair that the first basis shows as well
+/// damped may be left out; judge by the full problem.
+#include "squeal/analysis/block.hpp"
 #include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/real_modes.hpp"
 
 namespace squeal
 {
+
+/// The pairs y = V a, of 2-norm 1, with their backward errors; V orthonormal.
+std::vector<Eigenpair> eigenpairs(const QuadraticProblem& problem, const Block& V,
+                                  const std::vector<DenseEigenpair>& found);
 
 struct ProjectionSettings
 {

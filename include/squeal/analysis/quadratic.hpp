@@ -26,6 +26,13 @@ struct Eigenpair
   double backward_error = 0;
 };
 
+/// Which eigenvalues are sought: least <= |lambda|^2 < limit [1/s2], Im > 0, or real and positive.
+struct Window
+{
+  double least = 0, limit = 0;
+  bool holds(std::complex<double> lambda) const;
+};
+
 /// The solver's own options have the prefix -modes_: -modes_pep_tol, -modes_st_…
 struct QuadraticSettings
 {
@@ -55,6 +62,9 @@ struct QuadraticNorms
 };
 
 QuadraticNorms norms_of(const QuadraticProblem& problem);
+
+/// |lambda|^2 up to which a motion is that of a free body, not a vibration: 1e-12 |K|/|M| [1/s2].
+double vibration_floor(const QuadraticNorms& norms);
 double backward_error(const QuadraticProblem& problem, const QuadraticNorms& norms, const Eigenpair& pair);
 
 /// real, imaginary = (lambda^2 M + lambda C + K) (y_r + i y_i)

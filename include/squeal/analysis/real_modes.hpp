@@ -1,6 +1,7 @@
 #pragma once
-/// The symmetric eigenproblem K y = omega^2 M y under the real modes: SLEPc's Krylov-Schur, shift-inverted just below
-/// zero, its completeness certified by the inertia of K - omega^2 M (Sylvester's law); LAPACK when small.
+/// The symmetric eigenproblem K y = omega^2 M y under the real modes: SLEPc's Krylov-Schur around shifts that climb
+/// from just below zero, complete by Sylvester's law, the factor at each shift counting what lies below it (after
+/// Grimes, Lewis, Simon 1994); LAPACK when small.
 #include "squeal/analysis/modes.hpp"
 
 namespace squeal
@@ -18,6 +19,9 @@ int count_real_modes(Mat M, Mat K, double band, int dense_limit);
 
 /// The lowest `count`, or as many as there are; shapes are y.
 RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit);
+
+/// All with omega below `band` [Hz].
+RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit);
 
 /// -modes_dense_limit
 int dense_limit_option();

@@ -125,7 +125,7 @@ struct ModesSettings
 {
   bool enabled = true;
   std::string method = "both"; // "projection" (paper), "full" (sparse quadratic problem), "both" (full judges)
-  int real_modes = 100;        // of the projection
+  int real_modes = 0;          // of the projection; 0: those below the band
   int residual_passes = 3;     // of the projection
   double band = 20000;         // [Hz] report every mode below
 };

@@ -1,0 +1,51 @@
+#pragma once
+/// The eigenvalues theta of K y = theta M y nearest a real shift, K and M symmetric or not, by a block Krylov space of
+/// (K - shift M)^-1 M.
+///
+/// Blocks, because brakes have many nearly equal modes (doublets of a disc, one a pin), which a space grown from a
+/// single vector finds late or never, and because MUMPS reads its factor once for a block. No restarts: a shift is
+/// moved on instead.
+#include "squeal/analysis/block.hpp"
+
+#include <complex>
+
+namespace squeal
+{
+
+enum class Symmetry
+{
+  symmetric, // K = K', M = M': Cholesky, whose pivots count eigenvalues
+  general    // LU
+};
+
+/// A factor that moves from shift to shift; the ordering is found once.
+struct ShiftInvert
+{
+  Mat K = nullptr, M = nullptr; // lent
+  Symmetry symmetry = Symmetry::general;
+  double shift = 0;
+  Owned<Mat> shifted, factor; // K - shift M
+};
+
+ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry);
+void move_to(ShiftInvert& pencil, double shift);
+
+/// Sylvester: as many eigenvalues of a symmetric pencil lie below the shift as its factor has negative pivots.
+int negative_pivots(const ShiftInvert& pencil);
+
+/// Orthonormal basis of the invariant subspace of all theta with |theta - shift| <= reach.
+struct Nearest
+{
+  Block space;
+  std::vector<std::complex<double>> theta;
+  double reach = 0;
+  bool converged = false; // or the space grew to its limit, and nothing is given
+};
+
+/// At least `count` of them, and at least those within `radius`.
+Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius);
+
+/// MUMPS does the factorisations of a spectral transformation of SLEPc's.
+void use_mumps(ST transformation);
+
+} // namespace squeal
