@@ -65,7 +65,7 @@ void print_help()
       "  exit code: 0 all converged, 2 a stage did not (the report says which), 1 an error\n\n"
       "%s\n"
       "Algorithm options (PETSc options database) [default]\n%s\n"
-      "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes -modes_pep_ -modes_st_ -modes_eps_\n"
+      "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes -modes_pep_ -modes_st_\n"
       "-cycle_snes_ -cycle_full_snes_ -cycle_full_ksp_: e.g. -cycle_snes_monitor, -modes_pep_monitor,\n"
       "-cycle_full_ksp_rtol 1e-3. Of the whole run: -log_view (one stage per step of the chain), -options_file FILE.\n",
       SQUEAL_VERSION, scene_reference().c_str(), option_reference().c_str());

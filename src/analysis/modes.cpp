@@ -128,13 +128,31 @@ RealSpectrum find_spectrum(const SlidingProblem& problem, const ModesSettings& s
   return spectrum;
 }
 
+// Friction may move a pair across the band's edge: of the last gaps between real modes below it, the highest where both
+// counts agree, or else the band.
 PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution& solution,
                         const RealSpectrum& spectrum, double band)
 {
-  const double floor = std::sqrt(vibration_floor(norms_of(problem))), edge = 2 * std::numbers::pi * band;
-  const auto expected = std::count_if(spectrum.modes.omega.begin(), spectrum.modes.omega.end(),
-                                      [&](double omega) { return omega >= floor && omega < edge; });
-  return {band, static_cast<int>(expected), static_cast<int>(solution.pairs.size())};
+  constexpr std::ptrdiff_t gaps_tried = 8;
+  const std::vector<double>& omega = spectrum.modes.omega;
+  const double floor = std::sqrt(vibration_floor(norms_of(problem))), end = 2 * std::numbers::pi * band;
+  const auto count_at = [&](double edge)
+  {
+    const auto expected = std::count_if(omega.begin(), omega.end(), [&](double w) { return w >= floor && w < edge; });
+    const auto found = std::count_if(solution.pairs.begin(), solution.pairs.end(),
+                                     [&](const Eigenpair& pair) { return std::abs(pair.lambda) < edge; });
+    return PairCount{edge / (2 * std::numbers::pi), static_cast<int>(expected), static_cast<int>(found)};
+  };
+  const PairCount whole = count_at(end);
+  if (whole.expected == whole.found) return whole;
+  const auto last = std::lower_bound(omega.begin(), omega.end(), end) - omega.begin();
+  for (std::ptrdiff_t k = last - 1; k > std::max<std::ptrdiff_t>(0, last - gaps_tried); --k)
+  {
+    const auto i = static_cast<std::size_t>(k);
+    const PairCount count = count_at((omega[i] + omega[i - 1]) / 2);
+    if (count.expected == count.found) return count;
+  }
+  return whole;
 }
 
 CountedSolution solve_full(const SlidingProblem& problem, const RealSpectrum& spectrum, const ModesSettings& settings,
@@ -145,7 +163,16 @@ CountedSolution solve_full(const SlidingProblem& problem, const RealSpectrum& sp
   check(MatGetSize(problem.K, &n, nullptr));
   CountedSolution result;
   if (n > limit && options.solver == "slices")
-    return solve_by_slices(problem.reduced, spectrum.modes.omega, settings.band, spectrum.reach);
+  {
+    result = solve_by_slices(problem.reduced, spectrum.modes.omega, settings.band, spectrum.reach);
+    if (result.count.expected == result.count.found) return result;
+    result.count = count_in_band(problem.reduced, result.solution, spectrum, settings.band);
+    if (result.count.found >= result.count.expected) return result;
+    result.solution.outcome.word = "not converged";
+    result.solution.outcome.reason =
+        "fewer pairs were found than are expected; -modes_solver toar seeks them otherwise";
+    return result;
+  }
   QuadraticSettings quadratic{settings.band, 0, static_cast<int>(spectrum.modes.omega.size()), limit};
   if (n > limit)
     quadratic.shift = std::sqrt(-shift_below_zero(problem.M, problem.K)) / (2 * std::numbers::pi * settings.band);
