@@ -17,7 +17,7 @@ using Complex = std::complex<double>;
 
 constexpr int per_slice = 20;      // pairs
 constexpr int passes = 10;         // of correction, the first included
-constexpr double refined = 3e-12;  // backward error to which pairs are corrected,
+constexpr double refined = 1e-13;  // backward error to which pairs are corrected,
 constexpr double accepted = 1e-10; // and below which a pair is one, not a shadow of those outside the slice
 constexpr double two_pi = 2 * std::numbers::pi;
 
