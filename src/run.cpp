@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <numbers>
 #include <span>
+#include <sys/resource.h>
 
 namespace squeal
 {
@@ -219,6 +220,15 @@ Verdict verdict_of(const Report& report)
   return all_good ? Verdict::converged : Verdict::not_converged;
 }
 
+double largest_memory(MPI_Comm comm)
+{
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  double bytes = 1024. * static_cast<double>(usage.ru_maxrss);
+  MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_DOUBLE, MPI_SUM, comm);
+  return bytes;
+}
+
 } // namespace
 
 Verdict run(const Scene& scene, const std::filesystem::path& output, MPI_Comm comm)
@@ -235,6 +245,7 @@ Verdict run(const Scene& scene, const std::filesystem::path& output, MPI_Comm co
   report.transient = timed(report, "transient", comm, [&] { return run_transient(scene, model, report); });
   report.cycle = timed(report, "cycle", comm, [&] { return run_cycle(scene, model, report); });
 
+  report.memory_bytes = largest_memory(comm);
   write_results(report, scene, model, output, comm);
   print_summary(report, scene, comm);
   if (rank_of(comm) == 0) std::printf("results are in %s\n", output.c_str());

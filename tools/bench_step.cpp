@@ -5,10 +5,10 @@
 #include "squeal/analysis/transient.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <ctime>
 #include <fstream>
-#include <sys/resource.h>
 
 using namespace squeal;
 
@@ -42,13 +42,65 @@ template <class Work> double seconds(int times, Work work)
   return median(all);
 }
 
+/// Largest resident size, all ranks together; not from getrusage, which a child inherits from who started it.
 double resident_megabytes()
 {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  double mine = static_cast<double>(usage.ru_maxrss) / 1024, all = 0;
+  std::ifstream status("/proc/self/status");
+  double mine = 0, all = 0;
+  for (std::string word; status >> word;)
+    if (word == "VmHWM:") status >> mine;
+  mine /= 1024;
   MPI_Reduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, 0, PETSC_COMM_WORLD);
   return all;
+}
+
+/// b of the first step, by the displacement law; on rank 0.
+std::vector<double> first_problem(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                                  const State& state, const StepWork& work)
+{
+  const auto rhs = copy_of(work.Mv), position = zeros_like(structure.load), v = zeros_like(structure.load);
+  check(VecAXPBYPCZ(rhs, (step.theta - 1) / step.theta, -step.h, 1 / step.theta, work.Av, work.Ku));
+  check(VecAXPY(rhs, step.h, structure.load));
+  std::vector<double> b = step.factor.forward(std::array<Vec, 1>{rhs});
+  step.factor.backward(std::vector<double>(b.size(), 0.), std::array<Vec, 1>{v});
+  check(VecWAXPY(position, step.h * (1 - step.theta), state.v, state.u));
+  const std::vector<double> moved = relative(interface, position);
+  const auto block = static_cast<std::size_t>(interface.block());
+  for (std::size_t i = 0; i < b.size(); ++i)
+    if (i % block == 0)
+      b[i] += (interface.gap[i / block] + moved[i]) / step.h;
+    else
+      b[i] -= interface.drive[i / block * (block - 1) + i % block - 1];
+  return b;
+}
+
+/// Seconds of contact alone from r = 0, and the sweeps.
+std::pair<double, int> cold_contact(const ThetaStep& step, double mu, const std::vector<double>& b, const char* solver)
+{
+  if (b.empty()) return {0, 0};
+  ContactSettings settings = step.contact;
+  settings.solver = solver;
+  settings.max_iterations = 100000;
+  int sweeps = 0;
+  const double taken = seconds(3,
+                               [&]
+                               {
+                                 std::vector<double> r;
+                                 ContactMemory memory;
+                                 const ContactProblem problem{b, r, memory};
+                                 sweeps = solve_contacts(step.W, mu, settings, std::span(&problem, 1))[0].iterations;
+                               });
+  return {taken, sweeps};
+}
+
+/// Entries of the factor of A alone.
+double plain_factor_entries(const Structure& structure, double h)
+{
+  Owned<Mat> A;
+  check(MatDuplicate(structure.M, MAT_COPY_VALUES, A.put()));
+  check(MatAXPY(A, h * .5, structure.C, SAME_NONZERO_PATTERN));
+  check(MatAXPY(A, h * h * .25, structure.K, SAME_NONZERO_PATTERN));
+  return Factor(A, nullptr, Factor::Kind::sparse).entries();
 }
 
 void run(const std::vector<std::string>& words)
@@ -73,6 +125,7 @@ void run(const std::vector<std::string>& words)
     check(VecScale(states.back().v, 1 + k / 1000.));
     works.push_back(begin_steps(step, structure, interface, states.back()));
   }
+  const std::vector<double> b = first_problem(step, structure, interface, states[0], works[0]);
   std::ofstream dump;
   if (words.size() > 6 && speaks) dump.open(words[6], std::ios::binary);
   std::vector<double> taken;
@@ -99,18 +152,23 @@ void run(const std::vector<std::string>& words)
   const double solve_time = seconds(5, [&] { solve(step.factor, structure.load, x); });
   const double product_time = seconds(5, [&] { check(MatMult(structure.K, structure.load, x)); });
   const double resident = resident_megabytes();
+  const auto [cold, cold_sweeps] = cold_contact(step, mu, b, "gauss_seidel");
+  const auto [fixed, fixed_sweeps] = cold_contact(step, mu, b, "fixed_point");
+  const double entries = plain_factor_entries(structure, h);
   const std::size_t dofs = whole(structure.load).size();
   if (!speaks) return;
   taken.erase(taken.begin());
   std::printf("{\"dofs\": %d, \"pairs\": %d, \"ranks\": %d, \"trajectories\": %d, \"step\": %.4g, "
               "\"step_each\": %.4g, \"prepare\": %.4g, \"solve\": %.4g, "
               "\"product\": %.4g, \"iterations\": %.4g, \"residual\": %.3g, \"energy_defect\": %.3g, "
-              "\"near_field\": %.4g, \"resident_MB\": %.4g}\n",
+              "\"near_field\": %.4g, \"resident_MB\": %.4g, "
+              "\"contact_cold\": %.4g, \"cold_sweeps\": %d, \"fixed_point_cold\": %.4g, \"fixed_point_sweeps\": %d, "
+              "\"factor_entries\": %.6g}\n",
               static_cast<int>(dofs), interface.pairs, ranks_of(comm), count, median(taken), median(taken) / count,
               prepared, solve_time, product_time, iterations / steps / count, residual, defect,
               static_cast<double>(step.W.near.values.size()) /
                   static_cast<double>(std::max<std::size_t>(1, step.W.W.size())),
-              resident);
+              resident, cold, cold_sweeps, fixed, fixed_sweeps, entries);
 }
 
 } // namespace

@@ -94,6 +94,8 @@ void measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int sam
     ++done;
   };
   march(map.step, map.structure, map.interface, equilibrium, probes, map.steps, state, cycle.history, watch);
+  cycle.factor_seconds = map.step.factor_seconds;
+  cycle.condensed_seconds = map.step.condensed_seconds;
   ++cycle.periods_integrated;
   cycle.start.reactions = map.reactions;
   const History& history = cycle.history;

@@ -199,6 +199,8 @@ Trajectory integrate(const Structure& structure, const Interface& interface, con
   const MarchSummary summary =
       march(step, structure, interface, equilibrium, probes, steps, trajectory.end, trajectory.history, watch);
   trajectory.seconds_per_step = (MPI_Wtime() - wall) / static_cast<double>(std::max(summary.steps, 1L));
+  trajectory.factor_seconds = step.factor_seconds;
+  trajectory.condensed_seconds = step.condensed_seconds;
   trajectory.steps = summary.steps;
   trajectory.law = step.law;
   trajectory.energy_defect_max = summary.energy_defect_max;

@@ -122,6 +122,7 @@ std::unique_ptr<DMUMPS_STRUC_C> start_mumps(MPI_Comm comm)
   control(*mumps, 4) = 0;  // silent
   control(*mumps, 18) = 3; // every rank gives its share of the entries
   control(*mumps, 7) = 1;  // the order that is given
+  control(*mumps, 14) = 1; // room beyond its estimate [%]: without pivoting that is near the truth
   mumps->cntl[0] = 0;      // no pivoting: positive definite
   return mumps;
 }
@@ -153,7 +154,7 @@ bool factorise_by_mumps(DMUMPS_STRUC_C& mumps, Triplets& mine, int dofs, int bor
   do // its guess of the room it needs can fall short
   {
     run(mumps, Job::factorise);
-    control(mumps, 14) *= 2;
+    control(mumps, 14) = 4 * control(mumps, 14) + 10;
   } while ((mumps.infog[0] == -8 || mumps.infog[0] == -9) && control(mumps, 14) < 2000);
   mumps.irn_loc = mumps.jcn_loc = mumps.perm_in = mumps.listvar_schur = nullptr;
   mumps.a_loc = nullptr;
@@ -344,11 +345,12 @@ void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x)
   }
 }
 
-double Factor::memory() const
+double Factor::entries() const
 {
-  const Parts& parts = *parts_;
-  return parts.mumps ? 1e6 * parts.mumps->info[21]
-                     : sizeof(double) * static_cast<double>(parts.L.size() + parts.influence.size());
+  const DMUMPS_STRUC_C* mumps = parts_->mumps.get();
+  if (!mumps) return .5 * static_cast<double>(parts_->dofs) * parts_->dofs;
+  const int told = mumps->infog[28]; // negative: in millions
+  return told < 0 ? -1e6 * told : told;
 }
 
 void solve(const Factor& factor, Vec b, Vec x)

@@ -207,7 +207,15 @@ std::string report_json(const Report& report, const Scene& scene)
                    {"pairs", report.pairs},
                    {"elements", report.elements},
                    {"ranks", report.ranks},
+                   {"memory_bytes", report.memory_bytes},
                    {"rounding_hz", report.rounding_hz}};
+  const double factor = std::max(report.transient.factor_seconds, report.cycle.factor_seconds);
+  if (factor > 0) // A was factored: what one step size costs before the first step
+  {
+    json["model"]["factor_seconds"] = factor;
+    json["model"]["condensed_operator_seconds"] =
+        std::max(report.transient.condensed_seconds, report.cycle.condensed_seconds);
+  }
   json["equilibrium"] = equilibrium_entry(report, scene);
   json["modes"] = modes_entry(report.modes);
   json["estimate"] = estimate_entry(report.estimate);

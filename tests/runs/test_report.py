@@ -11,7 +11,7 @@ import pytest
 from conftest import INPUTS, ROOT
 
 KEYS = {
-    "model": "dofs pairs elements ranks",
+    "model": "dofs pairs elements ranks memory_bytes factor_seconds condensed_operator_seconds",
     "equilibrium": "outcome iterations closed normal_force_sum normal_force_min normal_force_max residual",
     "modes": "outcome method unstable_count modes",
     "estimate": "outcome amplitude lift_off_amplitude reversal_amplitude damping_rate friction_rate_linear",

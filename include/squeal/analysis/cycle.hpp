@@ -58,6 +58,7 @@ struct LimitCycle
   std::string stability;       // "stable", "unstable", "undecided", or "" without multipliers
   double trivial_error = 0;    // distance of the shift's own multiplier from 1: the error bar of the verdict
   long multiplier_periods = 0; // integrated for them, not in periods_integrated
+  double factor_seconds = 0, condensed_seconds = 0; // of the last ThetaStep
 };
 
 /// Where shooting starts, and what its reduced space is made of.

@@ -121,6 +121,7 @@ struct Trajectory
   double growth_rate_predicted = 0; // [1/s] discrete, of the followed mode
   double energy_defect_max = 0;     // of the energy, largest over the steps
   double seconds_per_step = 0, contact_iterations_mean = 0;
+  double factor_seconds = 0, condensed_seconds = 0; // of its ThetaStep
   State end;
   History history;
 };

@@ -47,8 +47,7 @@ public:
   /// x = A^-1 (b - B' lambda) for the b of the last `forward`; lambda as `forward` returns, read on rank 0.
   void backward(const std::vector<double>& lambda, std::span<const Vec> x) const;
 
-  /// [bytes] of this rank: what the factor occupies.
-  double memory() const;
+  double entries() const; // of the triangular factor, the border's rows included
 
 private:
   struct Parts;

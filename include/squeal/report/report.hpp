@@ -18,7 +18,8 @@ struct Report
   PetscInt dofs = 0;
   long elements = 0;
   int pairs = 0, ranks = 1;
-  double rounding_hz = 0; // 1e-6 sqrt(|K|/|M|) / 2 pi: slower modes are taken for rigid motions
+  double memory_bytes = 0; // largest resident size so far, all ranks together
+  double rounding_hz = 0;  // 1e-6 sqrt(|K|/|M|) / 2 pi: slower modes are taken for rigid motions
   Equilibrium equilibrium;
   std::vector<double> contact_forces;     // [N] sum of r_n of each contact of the scene; empty on a matrix scene
   std::vector<double> contact_torques;    // [N m] with which each brakes its rotation: sum of r_t.v_d over the rate
