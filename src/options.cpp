@@ -37,6 +37,11 @@ constexpr std::array options = {
     Option{"-cycle_start_amplitude", "1", "multiple of the estimate's amplitude to start from"},
     Option{"-cycle_start_phase", "0", "degrees, added to the estimate's phase of the start"},
     Option{"-cycle_start_period", "1", "multiple of the mode's period to start from"},
+    Option{"-reduced_margin", "1", "pairs that part at this many times the start's amplitude keep their contact"},
+    Option{"-reduced_threshold", "1e-5", "an attachment shape is dropped when less than this part of it is new"},
+    Option{"-reduced_modes", "100000", "complex modes taken, the followed one and the nearest in frequency"},
+    Option{"-reduced_free_periods", "100", "integrated on the reduced model before its first Newton step"},
+    Option{"-reduced_corrections", "20", "times that a period of the full model corrects the reduced cycle"},
     Option{"-cycle_reduced_newtons", "10", "iterations of the reduced system on the mode's shapes; 0: not tried"},
     Option{"-cycle_base_growths", "-1",
            "times the reduced base may grow by what it missed; -1: 4 without a finish, else 0"},
@@ -55,7 +60,8 @@ constexpr std::array options = {
     Option{"-cycle_samples", "32", "displacements kept over the last period, for the fields file"},
 };
 
-constexpr std::array stages = {"equilibrium_", "modes_", "transient_", "cycle_", "cycle_full_", "estimate_"};
+constexpr std::array stages = {"equilibrium_", "modes_",    "transient_", "cycle_",
+                               "cycle_full_",  "estimate_", "reduced_"};
 
 // What a stage hands on to a solver object, which checks the rest itself.
 constexpr std::array solver_parts = {"snes_", "ksp_", "pc_", "pep_", "eps_", "st_",

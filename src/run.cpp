@@ -124,7 +124,7 @@ std::string cycle_refusal(const Scene& scene, const Model& model, const Report& 
   return step_refusal(model.structure, &mode, scene.cycle.theta, period / scene.cycle.steps_per_period);
 }
 
-LimitCycle run_cycle(const Scene& scene, const Model& model, const Report& report)
+LimitCycle run_cycle(const Scene& scene, const Model& model, Report& report)
 {
   LimitCycle cycle;
   const std::string reason = no_mode_to_follow(report);
@@ -134,9 +134,16 @@ LimitCycle run_cycle(const Scene& scene, const Model& model, const Report& repor
     cycle.outcome = not_run("skipped", reason);
   else if (const std::string lie = cycle_refusal(scene, model, report); !lie.empty())
     cycle.outcome = not_run("refused", lie);
-  else
+  else if (scene.fidelity == "full")
     return find_cycle(model.structure, model.interface, report.equilibrium, growing_modes(report), report.estimate,
                       scene.cycle, model.probes);
+  else
+  {
+    FittedCycle fitted = find_fitted_cycle(model.structure, model.interface, report.equilibrium, report.modes,
+                                           report.estimate, scene.cycle, scene.fidelity, scene.accuracy, model.probes);
+    report.fidelity = fitted.fidelity;
+    return std::move(fitted.cycle);
+  }
   return cycle;
 }
 

@@ -78,8 +78,9 @@ double mean(const std::vector<double>& values)
   return std::accumulate(values.begin(), values.end(), 0.) / static_cast<double>(values.size());
 }
 
-/// One more period from the cycle's start, recorded.
-void measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int samples, LimitCycle& cycle)
+} // namespace
+
+State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int samples, LimitCycle& cycle)
 {
   State state = copy_of(cycle.start);
   state.reactions = map.reactions;
@@ -99,7 +100,7 @@ void measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int sam
   ++cycle.periods_integrated;
   cycle.start.reactions = map.reactions;
   const History& history = cycle.history;
-  if (history.energy.empty()) return;
+  if (history.energy.empty()) return state;
   cycle.mean_energy = mean(history.energy);
   cycle.mean_fluctuating_energy = mean(history.fluctuating_energy);
   cycle.open_pairs_mean = mean({history.open.begin(), history.open.end()});
@@ -110,9 +111,8 @@ void measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int sam
     const auto [least, largest] = std::minmax_element(probe.begin(), probe.end());
     cycle.peak_to_peak.push_back(*largest - *least);
   }
+  return state;
 }
-
-} // namespace
 
 Flow flow_of(PeriodMap& map)
 {

@@ -151,33 +151,41 @@ std::vector<double> corrected(const SlidingPreconditioner& preconditioner, doubl
 
 } // namespace
 
-SlidingPreconditioner make_preconditioner(const Structure& structure, const Interface& interface,
-                                          const Equilibrium& equilibrium, const RealModes& modes, int steps,
-                                          double theta)
+SlidingPreconditioner make_preconditioner(const std::vector<DenseEigenpair>& sliding,
+                                          const std::vector<Owned<Vec>>& shapes, Mat M, int steps, double theta)
 {
   SlidingPreconditioner result;
   result.steps = steps;
   result.theta = theta;
-  const Index m = modes.shapes.size();
+  const Index m = shapes.size();
   if (m == 0) return result;
+  for (const DenseEigenpair& pair : sliding)
+  {
+    result.lambda.push_back(pair.lambda);
+    if (pair.lambda.real() > result.lambda[result.followed].real()) result.followed = result.lambda.size() - 1;
+  }
+  result.right = real_columns(sliding);
+  if (result.right.size() != 4 * m * m) throw Error("cycle: sliding modes are missing from the preconditioner");
+  result.left = inverse(result.right, 2 * m);
+  result.shapes = columns_of(shapes, nullptr);
+  result.weighted = columns_of(shapes, M);
+  return result;
+}
+
+SlidingPreconditioner make_preconditioner(const Structure& structure, const Interface& interface,
+                                          const Equilibrium& equilibrium, const RealModes& modes, int steps,
+                                          double theta)
+{
+  const Index m = modes.shapes.size();
+  if (m == 0) return make_preconditioner({}, {}, structure.M, steps, theta);
   const ClosedContact contact = eliminate_closed_pairs(structure, interface, equilibrium);
   const auto friction = friction_of(interface, modes.shapes);
   const Owned<Mat> C = sliding_damping(structure, interface, equilibrium);
   const auto reduced = [&](Mat X) { return on_modes(modes.shapes, friction, contact, X); };
   const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
-  const std::vector<DenseEigenpair> pairs =
-      solve_dense_quadratic_shared(comm, static_cast<int>(m), reduced(structure.M), reduced(C), reduced(structure.K));
-  for (const DenseEigenpair& pair : pairs)
-  {
-    result.lambda.push_back(pair.lambda);
-    if (pair.lambda.real() > result.lambda[result.followed].real()) result.followed = result.lambda.size() - 1;
-  }
-  result.right = real_columns(pairs);
-  if (result.right.size() != 4 * m * m) throw Error("cycle: sliding modes are missing from the preconditioner");
-  result.left = inverse(result.right, 2 * m);
-  result.shapes = columns_of(modes.shapes, nullptr);
-  result.weighted = columns_of(modes.shapes, structure.M);
-  return result;
+  return make_preconditioner(
+      solve_dense_quadratic_shared(comm, static_cast<int>(m), reduced(structure.M), reduced(C), reduced(structure.K)),
+      modes.shapes, structure.M, steps, theta);
 }
 
 void apply(const SlidingPreconditioner& preconditioner, double period, Vec x, Vec y)

@@ -195,7 +195,7 @@ LimitCycle shoot(const Flow& flow, const ShootingStart& start, const SlidingPrec
   Orbit orbit = free_periods(shooting, first, start.period, free);
   // Below the first event nothing limits a vibration; above it a start may be ten times too large and still find one.
   shooting.least_fluctuation = std::min(orbit.fluctuation, start.first_event) * std::sqrt(0.1);
-  if (orbit.residual > tolerance && shooting.options.reduced_newtons != 0)
+  if (orbit.residual > tolerance && shooting.options.reduced_newtons != 0 && !start.shapes.empty())
     orbit = reduce(shooting, std::move(orbit), start.shapes);
   Finish finish = finish_in_full_space(shooting, std::move(orbit));
 

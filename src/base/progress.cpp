@@ -25,9 +25,10 @@ bool writes_to_terminal()
 Progress::Progress(MPI_Comm comm, std::string stage, double total)
     : stage_(std::move(stage)), total_(std::max(total, 1e-300)), start_(std::chrono::steady_clock::now()), last_(start_)
 {
-  int rank = 0;
+  int rank = 0, in_all = 0;
   MPI_Comm_rank(comm, &rank);
-  speaks_ = rank == 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &in_all); // of work that every rank does for itself, one tells
+  speaks_ = rank == 0 && in_all == 0;
   terminal_ = speaks_ && writes_to_terminal();
 }
 

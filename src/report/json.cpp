@@ -174,6 +174,31 @@ Json cycle_entry(const Report& report, const Scene& scene)
   return entry;
 }
 
+Json fidelity_entry(const Fidelity& fidelity)
+{
+  Json entry = {{"asked", fidelity.asked}, {"used", fidelity.used}};
+  if (!fidelity.reason.empty()) entry["reason"] = fidelity.reason;
+  if (fidelity.asked == "full") return entry;
+  entry["accuracy"] = fidelity.accuracy;
+  entry["size"] = fidelity.size;
+  entry["modes"] = fidelity.modes;
+  entry["attachment_shapes"] = fidelity.attachment_shapes;
+  entry["active_pairs"] = fidelity.active_pairs;
+  entry["sliding_pairs"] = fidelity.sliding_pairs;
+  entry["steps_per_period"] = fidelity.steps_per_period;
+  entry["contact_tolerance"] = fidelity.contact_tolerance;
+  entry["reduced_periods"] = fidelity.reduced_periods;
+  entry["full_periods"] = fidelity.full_periods;
+  entry["error_estimates"] = {{"frequency", fidelity.frequency_error},
+                              {"energy", fidelity.energy_error},
+                              {"step_frequency", fidelity.step_frequency_error},
+                              {"step_energy", fidelity.step_energy_error}};
+  entry["seconds"] = {{"reduction", fidelity.reduction_seconds},
+                      {"reduced_cycles", fidelity.reduced_seconds},
+                      {"full_periods", fidelity.full_seconds}};
+  return entry;
+}
+
 } // namespace
 
 bool ran(const Outcome& outcome)
@@ -221,6 +246,7 @@ std::string report_json(const Report& report, const Scene& scene)
   json["estimate"] = estimate_entry(report.estimate);
   json["transient"] = transient_entry(report);
   json["cycle"] = cycle_entry(report, scene);
+  json["fidelity"] = fidelity_entry(report.fidelity);
   const Verdicts verdicts = verdicts_of(report);
   const auto warn = [&json](const char* stage, const std::vector<std::string>& sentences)
   {

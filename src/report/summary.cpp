@@ -137,6 +137,24 @@ std::string cycle_text(const Report& report, const Scene& scene)
   return text;
 }
 
+std::string fidelity_text(const Fidelity& fidelity)
+{
+  if (fidelity.asked == "full") return "";
+  std::string text = row("fidelity", fidelity.asked + ": " + fidelity.used + " model used" +
+                                         (fidelity.reason.empty() ? "" : ", " + fidelity.reason));
+  if (fidelity.used == "full" || fidelity.full_periods == 0) return text;
+  text +=
+      row("", format("%d shapes: %d of modes, %d of attachment; %d pairs in contact with friction, %d taken to slide",
+                     fidelity.size, fidelity.modes, fidelity.attachment_shapes, fidelity.active_pairs,
+                     fidelity.sliding_pairs));
+  text += row("", format("%ld periods of the reduced model, %ld of the full one", fidelity.reduced_periods,
+                         fidelity.full_periods));
+  text += row("", format("error estimates (wish %.0e): frequency %.1e, energy %.1e; of the steps %.1e, %.1e",
+                         fidelity.accuracy, fidelity.frequency_error, fidelity.energy_error,
+                         fidelity.step_frequency_error, fidelity.step_energy_error));
+  return text;
+}
+
 std::string timings_text(const Report& report)
 {
   double total = 0;
@@ -173,6 +191,7 @@ std::string summary(const Report& report, const Scene& scene)
   text += estimate_text(report.estimate) + warnings(verdicts.estimate);
   text += transient_text(report) + warnings(verdicts.transient);
   text += cycle_text(report, scene) + warnings(verdicts.cycle);
+  text += fidelity_text(report.fidelity);
   return text + timings_text(report);
 }
 

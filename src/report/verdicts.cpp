@@ -96,7 +96,8 @@ Sentences of_cycle(const Report& report)
   if (std::abs(bias.growth) > .1)
     said.push_back(format("theta and the step change the growth rate by %+.0f %%: the cycle's amplitude suffers",
                           100 * bias.growth));
-  if (cycle.residual_full > 1e-3) said.push_back("a residual this large is no proof of a periodic motion");
+  if (cycle.residual_full > 1e-3 && report.fidelity.used == "full")
+    said.push_back("a residual this large is no proof of a periodic motion");
   add_chatter(cycle.history, said);
   if (cycle.stability == "undecided")
     said.push_back(

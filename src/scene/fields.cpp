@@ -18,7 +18,17 @@ bool has_unit(const std::string& unit)
 
 Fields fields(Scene& scene)
 {
-  return {{"title", &scene.title, optional, Rule::any, "text", "what the scene shows", {}}};
+  return {
+      {"title", &scene.title, optional, Rule::any, "text", "what the scene shows", {}},
+      {"fidelity",
+       &scene.fidelity,
+       optional,
+       Rule::word,
+       "word",
+       "of the cycle's model: full, reduced, or auto (reduced as far as the accuracy allows)",
+       {"full", "reduced", "auto"}},
+      {"accuracy", &scene.accuracy, optional, Rule::positive, "-", "wished, of the cycle's frequency and energy", {}},
+  };
 }
 
 Fields fields(MeshSource& m)

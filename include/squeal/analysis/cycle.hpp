@@ -66,8 +66,8 @@ struct ShootingStart
 {
   Vec equilibrium = nullptr; // u0 [m]
   Vec u = nullptr, v = nullptr;
-  double period = 0;                // [s]
-  std::vector<Vec> shapes;          // the paper's phi_r, phi_i, phi_e: of the displacements and of the velocities alike
+  double period = 0;       // [s]
+  std::vector<Vec> shapes; // the paper's phi_r, phi_i, phi_e: of the displacements and of the velocities alike; or none
   std::vector<Owned<Vec>> asleep{}; // motions (u, v) of the other unstable modes, which a cycle may leave out
   double first_event = std::numeric_limits<double>::infinity(); // energy norm at which lift-off or reversal begins
 };
@@ -116,6 +116,10 @@ struct PeriodMap
 
 /// Borrows the map.
 Flow flow_of(PeriodMap& map);
+
+/// Fills what is measured over one more period from the cycle's start, recorded; `samples` displacements are kept.
+/// Returns the period's end.
+State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int samples, LimitCycle& cycle);
 
 /// From the energy estimate of the first of the unstable modes, which the cycle follows, and those of the others on
 /// top: none may be left asleep. Options: -cycle_start_amplitude, -cycle_start_period (multiples of the estimate's, 1),

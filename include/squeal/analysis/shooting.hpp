@@ -4,6 +4,7 @@
 /// f the flow's direction: a correction along the orbit would only move the time origin. Products are energy products,
 /// <a, b> = a_u'K b_u + a_v'M b_v. Each stage returns the best candidate it met.
 #include "squeal/analysis/cycle.hpp"
+#include "squeal/analysis/quadratic.hpp"
 
 namespace squeal
 {
@@ -98,6 +99,10 @@ Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start);
 /// Make the solvers' options known to the library even when they never run.
 void declare_reduced_options();
 void declare_fallback_options();
+
+/// From sliding modes y of the shapes' coordinates, all of them; the shapes M-orthonormal.
+SlidingPreconditioner make_preconditioner(const std::vector<DenseEigenpair>& sliding,
+                                          const std::vector<Owned<Vec>>& shapes, Mat M, int steps, double theta);
 
 /// The bordered system [J d; f' 0] (x, t) = (b, row) at an orbit, J replaced by P: x = P^-1 b - t P^-1 d.
 struct Border

@@ -1,7 +1,7 @@
 #pragma once
 /// What a run leaves behind: report.json, fields.h5 + fields.xdmf, history.h5, scene.toml (resolved), options.txt, and
 /// the printed table. Every number comes with its unit and with what it is worth (residual, backward error, defect).
-#include "squeal/analysis/cycle.hpp"
+#include "squeal/analysis/fidelity.hpp"
 #include "squeal/contact/model.hpp"
 
 #include <filesystem>
@@ -28,6 +28,7 @@ struct Report
   Estimate estimate;
   Trajectory transient;
   LimitCycle cycle;
+  Fidelity fidelity;                                   // of the cycle
   std::vector<std::pair<std::string, double>> timings; // stage, wall seconds, in order
 };
 

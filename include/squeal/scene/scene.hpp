@@ -170,7 +170,9 @@ struct Probe
 struct Scene
 {
   std::string title;
-  std::filesystem::path file; // absolute
+  std::string fidelity = "full"; // of the cycle: "full", "reduced" or "auto" model
+  double accuracy = 1e-3;        // [-] wished, of the cycle's frequency and energy
+  std::filesystem::path file;    // absolute
   std::optional<MeshSource> mesh;
   std::optional<std::filesystem::path> matrices; // folder; absolute
   std::vector<Part> parts;

@@ -1,0 +1,107 @@
+#pragma once
+/// A model no larger than its cycle needs, about the sliding equilibrium (u0, r0).
+///
+/// Pairs that stay closed and sliding are eliminated as in the modes (paper, eq. 5): du = Z y, equations tested by Y.
+/// The others, the active ones, keep unilateral contact and Coulomb friction. Then y = V q, V dense:
+///     M q'' + C q' + K q = H (r - r0),   M = (Y V)'M (Z V) ...,  H = (Y V)'B_a',
+///     g = g0 + G_n q >= 0,   s = G_t q' - v_d,   G = B_a Z V,
+/// all three matrices unsymmetric. V holds the complex modes of the full problem in the band (real and imaginary parts,
+/// so that the reduced model has exactly their growth rates) and the attachment shapes of the active pairs,
+///     (K_z + w^2 M_z) X = Z'B_a',   K_z = Z'K Z, w the followed mode's,
+/// orthonormal in the energy of K_z + w^2 M_z; of the attachments what is new above a threshold.
+///
+/// Caveats: an eliminated pair's friction turns with the sliding direction to first order only (C_f), and it is taken
+/// never to part or stick. What all that is worth is measured: one period of the full model from the reduced cycle.
+///
+/// Everything reduced is dense, small, and the same on every rank.
+#include "squeal/analysis/cycle.hpp"
+#include "squeal/analysis/quadratic.hpp"
+
+#include <Eigen/Dense>
+
+namespace squeal
+{
+
+struct ReducedModel
+{
+  Eigen::MatrixXd M, C, K;       // size x size [of kg, N s/m, N/m]
+  Eigen::MatrixXd H, G;          // size x rows, rows x size; block rows a pair: normal, tangential
+  Eigen::MatrixXd M_z, C_z, K_z; // symmetric: V'Z'M Z V ..., of the energies
+  std::vector<int> active;       // pairs, ascending
+  int directions = 2;
+  double friction = 0;
+  std::vector<double> gap;        // [m] at equilibrium, per active pair
+  std::vector<double> drive;      // [m/s]
+  std::vector<double> reactions;  // [N] r0
+  Owned<Mat> shapes;              // Z V, dofs x size, dense: u = u0 + shapes q
+  double omega = 0;               // [rad/s] of the followed mode
+  int modes = 0, attachments = 0; // columns of V
+  double seconds = 0;
+
+  int size() const { return static_cast<int>(M.rows()); }
+};
+
+/// Pairs whose normal reaction in u0 + amplitude Re(phi e^{iwt}) falls below zero, or whose gap does.
+std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
+                                       const ComplexMode& mode, double amplitude);
+
+struct Reduction
+{
+  int modes = 0;           // complex modes taken, nearest in frequency to the followed one, which is the first of all
+  double threshold = 1e-5; // an attachment shape is dropped when less than this part of it is new
+};
+
+ReducedModel reduce(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                    const std::vector<ComplexMode>& modes, std::vector<int> active, const Reduction& reduction);
+
+/// Position and velocity about the equilibrium.
+struct ReducedState
+{
+  Eigen::VectorXd q, v;
+};
+
+/// Coordinates of du and v: of the nearest shape in the energy of K + omega^2 M, and in that of M.
+ReducedState coordinates(const ReducedModel& model, const Structure& structure, Vec du, Vec v);
+
+/// target += factor shapes q
+void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd& q, Vec target);
+
+/// As vectors of this rank's own, and back.
+Owned<Vec> small_vector(const Eigen::VectorXd& values);
+Eigen::VectorXd entries_of(Vec x);
+
+/// The period map of the reduced model by theta steps (method as analysis/transient.hpp), whose matrices are formed
+/// once per step size:  (v, q) -> v_free,  r -> v+ - v_free,  W r.
+struct ReducedMap
+{
+  const ReducedModel& model;
+  int steps = 0;
+  double theta = 0.5;
+  double h = 0;                 // [s] of the matrices below
+  Eigen::MatrixXd from_state{}; // v_free = from_state (v, q) + from_equilibrium
+  Eigen::VectorXd from_equilibrium{};
+  Eigen::MatrixXd from_reactions{}; // h A^-1 H
+  Eigen::MatrixXd W{};              // G h A^-1 H
+  Eigen::VectorXd reactions{};      // [N] warm start
+  ReducedState shift{};             // added to the period's end; empty: none
+  ContactSettings contact{};
+  long unconverged = 0;
+};
+
+/// N steps of the period; `watch` after each.
+ReducedState integrate(ReducedMap& map, double period, ReducedState state,
+                       const std::function<void(const ReducedState&)>& watch);
+
+/// The flow for shooting; borrows the map and the matrices of `norm`.
+Flow flow_of(ReducedMap& map, const Structure& norm);
+
+/// M_z, C_z, K_z as a structure of one rank's own.
+Structure small_structure(const ReducedModel& model);
+
+/// Sliding motion on the coordinates of those real modes, friction on the reactions it takes included.
+std::vector<DenseEigenpair> sliding_modes(const ReducedModel& model, const RealModes& modes);
+
+/// Real modes of the small structure below `band` [Hz] with the active pairs closed that are closed at equilibrium.
+RealModes closed_modes(const ReducedModel& model, double band);
+
+} // namespace squeal

@@ -1,0 +1,63 @@
+"""No more model than the scene needs: what the reduced model says of itself is true, and it is refused where it is none."""
+
+import pytest
+from conftest import INPUTS
+
+PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "modes.method=full"]
+
+
+def energy(report):
+    return report["cycle"]["mean_fluctuating_energy"]
+
+
+@pytest.fixture(scope="module")
+def reduced(module_run):
+    return [module_run(*PIN, "--set", "fidelity=reduced", ranks=ranks) for ranks in (1, 2, 3)]
+
+
+@pytest.fixture(scope="module")
+def fitted(module_run):
+    """To a wish of 3e-2 and, as the judge, of 1e-2."""
+    return [module_run(*PIN, "--set", "fidelity=auto", "--set", f"accuracy={wish}", ranks=2) for wish in (3e-2, 1e-2)]
+
+
+def test_ranks_agree(reduced):
+    """1e-5 and 1e-4: the reduced cycle is shot to 1e-6, which a slow motion (multiplier .99) makes a hundredfold."""
+    for other in reduced[1:]:
+        assert other["cycle"]["period"] == pytest.approx(reduced[0]["cycle"]["period"], rel=1e-5)
+        assert energy(other) == pytest.approx(energy(reduced[0]), rel=1e-4)
+        assert other["fidelity"]["size"] == reduced[0]["fidelity"]["size"]
+
+
+def test_error_estimates_hold(reduced, fitted):
+    """The cycle at the finer wish lies within the estimates of the coarser one, and of the mere reduced model."""
+    judge = fitted[1]
+    for run in (reduced[0], fitted[0]):
+        estimates = run["fidelity"]["error_estimates"]
+        off = abs(energy(run) / energy(judge) - 1)
+        assert off < estimates["energy"] + estimates["step_energy"] + 1e-2
+        off = abs(run["cycle"]["period"] / judge["cycle"]["period"] - 1)
+        assert off < estimates["frequency"] + estimates["step_frequency"] + 1e-2
+
+
+def test_wish_is_met(fitted):
+    for run, wish in zip(fitted, (3e-2, 1e-2)):
+        fidelity = run["fidelity"]
+        assert fidelity["used"] == "reduced" and run["cycle"]["outcome"] == "converged"
+        assert fidelity["size"] < run["model"]["dofs"] / 10
+        assert max(fidelity["error_estimates"].values()) <= wish
+    assert energy(fitted[0]) == pytest.approx(energy(fitted[1]), rel=4e-2)
+
+
+def test_full_periods_are_the_judge(fitted):
+    """Corrections converge to the full model's cycle: its own full-space residual ends far below the reduced cycle's."""
+    residuals = [record["residual_full"] for record in fitted[1]["cycle"]["newton"]]
+    assert residuals[-1] < 0.2 * residuals[0]
+
+
+def test_small_model_is_not_reduced(module_run, tmp_path):
+    """Three degrees of freedom: the oscillator is shot at as it is, to its own tolerance."""
+    scene = INPUTS / "oscillator" / "scene.toml"
+    run = module_run(scene, "--set", "cycle.enabled=true", "--set", "fidelity=auto", ranks=1)
+    assert run["fidelity"]["used"] == "full" and "not small" in run["fidelity"]["reason"]
+    assert run["cycle"]["outcome"] == "converged" and run["cycle"]["residual_full"] <= 1e-8
