@@ -100,11 +100,11 @@ struct Contact
 {
   std::string rotor, stator;
   double gap = 0;                   // [m] initial, positive open
-  double reach = 0;                 // [m] how far apart along the normal partners may stand
   std::optional<Vec3> normal;       // unit; needed for points and a reach, else from the rotor's surface
   std::vector<Vec3> tangents;       // one: plane friction along it; two; empty: two, chosen from the normal
   std::optional<Rotation> rotation; // of the rotor: v_d = rate axis x (x - centre), its tangential part
   Vec3 velocity{};                  // [m/s] of the rotor's surface when there is no rotation
+  double reach = 0;                 // [m] how far apart along the normal partners may stand
 };
 
 struct FrictionLaw
