@@ -96,6 +96,15 @@ Finish finish_in_full_space(Shooting& shooting, Orbit start)
   return finish;
 }
 
+/// A cycle gone round twice is a solution, too, and no answer: where half the period nearly closes it, that is sought.
+Finish gone_round_once(Shooting& shooting, Finish finish)
+{
+  Orbit half = evaluate(shooting, finish.orbit.state, finish.orbit.period / 2);
+  if (!(half.residual < 1e-2)) return finish;
+  Finish once = finish_in_full_space(shooting, std::move(half));
+  return once.ending == Ending::converged ? std::move(once) : std::move(finish);
+}
+
 /// Off a cycle that repels, along what grows and first towards less energy, far enough that free periods lead
 /// elsewhere: another cycle, or the same one.
 Finish leave(Shooting& shooting, const Finish& found, Vec growing)
@@ -200,6 +209,7 @@ LimitCycle shoot(const Flow& flow, const ShootingStart& start, const SlidingPrec
   Finish finish = finish_in_full_space(shooting, std::move(orbit));
 
   LimitCycle cycle;
+  if (finish.ending == Ending::converged) finish = gone_round_once(shooting, std::move(finish));
   if (finish.ending == Ending::converged) finish = attracting(shooting, std::move(finish), start.asleep, cycle);
   cycle.outcome = outcome_of(shooting, finish);
   cycle.period = finish.orbit.period;

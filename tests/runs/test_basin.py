@@ -44,3 +44,24 @@ def test_beside_a_neighbour_that_is_stable_the_cycle_is_found(squeal, tmp_path):
     cycle = run.report["cycle"]
     assert cycle["outcome"] == "converged" and cycle["multipliers"]["stability"] == "stable"
     assert cycle["period"] == pytest.approx(5.954461004653, rel=1e-3)  # exact; 100 steps a period leave 3e-4
+
+
+@pytest.mark.parametrize("start", [["-cycle_start_amplitude", "0.2"], ["-cycle_start_amplitude", "20"],
+                                   ["-cycle_start_phase", "180"], ["-cycle_start_period", "0.6"],
+                                   ["-cycle_start_period", "1.6"]])
+def test_the_oscillator_leads_to_one_cycle_from_afar(converged, start):
+    """From 1.6 times the period Newton finds the cycle gone round twice, which is told from the cycle."""
+    cycle = converged(INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set",
+                      "cycle.steps_per_period=100", "--set", "cycle.tolerance=1e-6", *start, ranks=1).report["cycle"]
+    assert cycle["period"] == pytest.approx(5.954461004653, rel=1e-3)
+    assert cycle["mean_energy"] == pytest.approx(1.77650678461, rel=1e-2)
+
+
+def test_of_two_cycles_of_the_pin_the_start_decides(converged):
+    """Both attract; the larger has several times the energy, and a period that lift-off has made longer."""
+    pin = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=3", "--set", "modes.method=full",
+           "--set", "modes.band=6000"]
+    heard, larger = (converged(*pin, "-cycle_start_amplitude", factor, ranks=1).report["cycle"] for factor in ("1", "3"))
+    for cycle in heard, larger:
+        assert cycle["multipliers"]["stability"] in ("stable", "undecided")
+    assert larger["mean_energy"] > 3 * heard["mean_energy"] and larger["period"] > 1.01 * heard["period"]
