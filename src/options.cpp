@@ -41,7 +41,7 @@ constexpr std::array options = {
     Option{"-reduced_threshold", "1e-5", "an attachment shape is dropped when less than this part of it is new"},
     Option{"-reduced_modes", "100000", "complex modes taken, the followed one and the nearest in frequency"},
     Option{"-reduced_free_periods", "100", "integrated on the reduced model before its first Newton step"},
-    Option{"-reduced_corrections", "20", "times that a period of the full model corrects the reduced cycle"},
+    Option{"-reduced_corrections", "40", "times that a period of the full model corrects the reduced cycle"},
     Option{"-cycle_reduced_newtons", "10", "iterations of the reduced system on the mode's shapes; 0: not tried"},
     Option{"-cycle_base_growths", "-1",
            "times the reduced base may grow by what it missed; -1: 4 without a finish, else 0"},

@@ -17,7 +17,7 @@ namespace
 struct Options
 {
   PetscReal margin = 1, threshold = 1e-5;
-  PetscInt modes = 100000, free_periods = 100, corrections = 20;
+  PetscInt modes = 100000, free_periods = 100, corrections = 40;
 };
 
 /// What the options mean is said in the program's option table.
@@ -311,18 +311,19 @@ double step_error(const Fidelity& fidelity)
   return std::max(fidelity.step_frequency_error, fidelity.step_energy_error);
 }
 
-/// Steps a period for which the step's errors are half the wish, and its growth rate's (omega h)^2/4 is the wish.
-int steps_for(const Fidelity& fidelity, int steps)
+/// Steps a period for which the step's errors are half the wish, and its growth rate's (omega h)^2/4 is the wish; as if
+/// of the order given.
+int steps_for(const Fidelity& fidelity, int steps, int order)
 {
-  const double measured = 1.1 * steps * std::sqrt(2 * step_error(fidelity) / fidelity.accuracy);
+  const double measured = 1.1 * steps * std::pow(2 * step_error(fidelity) / fidelity.accuracy, 1. / order);
   const double theory = std::numbers::pi / std::sqrt(fidelity.accuracy);
   return 8 * static_cast<int>(std::ceil(std::max(measured, theory) / 8));
 }
 
 /// The candidate at as many steps a period as the wish needs; says what is in the way.
-std::string refine_steps(Fitting& fitting, Correction correction)
+std::string refine_steps(Fitting& fitting, Correction correction, int order)
 {
-  const int steps = std::max(fitting.steps, steps_for(fitting.result.fidelity, fitting.steps));
+  const int steps = std::max(fitting.steps, steps_for(fitting.result.fidelity, fitting.steps, order));
   const ReducedOrbit fine =
       shoot_reduced(fitting, correction.orbit.state, correction.shift, correction.orbit.period, steps, 0);
   if (fine.cycle.outcome.word != "converged")
@@ -397,7 +398,7 @@ std::string fit(Fitting& fitting)
       if (!judge_steps(fitting, correction.orbit, correction.shift) && adaptive)
         return "the reduced model has no cycle at twice as many steps a period";
       if (!adaptive || (!rough && step_error(fidelity) <= fidelity.accuracy / 2)) return {};
-      const std::string problem = refine_steps(fitting, std::move(correction));
+      const std::string problem = refine_steps(fitting, std::move(correction), rough ? 2 : 1); // 2 was not enough
       if (!problem.empty()) return problem;
       rough = false;
       acceleration.tried.clear();
@@ -453,10 +454,12 @@ FittedCycle find_fitted_cycle(const Structure& structure, const Interface& inter
   }
   fidelity.used = "full";
   const double clock = MPI_Wtime();
+  CycleSettings refined = settings;
+  refined.steps_per_period = std::max(settings.steps_per_period, fitting.steps);
   result.cycle = find_cycle(structure, interface, equilibrium,
                             std::span(modes.modes).first(static_cast<std::size_t>(std::max(modes.unstable_count, 1))),
-                            estimate, settings, probes);
-  fidelity.steps_per_period = settings.steps_per_period;
+                            estimate, refined, probes);
+  fidelity.steps_per_period = refined.steps_per_period;
   fidelity.full_seconds += MPI_Wtime() - clock;
   fidelity.full_periods += result.cycle.periods_integrated;
   return std::move(result);
