@@ -99,6 +99,10 @@ struct Found
   int iterations = 0;
 
   int count() const { return static_cast<int>(theta.size()); }
+  int below(double limit) const
+  {
+    return static_cast<int>(std::lower_bound(theta.begin(), theta.end(), limit) - theta.begin());
+  }
 };
 
 // Between the last third of the ascending values, the middle of the widest gap: a cluster is not cut there.
@@ -175,7 +179,7 @@ int climb(ShiftInvert& pencil, const Found& found, double step, double limit)
 // Forgets what no count has confirmed.
 void fall_back(Found& found, double verified)
 {
-  const auto kept = std::lower_bound(found.theta.begin(), found.theta.end(), verified) - found.theta.begin();
+  const int kept = found.below(verified);
   found.theta.resize(static_cast<std::size_t>(kept));
   found.shapes.columns = static_cast<PetscInt>(kept);
   found.shapes.entries.resize(static_cast<std::size_t>(kept) * static_cast<std::size_t>(found.shapes.rows));
@@ -226,7 +230,7 @@ Found sweep(Mat M, Mat K, const Sought& sought)
     }
     // Done if the count says so; or what is missing lies below, and nearer shifts find it.
     if (good) move_to(pencil, found.covered);
-    found.complete = good && negative_pivots(pencil) == found.count();
+    found.complete = good && negative_pivots(pencil) == found.below(pencil.shift);
     if (found.complete) break;
     fall_back(found, verified);
     if (!good) move_to(pencil, (verified + pencil.shift) / 2);

@@ -180,11 +180,59 @@ std::vector<double> padded(const std::vector<double>& Q, const Krylov& krylov)
   return result;
 }
 
-// The negative pivots of a root that ScaLAPACK factors are not counted: MUMPS keeps the root to itself.
-void set_up(Mat factor)
+// MUMPS's own account of its last phase: INFOG, counted from one.
+PetscInt infog(Mat factor, PetscInt number)
 {
+  PetscInt value = 0;
+  check(MatMumpsGetInfog(factor, number, &value));
+  return value;
+}
+
+constexpr PetscInt singular = -10, most_room = 2000; // INFOG(1); percent of memory beyond MUMPS's estimate
+
+// Pivots that are put off need more room than was estimated, how much depends on the timing of the ranks.
+bool short_of_room(PetscInt outcome)
+{
+  return outcome == -8 || outcome == -9 || outcome == -17 || outcome == -20;
+}
+
+// `room`: percent beyond the estimate, or 0 for MUMPS's own margin.
+Owned<Mat> analysed(const ShiftInvert& pencil, PetscInt room)
+{
+  const bool symmetric = pencil.symmetry == Symmetry::symmetric;
+  const Mat A = pencil.shifted;
+  Owned<Mat> factor;
+  MatFactorInfo settings;
+  check(MatFactorInfoInitialize(&settings));
+  check(MatGetFactor(A, MATSOLVERMUMPS, symmetric ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, factor.put()));
+  check(MatSetOptionsPrefix(factor, "modes_"));
+  // The negative pivots of a root that ScaLAPACK factors are not counted: MUMPS keeps the root to itself.
   check(MatMumpsSetIcntl(factor, 13, 1));
   check(MatMumpsSetIcntl(factor, 27, block_size));
+  check(symmetric ? MatCholeskyFactorSymbolic(factor, A, nullptr, &settings)
+                  : MatLUFactorSymbolic(factor, A, nullptr, nullptr, &settings));
+  if (room > 0) check(MatMumpsSetIcntl(factor, 14, room));
+  return factor;
+}
+
+// INFOG(1) of the factorisation, below zero if it failed, of which PETSc says nothing. The analysis is kept from shift
+// to shift, but a failure takes it away: PETSc would pass over every later factorisation.
+PetscInt factorise(ShiftInvert& pencil)
+{
+  MatFactorInfo settings;
+  check(MatFactorInfoInitialize(&settings));
+  for (PetscInt room = 0;;)
+  {
+    if (!pencil.factor.get()) pencil.factor = analysed(pencil, room);
+    check(pencil.symmetry == Symmetry::symmetric ? MatCholeskyFactorNumeric(pencil.factor, pencil.shifted, &settings)
+                                                 : MatLUFactorNumeric(pencil.factor, pencil.shifted, &settings));
+    const PetscInt outcome = infog(pencil.factor, 1);
+    if (outcome >= 0) return outcome;
+    check(MatMumpsGetIcntl(pencil.factor, 14, &room));
+    room = 4 * std::max<PetscInt>(room, 0) + 10;
+    pencil.factor = {};
+    if (!short_of_room(outcome) || room > most_room) return outcome;
+  }
 }
 
 } // namespace
@@ -210,38 +258,30 @@ ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry)
   return pencil;
 }
 
+// On an eigenvalue there is no factor: below it there is.
 void move_to(ShiftInvert& pencil, double shift)
 {
   const Mat A = pencil.shifted;
-  check(MatZeroEntries(A));
-  check(MatAXPY(A, 1, pencil.K, SUBSET_NONZERO_PATTERN));
-  check(MatAXPY(A, -shift, pencil.M, SUBSET_NONZERO_PATTERN));
-  pencil.shift = shift;
-  const bool symmetric = pencil.symmetry == Symmetry::symmetric, first = !pencil.factor.get();
-  MatFactorInfo settings;
-  check(MatFactorInfoInitialize(&settings));
-  if (first)
+  PetscInt outcome = singular;
+  for (double step = 1e-6; outcome == singular && step < 1e-2; step *= 10)
   {
-    check(MatGetFactor(A, MATSOLVERMUMPS, symmetric ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, pencil.factor.put()));
-    set_up(pencil.factor);
+    check(MatZeroEntries(A));
+    check(MatAXPY(A, 1, pencil.K, SUBSET_NONZERO_PATTERN));
+    check(MatAXPY(A, -shift, pencil.M, SUBSET_NONZERO_PATTERN));
+    pencil.shift = shift;
+    outcome = factorise(pencil);
+    shift -= step * std::abs(shift);
   }
-  if (symmetric)
-  {
-    if (first) check(MatCholeskyFactorSymbolic(pencil.factor, A, nullptr, &settings));
-    check(MatCholeskyFactorNumeric(pencil.factor, A, &settings));
-  }
-  else
-  {
-    if (first) check(MatLUFactorSymbolic(pencil.factor, A, nullptr, nullptr, &settings));
-    check(MatLUFactorNumeric(pencil.factor, A, &settings));
-  }
+  if (outcome < 0)
+    throw LibraryError("MUMPS found no factor of K - " + std::to_string(pencil.shift) +
+                       " M: INFOG(1) = " + std::to_string(outcome) +
+                       ", which its manual explains (-13: out of memory); -modes_mat_mumps_icntl_4 2 says more");
 }
 
 int negative_pivots(const ShiftInvert& pencil)
 {
-  PetscInt negative = 0;
-  check(MatMumpsGetInfog(pencil.factor, 12, &negative)); // MatGetInertia insists on null pivot detection: not wanted
-  return static_cast<int>(negative);
+  // MatGetInertia insists on null pivot detection: not wanted
+  return static_cast<int>(infog(pencil.factor, 12));
 }
 
 Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius)

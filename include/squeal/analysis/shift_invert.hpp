@@ -28,6 +28,9 @@ struct ShiftInvert
 };
 
 ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry);
+
+/// To the shift, or a little below it where it is an eigenvalue. LibraryError: memory ran out.
+/// Options: -modes_mat_mumps_...; room beyond MUMPS's estimate (icntl_14) grows by itself.
 void move_to(ShiftInvert& pencil, double shift);
 
 /// Sylvester: as many eigenvalues of a symmetric pencil lie below the shift as its factor has negative pivots.
