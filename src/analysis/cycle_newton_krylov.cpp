@@ -60,7 +60,7 @@ void pack(const FullSpace& full, Vec state, double border, Vec z)
     check(VecRestoreArrayRead(part, &from));
     offset += size;
   }
-  if (rank_of(PetscObjectComm(reinterpret_cast<PetscObject>(z))) == 0) to[offset] = full.speed * border;
+  if (rank_of(comm_of(z)) == 0) to[offset] = full.speed * border;
   check(VecRestoreArray(z, &to));
 }
 
@@ -79,7 +79,7 @@ double unpack(const FullSpace& full, Vec z, Vec state)
     check(VecRestoreArray(part, &to));
     offset += size;
   }
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(z));
+  const MPI_Comm comm = comm_of(z);
   double border = rank_of(comm) == 0 ? from[offset] / full.speed : 0;
   MPI_Bcast(&border, 1, MPI_DOUBLE, 0, comm);
   check(VecRestoreArrayRead(z, &from));
@@ -277,7 +277,7 @@ Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start)
                  copy_of(start),
                  0,
                  {}};
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(displacement(start.state)));
+  const MPI_Comm comm = comm_of(displacement(start.state));
   PetscInt local = 0;
   check(VecGetLocalSize(displacement(start.state), &local));
   local = 2 * local + (rank_of(comm) == 0 ? 1 : 0);

@@ -30,7 +30,7 @@ Owned<Mat> dense(Vec layout, PetscInt columns)
   Owned<Mat> result;
   PetscInt rows = 0;
   check(VecGetLocalSize(layout, &rows));
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(layout));
+  const MPI_Comm comm = comm_of(layout);
   check(MatCreateDense(comm, rows, PETSC_DECIDE, PETSC_DETERMINE, columns, nullptr, result.put()));
   return result;
 }
@@ -182,7 +182,7 @@ SlidingPreconditioner make_preconditioner(const Structure& structure, const Inte
   const auto friction = friction_of(interface, modes.shapes);
   const Owned<Mat> C = sliding_damping(structure, interface, equilibrium);
   const auto reduced = [&](Mat X) { return on_modes(modes.shapes, friction, contact, X); };
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
+  const MPI_Comm comm = comm_of(structure.load);
   return make_preconditioner(
       solve_dense_quadratic_shared(comm, static_cast<int>(m), reduced(structure.M), reduced(C), reduced(structure.K)),
       modes.shapes, structure.M, steps, theta);

@@ -58,11 +58,6 @@ template <class Work> PetscErrorCode guarded(Reduced& reduced, Work work)
   return PETSC_SUCCESS;
 }
 
-MPI_Comm comm_of(const Reduced& reduced)
-{
-  return PetscObjectComm(reinterpret_cast<PetscObject>(reduced.origin.get()));
-}
-
 std::vector<double> entries_of(const Reduced& reduced, Vec y)
 {
   const double* entries = nullptr;
@@ -72,7 +67,7 @@ std::vector<double> entries_of(const Reduced& reduced, Vec y)
   std::vector<double> result(entries, entries + size);
   check(VecRestoreArrayRead(y, &entries));
   // all ranks go the same way in the solver only if they hold the same bits
-  MPI_Bcast(result.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm_of(reduced));
+  MPI_Bcast(result.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm_of(reduced.origin));
   return result;
 }
 
@@ -115,7 +110,7 @@ PetscErrorCode function(SNES, Vec y, Vec R, void* context)
                      check(VecDot(reduced.phase, moved, &along));
                    }
                    rows.insert(rows.begin(), along);
-                   MPI_Bcast(rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, 0, comm_of(reduced));
+                   MPI_Bcast(rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, 0, comm_of(reduced.origin));
                    for (PetscInt i = 0; i < reduced.size(); ++i)
                      check(VecSetValue(R, i, rows[static_cast<std::size_t>(i)] / reduced.scale, INSERT_VALUES));
                    check(VecAssemblyBegin(R));
@@ -141,7 +136,7 @@ void set_column(const Reduced& reduced, Mat J, PetscInt column, double first, co
 {
   std::vector<double> rows = {first};
   for (const double value : rest) rows.push_back(value * factor);
-  MPI_Bcast(rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, 0, comm_of(reduced));
+  MPI_Bcast(rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, 0, comm_of(reduced.origin));
   for (std::size_t i = 0; i < rows.size(); ++i)
     check(MatSetValue(J, static_cast<PetscInt>(i), column, rows[i], INSERT_VALUES));
 }

@@ -196,7 +196,7 @@ LimitCycle shoot(const Flow& flow, const ShootingStart& start, const SlidingPrec
   shooting.residual_projected = std::nan("");
   declare_reduced_options();
   declare_fallback_options();
-  Progress progress(PetscObjectComm(reinterpret_cast<PetscObject>(start.u)), "cycle", free + 60.);
+  Progress progress(comm_of(start.u), "cycle", free + 60.);
   shooting.announce = [&](const NewtonRecord& entry)
   { progress.update(static_cast<double>(entry.periods), note_of(entry)); };
 

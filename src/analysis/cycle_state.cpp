@@ -13,7 +13,7 @@ Owned<Vec> state_of(Vec u, Vec v)
   const Owned<Vec> mine_u = copy_of(u), mine_v = copy_of(v);
   Vec parts[] = {mine_u, mine_v};
   Owned<Vec> state;
-  check(VecCreateNest(PetscObjectComm(reinterpret_cast<PetscObject>(u)), 2, nullptr, parts, state.put()));
+  check(VecCreateNest(comm_of(u), 2, nullptr, parts, state.put()));
   return state;
 }
 

@@ -31,11 +31,6 @@ struct Rows
   PetscBLASInt count = 0, width = 0, stride = 0;
 };
 
-MPI_Comm comm_of(Mat A)
-{
-  return PetscObjectComm(reinterpret_cast<PetscObject>(A));
-}
-
 /// target = factor target + sign X Y
 void multiply(const Rows& X, const Eigen::MatrixXd& Y, double sign, double factor, const Rows& target)
 {

@@ -54,7 +54,7 @@ Owned<Mat> normal_springs(const Interface& interface)
   std::vector<PetscInt> normals;
   for (PetscInt row = first; row < last; ++row)
     if (row % block == 0) normals.push_back(row);
-  const auto comm = PetscObjectComm(reinterpret_cast<PetscObject>(interface.B.get()));
+  const auto comm = comm_of(interface.B);
   Owned<IS> rows, columns;
   check(ISCreateGeneral(comm, static_cast<PetscInt>(normals.size()), normals.data(), PETSC_COPY_VALUES, rows.put()));
   check(ISCreateStride(comm, last_dof - first_dof, first_dof, 1, columns.put()));
@@ -355,7 +355,7 @@ bool stays_at_rest(const Structure& structure, const Interface& interface)
 
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface)
 {
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
+  const MPI_Comm comm = comm_of(structure.load);
   const Options options = read_options(interface.pairs);
   const auto pairs = static_cast<std::size_t>(interface.pairs);
 

@@ -300,7 +300,7 @@ Estimate estimate_amplitude(const Structure& structure, const Interface& interfa
   }
   // Each pair's share of an absolute tolerance; the rule's finer half is far better than the difference it is held to.
   const double tolerance = 1e-9 * std::max(scale, energy * result.damping_rate) / static_cast<double>(pairs.size());
-  MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.K.get()));
+  MPI_Comm comm = comm_of(structure.K);
   const auto rank = static_cast<std::size_t>(rank_of(comm)), ranks = static_cast<std::size_t>(ranks_of(comm));
   const auto rate = [&](double q)
   {

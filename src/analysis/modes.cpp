@@ -45,7 +45,7 @@ std::complex<double> largest_entry(Vec real, Vec imaginary)
   check(VecGetOwnershipRange(real, &first, &last));
   check(VecGetArrayRead(real, &re));
   check(VecGetArrayRead(imaginary, &im));
-  MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(real));
+  MPI_Comm comm = comm_of(real);
   double largest = 0;
   for (PetscInt i = 0; i < last - first; ++i) largest = std::max(largest, std::hypot(re[i], im[i]));
   MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm);

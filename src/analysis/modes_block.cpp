@@ -77,7 +77,7 @@ Block empty_block(Mat A)
 {
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRangeColumn(A, &first, &last));
-  return {PetscObjectComm(reinterpret_cast<PetscObject>(A)), last - first, 0, {}};
+  return {comm_of(A), last - first, 0, {}};
 }
 
 void append(Block& X, Vec x)

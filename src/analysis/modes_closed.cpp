@@ -39,24 +39,20 @@ std::vector<Row> read_rows(const Interface& interface, const std::vector<int>& p
   check(MatCreateSubMatrices(interface.B, 1, &wanted_rows, &wanted_columns, MAT_INITIAL_MATRIX, &parts));
   const std::vector<double> e = drive_directions(interface);
   std::vector<Row> result(pairs.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    for (int k = 0; k < block; ++k)
-    {
-      PetscInt count = 0;
-      const PetscInt row = static_cast<PetscInt>(i) * block + k, *column = nullptr;
-      const PetscScalar* value = nullptr;
-      check(MatGetRow(parts[0], row, &count, &column, &value));
-      const double weight =
-          k == 0 ? 1 : interface.friction * e[static_cast<std::size_t>(pairs[i] * interface.directions + k - 1)];
-      for (PetscInt j = 0; j < count; ++j)
-      {
-        if (value[j] == 0) continue;
-        Coefficients& entry = result[i][column[j]];
-        if (k == 0) entry.normal += value[j];
-        entry.sliding += weight * value[j];
-      }
-      check(MatRestoreRow(parts[0], row, &count, &column, &value));
-    }
+  for_each_row(parts[0],
+               [&](PetscInt row, std::span<const PetscInt> column, std::span<const PetscScalar> value)
+               {
+                 const auto i = static_cast<std::size_t>(row / block);
+                 const int k = static_cast<int>(row % block), direction = pairs[i] * interface.directions + k - 1;
+                 const double weight = k == 0 ? 1 : interface.friction * e[static_cast<std::size_t>(direction)];
+                 for (std::size_t j = 0; j < column.size(); ++j)
+                 {
+                   if (value[j] == 0) continue;
+                   Coefficients& entry = result[i][column[j]];
+                   if (k == 0) entry.normal += value[j];
+                   entry.sliding += weight * value[j];
+                 }
+               });
   check(MatDestroySubMatrices(1, &parts));
   return result;
 }
@@ -186,8 +182,8 @@ Owned<Mat> assemble_basis(const Elimination& elimination, double Coefficients::*
     outside.push_back(static_cast<PetscInt>(columns.size()) - inside.back());
   }
   Owned<Mat> result;
-  check(MatCreateAIJ(PetscObjectComm(reinterpret_cast<PetscObject>(pattern)), last - first, last_column - first_column,
-                     PETSC_DETERMINE, PETSC_DETERMINE, 0, inside.data(), 0, outside.data(), result.put()));
+  check(MatCreateAIJ(comm_of(pattern), last - first, last_column - first_column, PETSC_DETERMINE, PETSC_DETERMINE, 0,
+                     inside.data(), 0, outside.data(), result.put()));
   for (PetscInt dof = first; dof < last; ++dof)
   {
     basis_row(elimination, dof, kind, columns, values);
@@ -207,7 +203,7 @@ Owned<Mat> assemble_reaction(const std::vector<Row>& rows, const std::vector<Pet
   check(MatGetOwnershipRangeColumn(interface.B, &first, &last));
   check(MatGetSize(interface.B, nullptr, &dofs));
   Owned<Mat> result;
-  check(MatCreate(PetscObjectComm(reinterpret_cast<PetscObject>(interface.B.get())), result.put()));
+  check(MatCreate(comm_of(interface.B), result.put()));
   check(MatSetSizes(result, PETSC_DECIDE, last - first, interface.pairs, dofs));
   check(MatSetType(result, MATAIJ));
   check(MatSetUp(result));
@@ -275,8 +271,8 @@ Owned<Mat> direction_damping(const Interface& interface, const Equilibrium& equi
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(interface.B, &first, &last));
   Owned<Mat> across, S, Cf;
-  check(MatCreateAIJ(PetscObjectComm(reinterpret_cast<PetscObject>(interface.B.get())), PETSC_DECIDE, last - first,
-                     interface.pairs, PETSC_DETERMINE, 2, nullptr, 2, nullptr, across.put()));
+  check(MatCreateAIJ(comm_of(interface.B), PETSC_DECIDE, last - first, interface.pairs, PETSC_DETERMINE, 2, nullptr, 2,
+                     nullptr, across.put()));
   PetscInt first_pair = 0, last_pair = 0;
   check(MatGetOwnershipRange(across, &first_pair, &last_pair));
   for (PetscInt pair = first_pair; pair < last_pair; ++pair)

@@ -162,16 +162,12 @@ std::vector<double> dense_copy(Mat A)
   Mat* parts = nullptr;
   check(MatCreateSubMatrices(A, 1, &row_set, &column_set, MAT_INITIAL_MATRIX, &parts));
   std::vector<double> result(static_cast<Index>(rows) * static_cast<Index>(columns), 0.0);
-  for (PetscInt i = 0; i < rows; ++i)
-  {
-    PetscInt count = 0;
-    const PetscInt* column = nullptr;
-    const PetscScalar* value = nullptr;
-    check(MatGetRow(parts[0], i, &count, &column, &value));
-    for (PetscInt j = 0; j < count; ++j)
-      result[static_cast<Index>(i) + static_cast<Index>(column[j]) * static_cast<Index>(rows)] = value[j];
-    check(MatRestoreRow(parts[0], i, &count, &column, &value));
-  }
+  for_each_row(parts[0],
+               [&](PetscInt i, std::span<const PetscInt> column, std::span<const PetscScalar> value)
+               {
+                 for (Index k = 0; k < column.size(); ++k)
+                   result[static_cast<Index>(i) + static_cast<Index>(column[k]) * static_cast<Index>(rows)] = value[k];
+               });
   check(MatDestroySubMatrices(1, &parts));
   return result;
 }

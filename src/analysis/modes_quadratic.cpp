@@ -12,11 +12,6 @@ namespace squeal
 namespace
 {
 
-MPI_Comm comm_of(Mat A)
-{
-  return PetscObjectComm(reinterpret_cast<PetscObject>(A));
-}
-
 void normalise(Eigenpair& pair)
 {
   double a = 0, b = 0;

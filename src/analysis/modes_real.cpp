@@ -15,11 +15,6 @@ namespace squeal
 namespace
 {
 
-MPI_Comm comm_of(Mat A)
-{
-  return PetscObjectComm(reinterpret_cast<PetscObject>(A));
-}
-
 double trace(Mat A)
 {
   double result = 0;

@@ -13,11 +13,6 @@ namespace squeal
 namespace
 {
 
-MPI_Comm comm_of(Mat A)
-{
-  return PetscObjectComm(reinterpret_cast<PetscObject>(A));
-}
-
 /// The rows of the active pairs.
 Owned<Mat> rows_of(const Interface& interface, const std::vector<int>& active)
 {
@@ -41,18 +36,13 @@ Owned<Mat> rows_of(const Interface& interface, const std::vector<int>& active)
 /// look the same; du is the same there.)
 Owned<VecScatter> to_kept(Mat Z, Vec u, Vec y)
 {
-  PetscInt first = 0, last = 0, own = 0;
-  check(MatGetOwnershipRange(Z, &first, &last));
+  PetscInt own = 0;
   const Owned<Vec> row_of = zeros_like(y);
-  for (PetscInt row = first; row < last; ++row)
-  {
-    PetscInt count = 0;
-    const PetscInt* columns = nullptr;
-    const PetscScalar* values = nullptr;
-    check(MatGetRow(Z, row, &count, &columns, &values));
-    if (count == 1 && values[0] == 1) check(VecSetValue(row_of, columns[0], row, INSERT_VALUES));
-    check(MatRestoreRow(Z, row, &count, &columns, &values));
-  }
+  for_each_row(Z,
+               [&](PetscInt row, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
+               {
+                 if (columns.size() == 1 && values[0] == 1) check(VecSetValue(row_of, columns[0], row, INSERT_VALUES));
+               });
   check(VecAssemblyBegin(row_of));
   check(VecAssemblyEnd(row_of));
   check(VecGetLocalSize(y, &own));
@@ -259,12 +249,8 @@ void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd&
 {
   Owned<Vec> small;
   check(MatCreateVecs(model.shapes, small.put(), nullptr));
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(small, &first, &last));
-  PetscScalar* entries = nullptr;
-  check(VecGetArrayWrite(small, &entries));
-  for (PetscInt i = first; i < last; ++i) entries[i - first] = factor * q(i);
-  check(VecRestoreArrayWrite(small, &entries));
+  const Eigen::VectorXd entries = factor * q;
+  set_whole(small, {entries.data(), static_cast<std::size_t>(entries.size())});
   check(MatMultAdd(model.shapes, small, target, target));
 }
 

@@ -73,7 +73,7 @@ Owned<VecScatter> to_file_order(const Structure& structure, Vec x, Vec in_file)
               [&](PetscInt a, PetscInt b)
               { return motion[static_cast<std::size_t>(a)] < motion[static_cast<std::size_t>(b)]; });
   Owned<IS> from, to;
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(x));
+  const MPI_Comm comm = comm_of(x);
   check(ISCreateGeneral(comm, last - first, order.data() + first, PETSC_COPY_VALUES, from.put()));
   check(ISCreateStride(comm, last - first, first, 1, to.put()));
   Owned<VecScatter> scatter;
@@ -118,7 +118,7 @@ double potential_energy(const Structure& structure, Vec u)
 
 void write_state(const State& state, const Structure& structure, const std::filesystem::path& file)
 {
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(state.u.get()));
+  const MPI_Comm comm = comm_of(state.u);
   std::filesystem::path draft = file;
   draft += ".part";
   // PETSc opens on one rank: find out there first that it can.
@@ -152,7 +152,7 @@ void write_state(const State& state, const Structure& structure, const std::file
 
 State read_state(const std::filesystem::path& file, const Structure& structure)
 {
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
+  const MPI_Comm comm = comm_of(structure.load);
   PetscInt size = 0;
   check(VecGetSize(structure.load, &size));
   on_rank_zero(comm, [&] { check_state_file(file, size); });

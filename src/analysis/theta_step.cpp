@@ -180,8 +180,8 @@ void multiply(Mat A, std::span<const Vec> x, std::span<const Vec> y)
   PetscInt rows = 0, leading = 0;
   check(MatGetLocalSize(A, &rows, nullptr));
   Owned<Mat> X, Y;
-  check(MatCreateDense(PetscObjectComm(reinterpret_cast<PetscObject>(A)), rows, PETSC_DECIDE, PETSC_DETERMINE,
-                       static_cast<PetscInt>(x.size()), nullptr, X.put()));
+  check(MatCreateDense(comm_of(A), rows, PETSC_DECIDE, PETSC_DETERMINE, static_cast<PetscInt>(x.size()), nullptr,
+                       X.put()));
   double* values = nullptr;
   check(MatDenseGetLDA(X, &leading));
   check(MatDenseGetArrayWrite(X, &values));
@@ -259,7 +259,7 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   CondensedOperator condensed = condense(A, interface, h, structure.names);
   step.factor = std::move(condensed.factor);
   step.factor_seconds = MPI_Wtime() - start;
-  if (rank_of(PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()))) == 0)
+  if (rank_of(comm_of(structure.load)) == 0)
     step.W = make_contact_operator(std::move(condensed.W), interface.pairs, interface.directions);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
   return step;
@@ -299,7 +299,7 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
   }
   const std::vector<double> Bv_free = step.factor.forward(right);
   std::vector<double> lambda;
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get()));
+  const MPI_Comm comm = comm_of(structure.load);
   if (interface.pairs > 0) lambda = push_apart(step, interface, Bv_free, works, states, reports, comm);
   step.factor.backward(lambda, next);
   std::vector<Vec> u, Mv, Ku;

@@ -185,8 +185,7 @@ Trajectory integrate(const Structure& structure, const Interface& interface, con
   ModeAmplitude amplitude;
   if (mode) amplitude = follow(structure, equilibrium, *mode);
   bool sliding = mode != nullptr; // so far
-  Progress progress(PetscObjectComm(reinterpret_cast<PetscObject>(structure.load.get())), "transient",
-                    static_cast<double>(steps));
+  Progress progress(comm_of(structure.load), "transient", static_cast<double>(steps));
   const Monitor watch = [&](const State& state, const StepReport& report, const StepWork& work)
   {
     sliding = sliding && slides_as_at_equilibrium(interface, equilibrium, drive, state.reactions);

@@ -1,5 +1,6 @@
 #include "squeal/base/petsc.hpp"
 
+#include <algorithm>
 #include <string>
 
 namespace squeal
@@ -22,6 +23,17 @@ PetscErrorCode keep_failure(MPI_Comm, int line, const char* function, const char
     last_failure() = std::string(message ? message : "") + " (" + (function ? function : "?") + ", " +
                      (file ? file : "?") + ":" + std::to_string(line) + ")";
   return code;
+}
+
+Shares shares_of(const PetscInt* ranges, MPI_Comm comm)
+{
+  Shares shares;
+  for (int rank = 0; rank < ranks_of(comm); ++rank)
+  {
+    shares.starts.push_back(static_cast<int>(ranges[rank]));
+    shares.counts.push_back(static_cast<int>(ranges[rank + 1] - ranges[rank]));
+  }
+  return shares;
 }
 
 } // namespace
@@ -68,23 +80,38 @@ Owned<Vec> copy_of(Vec source)
 
 std::vector<double> whole(Vec x)
 {
-  const auto comm = PetscObjectComm(reinterpret_cast<PetscObject>(x));
-  const PetscInt* ranges = nullptr;
-  check(VecGetOwnershipRanges(x, &ranges));
-  const auto ranks = static_cast<std::size_t>(ranks_of(comm));
-  std::vector<int> counts(ranks), starts(ranks);
-  for (std::size_t rank = 0; rank < ranks; ++rank)
-  {
-    starts[rank] = static_cast<int>(ranges[rank]);
-    counts[rank] = static_cast<int>(ranges[rank + 1] - ranges[rank]);
-  }
-  std::vector<double> result(static_cast<std::size_t>(ranges[ranks]));
+  const Shares shares = shares_of(x);
+  std::vector<double> result(static_cast<std::size_t>(shares.total()));
   const PetscScalar* mine = nullptr;
   check(VecGetArrayRead(x, &mine));
-  MPI_Allgatherv(mine, counts[static_cast<std::size_t>(rank_of(comm))], MPI_DOUBLE, result.data(), counts.data(),
-                 starts.data(), MPI_DOUBLE, comm);
+  MPI_Allgatherv(mine, shares.counts[static_cast<std::size_t>(rank_of(comm_of(x)))], MPI_DOUBLE, result.data(),
+                 shares.counts.data(), shares.starts.data(), MPI_DOUBLE, comm_of(x));
   check(VecRestoreArrayRead(x, &mine));
   return result;
+}
+
+void set_whole(Vec x, std::span<const double> entries)
+{
+  PetscInt first = 0, last = 0;
+  check(VecGetOwnershipRange(x, &first, &last));
+  PetscScalar* mine = nullptr;
+  check(VecGetArrayWrite(x, &mine));
+  std::copy(entries.begin() + first, entries.begin() + last, mine);
+  check(VecRestoreArrayWrite(x, &mine));
+}
+
+Shares shares_of(Vec x)
+{
+  const PetscInt* ranges = nullptr;
+  check(VecGetOwnershipRanges(x, &ranges));
+  return shares_of(ranges, comm_of(x));
+}
+
+Shares shares_of(Mat A)
+{
+  const PetscInt* ranges = nullptr;
+  check(MatGetOwnershipRanges(A, &ranges));
+  return shares_of(ranges, comm_of(A));
 }
 
 LogStage::LogStage(const char* name)
@@ -98,6 +125,16 @@ LogStage::LogStage(const char* name)
 LogStage::~LogStage()
 {
   (void)PetscLogStagePop();
+}
+
+MPI_Comm comm_of(Vec x)
+{
+  return PetscObjectComm(reinterpret_cast<PetscObject>(x));
+}
+
+MPI_Comm comm_of(Mat A)
+{
+  return PetscObjectComm(reinterpret_cast<PetscObject>(A));
 }
 
 int rank_of(MPI_Comm comm)

@@ -31,7 +31,7 @@ struct Factor::Parts
   MPI_Comm comm = MPI_COMM_NULL;
   int dofs = 0, border = 0;
   bool failed = false;
-  std::vector<int> counts, starts;            // of every rank's share of the degrees of freedom
+  Shares shares;                              // of the degrees of freedom
   mutable std::vector<double> right, reduced; // columns: dofs (sparse: + border) and border long
   mutable int columns = 0;                    // of the last forward
   std::vector<double> corner;                 // -B A^-1 B' as MUMPS leaves it, or B A^-1 B'
@@ -39,6 +39,7 @@ struct Factor::Parts
   std::vector<double> L, influence;           // dense, column-major: dofs x dofs, A^-1 B' of dofs x border
 
   bool here() const { return rank_of(comm) == 0; }
+  int own() const { return shares.counts[static_cast<std::size_t>(rank_of(comm))]; }
   int length() const { return mumps ? dofs + border : dofs; } // of a column of `right`
   void solve_half(Half half) const;
   ~Parts();
@@ -242,16 +243,9 @@ Factor::~Factor() = default;
 Factor::Factor(Mat A, Mat B, Kind kind) : parts_(std::make_unique<Parts>())
 {
   Parts& parts = *parts_;
-  parts.comm = PetscObjectComm(reinterpret_cast<PetscObject>(A));
-  const PetscInt* ranges = nullptr;
-  check(MatGetOwnershipRanges(A, &ranges));
-  const int ranks = ranks_of(parts.comm);
-  for (int rank = 0; rank < ranks; ++rank)
-  {
-    parts.starts.push_back(static_cast<int>(ranges[rank]));
-    parts.counts.push_back(static_cast<int>(ranges[rank + 1] - ranges[rank]));
-  }
-  parts.dofs = static_cast<int>(ranges[ranks]);
+  parts.comm = comm_of(A);
+  parts.shares = shares_of(A);
+  parts.dofs = parts.shares.total();
   PetscInt rows = 0;
   if (B) check(MatGetSize(B, &rows, nullptr));
   parts.border = static_cast<int>(rows);
@@ -301,8 +295,8 @@ std::vector<double> Factor::forward(std::span<const Vec> b) const
     const double* mine = nullptr;
     check(VecGetArrayRead(b[column], &mine));
     double* whole = parts.here() ? &parts.right[column * length] : nullptr;
-    MPI_Gatherv(mine, parts.counts[static_cast<std::size_t>(rank_of(parts.comm))], MPI_DOUBLE, whole,
-                parts.counts.data(), parts.starts.data(), MPI_DOUBLE, 0, parts.comm);
+    MPI_Gatherv(mine, parts.own(), MPI_DOUBLE, whole, parts.shares.counts.data(), parts.shares.starts.data(),
+                MPI_DOUBLE, 0, parts.comm);
     check(VecRestoreArrayRead(b[column], &mine));
     if (whole) std::fill(whole + parts.dofs, whole + length, 0.);
   }
@@ -339,8 +333,8 @@ void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x)
     double* mine = nullptr;
     check(VecGetArrayWrite(x[column], &mine));
     const double* whole = parts.here() ? &parts.right[column * length] : nullptr;
-    MPI_Scatterv(whole, parts.counts.data(), parts.starts.data(), MPI_DOUBLE, mine,
-                 parts.counts[static_cast<std::size_t>(rank_of(parts.comm))], MPI_DOUBLE, 0, parts.comm);
+    MPI_Scatterv(whole, parts.shares.counts.data(), parts.shares.starts.data(), MPI_DOUBLE, mine, parts.own(),
+                 MPI_DOUBLE, 0, parts.comm);
     check(VecRestoreArrayWrite(x[column], &mine));
   }
 }

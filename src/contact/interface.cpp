@@ -65,26 +65,22 @@ std::string where(const Interface& interface, int pair)
 void check_interface(const Interface& interface, const std::string& source, MPI_Comm comm)
 {
   std::string problem;
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(interface.B, &first, &last));
-  const PetscInt block = interface.block();
-  for (PetscInt row = first; row < last && problem.empty(); row += block)
-  {
-    PetscInt count = 0;
-    const PetscScalar* values = nullptr;
-    check(MatGetRow(interface.B, row, &count, nullptr, &values));
-    const bool empty = std::all_of(values, values + count, [](double value) { return value == 0; });
-    check(MatRestoreRow(interface.B, row, &count, nullptr, &values));
-    if (empty)
-      problem = source + ": " + where(interface, static_cast<int>(row / block)) +
-                " cannot move along its normal: both sides are held still there, remove it from the contact";
-  }
+  const auto is_zero = [](double value) { return value == 0; };
+  for_each_row(interface.B,
+               [&](PetscInt row, std::span<const PetscInt>, std::span<const PetscScalar> values)
+               {
+                 if (row % interface.block() != 0 || !problem.empty()) return;
+                 if (std::all_of(values.begin(), values.end(), is_zero))
+                   problem = source + ": " + where(interface, static_cast<int>(row / interface.block())) +
+                             " cannot move along its normal: both sides are held still there, remove it from the "
+                             "contact";
+               });
   agree(comm, problem);
   if (interface.friction == 0) return;
   const auto directions = drive_directions(interface);
   const auto width = static_cast<std::size_t>(interface.directions);
   for (std::size_t i = 0; i < directions.size(); i += width)
-    if (std::all_of(&directions[i], &directions[i] + width, [](double value) { return value == 0; }))
+    if (std::all_of(&directions[i], &directions[i] + width, is_zero))
       throw Error(source + ": " + where(interface, static_cast<int>(i / width)) +
                   " has no tangential drive velocity: friction has no direction there; give a velocity or move the " +
                   "axis of rotation, or set friction.coefficient = 0");
@@ -172,12 +168,7 @@ void add_reactions(const Interface& interface, const std::vector<double>& r, Vec
 {
   Owned<Vec> rows;
   check(MatCreateVecs(interface.B, nullptr, rows.put()));
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(rows, &first, &last));
-  PetscScalar* mine = nullptr;
-  check(VecGetArrayWrite(rows, &mine));
-  std::copy(r.begin() + first, r.begin() + last, mine);
-  check(VecRestoreArrayWrite(rows, &mine));
+  set_whole(rows, r);
   check(MatMultTransposeAdd(interface.B, rows, y, y));
 }
 

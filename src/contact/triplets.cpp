@@ -8,23 +8,17 @@ namespace
 
 template <class Keep> void append(Mat matrix, int offset, Keep keep, Triplets& mine)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(matrix, &first, &last));
-  for (PetscInt i = first; i < last; ++i)
-  {
-    PetscInt count = 0;
-    const PetscInt* columns = nullptr;
-    const double* values = nullptr;
-    check(MatGetRow(matrix, i, &count, &columns, &values));
-    for (PetscInt k = 0; k < count; ++k)
-    {
-      if (!keep(i, columns[k])) continue;
-      mine.row.push_back(static_cast<int>(offset + i) + 1);
-      mine.column.push_back(static_cast<int>(columns[k]) + 1);
-      mine.value.push_back(values[k]);
-    }
-    check(MatRestoreRow(matrix, i, &count, &columns, &values));
-  }
+  for_each_row(matrix,
+               [&](PetscInt i, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
+               {
+                 for (std::size_t k = 0; k < columns.size(); ++k)
+                 {
+                   if (!keep(i, columns[k])) continue;
+                   mine.row.push_back(static_cast<int>(offset + i) + 1);
+                   mine.column.push_back(static_cast<int>(columns[k]) + 1);
+                   mine.value.push_back(values[k]);
+                 }
+               });
 }
 
 template <class T> std::vector<T> gather(const std::vector<T>& mine, MPI_Datatype type, MPI_Comm comm)

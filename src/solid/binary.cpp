@@ -101,21 +101,15 @@ MatrixSize checked_size(const std::filesystem::path& file)
 /// Text for the first entry of this rank's rows that is not finite.
 std::string not_finite(Mat A, const std::filesystem::path& file)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(A, &first, &last));
   std::string problem;
-  for (PetscInt row = first; row < last && problem.empty(); ++row)
-  {
-    PetscInt count = 0;
-    const PetscInt* columns = nullptr;
-    const PetscScalar* values = nullptr;
-    check(MatGetRow(A, row, &count, &columns, &values));
-    const auto* bad = std::find_if_not(values, values + count, [](double value) { return std::isfinite(value); });
-    if (bad != values + count)
-      problem = file.string() + ": entry (" + std::to_string(row) + ", " + std::to_string(columns[bad - values]) +
-                ") is " + std::to_string(*bad);
-    check(MatRestoreRow(A, row, &count, &columns, &values));
-  }
+  for_each_row(A,
+               [&](PetscInt row, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
+               {
+                 for (std::size_t k = 0; k < columns.size() && problem.empty(); ++k)
+                   if (!std::isfinite(values[k]))
+                     problem = file.string() + ": entry (" + std::to_string(row) + ", " + std::to_string(columns[k]) +
+                               ") is " + std::to_string(values[k]);
+               });
   return problem;
 }
 

@@ -3,7 +3,6 @@
 
 #include "squeal/solid/binary.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -24,19 +23,13 @@ struct Entry
 
 Entry largest_entry(Mat A)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(A, &first, &last));
   Entry largest;
-  for (PetscInt row = first; row < last; ++row)
-  {
-    PetscInt count = 0;
-    const PetscInt* columns = nullptr;
-    const PetscScalar* values = nullptr;
-    check(MatGetRow(A, row, &count, &columns, &values));
-    for (PetscInt k = 0; k < count; ++k)
-      if (std::abs(values[k]) > largest.size) largest = {std::abs(values[k]), row, columns[k]};
-    check(MatRestoreRow(A, row, &count, &columns, &values));
-  }
+  for_each_row(A,
+               [&](PetscInt row, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
+               {
+                 for (std::size_t k = 0; k < columns.size(); ++k)
+                   if (std::abs(values[k]) > largest.size) largest = {std::abs(values[k]), row, columns[k]};
+               });
   return largest;
 }
 
@@ -153,12 +146,7 @@ Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
     throw Error((folder / "F.petsc").string() + ": length " + std::to_string(force.size()) + ", but M.petsc is " +
                 std::to_string(size) + " x " + std::to_string(size));
   check(MatCreateVecs(structure.K, nullptr, structure.load.put()));
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(structure.load, &first, &last));
-  PetscScalar* entries = nullptr;
-  check(VecGetArrayWrite(structure.load, &entries));
-  std::copy(force.begin() + first, force.begin() + last, entries);
-  check(VecRestoreArrayWrite(structure.load, &entries));
+  set_whole(structure.load, force);
   return structure;
 }
 

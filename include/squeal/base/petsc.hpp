@@ -6,6 +6,7 @@
 
 #include <slepc.h>
 #include <source_location>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -113,6 +114,36 @@ Owned<Vec> copy_of(Vec source);
 /// The entries of a small distributed vector, whole on every rank. Collective.
 std::vector<double> whole(Vec x);
 
+/// The inverse: this rank's share of `entries` into x.
+void set_whole(Vec x, std::span<const double> entries);
+
+/// How many rows each rank has of an object's, and where they start, as MPI's gathers take them.
+struct Shares
+{
+  std::vector<int> counts, starts;
+  int total() const { return starts.back() + counts.back(); }
+};
+
+Shares shares_of(Vec x);
+Shares shares_of(Mat A); // of its rows
+
+/// visit(row, columns, values) for every row of this rank; the spans end with the call.
+template <class Visit> void for_each_row(Mat A, Visit visit)
+{
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(A, &first, &last));
+  for (PetscInt row = first; row < last; ++row)
+  {
+    PetscInt count = 0;
+    const PetscInt* columns = nullptr;
+    const PetscScalar* values = nullptr;
+    check(MatGetRow(A, row, &count, &columns, &values));
+    const auto length = static_cast<std::size_t>(count);
+    visit(row, std::span(columns, length), std::span(values, length));
+    check(MatRestoreRow(A, row, &count, &columns, &values));
+  }
+}
+
 /// Registers (once) and enters a -log_view stage for as long as it lives.
 class LogStage
 {
@@ -123,6 +154,8 @@ public:
   LogStage& operator=(const LogStage&) = delete;
 };
 
+MPI_Comm comm_of(Vec x);
+MPI_Comm comm_of(Mat A);
 int rank_of(MPI_Comm comm);
 int ranks_of(MPI_Comm comm);
 
