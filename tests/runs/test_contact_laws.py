@@ -9,6 +9,7 @@ import pytest
 from conftest import INPUTS, ROOT
 
 sys.dont_write_bytecode = True
+sys.path.insert(0, str(ROOT / "tools"))  # where atlas finds its own
 loader = importlib.machinery.SourceFileLoader("atlas", str(ROOT / "tools" / "atlas"))
 atlas = importlib.util.module_from_spec(importlib.util.spec_from_loader("atlas", loader))
 loader.exec_module(atlas)

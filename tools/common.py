@@ -1,0 +1,74 @@
+"""What the Python tools share: a python that has their modules, runs of squeal, files in PETSc's binary format."""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+TOOL = Path(sys.argv[0]).name
+ROOT = Path(__file__).resolve().parent.parent
+PROGRAM = Path(os.environ.get("SQUEAL", ROOT / "build" / "squeal")).resolve()
+DEBIAN = "/usr/bin/python3"
+MATRIX_ID, VECTOR_ID = 1211216, 1211214  # PETSc's class numbers, MAT_FILE_CLASSID and VEC_FILE_CLASSID
+
+
+def needs(*modules):
+    """Starts the tool again in Debian's python where this one lacks a module; to be called before they are imported."""
+    missing = [module for module in modules if importlib.util.find_spec(module) is None]
+    if not missing:
+        return
+    # A private python first in PATH hides the one whose modules Debian installs.
+    if os.path.realpath(sys.executable) == os.path.realpath(DEBIAN) or not os.path.exists(DEBIAN):
+        sys.exit(f"{TOOL}: no python module {', '.join(missing)}; tools/setup installs what the tools need")
+    os.execv(DEBIAN, [DEBIAN, *sys.argv])
+
+
+def arguments_and_options():
+    """The tool's own arguments, and squeal's after a --."""
+    words = sys.argv[1:]
+    cut = words.index("--") if "--" in words else len(words)
+    return words[:cut], words[cut + 1 :]
+
+
+def run_squeal(scene, output, values, words=(), ranks=1, limit=None):
+    """Exit code and report of a run; values: of the scene's keys. None: it took more than `limit` seconds.
+
+    Bad input ends the tool with squeal's own words.
+    """
+    if not PROGRAM.exists():
+        sys.exit(f"{TOOL}: {PROGRAM} is missing: tools/build makes it, or say where it is by SQUEAL=FILE")
+    command = [*(["mpirun", "-n", ranks] if ranks > 1 else []), PROGRAM, scene, *words, "--output", output]
+    for key, value in values.items():
+        command += ["--set", f"{key}={value}"]
+    command = [str(word) for word in command]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=limit)
+    except subprocess.TimeoutExpired:
+        return None
+    if done.returncode not in (0, 2):
+        sys.exit(f"{TOOL}: {' '.join(command)}\n{done.stderr.strip()}")
+    return done.returncode, json.loads((Path(output) / "report.json").read_text())
+
+
+def petsc_bytes(array):
+    """A vector: id, size, values. A sparse or dense matrix: id, rows, columns, entries, entries of each row, columns, values."""
+    import numpy as np  # not before needs()
+
+    if not hasattr(array, "indptr"):
+        array = np.atleast_1d(np.asarray(array, float))
+        if array.ndim == 1:
+            return np.array([VECTOR_ID, len(array)], ">i4").tobytes() + array.astype(">f8").tobytes()
+        rows, columns = np.nonzero(array)
+        lengths, values = np.bincount(rows, minlength=array.shape[0]), array[rows, columns]
+    else:
+        array.sort_indices()
+        lengths, columns, values = np.diff(array.indptr), array.indices, array.data
+    head = np.array([MATRIX_ID, *array.shape, len(values)], ">i4")
+    return b"".join(part.tobytes() for part in (head, lengths.astype(">i4"), columns.astype(">i4"), values.astype(">f8")))
+
+
+def write_petsc(file, *arrays):
+    """Several vectors go one after the other."""
+    file.write_bytes(b"".join(map(petsc_bytes, arrays)))
