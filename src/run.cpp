@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <numbers>
 #include <span>
-#include <sys/resource.h>
 
 namespace squeal
 {
@@ -227,15 +226,6 @@ Verdict verdict_of(const Report& report)
   return all_good ? Verdict::converged : Verdict::not_converged;
 }
 
-double largest_memory(MPI_Comm comm)
-{
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  double bytes = 1024. * static_cast<double>(usage.ru_maxrss);
-  MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_DOUBLE, MPI_SUM, comm);
-  return bytes;
-}
-
 } // namespace
 
 Verdict run(const Scene& scene, const std::filesystem::path& output, MPI_Comm comm)
@@ -252,7 +242,7 @@ Verdict run(const Scene& scene, const std::filesystem::path& output, MPI_Comm co
   report.transient = timed(report, "transient", comm, [&] { return run_transient(scene, model, report); });
   report.cycle = timed(report, "cycle", comm, [&] { return run_cycle(scene, model, report); });
 
-  report.memory_bytes = largest_memory(comm);
+  report.memory_bytes = peak_memory(comm);
   write_results(report, scene, model, output, comm);
   print_summary(report, scene, comm);
   if (rank_of(comm) == 0) std::printf("results are in %s\n", output.c_str());

@@ -42,18 +42,6 @@ template <class Work> double seconds(int times, Work work)
   return median(all);
 }
 
-/// Largest resident size, all ranks together; not from getrusage, which a child inherits from who started it.
-double resident_megabytes()
-{
-  std::ifstream status("/proc/self/status");
-  double mine = 0, all = 0;
-  for (std::string word; status >> word;)
-    if (word == "VmHWM:") status >> mine;
-  mine /= 1024;
-  MPI_Reduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, 0, PETSC_COMM_WORLD);
-  return all;
-}
-
 /// b of the first step, by the displacement law; on rank 0.
 std::vector<double> first_problem(const ThetaStep& step, const Structure& structure, const Interface& interface,
                                   const State& state, const StepWork& work)
@@ -96,11 +84,7 @@ std::pair<double, int> cold_contact(const ThetaStep& step, double mu, const std:
 /// Entries of the factor of A alone.
 double plain_factor_entries(const Structure& structure, double h)
 {
-  Owned<Mat> A;
-  check(MatDuplicate(structure.M, MAT_COPY_VALUES, A.put()));
-  check(MatAXPY(A, h * .5, structure.C, SAME_NONZERO_PATTERN));
-  check(MatAXPY(A, h * h * .25, structure.K, SAME_NONZERO_PATTERN));
-  return Factor(A, nullptr, Factor::Kind::sparse).entries();
+  return Factor(step_matrix(structure, h, .5), nullptr, Factor::Kind::sparse).entries();
 }
 
 void run(const std::vector<std::string>& words)
@@ -151,7 +135,7 @@ void run(const std::vector<std::string>& words)
   const auto x = zeros_like(structure.load);
   const double solve_time = seconds(5, [&] { solve(step.factor, structure.load, x); });
   const double product_time = seconds(5, [&] { check(MatMult(structure.K, structure.load, x)); });
-  const double resident = resident_megabytes();
+  const double resident = peak_memory(comm) / 1024 / 1024;
   const auto [cold, cold_sweeps] = cold_contact(step, mu, b, "gauss_seidel");
   const auto [fixed, fixed_sweeps] = cold_contact(step, mu, b, "fixed_point");
   const double entries = plain_factor_entries(structure, h);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 namespace squeal
@@ -317,13 +316,12 @@ void judge(const Structure& structure, const Interface& interface, const Search&
 Outcome failure(const StatusSolution& solution, double friction)
 {
   Outcome outcome{"no equilibrium", "", solution.iterations, 1};
-  std::array<char, 32> at{};
-  std::snprintf(at.data(), at.size(), " at mu = %g", friction);
   if (solution.outcome == "cycles")
-    outcome.reason = "the sets of closed pairs repeat without end" + std::string(at.data()) + ": friction is too large";
+    outcome.reason = format("the sets of closed pairs repeat without end at mu = %g: friction is too large", friction);
   else if (solution.outcome == "singular")
-    outcome.reason = "no set of closed pairs balances the load" + std::string(at.data()) +
-                     ": the structure tips, slides away or lifts off";
+    outcome.reason = format("no set of closed pairs balances the load at mu = %g: the structure tips, slides away or "
+                            "lifts off",
+                            friction);
   else
     outcome = {"not converged", "no fitting set of closed pairs within -equilibrium_max_it", solution.iterations, 1};
   return outcome;
@@ -382,7 +380,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
                  {
                    search.D_nn = normal_block(D, interface);
                    search.problem = problem_of(D, search.D_nn, interface, held.kappa, q);
-                   search.rho = 1 / largest_eigenvalue(search.D_nn, pairs);
+                   search.rho = 1 / largest_eigenvalue(search.D_nn, pairs, 30);
                    search.solution = find_split(search.problem, interface, options.max_iterations, 1.5 * search.rho);
                  });
     share(search.solution, pairs, comm);

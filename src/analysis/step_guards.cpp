@@ -1,10 +1,8 @@
 #include "squeal/analysis/step_guards.hpp"
 
-#include "squeal/contact/factor.hpp"
+#include "squeal/analysis/transient.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 namespace squeal
@@ -15,13 +13,6 @@ namespace
 
 constexpr double two_pi = 2 * std::numbers::pi;
 
-std::string number(double value)
-{
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.4g", value);
-  return text.data();
-}
-
 std::string mode_refusal(const ComplexMode& mode, double theta, double h)
 {
   const double sigma = mode.lambda.real(), omega = std::abs(mode.lambda.imag());
@@ -29,11 +20,11 @@ std::string mode_refusal(const ComplexMode& mode, double theta, double h)
   const double steps = two_pi / (omega * h);
   const double needed = two_pi * std::abs(theta - 0.5) * std::norm(mode.lambda) / (omega * sigma);
   if (steps > needed) return {};
-  const std::string what = " steps a period the mode that grows at sigma = " + number(sigma) + " /s would ";
-  return "with theta = " + number(theta) + " and " + number(steps) + what +
+  return format("with theta = %.4g and %.4g steps a period the mode that grows at sigma = %.4g /s would ", theta, steps,
+                sigma) +
          (theta > 0.5 ? "look stable: more than 2 pi (theta - 1/2) omega/sigma = "
                       : "owe most of its growth to the step: more than 2 pi (1/2 - theta) omega/sigma = ") +
-         number(needed) + " steps a period are needed, or theta = 1/2";
+         format("%.4g steps a period are needed, or theta = 1/2", needed);
 }
 
 /// One step of the free structure in place: A v+ = [M v - (1-theta) A v]/theta - h K u, u+ = u + h v_theta.
@@ -84,10 +75,7 @@ double growth_bias(std::complex<double> lambda, double theta, double h)
 double free_growth(const Structure& structure, double theta, double h)
 {
   FreeStep step{structure, theta, h, {}, {}, {}, {}, {}, {}, {}};
-  check(MatDuplicate(structure.M, MAT_COPY_VALUES, step.A.put()));
-  check(MatAXPY(step.A, h * theta, structure.C, SAME_NONZERO_PATTERN));
-  check(MatAXPY(step.A, h * h * theta * theta, structure.K, SAME_NONZERO_PATTERN));
-  check(MatSetOption(step.A, MAT_SYMMETRIC, PETSC_TRUE));
+  step.A = step_matrix(structure, h, theta);
   step.factor = Factor(step.A, nullptr, Factor::Kind::automatic);
   for (Owned<Vec>* x : {&step.u, &step.v, &step.next, &step.rhs, &step.image}) *x = zeros_like(structure.load);
   PetscInt first = 0, last = 0;
@@ -120,8 +108,9 @@ std::string step_refusal(const Structure& structure, const ComplexMode* mode, do
   const double growth = free_growth(structure, theta, h);
   constexpr double negligible = 2e-6; // less than what the fit sees, and no harm in 100 000 steps
   if (growth <= negligible) return {};
-  return "with theta = " + number(theta) + " a step of " + number(h) + " s multiplies free vibrations by exp(" +
-         number(growth) + "), more than damping takes: theta = 1/2 needs no damping, theta below it a shorter step";
+  return format("with theta = %.4g a step of %.4g s multiplies free vibrations by exp(%.4g), more than damping takes: "
+                "theta = 1/2 needs no damping, theta below it a shorter step",
+                theta, h, growth);
 }
 
 } // namespace squeal

@@ -4,6 +4,7 @@
 ///     M - h(1-theta) C - h^2 theta(1-theta) K = [M - (1-theta) A]/theta,
 /// and A v+ is the right-hand side just solved for: a step multiplies by M and K once each. The same vectors give the
 /// energies and, from (A - M) v_theta = h theta C v_theta + theta^2 h (K u+ - K u), the damping work.
+#include "squeal/analysis/block.hpp"
 #include "squeal/analysis/transient.hpp"
 
 #include <algorithm>
@@ -164,11 +165,6 @@ void account(const ThetaStep& step, const Structure& structure, std::span<const 
   }
 }
 
-double* column_of(double* values, PetscInt leading, std::size_t column)
-{
-  return values + static_cast<std::ptrdiff_t>(column) * leading;
-}
-
 /// y_k = A x_k for all k at one reading of A.
 void multiply(Mat A, std::span<const Vec> x, std::span<const Vec> y)
 {
@@ -177,33 +173,10 @@ void multiply(Mat A, std::span<const Vec> x, std::span<const Vec> y)
     check(MatMult(A, x[0], y[0]));
     return;
   }
-  PetscInt rows = 0, leading = 0;
-  check(MatGetLocalSize(A, &rows, nullptr));
-  Owned<Mat> X, Y;
-  check(MatCreateDense(comm_of(A), rows, PETSC_DECIDE, PETSC_DETERMINE, static_cast<PetscInt>(x.size()), nullptr,
-                       X.put()));
-  double* values = nullptr;
-  check(MatDenseGetLDA(X, &leading));
-  check(MatDenseGetArrayWrite(X, &values));
-  for (std::size_t k = 0; k < x.size(); ++k)
-  {
-    const double* mine = nullptr;
-    check(VecGetArrayRead(x[k], &mine));
-    std::copy_n(mine, rows, column_of(values, leading, k));
-    check(VecRestoreArrayRead(x[k], &mine));
-  }
-  check(MatDenseRestoreArrayWrite(X, &values));
-  check(MatMatMult(A, X, MAT_INITIAL_MATRIX, PETSC_DEFAULT, Y.put()));
-  check(MatDenseGetLDA(Y, &leading));
-  check(MatDenseGetArray(Y, &values));
-  for (std::size_t k = 0; k < y.size(); ++k)
-  {
-    double* mine = nullptr;
-    check(VecGetArrayWrite(y[k], &mine));
-    std::copy_n(column_of(values, leading, k), rows, mine);
-    check(VecRestoreArrayWrite(y[k], &mine));
-  }
-  check(MatDenseRestoreArray(Y, &values));
+  Block X = empty_block(A);
+  for (const Vec column : x) append(X, column);
+  const Block Y = product(A, X);
+  for (std::size_t k = 0; k < y.size(); ++k) copy_column(Y, static_cast<PetscInt>(k), y[k]);
 }
 
 /// The start of a step: A v_free = [M v - (1-theta) A v]/theta - h K u + h F, into A v_next.
@@ -243,6 +216,16 @@ std::vector<double> push_apart(const ThetaStep& step, const Interface& interface
 
 } // namespace
 
+Owned<Mat> step_matrix(const Structure& structure, double h, double theta)
+{
+  Owned<Mat> A;
+  check(MatDuplicate(structure.M, MAT_COPY_VALUES, A.put()));
+  check(MatAXPY(A, h * theta, structure.C, SAME_NONZERO_PATTERN));
+  check(MatAXPY(A, h * h * theta * theta, structure.K, SAME_NONZERO_PATTERN));
+  check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
+  return A;
+}
+
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta)
 {
   if (!(h > 0) || !std::isfinite(h)) throw Error("the time step must be above 0, not " + std::to_string(h) + " s");
@@ -252,11 +235,7 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.h = h;
   step.theta = theta;
   read_options(step);
-  Owned<Mat> A;
-  check(MatDuplicate(structure.M, MAT_COPY_VALUES, A.put()));
-  check(MatAXPY(A, h * theta, structure.C, SAME_NONZERO_PATTERN));
-  check(MatAXPY(A, h * h * theta * theta, structure.K, SAME_NONZERO_PATTERN));
-  CondensedOperator condensed = condense(A, interface, h, structure.names);
+  CondensedOperator condensed = condense(step_matrix(structure, h, theta), interface, h, structure.names);
   step.factor = std::move(condensed.factor);
   step.factor_seconds = MPI_Wtime() - start;
   if (rank_of(comm_of(structure.load)) == 0)

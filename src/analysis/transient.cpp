@@ -86,13 +86,6 @@ bool slides_as_at_equilibrium(const Interface& interface, const Equilibrium& equ
   return true;
 }
 
-std::string number(double value)
-{
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.4g", value);
-  return text.data();
-}
-
 /// Step size and number of steps; refuses where the rule does.
 long plan(Trajectory& trajectory, const Structure& structure, const ComplexMode* mode,
           const TransientSettings& settings)
@@ -120,15 +113,15 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
   if (summary.unconverged > 0)
   {
     outcome.word = "not converged";
-    outcome.reason = "contact did not converge in " + std::to_string(summary.unconverged) + " of " +
-                     std::to_string(summary.steps) + " steps, first at t = " + number(summary.first_unconverged) +
-                     " s (largest residual " + number(summary.contact_residual_max) +
-                     "): raise -transient_contact_max_it or shorten the step";
+    outcome.reason =
+        format("contact did not converge in %ld of %ld steps, first at t = %.4g s (largest residual %.4g): "
+               "raise -transient_contact_max_it or shorten the step",
+               summary.unconverged, summary.steps, summary.first_unconverged, summary.contact_residual_max);
   }
   if (summary.steps < asked)
   {
     outcome.word = "not converged";
-    outcome.reason = "the energy is no longer finite at t = " + number(trajectory.end.time) + " s";
+    outcome.reason = format("the energy is no longer finite at t = %.4g s", trajectory.end.time);
   }
   outcome.residual = summary.contact_residual_max;
   outcome.iterations = static_cast<int>(summary.contact_iterations_mean * static_cast<double>(summary.steps) + 0.5);
@@ -190,9 +183,8 @@ Trajectory integrate(const Structure& structure, const Interface& interface, con
   {
     sliding = sliding && slides_as_at_equilibrium(interface, equilibrium, drive, state.reactions);
     if (sliding) observe(amplitude, state.time, work.Ku, work.Mv);
-    progress.update(static_cast<double>(trajectory.history.time.size()), "energy " + number(report.energy) +
-                                                                             " J, open " + std::to_string(report.open) +
-                                                                             ", stick " + std::to_string(report.stick));
+    progress.update(static_cast<double>(trajectory.history.time.size()),
+                    format("energy %.4g J, open %d, stick %d", report.energy, report.open, report.stick));
   };
   const double wall = MPI_Wtime();
   const MarchSummary summary =

@@ -1,6 +1,8 @@
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
+#include <cstdarg>
+#include <cstdio>
 #include <numeric>
 #include <vector>
 
@@ -22,6 +24,19 @@ void agree(MPI_Comm comm, const std::string& problem)
   text.resize(static_cast<std::size_t>(length));
   MPI_Bcast(text.data(), length, MPI_CHAR, first, comm);
   throw Error(text);
+}
+
+std::string format(const char* pattern, ...)
+{
+  std::va_list arguments, again;
+  va_start(arguments, pattern);
+  va_copy(again, arguments);
+  const int length = std::vsnprintf(nullptr, 0, pattern, arguments);
+  va_end(arguments);
+  std::string text(static_cast<std::size_t>(std::max(length, 0)), ' ');
+  std::vsnprintf(text.data(), text.size() + 1, pattern, again);
+  va_end(again);
+  return text;
 }
 
 int edit_distance(const std::string& a, const std::string& b)

@@ -1,7 +1,9 @@
 #include "squeal/base/petsc.hpp"
 
 #include <algorithm>
+#include <fstream>
 #include <string>
+#include <sys/resource.h>
 
 namespace squeal
 {
@@ -112,6 +114,22 @@ Shares shares_of(Mat A)
   const PetscInt* ranges = nullptr;
   check(MatGetOwnershipRanges(A, &ranges));
   return shares_of(ranges, comm_of(A));
+}
+
+double peak_memory(MPI_Comm comm)
+{
+  double bytes = 0;
+  std::ifstream status("/proc/self/status"); // getrusage inherits the size of whoever started the process
+  for (std::string word; status >> word;)
+    if (word == "VmHWM:" && status >> bytes) bytes *= 1024;
+  if (bytes == 0)
+  {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    bytes = 1024. * static_cast<double>(usage.ru_maxrss);
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_DOUBLE, MPI_SUM, comm);
+  return bytes;
 }
 
 LogStage::LogStage(const char* name)

@@ -3,8 +3,8 @@
 #include "squeal/base/petsc.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <Eigen/Core>
 #include <petscblaslapack.h>
 #include <set>
 
@@ -81,19 +81,11 @@ void solve_by_svd(Dense matrix, std::vector<double>& x)
 
 std::vector<double> gaps(const ComplementarityProblem& problem, const std::vector<double>& r)
 {
-  const std::size_t n = problem.q.size();
+  const auto n = static_cast<Eigen::Index>(problem.q.size());
   std::vector<double> g = problem.q;
-  for (std::size_t i = 0; i < n; ++i)
-  {
-    // four sums, since the compiler may not reorder one
-    const double* row = problem.M.data() + i * n;
-    std::array<double, 4> sum{};
-    std::size_t j = 0;
-    for (; j + 4 <= n; j += 4)
-      for (std::size_t k = 0; k < 4; ++k) sum[k] += row[j + k] * r[j + k];
-    for (; j < n; ++j) sum[0] += row[j] * r[j];
-    g[i] += sum[0] + sum[1] + sum[2] + sum[3];
-  }
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Eigen::Map<Eigen::VectorXd>(g.data(), n).noalias() +=
+      Eigen::Map<const RowMajor>(problem.M.data(), n, n) * Eigen::Map<const Eigen::VectorXd>(r.data(), n);
   return g;
 }
 
@@ -208,25 +200,22 @@ ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, do
   }
 }
 
-double largest_eigenvalue(const std::vector<double>& matrix, std::size_t n)
+double largest_eigenvalue(const std::vector<double>& matrix, std::size_t n, int iterations)
 {
-  std::vector<double> x(n), y(n);
-  for (std::size_t i = 0; i < n; ++i) x[i] = 1 + .5 * std::sin(7. * static_cast<double>(i) + 1);
-  double size = 0;
-  for (int iteration = 0; iteration < 30; ++iteration)
+  const auto size = static_cast<Eigen::Index>(n);
+  const Eigen::Map<const Eigen::MatrixXd> A(matrix.data(), size, size);
+  Eigen::VectorXd x(size), image(size);
+  for (Eigen::Index i = 0; i < size; ++i) x[i] = 1 + .5 * std::sin(7. * static_cast<double>(i) + 1);
+  double eigenvalue = 0;
+  for (int iteration = 0; iteration < iterations; ++iteration)
   {
-    size = 0;
-    for (const double value : x) size = std::hypot(size, value);
-    if (size == 0) return 0;
-    for (double& value : x) value /= size;
-    for (std::size_t i = 0; i < n; ++i)
-    {
-      y[i] = 0;
-      for (std::size_t j = 0; j < n; ++j) y[i] += matrix[i * n + j] * x[j];
-    }
-    x.swap(y);
+    if (x.norm() == 0) return 0;
+    x.normalize();
+    image.noalias() = A.selfadjointView<Eigen::Lower>() * x;
+    eigenvalue = image.norm();
+    x.swap(image);
   }
-  return size;
+  return eigenvalue;
 }
 
 } // namespace squeal

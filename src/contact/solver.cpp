@@ -1,13 +1,13 @@
 #include "squeal/contact/solver.hpp"
 
 #include "squeal/base/petsc.hpp"
+#include "squeal/contact/complementarity.hpp"
 #include "work.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Core>
 #include <limits>
-#include <numeric>
 #include <petscblaslapack.h>
 
 namespace squeal
@@ -80,25 +80,6 @@ void multiply(const ContactOperator& W, const std::vector<double>& x, int column
   BLASsymm_("L", "L", &n, &m, &unit, W.W.data(), &n, x.data(), &n, &zero, y.data(), &n);
 }
 
-/// Largest eigenvalue of W from a few power iterations: a lower bound, close enough for a step that adapts.
-double largest_eigenvalue(const ContactOperator& W)
-{
-  std::vector<double> x(W.size()), y;
-  for (std::size_t i = 0; i < x.size(); ++i) x[i] = 1 + .5 * std::sin(static_cast<double>(7 * i + 1));
-  double eigenvalue = 0;
-  for (int iteration = 0; iteration < 12; ++iteration)
-  {
-    double size = 0;
-    for (const double value : x) size += value * value;
-    if (size == 0) return eigenvalue;
-    for (double& value : x) value /= std::sqrt(size);
-    multiply(W, x, 1, y);
-    eigenvalue = std::inner_product(x.begin(), x.end(), y.begin(), 0.);
-    x.swap(y);
-  }
-  return eigenvalue;
-}
-
 void fixed_point(ContactWork& work, const ContactSettings& settings)
 {
   const std::size_t block = work.W.block();
@@ -108,7 +89,8 @@ void fixed_point(ContactWork& work, const ContactSettings& settings)
   ContactWork* const alone[] = {&work};
   refresh(alone);
   result.residual = residual_of(work);
-  const double lambda = result.residual > settings.tolerance ? largest_eigenvalue(work.W) : 0;
+  // a lower bound, close enough for a step that adapts
+  const double lambda = result.residual > settings.tolerance ? largest_eigenvalue(work.W.W, work.W.size(), 12) : 0;
   double rho = (settings.rho > 0 ? settings.rho : 1.5) / (lambda > 0 ? lambda : 1);
   double best = result.residual;
   while (result.residual > settings.tolerance && std::isfinite(result.residual) &&

@@ -147,9 +147,8 @@ void check_parts(const FileMesh& file, const Mesh& mesh, const Scene& scene)
       throw Error("part '" + name + "' is a surface in the mesh: give it a thickness, which makes it a shell");
     if (shell && names[3].count(name))
       throw Error("part '" + name + "' is a volume in the mesh but has a thickness: remove the thickness");
-    const std::string nearest = nearest_word(name, names[shell ? 2 : 3]);
     throw Error("part '" + name + "': the mesh has no elements in a physical " + (shell ? "surface" : "volume") +
-                " of that name" + (nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
+                " of that name" + suggestion(name, names[shell ? 2 : 3]));
   }
 }
 

@@ -82,12 +82,9 @@ void check_parameters(const MeshSource& source)
     throw Error(source.file.string() + ": [mesh.parameters] need a .geo geometry; a mesh file has none. Remove them");
   const std::vector<std::string> known = geometry_parameters(source.file);
   for (const auto& [name, value] : source.parameters)
-  {
-    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-    const std::string nearest = nearest_word(name, known);
-    throw Error(source.file.string() + ": no parameter '" + name + "' in its DefineConstant lists" +
-                (nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
-  }
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      throw Error(source.file.string() + ": no parameter '" + name + "' in its DefineConstant lists" +
+                  suggestion(name, known));
 }
 
 // libgmsh lives from here to the end of the read, mute. It keeps -setnumber values as long as the process lives, which

@@ -49,9 +49,7 @@ template <class List> std::set<std::string> keys(const List& list)
 void check_name(const std::string& user, const std::string& name, const std::set<std::string>& known)
 {
   if (known.count(name)) return;
-  const std::string nearest = nearest_word(name, known);
-  throw Error(user + ": no '" + name + "' in the mesh or among the points" +
-              (nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
+  throw Error(user + ": no '" + name + "' in the mesh or among the points" + suggestion(name, known));
 }
 
 void check_names(const Mesh& mesh, const Scene& scene)

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdarg>
 #include <cstdio>
 
 namespace squeal
@@ -168,16 +167,6 @@ std::string timings_text(const Report& report)
 }
 
 } // namespace
-
-std::string format(const char* pattern, ...)
-{
-  char text[512];
-  std::va_list arguments;
-  va_start(arguments, pattern);
-  std::vsnprintf(text, sizeof text, pattern, arguments);
-  va_end(arguments);
-  return text;
-}
 
 std::string summary(const Report& report, const Scene& scene)
 {

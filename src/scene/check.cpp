@@ -106,7 +106,7 @@ private:
                   const std::string& key) const
   {
     if (std::find(known.begin(), known.end(), name) == known.end())
-      fail(member, key + " = \"" + name + "\" is not defined" + suggestion(name, known));
+      fail(member, key + " = \"" + name + "\" is not defined" + suggestion_or_list(name, known));
   }
 
   void check_motions() const

@@ -61,7 +61,8 @@ void merge_list(const std::string& key, toml::array& list, toml::table& from)
       if (wanted == name || (!entry && wanted == index)) entry = candidate;
     }
     if (!entry)
-      throw Error(place_of(value) + ": no [[" + key + "]] is called '" + wanted + "'" + suggestion(wanted, known));
+      throw Error(place_of(value) + ": no [[" + key + "]] is called '" + wanted + "'" +
+                  suggestion_or_list(wanted, known));
     if (!value.is_table()) throw Error(place_of(value) + ": expected " + key + "." + wanted + ".KEY=VALUE");
     merge(*entry, *value.as_table());
   }
@@ -120,10 +121,10 @@ std::string joined(const std::vector<std::string>& words)
   return text;
 }
 
-std::string suggestion(const std::string& word, const std::vector<std::string>& known)
+std::string suggestion_or_list(const std::string& word, const std::vector<std::string>& known)
 {
-  const std::string near = nearest_word(word, known);
-  return near.empty() ? "; known: " + joined(known) : "; did you mean '" + near + "'?";
+  const std::string near = suggestion(word, known);
+  return near.empty() ? "; known: " + joined(known) : near;
 }
 
 void apply_override(toml::table& root, const std::string& text)

@@ -51,7 +51,7 @@ public:
     for (const auto& [key, node] : root)
       if (std::find(known.begin(), known.end(), key.str()) == known.end())
         throw Error(place_of(node) + ": unknown key '" + std::string(key.str()) + "'" +
-                    suggestion(std::string(key.str()), known));
+                    suggestion_or_list(std::string(key.str()), known));
     for (const Field& field : fields(scene))
       if (const toml::node* node = root.get(field.key)) read_field(field, *node, "");
     for_each_table(scene,
@@ -99,7 +99,7 @@ private:
     for (const auto& [key, value] : *table)
       if (std::find(known.begin(), known.end(), key.str()) == known.end())
         throw Error(place_of(value) + ": " + label + "unknown key '" + std::string(key.str()) + "'" +
-                    suggestion(std::string(key.str()), known));
+                    suggestion_or_list(std::string(key.str()), known));
     for (const Field& field : list)
     {
       if (const toml::node* value = table->get(field.key))
@@ -221,7 +221,7 @@ private:
     const bool listed = std::find(words.begin(), words.end(), target) != words.end();
     if (field_->rule == Rule::word && !listed)
       throw Error(place_of(node) + ": " + label_ + field_->key + " = '" + target + "' is none of " + joined(words) +
-                  suggestion(target, words));
+                  suggestion_or_list(target, words));
     if (field_->rule == Rule::word_or_file && !listed)
     {
       const auto file = absolute(target);

@@ -24,9 +24,8 @@ const std::vector<Face>& faces_under(const Mesh& mesh, const Pressure& pressure)
   if (const auto surface = mesh.surfaces.find(pressure.on); surface != mesh.surfaces.end()) return surface->second;
   std::vector<std::string> known;
   for (const auto& [name, faces] : mesh.surfaces) known.push_back(name);
-  const std::string nearest = nearest_word(pressure.on, known);
   throw Error("pressure on \"" + pressure.on + "\": the mesh has no such surface of a solid" +
-              (nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?"));
+              suggestion(pressure.on, known));
 }
 
 void add_pressure(Vec load, const DofMap& dofs, const Mesh& mesh, const Face& face, double pressure)

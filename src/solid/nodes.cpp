@@ -18,9 +18,7 @@ template <class Map> void add_names(const Map& map, std::vector<std::string>& na
 [[noreturn]] void refuse(const std::string& asker, const std::string& name, const std::string& kind,
                          const std::vector<std::string>& known)
 {
-  const std::string nearest = nearest_word(name, known);
-  throw Error(asker + ": there is no " + kind + " \"" + name + "\"" +
-              (nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?"));
+  throw Error(asker + ": there is no " + kind + " \"" + name + "\"" + suggestion(name, known));
 }
 
 } // namespace

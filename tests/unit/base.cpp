@@ -28,3 +28,41 @@ TEST_CASE("the nearest word is the misspelt one, and a far word has none")
   CHECK(nearest_word("fricton", known) == "friction");
   CHECK(nearest_word("zzzzzzzzzz", known).empty());
 }
+
+TEST_CASE("what is set whole comes back whole, and the rows visited are those that were put in")
+{
+  const PetscInt size = 7;
+  Owned<Mat> A;
+  check(MatCreateAIJ(PETSC_COMM_WORLD, PETSC_DECIDE, PETSC_DECIDE, size, size, 2, nullptr, 2, nullptr, A.put()));
+  Owned<Vec> x;
+  check(MatCreateVecs(A, x.put(), nullptr));
+  std::vector<double> entries;
+  for (int i = 0; i < size; ++i) entries.push_back(i * i - 3);
+  set_whole(x, entries);
+  CHECK(whole(x) == entries);
+  CHECK(shares_of(x).total() == size);
+  CHECK(shares_of(A).counts == shares_of(x).counts);
+
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(A, &first, &last));
+  for (PetscInt i = first; i < last; ++i)
+    for (const PetscInt j : {i, (i + 3) % size}) check(MatSetValue(A, i, j, 10. * i + j, INSERT_VALUES));
+  check(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  PetscInt rows = 0;
+  for_each_row(A,
+               [&](PetscInt i, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
+               {
+                 CHECK(i == first + rows++);
+                 CHECK(columns.size() == 2);
+                 for (std::size_t k = 0; k < columns.size(); ++k) CHECK(values[k] == 10. * i + columns[k]);
+               });
+  CHECK(rows == last - first);
+  CHECK(comm_of(A) == comm_of(x));
+}
+
+TEST_CASE("a message is as long as it must be")
+{
+  CHECK(format("%s at %.4g", "load", 1234.56) == "load at 1235");
+  CHECK(format("%s", std::string(2000, 'x').c_str()).size() == 2000);
+}

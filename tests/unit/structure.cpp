@@ -307,7 +307,7 @@ TEST_CASE("contradictions name the node and both sides")
   SUBCASE("names that are not there")
   {
     scene.supports = {{"blok:x-", all}};
-    says(scene, "no point, rigid body or mesh group \"blok:x-\"; did you mean \"block:x-\"?");
+    says(scene, "no point, rigid body or mesh group \"blok:x-\"; did you mean 'block:x-'?");
     scene.supports.clear();
     scene.pressures = {{"block:w+", 1}};
     says(scene, "the mesh has no such surface");

@@ -34,6 +34,9 @@ struct ThetaStep
   double factor_seconds = 0, condensed_seconds = 0; // to factor A with the corner that W is, to prepare W
 };
 
+/// A
+Owned<Mat> step_matrix(const Structure& structure, double h, double theta);
+
 /// Options, prefix -transient_: contact_law (displacement | velocity), contact_solver (gauss_seidel | fixed_point),
 /// contact_tolerance, contact_max_it, contact_rho, contact_extrapolation. Error: h not above 0, theta not in (0, 1].
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta);

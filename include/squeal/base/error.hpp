@@ -61,10 +61,13 @@ template <class Work> void on_rank_zero(MPI_Comm comm, Work work)
                 });
 }
 
+/// printf into text, for messages and tables.
+[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
+
 /// Number of single-character insertions, deletions and substitutions that turn `a` into `b` (Levenshtein 1966).
 int edit_distance(const std::string& a, const std::string& b);
 
-/// Of `known`, the word with the smallest edit distance to `word`, for "did you mean" messages; empty if none is near.
+/// Of `known`, the word with the smallest edit distance to `word`; empty if none is near.
 template <class Words> std::string nearest_word(const std::string& word, const Words& known)
 {
   std::string best;
@@ -79,6 +82,13 @@ template <class Words> std::string nearest_word(const std::string& word, const W
     }
   }
   return best;
+}
+
+/// "; did you mean 'best'?", or nothing.
+template <class Words> std::string suggestion(const std::string& word, const Words& known)
+{
+  const std::string best = nearest_word(word, known);
+  return best.empty() ? "" : "; did you mean '" + best + "'?";
 }
 
 } // namespace squeal

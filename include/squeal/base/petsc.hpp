@@ -144,6 +144,9 @@ template <class Visit> void for_each_row(Mat A, Visit visit)
   }
 }
 
+/// Largest resident size so far, the ranks' added up [bytes]. Collective.
+double peak_memory(MPI_Comm comm);
+
 /// Registers (once) and enters a -log_view stage for as long as it lives.
 class LogStage
 {

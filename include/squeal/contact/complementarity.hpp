@@ -55,7 +55,7 @@ struct ProjectionSolution
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
                                        int max_iterations);
 
-/// Largest eigenvalue of a square matrix with non-negative spectrum, by power iteration [a lower bound].
-double largest_eigenvalue(const std::vector<double>& matrix, std::size_t n);
+/// Largest eigenvalue of a positive semi-definite matrix, by power iteration: a lower bound.
+double largest_eigenvalue(const std::vector<double>& matrix, std::size_t n, int iterations);
 
 } // namespace squeal

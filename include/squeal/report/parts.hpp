@@ -53,9 +53,6 @@ struct Verdicts
 
 Verdicts verdicts_of(const Report& report);
 
-/// printf into text.
-[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
-
 /// A stage that was off or skipped has nothing but its reason.
 bool ran(const Outcome& outcome);
 

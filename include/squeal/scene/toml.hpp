@@ -17,7 +17,7 @@ std::string kind_of(const toml::node& node);
 std::string text_of(const toml::node& node);
 
 /// "; did you mean 'x'?", or all that is known when nothing is near.
-std::string suggestion(const std::string& word, const std::vector<std::string>& known);
+std::string suggestion_or_list(const std::string& word, const std::vector<std::string>& known);
 
 std::string joined(const std::vector<std::string>& words);
 
