@@ -51,13 +51,12 @@ std::span<const ComplexMode> growing_modes(const Report& report)
   return std::span(report.modes.modes).first(static_cast<std::size_t>(std::max(report.modes.unstable_count, 1)));
 }
 
-State transient_start(const Scene& scene, const Model& model, const Report& report)
+State transient_start(const TransientSettings& settings, const ComplexMode& mode, const Model& model,
+                      const Report& report)
 {
-  const TransientSettings& settings = scene.transient;
   if (settings.start == "estimate")
   {
-    State start = mode_state(report.equilibrium, report.modes.modes.front(), start_amplitude(report.estimate),
-                             report.estimate.phase);
+    State start = mode_state(report.equilibrium, mode, start_amplitude(report.estimate), report.estimate.phase);
     for (const State& other :
          estimated_motions(model.structure, model.interface, report.equilibrium, growing_modes(report).subspan(1)))
     {
@@ -69,7 +68,7 @@ State transient_start(const Scene& scene, const Model& model, const Report& repo
   if (settings.start == "mode")
   {
     const double amplitude = settings.amplitude > 0 ? settings.amplitude : 0.1 * report.estimate.lift_off_amplitude;
-    return mode_state(report.equilibrium, report.modes.modes.front(), amplitude, report.estimate.phase);
+    return mode_state(report.equilibrium, mode, amplitude, report.estimate.phase);
   }
   return read_state(settings.start, model.structure);
 }
@@ -108,10 +107,18 @@ Trajectory run_transient(const Scene& scene, const Model& model, const Report& r
     trajectory.outcome = not_run("off", "the scene has no [transient]");
   else if (report.equilibrium.outcome.word != "converged" || (!reason.empty() && !from_file))
     trajectory.outcome = not_run("skipped", reason);
+  else if (!reason.empty())
+    return integrate(model.structure, model.interface, report.equilibrium, nullptr, scene.transient,
+                     read_state(scene.transient.start, model.structure), model.probes);
   else
-    return integrate(model.structure, model.interface, report.equilibrium,
-                     reason.empty() ? &report.modes.modes.front() : nullptr, scene.transient,
-                     transient_start(scene, model, report), model.probes);
+  {
+    const ComplexMode& mode = report.modes.modes.front();
+    const TransientSettings settings = planned(scene.transient, mode);
+    const ComplexMode seen = mode_seen_by_step(model.structure, model.interface, report.equilibrium, report.modes.modes,
+                                               settings.theta, settings.step_size);
+    return integrate(model.structure, model.interface, report.equilibrium, &seen, settings,
+                     transient_start(settings, seen, model, report), model.probes);
+  }
   return trajectory;
 }
 

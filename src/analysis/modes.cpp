@@ -181,6 +181,18 @@ CountedSolution solve_full(const SlidingProblem& problem, const RealSpectrum& sp
   return result;
 }
 
+// Of the first mode, by frequency; it is one of them.
+std::vector<const ComplexMode*> nearest(const std::vector<ComplexMode>& modes, std::size_t count)
+{
+  std::vector<const ComplexMode*> sorted;
+  for (const ComplexMode& mode : modes) sorted.push_back(&mode);
+  const auto distance = [&](const ComplexMode* mode) { return std::abs(mode->lambda - modes.front().lambda); };
+  std::sort(sorted.begin(), sorted.end(),
+            [&](const ComplexMode* a, const ComplexMode* b) { return distance(a) < distance(b); });
+  sorted.resize(std::min(count, sorted.size()));
+  return sorted;
+}
+
 // As many real modes as the scene says, or those of the spectrum, at least twenty.
 QuadraticSolution solve_by_projection(const SlidingProblem& problem, const RealSpectrum& spectrum,
                                       const ModesSettings& settings, const ModesOptions& options)
@@ -260,6 +272,29 @@ double ComplexMode::frequency_hz() const
 double ComplexMode::damping_ratio() const
 {
   return -lambda.real() / std::abs(lambda);
+}
+
+ComplexMode mode_seen_by_step(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                              const std::vector<ComplexMode>& modes, double theta, double h)
+{
+  const ComplexMode& mode = modes.front();
+  ComplexMode seen{mode.lambda, copy_of(mode.real.get()), copy_of(mode.imaginary.get()), mode.reactions,
+                   mode.backward_error};
+  Owned<Mat> Cf;
+  if (interface.direction_damping) Cf = direction_damping(interface, equilibrium);
+  if (!Cf.get() || theta == 1) return seen;
+  SlidingProblem problem = make_problem(structure, interface, equilibrium);
+  const Owned<Mat> added = project(Cf, problem.contact.Y, problem.contact.Z);
+  check(MatAXPY(problem.reduced.M, h * (1 - theta), added, UNKNOWN_NONZERO_PATTERN));
+  Block start = empty_block(problem.reduced.K);
+  for (const ComplexMode* near : nearest(modes, 20))
+    for (const Vec part : {near->real.get(), near->imaginary.get()}) append(start, remaining(problem.contact, part));
+  const Eigenpair pair = solve_near(problem.reduced, mode.lambda, std::move(start));
+  if (!std::isfinite(pair.backward_error)) return seen;
+  seen.lambda = pair.lambda;
+  seen.backward_error = pair.backward_error;
+  set_shape(seen, problem.contact, pair);
+  return seen;
 }
 
 Modes find_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,

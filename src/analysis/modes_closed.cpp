@@ -236,6 +236,7 @@ ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface
   result.Z = assemble_basis(elimination, &Coefficients::normal, structure.K);
   result.Y = assemble_basis(elimination, &Coefficients::sliding, structure.K);
   result.reaction = assemble_reaction(rows, pivots, result.pairs, interface);
+  result.pivots = std::move(elimination.pivots);
   return result;
 }
 
@@ -253,6 +254,24 @@ Owned<Mat> project(Mat A, Mat Y, Mat Z)
   check(MatMatMult(A, Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, AZ.put()));
   check(MatTransposeMatMult(Y, AZ, MAT_INITIAL_MATRIX, PETSC_DEFAULT, result.put()));
   return result;
+}
+
+Owned<Vec> remaining(const ClosedContact& contact, Vec du)
+{
+  Owned<Vec> y;
+  check(MatCreateVecs(contact.Z, y.put(), nullptr));
+  PetscInt first = 0, last = 0;
+  check(VecGetOwnershipRange(du, &first, &last));
+  const PetscScalar* from = nullptr;
+  PetscScalar* to = nullptr;
+  check(VecGetArrayRead(du, &from));
+  check(VecGetArrayWrite(y, &to));
+  PetscScalar* next = to;
+  for (PetscInt dof = first; dof < last; ++dof)
+    if (!std::binary_search(contact.pivots.begin(), contact.pivots.end(), dof)) *next++ = from[dof - first];
+  check(VecRestoreArrayWrite(y, &to));
+  check(VecRestoreArrayRead(du, &from));
+  return y;
 }
 
 Owned<Mat> direction_damping(const Interface& interface, const Equilibrium& equilibrium)

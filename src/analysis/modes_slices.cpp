@@ -236,4 +236,26 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, const std::vect
   return result;
 }
 
+Eigenpair solve_near(const QuadraticProblem& problem, std::complex<double> lambda, Block start)
+{
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::general);
+  move_to(pencil, std::norm(lambda));
+  SliceSpace space{empty_block(problem.K), empty_block(problem.K), empty_block(problem.K), {}, {}};
+  Eigenpair best;
+  best.backward_error = INFINITY;
+  for (int pass = 0; pass < passes && extend(space, problem, pencil, std::move(start)); ++pass)
+  {
+    std::vector<DenseEigenpair> found = solve_on(space, pencil.shift, {0, INFINITY});
+    const auto nearest = std::min_element(found.begin(), found.end(),
+                                          [&](const DenseEigenpair& a, const DenseEigenpair& b)
+                                          { return std::abs(a.lambda - lambda) < std::abs(b.lambda - lambda); });
+    if (nearest == found.end()) break;
+    found = {*nearest};
+    std::vector<Eigenpair> pairs = eigenpairs(problem, space.V, found);
+    start = corrections(space, pencil.shift, 1, found, pairs);
+    best = std::move(pairs.front());
+  }
+  return best;
+}
+
 } // namespace squeal

@@ -86,23 +86,26 @@ bool slides_as_at_equilibrium(const Interface& interface, const Equilibrium& equ
   return true;
 }
 
-/// Step size and number of steps; refuses where the rule does.
-long plan(Trajectory& trajectory, const Structure& structure, const ComplexMode* mode,
-          const TransientSettings& settings)
+bool counts_steps(const TransientSettings& settings)
 {
-  const bool explicit_steps = settings.steps > 0 && settings.step_size > 0;
-  if (!mode && !explicit_steps)
+  return settings.steps > 0 && settings.step_size > 0;
+}
+
+/// Step size and number of steps; refuses where the rule does.
+long plan(Trajectory& trajectory, const Structure& structure, const ComplexMode* mode, TransientSettings settings)
+{
+  if (mode) settings = planned(settings, *mode);
+  if (!counts_steps(settings))
     throw Error("transient.periods counts periods of a mode, and there is none to follow: give transient.steps and "
                 "transient.step_size");
   trajectory.theta = settings.theta;
-  trajectory.step_size =
-      explicit_steps ? settings.step_size : two_pi / (std::abs(mode->lambda.imag()) * settings.steps_per_period);
-  trajectory.growth_rate_fit = trajectory.growth_rate_predicted = std::numeric_limits<double>::quiet_NaN();
-  if (mode)
-    trajectory.growth_rate_predicted = discrete_eigenvalue(mode->lambda, settings.theta, trajectory.step_size).real();
+  trajectory.step_size = settings.step_size;
+  trajectory.growth_rate_fit = std::numeric_limits<double>::quiet_NaN();
+  trajectory.predicted = mode ? discrete_eigenvalue(mode->lambda, settings.theta, settings.step_size)
+                              : std::complex<double>(std::numeric_limits<double>::quiet_NaN(), 0);
   trajectory.outcome.reason = step_refusal(structure, mode, settings.theta, trajectory.step_size);
   if (!trajectory.outcome.reason.empty()) trajectory.outcome.word = "refused";
-  return explicit_steps ? settings.steps : std::lround(settings.periods * settings.steps_per_period);
+  return settings.steps;
 }
 
 void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
@@ -165,6 +168,14 @@ MarchSummary march(const ThetaStep& step, const Structure& structure, const Inte
   return summary;
 }
 
+TransientSettings planned(TransientSettings settings, const ComplexMode& mode)
+{
+  if (counts_steps(settings)) return settings;
+  settings.step_size = two_pi / (std::abs(mode.lambda.imag()) * settings.steps_per_period);
+  settings.steps = std::lround(settings.periods * settings.steps_per_period);
+  return settings;
+}
+
 Trajectory integrate(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                      const ComplexMode* mode, const TransientSettings& settings, State start, Mat probes)
 {
@@ -199,8 +210,7 @@ Trajectory integrate(const Structure& structure, const Interface& interface, con
   if (mode)
   {
     trajectory.periods = static_cast<double>(summary.steps) * step.h * std::abs(mode->lambda.imag()) / two_pi;
-    const double omega = discrete_eigenvalue(mode->lambda, step.theta, step.h).imag();
-    trajectory.growth_rate_fit = growth_rate(amplitude, two_pi / std::abs(omega));
+    trajectory.growth_rate_fit = growth_rate(amplitude, two_pi / std::abs(trajectory.predicted.imag()));
   }
   conclude(trajectory, summary, steps);
   if (!settings.save_state.empty()) write_state(trajectory.end, structure, settings.save_state);

@@ -108,7 +108,7 @@ Json transient_entry(const Report& report)
   entry["step_size"] = transient.step_size;
   entry["periods"] = transient.periods;
   entry["growth_rate_fit"] = transient.growth_rate_fit;
-  entry["growth_rate_predicted"] = transient.growth_rate_predicted;
+  entry["growth_rate_predicted"] = transient.predicted.real();
   entry["growth_rate_bias"] = transient_bias(report).growth;
   entry["frequency_bias"] = transient_bias(report).frequency;
   entry["normal_force_chatter"] = chatter(transient.history);

@@ -76,7 +76,7 @@ Sentences of_transient(const Report& report)
   if (std::abs(bias) > .1)
     said.push_back(format("theta and the step change the growth rate by %+.0f %%: more steps a period, or theta = 1/2",
                           100 * bias));
-  const double fit = transient.growth_rate_fit, predicted = transient.growth_rate_predicted;
+  const double fit = transient.growth_rate_fit, predicted = transient.predicted.real();
   if (std::abs(fit - predicted) > .01 * std::abs(predicted))
     said.push_back("the fitted growth rate is not the predicted one: other motion than the mode is in the start");
   if (transient.law == ContactLaw::velocity)
@@ -107,24 +107,25 @@ Sentences of_cycle(const Report& report)
   return said;
 }
 
-StepBias bias_of(const Report& report, double theta, double h)
+StepBias bias_of(const Report& report, std::complex<double> discrete)
 {
-  if (report.modes.modes.empty() || !(h > 0)) return {};
+  if (report.modes.modes.empty()) return {};
   const std::complex<double> lambda = report.modes.modes.front().lambda;
-  if (lambda.imag() == 0) return {};
-  return {growth_bias(lambda, theta, h), discrete_eigenvalue(lambda, theta, h).imag() / lambda.imag() - 1};
+  return {discrete.real() / lambda.real() - 1, discrete.imag() / lambda.imag() - 1};
 }
 
 } // namespace
 
 StepBias transient_bias(const Report& report)
 {
-  return bias_of(report, report.transient.theta, report.transient.step_size);
+  return bias_of(report, report.transient.predicted);
 }
 
 StepBias cycle_bias(const Report& report)
 {
-  return bias_of(report, report.cycle.theta, report.cycle.period / std::max(report.cycle.steps_per_period, 1));
+  if (report.modes.modes.empty() || !(report.cycle.period > 0)) return {};
+  const double h = report.cycle.period / report.cycle.steps_per_period;
+  return bias_of(report, discrete_eigenvalue(report.modes.modes.front().lambda, report.cycle.theta, h));
 }
 
 double chatter(const History& history)

@@ -36,11 +36,12 @@ def test_brake_eigenvalues(brakes):
 
 
 def test_brake_transient(brakes):
-    """Growth fitted over two periods of exact contact: 1e-6, the contact tolerance seen through the fit."""
+    """Growth fitted over two periods of exact contact is the discrete mode's, friction's direction at the end of each
+    step included (0.4 % of it): 1e-6, the contact tolerance seen through the fit."""
     for run in brakes:
         transient = run["transient"]
         assert transient["energy_defect_max"] < 1e-10
-        assert transient["growth_rate_fit"] == pytest.approx(transient["growth_rate_predicted"], rel=1e-3)
+        assert transient["growth_rate_fit"] == pytest.approx(transient["growth_rate_predicted"], rel=1e-6)
         assert transient["growth_rate_fit"] == pytest.approx(brakes[0]["transient"]["growth_rate_fit"], rel=1e-6)
 
 

@@ -7,6 +7,7 @@
 /// damped pairs until each has its backward error in the full problem.
 /// Caveat: damping strong enough to move pairs across slices, or to stop their oscillation, shows in the count; TOAR
 /// (quadratic.hpp) knows no slices.
+#include "squeal/analysis/block.hpp"
 #include "squeal/analysis/quadratic.hpp"
 
 namespace squeal
@@ -32,5 +33,8 @@ struct CountedSolution
 /// mode more or less lies below the edge, the edge moves on between band and reach.
 CountedSolution solve_by_slices(const QuadraticProblem& problem, const std::vector<double>& omega, double band,
                                 double reach);
+
+/// The pair nearest lambda, from a space that nearly holds it; its backward error says how near 1e-13 it came.
+Eigenpair solve_near(const QuadraticProblem& problem, std::complex<double> lambda, Block start);
 
 } // namespace squeal

@@ -120,14 +120,17 @@ struct Trajectory
   ContactLaw law = ContactLaw::displacement;
   double theta = 0, step_size = 0, periods = 0;
   long steps = 0;
-  double growth_rate_fit = 0;       // [1/s] of the followed mode's amplitude before the first event; NaN: too short
-  double growth_rate_predicted = 0; // [1/s] discrete, of the followed mode
-  double energy_defect_max = 0;     // of the energy, largest over the steps
+  double growth_rate_fit = 0;     // [1/s] of the followed mode's amplitude before the first event; NaN: too short
+  std::complex<double> predicted; // [1/s] discrete eigenvalue of the followed mode; NaN: none is followed
+  double energy_defect_max = 0;   // of the energy, largest over the steps
   double seconds_per_step = 0, contact_iterations_mean = 0;
   double factor_seconds = 0, condensed_seconds = 0; // of its ThetaStep
   State end;
   History history;
 };
+
+/// With the steps and the step size that the periods of the mode mean, if they are not given.
+TransientSettings planned(TransientSettings settings, const ComplexMode& mode);
 
 /// Integrates from `start`; `mode` is the followed mode (null: no growth is fitted, and the settings must give steps
 /// and step_size).
