@@ -99,8 +99,8 @@ std::string transient_text(const Report& report)
                          transient.periods, transient.theta));
   const std::string fit = std::isfinite(transient.growth_rate_fit) ? format("%.6g 1/s", transient.growth_rate_fit)
                                                                    : std::string("too short to fit");
-  text += row("", "growth rate before first lift-off: " + fit +
-                      format(", predicted %.6g 1/s", transient.predicted.real()));
+  text +=
+      row("", "growth rate before first lift-off: " + fit + format(", predicted %.6g 1/s", transient.predicted.real()));
   const StepBias bias = transient_bias(report);
   if (std::isfinite(bias.growth))
     text += row("", format("the step's own error: growth rate %+.1e, frequency %+.1e", bias.growth, bias.frequency));
