@@ -30,7 +30,7 @@ constexpr std::array options = {
     Option{"-transient_contact_rho", "0", "of the fixed point, over 1/lambda_max(W); 0: chosen"},
     Option{"-transient_contact_extrapolation", "2", "highest order in time of the warm start; the best one is taken"},
     Option{"-transient_refuse", "true", "false: march even where theta and the step make growth rates lie"},
-    Option{"-modes_dense_limit", "200", "eigenproblems up to this size are solved whole by LAPACK"},
+    Option{"-modes_dense_limit", "400", "eigenproblems up to this size are solved whole by LAPACK"},
     Option{"-modes_solver", "slices", "of large problems: slices of frequency, or TOAR around zero (toar)"},
     Option{"-modes_candidates", "20", "pairs that each residual pass of the projection corrects"},
     Option{"-estimate_lift_off_multiple", "2", "of first lift-off: where vibrations start without an energy balance"},

@@ -21,9 +21,9 @@ template <class Work> auto timed(Report& report, const char* name, MPI_Comm comm
 {
   const LogStage log(name);
   if (rank_of(comm) == 0) std::printf("%s …\n", name), std::fflush(stdout);
-  const double start = MPI_Wtime();
+  const double start = MPI_Wtime(), processor_start = processor_time();
   auto result = work();
-  report.timings.emplace_back(name, MPI_Wtime() - start);
+  report.timings.push_back({name, MPI_Wtime() - start, processor_time() - processor_start});
   return result;
 }
 

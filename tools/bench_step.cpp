@@ -1,13 +1,14 @@
 /// Times the theta-step of a matrix folder, for tools/bench: one line of JSON on standard output.
 ///     bench_step FOLDER STATE h mu steps trajectories [dump]
+///     bench_step factors FOLDER h            the same matrix factored dense and sparse
 /// Trajectory k starts from STATE with its velocity scaled by 1 + k/1000. `dump`: the first trajectory's u and v after
-/// every step, raw doubles. Contact options as in squeal (-transient_…).
+/// every step, raw doubles. Seconds are the processor's, of this rank, waiting included. Contact options as in squeal
+/// (-transient_…).
 #include "squeal/analysis/transient.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <ctime>
 #include <fstream>
 
 using namespace squeal;
@@ -22,22 +23,14 @@ double median(std::vector<double> values)
   return values[values.size() / 2];
 }
 
-/// Processor time, which a busy machine does not stretch; of this rank, waiting included.
-double now()
-{
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 template <class Work> double seconds(int times, Work work)
 {
   std::vector<double> all;
   for (int i = 0; i < times; ++i)
   {
-    const double start = now();
+    const double start = processor_time();
     work();
-    all.push_back(now() - start);
+    all.push_back(processor_time() - start);
   }
   return median(all);
 }
@@ -87,8 +80,38 @@ double plain_factor_entries(const Structure& structure, double h)
   return Factor(step_matrix(structure, h, .5), nullptr, Factor::Kind::sparse).entries();
 }
 
+/// Seconds to factor A bordered by B with its condensed corner, and of one solve in two halves.
+std::pair<double, double> factor_times(Mat A, Mat B, Factor::Kind kind, Vec b, Vec x)
+{
+  Factor factor;
+  const double factoring = seconds(5,
+                                   [&]
+                                   {
+                                     factor = Factor(A, B, kind);
+                                     (void)factor.condensed(1);
+                                   });
+  if (factor.failed()) throw Error("the matrix to be factored is not positive definite");
+  return {factoring, seconds(41, [&] { solve(factor, b, x); })};
+}
+
+void compare_factors(const std::filesystem::path& folder, double h)
+{
+  const Structure structure = read_structure(folder, PETSC_COMM_WORLD);
+  const Interface interface = read_interface(folder, structure, {0, true}, PETSC_COMM_WORLD);
+  const Owned<Mat> A = step_matrix(structure, h, .5);
+  const auto x = zeros_like(structure.load);
+  const auto [dense, dense_solve] = factor_times(A, interface.B, Factor::Kind::dense, structure.load, x);
+  const auto [sparse, sparse_solve] = factor_times(A, interface.B, Factor::Kind::sparse, structure.load, x);
+  MatInfo info;
+  check(MatGetInfo(A, MAT_GLOBAL_SUM, &info));
+  std::printf("{\"entries\": %.0f, \"dense\": %.4g, \"dense_solve\": %.4g, \"sparse\": %.4g, \"sparse_solve\": "
+              "%.4g}\n",
+              info.nz_used, dense, dense_solve, sparse, sparse_solve);
+}
+
 void run(const std::vector<std::string>& words)
 {
+  if (words.at(0) == "factors") return compare_factors(words.at(1), std::stod(words.at(2)));
   const std::filesystem::path folder = words.at(0);
   const double h = std::stod(words.at(2)), mu = std::stod(words.at(3));
   const int steps = std::stoi(words.at(4)), count = std::stoi(words.at(5));
@@ -97,9 +120,9 @@ void run(const std::vector<std::string>& words)
   const Structure structure = read_structure(folder, comm);
   const Interface interface = read_interface(folder, structure, {mu, true}, comm);
   const State start = read_state(words.at(1), structure);
-  const double begin = now();
+  const double begin = processor_time();
   const ThetaStep step = make_theta_step(structure, interface, h, .5);
-  const double prepared = now() - begin;
+  const double prepared = processor_time() - begin;
 
   std::vector<State> states;
   std::vector<StepWork> works;
@@ -116,9 +139,9 @@ void run(const std::vector<std::string>& words)
   double iterations = 0, residual = 0, defect = 0;
   for (int i = 0; i < steps; ++i)
   {
-    const double before = now();
+    const double before = processor_time();
     const std::vector<StepReport> reports = advance(step, structure, interface, works, states);
-    taken.push_back(now() - before);
+    taken.push_back(processor_time() - before);
     for (const StepReport& report : reports)
     {
       iterations += report.contact_iterations;

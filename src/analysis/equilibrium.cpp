@@ -78,27 +78,34 @@ Held hold(const Structure& structure, const Interface& interface)
 {
   // Springs this soft beside the rest lose the digits of the reactions, which contact would hold.
   constexpr double soft = 1e-10;
-  auto [factor, loose, resistance] = factor_positive(structure.K, interface);
-  if (interface.pairs > 0 && (loose || resistance < soft))
+  Factored first = factor_positive(structure.K, interface);
+  Held held;
+  if (interface.pairs > 0 && (first.loose || first.resistance < soft))
   {
-    Held held;
+    first.factor = Factor(); // two of them side by side would be the most that a run ever holds
     held.kappa = typical_stiffness(structure.K);
     check(MatDuplicate(structure.K, MAT_COPY_VALUES, held.augmented.put()));
     check(MatAXPY(held.augmented, held.kappa, normal_springs(interface), DIFFERENT_NONZERO_PATTERN));
     check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
-    auto second = factor_positive(held.augmented, interface);
-    if (!second.loose && second.resistance > 10 * resistance)
+    Factored second = factor_positive(held.augmented, interface);
+    if (!second.loose && second.resistance > 10 * first.resistance)
     {
       held.factor = std::move(second.factor);
       return held;
     }
-    if (loose) loose = second.loose;
+    held = {};
+    if (first.loose)
+      first.loose = second.loose;
+    else
+    {
+      second.factor = Factor();
+      first = factor_positive(structure.K, interface);
+    }
   }
-  if (loose)
+  if (first.loose)
     throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
-                describe(structure.names, *loose) + "; give it a support or a spring");
-  Held held;
-  held.factor = std::move(factor);
+                describe(structure.names, *first.loose) + "; give it a support or a spring");
+  held.factor = std::move(first.factor);
   return held;
 }
 

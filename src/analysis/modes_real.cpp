@@ -329,7 +329,7 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit)
 
 int dense_limit_option()
 {
-  PetscInt limit = 200;
+  PetscInt limit = 400;
   check(PetscOptionsGetInt(nullptr, "modes_", "-dense_limit", &limit, nullptr));
   return static_cast<int>(limit);
 }

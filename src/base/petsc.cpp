@@ -1,6 +1,7 @@
 #include "squeal/base/petsc.hpp"
 
 #include <algorithm>
+#include <ctime>
 #include <fstream>
 #include <string>
 #include <sys/resource.h>
@@ -114,6 +115,13 @@ Shares shares_of(Mat A)
   const PetscInt* ranges = nullptr;
   check(MatGetOwnershipRanges(A, &ranges));
   return shares_of(ranges, comm_of(A));
+}
+
+double processor_time()
+{
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 double peak_memory(MPI_Comm comm)

@@ -48,9 +48,11 @@ struct Factor::Parts
 namespace
 {
 
-/// Below this size dense algebra is quicker than MUMPS whatever the sparsity, and above it for a matrix this full.
-constexpr int dense_size = 250;
-constexpr double dense_fill = 0.2;
+/// Below this size dense algebra is quicker than MUMPS whatever the sparsity, and above it for a matrix this full:
+/// tools/bench factors. A solve breaks even at 500 to 800, since MUMPS asks .1 ms for each; factoring at 400 on elastic
+/// columns (17 % full at 300, 6 % at 1000), at 2 % on random patterns.
+constexpr int dense_size = 500;
+constexpr double dense_fill = 0.1;
 
 enum Job
 {
@@ -128,9 +130,8 @@ std::unique_ptr<DMUMPS_STRUC_C> start_mumps(MPI_Comm comm)
   return mumps;
 }
 
-/// False if a pivot was zero or negative. `schur`: room for the corner, on rank 0.
-bool factorise_by_mumps(DMUMPS_STRUC_C& mumps, Triplets& mine, int dofs, int border, std::vector<double>& schur,
-                        MPI_Comm comm)
+/// Orders the elimination and foresees what it takes.
+void analyse_by_mumps(DMUMPS_STRUC_C& mumps, Triplets& mine, int dofs, int border, MPI_Comm comm)
 {
   std::vector<MUMPS_INT> order, kept;
   Triplets pattern = gathered(mine, Triplets::Part::pattern, comm);
@@ -148,19 +149,49 @@ bool factorise_by_mumps(DMUMPS_STRUC_C& mumps, Triplets& mine, int dofs, int bor
     control(mumps, 19) = 1; // the corner whole on rank 0, by rows, of which the lower triangle is valid
     mumps.size_schur = border;
     mumps.listvar_schur = kept.data();
-    mumps.schur = schur.data();
   }
   run(mumps, Job::analyse);
   if (mumps.infog[0] < 0) give_up(mumps, "analysis");
+  mumps.perm_in = mumps.listvar_schur = nullptr;
+}
+
+/// False if a pivot was zero or negative. `schur`: room for the corner, on rank 0.
+bool factorise_by_mumps(DMUMPS_STRUC_C& mumps, std::vector<double>& schur)
+{
+  mumps.schur = schur.data();
   do // its guess of the room it needs can fall short
   {
     run(mumps, Job::factorise);
     control(mumps, 14) = 4 * control(mumps, 14) + 10;
   } while ((mumps.infog[0] == -8 || mumps.infog[0] == -9) && control(mumps, 14) < 2000);
-  mumps.irn_loc = mumps.jcn_loc = mumps.perm_in = mumps.listvar_schur = nullptr;
+  mumps.irn_loc = mumps.jcn_loc = nullptr;
   mumps.a_loc = nullptr;
   if (mumps.infog[0] < 0 && mumps.infog[0] != -10) give_up(mumps, "factorisation");
   return mumps.infog[0] == 0 && mumps.infog[11] == 0;
+}
+
+/// B may be null.
+int rows_of(Mat B)
+{
+  PetscInt rows = 0;
+  if (B) check(MatGetSize(B, &rows, nullptr));
+  return static_cast<int>(rows);
+}
+
+/// This rank's share of the lower triangle of A and of B below it.
+Triplets bordered(Mat A, Mat B)
+{
+  Triplets mine = lower_triangle(A);
+  if (B) append_rows(B, rows_of(A), mine);
+  return mine;
+}
+
+Factor::Kind chosen(Factor::Kind kind, Mat A, const Triplets& mine)
+{
+  if (kind != Factor::Kind::automatic) return kind;
+  double entries = static_cast<double>(mine.row.size()), size = rows_of(A);
+  MPI_Allreduce(MPI_IN_PLACE, &entries, 1, MPI_DOUBLE, MPI_SUM, comm_of(A));
+  return size <= dense_size || 2 * entries > dense_fill * size * size ? Factor::Kind::dense : Factor::Kind::sparse;
 }
 
 std::size_t area(int rows, int columns)
@@ -246,23 +277,15 @@ Factor::Factor(Mat A, Mat B, Kind kind) : parts_(std::make_unique<Parts>())
   parts.comm = comm_of(A);
   parts.shares = shares_of(A);
   parts.dofs = parts.shares.total();
-  PetscInt rows = 0;
-  if (B) check(MatGetSize(B, &rows, nullptr));
-  parts.border = static_cast<int>(rows);
-  Triplets mine = lower_triangle(A);
-  if (B) append_rows(B, parts.dofs, mine);
-  if (kind == Kind::automatic)
-  {
-    double entries = static_cast<double>(mine.row.size()), size = parts.dofs;
-    MPI_Allreduce(MPI_IN_PLACE, &entries, 1, MPI_DOUBLE, MPI_SUM, parts.comm);
-    kind = size <= dense_size || 2 * entries > dense_fill * size * size ? Kind::dense : Kind::sparse;
-  }
+  parts.border = rows_of(B);
+  Triplets mine = bordered(A, B);
   int good = 1;
-  if (kind == Kind::sparse)
+  if (chosen(kind, A, mine) == Kind::sparse)
   {
     parts.mumps = start_mumps(parts.comm);
+    analyse_by_mumps(*parts.mumps, mine, parts.dofs, parts.border, parts.comm);
     if (parts.here()) parts.corner.resize(area(parts.border, parts.border));
-    good = factorise_by_mumps(*parts.mumps, mine, parts.dofs, parts.border, parts.corner, parts.comm);
+    good = factorise_by_mumps(*parts.mumps, parts.corner);
   }
   else
   {
@@ -345,6 +368,19 @@ double Factor::entries() const
   if (!mumps) return .5 * static_cast<double>(parts_->dofs) * parts_->dofs;
   const int told = mumps->infog[28]; // negative: in millions
   return told < 0 ? -1e6 * told : told;
+}
+
+double factor_memory(Mat A, Mat B)
+{
+  const int dofs = rows_of(A), border = rows_of(B);
+  Triplets mine = bordered(A, B);
+  if (chosen(Factor::Kind::automatic, A, mine) == Factor::Kind::dense)
+    return 8 * static_cast<double>(area(dofs, dofs + border));
+  const auto mumps = start_mumps(comm_of(A));
+  analyse_by_mumps(*mumps, mine, dofs, border, comm_of(A));
+  const double megabytes = mumps->infog[16];
+  run(*mumps, Job::end);
+  return 1e6 * megabytes;
 }
 
 void solve(const Factor& factor, Vec b, Vec x)

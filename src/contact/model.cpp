@@ -1,5 +1,7 @@
 #include "squeal/contact/model.hpp"
 
+#include "squeal/contact/factor.hpp"
+
 namespace squeal
 {
 
@@ -43,16 +45,9 @@ MemoryForecast forecast_memory(const Model& model)
   {
     MatInfo info;
     check(MatGetInfo(matrix, MAT_GLOBAL_SUM, &info));
-    forecast.matrices += info.memory;
+    forecast.matrices += info.nz_used * (sizeof(PetscScalar) + sizeof(PetscInt)); // info.memory is 0 in most builds
   }
-  Owned<Mat> factor;
-  check(MatGetFactor(structure.K, MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, factor.put()));
-  MatFactorInfo settings;
-  check(MatFactorInfoInitialize(&settings));
-  check(MatCholeskyFactorSymbolic(factor, structure.K, nullptr, &settings));
-  PetscInt megabytes = 0; // over all ranks, as the symbolic phase foresees it
-  check(MatMumpsGetInfog(factor, 17, &megabytes));
-  forecast.factor = 1e6 * static_cast<double>(megabytes);
+  forecast.factor = factor_memory(structure.K, model.interface.pairs > 0 ? model.interface.B.get() : nullptr);
   const double contact_size = static_cast<double>(model.interface.size());
   forecast.condensed_operator = 8 * contact_size * contact_size;
   return forecast;

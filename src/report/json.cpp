@@ -257,9 +257,11 @@ std::string report_json(const Report& report, const Scene& scene)
   warn("estimate", verdicts.estimate);
   warn("transient", verdicts.transient);
   warn("cycle", verdicts.cycle);
-  Json timings = Json::object();
-  for (const auto& [stage, seconds] : report.timings) timings[stage] = seconds;
-  json["timings"] = timings;
+  for (const auto& [stage, seconds, processor_seconds] : report.timings)
+  {
+    json["timings"][stage] = seconds;
+    json["processor_seconds"][stage] = processor_seconds;
+  }
   Json libraries = Json::object();
   for (const auto& [name, version] : versions()) libraries[name] = version;
   json["versions"] = libraries;

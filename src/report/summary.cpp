@@ -158,7 +158,7 @@ std::string timings_text(const Report& report)
 {
   double total = 0;
   std::string text;
-  for (const auto& [stage, seconds] : report.timings)
+  for (const auto& [stage, seconds, processor_seconds] : report.timings)
   {
     text += row(text.empty() ? "time" : "", format("%10.2f s  %s", seconds, stage.c_str()));
     total += seconds;

@@ -151,7 +151,7 @@ Report full_report(const Model& model)
   report.cycle.peak_to_peak = {1e-6};
   report.cycle.statuses = {{ContactStatus::open, ContactStatus::slip}, {ContactStatus::stick, ContactStatus::slip}};
   for (int i = 0; i < 4; ++i) report.cycle.displacements.push_back(ramp(model, i));
-  report.timings = {{"modes", 1.5}};
+  report.timings = {{"modes", 1.5, 1.25}};
   return report;
 }
 
@@ -256,6 +256,7 @@ TEST_CASE("report.json has the documented keys; what is not a number is null; a 
   CHECK(json["transient"]["growth_rate_fit"].is_null());
   CHECK(json["cycle"]["peak_to_peak"]["tip/x"] == 1e-6);
   CHECK(json["timings"]["modes"] == 1.5);
+  CHECK(json["processor_seconds"]["modes"] == 1.25);
   const std::vector<std::pair<std::string, std::vector<std::string>>> documented = {
       {"model", {"dofs", "pairs", "elements", "ranks"}},
       {"equilibrium",

@@ -144,6 +144,9 @@ template <class Visit> void for_each_row(Mat A, Visit visit)
   }
 }
 
+/// Of this process so far [s].
+double processor_time();
+
 /// Largest resident size so far, the ranks' added up [bytes]. Collective.
 double peak_memory(MPI_Comm comm);
 

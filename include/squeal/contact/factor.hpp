@@ -54,6 +54,10 @@ private:
   std::unique_ptr<Parts> parts_;
 };
 
+/// What a Factor of A bordered by B (may be null) would hold at its largest, the ranks' added up, as the analysis
+/// foresees it; its condensed corner apart [bytes]. Collective.
+double factor_memory(Mat A, Mat B);
+
 /// x = A^-1 b.
 void solve(const Factor& factor, Vec b, Vec x);
 

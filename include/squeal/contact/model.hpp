@@ -17,7 +17,7 @@ struct Model
 /// Collective.
 Model build_model(const Scene& scene, MPI_Comm comm);
 
-/// What the run would hold in memory, from the symbolic factorisation of K and the size of W. [bytes], all ranks.
+/// What the run would hold in memory, from the analysis of K bordered by B and the size of W. [bytes], all ranks.
 struct MemoryForecast
 {
   double matrices = 0, factor = 0, condensed_operator = 0;

@@ -12,6 +12,13 @@
 namespace squeal
 {
 
+struct Timing
+{
+  std::string stage;
+  double seconds = 0;           // by the clock on the wall
+  double processor_seconds = 0; // of rank 0, its waiting for others included: a busy machine does not stretch it
+};
+
 /// All results of a run. A stage that did not run has outcome "off" (by the scene) or "skipped", with the reason.
 struct Report
 {
@@ -28,8 +35,8 @@ struct Report
   Estimate estimate;
   Trajectory transient;
   LimitCycle cycle;
-  Fidelity fidelity;                                   // of the cycle
-  std::vector<std::pair<std::string, double>> timings; // stage, wall seconds, in order
+  Fidelity fidelity;           // of the cycle
+  std::vector<Timing> timings; // in order
 };
 
 /// Rank 0 prints the table a person reads.
