@@ -1,6 +1,7 @@
 #include "squeal/analysis/modes.hpp"
 
 #include "squeal/analysis/closed_contact.hpp"
+#include "squeal/analysis/complex_shift.hpp"
 #include "squeal/analysis/projection.hpp"
 #include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/real_modes.hpp"
@@ -136,13 +137,7 @@ PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution
   constexpr std::ptrdiff_t gaps_tried = 8;
   const std::vector<double>& omega = spectrum.modes.omega;
   const double floor = std::sqrt(vibration_floor(norms_of(problem))), end = 2 * std::numbers::pi * band;
-  const auto count_at = [&](double edge)
-  {
-    const auto expected = std::count_if(omega.begin(), omega.end(), [&](double w) { return w >= floor && w < edge; });
-    const auto found = std::count_if(solution.pairs.begin(), solution.pairs.end(),
-                                     [&](const Eigenpair& pair) { return std::abs(pair.lambda) < edge; });
-    return PairCount{edge / (2 * std::numbers::pi), static_cast<int>(expected), static_cast<int>(found)};
-  };
+  const auto count_at = [&](double edge) { return count_pairs(solution, omega, floor, edge); };
   const PairCount whole = count_at(end);
   if (whole.expected == whole.found) return whole;
   const auto last = std::lower_bound(omega.begin(), omega.end(), end) - omega.begin();
@@ -164,7 +159,8 @@ CountedSolution solve_full(const SlidingProblem& problem, const RealSpectrum& sp
   CountedSolution result;
   if (n > limit && options.solver == "slices")
   {
-    result = solve_by_slices(problem.reduced, spectrum.modes.omega, settings.band, spectrum.reach);
+    result = solve_by_slices(problem.reduced, predicted_pairs(spectrum.modes, problem.reduced.C), settings.band,
+                             spectrum.reach);
     if (result.count.expected == result.count.found) return result;
     result.count = count_in_band(problem.reduced, result.solution, spectrum, settings.band);
     if (result.count.found >= result.count.expected) return result;
@@ -179,18 +175,6 @@ CountedSolution solve_full(const SlidingProblem& problem, const RealSpectrum& sp
   result.solution = solve_quadratic(problem.reduced, quadratic);
   result.count = count_in_band(problem.reduced, result.solution, spectrum, settings.band);
   return result;
-}
-
-// Of the first mode, by frequency; it is one of them.
-std::vector<const ComplexMode*> nearest(const std::vector<ComplexMode>& modes, std::size_t count)
-{
-  std::vector<const ComplexMode*> sorted;
-  for (const ComplexMode& mode : modes) sorted.push_back(&mode);
-  const auto distance = [&](const ComplexMode* mode) { return std::abs(mode->lambda - modes.front().lambda); };
-  std::sort(sorted.begin(), sorted.end(),
-            [&](const ComplexMode* a, const ComplexMode* b) { return distance(a) < distance(b); });
-  sorted.resize(std::min(count, sorted.size()));
-  return sorted;
 }
 
 // As many real modes as the scene says, or those of the spectrum, at least twenty.
@@ -286,10 +270,7 @@ ComplexMode mode_seen_by_step(const Structure& structure, const Interface& inter
   SlidingProblem problem = make_problem(structure, interface, equilibrium);
   const Owned<Mat> added = project(Cf, problem.contact.Y, problem.contact.Z);
   check(MatAXPY(problem.reduced.M, h * (1 - theta), added, UNKNOWN_NONZERO_PATTERN));
-  Block start = empty_block(problem.reduced.K);
-  for (const ComplexMode* near : nearest(modes, 20))
-    for (const Vec part : {near->real.get(), near->imaginary.get()}) append(start, remaining(problem.contact, part));
-  const Eigenpair pair = solve_near(problem.reduced, mode.lambda, std::move(start));
+  const Eigenpair pair = solve_near(problem.reduced, mode.lambda);
   if (!std::isfinite(pair.backward_error)) return seen;
   seen.lambda = pair.lambda;
   seen.backward_error = pair.backward_error;

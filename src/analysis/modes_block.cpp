@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <petscblaslapack.h>
 
 namespace squeal
@@ -78,6 +79,26 @@ Block empty_block(Mat A)
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRangeColumn(A, &first, &last));
   return {comm_of(A), last - first, 0, {}};
+}
+
+Block uneven_block(Mat A, PetscInt columns)
+{
+  Block X = empty_block(A);
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRangeColumn(A, &first, &last));
+  std::uint64_t state = 0;
+  const auto next = [&](std::uint64_t seed) // splitmix64
+  {
+    state = seed + 0x9e3779b97f4a7c15u;
+    state = (state ^ (state >> 30)) * 0xbf58476d1ce4e5b9u;
+    state = (state ^ (state >> 27)) * 0x94d049bb133111ebu;
+    return static_cast<double>((state ^ (state >> 31)) >> 11) * 0x1p-52 - 1;
+  };
+  for (PetscInt j = 0; j < columns; ++j)
+    for (PetscInt i = first; i < last; ++i)
+      X.entries.push_back(next(0x9e3779b97f4a7c15u * static_cast<std::uint64_t>(i * columns + j + 1)));
+  X.columns = columns;
+  return X;
 }
 
 void append(Block& X, Vec x)

@@ -256,24 +256,6 @@ Owned<Mat> project(Mat A, Mat Y, Mat Z)
   return result;
 }
 
-Owned<Vec> remaining(const ClosedContact& contact, Vec du)
-{
-  Owned<Vec> y;
-  check(MatCreateVecs(contact.Z, y.put(), nullptr));
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(du, &first, &last));
-  const PetscScalar* from = nullptr;
-  PetscScalar* to = nullptr;
-  check(VecGetArrayRead(du, &from));
-  check(VecGetArrayWrite(y, &to));
-  PetscScalar* next = to;
-  for (PetscInt dof = first; dof < last; ++dof)
-    if (!std::binary_search(contact.pivots.begin(), contact.pivots.end(), dof)) *next++ = from[dof - first];
-  check(VecRestoreArrayWrite(y, &to));
-  check(VecRestoreArrayRead(du, &from));
-  return y;
-}
-
 Owned<Mat> direction_damping(const Interface& interface, const Equilibrium& equilibrium)
 {
   if (interface.directions < 2 || interface.friction == 0) return {};

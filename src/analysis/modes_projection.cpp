@@ -95,37 +95,67 @@ void add_term(Block& residual, const Block& Ay, const std::vector<std::complex<d
   }
 }
 
+// `y`: of some length; made 1.
+Expanded expand(const QuadraticProblem& problem, const QuadraticNorms& norms,
+                const std::vector<std::complex<double>>& lambda, Block y)
+{
+  const Index count = lambda.size();
+  const std::vector<double> length = column_norms(y);
+  std::vector<std::complex<double>> square;
+  for (Index k = 0; k < count; ++k)
+  {
+    square.push_back(lambda[k] * lambda[k]);
+    for (const Index column : {k, count + k})
+      std::transform(y.column(static_cast<PetscInt>(column)), y.column(static_cast<PetscInt>(column)) + y.rows,
+                     y.column(static_cast<PetscInt>(column)),
+                     [&](double entry) { return entry / std::hypot(length[k], length[count + k]); });
+  }
+  Expanded result;
+  result.y = std::move(y);
+  result.residual = product(problem.K, result.y);
+  add_term(result.residual, product(problem.C, result.y), lambda);
+  add_term(result.residual, product(problem.M, result.y), square);
+  const std::vector<double> left = column_norms(result.residual);
+  for (Index k = 0; k < count; ++k)
+  {
+    const double w = std::abs(lambda[k]), scale = w * w * norms.M + w * norms.C + norms.K;
+    result.backward_error.push_back(std::hypot(left[k], left[count + k]) / scale);
+  }
+  return result;
+}
+
+// y = V a
 Expanded expand(const QuadraticProblem& problem, const QuadraticNorms& norms, const Block& V,
                 const DenseEigenpair* pairs, Index count)
 {
   std::vector<double> re, im;
-  std::vector<std::complex<double>> lambda, square;
+  std::vector<std::complex<double>> lambda;
   for (const DenseEigenpair* pair = pairs; pair != pairs + count; ++pair)
   {
-    double size = 0; // of a is that of y, V being orthonormal
-    for (const std::complex<double>& a : pair->y) size += std::norm(a);
     for (const std::complex<double>& a : pair->y)
     {
-      re.push_back(a.real() / std::sqrt(size));
-      im.push_back(a.imag() / std::sqrt(size));
+      re.push_back(a.real());
+      im.push_back(a.imag());
     }
     lambda.push_back(pair->lambda);
-    square.push_back(pair->lambda * pair->lambda);
   }
   re.insert(re.end(), im.begin(), im.end());
-  Expanded result;
-  result.y = combination(V, re, static_cast<PetscInt>(2 * count));
-  result.residual = product(problem.K, result.y);
-  add_term(result.residual, product(problem.C, result.y), lambda);
-  add_term(result.residual, product(problem.M, result.y), square);
-  const std::vector<double> left = column_norms(result.residual), size = column_norms(result.y);
-  for (Index k = 0; k < count; ++k)
+  return expand(problem, norms, lambda, combination(V, re, static_cast<PetscInt>(2 * count)));
+}
+
+void append_pairs(const QuadraticProblem& problem, const std::vector<std::complex<double>>& lambda,
+                  const Expanded& expanded, std::vector<Eigenpair>& pairs)
+{
+  const auto count = static_cast<PetscInt>(lambda.size());
+  for (PetscInt k = 0; k < count; ++k)
   {
-    const double w = std::abs(lambda[k]), scale = w * w * norms.M + w * norms.C + norms.K;
-    result.backward_error.push_back(std::hypot(left[k], left[count + k]) /
-                                    (scale * std::hypot(size[k], size[count + k])));
+    const auto i = static_cast<Index>(k);
+    Eigenpair pair{lambda[i], {}, {}, expanded.backward_error[i]};
+    check(MatCreateVecs(problem.K, pair.real.put(), pair.imaginary.put()));
+    copy_column(expanded.y, k, pair.real);
+    copy_column(expanded.y, count + k, pair.imaginary);
+    pairs.push_back(std::move(pair));
   }
-  return result;
 }
 
 constexpr Index at_once = 64; // pairs expanded at a time
@@ -160,25 +190,14 @@ bool correct(Subspace& space, const QuadraticProblem& problem, const QuadraticNo
 
 } // namespace
 
-std::vector<Eigenpair> eigenpairs(const QuadraticProblem& problem, const Block& V,
-                                  const std::vector<DenseEigenpair>& found)
+std::vector<Eigenpair> eigenpairs(const QuadraticProblem& problem, const std::vector<std::complex<double>>& lambda,
+                                  const ComplexBlock& y)
 {
-  const QuadraticNorms norms = norms_of(problem);
-  std::vector<Eigenpair> result;
-  for (Index first = 0; first < found.size(); first += at_once)
-  {
-    const Index count = std::min(at_once, found.size() - first);
-    const Expanded pairs = expand(problem, norms, V, found.data() + first, count);
-    for (Index k = 0; k < count; ++k)
-    {
-      Eigenpair pair{found[first + k].lambda, {}, {}, pairs.backward_error[k]};
-      check(MatCreateVecs(problem.K, pair.real.put(), pair.imaginary.put()));
-      copy_column(pairs.y, static_cast<PetscInt>(k), pair.real);
-      copy_column(pairs.y, static_cast<PetscInt>(count + k), pair.imaginary);
-      result.push_back(std::move(pair));
-    }
-  }
-  return result;
+  Block parts = y.re;
+  append(parts, y.im);
+  std::vector<Eigenpair> pairs;
+  append_pairs(problem, lambda, expand(problem, norms_of(problem), lambda, std::move(parts)), pairs);
+  return pairs;
 }
 
 QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K, const RealModes& modes,
@@ -196,7 +215,7 @@ QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K,
   Block shapes = empty_block(K);
   for (const Owned<Vec>& shape : modes.shapes) append(shapes, shape);
   extend(space, extend_orthonormal(space.V, std::move(shapes)));
-  ShiftInvert stiffness = make_shift_invert(K, M, Symmetry::symmetric);
+  ShiftInvert stiffness = make_shift_invert(K, M);
   if (settings.passes > 0) move_to(stiffness, shift_below_zero(M, K));
   std::vector<DenseEigenpair> found = solve_on(space, window);
   for (int pass = 0; pass < settings.passes; ++pass)
@@ -205,11 +224,14 @@ QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K,
     found = solve_on(space, window);
     ++result.outcome.iterations;
   }
-  result.pairs = eigenpairs(problem, space.V, found);
-  for (const Eigenpair& pair : result.pairs)
-    result.outcome.residual = std::max(result.outcome.residual, pair.backward_error);
-  std::stable_sort(result.pairs.begin(), result.pairs.end(),
-                   [](const Eigenpair& a, const Eigenpair& b) { return a.lambda.real() > b.lambda.real(); });
+  for (Index first = 0; first < found.size(); first += at_once)
+  {
+    const Index count = std::min(at_once, found.size() - first);
+    std::vector<std::complex<double>> lambda;
+    for (Index k = 0; k < count; ++k) lambda.push_back(found[first + k].lambda);
+    append_pairs(problem, lambda, expand(problem, norms, space.V, found.data() + first, count), result.pairs);
+  }
+  settle(result);
   return result;
 }
 

@@ -152,11 +152,17 @@ QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const Quadrat
   {
     normalise(pair);
     pair.backward_error = backward_error(problem, norms, pair);
-    result.outcome.residual = std::max(result.outcome.residual, pair.backward_error);
   }
-  std::stable_sort(result.pairs.begin(), result.pairs.end(),
-                   [](const Eigenpair& a, const Eigenpair& b) { return a.lambda.real() > b.lambda.real(); });
+  settle(result);
   return result;
+}
+
+void settle(QuadraticSolution& solution)
+{
+  for (const Eigenpair& pair : solution.pairs)
+    solution.outcome.residual = std::max(solution.outcome.residual, pair.backward_error);
+  std::stable_sort(solution.pairs.begin(), solution.pairs.end(),
+                   [](const Eigenpair& a, const Eigenpair& b) { return a.lambda.real() > b.lambda.real(); });
 }
 
 bool is_unstable(std::complex<double> lambda)

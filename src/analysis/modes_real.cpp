@@ -73,7 +73,7 @@ RealModes first_of(const DenseModes& all, Mat K, int count)
 
 int inertia_below(Mat M, Mat K, double theta)
 {
-  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric);
+  ShiftInvert pencil = make_shift_invert(K, M);
   move_to(pencil, theta);
   return negative_pivots(pencil);
 }
@@ -154,7 +154,7 @@ double largest_residual(const Found& found, Mat M, Mat K)
   return largest;
 }
 
-constexpr int ahead = 10, above = 30; // values from what is found to the next shift, and beyond it
+constexpr int ahead = 20, above = 40; // values from what is found to the next shift, and beyond it
 
 // Moves up until about `ahead` values lie between what is found and the shift; returns how many do.
 int climb(ShiftInvert& pencil, const Found& found, double step, double limit)
@@ -200,7 +200,7 @@ Found sweep(Mat M, Mat K, const Sought& sought)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric);
+  ShiftInvert pencil = make_shift_invert(K, M);
   Found found;
   found.shapes = empty_block(K);
   double verified = shift_below_zero(M, K); // all below is found for sure
@@ -287,15 +287,6 @@ double shift_below_zero(Mat M, Mat K)
   return -1e-8 * trace(K) / trace(M);
 }
 
-Owned<Mat> shifted(Mat M, Mat K, double shift)
-{
-  Owned<Mat> A;
-  check(MatDuplicate(K, MAT_COPY_VALUES, A.put()));
-  check(MatAXPY(A, -shift, M, UNKNOWN_NONZERO_PATTERN));
-  check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
-  return A;
-}
-
 int count_real_modes(Mat M, Mat K, double band, int dense_limit)
 {
   PetscInt n = 0;
@@ -332,15 +323,6 @@ int dense_limit_option()
   PetscInt limit = 400;
   check(PetscOptionsGetInt(nullptr, "modes_", "-dense_limit", &limit, nullptr));
   return static_cast<int>(limit);
-}
-
-RealModes find_real_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                          int count)
-{
-  const BilateralProblem problem = make_bilateral(structure, interface, equilibrium);
-  RealModes modes = solve_real_modes(problem.M, problem.K, count, dense_limit_option());
-  to_structure(modes, problem);
-  return modes;
 }
 
 RealModes find_real_modes_below(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,

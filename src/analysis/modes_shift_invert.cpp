@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <numeric>
 #include <slepcblaslapack.h>
 
 namespace squeal
@@ -17,27 +15,6 @@ using Index = std::size_t;
 constexpr PetscInt block_size = 12;     // solved for at once
 constexpr PetscInt largest_space = 600; // vectors
 constexpr double tolerance = 1e-9;      // of an invariant subspace, relative to the eigenvalues of the inverse
-
-// The same vectors for any number of ranks, orthogonal to nothing in particular.
-Block uneven_block(Mat A, PetscInt columns)
-{
-  Block X = empty_block(A);
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRangeColumn(A, &first, &last));
-  std::uint64_t state = 0;
-  const auto next = [&](std::uint64_t seed) // splitmix64
-  {
-    state = seed + 0x9e3779b97f4a7c15u;
-    state = (state ^ (state >> 30)) * 0xbf58476d1ce4e5b9u;
-    state = (state ^ (state >> 27)) * 0x94d049bb133111ebu;
-    return static_cast<double>((state ^ (state >> 31)) >> 11) * 0x1p-52 - 1;
-  };
-  for (PetscInt j = 0; j < columns; ++j)
-    for (PetscInt i = first; i < last; ++i)
-      X.entries.push_back(next(0x9e3779b97f4a7c15u * static_cast<std::uint64_t>(i * columns + j + 1)));
-  X.columns = columns;
-  return X;
-}
 
 // A^-1 M V_k = V H: the columns of H are those of V multiplied so far, its rows all of V.
 struct Krylov
@@ -197,20 +174,17 @@ bool short_of_room(PetscInt outcome)
 }
 
 // `room`: percent beyond the estimate, or 0 for MUMPS's own margin.
-Owned<Mat> analysed(const ShiftInvert& pencil, PetscInt room)
+Owned<Mat> analysed(Mat A, PetscInt room)
 {
-  const bool symmetric = pencil.symmetry == Symmetry::symmetric;
-  const Mat A = pencil.shifted;
   Owned<Mat> factor;
   MatFactorInfo settings;
   check(MatFactorInfoInitialize(&settings));
-  check(MatGetFactor(A, MATSOLVERMUMPS, symmetric ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, factor.put()));
+  check(MatGetFactor(A, MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, factor.put()));
   check(MatSetOptionsPrefix(factor, "modes_"));
   // The negative pivots of a root that ScaLAPACK factors are not counted: MUMPS keeps the root to itself.
   check(MatMumpsSetIcntl(factor, 13, 1));
   check(MatMumpsSetIcntl(factor, 27, block_size));
-  check(symmetric ? MatCholeskyFactorSymbolic(factor, A, nullptr, &settings)
-                  : MatLUFactorSymbolic(factor, A, nullptr, nullptr, &settings));
+  check(MatCholeskyFactorSymbolic(factor, A, nullptr, &settings));
   if (room > 0) check(MatMumpsSetIcntl(factor, 14, room));
   return factor;
 }
@@ -223,9 +197,8 @@ PetscInt factorise(ShiftInvert& pencil)
   check(MatFactorInfoInitialize(&settings));
   for (PetscInt room = 0;;)
   {
-    if (!pencil.factor.get()) pencil.factor = analysed(pencil, room);
-    check(pencil.symmetry == Symmetry::symmetric ? MatCholeskyFactorNumeric(pencil.factor, pencil.shifted, &settings)
-                                                 : MatLUFactorNumeric(pencil.factor, pencil.shifted, &settings));
+    if (!pencil.factor.get()) pencil.factor = analysed(pencil.shifted, room);
+    check(MatCholeskyFactorNumeric(pencil.factor, pencil.shifted, &settings));
     const PetscInt outcome = infog(pencil.factor, 1);
     if (outcome >= 0) return outcome;
     check(MatMumpsGetIcntl(pencil.factor, 14, &room));
@@ -249,12 +222,12 @@ void use_mumps(ST transformation)
   check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
 }
 
-ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry)
+ShiftInvert make_shift_invert(Mat K, Mat M)
 {
-  ShiftInvert pencil{K, M, symmetry, 0, {}, {}};
+  ShiftInvert pencil{K, M, 0, {}, {}};
   check(MatDuplicate(K, MAT_COPY_VALUES, pencil.shifted.put()));
   check(MatAXPY(pencil.shifted, 1, M, DIFFERENT_NONZERO_PATTERN));
-  if (symmetry == Symmetry::symmetric) check(MatSetOption(pencil.shifted, MAT_SYMMETRIC, PETSC_TRUE));
+  check(MatSetOption(pencil.shifted, MAT_SYMMETRIC, PETSC_TRUE));
   return pencil;
 }
 
@@ -294,11 +267,11 @@ Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius)
   const PetscInt room = std::max(largest_space, 4 * count);
   const double least = radius > 0 ? 1 / radius : INFINITY;
   Nearest result;
-  while (!result.converged && krylov.V.columns < room)
+  for (int round = 0; !result.converged && krylov.V.columns < room; ++round)
   {
     grow(krylov, pencil);
     const bool exhausted = krylov.V.columns == krylov.order;
-    if (!exhausted && krylov.order < 2 * count) continue;
+    if (!exhausted && (krylov.order < 2 * count || round % 3 != 0)) continue;
     Leading leading = leading_subspace_shared(krylov, count, least);
     result.converged = exhausted || leading.residual < tolerance;
     if (!result.converged) continue;

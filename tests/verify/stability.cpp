@@ -1,5 +1,6 @@
 // ranks: 1 2 3
 // Published and exact eigenvalues of sliding systems.
+#include "../support/flutter_chain.hpp"
 #include "../support/sliding_oscillator.hpp"
 #include "squeal/analysis/modes.hpp"
 #include "squeal/analysis/quadratic.hpp"
@@ -14,27 +15,11 @@ using Complex = std::complex<double>;
 namespace
 {
 
-QuadraticProblem problem_of(const Rows& M, const Rows& C, const Rows& K)
-{
-  Rows pattern = diagonal(std::vector<double>(M.size(), 1.));
-  for (std::size_t i = 0; i < M.size(); ++i)
-    for (std::size_t j = 0; j < M.size(); ++j)
-      if (M[i][j] != 0 || C[i][j] != 0 || K[i][j] != 0) pattern[i][j] = 1;
-  return {sparse(M, pattern), sparse(C, pattern), sparse(K, pattern)};
-}
-
 constexpr int by_lapack = 1000, by_arnoldi = 0; // dense limits
 
 QuadraticSolution solve(const QuadraticProblem& problem, int dense_limit)
 {
   return solve_quadratic(problem, {10, 0, 5, dense_limit});
-}
-
-int count_unstable(const QuadraticSolution& solution)
-{
-  int count = 0;
-  for (const Eigenpair& pair : solution.pairs) count += is_unstable(pair.lambda);
-  return count;
 }
 
 // Two modes coupled by friction (Hoffmann et al. 2002).
@@ -50,22 +35,6 @@ int unstable_modes_of_ziegler(double P, double b)
 {
   const QuadraticProblem problem = problem_of({{3, 1}, {1, 1}}, {{2 * b, -b}, {-b, b}}, {{2 - P, P - 1}, {-1, 1}});
   return count_unstable(solve(problem, by_lapack));
-}
-
-QuadraticProblem chain(int cells, double mu)
-{
-  const double k = 4.5 * std::sqrt(3.) / 2;
-  const auto n = 2 * static_cast<std::size_t>(cells);
-  Rows K = zeros(n, n);
-  for (std::size_t i = 0; i < n; i += 2)
-  {
-    K[i][i] = 2 + 17;
-    K[i][i + 1] = k - 11 * mu;
-    K[i + 1][i] = k;
-    K[i + 1][i + 1] = 18.75;
-    if (i + 2 < n) K[i][i + 2] = K[i + 2][i] = -1;
-  }
-  return problem_of(diagonal(std::vector<double>(n, 1.)), diagonal(std::vector<double>(n, .02)), K);
 }
 
 double distance(const QuadraticSolution& solution, Complex lambda)
@@ -112,7 +81,7 @@ TEST_CASE("no unstable mode of a chain of cells is missed, solved whole or by Ar
 {
   for (const int limit : {by_lapack, by_arnoldi})
   {
-    const QuadraticSolution many = solve(chain(50, .38), limit), fewer = solve(chain(50, .36), limit);
+    const QuadraticSolution many = solve(flutter_chain(50, .38), limit), fewer = solve(flutter_chain(50, .36), limit);
     CHECK(many.outcome.word == "converged");
     CHECK(many.pairs.size() == 100);
     CHECK(count_unstable(many) == 44);

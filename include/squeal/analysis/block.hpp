@@ -19,6 +19,9 @@ struct Block
 /// No columns yet, rows as the columns of A are distributed.
 Block empty_block(Mat A);
 
+/// `columns` vectors to start from, orthogonal to nothing in particular, the same for any number of ranks.
+Block uneven_block(Mat A, PetscInt columns);
+
 void append(Block& X, Vec x);
 void append(Block& X, const Block& Y);
 void copy_column(const Block& X, PetscInt j, Vec x);

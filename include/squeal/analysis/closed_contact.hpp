@@ -21,9 +21,6 @@ struct ClosedContact
   std::vector<PetscInt> pivots; // the degrees of freedom that y leaves out, ascending
 };
 
-/// y of a motion du that keeps the closed pairs closed.
-Owned<Vec> remaining(const ClosedContact& contact, Vec du);
-
 /// Error: a closed pair whose normal motion the other closed pairs already fix, or that the friction coefficient jams
 /// (which pair).
 ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface& interface,

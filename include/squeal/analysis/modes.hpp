@@ -57,11 +57,7 @@ struct Modes
   std::string count_check; // in words: unstable modes by either route, all modes by inertia
 };
 
-/// Option: -modes_dense_limit, as below.
-RealModes find_real_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                          int count);
-
-/// Real modes with frequency below `band` [Hz], as many as there are.
+/// Real modes with frequency below `band` [Hz], as many as there are. Option: -modes_dense_limit, as below.
 RealModes find_real_modes_below(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                                 double band);
 

@@ -6,16 +6,16 @@
 /// joins V, and so on for some passes (Brizard, Chiello, Sinou, Lorang 2011). Only the pairs of largest growth
 /// (Re/|lambda|) in the band are corrected: those decide. Caveat: an unstable pair that the first basis shows as well
 /// damped may be left out; judge by the full problem.
-#include "squeal/analysis/block.hpp"
+#include "squeal/analysis/complex_block.hpp"
 #include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/real_modes.hpp"
 
 namespace squeal
 {
 
-/// The pairs y = V a, of 2-norm 1, with their backward errors; V orthonormal.
-std::vector<Eigenpair> eigenpairs(const QuadraticProblem& problem, const Block& V,
-                                  const std::vector<DenseEigenpair>& found);
+/// The pairs (lambda, y), y brought to 2-norm 1, with their backward errors.
+std::vector<Eigenpair> eigenpairs(const QuadraticProblem& problem, const std::vector<std::complex<double>>& lambda,
+                                  const ComplexBlock& y);
 
 struct ProjectionSettings
 {

@@ -53,6 +53,9 @@ struct QuadraticSolution
 /// lambda.
 QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings);
 
+/// Largest real part first; outcome.residual becomes the largest backward error.
+void settle(QuadraticSolution& solution);
+
 /// Real part large enough to call unstable: rounding shows up to 1e-8 |lambda| on a mode without damping.
 bool is_unstable(std::complex<double> lambda);
 

@@ -11,9 +11,6 @@ namespace squeal
 /// K - shift M is positive definite still.
 double shift_below_zero(Mat M, Mat K);
 
-/// K - shift M
-Owned<Mat> shifted(Mat M, Mat K, double shift);
-
 /// How many omega lie below `band` [Hz].
 int count_real_modes(Mat M, Mat K, double band, int dense_limit);
 

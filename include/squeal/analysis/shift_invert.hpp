@@ -1,5 +1,5 @@
 #pragma once
-/// The eigenvalues theta of K y = theta M y nearest a real shift, K and M symmetric or not, by a block Krylov space of
+/// The eigenvalues theta of the symmetric K y = theta M y nearest a real shift, by a block Krylov space of
 /// (K - shift M)^-1 M.
 ///
 /// Blocks, because brakes have many nearly equal modes (doublets of a disc, one a pin), which a space grown from a
@@ -12,28 +12,21 @@
 namespace squeal
 {
 
-enum class Symmetry
-{
-  symmetric, // K = K', M = M': Cholesky, whose pivots count eigenvalues
-  general    // LU
-};
-
 /// A factor that moves from shift to shift; the ordering is found once.
 struct ShiftInvert
 {
   Mat K = nullptr, M = nullptr; // lent
-  Symmetry symmetry = Symmetry::general;
   double shift = 0;
   Owned<Mat> shifted, factor; // K - shift M
 };
 
-ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry);
+ShiftInvert make_shift_invert(Mat K, Mat M);
 
 /// To the shift, or a little below it where it is an eigenvalue. LibraryError: memory ran out.
 /// Options: -modes_mat_mumps_...; room beyond MUMPS's estimate (icntl_14) grows by itself.
 void move_to(ShiftInvert& pencil, double shift);
 
-/// Sylvester: as many eigenvalues of a symmetric pencil lie below the shift as its factor has negative pivots.
+/// Sylvester: as many eigenvalues lie below the shift as its factor has negative pivots.
 int negative_pivots(const ShiftInvert& pencil);
 
 /// Orthonormal basis of the invariant subspace of all theta with |theta - shift| <= reach.

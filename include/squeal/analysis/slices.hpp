@@ -1,14 +1,13 @@
 #pragma once
-/// Every pair of a band of the full quadratic problem, slice by slice of frequency, in real arithmetic.
+/// Every pair of a band of the full quadratic problem, slice by slice of frequency, each from a complex shift at its
+/// middle (complex_shift.hpp).
 ///
-/// Without damping, theta = -lambda^2 is an eigenvalue of the real unsymmetric pencil K y = theta M y, which real
-/// shifts near theta = omega_0^2 slice, where a real shift of lambda reaches no oscillating pair above. Damping is then
-/// small beside what the slice's factor holds: the space of the undamped modes is corrected by the residuals of the
-/// damped pairs until each has its backward error in the full problem.
-/// Caveat: damping strong enough to move pairs across slices, or to stop their oscillation, shows in the count; TOAR
-/// (quadratic.hpp) knows no slices.
-#include "squeal/analysis/block.hpp"
+/// Slices are planned on the frictionless pairs, lambda^2 + c lambda + omega^2 = 0 with the modal damping c = x'C x of
+/// the real modes x, which also count.
+/// Caveat: a pair that friction moves by more than the width of its slice, or whose oscillation stops, shows in the
+/// count; TOAR (quadratic.hpp) knows no slices.
 #include "squeal/analysis/quadratic.hpp"
+#include "squeal/analysis/real_modes.hpp"
 
 namespace squeal
 {
@@ -22,6 +21,9 @@ struct PairCount
   int found = 0;        // pairs with |lambda| below
 };
 
+/// Of both below `edge` [rad/s]; `omega`: the real modes, ascending, of which those below `floor` are no vibrations.
+PairCount count_pairs(const QuadraticSolution& solution, const std::vector<double>& omega, double floor, double edge);
+
 /// solution.pairs reach up to count.frequency.
 struct CountedSolution
 {
@@ -29,12 +31,12 @@ struct CountedSolution
   PairCount count;
 };
 
-/// `omega` [rad/s]: the frictionless undamped modes, ascending, all up to `reach` [Hz] at or above the band. Where one
-/// mode more or less lies below the edge, the edge moves on between band and reach.
-CountedSolution solve_by_slices(const QuadraticProblem& problem, const std::vector<double>& omega, double band,
-                                double reach);
+/// lambda with |lambda| = omega of the real modes, and their modal damping: an overdamped one lies at -omega.
+std::vector<std::complex<double>> predicted_pairs(const RealModes& modes, Mat C);
 
-/// The pair nearest lambda, from a space that nearly holds it; its backward error says how near 1e-13 it came.
-Eigenpair solve_near(const QuadraticProblem& problem, std::complex<double> lambda, Block start);
+/// `predicted`: ascending, all up to `reach` [Hz] at or above the band. Where one more or less lies below the edge, the
+/// edge moves on between band and reach.
+CountedSolution solve_by_slices(const QuadraticProblem& problem, const std::vector<std::complex<double>>& predicted,
+                                double band, double reach);
 
 } // namespace squeal

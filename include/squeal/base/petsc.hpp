@@ -46,17 +46,9 @@ inline PetscErrorCode destroy(SNES* object)
 {
   return SNESDestroy(object);
 }
-inline PetscErrorCode destroy(EPS* object)
-{
-  return EPSDestroy(object);
-}
 inline PetscErrorCode destroy(PEP* object)
 {
   return PEPDestroy(object);
-}
-inline PetscErrorCode destroy(BV* object)
-{
-  return BVDestroy(object);
 }
 inline PetscErrorCode destroy(IS* object)
 {
