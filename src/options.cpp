@@ -34,6 +34,7 @@ constexpr std::array options = {
     Option{"-modes_solver", "slices", "of large problems: slices of frequency, or TOAR around zero (toar)"},
     Option{"-modes_candidates", "20", "pairs that each residual pass of the projection corrects"},
     Option{"-estimate_lift_off_multiple", "2", "of first lift-off: where vibrations start without an energy balance"},
+    Option{"-cycle_start", "estimate", "of the full model's shooting: estimate, or reduced (that model's cycle)"},
     Option{"-cycle_start_amplitude", "1", "multiple of the estimate's amplitude to start from"},
     Option{"-cycle_start_phase", "0", "degrees, added to the estimate's phase of the start"},
     Option{"-cycle_start_period", "1", "multiple of the mode's period to start from"},

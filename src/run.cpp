@@ -59,10 +59,7 @@ State transient_start(const TransientSettings& settings, const ComplexMode& mode
     State start = mode_state(report.equilibrium, mode, start_amplitude(report.estimate), report.estimate.phase);
     for (const State& other :
          estimated_motions(model.structure, model.interface, report.equilibrium, growing_modes(report).subspan(1)))
-    {
-      check(VecAXPY(start.u, 1, other.u));
-      check(VecAXPY(start.v, 1, other.v));
-    }
+      add_motion(other, 1, start);
     return start;
   }
   if (settings.start == "mode")
@@ -140,9 +137,6 @@ LimitCycle run_cycle(const Scene& scene, const Model& model, Report& report)
     cycle.outcome = not_run("skipped", reason);
   else if (const std::string lie = cycle_refusal(scene, model, report); !lie.empty())
     cycle.outcome = not_run("refused", lie);
-  else if (scene.fidelity == "full")
-    return find_cycle(model.structure, model.interface, report.equilibrium, growing_modes(report), report.estimate,
-                      scene.cycle, model.probes);
   else
   {
     FittedCycle fitted = find_fitted_cycle(model.structure, model.interface, report.equilibrium, report.modes,

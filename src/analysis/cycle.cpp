@@ -12,16 +12,14 @@
 namespace squeal
 {
 
-namespace
-{
-
 void set_period(PeriodMap& map, double period)
 {
   const double h = period / map.steps;
-  if (h == map.step.h) return;
-  map.step = make_theta_step(map.structure, map.interface, h, map.theta);
-  ++map.factorings;
+  if (h != map.step.h) map.step = make_theta_step(map.structure, map.interface, h, map.theta);
 }
+
+namespace
+{
 
 void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
 {
@@ -84,8 +82,7 @@ State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int sa
 {
   State state = copy_of(cycle.start);
   state.reactions = map.reactions;
-  if (map.step.h != cycle.period / map.steps)
-    map.step = make_theta_step(map.structure, map.interface, cycle.period / map.steps, map.theta);
+  set_period(map, cycle.period);
   int done = 0;
   const auto watch = [&](const State& now, const StepReport&, const StepWork&)
   {
@@ -135,26 +132,14 @@ struct StartOptions
 StartOptions read_options()
 {
   StartOptions options;
-  check(PetscOptionsGetReal(nullptr, "cycle_", "-start_amplitude", &options.amplitude, nullptr));
+  options.amplitude = start_amplitude_factor();
   check(PetscOptionsGetReal(nullptr, "cycle_", "-start_phase", &options.phase, nullptr));
   check(PetscOptionsGetReal(nullptr, "cycle_", "-start_period", &options.period, nullptr));
   check(PetscOptionsGetReal(nullptr, "cycle_", "-band_factor", &options.band_factor, nullptr));
   check(PetscOptionsGetInt(nullptr, "cycle_", "-samples", &options.samples, nullptr));
-  if (!(options.amplitude > 0)) throw Error("-cycle_start_amplitude must be above 0");
   if (!(options.period > 0)) throw Error("-cycle_start_period must be above 0");
   if (options.samples < 1) throw Error("-cycle_samples must be at least 1");
   return options;
-}
-
-/// The starts of the other modes that grow are added, their motions noted as able to sleep.
-void wake(const std::vector<State>& others, double amplitude, State& state, ShootingStart& start)
-{
-  for (const State& motion : others)
-  {
-    check(VecAXPY(state.u, amplitude, motion.u));
-    check(VecAXPY(state.v, amplitude, motion.v));
-    start.asleep.push_back(state_of(motion.u, motion.v));
-  }
 }
 
 double fluctuation_norm(const Structure& structure, const Equilibrium& equilibrium, const State& state)
@@ -165,6 +150,34 @@ double fluctuation_norm(const Structure& structure, const Equilibrium& equilibri
 }
 
 } // namespace
+
+double start_amplitude_factor()
+{
+  PetscReal factor = 1;
+  check(PetscOptionsGetReal(nullptr, "cycle_", "-start_amplitude", &factor, nullptr));
+  if (!(factor > 0)) throw Error("-cycle_start_amplitude must be above 0");
+  return factor;
+}
+
+LimitCycle shoot_at_model(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                          const ShootingStart& start, const Preconditioner& preconditioner,
+                          const CycleSettings& settings, int free_periods, Mat probes)
+{
+  PeriodMap map{structure, interface, settings.steps_per_period, settings.theta};
+  map.reactions = equilibrium.reactions;
+  LimitCycle cycle = shoot(flow_of(map), start, preconditioner, settings.tolerance, free_periods);
+  cycle.steps_per_period = settings.steps_per_period;
+  cycle.theta = settings.theta;
+  measure(map, equilibrium, probes, static_cast<int>(read_options().samples), cycle);
+  if (map.step.law == ContactLaw::velocity && cycle.outcome.word != "converged")
+    cycle.outcome.reason += "; by the velocity law the period map jumps where a step begins open or closed: "
+                            "-transient_contact_law displacement";
+  if (map.unconverged > 0)
+    cycle.outcome.reason += (cycle.outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) +
+                            " steps left the contact unconverged (-transient_contact_max_it)";
+  if (!settings.save_state.empty()) write_state(cycle.start, structure, settings.save_state);
+  return cycle;
+}
 
 LimitCycle find_cycle(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                       std::span<const ComplexMode> unstable, const Estimate& estimate, const CycleSettings& settings,
@@ -182,33 +195,24 @@ LimitCycle find_cycle(const Structure& structure, const Interface& interface, co
   }
   State first = mode_state(equilibrium, mode, amplitude, estimate.phase + options.phase * std::numbers::pi / 180);
   const double frequency_hz = mode.frequency_hz();
-  SlidingPreconditioner preconditioner;
+  Preconditioner preconditioner;
   if (options.band_factor > 0)
-    preconditioner = make_preconditioner(
+    preconditioner = sliding_preconditioner(
         structure, interface, equilibrium,
         find_real_modes_below(structure, interface, equilibrium, options.band_factor * frequency_hz),
         settings.steps_per_period, settings.theta);
-  PeriodMap map{structure, interface, settings.steps_per_period, settings.theta};
-  map.reactions = equilibrium.reactions;
-  const Flow flow = flow_of(map);
   const double first_event = std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude) / amplitude *
                              fluctuation_norm(structure, equilibrium, first);
   ShootingStart start{
       equilibrium.u, first.u, first.v, options.period / frequency_hz, {mode.real, mode.imaginary, equilibrium.u}, {},
       first_event};
-  wake(estimated_motions(structure, interface, equilibrium, unstable.subspan(1)), options.amplitude, first, start);
-  LimitCycle cycle = shoot(flow, start, preconditioner, settings.tolerance, settings.free_periods);
-  cycle.steps_per_period = settings.steps_per_period;
-  cycle.theta = settings.theta;
-  measure(map, equilibrium, probes, static_cast<int>(options.samples), cycle);
-  if (map.step.law == ContactLaw::velocity && cycle.outcome.word != "converged")
-    cycle.outcome.reason += "; by the velocity law the period map jumps where a step begins open or closed: "
-                            "-transient_contact_law displacement";
-  if (map.unconverged > 0)
-    cycle.outcome.reason += (cycle.outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) +
-                            " steps left the contact unconverged (-transient_contact_max_it)";
-  if (!settings.save_state.empty()) write_state(cycle.start, structure, settings.save_state);
-  return cycle;
+  for (const State& motion : estimated_motions(structure, interface, equilibrium, unstable.subspan(1)))
+  {
+    add_motion(motion, options.amplitude, first);
+    start.asleep.push_back(state_of(motion.u, motion.v));
+  }
+  return shoot_at_model(structure, interface, equilibrium, start, preconditioner, settings, settings.free_periods,
+                        probes);
 }
 
 } // namespace squeal

@@ -7,6 +7,7 @@
 /// At the cycle the unstable pair has become {1, a contraction}: it is taken to decay at three times the rate of its
 /// growth, the followed one in step with the cycle. Near the onset of the instability, where the square of the
 /// amplitude limits the growth, the rate is twice; too slow a decay makes the steps too long.
+#include "squeal/analysis/block.hpp"
 #include "squeal/analysis/closed_contact.hpp"
 #include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/shooting.hpp"
@@ -25,31 +26,16 @@ namespace
 using Complex = std::complex<double>;
 using Index = std::size_t;
 
-Owned<Mat> dense(Vec layout, PetscInt columns)
+/// P^-1 x = -x + E D E^+ x
+struct Sliding
 {
-  Owned<Mat> result;
-  PetscInt rows = 0;
-  check(VecGetLocalSize(layout, &rows));
-  const MPI_Comm comm = comm_of(layout);
-  check(MatCreateDense(comm, rows, PETSC_DECIDE, PETSC_DETERMINE, columns, nullptr, result.put()));
-  return result;
-}
-
-/// Phi, or M Phi.
-Owned<Mat> columns_of(const std::vector<Owned<Vec>>& shapes, Mat M)
-{
-  Owned<Mat> result = dense(shapes[0], static_cast<PetscInt>(shapes.size()));
-  for (Index i = 0; i < shapes.size(); ++i)
-  {
-    Vec column = nullptr;
-    check(MatDenseGetColumnVecWrite(result, static_cast<PetscInt>(i), &column));
-    check(M ? MatMult(M, shapes[i], column) : VecCopy(shapes[i], column));
-    check(MatDenseRestoreColumnVecWrite(result, static_cast<PetscInt>(i), &column));
-  }
-  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
-  return result;
-}
+  Block shapes;                    // Phi
+  std::vector<Complex> lambda;     // [1/s] of the sliding modes, Im >= 0
+  Index followed = 0;              // the one that grows most
+  std::vector<double> right, left; // Re and Im of its (y, lambda y) a pair, column-major, and the inverse
+  int steps = 0;
+  double theta = 0.5;
+};
 
 /// mu e.B_t Phi, one mode after the other.
 std::vector<std::vector<double>> friction_of(const Interface& interface, const std::vector<Owned<Vec>>& shapes)
@@ -114,7 +100,7 @@ std::vector<double> inverse(std::vector<double> A, Index size)
 }
 
 /// 1/(m - 1) + 1 of an eigenvalue; zero where m is 1 (a motion of a free body, or a resonance without damping).
-Complex correction(Complex lambda, bool followed, const SlidingPreconditioner& preconditioner, double period)
+Complex correction(Complex lambda, bool followed, const Sliding& preconditioner, double period)
 {
   if (lambda.real() > 0) lambda = {-3 * lambda.real(), followed ? 2 * std::numbers::pi / period : lambda.imag()};
   const double h = period / preconditioner.steps, theta = preconditioner.theta;
@@ -123,7 +109,7 @@ Complex correction(Complex lambda, bool followed, const SlidingPreconditioner& p
 }
 
 /// V^-1 (q, q') of every mode, each pair's two coordinates turned by its correction; then V of that.
-std::vector<double> corrected(const SlidingPreconditioner& preconditioner, double period, const std::vector<double>& z)
+std::vector<double> corrected(const Sliding& preconditioner, double period, const std::vector<double>& z)
 {
   const std::vector<double>&left = preconditioner.left, &right = preconditioner.right;
   const Index n = z.size();
@@ -151,70 +137,52 @@ std::vector<double> corrected(const SlidingPreconditioner& preconditioner, doubl
 
 } // namespace
 
-SlidingPreconditioner make_preconditioner(const std::vector<DenseEigenpair>& sliding,
-                                          const std::vector<Owned<Vec>>& shapes, Mat M, int steps, double theta)
+Preconditioner sliding_preconditioner(const std::vector<DenseEigenpair>& sliding, const std::vector<Owned<Vec>>& shapes,
+                                      Mat M, int steps, double theta)
 {
-  SlidingPreconditioner result;
-  result.steps = steps;
-  result.theta = theta;
   const Index m = shapes.size();
-  if (m == 0) return result;
+  if (m == 0) return {};
+  Sliding inside{empty_block(M), {}, 0, real_columns(sliding), {}, steps, theta};
   for (const DenseEigenpair& pair : sliding)
   {
-    result.lambda.push_back(pair.lambda);
-    if (pair.lambda.real() > result.lambda[result.followed].real()) result.followed = result.lambda.size() - 1;
+    inside.lambda.push_back(pair.lambda);
+    if (pair.lambda.real() > inside.lambda[inside.followed].real()) inside.followed = inside.lambda.size() - 1;
   }
-  result.right = real_columns(sliding);
-  if (result.right.size() != 4 * m * m) throw Error("cycle: sliding modes are missing from the preconditioner");
-  result.left = inverse(result.right, 2 * m);
-  result.shapes = columns_of(shapes, nullptr);
-  result.weighted = columns_of(shapes, M);
-  return result;
+  if (inside.right.size() != 4 * m * m) throw Error("cycle: sliding modes are missing from the preconditioner");
+  inside.left = inverse(inside.right, 2 * m);
+  for (const Owned<Vec>& shape : shapes) append(inside.shapes, shape);
+  return [inside = std::move(inside), M](double period, Vec x, Vec y)
+  {
+    Block sum = empty_block(M);
+    for (const Vec half : {displacement(x), velocity(x)}) append(sum, half);
+    const std::vector<double> turned = corrected(inside, period, inner(inside.shapes, product(M, sum)));
+    std::transform(sum.entries.begin(), sum.entries.end(), sum.entries.begin(), std::negate());
+    add_combination(sum, 1, inside.shapes, turned);
+    copy_column(sum, 0, displacement(y));
+    copy_column(sum, 1, velocity(y));
+  };
 }
 
-SlidingPreconditioner make_preconditioner(const Structure& structure, const Interface& interface,
-                                          const Equilibrium& equilibrium, const RealModes& modes, int steps,
-                                          double theta)
+Preconditioner sliding_preconditioner(const Structure& structure, const Interface& interface,
+                                      const Equilibrium& equilibrium, const RealModes& modes, int steps, double theta)
 {
   const Index m = modes.shapes.size();
-  if (m == 0) return make_preconditioner({}, {}, structure.M, steps, theta);
+  if (m == 0) return {};
   const ClosedContact contact = eliminate_closed_pairs(structure, interface, equilibrium);
   const auto friction = friction_of(interface, modes.shapes);
   const Owned<Mat> C = sliding_damping(structure, interface, equilibrium);
   const auto reduced = [&](Mat X) { return on_modes(modes.shapes, friction, contact, X); };
-  const MPI_Comm comm = comm_of(structure.load);
-  return make_preconditioner(
-      solve_dense_quadratic_shared(comm, static_cast<int>(m), reduced(structure.M), reduced(C), reduced(structure.K)),
-      modes.shapes, structure.M, steps, theta);
+  return sliding_preconditioner(solve_dense_quadratic_shared(comm_of(structure.load), static_cast<int>(m),
+                                                             reduced(structure.M), reduced(C), reduced(structure.K)),
+                                modes.shapes, structure.M, steps, theta);
 }
 
-void apply(const SlidingPreconditioner& preconditioner, double period, Vec x, Vec y)
+void apply(const Preconditioner& preconditioner, double period, Vec x, Vec y)
 {
-  check(VecCopy(x, y));
-  check(VecScale(y, -1));
-  if (!preconditioner.shapes.get()) return;
-  Owned<Vec> part;
-  check(MatCreateVecs(preconditioner.weighted, part.put(), nullptr));
-  std::vector<double> z;
-  for (const Vec half : {displacement(x), velocity(x)})
-  {
-    check(MatMultTranspose(preconditioner.weighted, half, part));
-    const std::vector<double> entries = whole(part);
-    z.insert(z.end(), entries.begin(), entries.end());
-  }
-  const std::vector<double> sum = corrected(preconditioner, period, z);
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(part, &first, &last));
-  auto from = sum.begin();
-  for (const Vec half : {displacement(y), velocity(y)})
-  {
-    double* entries = nullptr;
-    check(VecGetArray(part, &entries));
-    std::copy(from + first, from + last, entries);
-    check(VecRestoreArray(part, &entries));
-    check(MatMultAdd(preconditioner.shapes, part, half, half));
-    from += static_cast<std::ptrdiff_t>(sum.size() / 2);
-  }
+  if (preconditioner)
+    preconditioner(period, x, y);
+  else
+    check(VecAXPBY(y, -1, 0, x));
 }
 
 Border border_at(const Shooting& shooting, const Orbit& orbit)

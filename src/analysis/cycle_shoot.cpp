@@ -185,8 +185,8 @@ std::string note_of(const NewtonRecord& record)
 
 } // namespace
 
-LimitCycle shoot(const Flow& flow, const ShootingStart& start, const SlidingPreconditioner& preconditioner,
-                 double tolerance, int free)
+LimitCycle shoot(const Flow& flow, const ShootingStart& start, const Preconditioner& preconditioner, double tolerance,
+                 int free)
 {
   Shooting shooting{flow, preconditioner, read_options()};
   const Owned<Vec> rest = zeros_like(start.equilibrium);

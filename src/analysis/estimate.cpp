@@ -338,6 +338,12 @@ std::vector<State> estimated_motions(const Structure& structure, const Interface
   return motions;
 }
 
+void add_motion(const State& motion, double factor, State& state)
+{
+  check(VecAXPY(state.u, factor, motion.u));
+  check(VecAXPY(state.v, factor, motion.v));
+}
+
 State mode_state(const Equilibrium& equilibrium, const ComplexMode& mode, double amplitude, double phase)
 {
   const Complex shape = amplitude * std::polar(1.0, phase), speed = mode.lambda * shape;

@@ -158,7 +158,11 @@ std::vector<double> inner(const Block& X, const Block& Y)
   if (left > 0 && right > 0)
     BLASgemm_("T", "N", &left, &right, &rows, &one, X.entries.data(), &leading, Y.entries.data(), &leading, &zero,
               result.data(), &left);
-  MPI_Allreduce(MPI_IN_PLACE, result.data(), static_cast<int>(result.size()), MPI_DOUBLE, MPI_SUM, X.comm);
+  // to one and from there to all: the last bit is everybody's, too
+  const auto size = static_cast<int>(result.size());
+  const bool here = rank_of(X.comm) == 0;
+  MPI_Reduce(here ? MPI_IN_PLACE : result.data(), result.data(), size, MPI_DOUBLE, MPI_SUM, 0, X.comm);
+  MPI_Bcast(result.data(), size, MPI_DOUBLE, 0, X.comm);
   return result;
 }
 

@@ -1,6 +1,5 @@
 #include "squeal/analysis/reduced.hpp"
 
-#include "dense.hpp"
 #include "squeal/analysis/closed_contact.hpp"
 
 #include <algorithm>
@@ -12,6 +11,9 @@ namespace squeal
 
 namespace
 {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 /// The rows of the active pairs.
 Owned<Mat> rows_of(const Interface& interface, const std::vector<int>& active)
@@ -59,7 +61,7 @@ Owned<VecScatter> to_kept(Mat Z, Vec u, Vec y)
 }
 
 /// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts.
-std::vector<Owned<Vec>> mode_columns(const std::vector<ComplexMode>& modes, int count, Mat Z)
+Block mode_columns(const std::vector<ComplexMode>& modes, int count, Mat Z)
 {
   const double omega = modes.front().lambda.imag();
   std::vector<const ComplexMode*> taken;
@@ -71,73 +73,115 @@ std::vector<Owned<Vec>> mode_columns(const std::vector<ComplexMode>& modes, int 
   Owned<Vec> y;
   check(MatCreateVecs(Z, y.put(), nullptr));
   const Owned<VecScatter> scatter = to_kept(Z, modes.front().real, y);
-  std::vector<Owned<Vec>> columns;
+  Block columns = empty_block(Z);
   for (const ComplexMode* mode : taken)
     for (const Vec part : {mode->real.get(), mode->imaginary.get()})
     {
       check(VecScatterBegin(scatter, part, y, INSERT_VALUES, SCATTER_FORWARD));
       check(VecScatterEnd(scatter, part, y, INSERT_VALUES, SCATTER_FORWARD));
-      columns.push_back(copy_of(y.get()));
+      append(columns, y);
     }
   return columns;
 }
 
-/// (K_z + w^2 M_z)^-1 Z'B_a'
-Owned<Mat> attachment_columns(Mat A, Mat forces)
+/// The rows of a matrix of few, as columns.
+Block transposed(Mat B)
+{
+  Block result = empty_block(B);
+  Owned<Vec> row, unit;
+  check(MatCreateVecs(B, row.put(), unit.put()));
+  PetscInt rows = 0;
+  check(MatGetSize(B, &rows, nullptr));
+  for (PetscInt i = 0; i < rows; ++i)
+  {
+    check(VecSet(unit, 0));
+    if (rank_of(result.comm) == 0) check(VecSetValue(unit, i, 1, INSERT_VALUES));
+    check(VecAssemblyBegin(unit));
+    check(VecAssemblyEnd(unit));
+    check(MatMultTranspose(B, unit, row));
+    append(result, row);
+  }
+  return result;
+}
+
+/// What each active pair pushes with, B_n' + mu B_t'e: its normal force and the friction that follows it.
+Block sliding_forces(const Block& rows, const Interface& interface, const std::vector<int>& active)
+{
+  const auto directions = static_cast<std::size_t>(interface.directions);
+  const std::vector<double> e = drive_directions(interface);
+  Block result{rows.comm, rows.rows, 0, {}};
+  for (std::size_t i = 0; i < active.size(); ++i)
+  {
+    const double* row = rows.column(static_cast<PetscInt>(i * (1 + directions)));
+    std::vector<double> force(row, row + rows.rows);
+    for (std::size_t k = 0; k < directions; ++k)
+    {
+      row += rows.rows;
+      const double friction = interface.friction * e[static_cast<std::size_t>(active[i]) * directions + k];
+      for (std::size_t j = 0; j < force.size(); ++j) force[j] += friction * row[j];
+    }
+    result.entries.insert(result.entries.end(), force.begin(), force.end());
+    ++result.columns;
+  }
+  return result;
+}
+
+/// (K_z + w^2 M_z)^-1 forces
+Block attachment_columns(Mat A, const Block& forces)
 {
   const Factor factor(A, nullptr, Factor::Kind::automatic);
   if (factor.failed()) throw Error("reduced model: K + omega^2 M is not positive definite with the active pairs open");
-  PetscInt columns = 0;
-  check(MatGetSize(forces, nullptr, &columns));
-  Owned<Mat> result = tall(forces, columns);
+  Owned<Vec> pattern;
+  check(MatCreateVecs(A, pattern.put(), nullptr));
+  Block result = empty_block(A);
   constexpr PetscInt at_once = 64;
-  for (PetscInt begin = 0; begin < columns; begin += at_once)
+  for (PetscInt begin = 0; begin < forces.columns; begin += at_once)
   {
     std::vector<Owned<Vec>> force, shape;
-    for (PetscInt i = begin; i < std::min(begin + at_once, columns); ++i)
+    for (PetscInt i = begin; i < std::min(begin + at_once, forces.columns); ++i)
     {
-      force.push_back(column_of(forces, i));
-      shape.push_back(zeros_like(force.back()));
+      force.push_back(zeros_like(pattern));
+      shape.push_back(zeros_like(pattern));
+      copy_column(forces, i, force.back());
     }
     (void)factor.forward(std::vector<Vec>(force.begin(), force.end()));
     factor.backward({}, std::vector<Vec>(shape.begin(), shape.end()));
-    for (std::size_t i = 0; i < shape.size(); ++i) set_column(result, begin + static_cast<PetscInt>(i), shape[i]);
+    for (const Owned<Vec>& column : shape) append(result, column);
   }
   return result;
+}
+
+/// X'Y
+MatrixXd gram(const Block& X, const Block& Y)
+{
+  return MatrixXd::Map(inner(X, Y).data(), X.columns, Y.columns);
+}
+
+std::vector<double> entries_of(const MatrixXd& A)
+{
+  return {A.data(), A.data() + A.size()};
 }
 
 /// What is new in `columns` next to V, orthonormal in the product of E: directions of which less than `threshold` of
-/// the columns' own size is new are dropped. V and EV grow.
-int extend(Owned<Mat>& V, Owned<Mat>& EV, Owned<Mat> columns, Mat E, double threshold)
+/// the columns' own size is new are dropped. V and EV grow; returns by how many.
+int extend(Block& V, Block& EV, Block columns, Mat E, double threshold)
 {
-  PetscInt added = 0;
-  check(MatGetSize(columns, nullptr, &added));
-  if (added == 0) return 0;
   for (int pass = 0; pass < 2; ++pass)
   {
-    Owned<Mat> image = times(E, columns);
-    const Eigen::VectorXd size = gram(columns, image).diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    if (V.get()) subtract(columns, V, gram(EV, columns));
-    image = times(E, columns);
-    const Eigen::MatrixXd scaled = size.asDiagonal() * gram(columns, image) * size.asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> spectrum((scaled + scaled.transpose()) / 2);
+    if (columns.columns == 0) return 0;
+    const VectorXd size = gram(columns, product(E, columns)).diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    add_combination(columns, -1, V, inner(EV, columns));
+    const MatrixXd scaled = size.asDiagonal() * gram(columns, product(E, columns)) * size.asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((scaled + scaled.transpose()) / 2);
     const double least = pass == 0 ? threshold * threshold : 0;
     const auto kept = (spectrum.eigenvalues().array() > least).count();
-    if (kept == 0) return 0;
-    columns = combine(columns, size.asDiagonal() * spectrum.eigenvectors().rightCols(kept) *
-                                   spectrum.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal());
+    const MatrixXd a = size.asDiagonal() * spectrum.eigenvectors().rightCols(kept) *
+                       spectrum.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+    columns = combination(columns, entries_of(a), static_cast<PetscInt>(kept));
   }
-  check(MatGetSize(columns, nullptr, &added));
-  V = V.get() ? beside(V, columns) : std::move(columns);
-  EV = times(E, V);
-  return static_cast<int>(added);
-}
-
-Owned<Mat> tall_of(const std::vector<Owned<Vec>>& columns, std::size_t first, std::size_t last, Mat pattern)
-{
-  Owned<Mat> result = tall(pattern, static_cast<PetscInt>(last - first));
-  for (std::size_t i = first; i < last; ++i) set_column(result, static_cast<PetscInt>(i - first), columns[i]);
-  return result;
+  append(V, columns);
+  append(EV, product(E, columns));
+  return static_cast<int>(columns.columns);
 }
 
 } // namespace
@@ -163,7 +207,6 @@ std::vector<int> pairs_that_may_change(const Interface& interface, const Equilib
 ReducedModel reduce(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                     const std::vector<ComplexMode>& modes, std::vector<int> active, const Reduction& reduction)
 {
-  const double start = MPI_Wtime();
   ReducedModel model;
   Equilibrium sliding; // the pairs that stay closed
   sliding.closed = equilibrium.closed;
@@ -173,41 +216,40 @@ ReducedModel reduce(const Structure& structure, const Interface& interface, cons
   const double omega = modes.front().lambda.imag();
 
   // the basis
-  Owned<Mat> E = project_symmetric(structure.K, contact.Z), V, EV;
+  Owned<Mat> E = project_symmetric(structure.K, contact.Z), BZ;
   const Owned<Mat> M_z = project_symmetric(structure.M, contact.Z);
   check(MatAXPY(E, omega * omega, M_z, UNKNOWN_NONZERO_PATTERN));
   check(MatSetOption(E, MAT_SYMMETRIC, PETSC_TRUE));
-  const std::vector<Owned<Vec>> shapes = mode_columns(modes, reduction.modes, contact.Z);
-  model.modes = extend(V, EV, tall_of(shapes, 0, 2, E), E, 1e-7); // the followed mode is kept whatever else is
-  if (shapes.size() > 2) model.modes += extend(V, EV, tall_of(shapes, 2, shapes.size(), E), E, 1e-6);
-  const Owned<Mat> B = rows_of(interface, active), B_t = tall_transpose(B);
-  {
-    Owned<Mat> forces;
-    Owned<Mat> BZ;
-    check(MatMatMult(B, contact.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
-    forces = tall_transpose(BZ);
-    model.attachments = extend(V, EV, attachment_columns(E, forces), E, reduction.threshold);
-  }
+  Block V = empty_block(E), EV = V;
+  Block shapes = mode_columns(modes, reduction.modes, contact.Z);
+  Block others = columns_from(shapes, 2);
+  shapes.columns = 2;
+  shapes.entries.resize(static_cast<std::size_t>(2 * shapes.rows));
+  model.modes = extend(V, EV, std::move(shapes), E, 1e-7); // the followed mode is kept whatever else is
+  model.modes += extend(V, EV, std::move(others), E, 1e-6);
+  const Owned<Mat> B = rows_of(interface, active);
+  check(MatMatMult(B, contact.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
+  model.attachments =
+      extend(V, EV, attachment_columns(E, sliding_forces(transposed(BZ), interface, active)), E, reduction.threshold);
 
   // the projection
-  const Owned<Mat> left = times(contact.Y, V);
-  model.shapes = times(contact.Z, V);
-  Owned<Mat> C;
-  check(MatDuplicate(structure.C, MAT_COPY_VALUES, C.put()));
-  const Owned<Mat> turning = direction_damping(interface, sliding);
-  if (turning.get()) check(MatAXPY(C, 1, turning, UNKNOWN_NONZERO_PATTERN));
+  const Block left = product(contact.Y, V), forces = transposed(B);
+  model.shapes = product(contact.Z, V);
   for (const auto& [matrix, unsymmetric, symmetric] :
        {std::tuple{structure.M.get(), &model.M, &model.M_z}, std::tuple{structure.C.get(), &model.C, &model.C_z},
         std::tuple{structure.K.get(), &model.K, &model.K_z}})
   {
-    const Owned<Mat> image = times(matrix, model.shapes);
+    const Block image = product(matrix, model.shapes);
     *unsymmetric = gram(left, image);
     *symmetric = gram(model.shapes, image);
     *symmetric = (*symmetric + symmetric->transpose()).eval() / 2;
   }
-  if (turning.get()) model.C = gram(left, times(C, model.shapes));
-  model.H = gram(left, B_t);
-  model.G = gram(B_t, model.shapes);
+  if (const Owned<Mat> turning = direction_damping(interface, sliding); turning.get())
+    model.C += gram(left, product(turning, model.shapes));
+  model.H = gram(left, forces);
+  model.G = gram(forces, model.shapes);
+  model.E_factor.compute(model.K_z + omega * omega * model.M_z);
+  model.M_factor.compute(model.M_z);
 
   // the active pairs
   const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
@@ -223,35 +265,29 @@ ReducedModel reduce(const Structure& structure, const Interface& interface, cons
   model.active = std::move(active);
   model.directions = interface.directions;
   model.friction = interface.friction;
-  model.seconds = MPI_Wtime() - start;
   return model;
 }
 
 ReducedState coordinates(const ReducedModel& model, const Structure& structure, Vec du, Vec v)
 {
-  const auto project = [&](Vec force)
-  {
-    Owned<Vec> small;
-    check(MatCreateVecs(model.shapes, small.put(), nullptr));
-    check(MatMultTranspose(model.shapes, force, small));
-    return entries_of(small);
-  };
-  const Owned<Vec> Kdu = zeros_like(du), Mdu = zeros_like(du), Mv = zeros_like(v);
-  check(MatMult(structure.K, du, Kdu));
-  check(MatMult(structure.M, du, Mdu));
-  check(VecAXPY(Kdu, model.omega * model.omega, Mdu));
-  check(MatMult(structure.M, v, Mv));
-  const Eigen::MatrixXd E = model.K_z + model.omega * model.omega * model.M_z;
-  return {E.llt().solve(project(Kdu)), model.M_z.llt().solve(project(Mv))};
+  const Owned<Vec> force = zeros_like(du), momentum = zeros_like(v);
+  check(MatMult(structure.M, du, force));
+  check(VecScale(force, model.omega * model.omega));
+  check(MatMultAdd(structure.K, du, force, force));
+  check(MatMult(structure.M, v, momentum));
+  Block both = empty_block(structure.M);
+  append(both, force);
+  append(both, momentum);
+  const MatrixXd seen = gram(model.shapes, both);
+  return {model.E_factor.solve(seen.col(0)), model.M_factor.solve(seen.col(1))};
 }
 
-void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd& q, Vec target)
+void add_motion(const ReducedModel& model, double factor, const VectorXd& q, Vec target)
 {
-  Owned<Vec> small;
-  check(MatCreateVecs(model.shapes, small.put(), nullptr));
-  const Eigen::VectorXd entries = factor * q;
-  set_whole(small, {entries.data(), static_cast<std::size_t>(entries.size())});
-  check(MatMultAdd(model.shapes, small, target, target));
+  Block sum{model.shapes.comm, model.shapes.rows, 0, {}};
+  append(sum, target);
+  add_combination(sum, factor, model.shapes, {q.data(), q.data() + q.size()});
+  copy_column(sum, 0, target);
 }
 
 } // namespace squeal

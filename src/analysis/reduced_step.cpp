@@ -15,114 +15,55 @@ namespace
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A^-1 B
-MatrixXd solve_dense(MatrixXd A, MatrixXd B)
-{
-  const auto n = static_cast<PetscBLASInt>(A.rows()), columns = static_cast<PetscBLASInt>(B.cols());
-  std::vector<PetscBLASInt> pivots(static_cast<std::size_t>(n));
-  PetscBLASInt info = 0;
-  LAPACKgesv_(&n, &columns, A.data(), &n, pivots.data(), B.data(), &n, &info);
-  if (info != 0) throw Error("reduced model: a motion has neither mass nor stiffness");
-  return B;
-}
-
-void prepare(ReducedMap& map, double h)
-{
-  const ReducedModel& model = map.model;
-  const double theta = map.theta;
-  const Eigen::Index n = model.size(), rows = model.G.rows();
-  MatrixXd right(n, 2 * n + rows);
-  right << model.M - h * (1 - theta) * model.C - h * h * theta * (1 - theta) * model.K, -h * model.K, h * model.H;
-  right = solve_dense(model.M + h * theta * model.C + h * h * theta * theta * model.K, std::move(right));
-  map.from_state = right.leftCols(2 * n);
-  map.from_reactions = right.rightCols(rows);
-  map.from_equilibrium = -map.from_reactions * VectorXd::Map(model.reactions.data(), rows);
-  map.W = model.G * map.from_reactions;
-  map.h = h;
-}
-
 /// The contact law of one pair as the eliminated pairs let it move: W is slightly unsymmetric (their friction), which
 /// the shared solvers do not take. Block Gauss-Seidel; the local solves see the symmetric part of W's own blocks, which
-/// leaves the fixed point what it is. Residual: the natural map over the largest reaction.
-bool solve_unsymmetric(const ReducedMap& map, const VectorXd& b, VectorXd& r)
+/// leaves the fixed point what it is. Residual: the natural map over the largest reaction; a pair far below the
+/// tolerance is left alone in that sweep. w: b, and then W r + b.
+bool solve_unsymmetric(const ReducedMap& map, VectorXd& w, VectorXd& r)
 {
   const ReducedModel& model = map.model;
-  const Eigen::Index block = 1 + model.directions, rows = b.size();
+  const Eigen::Index block = 1 + model.directions, rows = w.size();
   const double friction = model.friction;
+  const auto of_pair = [&](const VectorXd& x, Eigen::Index i)
+  {
+    PairVector own{};
+    for (Eigen::Index k = 0; k < block; ++k) own[static_cast<std::size_t>(k)] = x(i + k);
+    return own;
+  };
   for (Eigen::Index i = 0; i < rows; i += block)
   {
-    PairVector first{};
-    for (Eigen::Index k = 0; k < block; ++k) first[static_cast<std::size_t>(k)] = r(i + k);
+    PairVector first = of_pair(r, i);
     first[0] = std::max(first[0], 0.);
     project_on_disc(first, friction);
     for (Eigen::Index k = 0; k < block; ++k) r(i + k) = first[static_cast<std::size_t>(k)];
   }
-  VectorXd w = b + map.W * r;
+  w += map.W * r;
   for (int sweep = 0; sweep < map.contact.max_iterations; ++sweep)
   {
-    double defect = 0;
+    const double tolerance = map.contact.tolerance * r.cwiseAbs().maxCoeff();
+    double worst = 0;
     for (Eigen::Index i = 0; i < rows; i += block)
     {
-      PairBlock A{};
-      PairVector last{}, own{};
-      for (Eigen::Index k = 0; k < block; ++k)
-      {
-        last[static_cast<std::size_t>(k)] = r(i + k);
-        own[static_cast<std::size_t>(k)] = w(i + k);
-      }
-      const double rho_n = 1 / map.W(i, i), rho_t = 1 / map.W.diagonal().segment(i + 1, block - 1).maxCoeff();
-      defect = std::max(defect, natural_map(last, own, friction, rho_n, rho_t));
-      PairVector q = own;
-      for (std::size_t k = 0; k < static_cast<std::size_t>(block); ++k)
-        for (std::size_t l = 0; l < static_cast<std::size_t>(block); ++l)
-        {
-          const auto row = i + static_cast<Eigen::Index>(k), column = i + static_cast<Eigen::Index>(l);
-          A[k][l] = (map.W(row, column) + map.W(column, row)) / 2;
-          q[k] -= A[k][l] * last[l];
-        }
+      const PairBlock& A = map.own[static_cast<std::size_t>(i / block)];
+      const PairVector last = of_pair(r, i);
+      PairVector q = of_pair(w, i);
+      const double defect = natural_map(last, q, friction, 1 / A[0][0], 1 / std::max(A[1][1], A[2][2]));
+      worst = std::max(worst, defect);
+      if (defect <= 0.01 * tolerance) continue;
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t l = 0; l < 3; ++l) q[k] -= A[k][l] * last[l];
       const PairVector next = solve_pair(A, q, model.directions, friction, last);
-      if (next == last) continue;
       for (Eigen::Index k = 0; k < block; ++k)
       {
         const double change = next[static_cast<std::size_t>(k)] - r(i + k);
+        if (change == 0) continue;
         r(i + k) += change;
         w += change * map.W.col(i + k);
       }
     }
-    if (defect <= map.contact.tolerance * r.cwiseAbs().maxCoeff()) return true;
+    if (worst <= map.contact.tolerance * r.cwiseAbs().maxCoeff()) return true;
   }
   return rows == 0;
-}
-
-/// One step; returns whether contact converged.
-bool advance(ReducedMap& map, ReducedState& state, VectorXd& before)
-{
-  const ReducedModel& model = map.model;
-  const double h = map.h, theta = map.theta;
-  const Eigen::Index n = model.size(), rows = model.G.rows();
-  VectorXd next = map.from_equilibrium;
-  next.noalias() += map.from_state.leftCols(n) * state.v;
-  next.noalias() += map.from_state.rightCols(n) * state.q;
-
-  // b of w = W r + b: normal rows are gap rates (g + G_n q~)/h + G_n v, q~ = q + h (1-theta) v, tangential ones s
-  const VectorXd motion = model.G * next, position = model.G * (state.q + h * (1 - theta) * state.v);
-  const auto block = static_cast<std::size_t>(1 + model.directions), directions = block - 1;
-  VectorXd b = motion;
-  for (std::size_t i = 0; i < model.gap.size(); ++i)
-  {
-    const auto row = static_cast<Eigen::Index>(i * block);
-    b(row) += (model.gap[i] + position(row)) / h;
-    for (std::size_t k = 0; k < directions; ++k)
-      b(row + 1 + static_cast<Eigen::Index>(k)) -= model.drive[i * directions + k];
-  }
-  VectorXd r = before.size() == rows ? VectorXd(2 * map.reactions - before) : map.reactions;
-  before = map.reactions;
-  const bool converged = solve_unsymmetric(map, b, r);
-  next.noalias() += map.from_reactions * r;
-  map.reactions = std::move(r);
-  state.q += h * (theta * next + (1 - theta) * state.v);
-  state.v = std::move(next);
-  return converged;
 }
 
 void put(const VectorXd& values, Vec x)
@@ -161,10 +102,74 @@ Owned<Vec> small_vector(const VectorXd& values)
   return x;
 }
 
+MatrixXd solve_dense(MatrixXd A, MatrixXd B)
+{
+  const auto n = static_cast<PetscBLASInt>(A.rows()), columns = static_cast<PetscBLASInt>(B.cols());
+  std::vector<PetscBLASInt> pivots(static_cast<std::size_t>(n));
+  PetscBLASInt info = 0;
+  LAPACKgesv_(&n, &columns, A.data(), &n, pivots.data(), B.data(), &n, &info);
+  if (info != 0) throw Error("reduced model: a motion has neither mass nor stiffness");
+  return B;
+}
+
+void prepare(ReducedMap& map, double period)
+{
+  const double h = period / map.steps;
+  if (h == map.h) return;
+  const ReducedModel& model = map.model;
+  const double theta = map.theta;
+  const Eigen::Index n = model.size(), rows = model.G.rows();
+  MatrixXd right(n, 2 * n + rows);
+  right << model.M - h * (1 - theta) * model.C - h * h * theta * (1 - theta) * model.K, -h * model.K, h * model.H;
+  right = solve_dense(model.M + h * theta * model.C + h * h * theta * theta * model.K, std::move(right));
+  map.from_state = right.leftCols(2 * n);
+  map.from_reactions = right.rightCols(rows);
+  map.from_equilibrium = -map.from_reactions * VectorXd::Map(model.reactions.data(), rows);
+  map.W = model.G * map.from_reactions;
+  map.own.assign(model.active.size(), {});
+  const Eigen::Index block = 1 + model.directions;
+  for (Eigen::Index row = 0; row < rows; ++row)
+    for (Eigen::Index k = 0, first = row - row % block; k < block; ++k)
+      map.own[static_cast<std::size_t>(row / block)][static_cast<std::size_t>(row % block)]
+             [static_cast<std::size_t>(k)] = (map.W(row, first + k) + map.W(first + k, row)) / 2;
+  map.h = h;
+}
+
+bool advance(ReducedMap& map, ReducedState& state, VectorXd& before)
+{
+  const ReducedModel& model = map.model;
+  const double h = map.h, theta = map.theta;
+  const Eigen::Index n = model.size(), rows = model.G.rows();
+  VectorXd next = map.from_equilibrium;
+  next.noalias() += map.from_state.leftCols(n) * state.v;
+  next.noalias() += map.from_state.rightCols(n) * state.q;
+
+  // b of w = W r + b: normal rows are gap rates (g + G_n q~)/h + G_n v, q~ = q + h (1-theta) v, tangential ones s
+  const VectorXd motion = model.G * next, position = model.G * (state.q + h * (1 - theta) * state.v);
+  const auto block = static_cast<std::size_t>(1 + model.directions), directions = block - 1;
+  VectorXd b = motion;
+  for (std::size_t i = 0; i < model.gap.size(); ++i)
+  {
+    const auto row = static_cast<Eigen::Index>(i * block);
+    b(row) += (model.gap[i] + position(row)) / h;
+    for (std::size_t k = 0; k < directions; ++k)
+      b(row + 1 + static_cast<Eigen::Index>(k)) -= model.drive[i * directions + k];
+  }
+  VectorXd r = before.size() == rows ? VectorXd(2 * map.reactions - before) : map.reactions;
+  before = map.reactions;
+  const bool converged = solve_unsymmetric(map, b, r);
+  map.rates = std::move(b);
+  next.noalias() += map.from_reactions * r;
+  map.reactions = std::move(r);
+  state.q += h * (theta * next + (1 - theta) * state.v);
+  state.v = std::move(next);
+  return converged;
+}
+
 ReducedState integrate(ReducedMap& map, double period, ReducedState state,
                        const std::function<void(const ReducedState&)>& watch)
 {
-  if (map.h != period / map.steps) prepare(map, period / map.steps);
+  prepare(map, period);
   VectorXd before;
   for (int i = 0; i < map.steps; ++i)
   {
@@ -174,29 +179,35 @@ ReducedState integrate(ReducedMap& map, double period, ReducedState state,
   return state;
 }
 
+Passage pass(ReducedMap& map, double period, ReducedState state)
+{
+  ReducedState last_but_one;
+  const VectorXd reactions = map.reactions; // every period from one warm start: a map, not a history
+  int done = 0;
+  const auto watch = [&](const ReducedState& now)
+  {
+    if (++done == map.steps - 1) last_but_one = now;
+  };
+  Passage result{integrate(map, period, std::move(state), watch), {}};
+  ReducedState next = result.end;
+  VectorXd before;
+  (void)advance(map, next, before);
+  result.rate = {(next.q - last_but_one.q) / (2 * map.h), (next.v - last_but_one.v) / (2 * map.h)};
+  map.reactions = reactions;
+  return result;
+}
+
 Flow flow_of(ReducedMap& map, const Structure& norm)
 {
   const auto period_map = [&map](double period, Vec start, Vec end, Vec rate)
   {
-    ReducedState last_but_one, state{entries_of(displacement(start)), entries_of(velocity(start))};
-    const VectorXd reactions = map.reactions; // every period from one warm start: a map, not a history
-    int done = 0;
-    const auto watch = [&](const ReducedState& now)
-    {
-      if (++done == map.steps - 1) last_but_one = now;
-    };
-    state = integrate(map, period, std::move(state), watch);
+    const Passage passage = pass(map, period, {entries_of(displacement(start)), entries_of(velocity(start))});
     const bool shifted = map.shift.q.size() > 0;
-    put(shifted ? VectorXd(state.q + map.shift.q) : state.q, displacement(end));
-    put(shifted ? VectorXd(state.v + map.shift.v) : state.v, velocity(end));
-    if (rate)
-    {
-      VectorXd before;
-      (void)advance(map, state, before);
-      put((state.q - last_but_one.q) / (2 * map.h), displacement(rate));
-      put((state.v - last_but_one.v) / (2 * map.h), velocity(rate));
-    }
-    map.reactions = reactions;
+    put(shifted ? VectorXd(passage.end.q + map.shift.q) : passage.end.q, displacement(end));
+    put(shifted ? VectorXd(passage.end.v + map.shift.v) : passage.end.v, velocity(end));
+    if (!rate) return;
+    put(passage.rate.q, displacement(rate));
+    put(passage.rate.v, velocity(rate));
   };
   return {period_map, norm.M, norm.K, {}};
 }

@@ -61,3 +61,23 @@ def test_small_model_is_not_reduced(module_run, tmp_path):
     run = module_run(scene, "--set", "cycle.enabled=true", "--set", "fidelity=auto", ranks=1)
     assert run["fidelity"]["used"] == "full" and "not small" in run["fidelity"]["reason"]
     assert run["cycle"]["outcome"] == "converged" and run["cycle"]["residual_full"] <= 1e-8
+
+
+def test_full_shooting_from_the_reduced_cycle(module_run):
+    """The same tolerance on the full residual, the reduced monodromy for a preconditioner: no free periods, and fewer
+    than half of the periods that the start from the estimate takes."""
+    common = [*PIN, "--set", "cycle.tolerance=1e-6", "-cycle_multipliers", "0"]
+    runs = [module_run(*common, "-cycle_start", start, ranks=2) for start in ("estimate", "reduced")]
+    for run in runs:
+        assert run["cycle"]["outcome"] == "converged" and run["cycle"]["residual_full"] <= 1e-6
+    old, new = (run["cycle"] for run in runs)
+    assert new["periods_integrated"] < 0.5 * old["periods_integrated"]
+    # one orbit, begun at another phase of its 64 steps, is another discrete one: 1e-3 of the period, as the step's error
+    assert new["period"] == pytest.approx(old["period"], rel=1e-3)
+
+
+def test_several_unstable_modes_are_refused(squeal):
+    """Hardly damped, three modes grow: a reduced cycle from the first alone would say nothing of the others."""
+    run = squeal(*PIN, "--set", "damping.beta=3e-8", "--set", "fidelity=reduced", ranks=1)
+    assert run.code == 2 and run.report["modes"]["unstable_count"] > 1
+    assert run.report["cycle"]["outcome"] == "refused" and "several modes" in run.report["cycle"]["reason"]

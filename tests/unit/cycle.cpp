@@ -277,7 +277,7 @@ TEST_CASE("a cycle that repels is left for one that attracts")
 TEST_CASE("dependent vectors do not enter the base")
 {
   const SmoothModel model = make_model(coupled, {1, 2});
-  const SlidingPreconditioner none;
+  const Preconditioner none;
   Shooting shooting{model.flow, none};
   std::vector<Owned<Vec>> base;
   const Owned<Vec> a = state_of(model.axes[0], model.zero), b = state_of(model.axes[1], model.zero);

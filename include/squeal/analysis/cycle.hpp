@@ -72,24 +72,12 @@ struct ShootingStart
   double first_event = std::numeric_limits<double>::infinity(); // energy norm at which lift-off or reversal begins
 };
 
-/// Approximate inverse of dPhi/dx - I from sliding motion about equilibrium on the frictionless bilateral real modes
-/// (method, section 6): P^-1 x = -x + E D E^+ x, D of the sliding modes' multipliers over N theta steps.
-struct SlidingPreconditioner
-{
-  Owned<Mat> shapes, weighted;              // Phi and M Phi, dofs x modes; null: no modes, P = -I
-  std::vector<std::complex<double>> lambda; // [1/s] of the sliding modes, Im >= 0
-  std::size_t followed = 0;                 // the one that grows most
-  std::vector<double> right, left;          // Re and Im of its (y, lambda y) a pair, column-major, and the inverse
-  int steps = 0;
-  double theta = 0.5;
-};
+/// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; states are nests. Empty: P = -I.
+using Preconditioner = std::function<void(double period, Vec x, Vec y)>;
 
-SlidingPreconditioner make_preconditioner(const Structure& structure, const Interface& interface,
-                                          const Equilibrium& equilibrium, const RealModes& modes, int steps,
-                                          double theta);
-
-/// y = P^-1 x at this period; states are nests.
-void apply(const SlidingPreconditioner& preconditioner, double period, Vec x, Vec y);
+/// From sliding motion about equilibrium on the frictionless bilateral real modes (method, section 6).
+Preconditioner sliding_preconditioner(const Structure& structure, const Interface& interface,
+                                      const Equilibrium& equilibrium, const RealModes& modes, int steps, double theta);
 
 /// Free periods, the reduced system, the growing base and the full-space finish, on any flow; fills everything of the
 /// cycle but what is measured on the brake's last period.
@@ -97,8 +85,8 @@ void apply(const SlidingPreconditioner& preconditioner, double period, Vec x, Ve
 /// Options, prefix -cycle_: those of the reduced SNES (-cycle_snes_..., dense, at most seven unknowns and what the base
 /// grows by); those of the fallback, -cycle_full_snes_..., -cycle_full_ksp_...; and base_growths, finish (multisecant |
 /// newton_krylov | none), difference, rank_tolerance, history, drop, clamp, stall, max_periods, multipliers.
-LimitCycle shoot(const Flow& flow, const ShootingStart& start, const SlidingPreconditioner& preconditioner,
-                 double tolerance, int free_periods);
+LimitCycle shoot(const Flow& flow, const ShootingStart& start, const Preconditioner& preconditioner, double tolerance,
+                 int free_periods);
 
 /// The brake's period map in `steps` theta steps. Keeps A and W of the last period: one factoring per period length,
 /// none for difference columns. The derivative in the period is (x_(N+1) - x_(N-1))/2h, exact for theta = 1/2 and a
@@ -110,9 +98,12 @@ struct PeriodMap
   int steps = 0;
   double theta = 0.5;
   ThetaStep step{};
-  std::vector<double> reactions{};      // warm start: at the end of the last period integrated with its rate
-  long factorings = 0, unconverged = 0; // unconverged: steps whose contact did not converge
+  std::vector<double> reactions{}; // warm start: at the end of the last period integrated with its rate
+  long unconverged = 0;            // steps whose contact did not converge
 };
+
+/// A and W for this period, unless they are those already.
+void set_period(PeriodMap& map, double period);
 
 /// Borrows the map.
 Flow flow_of(PeriodMap& map);
@@ -120,6 +111,14 @@ Flow flow_of(PeriodMap& map);
 /// Fills what is measured over one more period from the cycle's start, recorded; `samples` displacements are kept.
 /// Returns the period's end.
 State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int samples, LimitCycle& cycle);
+
+/// -cycle_start_amplitude
+double start_amplitude_factor();
+
+/// The shooting's cycle of the model from any start, with what is measured over one more period of it.
+LimitCycle shoot_at_model(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                          const ShootingStart& start, const Preconditioner& preconditioner,
+                          const CycleSettings& settings, int free_periods, Mat probes);
 
 /// From the energy estimate of the first of the unstable modes, which the cycle follows, and those of the others on
 /// top: none may be left asleep. Options: -cycle_start_amplitude, -cycle_start_period (multiples of the estimate's, 1),

@@ -51,4 +51,7 @@ State mode_state(const Equilibrium& equilibrium, const ComplexMode& mode, double
 std::vector<State> estimated_motions(const Structure& structure, const Interface& interface,
                                      const Equilibrium& equilibrium, std::span<const ComplexMode> modes);
 
+/// state += factor motion
+void add_motion(const State& motion, double factor, State& state);
+
 } // namespace squeal

@@ -30,7 +30,6 @@ struct Fidelity
   long reduced_periods = 0, full_periods = 0;
   double frequency_error = 0, energy_error = 0;           // of the model: what the last correction moved
   double step_frequency_error = 0, step_energy_error = 0; // of the step size
-  double growth_rate_error = 0;                           // of the reduced model's followed mode
   double reduction_seconds = 0, reduced_seconds = 0, full_seconds = 0;
 };
 

@@ -7,15 +7,18 @@
 ///     g = g0 + G_n q >= 0,   s = G_t q' - v_d,   G = B_a Z V,
 /// all three matrices unsymmetric. V holds the complex modes of the full problem in the band (real and imaginary parts,
 /// so that the reduced model has exactly their growth rates) and the attachment shapes of the active pairs,
-///     (K_z + w^2 M_z) X = Z'B_a',   K_z = Z'K Z, w the followed mode's,
-/// orthonormal in the energy of K_z + w^2 M_z; of the attachments what is new above a threshold.
+///     (K_z + w^2 M_z) X = Z'(B_n' + mu B_t'e),   K_z = Z'K Z, w the followed mode's, e the drive's direction,
+/// one a pair (two more across it gained nothing), orthonormal in the energy of K_z + w^2 M_z; of the attachments what
+/// is new above a threshold.
 ///
 /// Caveats: an eliminated pair's friction turns with the sliding direction to first order only (C_f), and it is taken
 /// never to part or stick. What all that is worth is measured: one period of the full model from the reduced cycle.
 ///
 /// Everything reduced is dense, small, and the same on every rank.
+#include "squeal/analysis/block.hpp"
 #include "squeal/analysis/cycle.hpp"
 #include "squeal/analysis/quadratic.hpp"
+#include "squeal/contact/local.hpp"
 
 #include <Eigen/Dense>
 
@@ -24,19 +27,19 @@ namespace squeal
 
 struct ReducedModel
 {
-  Eigen::MatrixXd M, C, K;       // size x size [of kg, N s/m, N/m]
-  Eigen::MatrixXd H, G;          // size x rows, rows x size; block rows a pair: normal, tangential
-  Eigen::MatrixXd M_z, C_z, K_z; // symmetric: V'Z'M Z V ..., of the energies
-  std::vector<int> active;       // pairs, ascending
+  Eigen::MatrixXd M, C, K;                        // size x size [of kg, N s/m, N/m]
+  Eigen::MatrixXd H, G;                           // size x rows, rows x size; block rows a pair: normal, tangential
+  Eigen::MatrixXd M_z, C_z, K_z;                  // symmetric: V'Z'M Z V ..., of the energies
+  Eigen::LLT<Eigen::MatrixXd> E_factor, M_factor; // of K_z + omega^2 M_z, M_z
+  std::vector<int> active;                        // pairs, ascending
   int directions = 2;
   double friction = 0;
   std::vector<double> gap;        // [m] at equilibrium, per active pair
   std::vector<double> drive;      // [m/s]
   std::vector<double> reactions;  // [N] r0
-  Owned<Mat> shapes;              // Z V, dofs x size, dense: u = u0 + shapes q
+  Block shapes;                   // Z V, dofs x size: u = u0 + shapes q
   double omega = 0;               // [rad/s] of the followed mode
   int modes = 0, attachments = 0; // columns of V
-  double seconds = 0;
 
   int size() const { return static_cast<int>(M.rows()); }
 };
@@ -82,15 +85,46 @@ struct ReducedMap
   Eigen::VectorXd from_equilibrium{};
   Eigen::MatrixXd from_reactions{}; // h A^-1 H
   Eigen::MatrixXd W{};              // G h A^-1 H
+  std::vector<PairBlock> own{};     // the symmetric part of each pair's own block of W
   Eigen::VectorXd reactions{};      // [N] warm start
+  Eigen::VectorXd rates{};          // w = W r + b of the last step
   ReducedState shift{};             // added to the period's end; empty: none
   ContactSettings contact{};
   long unconverged = 0;
 };
 
+/// A^-1 B
+Eigen::MatrixXd solve_dense(Eigen::MatrixXd A, Eigen::MatrixXd B);
+
+/// The matrices of the period's step size, unless they are those already.
+void prepare(ReducedMap& map, double period);
+
+/// One step; `before`: reactions of the step before the last, kept for extrapolation. Returns whether contact
+/// converged.
+bool advance(ReducedMap& map, ReducedState& state, Eigen::VectorXd& before);
+
 /// N steps of the period; `watch` after each.
 ReducedState integrate(ReducedMap& map, double period, ReducedState state,
                        const std::function<void(const ReducedState&)>& watch);
+
+/// A period's end and dPhi/dT there; the warm start stays what it was.
+struct Passage
+{
+  ReducedState end, rate;
+};
+
+Passage pass(ReducedMap& map, double period, ReducedState state);
+
+/// The derivative of a period's end (q, v) in its start: the product of the steps' own, exact where no pair changes its
+/// state within rounding. Collective: each rank does its share of the columns.
+Eigen::MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm comm);
+
+/// D = (dPhi_r/dx - f f^+ - I)^-1 + I at a state: f is the flow, along which the border of the shooting decides.
+Eigen::MatrixXd inside_of(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm);
+
+/// P^-1 x = -x + V D R x on the full model, V the shapes, R the coordinates in them: what lies outside is taken as
+/// forgotten within a period. Borrows both models.
+Preconditioner reduced_preconditioner(const ReducedModel& model, const Structure& structure, Eigen::MatrixXd inside);
 
 /// The flow for shooting; borrows the map and the matrices of `norm`.
 Flow flow_of(ReducedMap& map, const Structure& norm);

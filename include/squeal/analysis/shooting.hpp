@@ -39,7 +39,7 @@ struct Orbit
 struct Shooting
 {
   const Flow& flow;
-  const SlidingPreconditioner& preconditioner;
+  const Preconditioner& preconditioner;
   ShootingOptions options{};
   Owned<Vec> equilibrium{}; // (u0, 0)
   double first_period = 0;
@@ -100,9 +100,11 @@ Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start);
 void declare_reduced_options();
 void declare_fallback_options();
 
-/// From sliding modes y of the shapes' coordinates, all of them; the shapes M-orthonormal.
-SlidingPreconditioner make_preconditioner(const std::vector<DenseEigenpair>& sliding,
-                                          const std::vector<Owned<Vec>>& shapes, Mat M, int steps, double theta);
+/// From sliding modes y of the shapes' coordinates, all of them; the shapes M-orthonormal. Borrows M.
+Preconditioner sliding_preconditioner(const std::vector<DenseEigenpair>& sliding, const std::vector<Owned<Vec>>& shapes,
+                                      Mat M, int steps, double theta);
+
+void apply(const Preconditioner& preconditioner, double period, Vec x, Vec y);
 
 /// The bordered system [J d; f' 0] (x, t) = (b, row) at an orbit, J replaced by P: x = P^-1 b - t P^-1 d.
 struct Border
