@@ -95,13 +95,21 @@ Held hold(const Structure& structure, const Interface& interface)
     }
     held = {};
     if (first.loose)
+    {
       first.loose = second.loose;
+      first.indefinite = second.indefinite;
+    }
     else
     {
       second.factor = Factor();
       first = factor_positive(structure.K, interface);
     }
   }
+  if (first.loose && first.indefinite)
+    throw Error("equilibrium: the stiffness is not positive definite: a motion that is largest at " +
+                describe(structure.names, *first.loose) +
+                " is driven on, not back, and the structure diverges (buckles) from any rest; look for a stiffness of "
+                "the wrong sign, or a load beyond the critical one");
   if (first.loose)
     throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
                 describe(structure.names, *first.loose) + "; give it a support or a spring");

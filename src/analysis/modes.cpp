@@ -207,15 +207,11 @@ std::string text_of(const ModeCount& count)
 // Unstable modes by either route; all modes by inertia.
 std::string count_check(const Modes& modes)
 {
-  const bool counted = !modes.count.certified_by.empty();
-  std::string text = counted ? "confirmed: " : "NOT confirmed: ";
+  const bool confirmed = !modes.count.certified_by.empty() && !modes.routes_disagree;
+  std::string text = confirmed ? "confirmed: " : "NOT confirmed: ";
   if (modes.method == "both")
-  {
-    const int other = unstable_in(modes.projected);
-    if (other != modes.unstable_count) text = "NOT confirmed: ";
-    text += std::to_string(modes.unstable_count) + " unstable by the full problem, " + std::to_string(other) +
-            " by projection on real modes; ";
-  }
+    text += std::to_string(modes.unstable_count) + " unstable by the full problem, " +
+            std::to_string(unstable_in(modes.projected)) + " by projection on real modes; ";
   return text + text_of(modes.count);
 }
 
@@ -224,6 +220,7 @@ void judge(Modes& modes)
   for (const ComplexMode& mode : modes.modes)
     modes.outcome.residual = std::max(modes.outcome.residual, mode.backward_error);
   modes.unstable_count = unstable_in(modes.modes);
+  modes.routes_disagree = modes.method == "both" && unstable_in(modes.projected) != modes.unstable_count;
   modes.count_check = count_check(modes);
   if (modes.outcome.residual <= 1e-8 || modes.outcome.word != "converged") return;
   modes.outcome.word = "not converged";

@@ -54,20 +54,26 @@ PetscInt largest_entry(Vec x)
   return where;
 }
 
-/// After a failed factorisation: the loose motion of A with a little added to its diagonal.
-PetscInt loose_by_shift(Mat A, Vec D)
+/// After a failed factorisation: the motion that A with a little added to its diagonal resists least. If that does not
+/// factor either, A does not resist that motion but drives it on.
+void find_loose(Mat A, Vec D, Factored& result)
 {
-  double largest = 0;
+  double largest = 0, part = 1e-8;
   check(VecNorm(D, NORM_INFINITY, &largest));
-  Owned<Mat> shifted;
-  check(MatDuplicate(A, MAT_COPY_VALUES, shifted.put()));
-  check(MatShift(shifted, largest > 0 ? 1e-8 * largest : 1));
-  const Factor factor(shifted, nullptr, Factor::Kind::automatic);
   const auto x = uneven_vector(A);
   const auto uniform = zeros_like(D);
   check(VecSet(uniform, 1));
-  if (!factor.failed()) least_resistance(factor, uniform, x);
-  return largest_entry(x);
+  for (bool failed = true; failed && part < 100; part *= 10)
+  {
+    Owned<Mat> shifted;
+    check(MatDuplicate(A, MAT_COPY_VALUES, shifted.put()));
+    check(MatShift(shifted, largest > 0 ? part * largest : 1));
+    const Factor factor(shifted, nullptr, Factor::Kind::automatic);
+    failed = factor.failed();
+    if (failed) result.indefinite = true;
+    if (!failed) least_resistance(factor, uniform, x);
+  }
+  result.loose = largest_entry(x);
 }
 
 } // namespace
@@ -82,7 +88,7 @@ Factored factor_positive(Mat A, const Interface& interface)
   check(MatGetDiagonal(A, D));
   if (result.factor.failed())
   {
-    result.loose = loose_by_shift(A, D);
+    find_loose(A, D, result);
     return result;
   }
   // a singular matrix often factors without complaint; rounding leaves it this much resistance and no more
@@ -94,10 +100,10 @@ Factored factor_positive(Mat A, const Interface& interface)
 
 CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names)
 {
-  auto [factor, loose, resistance] = factor_positive(A, interface);
+  auto [factor, loose, indefinite, resistance] = factor_positive(A, interface);
   if (loose)
-    throw Error("singular: nothing resists a motion that is largest at " + describe(names, *loose) +
-                "; give it a support, a spring or mass");
+    throw Error((indefinite ? "not positive definite: driven on, not back, is" : "singular: nothing resists") +
+                (" a motion that is largest at " + describe(names, *loose)) + "; give it a support, a spring or mass");
   CondensedOperator condensed;
   condensed.factor = std::move(factor);
   condensed.W = condensed.factor.condensed(scale);

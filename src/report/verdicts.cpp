@@ -35,8 +35,14 @@ Sentences of_modes(const Report& report)
   if (on_the_edge > 0)
     said.push_back(format("%ld of the modes are within 0.01 %% of the threshold: mesh and damping decide their sign",
                           static_cast<long>(on_the_edge)));
-  if (modes.count_check.rfind("NOT confirmed", 0) == 0)
-    said.push_back("the two routes disagree on the number of unstable modes: raise modes.real_modes");
+  if (modes.routes_disagree)
+    said.push_back("the two routes disagree on the number of unstable modes: raise modes.real_modes or "
+                   "modes.residual_passes");
+  if (modes.count.certified_by.empty() && modes.count.expected != modes.count.found)
+    said.push_back(format("%d pairs were found where %d are expected, so an unstable one may be missing: %s",
+                          modes.count.found, modes.count.expected,
+                          modes.method == "projection" ? "raise modes.real_modes, or take modes.method = \"full\""
+                                                       : "-modes_solver toar seeks them otherwise"));
   return said;
 }
 

@@ -103,6 +103,12 @@ def with_nan(folder):
     (folder / "F.petsc").write_bytes(struct.pack(">ii", 1211214, 3) + struct.pack(">3d", 0, float("nan"), 0))
 
 
+def with_negative_stiffness(folder):
+    data = (folder / "K.petsc").read_bytes()
+    assert data.count(struct.pack(">d", 1.1)) == 1
+    (folder / "K.petsc").write_bytes(data.replace(struct.pack(">d", 1.1), struct.pack(">d", -1.1)))
+
+
 # name: how to write it, what the message must speak of
 CASES = {
     "missing scene file": (lambda folder: [folder / "absent.toml"], ["absent.toml"]),
@@ -130,6 +136,7 @@ CASES = {
     "not a PETSc file": (matrix_scene(not_petsc), ["M.petsc"]),
     "sizes that disagree": (matrix_scene(wrong_size), ["F.petsc", "2", "3"]),
     "missing matrix": (matrix_scene(missing), ["B.petsc"]),
+    "negative stiffness": (matrix_scene(with_negative_stiffness), ["not positive definite", "dof 0"]),
     "entry not finite": (matrix_scene(with_nan), ["F.petsc"]),
 }
 

@@ -53,6 +53,7 @@ struct Modes
   std::vector<ComplexMode> projected; // the other route's, when both ran
   std::vector<double> beyond_band;    // [Hz] pairs between the band and count.frequency
   int unstable_count = 0;
+  bool routes_disagree = false; // on unstable_count, when both ran
   ModeCount count;
   std::string count_check; // in words: unstable modes by either route, all modes by inertia
 };

@@ -27,7 +27,8 @@ struct Factored
 {
   Factor factor;
   std::optional<PetscInt> loose;
-  double resistance = 0; // least x'A x / x' diag(A) x found by inverse iteration
+  bool indefinite = false; // of `loose`: A drives that motion on
+  double resistance = 0;   // least x'A x / x' diag(A) x found by inverse iteration
 };
 
 Factored factor_positive(Mat A, const Interface& interface);
