@@ -196,3 +196,17 @@ TEST_CASE("sparse and dense factors agree: the condensed operator, both halves o
     CHECK(distance < 1e-12);
   }
 }
+
+TEST_CASE("the memory foreseen for a factor holds its entries, and more with a border than without")
+{
+  const std::size_t n = 600, rows = 300; // sparse enough for MUMPS, wide enough to be seen in whole megabytes
+  const auto K = chain_stiffness(n);
+  test::Rows B = test::zeros(rows, n);
+  for (std::size_t i = 0; i < rows; ++i) B[i][2 * i] = 1;
+  const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
+  const auto interface =
+      test::make_interface(B, 1, std::vector<double>(150, 0.), std::vector<double>(150, 1.), .3, structure.K);
+  const double bordered = factor_memory(structure.K, interface.B), alone = factor_memory(structure.K, nullptr);
+  CHECK(bordered >= 8 * Factor(structure.K, interface.B, Factor::Kind::automatic).entries());
+  CHECK(bordered > alone);
+}
