@@ -1,10 +1,10 @@
 /// Structures that come as matrices: M C K F of a folder, PETSc binary.
 #include "matrices.hpp"
 
+#include "nodes.hpp"
 #include "squeal/solid/binary.hpp"
 
 #include <cmath>
-#include <sstream>
 
 namespace squeal
 {
@@ -51,10 +51,10 @@ void check_symmetric(Mat A, const std::filesystem::path& file, MPI_Comm comm)
   std::string problem;
   if (overall > symmetry_tolerance * scale && worst.size == overall)
   {
-    std::ostringstream text;
-    text << file.string() << ": not symmetric: entries (" << worst.row << ", " << worst.column << ") and ("
-         << worst.column << ", " << worst.row << ") differ by " << worst.size << ", the largest entry is " << scale;
-    problem = text.str();
+    problem =
+        file.string() + format(": not symmetric: entries (%d, %d) and (%d, %d) differ by %g, the largest entry is %g",
+                               static_cast<int>(worst.row), static_cast<int>(worst.column),
+                               static_cast<int>(worst.column), static_cast<int>(worst.row), worst.size, scale);
   }
   agree(comm, problem);
 }
@@ -105,11 +105,8 @@ std::string describe(const DofNames& names, PetscInt dof)
   static const char* const directions[] = {"x", "y", "z", "rx", "ry", "rz"};
   const int motion = names.motion.at(static_cast<std::size_t>(dof));
   const auto node = static_cast<std::size_t>(motion / 6);
-  const Vec3& at = names.at[node];
-  std::ostringstream text;
-  text << names.bodies[static_cast<std::size_t>(names.body[node])] << ", node " << node << " at (" << at[0] << ", "
-       << at[1] << ", " << at[2] << "), direction " << directions[motion % 6];
-  return text.str();
+  return names.bodies[static_cast<std::size_t>(names.body[node])] + ", " + node_text(motion / 6, names.at[node]) +
+         ", direction " + directions[motion % 6];
 }
 
 void mark_symmetric(Mat A)

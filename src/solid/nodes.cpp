@@ -2,8 +2,6 @@
 
 #include "squeal/base/error.hpp"
 
-#include <sstream>
-
 namespace squeal
 {
 
@@ -23,12 +21,14 @@ template <class Map> void add_names(const Map& map, std::vector<std::string>& na
 
 } // namespace
 
+std::string node_text(int node, const Vec3& at)
+{
+  return format("node %d at (%g, %g, %g)", node, at[0], at[1], at[2]);
+}
+
 std::string node_text(const Mesh& mesh, int node)
 {
-  const Vec3& at = mesh.nodes[static_cast<std::size_t>(node)];
-  std::ostringstream text;
-  text << "node " << node << " at (" << at[0] << ", " << at[1] << ", " << at[2] << ")";
-  return text.str();
+  return node_text(node, mesh.nodes[static_cast<std::size_t>(node)]);
 }
 
 std::vector<int> nodes_named(const Mesh& mesh, const std::string& name, const std::string& asker)

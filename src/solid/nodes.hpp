@@ -7,6 +7,7 @@ namespace squeal
 {
 
 /// "node 12 at (x, y, z)"
+std::string node_text(int node, const Vec3& at);
 std::string node_text(const Mesh& mesh, int node);
 
 /// The node of a point or rigid body, or else the nodes of a group. Error: no such name; `asker` is who named it.
