@@ -21,7 +21,7 @@ using Complex = std::complex<double>;
 using Eigen::Index, Eigen::MatrixXcd, Eigen::VectorXcd;
 
 constexpr PetscInt block_size = 6;      // solved for at once
-constexpr PetscInt largest_space = 600; // vectors
+constexpr PetscInt largest_space = 800; // vectors
 constexpr double tolerance = 1e-11;     // of a pair, relative to its eigenvalue of the inverse
 
 // |s| (A - s B)^-1 B Z, on z = (y, lambda y / |s|).

@@ -15,7 +15,8 @@ namespace
 
 using Complex = std::complex<double>;
 
-constexpr int per_slice = 50; // pairs
+constexpr int per_slice = 70;            // pairs
+constexpr double usual = .03, wide = .1; // [rad] by which friction may turn a pair: the change of its damping ratio
 constexpr double two_pi = 2 * std::numbers::pi;
 
 int count_below(const std::vector<double>& ascending, double omega)
@@ -49,21 +50,21 @@ std::vector<double> plan(const std::vector<double>& omega, double floor, double 
   return edges;
 }
 
-// The pairs expected in a slice, and the disc about them that must be searched: all of the slice at their angle, and
-// a tenth more for what friction moves.
+// The pairs expected in a slice, and those found in the disc that is searched about them.
 struct Slice
 {
   double lower = 0, upper = 0; // [rad/s]
   int expected = 0;
-  Complex centre;
-  double radius = 0;
+  Complex centre;    // at the angle of those expected,
+  double spread = 0; // and the farthest of them from it
+  std::vector<Eigenpair> pairs;
 
   Window window() const { return {lower * lower, upper * upper}; }
 };
 
 Slice slice_between(const std::vector<Complex>& predicted, double lower, double upper)
 {
-  Slice slice{lower, upper, 0, 0, 0};
+  Slice slice{lower, upper, 0, 0, 0, {}};
   double angle = 0;
   for (const Complex lambda : predicted)
     if (std::abs(lambda) >= lower && std::abs(lambda) < upper)
@@ -73,23 +74,46 @@ Slice slice_between(const std::vector<Complex>& predicted, double lower, double 
     }
   angle = slice.expected > 0 ? angle / slice.expected : std::numbers::pi / 2;
   slice.centre = std::polar((lower + upper) / 2, angle);
-  slice.radius = (upper - lower) / 2;
   for (const Complex lambda : predicted)
     if (std::abs(lambda) >= lower && std::abs(lambda) < upper)
-      slice.radius = std::max(slice.radius, std::abs(lambda - slice.centre));
-  slice.radius *= 1.1;
+      slice.spread = std::max(slice.spread, std::abs(lambda - slice.centre));
   return slice;
 }
 
-// If the Krylov space grows too large the slice stays empty, and the count tells.
-std::vector<Eigenpair> find_pairs(const QuadraticProblem& problem, ComplexFactor& factor, const Slice& slice)
+// The disc holds those expected, and all of the slice whose angle is `slack` [rad] or less from the centre's. If the
+// Krylov space grows too large the slice stays as it is, and the count tells.
+void find_pairs(Slice& slice, const QuadraticProblem& problem, ComplexFactor& factor, double slack)
 {
   factor.move_to(slice.centre);
-  const NearestPairs nearest = solve_nearest_pairs(problem, factor, slice.radius, slice.expected);
-  std::vector<Eigenpair> pairs;
-  if (nearest.converged) pairs = eigenpairs(problem, nearest.lambda, nearest.y);
-  std::erase_if(pairs, [&](const Eigenpair& pair) { return !slice.window().holds(pair.lambda); });
-  return pairs;
+  const Complex corner = std::polar(slice.upper, std::arg(slice.centre) + slack);
+  const double radius = std::max(1.02 * slice.spread, std::abs(corner - slice.centre));
+  const NearestPairs nearest = solve_nearest_pairs(problem, factor, radius, slice.expected);
+  if (!nearest.converged) return;
+  slice.pairs = eigenpairs(problem, nearest.lambda, nearest.y);
+  std::erase_if(slice.pairs, [&](const Eigenpair& pair) { return !slice.window().holds(pair.lambda); });
+}
+
+int found_in(const std::vector<Slice>& slices)
+{
+  int count = 0;
+  for (const Slice& slice : slices) count += static_cast<int>(slice.pairs.size());
+  return count;
+}
+
+int expected_in(const std::vector<Slice>& slices)
+{
+  int count = 0;
+  for (const Slice& slice : slices) count += slice.expected;
+  return count;
+}
+
+// If pairs are missing, friction moved them far: wherever a slice has fewer than expected, more is searched. Between
+// neighbours pairs may have changed places, so that only the sum is sure.
+void search_wider(std::vector<Slice>& slices, const QuadraticProblem& problem, ComplexFactor& factor)
+{
+  for (Slice& slice : slices)
+    if (found_in(slices) < expected_in(slices) && static_cast<int>(slice.pairs.size()) < slice.expected)
+      find_pairs(slice, problem, factor, wide);
 }
 
 } // namespace
@@ -128,14 +152,19 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, const std::vect
   const double floor = std::sqrt(vibration_floor(norms_of(problem)));
   const std::vector<double> edges = plan(omega, floor, two_pi * band, two_pi * reach);
   ComplexFactor factor(problem);
+  std::vector<Slice> slices;
   for (std::size_t k = 1; k < edges.size(); ++k)
   {
-    for (Eigenpair& pair : find_pairs(problem, factor, slice_between(predicted, edges[k - 1], edges[k])))
-      solution.pairs.push_back(std::move(pair));
+    slices.push_back(slice_between(predicted, edges[k - 1], edges[k]));
+    find_pairs(slices.back(), problem, factor, usual);
     ++solution.outcome.iterations;
-    result.count = count_pairs(solution, omega, floor, edges[k]);
-    if (edges[k] >= two_pi * band && result.count.expected == result.count.found) break;
+    if (edges[k] < two_pi * band) continue;
+    if (found_in(slices) < expected_in(slices)) search_wider(slices, problem, factor);
+    if (found_in(slices) == expected_in(slices)) break;
   }
+  for (Slice& slice : slices)
+    for (Eigenpair& pair : slice.pairs) solution.pairs.push_back(std::move(pair));
+  result.count = count_pairs(solution, omega, floor, slices.back().upper);
   settle(solution);
   return result;
 }

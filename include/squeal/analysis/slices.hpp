@@ -4,8 +4,9 @@
 ///
 /// Slices are planned on the frictionless pairs, lambda^2 + c lambda + omega^2 = 0 with the modal damping c = x'C x of
 /// the real modes x, which also count.
-/// Caveat: a pair that friction moves by more than the width of its slice, or whose oscillation stops, shows in the
-/// count; TOAR (quadratic.hpp) knows no slices.
+/// Friction turns pairs about zero, by as much as it changes their damping ratio: a slice holds those turned by .03,
+/// and where pairs are missing in the end, by .1. Caveat: a pair that turns further, or whose oscillation stops, shows
+/// in the count; TOAR (quadratic.hpp) knows no slices.
 #include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/real_modes.hpp"
 
