@@ -172,7 +172,7 @@ FittedCycle find_fitted_cycle(const Structure& structure, const Interface& inter
   const auto unstable = static_cast<std::size_t>(std::max(modes.unstable_count, 1));
   const Full full{structure, interface, equilibrium, modes.modes, std::span(modes.modes).first(unstable),
                   estimate,  settings,  probes};
-  const bool adaptive = asked == "auto", from_reduced = asked == "full" && starts_reduced();
+  const bool adaptive = asked == "auto", from_reduced = starts_reduced() && asked == "full";
   Fitting fitting(full);
   fitting.steps = adaptive ? std::min(64, settings.steps_per_period) : settings.steps_per_period;
   fitting.tolerance = from_reduced ? 1e-3 : 1e-3 * accuracy; // a start need not be better
