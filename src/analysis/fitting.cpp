@@ -70,8 +70,9 @@ void build(Fitting& fitting)
   const double clock = MPI_Wtime();
   const Full& full = fitting.full;
   Reduced& reduced = fitting.reduced;
-  reduced.model = reduce(full.structure, full.interface, full.equilibrium, full.modes, fitting.active,
-                         {static_cast<int>(fitting.options.modes), fitting.options.threshold});
+  reduced.model = reduce(
+      full.structure, full.interface, full.equilibrium, full.modes, fitting.active,
+      {static_cast<int>(fitting.options.modes), fitting.options.threshold, fitting.result.fidelity.asked == "full"});
   reduced.norm = small_structure(reduced.model);
   reduced.modes = closed_modes(reduced.model, 3 * full.unstable.front().frequency_hz());
   reduced.sliding = sliding_modes(reduced.model, reduced.modes);

@@ -229,11 +229,12 @@ ReducedModel reduce(const Structure& structure, const Interface& interface, cons
   model.modes += extend(V, EV, std::move(others), E, 1e-6);
   const Owned<Mat> B = rows_of(interface, active);
   check(MatMatMult(B, contact.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
-  model.attachments =
-      extend(V, EV, attachment_columns(E, sliding_forces(transposed(BZ), interface, active)), E, reduction.threshold);
+  Block forces = transposed(BZ);
+  if (reduction.sliding_forces) forces = sliding_forces(forces, interface, active);
+  model.attachments = extend(V, EV, attachment_columns(E, forces), E, reduction.threshold);
 
   // the projection
-  const Block left = product(contact.Y, V), forces = transposed(B);
+  const Block left = product(contact.Y, V), rows = transposed(B);
   model.shapes = product(contact.Z, V);
   for (const auto& [matrix, unsymmetric, symmetric] :
        {std::tuple{structure.M.get(), &model.M, &model.M_z}, std::tuple{structure.C.get(), &model.C, &model.C_z},
@@ -246,8 +247,8 @@ ReducedModel reduce(const Structure& structure, const Interface& interface, cons
   }
   if (const Owned<Mat> turning = direction_damping(interface, sliding); turning.get())
     model.C += gram(left, product(turning, model.shapes));
-  model.H = gram(left, forces);
-  model.G = gram(forces, model.shapes);
+  model.H = gram(left, rows);
+  model.G = gram(rows, model.shapes);
   model.E_factor.compute(model.K_z + omega * omega * model.M_z);
   model.M_factor.compute(model.M_z);
 

@@ -7,9 +7,9 @@
 ///     g = g0 + G_n q >= 0,   s = G_t q' - v_d,   G = B_a Z V,
 /// all three matrices unsymmetric. V holds the complex modes of the full problem in the band (real and imaginary parts,
 /// so that the reduced model has exactly their growth rates) and the attachment shapes of the active pairs,
-///     (K_z + w^2 M_z) X = Z'(B_n' + mu B_t'e),   K_z = Z'K Z, w the followed mode's, e the drive's direction,
-/// one a pair (two more across it gained nothing), orthonormal in the energy of K_z + w^2 M_z; of the attachments what
-/// is new above a threshold.
+///     (K_z + w^2 M_z) X = Z'B_a',   K_z = Z'K Z, w the followed mode's,
+/// orthonormal in the energy of K_z + w^2 M_z; of the attachments what is new above a threshold. One shape a pair, of
+/// Z'(B_n' + mu B_t'e) with e along the drive, does for a preconditioner; a cycle of its own needs them all.
 ///
 /// Caveats: an eliminated pair's friction turns with the sliding direction to first order only (C_f), and it is taken
 /// never to part or stick. What all that is worth is measured: one period of the full model from the reduced cycle.
@@ -52,6 +52,7 @@ struct Reduction
 {
   int modes = 0;           // complex modes taken, nearest in frequency to the followed one, which is the first of all
   double threshold = 1e-5; // an attachment shape is dropped when less than this part of it is new
+  bool sliding_forces = false; // attachments of each pair's normal force with its friction alone
 };
 
 ReducedModel reduce(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
