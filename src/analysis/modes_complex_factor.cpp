@@ -1,5 +1,7 @@
 #include "squeal/analysis/complex_factor.hpp"
 
+#include "squeal/contact/mumps.hpp"
+
 #include <algorithm>
 #include <cstring>
 #include <zmumps_c.h>
@@ -12,15 +14,6 @@ namespace
 
 using Complex = std::complex<double>;
 using Index = std::size_t;
-
-enum Job
-{
-  start = -1,
-  end = -2,
-  analyse = 1,
-  factorise = 2,
-  solve_phase = 3,
-};
 
 // The entries of K, C and M, one after the other: MUMPS sums those of one place.
 struct Entries
@@ -53,22 +46,16 @@ struct ComplexFactor::Parts
   ZMUMPS_STRUC_C mumps;
 
   bool here() const { return rank_of(comm) == 0; }
-  MUMPS_INT& control(int number) { return mumps.icntl[number - 1]; } // MUMPS counts from one
-  void run(Job job, const char* phase);
+  void run(MumpsJob job, const char* phase);
   void gather(const ComplexBlock& X);
   ComplexBlock scatter(const ComplexBlock& pattern);
 };
 
-void ComplexFactor::Parts::run(Job job, const char* phase)
+void ComplexFactor::Parts::run(MumpsJob job, const char* phase)
 {
-  mumps.job = job;
-  zmumps_c(&mumps);
-  // Pivots that are put off need more room than was estimated.
-  while (job == Job::factorise && (mumps.infog[0] == -8 || mumps.infog[0] == -9) && control(14) < 2000)
-  {
-    control(14) = 4 * control(14) + 10;
-    zmumps_c(&mumps);
-  }
+  mumps.job = static_cast<MUMPS_INT>(job);
+  const auto work = [&] { zmumps_c(&mumps); };
+  job == MumpsJob::factorise ? factorise_in_room(mumps, work) : work();
   if (mumps.infog[0] < 0)
     throw LibraryError("MUMPS's " + std::string(phase) + " of the modes at a complex shift: INFOG(1) = " +
                        std::to_string(mumps.infog[0]) + ", which its manual explains (-13: out of memory)");
@@ -124,22 +111,22 @@ ComplexFactor::ComplexFactor(const QuadraticProblem& problem) : parts_(std::make
   mumps.par = 1;
   mumps.sym = 0;
   mumps.comm_fortran = static_cast<MUMPS_INT>(MPI_Comm_c2f(parts.comm));
-  parts.run(Job::start, "start");
-  for (const int stream : {1, 2, 3}) parts.control(stream) = -1;
-  parts.control(4) = 0;   // silent
-  parts.control(14) = 30; // [%] room beyond its estimate
-  parts.control(18) = 3;  // every rank gives its share of the entries
+  parts.run(MumpsJob::start, "start");
+  for (const int stream : {1, 2, 3}) control(mumps, stream) = -1;
+  control(mumps, 4) = 0;   // silent
+  control(mumps, 14) = 30; // [%] room beyond its estimate
+  control(mumps, 18) = 3;  // every rank gives its share of the entries
   mumps.n = parts.shares.total();
   mumps.nnz_loc = static_cast<MUMPS_INT8>(parts.values.size());
   mumps.irn_loc = parts.entries.row.data();
   mumps.jcn_loc = parts.entries.column.data();
   mumps.a_loc = reinterpret_cast<ZMUMPS_COMPLEX*>(parts.values.data());
-  parts.run(Job::analyse, "analysis");
+  parts.run(MumpsJob::analyse, "analysis");
 }
 
 ComplexFactor::~ComplexFactor()
 {
-  parts_->mumps.job = Job::end;
+  parts_->mumps.job = static_cast<MUMPS_INT>(MumpsJob::end);
   zmumps_c(&parts_->mumps);
 }
 
@@ -150,7 +137,7 @@ void ComplexFactor::move_to(Complex s)
   for (Index k = 0; k < entries.value.size(); ++k)
     parts.values[k] = entries.value[k] * (k < entries.first_of_C ? 1. : k < entries.first_of_M ? s : s * s);
   parts.s = s;
-  parts.run(Job::factorise, "factorisation");
+  parts.run(MumpsJob::factorise, "factorisation");
 }
 
 Complex ComplexFactor::s() const
@@ -162,11 +149,11 @@ ComplexBlock ComplexFactor::solved(const ComplexBlock& X) const
 {
   Parts& parts = *parts_;
   parts.gather(X);
-  parts.control(27) = static_cast<MUMPS_INT>(X.columns()); // all of them at each reading of the factor
+  control(parts.mumps, 27) = static_cast<MUMPS_INT>(X.columns()); // all of them at each reading of the factor
   parts.mumps.rhs = reinterpret_cast<ZMUMPS_COMPLEX*>(parts.right.data());
   parts.mumps.nrhs = static_cast<MUMPS_INT>(X.columns());
   parts.mumps.lrhs = parts.shares.total();
-  parts.run(Job::solve_phase, "solution");
+  parts.run(MumpsJob::solve_phase, "solution");
   return parts.scatter(X);
 }
 

@@ -1,5 +1,6 @@
 #include "squeal/contact/factor.hpp"
 
+#include "squeal/contact/mumps.hpp"
 #include "triplets.hpp"
 
 #include <algorithm>
@@ -54,24 +55,9 @@ namespace
 constexpr int dense_size = 500;
 constexpr double dense_fill = 0.1;
 
-enum Job
+void run(DMUMPS_STRUC_C& mumps, MumpsJob job)
 {
-  start = -1,
-  end = -2,
-  analyse = 1,
-  factorise = 2,
-  solve_phase = 3,
-};
-
-/// MUMPS's own numbering of its controls, which counts from one.
-MUMPS_INT& control(DMUMPS_STRUC_C& mumps, int number)
-{
-  return mumps.icntl[number - 1];
-}
-
-void run(DMUMPS_STRUC_C& mumps, Job job)
-{
-  mumps.job = job;
+  mumps.job = static_cast<MUMPS_INT>(job);
   dmumps_c(&mumps);
 }
 
@@ -120,7 +106,7 @@ std::unique_ptr<DMUMPS_STRUC_C> start_mumps(MPI_Comm comm)
   mumps->par = 1;
   mumps->sym = 2; // counts its negative pivots; with sym = 1 they would go unseen
   mumps->comm_fortran = static_cast<MUMPS_INT>(MPI_Comm_c2f(comm));
-  run(*mumps, Job::start);
+  run(*mumps, MumpsJob::start);
   for (const int stream : {1, 2, 3}) control(*mumps, stream) = -1;
   control(*mumps, 4) = 0;  // silent
   control(*mumps, 18) = 3; // every rank gives its share of the entries
@@ -150,7 +136,7 @@ void analyse_by_mumps(DMUMPS_STRUC_C& mumps, Triplets& mine, int dofs, int borde
     mumps.size_schur = border;
     mumps.listvar_schur = kept.data();
   }
-  run(mumps, Job::analyse);
+  run(mumps, MumpsJob::analyse);
   if (mumps.infog[0] < 0) give_up(mumps, "analysis");
   mumps.perm_in = mumps.listvar_schur = nullptr;
 }
@@ -159,11 +145,7 @@ void analyse_by_mumps(DMUMPS_STRUC_C& mumps, Triplets& mine, int dofs, int borde
 bool factorise_by_mumps(DMUMPS_STRUC_C& mumps, std::vector<double>& schur)
 {
   mumps.schur = schur.data();
-  do // its guess of the room it needs can fall short
-  {
-    run(mumps, Job::factorise);
-    control(mumps, 14) = 4 * control(mumps, 14) + 10;
-  } while ((mumps.infog[0] == -8 || mumps.infog[0] == -9) && control(mumps, 14) < 2000);
+  factorise_in_room(mumps, [&] { run(mumps, MumpsJob::factorise); });
   mumps.irn_loc = mumps.jcn_loc = nullptr;
   mumps.a_loc = nullptr;
   if (mumps.infog[0] < 0 && mumps.infog[0] != -10) give_up(mumps, "factorisation");
@@ -257,13 +239,13 @@ void Factor::Parts::solve_half(Half half) const
   mumps->lrhs = length();
   mumps->redrhs = reduced.data();
   mumps->lredrhs = border;
-  run(*mumps, Job::solve_phase);
+  run(*mumps, MumpsJob::solve_phase);
   if (mumps->infog[0] < 0) give_up(*mumps, "solution");
 }
 
 Factor::Parts::~Parts()
 {
-  if (mumps) run(*mumps, Job::end);
+  if (mumps) run(*mumps, MumpsJob::end);
 }
 
 Factor::Factor() = default;
@@ -379,7 +361,7 @@ double factor_memory(Mat A, Mat B)
   const auto mumps = start_mumps(comm_of(A));
   analyse_by_mumps(*mumps, mine, dofs, border, comm_of(A));
   const double megabytes = mumps->infog[16];
-  run(*mumps, Job::end);
+  run(*mumps, MumpsJob::end);
   return 1e6 * megabytes;
 }
 
