@@ -67,11 +67,6 @@ std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double the
   return std::log((1. + (1 - theta) * h * lambda) / (1. - theta * h * lambda)) / h;
 }
 
-double growth_bias(std::complex<double> lambda, double theta, double h)
-{
-  return discrete_eigenvalue(lambda, theta, h).real() / lambda.real() - 1;
-}
-
 double free_growth(const Structure& structure, double theta, double h)
 {
   FreeStep step{structure, theta, h, {}, {}, {}, {}, {}, {}, {}};

@@ -55,6 +55,12 @@ Structure chain(double beta)
   return test::make_structure(test::diagonal(std::vector<double>(n, 1)), C, K, std::vector<double>(n, 0));
 }
 
+/// Re(lambda_h)/Re(lambda) - 1: the part of the growth rate that the step adds or takes.
+double growth_bias(std::complex<double> lambda, double theta, double h)
+{
+  return discrete_eigenvalue(lambda, theta, h).real() / lambda.real() - 1;
+}
+
 } // namespace
 
 TEST_CASE("theta > 1/2: an unstable mode looks stable below the stated number of steps, and is refused there only")

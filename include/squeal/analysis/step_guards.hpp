@@ -16,9 +16,6 @@ namespace squeal
 /// ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h
 std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h);
 
-/// Re(lambda_h)/Re(lambda) - 1: the part of the growth rate that the step adds or takes.
-double growth_bias(std::complex<double> lambda, double theta, double h);
-
 /// Growth of the energy norm in one step of the structure free of load and contact, asymptotically: the logarithm,
 /// per step, by 300 steps from a state that excites every mode. Collective; factors A anew.
 double free_growth(const Structure& structure, double theta, double h);
