@@ -1,4 +1,5 @@
-"""What the Python tools share: a python that has their modules, runs of squeal, files in PETSc's binary format."""
+"""What the Python tools share: a python that has their modules, runs of squeal, the style of the pictures, files in
+PETSc's binary format."""
 
 import importlib.util
 import json
@@ -12,6 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PROGRAM = Path(os.environ.get("SQUEAL", ROOT / "build" / "squeal")).resolve()
 DEBIAN = "/usr/bin/python3"
 MATRIX_ID, VECTOR_ID = 1211216, 1211214  # PETSc's class numbers, MAT_FILE_CLASSID and VEC_FILE_CLASSID
+BLUE, RED, ORANGE, GREEN, GREY = "#1b6ca8", "#c0272d", "#d95f02", "#2e8b57", "#8a8a8a"
 
 
 def needs(*modules):
@@ -23,6 +25,27 @@ def needs(*modules):
     if os.path.realpath(sys.executable) == os.path.realpath(DEBIAN) or not os.path.exists(DEBIAN):
         sys.exit(f"{TOOL}: no python module {', '.join(missing)}; tools/setup installs what the tools need")
     os.execv(DEBIAN, [DEBIAN, *sys.argv])
+
+
+def pyplot(dpi=110, font_size=10):
+    """matplotlib.pyplot, drawing to files, in the style of all pictures; not before needs()."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    plt.rcParams.update({"figure.dpi": dpi, "font.size": font_size, "axes.grid": True, "grid.alpha": 0.3,
+                         "axes.spines.top": False, "axes.spines.right": False, "legend.framealpha": 0.9,
+                         "figure.constrained_layout.use": True})
+    return plt
+
+
+def save_small(figure, file):
+    """As a PNG of 256 colours: a third of the size."""
+    from PIL import Image  # matplotlib's own dependency
+
+    figure.savefig(file)
+    Image.open(file).convert("RGB").quantize(256).save(file, optimize=True)
 
 
 def arguments_and_options():
