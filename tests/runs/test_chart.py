@@ -18,8 +18,8 @@ chart = importlib.util.module_from_spec(importlib.util.spec_from_loader("chart",
 loader.exec_module(chart)
 
 
-def point(seconds, error, periods=1):
-    return chart.Point(seconds, periods, 1 + error, 1 + error)
+def point(seconds, error):
+    return chart.Point(seconds, {chart.PERIOD: 1 + error})
 
 
 def test_period_and_energy_of_a_sampled_motion(tmp_path):
@@ -82,11 +82,11 @@ def test_the_oscillator(drawn, folder):
     off by (a sixteenth of that of 100 steps); and two pictures."""
     code, printed = drawn
     assert code == 0, printed
-    errors = dict(re.findall(r"estimate: steps a period +(\d+) .* period ([+-][\d.e+-]+)$", printed, re.M))
+    errors = dict(re.findall(r"from the estimate, (\d+) steps .* period ([+-][\d.e+-]+)$", printed, re.M))
     # 50 steps a period: 1.33e-3, 100: 3.4e-4 (inputs/oscillator, 5.954461004653 s)
     assert float(errors["50"]) == pytest.approx(1.33e-3, rel=0.1)
     assert float(errors["100"]) == pytest.approx(0.25 * float(errors["50"]), rel=0.15)
-    assert re.search(r"^  1e-2 .*: [\d.]+ s, \d+ periods", printed, re.M)
+    assert re.search(r"^  1e-2 +shooting from the estimate, 50 steps: [\d.]+ s", printed, re.M)
     for name in ("chart.png", "chart_parts.png"):
         assert 10000 < (folder / name).stat().st_size < 120000
 
