@@ -86,7 +86,7 @@ def test_the_oscillator(drawn, folder):
     # 50 steps a period: 1.33e-3, 100: 3.4e-4 (inputs/oscillator, 5.954461004653 s)
     assert float(errors["50"]) == pytest.approx(1.33e-3, rel=0.1)
     assert float(errors["100"]) == pytest.approx(0.25 * float(errors["50"]), rel=0.15)
-    assert re.search(r"^  1e-2 +shooting from the estimate, 50 steps: [\d.]+ s", printed, re.M)
+    assert re.search(r"^  1e-2 +\S.* steps: [\d.]+ s +\S.* steps: [\d.]+ s", printed, re.M)  # whoever was quickest
     for name in ("chart.png", "chart_parts.png"):
         assert 10000 < (folder / name).stat().st_size < 120000
 
