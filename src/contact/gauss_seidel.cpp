@@ -4,18 +4,12 @@
 /// With w = w_0 + dw, w_0 = W r_0 + b exact and dw the effect of the changes since, the sweeps update dw alone: from
 /// the near field in single precision, which its smallness affords, or from W in double where that did not converge.
 /// The residual is believed only after w was formed afresh.
+#include "wide.hpp"
 #include "work.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-// GCC compiles what follows it for wider registers too, and chooses when the program starts.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define SQUEAL_WIDE __attribute__((target_clones("arch=haswell", "default")))
-#else
-#define SQUEAL_WIDE
-#endif
 
 namespace squeal
 {

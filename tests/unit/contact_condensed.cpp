@@ -151,55 +151,110 @@ TEST_CASE("a soft support is a support: twelve decades between springs still fac
   CHECK(factor_positive(structure.K, Interface{}).loose.has_value() == false);
 }
 
-TEST_CASE("sparse and dense factors agree: the condensed operator, both halves of a solve, several columns at once")
+namespace
 {
-  const std::size_t n = 60, rows = 6;
-  const auto K = chain_stiffness(n);
+
+/// A lattice of nodes with `width` degrees of freedom, every node coupled to its neighbours, diagonals included, by
+/// full blocks: nodes whose degrees of freedom have equal neighbours, and a few that have not.
+test::Rows lattice_stiffness(std::size_t side, std::size_t width)
+{
+  const std::size_t nodes = side * side * side, n = nodes * width;
+  test::Rows K = test::diagonal(std::vector<double>(n, 1.));
+  const auto couple = [&](std::size_t a, std::size_t b, double k)
+  {
+    K[a][a] += k, K[b][b] += k;
+    K[a][b] -= k, K[b][a] -= k;
+  };
+  const auto place = [&](std::size_t node) { return std::array{node % side, node / side % side, node / side / side}; };
+  for (std::size_t a = 0; a < nodes; ++a)
+    for (std::size_t b = 0; b < a; ++b)
+    {
+      const auto p = place(a), q = place(b);
+      bool near = true;
+      for (std::size_t k = 0; k < 3; ++k) near = near && p[k] <= q[k] + 1 && q[k] <= p[k] + 1;
+      if (!near) continue;
+      for (std::size_t i = 0; i < width; ++i)
+        for (std::size_t j = 0; j < width; ++j)
+          couple(a * width + i, b * width + j, .02 + .002 * static_cast<double>((a + 3 * b + i + 2 * j) % 7));
+    }
+  couple(0, n - 1, .5); // neighbours of their own
+  couple(1, n / 2, .5);
+  return K;
+}
+
+/// The condensed operator and both halves of a solve with `columns` right-hand sides, by both kinds of factor.
+void check_agreement(const test::Rows& K, std::size_t rows, std::size_t columns)
+{
+  const std::size_t n = K.size();
   test::Rows B = test::zeros(rows, n);
   for (std::size_t i = 0; i < rows; ++i) B[i][7 * i + 3] = 1, B[i][n - 1 - i] = -.7;
   const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
-  const auto interface = test::make_interface(B, 1, {0, 0, 0}, {1, 1, 1}, .3, structure.K);
+  const auto interface =
+      test::make_interface(B, 1, std::vector<double>(rows / 2, 0.), std::vector<double>(rows / 2, 1.), .3, structure.K);
   Factor sparse(structure.K, interface.B, Factor::Kind::sparse), dense(structure.K, interface.B, Factor::Kind::dense);
   CHECK(!sparse.failed());
   CHECK(!dense.failed());
   CHECK(largest_difference(sparse.condensed(2), dense.condensed(2)) < 1e-12);
 
-  const auto other = copy_of(structure.load);
-  check(VecSetValue(other, 11, 5, INSERT_VALUES));
-  check(VecAssemblyBegin(other));
-  check(VecAssemblyEnd(other));
-  const std::array<Vec, 2> b = {structure.load, other};
+  std::vector<Owned<Vec>> loads, by_sparse, by_dense;
+  std::vector<Vec> b, x, y;
+  for (std::size_t k = 0; k < columns; ++k)
+  {
+    loads.push_back(copy_of(structure.load));
+    check(VecSetValue(loads[k], static_cast<PetscInt>(11 + k), 5, INSERT_VALUES));
+    check(VecAssemblyBegin(loads[k]));
+    check(VecAssemblyEnd(loads[k]));
+    by_sparse.push_back(zeros_like(structure.load));
+    by_dense.push_back(zeros_like(structure.load));
+    b.push_back(loads[k]);
+    x.push_back(by_sparse[k]);
+    y.push_back(by_dense[k]);
+  }
   const auto seen = sparse.forward(b);
   CHECK(largest_difference(seen, dense.forward(b)) < 1e-12);
   std::vector<double> lambda(seen.size());
   for (std::size_t i = 0; i < lambda.size(); ++i) lambda[i] = 1 + static_cast<double>(i % 5);
-  const auto x = zeros_like(other), y = zeros_like(other), z = zeros_like(other), w = zeros_like(other);
-  const std::array<Vec, 2> by_sparse = {x, y}, by_dense = {z, w};
-  sparse.backward(lambda, by_sparse);
-  dense.backward(lambda, by_dense);
-  for (std::size_t i = 0; i < 2; ++i)
+  sparse.backward(lambda, x);
+  dense.backward(lambda, y);
+  for (std::size_t k = 0; k < columns; ++k)
   {
     // A x + B' lambda = b, the lambda of this column
-    const auto residual = copy_of(b[i]);
+    const auto residual = copy_of(b[k]);
     check(VecScale(residual, -1));
-    check(MatMultAdd(structure.K, by_sparse[i], residual, residual));
-    const std::size_t here = lambda.size() / 2;
+    check(MatMultAdd(structure.K, x[k], residual, residual));
     std::vector<double> mine(rows);
-    for (std::size_t k = 0; k < rows; ++k) mine[k] = here > 0 ? lambda[i * here + k] : 0;
+    if (!lambda.empty()) std::copy_n(&lambda[k * rows], rows, mine.begin());
     MPI_Bcast(mine.data(), static_cast<int>(rows), MPI_DOUBLE, 0, PETSC_COMM_WORLD);
     add_reactions(interface, mine, residual);
     double defect = 0, distance = 0;
     check(VecNorm(residual, NORM_INFINITY, &defect));
     CHECK(defect < 1e-12); // entries of order one: rounding
-    check(VecAXPY(by_sparse[i], -1, by_dense[i]));
-    check(VecNorm(by_sparse[i], NORM_INFINITY, &distance));
+    check(VecAXPY(x[k], -1, y[k]));
+    check(VecNorm(x[k], NORM_INFINITY, &distance));
     CHECK(distance < 1e-12);
   }
 }
 
+} // namespace
+
+TEST_CASE("sparse and dense factors agree: the condensed operator, both halves of a solve, several columns at once")
+{
+  check_agreement(chain_stiffness(60), 6, 2);
+  check_agreement(lattice_stiffness(6, 2), 30, 1);
+  check_agreement(lattice_stiffness(6, 2), 30, 11); // more than stand side by side
+}
+
+TEST_CASE("a sparse factor says of a matrix with one negative eigenvalue that it failed")
+{
+  auto K = lattice_stiffness(4, 2);
+  K[77][77] = -1;
+  const auto structure = test::make_structure(K, K, K, std::vector<double>(K.size(), 1.));
+  CHECK(Factor(structure.K, nullptr, Factor::Kind::sparse).failed());
+}
+
 TEST_CASE("the memory foreseen for a factor holds its entries, and more with a border than without")
 {
-  const std::size_t n = 600, rows = 300; // sparse enough for MUMPS, wide enough to be seen in whole megabytes
+  const std::size_t n = 600, rows = 300; // sparse enough not to be taken dense
   const auto K = chain_stiffness(n);
   test::Rows B = test::zeros(rows, n);
   for (std::size_t i = 0; i < rows; ++i) B[i][2 * i] = 1;

@@ -5,8 +5,8 @@
 /// and splits a solve in two halves: `forward` turns b into B A^-1 b, `backward` then gives x = A^-1 (b - B' lambda)
 /// for a lambda chosen in between. Both together cost less than two solves with A alone.
 ///
-/// By MUMPS (L D L' without pivoting, METIS ordering), or dense (L L' by LAPACK) where that is quicker: small or full
-/// A. Right-hand sides, several at once at will, pass through rank 0.
+/// Sparse by supernodes (L L', METIS ordering), or dense by LAPACK where that is quicker: small or full A. It is kept
+/// on rank 0, and right-hand sides, several at once at will, pass through there.
 #include "squeal/base/petsc.hpp"
 
 #include <memory>
@@ -54,8 +54,7 @@ private:
   std::unique_ptr<Parts> parts_;
 };
 
-/// What a Factor of A bordered by B (may be null) would hold at its largest, the ranks' added up, as the analysis
-/// foresees it; its condensed corner apart [bytes]. Collective.
+/// What a Factor of A bordered by B (may be null) holds at its largest; its condensed corner apart [bytes]. Collective.
 double factor_memory(Mat A, Mat B);
 
 /// x = A^-1 b.

@@ -1,0 +1,168 @@
+#include "panel.hpp"
+
+#include "wide.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Four = double __attribute__((vector_size(32)));
+
+SQUEAL_INLINE void get(const double* from, Four& to)
+{
+  std::memcpy(&to, from, sizeof to);
+}
+
+SQUEAL_INLINE void put(const Four& value, double* to)
+{
+  std::memcpy(to, &value, sizeof value);
+}
+
+SQUEAL_INLINE void product_of_one(const Panel& L, const double* __restrict x, double* __restrict y)
+{
+  std::size_t j = 0;
+  for (; j + 4 <= L.columns; j += 4)
+  {
+    const double *a = L.values + j * L.height, *b = a + L.height, *c = b + L.height, *d = c + L.height;
+    const double p = x[j], q = x[j + 1], r = x[j + 2], s = x[j + 3];
+    for (std::size_t i = 0; i < L.rows; ++i) y[i] -= p * a[i] + q * b[i] + r * c[i] + s * d[i];
+  }
+  for (; j < L.columns; ++j)
+    for (std::size_t i = 0; i < L.rows; ++i) y[i] -= x[j] * L.values[j * L.height + i];
+}
+
+/// y[k] -= L_k'x, one after the other in four sums, which the compiler may not form by itself.
+template <std::size_t columns>
+SQUEAL_INLINE void subtract_dots(const Panel& L, std::size_t j, const double* x, double* y)
+{
+  const double* const first = L.values + j * L.height;
+  Four sums[columns] = {}, some_L, some_x;
+  std::size_t i = 0;
+  for (; i + 4 <= L.rows; i += 4)
+  {
+    get(x + i, some_x);
+    for (std::size_t k = 0; k < columns; ++k)
+    {
+      get(first + k * L.height + i, some_L);
+      sums[k] += some_L * some_x;
+    }
+  }
+  for (std::size_t k = 0; k < columns; ++k)
+  {
+    double sum = sums[k][0] + sums[k][1] + sums[k][2] + sums[k][3];
+    for (std::size_t row = i; row < L.rows; ++row) sum += first[k * L.height + row] * x[row];
+    y[j + k] -= sum;
+  }
+}
+
+SQUEAL_INLINE void transposed_of_one(const Panel& L, const double* __restrict x, double* __restrict y)
+{
+  std::size_t j = 0;
+  for (; j + 4 <= L.columns; j += 4) subtract_dots<4>(L, j, x, y);
+  for (; j < L.columns; ++j) subtract_dots<1>(L, j, x, y);
+}
+
+constexpr std::size_t strip = 4, block = 64; // rows and columns of what is gathered at a time
+
+/// Rows [i, i + rows) of `count` columns from j on, those of a column side by side; zeros up to a whole strip.
+SQUEAL_INLINE void gather(const Panel& L, std::size_t i, std::size_t rows, std::size_t j, std::size_t count, double* to)
+{
+  const double* from = L.values + j * L.height + i;
+  for (std::size_t k = 0; k < count; ++k)
+    if (rows == strip)
+      std::memcpy(to + strip * k, from + k * L.height, strip * sizeof(double));
+    else
+      for (std::size_t row = 0; row < strip; ++row) to[strip * k + row] = row < rows ? from[k * L.height + row] : 0.;
+}
+
+SQUEAL_INLINE void product_of_many(const Panel& L, std::size_t lanes, const double* __restrict x, double* __restrict y)
+{
+  double some_L[strip * block];
+  for (std::size_t j = 0; j < L.columns; j += block)
+  {
+    const std::size_t count = std::min(block, L.columns - j);
+    for (std::size_t i = 0; i < L.rows; i += strip)
+    {
+      const std::size_t rows = std::min(strip, L.rows - i);
+      gather(L, i, rows, j, count, some_L);
+      for (std::size_t lane = 0; lane < lanes; lane += wide)
+      {
+        Four sums[strip][2] = {}, low, high;
+        for (std::size_t k = 0; k < count; ++k)
+        {
+          get(x + (j + k) * lanes + lane, low);
+          get(x + (j + k) * lanes + lane + 4, high);
+          for (std::size_t row = 0; row < strip; ++row)
+          {
+            sums[row][0] += some_L[strip * k + row] * low;
+            sums[row][1] += some_L[strip * k + row] * high;
+          }
+        }
+        for (std::size_t row = 0; row < rows; ++row)
+        {
+          double* const target = y + (i + row) * lanes + lane;
+          get(target, low);
+          get(target + 4, high);
+          put(low - sums[row][0], target);
+          put(high - sums[row][1], target + 4);
+        }
+      }
+    }
+  }
+}
+
+SQUEAL_INLINE void transposed_of_many(const Panel& L, std::size_t lanes, const double* __restrict x,
+                                      double* __restrict y)
+{
+  double some_L[strip * block];
+  for (std::size_t j = 0; j < L.columns; j += block)
+  {
+    const std::size_t count = std::min(block, L.columns - j);
+    for (std::size_t i = 0; i < L.rows; i += strip)
+    {
+      const std::size_t rows = std::min(strip, L.rows - i);
+      gather(L, i, rows, j, count, some_L);
+      for (std::size_t lane = 0; lane < lanes; lane += wide)
+      {
+        Four some_x[strip][2] = {}, low, high;
+        for (std::size_t row = 0; row < rows; ++row)
+        {
+          get(x + (i + row) * lanes + lane, some_x[row][0]);
+          get(x + (i + row) * lanes + lane + 4, some_x[row][1]);
+        }
+        for (std::size_t k = 0; k < count; ++k)
+        {
+          double* const target = y + (j + k) * lanes + lane;
+          get(target, low);
+          get(target + 4, high);
+          for (std::size_t row = 0; row < strip; ++row)
+          {
+            low -= some_L[strip * k + row] * some_x[row][0];
+            high -= some_L[strip * k + row] * some_x[row][1];
+          }
+          put(low, target);
+          put(high, target + 4);
+        }
+      }
+    }
+  }
+}
+
+} // namespace
+
+SQUEAL_WIDE void subtract_product(const Panel& L, std::size_t lanes, const double* x, double* y)
+{
+  lanes == 1 ? product_of_one(L, x, y) : product_of_many(L, lanes, x, y);
+}
+
+SQUEAL_WIDE void subtract_transposed(const Panel& L, std::size_t lanes, const double* x, double* y)
+{
+  lanes == 1 ? transposed_of_one(L, x, y) : transposed_of_many(L, lanes, x, y);
+}
+
+} // namespace squeal
