@@ -1,7 +1,6 @@
 #include "squeal/analysis/modes.hpp"
 
 #include "squeal/analysis/closed_contact.hpp"
-#include "squeal/analysis/complex_shift.hpp"
 #include "squeal/analysis/projection.hpp"
 #include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/real_modes.hpp"
@@ -114,80 +113,53 @@ ModesOptions read_options()
   return options;
 }
 
-// The real modes a little beyond the band, by which slices are planned and pairs are counted.
-struct RealSpectrum
+// Friction may move a pair across the band's edge: a little below it both counts agree, then.
+PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution& solution, RealCount& real,
+                        double band)
 {
-  RealModes modes;
-  double reach = 0; // [Hz]: all below are there
-};
-
-RealSpectrum find_spectrum(const SlidingProblem& problem, const ModesSettings& settings, int dense_limit)
-{
-  RealSpectrum spectrum;
-  spectrum.reach = 1.05 * settings.band;
-  spectrum.modes = solve_real_modes_below(problem.M, problem.K, spectrum.reach, dense_limit);
-  return spectrum;
+  const double end = 2 * std::numbers::pi * band;
+  return count_pairs(solution, real, std::sqrt(vibration_floor(norms_of(problem))), .8 * end, end);
 }
 
-// Friction may move a pair across the band's edge: of the last gaps between real modes below it, the highest where both
-// counts agree, or else the band.
-PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution& solution,
-                        const RealSpectrum& spectrum, double band)
-{
-  constexpr std::ptrdiff_t gaps_tried = 8;
-  const std::vector<double>& omega = spectrum.modes.omega;
-  const double floor = std::sqrt(vibration_floor(norms_of(problem))), end = 2 * std::numbers::pi * band;
-  const auto count_at = [&](double edge) { return count_pairs(solution, omega, floor, edge); };
-  const PairCount whole = count_at(end);
-  if (whole.expected == whole.found) return whole;
-  const auto last = std::lower_bound(omega.begin(), omega.end(), end) - omega.begin();
-  for (std::ptrdiff_t k = last - 1; k > std::max<std::ptrdiff_t>(0, last - gaps_tried); --k)
-  {
-    const auto i = static_cast<std::size_t>(k);
-    const PairCount count = count_at((omega[i] + omega[i - 1]) / 2);
-    if (count.expected == count.found) return count;
-  }
-  return whole;
-}
-
-CountedSolution solve_full(const SlidingProblem& problem, const RealSpectrum& spectrum, const ModesSettings& settings,
+CountedSolution solve_full(const SlidingProblem& problem, RealCount& real, const ModesSettings& settings,
                            const ModesOptions& options)
 {
   const int limit = static_cast<int>(options.dense_limit);
+  const double band = settings.band, end = 2 * std::numbers::pi * band;
   PetscInt n = 0;
   check(MatGetSize(problem.K, &n, nullptr));
   CountedSolution result;
   if (n > limit && options.solver == "slices")
   {
-    result = solve_by_slices(problem.reduced, predicted_pairs(spectrum.modes, problem.reduced.C), settings.band,
-                             spectrum.reach);
+    result = solve_by_slices(problem.reduced, real, band);
     if (result.count.expected == result.count.found) return result;
-    result.count = count_in_band(problem.reduced, result.solution, spectrum, settings.band);
+    result.count = count_in_band(problem.reduced, result.solution, real, band);
     if (result.count.found >= result.count.expected) return result;
     result.solution.outcome.word = "not converged";
     result.solution.outcome.reason =
         "fewer pairs were found than are expected; -modes_solver toar seeks them otherwise";
     return result;
   }
-  QuadraticSettings quadratic{settings.band, 0, static_cast<int>(spectrum.modes.omega.size()), limit};
-  if (n > limit)
-    quadratic.shift = std::sqrt(-shift_below_zero(problem.M, problem.K)) / (2 * std::numbers::pi * settings.band);
+  QuadraticSettings quadratic{band, 0, n > limit ? count_below(real, end) : 0, limit};
+  if (n > limit) quadratic.shift = std::sqrt(-shift_below_zero(problem.M, problem.K)) / end;
   result.solution = solve_quadratic(problem.reduced, quadratic);
-  result.count = count_in_band(problem.reduced, result.solution, spectrum, settings.band);
+  result.count = count_in_band(problem.reduced, result.solution, real, band);
   return result;
 }
 
-// As many real modes as the scene says, or those of the spectrum, at least twenty.
-QuadraticSolution solve_by_projection(const SlidingProblem& problem, const RealSpectrum& spectrum,
-                                      const ModesSettings& settings, const ModesOptions& options)
+// As many real modes as the scene says, or those up to a little beyond the band, at least twenty.
+QuadraticSolution solve_by_projection(const SlidingProblem& problem, const ModesSettings& settings,
+                                      const ModesOptions& options)
 {
   constexpr int fewest = 20;
-  const int known = static_cast<int>(spectrum.modes.omega.size());
-  const int wanted = settings.real_modes > 0 ? settings.real_modes : std::max(fewest, known);
-  const ProjectionSettings projection{settings.band, settings.residual_passes, static_cast<int>(options.candidates)};
-  if (wanted == known) return solve_projected(problem.reduced, problem.M, problem.K, spectrum.modes, projection);
-  const RealModes basis = solve_real_modes(problem.M, problem.K, wanted, static_cast<int>(options.dense_limit));
-  return solve_projected(problem.reduced, problem.M, problem.K, basis, projection);
+  const Mat M = problem.M, K = problem.K;
+  const int limit = static_cast<int>(options.dense_limit);
+  RealModes basis;
+  if (settings.real_modes == 0) basis = solve_real_modes_below(M, K, 1.05 * settings.band, limit);
+  const int wanted = settings.real_modes > 0 ? settings.real_modes : fewest;
+  if (static_cast<int>(basis.omega.size()) < wanted) basis = solve_real_modes(M, K, wanted, limit);
+  return solve_projected(problem.reduced, M, K, basis,
+                         {settings.band, settings.residual_passes, static_cast<int>(options.candidates)});
 }
 
 int unstable_in(const std::vector<ComplexMode>& modes)
@@ -227,10 +199,9 @@ void judge(Modes& modes)
   modes.outcome.reason = "a backward error exceeds 1e-8";
 }
 
-ModeCount certificate(const PairCount& count, const RealSpectrum& spectrum)
+ModeCount certificate(const PairCount& count)
 {
-  const bool good = count.expected == count.found && spectrum.modes.outcome.word == "converged";
-  return {good ? "inertia" : "", count.frequency, count.expected, count.found};
+  return {count.expected == count.found ? "inertia" : "", count.frequency, count.expected, count.found};
 }
 
 // Pairs that were found beyond the band, for the count, are told by their frequency only.
@@ -291,23 +262,23 @@ Modes find_modes(const Structure& structure, const Interface& interface, const E
     modes.count_check = "confirmed: there is no mode to count";
     return modes;
   }
-  const RealSpectrum spectrum = find_spectrum(problem, settings, static_cast<int>(options.dense_limit));
+  RealCount real = make_real_count(problem.M, problem.K, static_cast<int>(options.dense_limit));
   CountedSolution found;
   if (settings.method != "full")
   {
-    found.solution = solve_by_projection(problem, spectrum, settings, options);
-    found.count = count_in_band(problem.reduced, found.solution, spectrum, settings.band);
+    found.solution = solve_by_projection(problem, settings, options);
+    found.count = count_in_band(problem.reduced, found.solution, real, settings.band);
     modes.projected = modes_of(found.solution, structure, problem);
   }
   if (settings.method == "projection")
     modes.modes = std::exchange(modes.projected, {});
   else
   {
-    found = solve_full(problem, spectrum, settings, options);
+    found = solve_full(problem, real, settings, options);
     modes.modes = modes_of(found.solution, structure, problem);
   }
   modes.outcome = found.solution.outcome;
-  modes.count = certificate(found.count, spectrum);
+  modes.count = certificate(found.count);
   keep_band(modes);
   judge(modes);
   return modes;

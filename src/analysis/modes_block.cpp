@@ -51,27 +51,6 @@ void normalise_columns(Block& X)
                    [&](double x) { return x / norms[static_cast<Index>(j)]; });
 }
 
-// X spans the same with X'X = I; directions below `least` of the largest eigenvalue of X'X are dropped.
-void orthonormalise(Block& X, double least)
-{
-  std::vector<double> G = inner(X, X), values(static_cast<Index>(X.columns));
-  const PetscBLASInt order = static_cast<PetscBLASInt>(X.columns);
-  PetscBLASInt info = 0, size = std::max(1, 34 * order);
-  std::vector<double> work(static_cast<Index>(size));
-  LAPACKsyev_("V", "U", &order, G.data(), &order, values.data(), work.data(), &size, &info);
-  if (info != 0) throw Error("LAPACK's symmetric eigensolver (syev) failed on an inner product");
-  PetscInt kept = 0;
-  std::vector<double> a;
-  for (PetscInt j = 0; j < X.columns; ++j)
-  {
-    const double value = values[static_cast<Index>(j)];
-    if (!(value > least * values.back())) continue;
-    for (PetscInt i = 0; i < X.columns; ++i) a.push_back(G[static_cast<Index>(i + j * X.columns)] / std::sqrt(value));
-    ++kept;
-  }
-  X = combination(X, a, kept);
-}
-
 } // namespace
 
 Block empty_block(Mat A)
@@ -196,6 +175,26 @@ std::vector<double> column_norms(const Block& X)
   MPI_Allreduce(MPI_IN_PLACE, squares.data(), static_cast<int>(squares.size()), MPI_DOUBLE, MPI_SUM, X.comm);
   for (double& value : squares) value = std::sqrt(value);
   return squares;
+}
+
+void orthonormalise(Block& X, double least)
+{
+  std::vector<double> G = inner(X, X), values(static_cast<Index>(X.columns));
+  const PetscBLASInt order = static_cast<PetscBLASInt>(X.columns);
+  PetscBLASInt info = 0, size = std::max(1, 34 * order);
+  std::vector<double> work(static_cast<Index>(size));
+  LAPACKsyev_("V", "U", &order, G.data(), &order, values.data(), work.data(), &size, &info);
+  if (info != 0) throw Error("LAPACK's symmetric eigensolver (syev) failed on an inner product");
+  PetscInt kept = 0;
+  std::vector<double> a;
+  for (PetscInt j = 0; j < X.columns; ++j)
+  {
+    const double value = values[static_cast<Index>(j)];
+    if (!(value > least * values.back())) continue;
+    for (PetscInt i = 0; i < X.columns; ++i) a.push_back(G[static_cast<Index>(i + j * X.columns)] / std::sqrt(value));
+    ++kept;
+  }
+  X = combination(X, a, kept);
 }
 
 PetscInt extend_orthonormal(Block& V, Block X)

@@ -14,35 +14,28 @@ namespace
 
 using Index = std::size_t;
 
-// The problem's matrices and their projections on V, which grow with it.
+// A matrix of the problem, A V and V'A V, which grow with V.
 struct Projected
 {
-  Owned<Mat> transposed;
   Mat matrix = nullptr;
-  std::vector<double> entries; // V'A V
+  Block image;
+  std::vector<double> entries;
 };
 
-Projected start_projection(Mat A)
-{
-  Projected result;
-  result.matrix = A;
-  check(MatTranspose(A, MAT_INITIAL_MATRIX, result.transposed.put()));
-  return result;
-}
-
-// V has gained its last columns, W: V'A V gains the columns V'(A W) and the rows W'A V = (V'(A'W))'.
+// V has gained its last columns, W: V'A V gains the columns V'(A W) and the rows W'(A V).
 void extend(Projected& projected, const Block& V, PetscInt gained)
 {
-  const Block W = columns_from(V, V.columns - gained);
-  const std::vector<double> right = inner(V, product(projected.matrix, W));
-  const std::vector<double> left = inner(V, product(projected.transposed, W));
+  const Block W = columns_from(V, V.columns - gained), AW = product(projected.matrix, W);
+  const std::vector<double> right = inner(V, AW), left = inner(W, projected.image);
+  append(projected.image, AW);
   const auto size = static_cast<Index>(V.columns), fresh = static_cast<Index>(gained), before = size - fresh;
   std::vector<double> entries(size * size);
   for (Index j = 0; j < before; ++j)
   {
     std::copy_n(projected.entries.begin() + static_cast<std::ptrdiff_t>(j * before), before,
                 entries.begin() + static_cast<std::ptrdiff_t>(j * size));
-    for (Index i = 0; i < fresh; ++i) entries[before + i + j * size] = left[j + i * size];
+    std::copy_n(left.begin() + static_cast<std::ptrdiff_t>(j * fresh), fresh,
+                entries.begin() + static_cast<std::ptrdiff_t>(j * size + before));
   }
   std::copy(right.begin(), right.end(), entries.begin() + static_cast<std::ptrdiff_t>(before * size));
   projected.entries = std::move(entries);
@@ -54,13 +47,20 @@ struct Subspace
   Projected M, C, K;
 };
 
-void extend(Subspace& space, PetscInt gained)
+// What is new in X joins V; false if nothing is.
+bool extend(Subspace& space, Block X)
 {
+  PetscInt n = 0;
+  check(MatGetSize(space.K.matrix, &n, nullptr));
+  if (X.columns == 0 || space.V.columns >= n) return false;
+  const PetscInt gained = extend_orthonormal(space.V, std::move(X));
+  if (gained == 0) return false;
   for (Projected* projected : {&space.M, &space.C, &space.K}) extend(*projected, space.V, gained);
+  return true;
 }
 
-// The pairs of the small problem in the window, largest growth ratio first.
-std::vector<DenseEigenpair> solve_on(const Subspace& space, const Window& window)
+// The pairs of the small problem in the window, a of 2-norm 1, largest growth ratio first.
+std::vector<DenseEigenpair> solve_small(const Subspace& space, const Window& window)
 {
   std::vector<DenseEigenpair> found = solve_dense_quadratic_shared(space.V.comm, static_cast<int>(space.V.columns),
                                                                    space.M.entries, space.C.entries, space.K.entries);
@@ -68,170 +68,132 @@ std::vector<DenseEigenpair> solve_on(const Subspace& space, const Window& window
   std::sort(found.begin(), found.end(),
             [](const DenseEigenpair& a, const DenseEigenpair& b)
             { return a.lambda.real() * std::abs(b.lambda) > b.lambda.real() * std::abs(a.lambda); });
+  for (DenseEigenpair& pair : found)
+  {
+    double square = 0;
+    for (const std::complex<double>& a : pair.y) square += std::norm(a);
+    for (std::complex<double>& a : pair.y) a /= std::sqrt(square);
+  }
   return found;
 }
 
-// y = V a of some pairs, of 2-norm 1, and their residuals and backward errors: real parts, then imaginary ones.
-struct Expanded
-{
-  Block y, residual;
-  std::vector<double> backward_error;
-};
+constexpr Index at_once = 64;      // pairs expanded at a time
+constexpr double critical = -1e-3; // growth ratio
+using Pairs = std::span<const DenseEigenpair>;
 
-// A y times the power of lambda that goes with A, added to the residuals
-void add_term(Block& residual, const Block& Ay, const std::vector<std::complex<double>>& factor)
-{
-  const auto pairs = static_cast<PetscInt>(factor.size());
-  for (PetscInt k = 0; k < pairs; ++k)
-  {
-    const double re = factor[static_cast<Index>(k)].real(), im = factor[static_cast<Index>(k)].imag();
-    const double *a = Ay.column(k), *b = Ay.column(pairs + k);
-    double *r = residual.column(k), *s = residual.column(pairs + k);
-    for (PetscInt i = 0; i < Ay.rows; ++i)
-    {
-      r[i] += re * a[i] - im * b[i];
-      s[i] += im * a[i] + re * b[i];
-    }
-  }
-}
-
-// `y`: of some length; made 1.
-Expanded expand(const QuadraticProblem& problem, const QuadraticNorms& norms,
-                const std::vector<std::complex<double>>& lambda, Block y)
-{
-  const Index count = lambda.size();
-  const std::vector<double> length = column_norms(y);
-  std::vector<std::complex<double>> square;
-  for (Index k = 0; k < count; ++k)
-  {
-    square.push_back(lambda[k] * lambda[k]);
-    for (const Index column : {k, count + k})
-      std::transform(y.column(static_cast<PetscInt>(column)), y.column(static_cast<PetscInt>(column)) + y.rows,
-                     y.column(static_cast<PetscInt>(column)),
-                     [&](double entry) { return entry / std::hypot(length[k], length[count + k]); });
-  }
-  Expanded result;
-  result.y = std::move(y);
-  result.residual = product(problem.K, result.y);
-  add_term(result.residual, product(problem.C, result.y), lambda);
-  add_term(result.residual, product(problem.M, result.y), square);
-  const std::vector<double> left = column_norms(result.residual);
-  for (Index k = 0; k < count; ++k)
-  {
-    const double w = std::abs(lambda[k]), scale = w * w * norms.M + w * norms.C + norms.K;
-    result.backward_error.push_back(std::hypot(left[k], left[count + k]) / scale);
-  }
-  return result;
-}
-
-// y = V a
-Expanded expand(const QuadraticProblem& problem, const QuadraticNorms& norms, const Block& V,
-                const DenseEigenpair* pairs, Index count)
+// lambda^power a of each pair: real parts, then imaginary ones
+std::vector<double> coefficients(Pairs pairs, int power)
 {
   std::vector<double> re, im;
-  std::vector<std::complex<double>> lambda;
-  for (const DenseEigenpair* pair = pairs; pair != pairs + count; ++pair)
-  {
-    for (const std::complex<double>& a : pair->y)
+  for (const DenseEigenpair& pair : pairs)
+    for (const std::complex<double>& a : pair.y)
     {
-      re.push_back(a.real());
-      im.push_back(a.imag());
+      const std::complex<double> value = std::pow(pair.lambda, power) * a;
+      re.push_back(value.real());
+      im.push_back(value.imag());
     }
-    lambda.push_back(pair->lambda);
-  }
   re.insert(re.end(), im.begin(), im.end());
-  return expand(problem, norms, lambda, combination(V, re, static_cast<PetscInt>(2 * count)));
+  return re;
 }
 
-void append_pairs(const QuadraticProblem& problem, const std::vector<std::complex<double>>& lambda,
-                  const Expanded& expanded, std::vector<Eigenpair>& pairs)
+// Pairs y = V a join `solution`, and of their residuals what is not good enough joins `residuals`.
+void expand(const Subspace& space, const QuadraticNorms& norms, Pairs pairs, const Correction& correction,
+            std::vector<Eigenpair>& solution, Block& residuals)
 {
-  const auto count = static_cast<PetscInt>(lambda.size());
+  const auto count = static_cast<PetscInt>(pairs.size());
+  const std::vector<double> a = coefficients(pairs, 0);
+  const Block y = combination(space.V, a, 2 * count);
+  Block residual = combination(space.K.image, a, 2 * count);
+  add_combination(residual, 1, space.C.image, coefficients(pairs, 1));
+  add_combination(residual, 1, space.M.image, coefficients(pairs, 2));
+  const std::vector<double> left = column_norms(residual);
   for (PetscInt k = 0; k < count; ++k)
   {
-    const auto i = static_cast<Index>(k);
-    Eigenpair pair{lambda[i], {}, {}, expanded.backward_error[i]};
-    check(MatCreateVecs(problem.K, pair.real.put(), pair.imaginary.put()));
-    copy_column(expanded.y, k, pair.real);
-    copy_column(expanded.y, count + k, pair.imaginary);
-    pairs.push_back(std::move(pair));
+    const std::complex<double> lambda = pairs[static_cast<Index>(k)].lambda;
+    const double w = std::abs(lambda), scale = w * w * norms.M + w * norms.C + norms.K;
+    const double re = left[static_cast<Index>(k)] / scale, im = left[static_cast<Index>(count + k)] / scale;
+    Eigenpair pair{lambda, {}, {}, std::hypot(re, im)};
+    check(MatCreateVecs(space.K.matrix, pair.real.put(), pair.imaginary.put()));
+    copy_column(y, k, pair.real);
+    copy_column(y, count + k, pair.imaginary);
+    solution.push_back(std::move(pair));
+    const double enough = lambda.real() > critical * w ? correction.sharp : correction.enough;
+    for (const auto& [error, column] : {std::pair{re, k}, std::pair{im, count + k}})
+    {
+      if (error <= enough) continue;
+      residuals.entries.insert(residuals.entries.end(), residual.column(column), residual.column(column + 1));
+      ++residuals.columns;
+    }
   }
 }
 
-constexpr Index at_once = 64; // pairs expanded at a time
-
-// Answers to the residuals of the first pairs join the space; false if nothing new came of them.
-bool correct(Subspace& space, const QuadraticProblem& problem, const QuadraticNorms& norms,
-             const std::vector<DenseEigenpair>& found, int most, Mat stiffness)
+// Directions down to `share` of the largest. No column counts for more than 30 times the median: a combination of
+// corrections that is no pair and happens to lie in the window would outweigh all others.
+Block largest_directions(Block residuals, double share)
 {
-  Block residuals = empty_block(problem.K);
-  const Index candidates = std::min(found.size(), static_cast<Index>(most));
-  for (Index first = 0; first < candidates; first += at_once)
-  {
-    const Index count = std::min(at_once, candidates - first);
-    const Expanded pairs = expand(problem, norms, space.V, found.data() + first, count);
-    for (Index k = 0; k < count; ++k)
-      if (pairs.backward_error[k] > 1e-15) // not solved to rounding
-        for (const Index column : {k, count + k})
-        {
-          const double* r = pairs.residual.column(static_cast<PetscInt>(column));
-          residuals.entries.insert(residuals.entries.end(), r, r + residuals.rows);
-          ++residuals.columns;
-        }
-  }
-  if (residuals.columns == 0) return false;
-  PetscInt n = 0;
-  check(MatGetSize(problem.K, &n, nullptr));
-  if (space.V.columns >= n) return false;
-  const PetscInt gained = extend_orthonormal(space.V, solved(stiffness, residuals));
-  if (gained > 0) extend(space, gained);
-  return gained > 0;
+  constexpr double outstanding = 30;
+  if (share == 0) return residuals;
+  const std::vector<double> sizes = column_norms(residuals);
+  std::vector<double> sorted = sizes;
+  const auto middle = sorted.begin() + residuals.columns / 2;
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  for (PetscInt j = 0; j < residuals.columns; ++j)
+    if (const double size = sizes[static_cast<Index>(j)]; size > outstanding * *middle)
+      std::transform(residuals.column(j), residuals.column(j + 1), residuals.column(j),
+                     [&](double entry) { return entry * outstanding * *middle / size; });
+  orthonormalise(residuals, share * share);
+  return residuals;
 }
 
 } // namespace
 
-std::vector<Eigenpair> eigenpairs(const QuadraticProblem& problem, const std::vector<std::complex<double>>& lambda,
-                                  const ComplexBlock& y)
+QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Block basis, Mat factor,
+                                    const Correction& correction)
 {
-  Block parts = y.re;
-  append(parts, y.im);
-  std::vector<Eigenpair> pairs;
-  append_pairs(problem, lambda, expand(problem, norms_of(problem), lambda, std::move(parts)), pairs);
-  return pairs;
+  QuadraticSolution result;
+  const QuadraticNorms norms = norms_of(problem);
+  const Block none = empty_block(problem.K);
+  Subspace space{none, {problem.M, none, {}}, {problem.C, none, {}}, {problem.K, none, {}}};
+  extend(space, std::move(basis));
+  for (int pass = 0;; ++pass)
+  {
+    const std::vector<DenseEigenpair> found = solve_small(space, correction.window);
+    Block residuals = none;
+    result.pairs.clear();
+    const auto expand_until = [&](Index end)
+    {
+      for (Index first = result.pairs.size(); first < end; first = result.pairs.size())
+        expand(space, norms, Pairs(found).subspan(first, std::min(at_once, end - first)), correction, result.pairs,
+               residuals);
+    };
+    if (pass < correction.passes) expand_until(std::min(found.size(), static_cast<Index>(correction.pairs)));
+    const bool better = pass < correction.passes && residuals.columns > 0 &&
+                        extend(space, solved(factor, largest_directions(std::move(residuals), correction.share)));
+    result.outcome.iterations = pass + better;
+    if (better) continue;
+    expand_until(found.size());
+    settle(result);
+    return result;
+  }
 }
 
 QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K, const RealModes& modes,
                                   const ProjectionSettings& settings)
 {
   QuadraticSolution result;
-  result.outcome = modes.outcome;
-  result.outcome.iterations = 0;
-  result.outcome.residual = 0;
-  if (modes.shapes.empty()) return result;
-  const QuadraticNorms norms = norms_of(problem);
-  const double omega = 2 * std::numbers::pi * settings.band;
-  const Window window{vibration_floor(norms), omega * omega};
-  Subspace space{empty_block(K), start_projection(problem.M), start_projection(problem.C), start_projection(problem.K)};
-  Block shapes = empty_block(K);
-  for (const Owned<Vec>& shape : modes.shapes) append(shapes, shape);
-  extend(space, extend_orthonormal(space.V, std::move(shapes)));
-  ShiftInvert stiffness = make_shift_invert(K, M);
-  if (settings.passes > 0) move_to(stiffness, shift_below_zero(M, K));
-  std::vector<DenseEigenpair> found = solve_on(space, window);
-  for (int pass = 0; pass < settings.passes; ++pass)
+  if (!modes.shapes.empty())
   {
-    if (!correct(space, problem, norms, found, settings.candidates, stiffness.factor)) break;
-    found = solve_on(space, window);
-    ++result.outcome.iterations;
+    Block shapes = empty_block(K);
+    for (const Owned<Vec>& shape : modes.shapes) append(shapes, shape);
+    ShiftInvert stiffness = make_shift_invert(K, M, MAT_FACTOR_CHOLESKY);
+    if (settings.passes > 0) move_to(stiffness, shift_below_zero(M, K));
+    const double omega = 2 * std::numbers::pi * settings.band;
+    const Window window{vibration_floor(norms_of(problem)), omega * omega};
+    result = solve_on_subspace(problem, std::move(shapes), stiffness.factor,
+                               {window, settings.passes, settings.candidates, 1e-15, 1e-15, 0});
   }
-  for (Index first = 0; first < found.size(); first += at_once)
-  {
-    const Index count = std::min(at_once, found.size() - first);
-    std::vector<std::complex<double>> lambda;
-    for (Index k = 0; k < count; ++k) lambda.push_back(found[first + k].lambda);
-    append_pairs(problem, lambda, expand(problem, norms, space.V, found.data() + first, count), result.pairs);
-  }
-  settle(result);
+  result.outcome.word = modes.outcome.word;
+  result.outcome.reason = modes.outcome.reason;
   return result;
 }
 

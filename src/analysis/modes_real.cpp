@@ -3,7 +3,6 @@
 #include "squeal/analysis/block.hpp"
 #include "squeal/analysis/closed_contact.hpp"
 #include "squeal/analysis/quadratic.hpp"
-#include "squeal/analysis/shift_invert.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -69,13 +68,6 @@ RealModes first_of(const DenseModes& all, Mat K, int count)
     modes.shapes.push_back(std::move(shape));
   }
   return modes;
-}
-
-int inertia_below(Mat M, Mat K, double theta)
-{
-  ShiftInvert pencil = make_shift_invert(K, M);
-  move_to(pencil, theta);
-  return negative_pivots(pencil);
 }
 
 // What a sweep looks for: all theta = omega^2 below a limit, or the first few.
@@ -200,7 +192,7 @@ Found sweep(Mat M, Mat K, const Sought& sought)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  ShiftInvert pencil = make_shift_invert(K, M);
+  ShiftInvert pencil = make_shift_invert(K, M, MAT_FACTOR_CHOLESKY);
   Found found;
   found.shapes = empty_block(K);
   double verified = shift_below_zero(M, K); // all below is found for sure
@@ -287,15 +279,22 @@ double shift_below_zero(Mat M, Mat K)
   return -1e-8 * trace(K) / trace(M);
 }
 
-int count_real_modes(Mat M, Mat K, double band, int dense_limit)
+RealCount make_real_count(Mat M, Mat K, int dense_limit)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  const double omega = 2 * std::numbers::pi * band;
-  if (n > dense_limit) return inertia_below(M, K, omega * omega);
-  const std::vector<double> lambda = solve_whole(M, K).lambda;
-  return static_cast<int>(
-      std::count_if(lambda.begin(), lambda.end(), [&](double value) { return value < omega * omega; }));
+  if (n <= dense_limit) return {{}, solve_whole(M, K).lambda, {}};
+  return {make_shift_invert(K, M, MAT_FACTOR_CHOLESKY), {}, {{0, 0}}};
+}
+
+int count_below(RealCount& count, double omega)
+{
+  if (!count.pencil.K)
+    return static_cast<int>(std::lower_bound(count.all.begin(), count.all.end(), omega * omega) - count.all.begin());
+  const auto [known, is_new] = count.below.try_emplace(omega);
+  if (!is_new) return known->second;
+  move_to(count.pencil, omega * omega);
+  return known->second = negative_pivots(count.pencil);
 }
 
 RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit)
@@ -313,7 +312,12 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit)
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
   const double omega = 2 * std::numbers::pi * band;
-  if (n <= dense_limit) return first_of(solve_whole(M, K), K, count_real_modes(M, K, band, dense_limit));
+  if (n <= dense_limit)
+  {
+    const DenseModes all = solve_whole(M, K);
+    const auto below = std::lower_bound(all.lambda.begin(), all.lambda.end(), omega * omega);
+    return first_of(all, K, static_cast<int>(below - all.lambda.begin()));
+  }
   const Sought sought{omega * omega, static_cast<int>(n)};
   return to_modes(sweep(M, K, sought), M, K, sought);
 }

@@ -174,17 +174,20 @@ bool short_of_room(PetscInt outcome)
 }
 
 // `room`: percent beyond the estimate, or 0 for MUMPS's own margin.
-Owned<Mat> analysed(Mat A, PetscInt room)
+Owned<Mat> analysed(const ShiftInvert& pencil, PetscInt room)
 {
   Owned<Mat> factor;
   MatFactorInfo settings;
   check(MatFactorInfoInitialize(&settings));
-  check(MatGetFactor(A, MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, factor.put()));
+  check(MatGetFactor(pencil.shifted, MATSOLVERMUMPS, pencil.kind, factor.put()));
   check(MatSetOptionsPrefix(factor, "modes_"));
   // The negative pivots of a root that ScaLAPACK factors are not counted: MUMPS keeps the root to itself.
   check(MatMumpsSetIcntl(factor, 13, 1));
   check(MatMumpsSetIcntl(factor, 27, block_size));
-  check(MatCholeskyFactorSymbolic(factor, A, nullptr, &settings));
+  if (pencil.kind == MAT_FACTOR_LU)
+    check(MatLUFactorSymbolic(factor, pencil.shifted, nullptr, nullptr, &settings));
+  else
+    check(MatCholeskyFactorSymbolic(factor, pencil.shifted, nullptr, &settings));
   if (room > 0) check(MatMumpsSetIcntl(factor, 14, room));
   return factor;
 }
@@ -197,8 +200,11 @@ PetscInt factorise(ShiftInvert& pencil)
   check(MatFactorInfoInitialize(&settings));
   for (PetscInt room = 0;;)
   {
-    if (!pencil.factor.get()) pencil.factor = analysed(pencil.shifted, room);
-    check(MatCholeskyFactorNumeric(pencil.factor, pencil.shifted, &settings));
+    if (!pencil.factor.get()) pencil.factor = analysed(pencil, room);
+    if (pencil.kind == MAT_FACTOR_LU)
+      check(MatLUFactorNumeric(pencil.factor, pencil.shifted, &settings));
+    else
+      check(MatCholeskyFactorNumeric(pencil.factor, pencil.shifted, &settings));
     const PetscInt outcome = infog(pencil.factor, 1);
     if (outcome >= 0) return outcome;
     check(MatMumpsGetIcntl(pencil.factor, 14, &room));
@@ -222,12 +228,12 @@ void use_mumps(ST transformation)
   check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
 }
 
-ShiftInvert make_shift_invert(Mat K, Mat M)
+ShiftInvert make_shift_invert(Mat K, Mat M, MatFactorType kind)
 {
-  ShiftInvert pencil{K, M, 0, {}, {}};
+  ShiftInvert pencil{K, M, kind, 0, {}, {}};
   check(MatDuplicate(K, MAT_COPY_VALUES, pencil.shifted.put()));
   check(MatAXPY(pencil.shifted, 1, M, DIFFERENT_NONZERO_PATTERN));
-  check(MatSetOption(pencil.shifted, MAT_SYMMETRIC, PETSC_TRUE));
+  if (kind == MAT_FACTOR_CHOLESKY) check(MatSetOption(pencil.shifted, MAT_SYMMETRIC, PETSC_TRUE));
   return pencil;
 }
 

@@ -1,10 +1,11 @@
 #include "squeal/analysis/slices.hpp"
 
-#include "squeal/analysis/complex_shift.hpp"
 #include "squeal/analysis/projection.hpp"
+#include "squeal/analysis/shift_invert.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace squeal
@@ -13,159 +14,122 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
-
-constexpr int per_slice = 70;            // pairs
-constexpr double usual = .03, wide = .1; // [rad] by which friction may turn a pair: the change of its damping ratio
+constexpr int per_slice = 100;           // pairs, at most
+constexpr int neighbours = 10;           // and theta beyond them, for V
+constexpr double beyond = 1.05;          // of the band, for the count
+constexpr double usual = .06, wide = .2; // [rad] by which friction may turn theta: twice the change of damping ratio
+constexpr int passes = 12;               // of residual correction, if not all pairs are exact before
+constexpr double enough = 1e-12, sharp = 1e-14; // backward errors,
+constexpr double spurious = 1e-8;               // and that of what is no pair
+constexpr double share = 1e-2;                  // a pass divides residuals by ten or so: a fourth of all directions
 constexpr double two_pi = 2 * std::numbers::pi;
 
-int count_below(const std::vector<double>& ascending, double omega)
-{
-  return static_cast<int>(std::lower_bound(ascending.begin(), ascending.end(), omega) - ascending.begin());
-}
-
-// Of the gaps between omega[first] and omega[last], ends included, the middle of the widest.
-double widest_gap(const std::vector<double>& omega, int first, int last)
-{
-  int best = first;
-  const auto at = [&](int k) { return omega[static_cast<std::size_t>(k)]; };
-  for (int k = first; k < last; ++k)
-    if (at(k + 1) - at(k) > at(best + 1) - at(best)) best = k;
-  return (at(best) + at(best + 1)) / 2;
-}
-
-// Edges [rad/s] of slices, in gaps between the real modes; smaller slices above the band, for the count.
-std::vector<double> plan(const std::vector<double>& omega, double floor, double band, double reach)
-{
-  std::vector<double> edges = {floor};
-  const int last = static_cast<int>(omega.size()) - 1;
-  for (int first = count_below(omega, floor); edges.back() < reach; first = count_below(omega, edges.back()))
-  {
-    const int inside = count_below(omega, band) - first, most = inside > 0 ? std::min(per_slice, inside + 2) : 5;
-    if (first + most + 6 >= last)
-      edges.push_back(reach);
-    else
-      edges.push_back(widest_gap(omega, first + most - most / 4, first + most + 6));
-  }
-  return edges;
-}
-
-// The pairs expected in a slice, and those found in the disc that is searched about them.
+// lower <= |lambda| < upper [rad/s]
 struct Slice
 {
-  double lower = 0, upper = 0; // [rad/s]
+  double lower = 0, upper = 0;
   int expected = 0;
-  Complex centre;    // at the angle of those expected,
-  double spread = 0; // and the farthest of them from it
   std::vector<Eigenpair> pairs;
-
-  Window window() const { return {lower * lower, upper * upper}; }
 };
 
-Slice slice_between(const std::vector<Complex>& predicted, double lower, double upper)
+// Halves [0, reach] until a slice holds few enough of the real modes.
+std::vector<Slice> plan(RealCount& real, double floor, double reach)
 {
-  Slice slice{lower, upper, 0, 0, 0, {}};
-  double angle = 0;
-  for (const Complex lambda : predicted)
-    if (std::abs(lambda) >= lower && std::abs(lambda) < upper)
+  std::vector<double> edges = {reach, 0}; // those still to come, descending
+  std::vector<Slice> slices;
+  while (edges.size() > 1)
+  {
+    const double lower = edges.back(), upper = edges[edges.size() - 2];
+    const int expected = count_below(real, upper) - count_below(real, lower);
+    if (expected > per_slice)
     {
-      angle += std::arg(lambda);
-      ++slice.expected;
+      edges.insert(edges.end() - 1, (lower + upper) / 2);
+      continue;
     }
-  angle = slice.expected > 0 ? angle / slice.expected : std::numbers::pi / 2;
-  slice.centre = std::polar((lower + upper) / 2, angle);
-  for (const Complex lambda : predicted)
-    if (std::abs(lambda) >= lower && std::abs(lambda) < upper)
-      slice.spread = std::max(slice.spread, std::abs(lambda - slice.centre));
-  return slice;
+    slices.push_back({std::max(lower, floor), upper, expected, {}});
+    edges.pop_back();
+  }
+  return slices;
 }
 
-// The disc holds those expected, and all of the slice whose angle is `slack` [rad] or less from the centre's. If the
-// Krylov space grows too large the slice stays as it is, and the count tells.
-void find_pairs(Slice& slice, const QuadraticProblem& problem, ComplexFactor& factor, double slack)
+// If the Krylov space grows too large the slice stays as it is, and the count tells.
+void find_pairs(Slice& slice, const QuadraticProblem& problem, ShiftInvert& pencil, double turned)
 {
-  factor.move_to(slice.centre);
-  const Complex corner = std::polar(slice.upper, std::arg(slice.centre) + slack);
-  const double radius = std::max(1.02 * slice.spread, std::abs(corner - slice.centre));
-  const NearestPairs nearest = solve_nearest_pairs(problem, factor, radius, slice.expected);
+  const double least = slice.lower * slice.lower, limit = slice.upper * slice.upper, middle = (least + limit) / 2;
+  move_to(pencil, middle);
+  const double radius = std::abs(std::polar(limit, turned) - pencil.shift);
+  Nearest nearest = solve_nearest(pencil, slice.expected + neighbours, radius);
   if (!nearest.converged) return;
-  slice.pairs = eigenpairs(problem, nearest.lambda, nearest.y);
-  std::erase_if(slice.pairs, [&](const Eigenpair& pair) { return !slice.window().holds(pair.lambda); });
+  const Correction correction{{least, limit}, passes, std::numeric_limits<int>::max(), enough, sharp, share};
+  slice.pairs = solve_on_subspace(problem, std::move(nearest.space), pencil.factor, correction).pairs;
+  std::erase_if(slice.pairs, [](const Eigenpair& pair) { return pair.backward_error > spurious; });
 }
 
-int found_in(const std::vector<Slice>& slices)
+QuadraticSolution joined(std::vector<Slice>& slices)
 {
-  int count = 0;
-  for (const Slice& slice : slices) count += static_cast<int>(slice.pairs.size());
-  return count;
-}
-
-int expected_in(const std::vector<Slice>& slices)
-{
-  int count = 0;
-  for (const Slice& slice : slices) count += slice.expected;
-  return count;
-}
-
-// If pairs are missing, friction moved them far: wherever a slice has fewer than expected, more is searched. Between
-// neighbours pairs may have changed places, so that only the sum is sure.
-void search_wider(std::vector<Slice>& slices, const QuadraticProblem& problem, ComplexFactor& factor)
-{
+  QuadraticSolution solution;
+  solution.outcome = {"converged", "", static_cast<int>(slices.size()), 0};
   for (Slice& slice : slices)
-    if (found_in(slices) < expected_in(slices) && static_cast<int>(slice.pairs.size()) < slice.expected)
-      find_pairs(slice, problem, factor, wide);
+    for (const Eigenpair& pair : slice.pairs)
+      solution.pairs.push_back({pair.lambda, copy_of(pair.real), copy_of(pair.imaginary), pair.backward_error});
+  settle(solution);
+  return solution;
 }
 
 } // namespace
 
-PairCount count_pairs(const QuadraticSolution& solution, const std::vector<double>& omega, double floor, double edge)
+PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, double floor, double least, double top)
 {
-  PairCount count{edge / two_pi, count_below(omega, edge) - count_below(omega, floor), 0};
-  for (const Eigenpair& pair : solution.pairs) count.found += std::abs(pair.lambda) < edge;
-  return count;
-}
-
-std::vector<Complex> predicted_pairs(const RealModes& modes, Mat C)
-{
-  std::vector<Complex> predicted;
-  for (std::size_t k = 0; k < modes.omega.size(); ++k)
+  constexpr std::size_t most = 8; // edges tried
+  std::vector<double> sizes, edges = {top};
+  for (const Eigenpair& pair : solution.pairs) sizes.push_back(std::abs(pair.lambda));
+  std::sort(sizes.rbegin(), sizes.rend());
+  for (std::size_t k = 1; k < sizes.size() && edges.size() < most; ++k)
+    if (const double edge = (sizes[k - 1] + sizes[k]) / 2; edge > least && edge < top) edges.push_back(edge);
+  const auto count_at = [&](double edge)
   {
-    const double omega = modes.omega[k];
-    const Owned<Vec> force = zeros_like(modes.shapes[k]);
-    double damping = 0;
-    check(MatMult(C, modes.shapes[k], force));
-    check(VecDot(modes.shapes[k], force, &damping));
-    const double ratio = omega > 0 ? std::clamp(damping / (2 * omega), -1., 1.) : 0;
-    predicted.push_back(std::polar(omega, std::acos(-ratio)));
-  }
-  return predicted;
+    PairCount count{edge / two_pi, count_below(real, edge), 0};
+    for (const double size : sizes) count.found += size < edge;
+    if (count.expected != count.found) count.expected -= count_below(real, floor);
+    return count;
+  };
+  for (const double edge : edges)
+    if (const PairCount count = count_at(edge); count.expected == count.found) return count;
+  return count_at(top);
 }
 
-CountedSolution solve_by_slices(const QuadraticProblem& problem, const std::vector<Complex>& predicted, double band,
-                                double reach)
+CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real, double band)
 {
+  const double floor = std::sqrt(vibration_floor(norms_of(problem))), end = two_pi * band, reach = beyond * end;
+  std::vector<Slice> slices = plan(real, floor, reach);
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, MAT_FACTOR_LU);
+  for (Slice& slice : slices) find_pairs(slice, problem, pencil, usual);
   CountedSolution result;
-  QuadraticSolution& solution = result.solution;
-  solution.outcome = {"converged", "", 0, 0};
-  std::vector<double> omega;
-  for (const Complex lambda : predicted) omega.push_back(std::abs(lambda));
-  const double floor = std::sqrt(vibration_floor(norms_of(problem)));
-  const std::vector<double> edges = plan(omega, floor, two_pi * band, two_pi * reach);
-  ComplexFactor factor(problem);
-  std::vector<Slice> slices;
-  for (std::size_t k = 1; k < edges.size(); ++k)
-  {
-    slices.push_back(slice_between(predicted, edges[k - 1], edges[k]));
-    find_pairs(slices.back(), problem, factor, usual);
-    ++solution.outcome.iterations;
-    if (edges[k] < two_pi * band) continue;
-    if (found_in(slices) < expected_in(slices)) search_wider(slices, problem, factor);
-    if (found_in(slices) == expected_in(slices)) break;
-  }
+  result.solution = joined(slices);
+  result.count = count_pairs(result.solution, real, floor, end, reach);
+  if (result.count.found >= result.count.expected) return result;
+  // Friction moved some far. Between neighbours pairs may have changed places: only the sum is sure.
   for (Slice& slice : slices)
-    for (Eigenpair& pair : slice.pairs) solution.pairs.push_back(std::move(pair));
-  result.count = count_pairs(solution, omega, floor, slices.back().upper);
-  settle(solution);
+    if (static_cast<int>(slice.pairs.size()) < slice.expected) find_pairs(slice, problem, pencil, wide);
+  result.solution = joined(slices);
+  result.count = count_pairs(result.solution, real, floor, end, reach);
+  return result;
+}
+
+Eigenpair solve_near(const QuadraticProblem& problem, std::complex<double> lambda)
+{
+  constexpr int count = 50; // V without its neighbours is corrected slowly: brakes have dozens of nearly equal pairs
+  constexpr double near = 2e-2, exact = 1e-15;
+  const double square = std::norm(lambda);
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, MAT_FACTOR_LU);
+  move_to(pencil, (1 + 1e-3) * square); // not on it, where there is no factor
+  Eigenpair result{lambda, {}, {}, INFINITY};
+  Nearest nearest = solve_nearest(pencil, count, 0);
+  if (!nearest.converged) return result;
+  const Correction correction{{(1 - near) * square, (1 + near) * square}, passes, count, exact, exact, share};
+  for (Eigenpair& pair : solve_on_subspace(problem, std::move(nearest.space), pencil.factor, correction).pairs)
+    if (!result.real.get() || std::abs(pair.lambda - lambda) < std::abs(result.lambda - lambda))
+      result = std::move(pair);
   return result;
 }
 

@@ -46,6 +46,9 @@ Block columns_from(const Block& X, PetscInt first);
 /// 2-norms of the columns
 std::vector<double> column_norms(const Block& X);
 
+/// X spans the same with X'X = I; directions below `least` of the largest eigenvalue of X'X are dropped.
+void orthonormalise(Block& X, double least);
+
 /// X appended to the orthonormal V as orthonormal columns; what V holds already (up to 1e-12 of a column) is dropped.
 /// Returns how many columns V gained.
 PetscInt extend_orthonormal(Block& V, Block X);

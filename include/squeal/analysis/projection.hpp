@@ -1,21 +1,31 @@
 #pragma once
 /// The quadratic eigenproblem on a small subspace, corrected by its own residuals.
 ///
-/// On an orthonormal V, V'(lambda^2 M + lambda C + K) V a = 0 is small and dense. What V, the first real modes, lacks
-/// shows in the residual r of each y = V a; its static answer K_s^-1 r, K_s the symmetric stiffness without friction,
-/// joins V, and so on for some passes (Brizard, Chiello, Sinou, Lorang 2011). Only the pairs of largest growth
-/// (Re/|lambda|) in the band are corrected: those decide. Caveat: an unstable pair that the first basis shows as well
-/// damped may be left out; judge by the full problem.
-#include "squeal/analysis/complex_block.hpp"
+/// On an orthonormal V, V'(lambda^2 M + lambda C + K) V a = 0 is small and dense. What V lacks shows in the residual r
+/// of each y = V a; an answer P^-1 r joins V, P a matrix whose factor is at hand, and so on for some passes.
+#include "squeal/analysis/block.hpp"
 #include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/real_modes.hpp"
 
 namespace squeal
 {
 
-/// The pairs (lambda, y), y brought to 2-norm 1, with their backward errors.
-std::vector<Eigenpair> eigenpairs(const QuadraticProblem& problem, const std::vector<std::complex<double>>& lambda,
-                                  const ComplexBlock& y);
+/// Only the pairs of largest growth ratio, Re/|lambda|, are corrected, and of these only what is not below `enough`
+/// yet, or, from a ratio of -1e-3 on, `sharp`: an eigenvalue's own error may be 1e4 times its backward error, and
+/// growth is a small part of it.
+struct Correction
+{
+  Window window;                // the pairs sought
+  int passes = 0;               // at most
+  int pairs = 0;                // corrected in each pass
+  double enough = 0, sharp = 0; // backward errors
+  double share = 0;             // of the residuals' largest direction: what is smaller waits for a later pass
+};
+
+/// `basis` spans the first V; `factor` is of P. Backward errors are those of `problem` itself; outcome.word is the
+/// caller's.
+QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Block basis, Mat factor,
+                                    const Correction& correction);
 
 struct ProjectionSettings
 {
@@ -24,8 +34,10 @@ struct ProjectionSettings
   int candidates = 0; // pairs corrected in each pass
 };
 
-/// `M`, `K`: the symmetric problem of the real modes `basis`, in the unknowns y of `problem`. Backward errors are those
-/// of `problem` itself.
+/// On the first real modes, corrected by the static answer of the symmetric stiffness without friction (Brizard,
+/// Chiello, Sinou, Lorang 2011). Caveat: an unstable pair that the first basis shows as well damped may be left out;
+/// judge by the full problem.
+/// `M`, `K`: the symmetric problem of the real modes `basis`, in the unknowns y of `problem`.
 QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K, const RealModes& basis,
                                   const ProjectionSettings& settings);
 

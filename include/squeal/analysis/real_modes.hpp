@@ -3,6 +3,9 @@
 /// from just below zero, complete by Sylvester's law, the factor at each shift counting what lies below it (after
 /// Grimes, Lewis, Simon 1994); LAPACK when small.
 #include "squeal/analysis/modes.hpp"
+#include "squeal/analysis/shift_invert.hpp"
+
+#include <map>
 
 namespace squeal
 {
@@ -11,8 +14,18 @@ namespace squeal
 /// K - shift M is positive definite still.
 double shift_below_zero(Mat M, Mat K);
 
-/// How many omega lie below `band` [Hz].
-int count_real_modes(Mat M, Mat K, double band, int dense_limit);
+/// How many omega lie below others, by a factor each or, when small, all of them once; what was asked is kept.
+struct RealCount
+{
+  ShiftInvert pencil;
+  std::vector<double> all; // eigenvalues, when small
+  std::map<double, int> below;
+};
+
+RealCount make_real_count(Mat M, Mat K, int dense_limit);
+
+/// Below omega [rad/s].
+int count_below(RealCount& count, double omega);
 
 /// The lowest `count`, or as many as there are; shapes are y.
 RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit);

@@ -1,5 +1,5 @@
 #pragma once
-/// The eigenvalues theta of the symmetric K y = theta M y nearest a real shift, by a block Krylov space of
+/// The eigenvalues theta of K y = theta M y, symmetric or not, nearest a real shift, by a block Krylov space of
 /// (K - shift M)^-1 M.
 ///
 /// Blocks, because brakes have many nearly equal modes (doublets of a disc, one a pin), which a space grown from a
@@ -16,17 +16,19 @@ namespace squeal
 struct ShiftInvert
 {
   Mat K = nullptr, M = nullptr; // lent
+  MatFactorType kind = MAT_FACTOR_CHOLESKY;
   double shift = 0;
   Owned<Mat> shifted, factor; // K - shift M
 };
 
-ShiftInvert make_shift_invert(Mat K, Mat M);
+/// MAT_FACTOR_CHOLESKY: L D L' of symmetric K and M; MAT_FACTOR_LU: of any.
+ShiftInvert make_shift_invert(Mat K, Mat M, MatFactorType kind);
 
 /// To the shift, or a little below it where it is an eigenvalue. LibraryError: memory ran out.
 /// Options: -modes_mat_mumps_...; room beyond MUMPS's estimate (icntl_14) grows by itself.
 void move_to(ShiftInvert& pencil, double shift);
 
-/// Sylvester: as many eigenvalues lie below the shift as its factor has negative pivots.
+/// Sylvester: as many eigenvalues lie below the shift as its L D L' has negative pivots.
 int negative_pivots(const ShiftInvert& pencil);
 
 /// Orthonormal basis of the invariant subspace of all theta with |theta - shift| <= reach.

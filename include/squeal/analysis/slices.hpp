@@ -1,12 +1,15 @@
 #pragma once
-/// Every pair of a band of the full quadratic problem, slice by slice of frequency, each from a complex shift at its
-/// middle (complex_shift.hpp).
+/// Every pair of a band of the full quadratic problem, slice by slice of frequency.
 ///
-/// Slices are planned on the frictionless pairs, lambda^2 + c lambda + omega^2 = 0 with the modal damping c = x'C x of
-/// the real modes x, which also count.
-/// Friction turns pairs about zero, by as much as it changes their damping ratio: a slice holds those turned by .03,
-/// and where pairs are missing in the end, by .1. Caveat: a pair that turns further, or whose oscillation stops, shows
-/// in the count; TOAR (quadratic.hpp) knows no slices.
+/// A slice starts from the undamped problem with friction, K x = theta M x, real and unsymmetric: the invariant
+/// subspace V of all theta about the slice's middle sigma, by one real factor of K - sigma M (shift_invert.hpp). Under
+/// Rayleigh damping, C = alpha M + beta K, the pairs of the quadratic problem lie in V: theta (1 + beta lambda) =
+/// -lambda (lambda + alpha). What other damping adds is what residuals r of the pairs on V show; (K - sigma M)^-1 r
+/// joins V until all are exact (projection.hpp).
+///
+/// Friction turns theta about zero: a slice holds all turned by .06, and where pairs are missing in the end, by .2.
+/// Caveat: a pair that turns further, or whose oscillation stops, shows in the count; TOAR (quadratic.hpp) knows no
+/// slices.
 #include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/real_modes.hpp"
 
@@ -17,13 +20,14 @@ namespace squeal
 /// changes only where one crosses its edge, and frictionless undamped modes are counted by inertia (Sylvester).
 struct PairCount
 {
-  double frequency = 0; // [Hz] up to which both were counted; the band or a little more
+  double frequency = 0; // [Hz] up to which both were counted
   int expected = 0;     // real modes below
   int found = 0;        // pairs with |lambda| below
 };
 
-/// Of both below `edge` [rad/s]; `omega`: the real modes, ascending, of which those below `floor` are no vibrations.
-PairCount count_pairs(const QuadraticSolution& solution, const std::vector<double>& omega, double floor, double edge);
+/// Both below `top`, or, where one more or less lies there, below the highest gap between pairs from `least` on where
+/// they agree [rad/s]. Motions of a free body, below `floor`, are no vibrations.
+PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, double floor, double least, double top);
 
 /// solution.pairs reach up to count.frequency.
 struct CountedSolution
@@ -32,12 +36,10 @@ struct CountedSolution
   PairCount count;
 };
 
-/// lambda with |lambda| = omega of the real modes, and their modal damping: an overdamped one lies at -omega.
-std::vector<std::complex<double>> predicted_pairs(const RealModes& modes, Mat C);
+/// All pairs below the band [Hz], and a little further for the count, which `real` plans and checks.
+CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real, double band);
 
-/// `predicted`: ascending, all up to `reach` [Hz] at or above the band. Where one more or less lies below the edge, the
-/// edge moves on between band and reach.
-CountedSolution solve_by_slices(const QuadraticProblem& problem, const std::vector<std::complex<double>>& predicted,
-                                double band, double reach);
+/// The pair nearest lambda; its backward error is infinite if none was found.
+Eigenpair solve_near(const QuadraticProblem& problem, std::complex<double> lambda);
 
 } // namespace squeal
