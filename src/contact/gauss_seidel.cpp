@@ -2,7 +2,7 @@
 /// that a pair's rows are read once for all the problems in which it moves.
 ///
 /// With w = w_0 + dw, w_0 = W r_0 + b exact and dw the effect of the changes since, the sweeps update dw alone: from
-/// the near field in single precision, which its smallness affords, or from W in double where that did not converge.
+/// the near field, kept in single precision, which dw's smallness affords, or from W where that did not converge.
 /// The residual is believed only after w was formed afresh.
 #include "wide.hpp"
 #include "work.hpp"
@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 namespace squeal
 {
@@ -17,10 +18,11 @@ namespace squeal
 namespace
 {
 
-template <class Real> struct Sweep
+/// `Entry`: of what is swept over, float for the near field and double for W itself.
+template <class Entry> struct Sweep
 {
   ContactWork& work;
-  std::vector<Real> dw;
+  std::vector<double> dw;
   bool dirty = false; // dw is not zero
   bool done = false;  // the sweeps have met their target, or nothing moves any more
   double fresh_residual = std::numeric_limits<double>::infinity(); // at the last product with W
@@ -29,45 +31,45 @@ template <class Real> struct Sweep
   int in_vain = 0; // products with W that told otherwise than the sweeps
 };
 
-SQUEAL_WIDE void add_rows(const float* __restrict rows, std::size_t count, std::size_t block, const PairVector& change,
-                          float* __restrict target)
+template <class Entry> SQUEAL_INLINE void add_block(const Entry* __restrict rows, std::size_t count, std::size_t block,
+                                                    const PairVector& change, double* __restrict target)
 {
-  const auto x = static_cast<float>(change[0]), y = static_cast<float>(change[1]), z = static_cast<float>(change[2]);
+  const double x = change[0], y = change[1], z = change[2];
+  const Entry *const second = rows + count, *const third = second + count;
   if (block == 2)
-    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * rows[count + j];
+    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * second[j];
   else
-    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * rows[count + j] + z * rows[2 * count + j];
+    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * second[j] + z * third[j];
 }
 
-SQUEAL_WIDE void add_rows(const double* __restrict rows, std::size_t count, std::size_t block, const PairVector& change,
-                          double* __restrict target)
+SQUEAL_WIDE void add_rows(const double* rows, std::size_t count, std::size_t block, const PairVector& change,
+                          double* target)
 {
-  if (block == 2)
-    for (std::size_t j = 0; j < count; ++j) target[j] += change[0] * rows[j] + change[1] * rows[count + j];
-  else
-    for (std::size_t j = 0; j < count; ++j)
-      target[j] += change[0] * rows[j] + change[1] * rows[count + j] + change[2] * rows[2 * count + j];
+  add_block(rows, count, block, change, target);
 }
 
-void spread(const ContactOperator& W, std::size_t pair, const PairVector& change, std::vector<double>& dw)
+SQUEAL_WIDE void add_runs(const NearField& near, std::size_t pair, std::size_t block, const PairVector& change,
+                          double* target)
 {
-  const std::size_t n = W.size(), block = W.block();
-  add_rows(&W.W[pair * block * n], n, block, change, dw.data());
-}
-
-void spread(const ContactOperator& W, std::size_t pair, const PairVector& change, std::vector<float>& dw)
-{
-  const std::size_t block = W.block();
-  const float* values = &W.near.values[W.near.values_of[pair]];
-  for (std::size_t run = W.near.runs_of[pair]; run < W.near.runs_of[pair + 1]; ++run)
+  const float* values = &near.values[near.values_of[pair]];
+  for (std::size_t run = near.runs_of[pair]; run < near.runs_of[pair + 1]; ++run)
   {
-    const auto [first, count] = W.near.runs[run];
-    add_rows(values, count, block, change, &dw[first]);
+    const auto [first, count] = near.runs[run];
+    add_block(values, count, block, change, target + first);
     values += block * count;
   }
 }
 
-template <class Real> PairVector velocity_of(const Sweep<Real>& sweep, std::size_t i, std::size_t block)
+template <class Entry>
+void spread(const ContactOperator& W, std::size_t pair, const PairVector& change, std::vector<double>& dw)
+{
+  if constexpr (std::is_same_v<Entry, float>)
+    add_runs(W.near, pair, W.block(), change, dw.data());
+  else
+    add_rows(&W.W[pair * W.block() * W.size()], W.size(), W.block(), change, dw.data());
+}
+
+template <class Entry> PairVector velocity_of(const Sweep<Entry>& sweep, std::size_t i, std::size_t block)
 {
   PairVector w = sweep.work.velocity(i);
   for (std::size_t k = 0; k < block; ++k) w[k] += sweep.dw[i + k];
@@ -75,7 +77,7 @@ template <class Real> PairVector velocity_of(const Sweep<Real>& sweep, std::size
 }
 
 /// False if it is the reaction there is.
-template <class Real> bool change_reaction(Sweep<Real>& sweep, std::size_t pair, const PairVector& next)
+template <class Entry> bool change_reaction(Sweep<Entry>& sweep, std::size_t pair, const PairVector& next)
 {
   const std::size_t block = sweep.work.W.block(), i = pair * block;
   PairVector change{};
@@ -85,12 +87,12 @@ template <class Real> bool change_reaction(Sweep<Real>& sweep, std::size_t pair,
     sweep.work.r[i + k] = next[k];
   }
   if (change == PairVector{}) return false;
-  spread(sweep.work.W, pair, change, sweep.dw);
+  spread<Entry>(sweep.work.W, pair, change, sweep.dw);
   return sweep.dirty = true;
 }
 
 /// A warm start need not be admissible, nor finite after a failed step.
-template <class Real> void admit(Sweep<Real>& sweep)
+template <class Entry> void admit(Sweep<Entry>& sweep)
 {
   const ContactWork& work = sweep.work;
   for (std::size_t pair = 0; pair < work.W.diagonal.size(); ++pair)
@@ -103,7 +105,7 @@ template <class Real> void admit(Sweep<Real>& sweep)
 }
 
 /// Solves one pair if its law is missed by more than `limit`; false if it does not move.
-template <class Real> bool visit(Sweep<Real>& sweep, std::size_t pair, double limit, double largest)
+template <class Entry> bool visit(Sweep<Entry>& sweep, std::size_t pair, double limit, double largest)
 {
   const ContactWork& work = sweep.work;
   const ContactOperator& W = work.W;
@@ -123,7 +125,7 @@ template <class Real> bool visit(Sweep<Real>& sweep, std::size_t pair, double li
 }
 
 /// The residual as far as the sweeps know it.
-template <class Real> double seen_residual(Sweep<Real>& sweep)
+template <class Entry> double seen_residual(Sweep<Entry>& sweep)
 {
   std::vector<double> exact = sweep.work.Wr;
   for (std::size_t i = 0; i < exact.size(); ++i) sweep.work.Wr[i] += sweep.dw[i];
@@ -133,7 +135,7 @@ template <class Real> double seen_residual(Sweep<Real>& sweep)
 }
 
 /// After a product with W: what the next sweeps aim at, and whether they go on.
-template <class Real> bool goes_on(Sweep<Real>& sweep, const ContactSettings& settings)
+template <class Entry> bool goes_on(Sweep<Entry>& sweep, const ContactSettings& settings)
 {
   ContactResult& result = sweep.work.result;
   const double before = sweep.fresh_residual;
@@ -142,13 +144,13 @@ template <class Real> bool goes_on(Sweep<Real>& sweep, const ContactSettings& se
   if (result.converged || !std::isfinite(result.residual) || result.iterations >= settings.max_iterations) return false;
   if (sweep.done) sweep.in_vain = result.residual > before / 2 ? sweep.in_vain + 1 : 0;
   sweep.done = false;
-  // what rounding of dw, which is as large as the residual at first, allows the sweeps to see
-  const double digits = 16 * static_cast<double>(std::numeric_limits<Real>::epsilon());
+  // what rounding of the entries allows the sweeps to see of dw, which is as large as the residual at first
+  const double digits = 2 * static_cast<double>(std::numeric_limits<Entry>::epsilon());
   sweep.target = std::max(settings.tolerance / 4, digits * result.residual);
   return sweep.in_vain < 2; // else this is what rounding, or the near field, allows
 }
 
-template <class Real> void relax(Sweep<Real>& sweep)
+template <class Entry> void relax(Sweep<Entry>& sweep)
 {
   // strong friction makes sweeps go round in circles, which shorter changes often end
   const double residual = sweep.work.result.residual;
@@ -157,19 +159,19 @@ template <class Real> void relax(Sweep<Real>& sweep)
 }
 
 /// One sweep of all of them; those that are done, or due for a product with W, leave.
-template <class Real> void sweep_once(std::vector<Sweep<Real>*>& moving, const ContactSettings& settings)
+template <class Entry> void sweep_once(std::vector<Sweep<Entry>*>& moving, const ContactSettings& settings)
 {
   std::vector<double> largest;
-  for (const Sweep<Real>* sweep : moving) largest.push_back(largest_reaction(sweep->work.r));
+  for (const Sweep<Entry>* sweep : moving) largest.push_back(largest_reaction(sweep->work.r));
   std::vector<char> moved(moving.size(), 0);
   const std::size_t pairs = moving.front()->work.W.diagonal.size();
   for (std::size_t pair = 0; pair < pairs; ++pair)
     for (std::size_t k = 0; k < moving.size(); ++k)
       if (visit(*moving[k], pair, moving[k]->target / 8, largest[k])) moved[k] = 1;
-  std::vector<Sweep<Real>*> still;
+  std::vector<Sweep<Entry>*> still;
   for (std::size_t k = 0; k < moving.size(); ++k)
   {
-    Sweep<Real>& sweep = *moving[k];
+    Sweep<Entry>& sweep = *moving[k];
     ContactResult& result = sweep.work.result;
     ++result.iterations;
     result.residual = seen_residual(sweep);
@@ -181,13 +183,13 @@ template <class Real> void sweep_once(std::vector<Sweep<Real>*>& moving, const C
   moving = std::move(still);
 }
 
-template <class Real> void solve(std::span<ContactWork* const> works, const ContactSettings& settings)
+template <class Entry> void solve(std::span<ContactWork* const> works, const ContactSettings& settings)
 {
-  std::vector<Sweep<Real>> sweeps;
+  std::vector<Sweep<Entry>> sweeps;
   sweeps.reserve(works.size());
-  for (ContactWork* work : works) sweeps.push_back({*work, std::vector<Real>(work->b.size())});
-  std::vector<Sweep<Real>*> active;
-  for (Sweep<Real>& sweep : sweeps)
+  for (ContactWork* work : works) sweeps.push_back({*work, std::vector<double>(work->b.size())});
+  std::vector<Sweep<Entry>*> active;
+  for (Sweep<Entry>& sweep : sweeps)
   {
     admit(sweep);
     active.push_back(&sweep);
@@ -195,16 +197,16 @@ template <class Real> void solve(std::span<ContactWork* const> works, const Cont
   while (!active.empty())
   {
     std::vector<ContactWork*> stale;
-    for (Sweep<Real>* sweep : active)
+    for (Sweep<Entry>* sweep : active)
       if (sweep->dirty) stale.push_back(&sweep->work);
     refresh(stale);
-    for (Sweep<Real>* sweep : active)
+    for (Sweep<Entry>* sweep : active)
     {
       sweep->dirty = false;
-      std::fill(sweep->dw.begin(), sweep->dw.end(), Real(0));
+      std::fill(sweep->dw.begin(), sweep->dw.end(), 0.);
     }
-    std::erase_if(active, [&](Sweep<Real>* sweep) { return !goes_on(*sweep, settings); });
-    std::vector<Sweep<Real>*> moving = active;
+    std::erase_if(active, [&](Sweep<Entry>* sweep) { return !goes_on(*sweep, settings); });
+    std::vector<Sweep<Entry>*> moving = active;
     while (!moving.empty()) sweep_once(moving, settings);
   }
 }

@@ -20,4 +20,7 @@ void subtract_product(const Panel& L, std::size_t lanes, const double* x, double
 /// y -= L' x
 void subtract_transposed(const Panel& L, std::size_t lanes, const double* x, double* y);
 
+/// y = W x for the lower triangle of a symmetric W, by columns, read once.
+void symmetric_product(const double* W, std::size_t size, const double* x, double* y);
+
 } // namespace squeal

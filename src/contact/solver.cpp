@@ -1,12 +1,12 @@
 #include "squeal/contact/solver.hpp"
 
+#include "panel.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/contact/complementarity.hpp"
 #include "work.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <Eigen/Core>
 #include <limits>
 #include <petscblaslapack.h>
 
@@ -69,10 +69,7 @@ void multiply(const ContactOperator& W, const std::vector<double>& x, int column
   y.resize(x.size());
   if (columns == 1)
   {
-    const auto n = static_cast<Eigen::Index>(W.size());
-    const Eigen::Map<const Eigen::MatrixXd> matrix(W.W.data(), n, n);
-    const Eigen::Map<const Eigen::VectorXd> vector(x.data(), n);
-    Eigen::Map<Eigen::VectorXd>(y.data(), n).noalias() = matrix.selfadjointView<Eigen::Lower>() * vector;
+    symmetric_product(W.W.data(), W.size(), x.data(), y.data());
     return;
   }
   const PetscBLASInt n = static_cast<PetscBLASInt>(W.size()), m = columns;
