@@ -134,7 +134,14 @@ template <class Entry> double seen_residual(Sweep<Entry>& sweep)
   return residual;
 }
 
-/// After a product with W: what the next sweeps aim at, and whether they go on.
+/// What rounding of the entries allows the sweeps to see of dw, which is as large as the residual at first.
+template <class Entry> void aim(Sweep<Entry>& sweep, const ContactSettings& settings)
+{
+  const double digits = 2 * static_cast<double>(std::numeric_limits<Entry>::epsilon());
+  sweep.target = std::max(settings.tolerance / 4, digits * sweep.fresh_residual);
+}
+
+/// After a product with W: whether the sweeps go on, and what they aim at.
 template <class Entry> bool goes_on(Sweep<Entry>& sweep, const ContactSettings& settings)
 {
   ContactResult& result = sweep.work.result;
@@ -144,9 +151,7 @@ template <class Entry> bool goes_on(Sweep<Entry>& sweep, const ContactSettings& 
   if (result.converged || !std::isfinite(result.residual) || result.iterations >= settings.max_iterations) return false;
   if (sweep.done) sweep.in_vain = result.residual > before / 2 ? sweep.in_vain + 1 : 0;
   sweep.done = false;
-  // what rounding of the entries allows the sweeps to see of dw, which is as large as the residual at first
-  const double digits = 2 * static_cast<double>(std::numeric_limits<Entry>::epsilon());
-  sweep.target = std::max(settings.tolerance / 4, digits * result.residual);
+  aim(sweep, settings);
   return sweep.in_vain < 2; // else this is what rounding, or the near field, allows
 }
 
@@ -183,6 +188,29 @@ template <class Entry> void sweep_once(std::vector<Sweep<Entry>*>& moving, const
   moving = std::move(still);
 }
 
+/// Where the sweeps begin: an admissible start, whose residual is as yet seen through the entries swept over.
+template <class Entry> void begin(Sweep<Entry>& sweep, const ContactSettings& settings)
+{
+  admit(sweep);
+  if (!sweep.dirty) return;
+  sweep.fresh_residual = seen_residual(sweep);
+  aim(sweep, settings);
+}
+
+/// One product with W for all that need it.
+template <class Entry> void refresh(std::span<Sweep<Entry>* const> sweeps)
+{
+  std::vector<ContactWork*> stale;
+  for (Sweep<Entry>* sweep : sweeps)
+  {
+    if (!sweep->dirty) continue;
+    stale.push_back(&sweep->work);
+    sweep->dirty = false;
+    std::fill(sweep->dw.begin(), sweep->dw.end(), 0.);
+  }
+  squeal::refresh(stale);
+}
+
 template <class Entry> void solve(std::span<ContactWork* const> works, const ContactSettings& settings)
 {
   std::vector<Sweep<Entry>> sweeps;
@@ -191,23 +219,15 @@ template <class Entry> void solve(std::span<ContactWork* const> works, const Con
   std::vector<Sweep<Entry>*> active;
   for (Sweep<Entry>& sweep : sweeps)
   {
-    admit(sweep);
-    active.push_back(&sweep);
+    begin(sweep, settings);
+    if (sweep.dirty || goes_on(sweep, settings)) active.push_back(&sweep);
   }
   while (!active.empty())
   {
-    std::vector<ContactWork*> stale;
-    for (Sweep<Entry>* sweep : active)
-      if (sweep->dirty) stale.push_back(&sweep->work);
-    refresh(stale);
-    for (Sweep<Entry>* sweep : active)
-    {
-      sweep->dirty = false;
-      std::fill(sweep->dw.begin(), sweep->dw.end(), 0.);
-    }
-    std::erase_if(active, [&](Sweep<Entry>* sweep) { return !goes_on(*sweep, settings); });
     std::vector<Sweep<Entry>*> moving = active;
     while (!moving.empty()) sweep_once(moving, settings);
+    refresh<Entry>(active);
+    std::erase_if(active, [&](Sweep<Entry>* sweep) { return !goes_on(*sweep, settings); });
   }
 }
 

@@ -12,7 +12,7 @@ namespace squeal
 namespace
 {
 
-constexpr double negligible = 1e-8;         // of the largest entry: what the sweeps leave to the product with W
+constexpr double negligible = 1e-7;         // of the largest entry: what the sweeps leave to the product with W
 constexpr std::size_t fits_the_cache = 250; // rows: sweeping over W itself is as quick
 
 void set_scales(ContactOperator& op)
