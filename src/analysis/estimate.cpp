@@ -131,8 +131,9 @@ std::vector<ShakenPair> shaken_pairs(const Structure& structure, const Interface
 {
   const Complex s(0, mode.lambda.imag()); // the motion assumed neither grows nor decays, and its reactions are those
   const std::vector<Complex> reactions =
-      normal_reactions(eliminate_closed_pairs(structure, interface, equilibrium), structure,
-                       sliding_damping(structure, interface, equilibrium), s, mode.real, mode.imaginary);
+      normal_reactions(reaction_operator(eliminate_closed_pairs(structure, interface, equilibrium), structure,
+                                         sliding_damping(structure, interface, equilibrium)),
+                       s, mode.real, mode.imaginary);
   const std::vector<double> e = drive_directions(interface), real = relative(interface, mode.real),
                             imaginary = relative(interface, mode.imaginary);
   const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;

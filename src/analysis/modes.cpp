@@ -82,13 +82,14 @@ std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const Struc
                                   const SlidingProblem& problem)
 {
   std::vector<ComplexMode> modes;
+  const ReactionOperator reaction = reaction_operator(problem.contact, structure, problem.C);
   for (const Eigenpair& pair : solution.pairs)
   {
     ComplexMode mode;
     mode.lambda = pair.lambda;
     mode.backward_error = pair.backward_error;
     set_shape(mode, problem.contact, pair);
-    mode.reactions = normal_reactions(problem.contact, structure, problem.C, mode.lambda, mode.real, mode.imaginary);
+    mode.reactions = normal_reactions(reaction, mode.lambda, mode.real, mode.imaginary);
     modes.push_back(std::move(mode));
   }
   return modes;
@@ -118,7 +119,8 @@ PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution
                         double band)
 {
   const double end = 2 * std::numbers::pi * band;
-  return count_pairs(solution, real, std::sqrt(vibration_floor(norms_of(problem))), .8 * end, end);
+  const int free = count_below(real, std::sqrt(vibration_floor(norms_of(problem))));
+  return count_pairs(solution, real, free, .8 * end, end);
 }
 
 CountedSolution solve_full(const SlidingProblem& problem, RealCount& real, const ModesSettings& settings,
@@ -267,11 +269,13 @@ Modes find_modes(const Structure& structure, const Interface& interface, const E
   if (settings.method != "full")
   {
     found.solution = solve_by_projection(problem, settings, options);
-    found.count = count_in_band(problem.reduced, found.solution, real, settings.band);
     modes.projected = modes_of(found.solution, structure, problem);
   }
   if (settings.method == "projection")
+  {
+    found.count = count_in_band(problem.reduced, found.solution, real, settings.band);
     modes.modes = std::exchange(modes.projected, {});
+  }
   else
   {
     found = solve_full(problem, real, settings, options);

@@ -299,17 +299,23 @@ Owned<Mat> sliding_damping(const Structure& structure, const Interface& interfac
   return C;
 }
 
-std::vector<std::complex<double>> normal_reactions(const ClosedContact& contact, const Structure& structure, Mat C,
-                                                   std::complex<double> s, Vec real, Vec imaginary)
+ReactionOperator reaction_operator(const ClosedContact& contact, const Structure& structure, Mat C)
 {
-  const Owned<Vec> force_r = zeros_like(real), force_i = zeros_like(real);
-  quadratic_residual(structure.M, C, structure.K, s, real, imaginary, force_r, force_i);
-  Owned<Vec> reaction;
-  check(MatCreateVecs(contact.reaction, nullptr, reaction.put()));
-  check(MatMult(contact.reaction, force_r, reaction));
-  const std::vector<double> first = whole(reaction);
-  check(MatMult(contact.reaction, force_i, reaction));
-  const std::vector<double> second = whole(reaction);
+  ReactionOperator result;
+  for (const auto& [A, rows] :
+       {std::pair{structure.M.get(), &result.M}, {C, &result.C}, {structure.K.get(), &result.K}})
+    check(MatMatMult(contact.reaction, A, MAT_INITIAL_MATRIX, PETSC_DEFAULT, rows->put()));
+  return result;
+}
+
+std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
+                                                   Vec imaginary)
+{
+  Owned<Vec> re, im;
+  check(MatCreateVecs(reaction.K, nullptr, re.put()));
+  check(MatCreateVecs(reaction.K, nullptr, im.put()));
+  quadratic_residual(reaction.M, reaction.C, reaction.K, s, real, imaginary, re, im);
+  const std::vector<double> first = whole(re), second = whole(im);
   std::vector<std::complex<double>> result;
   for (std::size_t i = 0; i < first.size(); ++i) result.emplace_back(first[i], second[i]);
   return result;

@@ -297,6 +297,25 @@ int count_below(RealCount& count, double omega)
   return known->second = negative_pivots(count.pencil);
 }
 
+std::vector<double> omegas_between(RealCount& count, double least, double top)
+{
+  std::vector<double> omega;
+  const auto take = [&](double theta)
+  {
+    if (theta >= least * least && theta < top * top) omega.push_back(std::sqrt(theta));
+  };
+  if (!count.pencil.K)
+    std::for_each(count.all.begin(), count.all.end(), take);
+  else
+  {
+    if (count.pencil.shift != top * top) move_to(count.pencil, top * top);
+    const Nearest nearest = solve_nearest(count.pencil, 1, top * top - least * least);
+    for (const std::complex<double> theta : nearest.theta) take(theta.real());
+  }
+  std::sort(omega.rbegin(), omega.rend());
+  return omega;
+}
+
 RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit)
 {
   PetscInt n = 0;

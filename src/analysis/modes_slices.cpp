@@ -21,6 +21,7 @@ constexpr double usual = .06, wide = .2; // [rad] by which friction may turn the
 constexpr int passes = 12;               // of residual correction, if not all pairs are exact before
 constexpr double enough = 1e-12, sharp = 1e-14; // backward errors,
 constexpr double spurious = 1e-8;               // and that of what is no pair
+constexpr double suspect = 1e-6;                // theta so small, in parts of the largest, may be a free body's
 constexpr double share = 1e-2;                  // a pass divides residuals by ten or so: a fourth of all directions
 constexpr double two_pi = 2 * std::numbers::pi;
 
@@ -29,6 +30,7 @@ struct Slice
 {
   double lower = 0, upper = 0;
   int expected = 0;
+  double slowest = INFINITY; // |theta|
   std::vector<Eigenpair> pairs;
 };
 
@@ -46,7 +48,7 @@ std::vector<Slice> plan(RealCount& real, double floor, double reach)
       edges.insert(edges.end() - 1, (lower + upper) / 2);
       continue;
     }
-    slices.push_back({std::max(lower, floor), upper, expected, {}});
+    slices.push_back({std::max(lower, floor), upper, expected, INFINITY, {}});
     edges.pop_back();
   }
   return slices;
@@ -60,6 +62,7 @@ void find_pairs(Slice& slice, const QuadraticProblem& problem, ShiftInvert& penc
   const double radius = std::abs(std::polar(limit, turned) - pencil.shift);
   Nearest nearest = solve_nearest(pencil, slice.expected + neighbours, radius);
   if (!nearest.converged) return;
+  for (const std::complex<double> theta : nearest.theta) slice.slowest = std::min(slice.slowest, std::abs(theta));
   const Correction correction{{least, limit}, passes, std::numeric_limits<int>::max(), enough, sharp, share};
   slice.pairs = solve_on_subspace(problem, std::move(nearest.space), pencil.factor, correction).pairs;
   std::erase_if(slice.pairs, [](const Eigenpair& pair) { return pair.backward_error > spurious; });
@@ -78,24 +81,26 @@ QuadraticSolution joined(std::vector<Slice>& slices)
 
 } // namespace
 
-PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, double floor, double least, double top)
+PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, int free, double least, double top)
 {
-  constexpr std::size_t most = 8; // edges tried
-  std::vector<double> sizes, edges = {top};
+  std::vector<double> sizes;
   for (const Eigenpair& pair : solution.pairs) sizes.push_back(std::abs(pair.lambda));
   std::sort(sizes.rbegin(), sizes.rend());
-  for (std::size_t k = 1; k < sizes.size() && edges.size() < most; ++k)
-    if (const double edge = (sizes[k - 1] + sizes[k]) / 2; edge > least && edge < top) edges.push_back(edge);
-  const auto count_at = [&](double edge)
-  {
-    PairCount count{edge / two_pi, count_below(real, edge), 0};
-    for (const double size : sizes) count.found += size < edge;
-    if (count.expected != count.found) count.expected -= count_below(real, floor);
-    return count;
+  const auto from = [](double edge, const std::vector<double>& values) {
+    return static_cast<int>(std::count_if(values.begin(), values.end(), [&](double value) { return value >= edge; }));
   };
-  for (const double edge : edges)
-    if (const PairCount count = count_at(edge); count.expected == count.found) return count;
-  return count_at(top);
+  const int all = static_cast<int>(sizes.size());
+  const PairCount whole{top / two_pi, count_below(real, top) - free, all - from(top, sizes)};
+  if (whole.expected == whole.found) return whole;
+  const std::vector<double> omega = omegas_between(real, least, top);
+  for (std::size_t k = 1; k < sizes.size() && sizes[k - 1] > least; ++k)
+  {
+    const double edge = std::max(least, (sizes[k - 1] + sizes[k]) / 2);
+    if (edge >= top) continue;
+    const PairCount count{edge / two_pi, whole.expected - from(edge, omega), all - from(edge, sizes)};
+    if (count.expected == count.found) return count;
+  }
+  return whole;
 }
 
 CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real, double band)
@@ -103,16 +108,22 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
   const double floor = std::sqrt(vibration_floor(norms_of(problem))), end = two_pi * band, reach = beyond * end;
   std::vector<Slice> slices = plan(real, floor, reach);
   ShiftInvert pencil = make_shift_invert(problem.K, problem.M, MAT_FACTOR_LU);
-  for (Slice& slice : slices) find_pairs(slice, problem, pencil, usual);
   CountedSolution result;
-  result.solution = joined(slices);
-  result.count = count_pairs(result.solution, real, floor, end, reach);
-  if (result.count.found >= result.count.expected) return result;
+  const auto search = [&](double turned)
+  {
+    bool slow = false;
+    for (Slice& slice : slices)
+    {
+      if (turned == usual || static_cast<int>(slice.pairs.size()) < slice.expected)
+        find_pairs(slice, problem, pencil, turned);
+      slow = slow || slice.slowest < suspect * reach * reach;
+    }
+    result.solution = joined(slices);
+    result.count = count_pairs(result.solution, real, slow ? count_below(real, floor) : 0, end, reach);
+  };
+  search(usual);
   // Friction moved some far. Between neighbours pairs may have changed places: only the sum is sure.
-  for (Slice& slice : slices)
-    if (static_cast<int>(slice.pairs.size()) < slice.expected) find_pairs(slice, problem, pencil, wide);
-  result.solution = joined(slices);
-  result.count = count_pairs(result.solution, real, floor, end, reach);
+  if (result.count.found < result.count.expected) search(wide);
   return result;
 }
 

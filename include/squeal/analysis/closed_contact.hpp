@@ -38,9 +38,16 @@ Owned<Mat> direction_damping(const Interface& interface, const Equilibrium& equi
 /// C, and C_f with it where the interface has it on.
 Owned<Mat> sliding_damping(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium);
 
-/// Normal reactions lambda_n per pair that the motion phi e^{s t} takes, from the pivots' rows of
-/// (s^2 M + s C + K) phi = R' lambda_n; 0 on open pairs. Every choice of rows agrees if s and phi are an eigenpair.
-std::vector<std::complex<double>> normal_reactions(const ClosedContact& contact, const Structure& structure, Mat C,
-                                                   std::complex<double> s, Vec real, Vec imaginary);
+/// Normal reactions lambda_n per pair that a motion phi e^{s t} takes are (s^2 M + s C + K) phi, from the pivots' rows
+/// of (s^2 M + s C + K) phi = R' lambda_n; 0 on open pairs. Every choice of rows agrees if s and phi are an eigenpair.
+struct ReactionOperator
+{
+  Owned<Mat> M, C, K; // pairs x dofs
+};
+
+ReactionOperator reaction_operator(const ClosedContact& contact, const Structure& structure, Mat C);
+
+std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
+                                                   Vec imaginary);
 
 } // namespace squeal

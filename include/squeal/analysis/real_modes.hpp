@@ -27,6 +27,10 @@ RealCount make_real_count(Mat M, Mat K, int dense_limit);
 /// Below omega [rad/s].
 int count_below(RealCount& count, double omega);
 
+/// All omega from `least` to `top` [rad/s], nearest `top` first. None if the search does not end. One that it misses
+/// makes the count below others too large, not too small.
+std::vector<double> omegas_between(RealCount& count, double least, double top);
+
 /// The lowest `count`, or as many as there are; shapes are y.
 RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit);
 

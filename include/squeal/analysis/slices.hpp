@@ -26,8 +26,8 @@ struct PairCount
 };
 
 /// Both below `top`, or, where one more or less lies there, below the highest gap between pairs from `least` on where
-/// they agree [rad/s]. Motions of a free body, below `floor`, are no vibrations.
-PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, double floor, double least, double top);
+/// they agree [rad/s]. `free`: motions of a free body, which are no vibrations.
+PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, int free, double least, double top);
 
 /// solution.pairs reach up to count.frequency.
 struct CountedSolution
