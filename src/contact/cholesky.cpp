@@ -3,6 +3,7 @@
 #include "panel.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <petscblaslapack.h>
 
 namespace squeal
@@ -159,18 +160,22 @@ void add_update(const Front& front, const Supernode& child, const int* rows, con
 
 } // namespace
 
-bool Cholesky::factorise(const Triplets& lower)
+bool Cholesky::factorise(Triplets lower)
 {
   const Columns A = sorted(lower, order_);
+  lower = {};
   const auto [most, largest] = room(order_);
-  std::vector<double> waiting(most), front_values(largest), tile; // updates on a stack: children come before parents
+  // updates on a stack, since children come before parents; memory is not touched before it is needed
+  const auto waiting = std::make_unique_for_overwrite<double[]>(most);
+  const auto front_values = std::make_unique_for_overwrite<double[]>(largest);
+  std::vector<double> tile;
   std::vector<int> local(at(order_.dofs + order_.border));
-  values_.resize(order_.values);
+  values_.reserve(order_.values);
   corner_.assign(at(order_.border) * at(order_.border), 0.);
-  double* top = waiting.data();
+  double* top = waiting.get();
   for (const Supernode& supernode : order_.supernodes)
   {
-    const Front front{supernode, order_.rows.data() + supernode.rows, front_values.data()};
+    const Front front{supernode, order_.rows.data() + supernode.rows, front_values.get()};
     const std::size_t pivots = front.pivots(), below = at(supernode.below);
     assemble(front, A, local);
     for (auto number = supernode.children.rbegin(); number != supernode.children.rend(); ++number)
@@ -180,7 +185,7 @@ bool Cholesky::factorise(const Triplets& lower)
       add_update(front, child, order_.rows.data() + child.rows, top, local);
     }
     if (!eliminate_pivots(front)) return false;
-    std::copy_n(front.values, front.height() * pivots, values_.begin() + static_cast<std::ptrdiff_t>(supernode.values));
+    values_.insert(values_.end(), front.values, front.column(pivots));
     if (supernode.bordering > 0) add_to_corner(front, order_, tile, corner_);
     for (std::size_t j = 0; j < at(supernode.inner()); ++j, top += below)
       std::copy_n(front.column(pivots + j) + pivots, below, top);
@@ -188,9 +193,9 @@ bool Cholesky::factorise(const Triplets& lower)
   return true;
 }
 
-Cholesky::Cholesky(const Triplets& lower, int dofs, int border) : order_(eliminate(lower, dofs, border))
+Cholesky::Cholesky(Triplets lower, int dofs, int border) : order_(eliminate(lower, dofs, border))
 {
-  failed_ = !factorise(lower);
+  failed_ = !factorise(std::move(lower));
 }
 
 namespace

@@ -12,7 +12,7 @@ class Cholesky
 {
 public:
   /// `lower`: the lower triangle of A and, from row dofs + 1 on, B.
-  Cholesky(const Triplets& lower, int dofs, int border);
+  Cholesky(Triplets lower, int dofs, int border);
 
   /// A is not positive definite: the factor is of no use.
   bool failed() const { return failed_; }
@@ -29,7 +29,7 @@ public:
   double entries() const { return static_cast<double>(values_.size()); }
 
 private:
-  bool factorise(const Triplets& lower);
+  bool factorise(Triplets lower);
 
   Elimination order_;
   std::vector<double> values_; // L and E, panel by panel

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <span>
 #include <unordered_map>
+#include <utility>
 
 namespace squeal
 {
@@ -32,20 +33,25 @@ struct Graph
   }
 };
 
-/// Of (node, neighbour) pairs.
-Graph graph_of(int nodes, std::vector<std::pair<int, int>>& edges)
+/// Of (node, neighbour) pairs, each neighbour once; neighbours are below `range`.
+Graph graph_of(int nodes, int range, const std::vector<std::pair<int, int>>& edges)
 {
-  Graph graph;
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-  graph.offsets.assign(at(nodes) + 1, 0);
-  graph.neighbours.reserve(edges.size() + 1); // never without an address
-  for (const auto& [node, neighbour] : edges)
+  std::vector<std::size_t> starts(at(nodes) + 1, 0);
+  for (const auto& edge : edges) ++starts[at(edge.first) + 1];
+  std::partial_sum(starts.begin(), starts.end(), starts.begin());
+  std::vector<idx_t> all(edges.size());
+  std::vector<std::size_t> next(starts.begin(), starts.end() - 1);
+  for (const auto& [node, neighbour] : edges) all[next[at(node)]++] = neighbour;
+  Graph graph{{0}, {}};
+  std::vector<int> seen_by(at(range), -1);
+  for (int node = 0; node < nodes; ++node)
   {
-    ++graph.offsets[at(node) + 1];
-    graph.neighbours.push_back(neighbour);
+    for (std::size_t k = starts[at(node)]; k < starts[at(node) + 1]; ++k)
+      if (std::exchange(seen_by[at(all[k])], node) != node) graph.neighbours.push_back(all[k]);
+    std::sort(graph.neighbours.begin() + graph.offsets.back(), graph.neighbours.end());
+    graph.offsets.push_back(static_cast<idx_t>(graph.neighbours.size()));
   }
-  std::partial_sum(graph.offsets.begin(), graph.offsets.end(), graph.offsets.begin());
+  graph.neighbours.reserve(1); // never without an address
   return graph;
 }
 
@@ -96,7 +102,7 @@ Graph renumbered(const Graph& graph, const std::vector<idx_t>& position)
   edges.reserve(graph.neighbours.size());
   for (int node = 0; node < graph.nodes(); ++node)
     for (const idx_t neighbour : graph.of(node)) edges.emplace_back(position[at(node)], position[at(neighbour)]);
-  return graph_of(graph.nodes(), edges);
+  return graph_of(graph.nodes(), graph.nodes(), edges);
 }
 
 /// Elimination tree (Liu 1990): the node whose column takes each node's update; -1 for none.
@@ -277,7 +283,7 @@ Elimination eliminate(const Triplets& lower, int dofs, int border)
       edges.emplace_back(j, node_of[at(i)]);
     }
   }
-  Graph graph = graph_of(nodes, edges);
+  Graph graph = graph_of(nodes, nodes, edges);
   edges = {};
   std::vector<idx_t> position = dissect(graph, weights);
   const std::vector<idx_t> moved = postorder(elimination_tree(renumbered(graph, position)));
@@ -288,7 +294,7 @@ Elimination eliminate(const Triplets& lower, int dofs, int border)
   for (auto& [node, row] : rows) node = position[at(node)];
   const std::vector<int> parent = elimination_tree(graph);
   const Weights weight{moved_weights};
-  const std::vector<Run> runs = joined(find_runs(graph, graph_of(nodes, rows), parent, weight), parent, weight);
+  const std::vector<Run> runs = joined(find_runs(graph, graph_of(nodes, border, rows), parent, weight), parent, weight);
   std::vector<int> starts(at(nodes) + 1, 0), next;
   std::partial_sum(moved_weights.begin(), moved_weights.end(), starts.begin() + 1);
   expand(runs, starts, result);

@@ -123,16 +123,16 @@ Factor::Factor(Mat A, Mat B, Kind kind) : parts_(std::make_unique<Parts>())
   parts.shares = shares_of(A);
   parts.dofs = parts.shares.total();
   parts.border = rows_of(B);
-  const Triplets mine = bordered(A, B);
+  Triplets mine = bordered(A, B);
   const bool sparse = chosen(kind, A, mine) == Kind::sparse;
-  const Triplets all = gathered(mine, Triplets::Part::everything, parts.comm);
+  Triplets all = gathered(std::move(mine), Triplets::Part::everything, parts.comm);
   int good = 1;
   on_rank_zero(parts.comm,
                [&]
                {
                  if (sparse)
                  {
-                   parts.sparse.emplace(all, parts.dofs, parts.border);
+                   parts.sparse.emplace(std::move(all), parts.dofs, parts.border);
                    good = !parts.sparse->failed();
                    parts.corner = parts.sparse->take_corner();
                  }
@@ -209,10 +209,10 @@ double Factor::entries() const
 double factor_memory(Mat A, Mat B)
 {
   const int dofs = rows_of(A), border = rows_of(B);
-  const Triplets mine = bordered(A, B);
+  Triplets mine = bordered(A, B);
   if (chosen(Factor::Kind::automatic, A, mine) == Factor::Kind::dense)
     return 8 * static_cast<double>(area(dofs, dofs + border));
-  const Triplets pattern = gathered(mine, Triplets::Part::pattern, comm_of(A));
+  const Triplets pattern = gathered(std::move(mine), Triplets::Part::pattern, comm_of(A));
   double bytes = 0;
   on_rank_zero(comm_of(A), [&] { bytes = cholesky_memory(pattern, dofs, border); });
   MPI_Bcast(&bytes, 1, MPI_DOUBLE, 0, comm_of(A));

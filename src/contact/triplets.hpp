@@ -1,5 +1,5 @@
 #pragma once
-/// Entries of a distributed matrix as (row, column, value), numbered from one: what MUMPS takes.
+/// Entries of a distributed matrix as (row, column, value), numbered from one.
 #include "squeal/base/petsc.hpp"
 
 #include <vector>
@@ -26,6 +26,6 @@ Triplets lower_triangle(Mat symmetric);
 void append_rows(Mat B, int offset, Triplets& mine);
 
 /// The entries of all ranks on rank 0; nothing elsewhere. Collective.
-Triplets gathered(const Triplets& mine, Triplets::Part part, MPI_Comm comm);
+Triplets gathered(Triplets mine, Triplets::Part part, MPI_Comm comm);
 
 } // namespace squeal

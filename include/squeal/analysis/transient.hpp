@@ -27,6 +27,7 @@ enum class ContactLaw
 struct ThetaStep
 {
   double h = 0, theta = 0.5; // [s], [-]
+  Owned<Mat> M, K;           // the structure's, one triangle stored: read in a third of the time; null on several ranks
   Factor factor;             // of A bordered by B
   ContactOperator W;         // on rank 0
   ContactLaw law = ContactLaw::displacement;
