@@ -180,9 +180,9 @@ Owned<Mat> one_triangle(Mat A)
 /// y_k = A x_k for all k at one reading of A; `half`: A by one triangle, or null.
 void multiply(Mat A, Mat half, std::span<const Vec> x, std::span<const Vec> y)
 {
-  if (x.size() == 1)
+  if (half || x.size() == 1)
   {
-    check(MatMult(half ? half : A, x[0], y[0]));
+    for (std::size_t k = 0; k < x.size(); ++k) check(MatMult(half ? half : A, x[k], y[k]));
     return;
   }
   Block X = empty_block(A);
