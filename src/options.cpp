@@ -32,6 +32,7 @@ constexpr std::array options = {
     Option{"-transient_refuse", "true", "false: march even where theta and the step make growth rates lie"},
     Option{"-modes_dense_limit", "400", "eigenproblems up to this size are solved whole by LAPACK"},
     Option{"-modes_solver", "slices", "of large problems: slices of frequency, or TOAR around zero (toar)"},
+    Option{"-modes_factor_room", "30", "[%] of memory beyond what MUMPS foresees for a factor; it grows by itself"},
     Option{"-modes_candidates", "20", "pairs that each residual pass of the projection corrects"},
     Option{"-estimate_lift_off_multiple", "2", "of first lift-off: where vibrations start without an energy balance"},
     Option{"-cycle_start", "estimate", "of the full model's shooting: estimate, or reduced (that model's cycle)"},

@@ -119,15 +119,6 @@ Block product(Mat A, const Block& X)
   return Y;
 }
 
-Block solved(Mat factor, const Block& X)
-{
-  Block Y = zero_block(X.comm, X.rows, X.columns);
-  if (X.columns == 0) return Y;
-  const Owned<Mat> from = as_matrix(X), to = as_matrix(Y);
-  check(MatMatSolve(factor, from, to));
-  return Y;
-}
-
 std::vector<double> inner(const Block& X, const Block& Y)
 {
   std::vector<double> result(static_cast<Index>(X.columns * Y.columns), 0.0);

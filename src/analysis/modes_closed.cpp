@@ -241,8 +241,7 @@ ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface
 
 Owned<Mat> project_symmetric(Mat A, Mat Z)
 {
-  Owned<Mat> result;
-  check(MatPtAP(A, Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, result.put()));
+  Owned<Mat> result = project(A, Z, Z); // MatPtAP takes three times as long
   check(MatSetOption(result, MAT_SYMMETRIC, PETSC_TRUE));
   return result;
 }

@@ -147,7 +147,7 @@ Block largest_directions(Block residuals, double share)
 
 } // namespace
 
-QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Block basis, Mat factor,
+QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Block basis, const PencilFactor& P,
                                     const Correction& correction)
 {
   QuadraticSolution result;
@@ -168,7 +168,7 @@ QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Block basis
     };
     if (pass < correction.passes) expand_until(std::min(found.size(), static_cast<Index>(correction.pairs)));
     const bool better = pass < correction.passes && residuals.columns > 0 &&
-                        extend(space, solved(factor, largest_directions(std::move(residuals), correction.share)));
+                        extend(space, P.solved(largest_directions(std::move(residuals), correction.share)));
     result.outcome.iterations = pass + better;
     if (better) continue;
     expand_until(found.size());
@@ -185,11 +185,11 @@ QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K,
   {
     Block shapes = empty_block(K);
     for (const Owned<Vec>& shape : modes.shapes) append(shapes, shape);
-    ShiftInvert stiffness = make_shift_invert(K, M, MAT_FACTOR_CHOLESKY);
+    ShiftInvert stiffness = make_shift_invert(K, M, Symmetry::symmetric);
     if (settings.passes > 0) move_to(stiffness, shift_below_zero(M, K));
     const double omega = 2 * std::numbers::pi * settings.band;
     const Window window{vibration_floor(norms_of(problem)), omega * omega};
-    result = solve_on_subspace(problem, std::move(shapes), stiffness.factor,
+    result = solve_on_subspace(problem, std::move(shapes), *stiffness.factor,
                                {window, settings.passes, settings.candidates, 1e-15, 1e-15, 0});
   }
   result.outcome.word = modes.outcome.word;

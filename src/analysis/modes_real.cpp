@@ -156,7 +156,7 @@ int climb(ShiftInvert& pencil, const Found& found, double step, double limit)
   {
     const double shift = std::min(found.covered + step, limit);
     move_to(pencil, shift);
-    between = negative_pivots(pencil) - found.count();
+    between = pencil.factor->negative_pivots() - found.count();
     if (between <= ahead + ahead / 4 && (2 * between >= ahead || shift == limit)) break;
     step = (shift - found.covered) * std::min(3.0, ahead / std::max(1.0, static_cast<double>(between)));
   }
@@ -176,7 +176,7 @@ void fall_back(Found& found, double verified)
 // What lies around the shift joins `found` if it is all there, by the shift's count of what lies below it.
 bool advance(Found& found, const ShiftInvert& pencil, PetscInt count, int between, const Sought& sought)
 {
-  const Nearest nearest = solve_nearest(pencil, count, pencil.shift - found.covered);
+  const Nearest nearest = solve_nearest(pencil, count, pencil.shift - found.covered, 1e-9);
   ++found.iterations;
   if (!nearest.converged) return false;
   const DenseModes ritz = ritz_modes(nearest, pencil.M, pencil.K);
@@ -192,7 +192,7 @@ Found sweep(Mat M, Mat K, const Sought& sought)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  ShiftInvert pencil = make_shift_invert(K, M, MAT_FACTOR_CHOLESKY);
+  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric);
   Found found;
   found.shapes = empty_block(K);
   double verified = shift_below_zero(M, K); // all below is found for sure
@@ -217,11 +217,11 @@ Found sweep(Mat M, Mat K, const Sought& sought)
     }
     // Done if the count says so; or what is missing lies below, and nearer shifts find it.
     if (good) move_to(pencil, found.covered);
-    found.complete = good && negative_pivots(pencil) == found.below(pencil.shift);
+    found.complete = good && pencil.factor->negative_pivots() == found.below(pencil.shift);
     if (found.complete) break;
     fall_back(found, verified);
     if (!good) move_to(pencil, (verified + pencil.shift) / 2);
-    between = negative_pivots(pencil) - found.count();
+    between = pencil.factor->negative_pivots() - found.count();
   }
   return found;
 }
@@ -284,7 +284,7 @@ RealCount make_real_count(Mat M, Mat K, int dense_limit)
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
   if (n <= dense_limit) return {{}, solve_whole(M, K).lambda, {}};
-  return {make_shift_invert(K, M, MAT_FACTOR_CHOLESKY), {}, {{0, 0}}};
+  return {make_shift_invert(K, M, Symmetry::symmetric), {}, {{0, 0}}};
 }
 
 int count_below(RealCount& count, double omega)
@@ -294,7 +294,7 @@ int count_below(RealCount& count, double omega)
   const auto [known, is_new] = count.below.try_emplace(omega);
   if (!is_new) return known->second;
   move_to(count.pencil, omega * omega);
-  return known->second = negative_pivots(count.pencil);
+  return known->second = count.pencil.factor->negative_pivots();
 }
 
 std::vector<double> omegas_between(RealCount& count, double least, double top)
@@ -309,7 +309,7 @@ std::vector<double> omegas_between(RealCount& count, double least, double top)
   else
   {
     if (count.pencil.shift != top * top) move_to(count.pencil, top * top);
-    const Nearest nearest = solve_nearest(count.pencil, 1, top * top - least * least);
+    const Nearest nearest = solve_nearest(count.pencil, 1, top * top - least * least, 1e-4);
     for (const std::complex<double> theta : nearest.theta) take(theta.real());
   }
   std::sort(omega.rbegin(), omega.rend());

@@ -14,7 +14,6 @@ using Index = std::size_t;
 
 constexpr PetscInt block_size = 12;     // solved for at once
 constexpr PetscInt largest_space = 600; // vectors
-constexpr double tolerance = 1e-9;      // of an invariant subspace, relative to the eigenvalues of the inverse
 
 // A^-1 M V_k = V H: the columns of H are those of V multiplied so far, its rows all of V.
 struct Krylov
@@ -29,7 +28,7 @@ void grow(Krylov& krylov, const ShiftInvert& pencil)
 {
   Block& V = krylov.V;
   const PetscInt size = V.columns, fresh = size - krylov.order;
-  const Block S = solved(pencil.factor, product(pencil.M, columns_from(V, krylov.order)));
+  const Block S = pencil.factor->solved(product(pencil.M, columns_from(V, krylov.order)));
   const std::vector<double> inside = inner(V, S);
   const PetscInt gained = extend_orthonormal(V, S);
   const std::vector<double> outside = inner(columns_from(V, size), S);
@@ -157,63 +156,6 @@ std::vector<double> padded(const std::vector<double>& Q, const Krylov& krylov)
   return result;
 }
 
-// MUMPS's own account of its last phase: INFOG, counted from one.
-PetscInt infog(Mat factor, PetscInt number)
-{
-  PetscInt value = 0;
-  check(MatMumpsGetInfog(factor, number, &value));
-  return value;
-}
-
-constexpr PetscInt singular = -10, most_room = 2000; // INFOG(1); percent of memory beyond MUMPS's estimate
-
-// Pivots that are put off need more room than was estimated, how much depends on the timing of the ranks.
-bool short_of_room(PetscInt outcome)
-{
-  return outcome == -8 || outcome == -9 || outcome == -17 || outcome == -20;
-}
-
-// `room`: percent beyond the estimate, or 0 for MUMPS's own margin.
-Owned<Mat> analysed(const ShiftInvert& pencil, PetscInt room)
-{
-  Owned<Mat> factor;
-  MatFactorInfo settings;
-  check(MatFactorInfoInitialize(&settings));
-  check(MatGetFactor(pencil.shifted, MATSOLVERMUMPS, pencil.kind, factor.put()));
-  check(MatSetOptionsPrefix(factor, "modes_"));
-  // The negative pivots of a root that ScaLAPACK factors are not counted: MUMPS keeps the root to itself.
-  check(MatMumpsSetIcntl(factor, 13, 1));
-  check(MatMumpsSetIcntl(factor, 27, block_size));
-  if (pencil.kind == MAT_FACTOR_LU)
-    check(MatLUFactorSymbolic(factor, pencil.shifted, nullptr, nullptr, &settings));
-  else
-    check(MatCholeskyFactorSymbolic(factor, pencil.shifted, nullptr, &settings));
-  if (room > 0) check(MatMumpsSetIcntl(factor, 14, room));
-  return factor;
-}
-
-// INFOG(1) of the factorisation, below zero if it failed, of which PETSc says nothing. The analysis is kept from shift
-// to shift, but a failure takes it away: PETSc would pass over every later factorisation.
-PetscInt factorise(ShiftInvert& pencil)
-{
-  MatFactorInfo settings;
-  check(MatFactorInfoInitialize(&settings));
-  for (PetscInt room = 0;;)
-  {
-    if (!pencil.factor.get()) pencil.factor = analysed(pencil, room);
-    if (pencil.kind == MAT_FACTOR_LU)
-      check(MatLUFactorNumeric(pencil.factor, pencil.shifted, &settings));
-    else
-      check(MatCholeskyFactorNumeric(pencil.factor, pencil.shifted, &settings));
-    const PetscInt outcome = infog(pencil.factor, 1);
-    if (outcome >= 0) return outcome;
-    check(MatMumpsGetIcntl(pencil.factor, 14, &room));
-    room = 4 * std::max<PetscInt>(room, 0) + 10;
-    pencil.factor = {};
-    if (!short_of_room(outcome) || room > most_room) return outcome;
-  }
-}
-
 } // namespace
 
 void use_mumps(ST transformation)
@@ -228,42 +170,24 @@ void use_mumps(ST transformation)
   check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
 }
 
-ShiftInvert make_shift_invert(Mat K, Mat M, MatFactorType kind)
+ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry)
 {
-  ShiftInvert pencil{K, M, kind, 0, {}, {}};
-  check(MatDuplicate(K, MAT_COPY_VALUES, pencil.shifted.put()));
-  check(MatAXPY(pencil.shifted, 1, M, DIFFERENT_NONZERO_PATTERN));
-  if (kind == MAT_FACTOR_CHOLESKY) check(MatSetOption(pencil.shifted, MAT_SYMMETRIC, PETSC_TRUE));
-  return pencil;
+  return {K, M, 0, std::make_unique<PencilFactor>(K, M, symmetry)};
 }
 
 // On an eigenvalue there is no factor: below it there is.
 void move_to(ShiftInvert& pencil, double shift)
 {
-  const Mat A = pencil.shifted;
-  PetscInt outcome = singular;
-  for (double step = 1e-6; outcome == singular && step < 1e-2; step *= 10)
+  for (double step = 1e-6; step < 1e-2; step *= 10)
   {
-    check(MatZeroEntries(A));
-    check(MatAXPY(A, 1, pencil.K, SUBSET_NONZERO_PATTERN));
-    check(MatAXPY(A, -shift, pencil.M, SUBSET_NONZERO_PATTERN));
     pencil.shift = shift;
-    outcome = factorise(pencil);
+    if (pencil.factor->factorise(shift)) return;
     shift -= step * std::abs(shift);
   }
-  if (outcome < 0)
-    throw LibraryError("MUMPS found no factor of K - " + std::to_string(pencil.shift) +
-                       " M: INFOG(1) = " + std::to_string(outcome) +
-                       ", which its manual explains (-13: out of memory); -modes_mat_mumps_icntl_4 2 says more");
+  throw LibraryError("K - " + std::to_string(pencil.shift) + " M of the modes is singular, and just below, too");
 }
 
-int negative_pivots(const ShiftInvert& pencil)
-{
-  // MatGetInertia insists on null pivot detection: not wanted
-  return static_cast<int>(infog(pencil.factor, 12));
-}
-
-Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius)
+Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, double tolerance)
 {
   PetscInt n = 0;
   check(MatGetSize(pencil.K, &n, nullptr));
@@ -277,7 +201,7 @@ Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius)
   {
     grow(krylov, pencil);
     const bool exhausted = krylov.V.columns == krylov.order;
-    if (!exhausted && (krylov.order < 2 * count || round % 3 != 0)) continue;
+    if (!exhausted && (krylov.order < 2 * count || round % (1 + krylov.order / 150) != 0)) continue;
     Leading leading = leading_subspace_shared(krylov, count, least);
     result.converged = exhausted || leading.residual < tolerance;
     if (!result.converged) continue;

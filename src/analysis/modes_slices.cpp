@@ -15,10 +15,10 @@ namespace
 {
 
 constexpr int per_slice = 100;           // pairs, at most
-constexpr int neighbours = 10;           // and theta beyond them, for V
 constexpr double beyond = 1.05;          // of the band, for the count
 constexpr double usual = .06, wide = .2; // [rad] by which friction may turn theta: twice the change of damping ratio
 constexpr int passes = 12;               // of residual correction, if not all pairs are exact before
+constexpr double invariant = 1e-9;       // V, to be exact
 constexpr double enough = 1e-12, sharp = 1e-14; // backward errors,
 constexpr double spurious = 1e-8;               // and that of what is no pair
 constexpr double suspect = 1e-6;                // theta so small, in parts of the largest, may be a free body's
@@ -60,11 +60,11 @@ void find_pairs(Slice& slice, const QuadraticProblem& problem, ShiftInvert& penc
   const double least = slice.lower * slice.lower, limit = slice.upper * slice.upper, middle = (least + limit) / 2;
   move_to(pencil, middle);
   const double radius = std::abs(std::polar(limit, turned) - pencil.shift);
-  Nearest nearest = solve_nearest(pencil, slice.expected + neighbours, radius);
+  const Nearest nearest = solve_nearest(pencil, slice.expected, radius, invariant);
   if (!nearest.converged) return;
   for (const std::complex<double> theta : nearest.theta) slice.slowest = std::min(slice.slowest, std::abs(theta));
   const Correction correction{{least, limit}, passes, std::numeric_limits<int>::max(), enough, sharp, share};
-  slice.pairs = solve_on_subspace(problem, std::move(nearest.space), pencil.factor, correction).pairs;
+  slice.pairs = solve_on_subspace(problem, nearest.space, *pencil.factor, correction).pairs;
   std::erase_if(slice.pairs, [](const Eigenpair& pair) { return pair.backward_error > spurious; });
 }
 
@@ -107,7 +107,7 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
 {
   const double floor = std::sqrt(vibration_floor(norms_of(problem))), end = two_pi * band, reach = beyond * end;
   std::vector<Slice> slices = plan(real, floor, reach);
-  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, MAT_FACTOR_LU);
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none);
   CountedSolution result;
   const auto search = [&](double turned)
   {
@@ -132,13 +132,13 @@ Eigenpair solve_near(const QuadraticProblem& problem, std::complex<double> lambd
   constexpr int count = 50; // V without its neighbours is corrected slowly: brakes have dozens of nearly equal pairs
   constexpr double near = 2e-2, exact = 1e-15;
   const double square = std::norm(lambda);
-  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, MAT_FACTOR_LU);
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none);
   move_to(pencil, (1 + 1e-3) * square); // not on it, where there is no factor
   Eigenpair result{lambda, {}, {}, INFINITY};
-  Nearest nearest = solve_nearest(pencil, count, 0);
+  const Nearest nearest = solve_nearest(pencil, count, 0, invariant);
   if (!nearest.converged) return result;
   const Correction correction{{(1 - near) * square, (1 + near) * square}, passes, count, exact, exact, share};
-  for (Eigenpair& pair : solve_on_subspace(problem, std::move(nearest.space), pencil.factor, correction).pairs)
+  for (Eigenpair& pair : solve_on_subspace(problem, nearest.space, *pencil.factor, correction).pairs)
     if (!result.real.get() || std::abs(pair.lambda - lambda) < std::abs(result.lambda - lambda))
       result = std::move(pair);
   return result;

@@ -37,9 +37,14 @@ template <class T> std::vector<T> gather(const std::vector<T>& mine, MPI_Datatyp
 Triplets lower_triangle(Mat symmetric)
 {
   Triplets mine;
+  append_lower_triangle(symmetric, mine);
+  return mine;
+}
+
+void append_lower_triangle(Mat symmetric, Triplets& mine)
+{
   append(
       symmetric, 0, [](PetscInt i, PetscInt j) { return j <= i; }, mine);
-  return mine;
 }
 
 void append_rows(Mat B, int offset, Triplets& mine)

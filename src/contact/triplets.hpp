@@ -22,6 +22,9 @@ struct Triplets
 /// This rank's share of the lower triangle, diagonal included.
 Triplets lower_triangle(Mat symmetric);
 
+/// The same, appended.
+void append_lower_triangle(Mat symmetric, Triplets& mine);
+
 /// This rank's rows of B, below row `offset`.
 void append_rows(Mat B, int offset, Triplets& mine);
 

@@ -29,9 +29,6 @@ void copy_column(const Block& X, PetscInt j, Vec x);
 /// A X
 Block product(Mat A, const Block& X);
 
-/// A^-1 X by the factor of A.
-Block solved(Mat factor, const Block& X);
-
 /// X'Y
 std::vector<double> inner(const Block& X, const Block& Y);
 

@@ -2,8 +2,8 @@
 /// The quadratic eigenproblem on a small subspace, corrected by its own residuals.
 ///
 /// On an orthonormal V, V'(lambda^2 M + lambda C + K) V a = 0 is small and dense. What V lacks shows in the residual r
-/// of each y = V a; an answer P^-1 r joins V, P a matrix whose factor is at hand, and so on for some passes.
-#include "squeal/analysis/block.hpp"
+/// of each y = V a; an answer P^-1 r joins V, P a factor at hand, and so on for some passes.
+#include "squeal/analysis/pencil_factor.hpp"
 #include "squeal/analysis/quadratic.hpp"
 #include "squeal/analysis/real_modes.hpp"
 
@@ -22,9 +22,9 @@ struct Correction
   double share = 0;             // of the residuals' largest direction: what is smaller waits for a later pass
 };
 
-/// `basis` spans the first V; `factor` is of P. Backward errors are those of `problem` itself; outcome.word is the
+/// `basis` spans the first V. Backward errors are those of `problem` itself; outcome.word is the
 /// caller's.
-QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Block basis, Mat factor,
+QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Block basis, const PencilFactor& P,
                                     const Correction& correction);
 
 struct ProjectionSettings
