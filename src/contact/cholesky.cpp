@@ -286,7 +286,7 @@ void backward_through(const Elimination& order, const std::vector<double>& value
 std::vector<double> Cholesky::forward(const std::vector<double>& b, int columns)
 {
   columns_ = at(columns);
-  lanes_ = columns == 1 ? 1 : (columns_ + wide - 1) / wide * wide;
+  lanes_ = lanes_for(columns_);
   const std::size_t dofs = at(order_.dofs), border = at(order_.border);
   work_.assign((dofs + border) * lanes_, 0.);
   for (std::size_t i = 0; i < dofs; ++i)

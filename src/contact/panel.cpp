@@ -80,6 +80,8 @@ SQUEAL_INLINE void gather(const Panel& L, std::size_t i, std::size_t rows, std::
       for (std::size_t row = 0; row < strip; ++row) to[strip * k + row] = row < rows ? from[k * L.height + row] : 0.;
 }
 
+/// `fours`: how many times four numbers are taken at once of a vector's width.
+template <std::size_t fours>
 SQUEAL_INLINE void product_of_many(const Panel& L, std::size_t lanes, const double* __restrict x, double* __restrict y)
 {
   double some_L[strip * block];
@@ -90,34 +92,29 @@ SQUEAL_INLINE void product_of_many(const Panel& L, std::size_t lanes, const doub
     {
       const std::size_t rows = std::min(strip, L.rows - i);
       gather(L, i, rows, j, count, some_L);
-      for (std::size_t lane = 0; lane < lanes; lane += wide)
+      for (std::size_t lane = 0; lane < lanes; lane += 4 * fours)
       {
-        Four sums[strip][2] = {}, low, high;
+        Four sums[strip][fours] = {}, some_x[fours], some_y;
         for (std::size_t k = 0; k < count; ++k)
         {
-          get(x + (j + k) * lanes + lane, low);
-          get(x + (j + k) * lanes + lane + 4, high);
+          for (std::size_t f = 0; f < fours; ++f) get(x + (j + k) * lanes + lane + 4 * f, some_x[f]);
           for (std::size_t row = 0; row < strip; ++row)
-          {
-            sums[row][0] += some_L[strip * k + row] * low;
-            sums[row][1] += some_L[strip * k + row] * high;
-          }
+            for (std::size_t f = 0; f < fours; ++f) sums[row][f] += some_L[strip * k + row] * some_x[f];
         }
         for (std::size_t row = 0; row < rows; ++row)
-        {
-          double* const target = y + (i + row) * lanes + lane;
-          get(target, low);
-          get(target + 4, high);
-          put(low - sums[row][0], target);
-          put(high - sums[row][1], target + 4);
-        }
+          for (std::size_t f = 0; f < fours; ++f)
+          {
+            double* const target = y + (i + row) * lanes + lane + 4 * f;
+            get(target, some_y);
+            put(some_y - sums[row][f], target);
+          }
       }
     }
   }
 }
 
-SQUEAL_INLINE void transposed_of_many(const Panel& L, std::size_t lanes, const double* __restrict x,
-                                      double* __restrict y)
+template <std::size_t fours> SQUEAL_INLINE void transposed_of_many(const Panel& L, std::size_t lanes,
+                                                                   const double* __restrict x, double* __restrict y)
 {
   double some_L[strip * block];
   for (std::size_t j = 0; j < L.columns; j += block)
@@ -127,26 +124,18 @@ SQUEAL_INLINE void transposed_of_many(const Panel& L, std::size_t lanes, const d
     {
       const std::size_t rows = std::min(strip, L.rows - i);
       gather(L, i, rows, j, count, some_L);
-      for (std::size_t lane = 0; lane < lanes; lane += wide)
+      for (std::size_t lane = 0; lane < lanes; lane += 4 * fours)
       {
-        Four some_x[strip][2] = {}, low, high;
+        Four some_x[strip][fours] = {}, some_y[fours];
         for (std::size_t row = 0; row < rows; ++row)
-        {
-          get(x + (i + row) * lanes + lane, some_x[row][0]);
-          get(x + (i + row) * lanes + lane + 4, some_x[row][1]);
-        }
+          for (std::size_t f = 0; f < fours; ++f) get(x + (i + row) * lanes + lane + 4 * f, some_x[row][f]);
         for (std::size_t k = 0; k < count; ++k)
         {
           double* const target = y + (j + k) * lanes + lane;
-          get(target, low);
-          get(target + 4, high);
+          for (std::size_t f = 0; f < fours; ++f) get(target + 4 * f, some_y[f]);
           for (std::size_t row = 0; row < strip; ++row)
-          {
-            low -= some_L[strip * k + row] * some_x[row][0];
-            high -= some_L[strip * k + row] * some_x[row][1];
-          }
-          put(low, target);
-          put(high, target + 4);
+            for (std::size_t f = 0; f < fours; ++f) some_y[f] -= some_L[strip * k + row] * some_x[row][f];
+          for (std::size_t f = 0; f < fours; ++f) put(some_y[f], target + 4 * f);
         }
       }
     }
@@ -199,12 +188,16 @@ SQUEAL_WIDE void symmetric_product(const double* W, std::size_t size, const doub
 
 SQUEAL_WIDE void subtract_product(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
-  lanes == 1 ? product_of_one(L, x, y) : product_of_many(L, lanes, x, y);
+  lanes == 1   ? product_of_one(L, x, y)
+  : lanes == 4 ? product_of_many<1>(L, lanes, x, y)
+               : product_of_many<2>(L, lanes, x, y);
 }
 
 SQUEAL_WIDE void subtract_transposed(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
-  lanes == 1 ? transposed_of_one(L, x, y) : transposed_of_many(L, lanes, x, y);
+  lanes == 1   ? transposed_of_one(L, x, y)
+  : lanes == 4 ? transposed_of_many<1>(L, lanes, x, y)
+               : transposed_of_many<2>(L, lanes, x, y);
 }
 
 } // namespace squeal

@@ -1,12 +1,16 @@
 #pragma once
 /// Products with a panel of a factor, rows x columns, stored by columns `height` apart. Vectors are
-/// `lanes` numbers wide, 1 or a multiple of `wide`: those of several right-hand sides side by side.
+/// `lanes` numbers wide, as `lanes_for` gives them: those of several right-hand sides side by side.
 #include <cstddef>
 
 namespace squeal
 {
 
-constexpr std::size_t wide = 8;
+/// For so many right-hand sides: 1, 4 or a multiple of 8.
+constexpr std::size_t lanes_for(std::size_t columns)
+{
+  return columns == 1 ? 1 : columns <= 4 ? 4 : (columns + 7) / 8 * 8;
+}
 
 struct Panel
 {

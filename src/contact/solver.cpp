@@ -63,13 +63,15 @@ double residual_of(const ContactWork& work)
 namespace
 {
 
-/// y = W x by columns; one triangle of W is read, once for all of them.
+/// y = W x by columns; one triangle of W is read, once for all of them if they are many.
 void multiply(const ContactOperator& W, const std::vector<double>& x, int columns, std::vector<double>& y)
 {
   y.resize(x.size());
-  if (columns == 1)
+  constexpr int few = 8; // up to which packing W for a matrix product costs more than reading it again
+  if (columns <= few)
   {
-    symmetric_product(W.W.data(), W.size(), x.data(), y.data());
+    for (std::size_t first = 0; first < x.size(); first += W.size())
+      symmetric_product(W.W.data(), W.size(), &x[first], &y[first]);
     return;
   }
   const PetscBLASInt n = static_cast<PetscBLASInt>(W.size()), m = columns;
