@@ -193,7 +193,7 @@ bool Cholesky::factorise(Triplets lower)
   return true;
 }
 
-Cholesky::Cholesky(Triplets lower, int dofs, int border) : order_(eliminate(lower, dofs, border))
+Cholesky::Cholesky(Triplets lower, Elimination order) : order_(std::move(order))
 {
   failed_ = !factorise(std::move(lower));
 }
@@ -309,9 +309,8 @@ void Cholesky::backward(const std::vector<double>& lambda, std::vector<double>& 
     for (std::size_t k = 0; k < columns_; ++k) x[k * dofs + i] = work_[at(order_.position[i]) * lanes_ + k];
 }
 
-double cholesky_memory(const Triplets& lower, int dofs, int border)
+double cholesky_memory(const Elimination& order)
 {
-  const Elimination order = eliminate(lower, dofs, border);
   const auto [waiting, front] = room(order);
   return 8 * static_cast<double>(order.values + waiting + front) + 4 * static_cast<double>(order.rows.size());
 }

@@ -11,8 +11,8 @@ namespace squeal
 class Cholesky
 {
 public:
-  /// `lower`: the lower triangle of A and, from row dofs + 1 on, B.
-  Cholesky(Triplets lower, int dofs, int border);
+  /// `lower`: the lower triangle of A and, from row dofs + 1 on, B, of which `order` is.
+  Cholesky(Triplets lower, Elimination order);
 
   /// A is not positive definite: the factor is of no use.
   bool failed() const { return failed_; }
@@ -39,7 +39,7 @@ private:
   bool failed_ = false;
 };
 
-/// What a Cholesky of this pattern holds at its largest, the corner apart [bytes].
-double cholesky_memory(const Triplets& lower, int dofs, int border);
+/// What a Cholesky in this order holds at its largest, the corner apart [bytes].
+double cholesky_memory(const Elimination& order);
 
 } // namespace squeal

@@ -1,15 +1,17 @@
 #include "squeal/contact/factor.hpp"
 
 #include "cholesky.hpp"
+#include "distributed.hpp"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <petscblaslapack.h>
 
 namespace squeal
 {
 
-/// `sparse` or `L`, by kind; all of it on rank 0, except the layout.
+/// `cholesky`, `distributed` or `L`, by kind; all but `distributed` and the layout on rank 0.
 struct Factor::Parts
 {
   MPI_Comm comm = MPI_COMM_NULL;
@@ -19,8 +21,9 @@ struct Factor::Parts
   mutable std::vector<double> right; // columns of degrees of freedom
   mutable int columns = 0;           // of the last forward
   std::vector<double> corner;        // B A^-1 B', lower triangle by columns
-  mutable std::optional<Cholesky> sparse;
-  std::vector<double> L, influence; // dense, column-major: dofs x dofs, A^-1 B' of dofs x border
+  mutable std::optional<Cholesky> cholesky;
+  mutable std::optional<Distributed> distributed; // on all ranks
+  std::vector<double> L, influence;               // dense, column-major: dofs x dofs, A^-1 B' of dofs x border
 
   bool here() const { return rank_of(comm) == 0; }
   int own() const { return shares.counts[static_cast<std::size_t>(rank_of(comm))]; }
@@ -50,12 +53,60 @@ Triplets bordered(Mat A, Mat B)
   return mine;
 }
 
-Factor::Kind chosen(Factor::Kind kind, Mat A, const Triplets& mine)
+/// Whether algebra is quickest without a thought of zeros.
+bool better_dense(Mat A, const Triplets& mine)
 {
-  if (kind != Factor::Kind::automatic) return kind;
   double entries = static_cast<double>(mine.row.size()), size = rows_of(A);
   MPI_Allreduce(MPI_IN_PLACE, &entries, 1, MPI_DOUBLE, MPI_SUM, comm_of(A));
-  return size <= dense_size || 2 * entries > dense_fill * size * size ? Factor::Kind::dense : Factor::Kind::sparse;
+  return size <= dense_size || 2 * entries > dense_fill * size * size;
+}
+
+struct Choice
+{
+  Factor::Kind kind = Factor::Kind::automatic;
+  double limit = 4; // [GB] that rank 0 may hold for all
+};
+
+/// A kind that is asked for in the program goes before the option.
+Choice choice_of(Factor::Kind kind)
+{
+  Choice choice;
+  const std::array<const char*, 4> kinds = {"automatic", "supernodal", "mumps", "dense"}; // in the order of Kind
+  PetscInt option = 0;
+  check(PetscOptionsGetEList(nullptr, nullptr, "-factor", kinds.data(), 4, &option, nullptr));
+  check(PetscOptionsGetReal(nullptr, nullptr, "-factor_limit", &choice.limit, nullptr));
+  choice.kind = kind == Factor::Kind::automatic ? static_cast<Factor::Kind>(option) : kind;
+  return choice;
+}
+
+/// What will be factored, how and in which order.
+struct Plan
+{
+  Factor::Kind kind; // one of them, not automatic
+  Triplets entries;  // on rank 0; without values for MUMPS, which every rank gives its share
+  Elimination order; // on rank 0, but for dense
+  double memory = 0; // of a supernodal factor [bytes]
+};
+
+Plan planned(Factor::Kind asked, Mat A, Mat B)
+{
+  const MPI_Comm comm = comm_of(A);
+  auto [kind, limit] = choice_of(asked);
+  Triplets mine = bordered(A, B);
+  if (kind == Factor::Kind::automatic && better_dense(A, mine)) kind = Factor::Kind::dense;
+  const auto part = kind == Factor::Kind::mumps ? Triplets::Part::pattern : Triplets::Part::everything;
+  Plan plan{kind, gathered(std::move(mine), part, comm), {}, 0};
+  if (kind == Factor::Kind::dense) return plan;
+  on_rank_zero(comm,
+               [&]
+               {
+                 plan.order = eliminate(plan.entries, rows_of(A), rows_of(B));
+                 plan.memory = cholesky_memory(plan.order);
+               });
+  MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);
+  const bool too_large = ranks_of(comm) > 1 && plan.memory > 1e9 * limit;
+  if (kind == Factor::Kind::automatic) plan.kind = too_large ? Factor::Kind::mumps : Factor::Kind::supernodal;
+  return plan;
 }
 
 std::size_t area(int rows, int columns)
@@ -123,21 +174,28 @@ Factor::Factor(Mat A, Mat B, Kind kind) : parts_(std::make_unique<Parts>())
   parts.shares = shares_of(A);
   parts.dofs = parts.shares.total();
   parts.border = rows_of(B);
-  Triplets mine = bordered(A, B);
-  const bool sparse = chosen(kind, A, mine) == Kind::sparse;
-  Triplets all = gathered(std::move(mine), Triplets::Part::everything, parts.comm);
+  Plan plan = planned(kind, A, B);
+  if (plan.kind == Kind::mumps)
+  {
+    plan.entries = {};
+    parts.distributed.emplace(bordered(A, B), plan.order.position, parts.dofs, parts.border, parts.comm);
+    parts.failed = parts.distributed->failed();
+    parts.corner = parts.distributed->take_corner();
+    return;
+  }
   int good = 1;
   on_rank_zero(parts.comm,
                [&]
                {
-                 if (sparse)
+                 if (plan.kind == Kind::supernodal)
                  {
-                   parts.sparse.emplace(std::move(all), parts.dofs, parts.border);
-                   good = !parts.sparse->failed();
-                   parts.corner = parts.sparse->take_corner();
+                   parts.cholesky.emplace(std::move(plan.entries), std::move(plan.order));
+                   good = !parts.cholesky->failed();
+                   parts.corner = parts.cholesky->take_corner();
                  }
                  else
-                   good = factorise_dense(all, parts.dofs, parts.border, parts.L, parts.influence, parts.corner);
+                   good =
+                       factorise_dense(plan.entries, parts.dofs, parts.border, parts.L, parts.influence, parts.corner);
                });
   MPI_Bcast(&good, 1, MPI_INT, 0, parts.comm);
   parts.failed = !good;
@@ -168,8 +226,9 @@ std::vector<double> Factor::forward(std::span<const Vec> b) const
                 MPI_DOUBLE, 0, parts.comm);
     check(VecRestoreArrayRead(b[column], &mine));
   }
+  if (parts.distributed) return parts.distributed->forward(parts.right, parts.columns);
   if (!parts.here()) return {};
-  if (parts.sparse) return parts.sparse->forward(parts.right, parts.columns);
+  if (parts.cholesky) return parts.cholesky->forward(parts.right, parts.columns);
   std::vector<double> reduced(area(parts.border, parts.columns));
   if (parts.border > 0)
     product("T", parts.influence, parts.dofs, parts.border, 1, parts.right, parts.columns, 0, reduced);
@@ -179,8 +238,10 @@ std::vector<double> Factor::forward(std::span<const Vec> b) const
 void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x) const
 {
   const Parts& parts = *parts_;
-  if (parts.here() && parts.sparse)
-    parts.sparse->backward(lambda, parts.right);
+  if (parts.distributed)
+    parts.distributed->backward(lambda, parts.right);
+  else if (parts.here() && parts.cholesky)
+    parts.cholesky->backward(lambda, parts.right);
   else if (parts.here())
   {
     PetscBLASInt n = parts.dofs, m = parts.columns, info = 0;
@@ -201,7 +262,9 @@ void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x)
 
 double Factor::entries() const
 {
-  double entries = parts_->sparse ? parts_->sparse->entries() : .5 * static_cast<double>(parts_->dofs) * parts_->dofs;
+  if (parts_->distributed) return parts_->distributed->entries();
+  double entries =
+      parts_->cholesky ? parts_->cholesky->entries() : .5 * static_cast<double>(parts_->dofs) * parts_->dofs;
   MPI_Bcast(&entries, 1, MPI_DOUBLE, 0, parts_->comm);
   return entries;
 }
@@ -209,14 +272,10 @@ double Factor::entries() const
 double factor_memory(Mat A, Mat B)
 {
   const int dofs = rows_of(A), border = rows_of(B);
-  Triplets mine = bordered(A, B);
-  if (chosen(Factor::Kind::automatic, A, mine) == Factor::Kind::dense)
-    return 8 * static_cast<double>(area(dofs, dofs + border));
-  const Triplets pattern = gathered(std::move(mine), Triplets::Part::pattern, comm_of(A));
-  double bytes = 0;
-  on_rank_zero(comm_of(A), [&] { bytes = cholesky_memory(pattern, dofs, border); });
-  MPI_Bcast(&bytes, 1, MPI_DOUBLE, 0, comm_of(A));
-  return bytes;
+  const Plan plan = planned(Factor::Kind::automatic, A, B);
+  if (plan.kind == Factor::Kind::dense) return 8 * static_cast<double>(area(dofs, dofs + border));
+  if (plan.kind == Factor::Kind::supernodal) return plan.memory;
+  return distributed_memory(bordered(A, B), plan.order.position, dofs, border, comm_of(A));
 }
 
 void solve(const Factor& factor, Vec b, Vec x)

@@ -1,4 +1,5 @@
 // ranks: 1 2 3
+#include "../support/option.hpp"
 #include "../support/small_models.hpp"
 #include "squeal/contact/condensed.hpp"
 
@@ -182,8 +183,10 @@ test::Rows lattice_stiffness(std::size_t side, std::size_t width)
   return K;
 }
 
-/// The condensed operator and both halves of a solve with `columns` right-hand sides, by both kinds of factor.
-void check_agreement(const test::Rows& K, std::size_t rows, std::size_t columns)
+constexpr std::array sparse_kinds = {Factor::Kind::supernodal, Factor::Kind::mumps};
+
+/// The condensed operator and both halves of a solve with `columns` right-hand sides, by a sparse factor and the dense.
+void check_agreement(Factor::Kind kind, const test::Rows& K, std::size_t rows, std::size_t columns)
 {
   const std::size_t n = K.size();
   test::Rows B = test::zeros(rows, n);
@@ -191,7 +194,7 @@ void check_agreement(const test::Rows& K, std::size_t rows, std::size_t columns)
   const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
   const auto interface =
       test::make_interface(B, 1, std::vector<double>(rows / 2, 0.), std::vector<double>(rows / 2, 1.), .3, structure.K);
-  Factor sparse(structure.K, interface.B, Factor::Kind::sparse), dense(structure.K, interface.B, Factor::Kind::dense);
+  Factor sparse(structure.K, interface.B, kind), dense(structure.K, interface.B, Factor::Kind::dense);
   CHECK(!sparse.failed());
   CHECK(!dense.failed());
   CHECK(largest_difference(sparse.condensed(2), dense.condensed(2)) < 1e-12);
@@ -239,9 +242,40 @@ void check_agreement(const test::Rows& K, std::size_t rows, std::size_t columns)
 
 TEST_CASE("sparse and dense factors agree: the condensed operator, both halves of a solve, several columns at once")
 {
-  check_agreement(chain_stiffness(60), 6, 2);
-  check_agreement(lattice_stiffness(6, 2), 30, 1);
-  check_agreement(lattice_stiffness(6, 2), 30, 11); // more than stand side by side
+  const auto lattice = lattice_stiffness(6, 2);
+  for (const Factor::Kind kind : sparse_kinds)
+  {
+    check_agreement(kind, chain_stiffness(60), 6, 2);
+    check_agreement(kind, lattice, 30, 1);
+    check_agreement(kind, lattice, 30, 11); // more than stand side by side
+  }
+}
+
+TEST_CASE("a factor is used again and again: later right-hand sides see nothing of earlier ones, bordered or not")
+{
+  const std::size_t n = 200;
+  const auto K = chain_stiffness(n);
+  const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
+  test::Rows B = test::zeros(2, n);
+  B[0][3] = B[1][150] = 1;
+  const auto interface = test::make_interface(B, 1, {0}, {1}, .3, structure.K);
+  for (const Factor::Kind kind : sparse_kinds)
+    for (Mat border : {Mat(nullptr), interface.B.get()})
+    {
+      const Factor factor(structure.K, border, kind);
+      const auto x = zeros_like(structure.load), y = zeros_like(structure.load), twice = copy_of(structure.load);
+      check(VecScale(twice, 2));
+      solve(factor, structure.load, x);
+      const std::vector<Vec> loads = {twice, structure.load}, answers = {y, x};
+      const std::vector<double> seen = factor.forward(loads);
+      factor.backward(std::vector<double>(seen.size(), 0.), answers);
+      solve(factor, twice, x);
+      check(VecAXPY(x, -1, y));
+      double distance = 0, size = 0;
+      check(VecNorm(x, NORM_INFINITY, &distance));
+      check(VecNorm(y, NORM_INFINITY, &size));
+      CHECK(distance < 1e-13 * size); // rounding
+    }
 }
 
 TEST_CASE("a sparse factor says of a matrix with one negative eigenvalue that it failed")
@@ -249,7 +283,7 @@ TEST_CASE("a sparse factor says of a matrix with one negative eigenvalue that it
   auto K = lattice_stiffness(4, 2);
   K[77][77] = -1;
   const auto structure = test::make_structure(K, K, K, std::vector<double>(K.size(), 1.));
-  CHECK(Factor(structure.K, nullptr, Factor::Kind::sparse).failed());
+  for (const Factor::Kind kind : sparse_kinds) CHECK(Factor(structure.K, nullptr, kind).failed());
 }
 
 TEST_CASE("the memory foreseen for a factor holds its entries, and more with a border than without")
@@ -261,7 +295,19 @@ TEST_CASE("the memory foreseen for a factor holds its entries, and more with a b
   const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
   const auto interface =
       test::make_interface(B, 1, std::vector<double>(150, 0.), std::vector<double>(150, 1.), .3, structure.K);
-  const double bordered = factor_memory(structure.K, interface.B), alone = factor_memory(structure.K, nullptr);
-  CHECK(bordered >= 8 * Factor(structure.K, interface.B, Factor::Kind::automatic).entries());
-  CHECK(bordered > alone);
+  const auto entries = [&](Factor::Kind kind) { return Factor(structure.K, interface.B, kind).entries(); };
+  const auto foreseen = [&] { return factor_memory(structure.K, interface.B); };
+  const double bordered = foreseen();
+  CHECK(bordered >= 8 * entries(Factor::Kind::automatic));
+  CHECK(bordered > factor_memory(structure.K, nullptr));
+  CHECK(entries(Factor::Kind::automatic) == entries(Factor::Kind::supernodal));
+
+  const test::Option small("-factor_limit", "0"); // several ranks share it then
+  const double shared = foreseen();
+  const bool several = ranks_of(PETSC_COMM_WORLD) > 1;
+  CHECK(entries(Factor::Kind::automatic) == entries(several ? Factor::Kind::mumps : Factor::Kind::supernodal));
+  CHECK(shared >= 8 * entries(Factor::Kind::automatic));
+  const test::Option named("-factor", "supernodal"); // whatever the limit
+  CHECK(foreseen() == bordered);
+  CHECK(entries(Factor::Kind::automatic) == entries(Factor::Kind::supernodal));
 }

@@ -1,9 +1,11 @@
+#include "../support/option.hpp"
 #include "squeal/analysis/shooting.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>
 
 using namespace squeal;
+using test::Option;
 
 namespace
 {
@@ -144,14 +146,6 @@ LimitCycle shoot_from(const SmoothModel& model, const std::vector<double>& u, do
   for (const auto& axis : model.axes) at.shapes.push_back(axis);
   return shoot(model.flow, at, {}, 1e-9, free);
 }
-
-/// An option for as long as it lives.
-struct Option
-{
-  const char* name;
-  Option(const char* key, const char* value) : name(key) { check(PetscOptionsSetValue(nullptr, key, value)); }
-  ~Option() { (void)PetscOptionsClearValue(nullptr, name); }
-};
 
 // Reference values to 20 digits from the literature of the equation x'' - (1 - x^2) x' + x = 0.
 constexpr double vdp_period = 6.6632868593231302, vdp_amplitude = 2.0086198608748431, vdp_multiplier = 8.5969506e-4;

@@ -1,6 +1,7 @@
 // ranks: 1 2 3
 #include "squeal/analysis/transient.hpp"
 #include "../support/about.hpp"
+#include "../support/option.hpp"
 #include "../support/oscillator_mode.hpp"
 
 #include <cmath>
@@ -159,6 +160,29 @@ TEST_CASE("trajectories stepped together follow those stepped alone, through con
     double distance = 0;
     check(VecNorm(together[k].u, NORM_INFINITY, &distance));
     CHECK(distance < 1e-12); // the same arithmetic, column by column
+  }
+}
+
+TEST_CASE("a trajectory is the same by every kind of factor, through contact and free flight")
+{
+  const auto model = test::unilateral_oscillator(.3, .6);
+  const auto end = [&](const char* kind)
+  {
+    const test::Option factor("-factor", kind);
+    const ThetaStep step = make_theta_step(model.structure, model.interface, .015, .5);
+    State state = state_of(model.structure, {3, -.5, -.5}, {0, 3, 0});
+    CHECK(test::run_steps(model, step, 500, state) == 0);
+    return std::pair(whole(state.u), whole(state.v));
+  };
+  const auto [u, v] = end("automatic");
+  for (const char* kind : {"dense", "supernodal", "mumps"})
+  {
+    const auto [other_u, other_v] = end(kind);
+    for (std::size_t i = 0; i < u.size(); ++i)
+    {
+      CHECK(std::abs(other_u[i] - u[i]) < 1e-10); // motions of order one; contact is solved to 1e-10
+      CHECK(std::abs(other_v[i] - v[i]) < 1e-10);
+    }
   }
 }
 

@@ -2,6 +2,7 @@
 // Limit cycles of the three-degree unilateral oscillator against exact ones (matrix exponentials between events).
 #include "../support/about.hpp"
 #include "../support/cycle_of.hpp"
+#include "../support/option.hpp"
 #include "../support/small_models.hpp"
 #include "squeal/analysis/shooting.hpp"
 
@@ -14,14 +15,6 @@ using namespace squeal::test;
 
 namespace
 {
-
-/// The option as given, for as long as it lives.
-struct Option
-{
-  const char* name;
-  Option(const char* key, const char* value) : name(key) { check(PetscOptionsSetValue(nullptr, key, value)); }
-  ~Option() { (void)PetscOptionsClearValue(nullptr, name); }
-};
 
 struct Row
 {

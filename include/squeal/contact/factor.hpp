@@ -5,8 +5,10 @@
 /// and splits a solve in two halves: `forward` turns b into B A^-1 b, `backward` then gives x = A^-1 (b - B' lambda)
 /// for a lambda chosen in between. Both together cost less than two solves with A alone.
 ///
-/// Sparse by supernodes (L L', METIS ordering), or dense by LAPACK where that is quicker: small or full A. It is kept
-/// on rank 0, and right-hand sides, several at once at will, pass through there.
+/// supernodal: L L' by supernodes in METIS's ordering, on rank 0, the quickest. mumps: MUMPS in the same ordering,
+/// spread over all ranks. dense: by LAPACK on rank 0. Right-hand sides, several at once at will, pass through rank 0.
+/// automatic: dense if A is small or full; else supernodal, but mumps on several ranks if rank 0 would hold more than
+/// -factor_limit for it. The option -factor names another.
 #include "squeal/base/petsc.hpp"
 
 #include <memory>
@@ -21,8 +23,9 @@ class Factor
 public:
   enum class Kind
   {
-    automatic,
-    sparse,
+    automatic, // as -factor says
+    supernodal,
+    mumps,
     dense,
   };
 
