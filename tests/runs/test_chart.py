@@ -98,7 +98,7 @@ def test_runs_of_another_command_are_refused(drawn, folder):
 
 def test_what_is_there_is_kept_and_what_did_not_finish_is_said(drawn, folder):
     code, printed = draw(folder, "--limit", 0.001, steps=(50, 100, 200))
-    assert code == 0 and "not in the picture: full_200, stopped after 0.001 s" in printed
+    assert code == 0 and "remark: full_200, stopped after 0.001 s" in printed
     code, printed = draw(folder, steps=(50, 100, 200))
-    assert code == 0 and "not in the picture" not in printed
+    assert code == 0 and "stopped after" not in printed
     assert set(re.findall(r"^chart: (\w+_\d+)", printed, re.M)) == {"full_200"}  # 200 is half the reference: there
