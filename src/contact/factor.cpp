@@ -64,7 +64,7 @@ bool better_dense(Mat A, const Triplets& mine)
 struct Choice
 {
   Factor::Kind kind = Factor::Kind::automatic;
-  /// [GB] that rank 0 may hold for all. Two ranks step an elastic block by MUMPS in 1.3 times the time where it holds
+  /// [GB] that rank 0 may hold for all. Two ranks step an elastic block by MUMPS in 1.2 times the time where it holds
   /// .065, in .87 times where it holds .30: tools/bench_step with -factor. A brake's steps at .15 take the same.
   double limit = .25;
 };
