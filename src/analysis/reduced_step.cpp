@@ -15,57 +15,6 @@ namespace
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The contact law of one pair as the eliminated pairs let it move: W is slightly unsymmetric (their friction), which
-/// the shared solvers do not take. Block Gauss-Seidel; the local solves see the symmetric part of W's own blocks, which
-/// leaves the fixed point what it is. Residual: the natural map over the largest reaction; a pair far below the
-/// tolerance is left alone in that sweep. w: b, and then W r + b.
-bool solve_unsymmetric(const ReducedMap& map, VectorXd& w, VectorXd& r)
-{
-  const ReducedModel& model = map.model;
-  const Eigen::Index block = 1 + model.directions, rows = w.size();
-  const double friction = model.friction;
-  const auto of_pair = [&](const VectorXd& x, Eigen::Index i)
-  {
-    PairVector own{};
-    for (Eigen::Index k = 0; k < block; ++k) own[static_cast<std::size_t>(k)] = x(i + k);
-    return own;
-  };
-  for (Eigen::Index i = 0; i < rows; i += block)
-  {
-    PairVector first = of_pair(r, i);
-    first[0] = std::max(first[0], 0.);
-    project_on_disc(first, friction);
-    for (Eigen::Index k = 0; k < block; ++k) r(i + k) = first[static_cast<std::size_t>(k)];
-  }
-  w += map.W * r;
-  for (int sweep = 0; sweep < map.contact.max_iterations; ++sweep)
-  {
-    const double tolerance = map.contact.tolerance * r.cwiseAbs().maxCoeff();
-    double worst = 0;
-    for (Eigen::Index i = 0; i < rows; i += block)
-    {
-      const PairBlock& A = map.own[static_cast<std::size_t>(i / block)];
-      const PairVector last = of_pair(r, i);
-      PairVector q = of_pair(w, i);
-      const double defect = natural_map(last, q, friction, 1 / A[0][0], 1 / std::max(A[1][1], A[2][2]));
-      worst = std::max(worst, defect);
-      if (defect <= 0.01 * tolerance) continue;
-      for (std::size_t k = 0; k < 3; ++k)
-        for (std::size_t l = 0; l < 3; ++l) q[k] -= A[k][l] * last[l];
-      const PairVector next = solve_pair(A, q, model.directions, friction, last);
-      for (Eigen::Index k = 0; k < block; ++k)
-      {
-        const double change = next[static_cast<std::size_t>(k)] - r(i + k);
-        if (change == 0) continue;
-        r(i + k) += change;
-        w += change * map.W.col(i + k);
-      }
-    }
-    if (worst <= map.contact.tolerance * r.cwiseAbs().maxCoeff()) return true;
-  }
-  return rows == 0;
-}
-
 void put(const VectorXd& values, Vec x)
 {
   PetscScalar* entries = nullptr;
@@ -102,6 +51,22 @@ Owned<Vec> small_vector(const VectorXd& values)
   return x;
 }
 
+MatrixXd product(const MatrixXd& A, const MatrixXd& B)
+{
+  MatrixXd result(A.rows(), B.cols());
+  const auto rows = static_cast<PetscBLASInt>(A.rows()), columns = static_cast<PetscBLASInt>(B.cols()),
+             inside = static_cast<PetscBLASInt>(A.cols());
+  const PetscBLASInt once = 1;
+  const double one = 1, zero = 0;
+  if (result.size() == 0 || inside == 0) return MatrixXd::Zero(A.rows(), B.cols());
+  if (columns == 1)
+    BLASgemv_("N", &rows, &inside, &one, A.data(), &rows, B.data(), &once, &zero, result.data(), &once);
+  else
+    BLASgemm_("N", "N", &rows, &columns, &inside, &one, A.data(), &rows, B.data(), &inside, &zero, result.data(),
+              &rows);
+  return result;
+}
+
 MatrixXd solve_dense(MatrixXd A, MatrixXd B)
 {
   const auto n = static_cast<PetscBLASInt>(A.rows()), columns = static_cast<PetscBLASInt>(B.cols());
@@ -125,7 +90,10 @@ void prepare(ReducedMap& map, double period)
   map.from_state = right.leftCols(2 * n);
   map.from_reactions = right.rightCols(rows);
   map.from_equilibrium = -map.from_reactions * VectorXd::Map(model.reactions.data(), rows);
-  map.W = model.G * map.from_reactions;
+  map.W = product(model.G, map.from_reactions);
+  map.G_n = model.G(Eigen::seq(0, Eigen::last, 1 + model.directions), Eigen::all);
+  map.W_single = map.W.cast<float>();
+  map.W_n = map.W_single(Eigen::seq(0, Eigen::last, 1 + model.directions), Eigen::all);
   map.own.assign(model.active.size(), {});
   const Eigen::Index block = 1 + model.directions;
   for (Eigen::Index row = 0; row < rows; ++row)
@@ -135,65 +103,72 @@ void prepare(ReducedMap& map, double period)
   map.h = h;
 }
 
-bool advance(ReducedMap& map, ReducedState& state, VectorXd& before)
+bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact)
 {
   const ReducedModel& model = map.model;
   const double h = map.h, theta = map.theta;
-  const Eigen::Index n = model.size(), rows = model.G.rows();
-  VectorXd next = map.from_equilibrium;
-  next.noalias() += map.from_state.leftCols(n) * state.v;
-  next.noalias() += map.from_state.rightCols(n) * state.q;
+  const Eigen::Index n = model.size();
+  VectorXd both(2 * n);
+  both << state.v, state.q;
+  VectorXd next = product(map.from_state, both) + map.from_equilibrium;
 
   // b of w = W r + b: normal rows are gap rates (g + G_n q~)/h + G_n v, q~ = q + h (1-theta) v, tangential ones s
-  const VectorXd motion = model.G * next, position = model.G * (state.q + h * (1 - theta) * state.v);
+  VectorXd b = product(model.G, next);
+  const VectorXd position = product(map.G_n, state.q + h * (1 - theta) * state.v);
   const auto block = static_cast<std::size_t>(1 + model.directions), directions = block - 1;
-  VectorXd b = motion;
   for (std::size_t i = 0; i < model.gap.size(); ++i)
   {
     const auto row = static_cast<Eigen::Index>(i * block);
-    b(row) += (model.gap[i] + position(row)) / h;
+    b(row) += (model.gap[i] + position(static_cast<Eigen::Index>(i))) / h;
     for (std::size_t k = 0; k < directions; ++k)
       b(row + 1 + static_cast<Eigen::Index>(k)) -= model.drive[i * directions + k];
   }
-  VectorXd r = before.size() == rows ? VectorXd(2 * map.reactions - before) : map.reactions;
-  before = map.reactions;
-  const bool converged = solve_unsymmetric(map, b, r);
-  map.rates = std::move(b);
-  next.noalias() += map.from_reactions * r;
-  map.reactions = std::move(r);
+  const bool converged = solve_contact(map, b, contact);
+  next += product(map.from_reactions, contact.r);
   state.q += h * (theta * next + (1 - theta) * state.v);
   state.v = std::move(next);
   return converged;
 }
 
+namespace
+{
+
+/// N steps from `state` on.
+void march(ReducedMap& map, ReducedState& state, ReducedContact& contact,
+           const std::function<void(const ReducedState&)>& watch)
+{
+  for (int i = 0; i < map.steps; ++i)
+  {
+    if (!advance(map, state, contact)) ++map.unconverged;
+    if (watch) watch(state);
+  }
+}
+
+} // namespace
+
 ReducedState integrate(ReducedMap& map, double period, ReducedState state,
                        const std::function<void(const ReducedState&)>& watch)
 {
   prepare(map, period);
-  VectorXd before;
-  for (int i = 0; i < map.steps; ++i)
-  {
-    if (!advance(map, state, before)) ++map.unconverged;
-    if (watch) watch(state);
-  }
+  ReducedContact contact{map.reactions};
+  march(map, state, contact, watch);
   return state;
 }
 
 Passage pass(ReducedMap& map, double period, ReducedState state)
 {
+  prepare(map, period);
+  ReducedContact contact{map.reactions};
   ReducedState last_but_one;
-  const VectorXd reactions = map.reactions; // every period from one warm start: a map, not a history
   int done = 0;
-  const auto watch = [&](const ReducedState& now)
-  {
-    if (++done == map.steps - 1) last_but_one = now;
-  };
-  Passage result{integrate(map, period, std::move(state), watch), {}};
-  ReducedState next = result.end;
-  VectorXd before;
-  (void)advance(map, next, before);
-  result.rate = {(next.q - last_but_one.q) / (2 * map.h), (next.v - last_but_one.v) / (2 * map.h)};
-  map.reactions = reactions;
+  march(map, state, contact,
+        [&](const ReducedState& now)
+        {
+          if (++done == map.steps - 1) last_but_one = now;
+        });
+  Passage result{state, {}};
+  (void)advance(map, state, contact);
+  result.rate = {(state.q - last_but_one.q) / (2 * map.h), (state.v - last_but_one.v) / (2 * map.h)};
   return result;
 }
 

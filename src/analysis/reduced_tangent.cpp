@@ -13,36 +13,23 @@ namespace
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A B, by the library's kernel: several times faster than Eigen's own at these sizes.
-MatrixXd product(const MatrixXd& A, const MatrixXd& B)
-{
-  MatrixXd result(A.rows(), B.cols());
-  const auto rows = static_cast<PetscBLASInt>(A.rows()), columns = static_cast<PetscBLASInt>(B.cols()),
-             inside = static_cast<PetscBLASInt>(A.cols());
-  const double one = 1, zero = 0;
-  if (result.size() > 0 && inside > 0)
-    BLASgemm_("N", "N", &rows, &columns, &inside, &one, A.data(), &rows, B.data(), &inside, &zero, result.data(),
-              &rows);
-  return result;
-}
-
 /// dr of w = W r + b under the contact law for changes db, where it is smooth: at w and r of the step just made. Open
 /// pairs have none; of the others
 ///     dw_n = 0,   and dw_t = 0 (stick) or dr_t + mu e dr_n + mu r_n/|s| (I - e e') dw_t = 0, e = s/|s| (slip).
-MatrixXd contact_response(const ReducedMap& map, const MatrixXd& db)
+MatrixXd contact_response(const ReducedMap& map, const ReducedContact& contact, const MatrixXd& db)
 {
   const ReducedModel& model = map.model;
   const Eigen::Index d = model.directions, block = 1 + d;
   std::vector<Eigen::Index> closed;
-  for (Eigen::Index i = 0; i < map.rates.size(); i += block)
-    for (Eigen::Index k = 0; k < block && map.reactions(i) > 0; ++k) closed.push_back(i + k);
+  for (Eigen::Index i = 0; i < contact.w.size(); i += block)
+    for (Eigen::Index k = 0; k < block && contact.r(i) > 0; ++k) closed.push_back(i + k);
   MatrixXd A = map.W(closed, closed), right = -db(closed, Eigen::all);
   for (Eigen::Index i = 0; i < A.rows(); i += block)
   {
     const Eigen::Index pair = closed[static_cast<std::size_t>(i)];
-    const double limit = model.friction * map.reactions(pair);
-    if (map.reactions.segment(pair + 1, d).norm() < (1 - 1e-8) * limit) continue; // sticks
-    const VectorXd s = map.rates.segment(pair + 1, d), e = s / std::max(s.norm(), 1e-300);
+    const double limit = model.friction * contact.r(pair);
+    if (contact.r.segment(pair + 1, d).norm() < (1 - 1e-8) * limit) continue; // sticks
+    const VectorXd s = contact.w.segment(pair + 1, d), e = s / std::max(s.norm(), 1e-300);
     const MatrixXd turn = limit / std::max(s.norm(), 1e-300) * (MatrixXd::Identity(d, d) - e * e.transpose());
     A.middleRows(i + 1, d) = (turn * A.middleRows(i + 1, d)).eval();
     right.middleRows(i + 1, d) = (turn * right.middleRows(i + 1, d)).eval();
@@ -75,17 +62,16 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm 
   MatrixXd X(2 * n, last - first);
   const MatrixXd one = MatrixXd::Identity(2 * n, 2 * n);
   X << one.bottomRows(n).middleCols(first, last - first), one.topRows(n).middleCols(first, last - first);
-  const VectorXd reactions = map.reactions;
-  VectorXd before;
+  ReducedContact contact{map.reactions};
   for (int i = 0; i < map.steps; ++i)
   {
-    if (!advance(map, state, before)) ++map.unconverged;
+    if (!advance(map, state, contact)) ++map.unconverged;
     MatrixXd v = product(map.from_state, X);
-    if (map.rates.size() > 0) v += product(map.from_reactions, contact_response(map, product(b_from_state, X)));
+    if (contact.r.size() > 0)
+      v += product(map.from_reactions, contact_response(map, contact, product(b_from_state, X)));
     X.bottomRows(n) += h * (theta * v + (1 - theta) * X.topRows(n));
     X.topRows(n) = v;
   }
-  map.reactions = reactions;
   MatrixXd result = MatrixXd::Zero(2 * n, 2 * n);
   result.topRows(n).middleCols(first, last - first) = X.bottomRows(n);
   result.bottomRows(n).middleCols(first, last - first) = X.topRows(n);

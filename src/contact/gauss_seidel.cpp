@@ -15,6 +15,18 @@
 namespace squeal
 {
 
+SQUEAL_WIDE void add_rows(const float* __restrict rows, std::size_t count, std::size_t block, const PairVector& change,
+                          float* __restrict target)
+{
+  const auto x = static_cast<float>(change[0]), y = static_cast<float>(change[1]), z = static_cast<float>(change[2]);
+  if (block == 1)
+    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j];
+  else if (block == 2)
+    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * rows[count + j];
+  else
+    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * rows[count + j] + z * rows[2 * count + j];
+}
+
 namespace
 {
 
@@ -42,8 +54,8 @@ template <class Entry> SQUEAL_INLINE void add_block(const Entry* __restrict rows
     for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * second[j] + z * third[j];
 }
 
-SQUEAL_WIDE void add_rows(const double* rows, std::size_t count, std::size_t block, const PairVector& change,
-                          double* target)
+SQUEAL_WIDE void add_whole_rows(const double* rows, std::size_t count, std::size_t block, const PairVector& change,
+                                double* target)
 {
   add_block(rows, count, block, change, target);
 }
@@ -66,7 +78,7 @@ void spread(const ContactOperator& W, std::size_t pair, const PairVector& change
   if constexpr (std::is_same_v<Entry, float>)
     add_runs(W.near, pair, W.block(), change, dw.data());
   else
-    add_rows(&W.W[pair * W.block() * W.size()], W.size(), W.block(), change, dw.data());
+    add_whole_rows(&W.W[pair * W.block() * W.size()], W.size(), W.block(), change, dw.data());
 }
 
 template <class Entry> PairVector velocity_of(const Sweep<Entry>& sweep, std::size_t i, std::size_t block)

@@ -74,6 +74,17 @@ void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd&
 Owned<Vec> small_vector(const Eigen::VectorXd& values);
 Eigen::VectorXd entries_of(Vec x);
 
+/// The active pairs at the end of a step, and what the next one starts from.
+struct ReducedContact
+{
+  Eigen::VectorXd r;                       // [N]
+  Eigen::VectorXd Wr{};                    // W r; empty: not known
+  Eigen::VectorXd w{};                     // [m/s] W r + b
+  Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
+  int unread = 0;          // steps since W was read in double precision
+  Eigen::MatrixXf along{}; // W_nn + W_nt e of those directions e in which friction was then, mu included
+};
+
 /// The period map of the reduced model by theta steps (method as analysis/transient.hpp), whose matrices are formed
 /// once per step size:  (v, q) -> v_free,  r -> v+ - v_free,  W r.
 struct ReducedMap
@@ -84,31 +95,36 @@ struct ReducedMap
   double h = 0;                 // [s] of the matrices below
   Eigen::MatrixXd from_state{}; // v_free = from_state (v, q) + from_equilibrium
   Eigen::VectorXd from_equilibrium{};
-  Eigen::MatrixXd from_reactions{}; // h A^-1 H
-  Eigen::MatrixXd W{};              // G h A^-1 H
-  std::vector<PairBlock> own{};     // the symmetric part of each pair's own block of W
-  Eigen::VectorXd reactions{};      // [N] warm start
-  Eigen::VectorXd rates{};          // w = W r + b of the last step
-  ReducedState shift{};             // added to the period's end; empty: none
+  Eigen::MatrixXd from_reactions{};  // h A^-1 H
+  Eigen::MatrixXd W{};               // G h A^-1 H
+  Eigen::MatrixXf W_single{}, W_n{}; // the same for changes; its normal rows
+  Eigen::MatrixXd G_n{};             // normal rows of G
+  std::vector<PairBlock> own{};      // the symmetric part of each pair's own block of W
+  Eigen::VectorXd reactions{};       // [N] every period's warm start
+  ReducedState shift{};              // added to the period's end; empty: none
   ContactSettings contact{};
   long unconverged = 0;
 };
 
-/// A^-1 B
+/// A B and A^-1 B, by the library's kernels: several times faster than Eigen's own at these sizes.
+Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 Eigen::MatrixXd solve_dense(Eigen::MatrixXd A, Eigen::MatrixXd B);
 
 /// The matrices of the period's step size, unless they are those already.
 void prepare(ReducedMap& map, double period);
 
-/// One step; `before`: reactions of the step before the last, kept for extrapolation. Returns whether contact
-/// converged.
-bool advance(ReducedMap& map, ReducedState& state, Eigen::VectorXd& before);
+/// The reactions after a step whose contact velocities are b without them; `contact` is of the step before. Residual:
+/// the natural map over the largest reaction. Returns whether it converged.
+bool solve_contact(const ReducedMap& map, const Eigen::VectorXd& b, ReducedContact& contact);
+
+/// One step. Returns whether contact converged.
+bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact);
 
 /// N steps of the period; `watch` after each.
 ReducedState integrate(ReducedMap& map, double period, ReducedState state,
                        const std::function<void(const ReducedState&)>& watch);
 
-/// A period's end and dPhi/dT there; the warm start stays what it was.
+/// A period's end and dPhi/dT there.
 struct Passage
 {
   ReducedState end, rate;

@@ -89,6 +89,9 @@ std::vector<ContactResult> solve_contacts(const ContactOperator& W, double frict
 ContactResult solve_contact(const std::vector<double>& W, const std::vector<double>& b, int pairs, int directions,
                             double friction, const ContactSettings& settings, std::vector<double>& r);
 
+/// target += rows' change, of one pair: its `block` rows (1 to 3), `count` long, one after the other.
+void add_rows(const float* rows, std::size_t count, std::size_t block, const PairVector& change, float* target);
+
 /// w = W r + b.
 std::vector<double> relative_velocity(const std::vector<double>& W, const std::vector<double>& b,
                                       const std::vector<double>& r);
