@@ -15,7 +15,9 @@ namespace squeal
 void set_period(PeriodMap& map, double period)
 {
   const double h = period / map.steps;
-  if (h != map.step.h) map.step = make_theta_step(map.structure, map.interface, h, map.theta);
+  if (h == map.step.h) return;
+  map.step = make_theta_step(map.structure, map.interface, h, map.theta);
+  if (map.contact_tolerance > 0) map.step.contact.tolerance = map.contact_tolerance;
 }
 
 namespace

@@ -9,19 +9,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 
 namespace squeal
 {
 
 namespace
 {
-
-struct Secant
-{
-  Owned<Vec> step, change; // dx; P^-1 dF
-  double period = 0;       // dT
-};
 
 /// A preconditioned change (x, t) with its energy image, and the combination of secants (dx, dT) it answers to.
 struct Direction
@@ -31,11 +24,11 @@ struct Direction
 };
 
 /// Newest first: Gram-Schmidt on the preconditioned changes, the same combinations applied to the steps.
-std::vector<Direction> orthonormalise(const Shooting& shooting, const std::deque<Secant>& secants, const Border& border)
+std::vector<Direction> orthonormalise(const Shooting& shooting, const Border& border)
 {
   const double weight = border.speed * border.speed;
   std::vector<Direction> directions;
-  for (const Secant& secant : secants)
+  for (const Secant& secant : shooting.secants)
   {
     Direction fresh{copy_of(secant.change), zeros_like(secant.change), copy_of(secant.step), 0, secant.period};
     double row = 0;
@@ -66,10 +59,10 @@ std::vector<Direction> orthonormalise(const Shooting& shooting, const std::deque
 }
 
 /// The step and its dT from the orbit's defect, preconditioned.
-Secant next_step(const Shooting& shooting, const Orbit& orbit, Vec defect, const std::deque<Secant>& secants)
+Secant step_from(const Shooting& shooting, const Orbit& orbit, Vec defect)
 {
   const Border border = border_at(shooting, orbit);
-  const std::vector<Direction> directions = orthonormalise(shooting, secants, border);
+  const std::vector<Direction> directions = orthonormalise(shooting, border);
   const Owned<Vec> rest = copy_of(defect);
   check(VecScale(rest, -1));
   double rest_period = close_border(border, rest, 0);
@@ -95,18 +88,38 @@ Secant next_step(const Shooting& shooting, const Orbit& orbit, Vec defect, const
 
 } // namespace
 
+Secant next_step(const Shooting& shooting, const Orbit& orbit)
+{
+  const Owned<Vec> defect = zeros_like(orbit.defect);
+  apply(shooting.preconditioner, orbit.period, orbit.defect, defect);
+  return step_from(shooting, orbit, defect);
+}
+
+void judge(Shooting& shooting, const Orbit& orbit, const Secant& step)
+{
+  const Owned<Vec> fluctuation = copy_of(orbit.state);
+  check(VecAXPY(fluctuation, -1, shooting.equilibrium));
+  const double work = energy_product(shooting.flow, fluctuation, step.step);
+  const Moves now{std::abs(step.period) / orbit.period, 2 * std::abs(work) / (orbit.fluctuation * orbit.fluctuation)};
+  shooting.to_come = {std::max(2 * now.frequency, shooting.last.frequency / 2),
+                      std::max(2 * now.energy, shooting.last.energy / 2)};
+  shooting.last = now;
+}
+
 Finish shoot_multisecant(Shooting& shooting, const Orbit& start)
 {
   Finish finish{copy_of(start), Ending::stalled};
   Orbit orbit = copy_of(start);
   Owned<Vec> defect = zeros_like(orbit.defect); // preconditioned
   apply(shooting.preconditioner, orbit.period, orbit.defect, defect);
-  std::deque<Secant> secants; // newest first
   int since_best = 0;
   while (finish.orbit.residual > shooting.tolerance)
   {
+    Secant step = step_from(shooting, orbit, defect);
+    judge(shooting, orbit, step);
+    if (std::max(shooting.to_come.frequency, shooting.to_come.energy) <= shooting.wish)
+      return {std::move(orbit), Ending::converged};
     if (shooting.periods >= shooting.options.max_periods || since_best >= shooting.options.stall) return finish;
-    Secant step = next_step(shooting, orbit, defect, secants);
     if (!admissible_period(shooting, orbit.period + step.period))
     {
       finish.ending = Ending::not_periodic;
@@ -126,8 +139,8 @@ Finish shoot_multisecant(Shooting& shooting, const Orbit& start)
     apply(shooting.preconditioner, next.period, next.defect, step.change);
     std::swap(step.change, defect);
     check(VecAYPX(step.change, -1, defect));
-    secants.push_front(std::move(step));
-    if (static_cast<PetscInt>(secants.size()) > shooting.options.secants) secants.pop_back();
+    shooting.secants.push_front(std::move(step));
+    if (static_cast<PetscInt>(shooting.secants.size()) > shooting.options.secants) shooting.secants.pop_back();
     ++since_best;
     if (next.residual < finish.orbit.residual)
     {

@@ -75,6 +75,7 @@ Orbit reduce(Shooting& shooting, Orbit orbit, const std::vector<Vec>& shapes)
 Finish finish_in_full_space(Shooting& shooting, Orbit start)
 {
   Finish finish{std::move(start), Ending::stalled};
+  shooting.secants.clear();
   if (finish.orbit.residual <= shooting.tolerance) return {std::move(finish.orbit), Ending::converged};
   if (shooting.options.finish == "none") return finish;
   if (shooting.options.finish == "multisecant")
@@ -83,6 +84,7 @@ Finish finish_in_full_space(Shooting& shooting, Orbit start)
     if (finish.ending == Ending::converged) return finish;
     if (shooting.periods < shooting.options.max_periods)
     {
+      shooting.secants.clear();
       Orbit again = free_periods(shooting, finish.orbit.state, finish.orbit.period, 10);
       if (vanishing(shooting, again)) return {std::move(again), Ending::vanished};
       finish = shoot_multisecant(shooting, again);
@@ -185,21 +187,27 @@ std::string note_of(const NewtonRecord& record)
 
 } // namespace
 
-LimitCycle shoot(const Flow& flow, const ShootingStart& start, const Preconditioner& preconditioner, double tolerance,
-                 int free)
+Shooting begin_shooting(const Flow& flow, const Preconditioner& preconditioner, const ShootingStart& start,
+                        double tolerance, Progress& progress)
 {
+  declare_reduced_options();
+  declare_fallback_options();
   Shooting shooting{flow, preconditioner, read_options()};
   const Owned<Vec> rest = zeros_like(start.equilibrium);
   shooting.equilibrium = state_of(start.equilibrium, rest);
   shooting.first_period = start.period;
   shooting.tolerance = tolerance;
   shooting.residual_projected = std::nan("");
-  declare_reduced_options();
-  declare_fallback_options();
-  Progress progress(comm_of(start.u), "cycle", free + 60.);
-  shooting.announce = [&](const NewtonRecord& entry)
+  shooting.announce = [&progress](const NewtonRecord& entry)
   { progress.update(static_cast<double>(entry.periods), note_of(entry)); };
+  return shooting;
+}
 
+LimitCycle shoot(const Flow& flow, const ShootingStart& start, const Preconditioner& preconditioner, double tolerance,
+                 int free)
+{
+  Progress progress(comm_of(start.u), "cycle", free + 60.);
+  Shooting shooting = begin_shooting(flow, preconditioner, start, tolerance, progress);
   const Owned<Vec> first = state_of(start.u, start.v);
   Orbit orbit = free_periods(shooting, first, start.period, free);
   // Below the first event nothing limits a vibration; above it a start may be ten times too large and still find one.

@@ -11,13 +11,13 @@ namespace squeal
 namespace
 {
 
-/// Of the step size, from the orbit at twice as many steps; as if of order 1, which impacts can make it. False without
-/// such an orbit.
-bool judge_steps(Fitting& fitting, const ReducedOrbit& orbit, const ReducedState& shift)
+/// Of the step size, from the reduced cycle at twice as many; as if of order 1, which impacts can make it. False
+/// without such a cycle.
+bool judge_steps(Fitting& fitting, const ReducedOrbit& orbit)
 {
-  const ReducedOrbit fine = shoot_reduced(fitting, orbit.state, shift, orbit.period, 2 * fitting.steps, 0);
+  const ReducedOrbit fine = shoot_reduced(fitting, orbit.state, orbit.period, 2 * fitting.steps, 0);
   Fidelity& fidelity = fitting.result.fidelity;
-  const bool good = fine.cycle.outcome.word == "converged";
+  const bool good = fine.outcome.word == "converged";
   fidelity.step_frequency_error = good ? 2 * std::abs(fine.period / orbit.period - 1) : std::nan("");
   fidelity.step_energy_error = good ? 2 * std::abs(fine.energy / orbit.energy - 1) : std::nan("");
   return good;
@@ -37,23 +37,6 @@ int steps_for(const Fidelity& fidelity, int steps, int order)
   return 8 * static_cast<int>(std::ceil(std::max(measured, theory) / 8));
 }
 
-/// The candidate at as many steps a period as the wish needs; says what is in the way.
-std::string refine_steps(Fitting& fitting, Correction correction, int order)
-{
-  const int steps = std::max(fitting.steps, steps_for(fitting.result.fidelity, fitting.steps, order));
-  const ReducedOrbit fine =
-      shoot_reduced(fitting, correction.orbit.state, correction.shift, correction.orbit.period, steps, 0);
-  if (fine.cycle.outcome.word != "converged")
-    return "the reduced model has no cycle at " + std::to_string(steps) + " steps a period";
-  fitting.energy_move = fitting.frequency_move = 1; // nothing is known yet at this many
-  fitting.candidate = std::move(correction.to);
-  fitting.candidate.period = fine.period;
-  add_motion(fitting.reduced.model, 1, fine.state.q - correction.orbit.state.q, displacement(fitting.candidate.state));
-  add_motion(fitting.reduced.model, 1, fine.state.v - correction.orbit.state.v, velocity(fitting.candidate.state));
-  fitting.steps = steps;
-  return {};
-}
-
 /// -cycle_start: the full shooting starts from the estimate, or from the reduced model's cycle.
 bool starts_reduced()
 {
@@ -63,104 +46,130 @@ bool starts_reduced()
   return start == 1;
 }
 
-/// The reduced model and its cycle, the first candidate; says what is in the way.
-std::string start(Fitting& fitting)
+/// The full model's shooting, from one number of steps a period to the next.
+struct Pursuit
 {
-  const Full& full = fitting.full;
-  const ComplexMode& mode = full.unstable.front();
-  if (full.unstable.size() > 1) return "several modes are unstable: only the full model's shooting wakes them all";
-  fitting.active = pairs_that_may_change(full.interface, full.equilibrium, mode,
-                                         fitting.options.margin * start_amplitude(full.estimate));
-  PetscInt dofs = 0;
-  check(VecGetSize(full.structure.load, &dofs));
-  const std::size_t shapes = std::min(full.modes.size(), static_cast<std::size_t>(fitting.options.modes)) +
-                             fitting.active.size() * static_cast<std::size_t>(full.interface.block());
-  if (2 * shapes > static_cast<std::size_t>(dofs))
-    return "a reduced model of " + std::to_string(shapes) + " shapes is not small next to " + std::to_string(dofs) +
-           " degrees of freedom";
-  build(fitting);
-  const State first = mode_state(full.equilibrium, mode, start_amplitude_factor() * start_amplitude(full.estimate),
-                                 full.estimate.phase);
-  check(VecAXPY(first.u, -1, full.equilibrium.u));
-  const ReducedOrbit orbit =
-      shoot_reduced(fitting, coordinates(fitting.reduced.model, full.structure, first.u, first.v), {},
-                    1 / mode.frequency_hz(), fitting.steps, static_cast<int>(fitting.options.free_periods));
-  if (orbit.cycle.outcome.word != "converged") return "the cycle of the reduced model: " + orbit.cycle.outcome.word;
-  fitting.candidate = candidate_of(full, fitting.reduced, orbit);
-  return {};
+  Fitting& fitting;
+  PeriodMap& map;
+  Shooting& shooting;
+  Orbit at;             // of the full model
+  ReducedOrbit orbit;   // of the reduced one
+  std::string reason{}; // what is in the way
+};
+
+void move_to(Pursuit& pursuit, Vec state, double period)
+{
+  pursuit.map.steps = pursuit.fitting.steps;
+  pursuit.at = evaluate(pursuit.shooting, state, period);
+  record(pursuit.shooting, "full period", full_unknowns(pursuit.at), std::nan(""), pursuit.at);
 }
 
-void note(Fitting& fitting, std::vector<NewtonRecord>& records)
+/// As many steps a period as the wish needs; what they change in the reduced cycle is added to the full one.
+void refine_steps(Pursuit& pursuit, int order)
 {
-  LimitCycle& cycle = fitting.result.cycle;
-  const Fidelity& fidelity = fitting.result.fidelity;
-  records.push_back({"full period", 2 * fidelity.size + 1, fidelity.full_periods, cycle.period,
-                     std::max(fidelity.frequency_error, fidelity.energy_error), cycle.residual_full});
-  cycle.records = records;
-  cycle.newton_iterations = static_cast<int>(fidelity.full_periods);
-  cycle.periods_integrated = fidelity.full_periods;
-  cycle.residual_projected = std::nan("");
-  cycle.outcome = {"converged", "", cycle.newton_iterations, cycle.residual_full};
-}
-
-/// One full period, or as many as the wish needs; says what is in the way.
-std::string fit(Fitting& fitting)
-{
-  const bool adaptive = fitting.result.fidelity.asked == "auto";
-  Fidelity& fidelity = fitting.result.fidelity;
-  std::vector<NewtonRecord> records;
-  Acceleration acceleration{fitting.full};
-  bool rough = adaptive; // the steps are not yet what the wish needs
-  for (PetscInt pass = 0; pass < (adaptive ? fitting.options.corrections : 1); ++pass)
+  Fitting& fitting = pursuit.fitting;
+  const int steps = std::max(fitting.steps, steps_for(fitting.result.fidelity, fitting.steps, order));
+  if (steps == fitting.steps) return;
+  ReducedOrbit fine = shoot_reduced(fitting, pursuit.orbit.state, pursuit.orbit.period, steps, 0);
+  if (fine.outcome.word != "converged")
   {
-    fidelity.steps_per_period = fitting.steps;
-    Correction correction = correct(fitting);
-    note(fitting, records);
-    if (correction.orbit.cycle.outcome.word != "converged")
-      return adaptive ? "the corrected cycle of the reduced model: " + correction.orbit.cycle.outcome.word : "";
-    const double error = std::max(fidelity.frequency_error, fidelity.energy_error);
-    const bool near = error <= (rough ? 4 : .5) * fidelity.accuracy;
-    if (!adaptive || near)
-    {
-      if (!judge_steps(fitting, correction.orbit, correction.shift) && adaptive)
-        return "the reduced model has no cycle at twice as many steps a period";
-      if (!adaptive || (!rough && step_error(fidelity) <= fidelity.accuracy / 2)) return {};
-      const std::string problem = refine_steps(fitting, std::move(correction), rough ? 2 : 1); // 2 was not enough
-      if (!problem.empty()) return problem;
-      rough = false;
-      acceleration.tried.clear();
-      continue;
-    }
-    const std::vector<int> odd = surprises(fitting.full, fitting.active, fitting.result.cycle);
-    if (odd.empty() || pass > 1)
-    {
-      fitting.candidate = next_candidate(acceleration, std::move(fitting.candidate), std::move(correction.to));
-      continue;
-    }
-    fitting.active.insert(fitting.active.end(), odd.begin(), odd.end());
-    std::sort(fitting.active.begin(), fitting.active.end());
-    fitting.candidate = std::move(correction.to);
-    acceleration.tried.clear();
-    build(fitting);
+    pursuit.reason = "the reduced model has no cycle at " + std::to_string(steps) + " steps a period";
+    return;
   }
-  return "the wish was not met in " + std::to_string(fidelity.full_periods) + " periods of the full model";
+  fitting.steps = steps;
+  const Owned<Vec> change = motion_of(fitting.full, fitting.reduced.model,
+                                      {fine.state.q - pursuit.orbit.state.q, fine.state.v - pursuit.orbit.state.v});
+  check(VecAXPY(change, 1, pursuit.at.state));
+  const double period = pursuit.at.period + fine.period - pursuit.orbit.period;
+  pursuit.orbit = std::move(fine);
+  move_to(pursuit, change, period);
 }
 
-/// The full model's cycle from the reduced one, whose derivative stands for the full one's.
-void finish(Fitting& fitting)
+/// Shoots until the wish is met by the model, then by the steps.
+void pursue(Pursuit& pursuit)
+{
+  Fitting& fitting = pursuit.fitting;
+  const Fidelity& fidelity = fitting.result.fidelity;
+  for (bool rough = true; pursuit.reason.empty(); rough = false)
+  {
+    pursuit.shooting.wish = (rough ? 4 : .5) * fidelity.accuracy; // at first the steps are not what it needs
+    Finish finish = shoot_multisecant(pursuit.shooting, pursuit.at);
+    pursuit.at = std::move(finish.orbit);
+    if (finish.ending != Ending::converged)
+      pursuit.reason =
+          "the wish was not met in " + std::to_string(pursuit.shooting.periods) + " periods of the full model";
+    else if (!judge_steps(fitting, pursuit.orbit))
+      pursuit.reason = "the reduced model has no cycle at twice as many steps a period";
+    else if (!rough && step_error(fidelity) <= fidelity.accuracy / 2)
+      return;
+    else
+      refine_steps(pursuit, rough ? 2 : 1); // 2 was not enough
+  }
+}
+
+/// The cycle of the full model as far as it is wished for; says what is in the way.
+std::string fit(Fitting& fitting, const ShootingStart& start, const Preconditioner& preconditioner, ReducedOrbit orbit)
+{
+  const double clock = MPI_Wtime();
+  const Full& full = fitting.full;
+  Fidelity& fidelity = fitting.result.fidelity;
+  PeriodMap map{full.structure, full.interface, fitting.steps, full.settings.theta};
+  map.reactions = full.equilibrium.reactions;
+  map.contact_tolerance = fidelity.contact_tolerance;
+  const Flow flow = flow_of(map);
+  Progress progress(comm_of(start.u), "cycle", 20);
+  Shooting shooting = begin_shooting(flow, preconditioner, start, 0, progress);
+  shooting.options.max_periods = fitting.options.corrections;
+  Pursuit pursuit{fitting, map, shooting, {}, std::move(orbit)};
+  const Owned<Vec> first = state_of(start.u, start.v);
+  move_to(pursuit, first, start.period);
+  if (fidelity.asked == "auto")
+    pursue(pursuit);
+  else
+  {
+    judge(shooting, pursuit.at, next_step(shooting, pursuit.at));
+    (void)judge_steps(fitting, pursuit.orbit);
+  }
+
+  LimitCycle& cycle = fitting.result.cycle;
+  cycle.period = pursuit.at.period;
+  cycle.start = {copy_of(displacement(pursuit.at.state)), copy_of(velocity(pursuit.at.state)), 0, {}};
+  cycle.steps_per_period = fitting.steps;
+  cycle.theta = map.theta;
+  cycle.newton_iterations = shooting.iterations;
+  cycle.periods_integrated = shooting.periods;
+  cycle.records = shooting.records;
+  cycle.residual_projected = std::nan("");
+  cycle.residual_full = pursuit.at.residual;
+  cycle.outcome = {"converged", "", shooting.iterations, pursuit.at.residual};
+  (void)measure(map, full.equilibrium, full.probes, 32, cycle);
+  fidelity.steps_per_period = fitting.steps;
+  fidelity.full_periods = cycle.periods_integrated;
+  fidelity.frequency_error = shooting.to_come.frequency;
+  fidelity.energy_error = shooting.to_come.energy;
+  fidelity.full_seconds += MPI_Wtime() - clock;
+  return pursuit.reason;
+}
+
+/// By way of the reduced model; says what is in the way.
+std::string by_reduced_model(Fitting& fitting)
 {
   const Full& full = fitting.full;
-  const Candidate& candidate = fitting.candidate;
-  const ReducedState at =
-      coordinates(fitting.reduced.model, full.structure, displacement(candidate.state), velocity(candidate.state));
+  if (full.unstable.size() > 1) return "several modes are unstable: only the full model's shooting wakes them all";
+  ReducedOrbit orbit;
+  const std::string problem = first_orbit(fitting, orbit);
+  if (!problem.empty()) return problem;
+  const double clock = MPI_Wtime();
   ReducedMap map = map_of(fitting, fitting.steps);
-  const Preconditioner preconditioner = reduced_preconditioner(
-      fitting.reduced.model, full.structure, inside_of(map, candidate.period, at, comm_of(full.structure.load)));
-  const Owned<Vec> u = copy_of(displacement(candidate.state));
-  check(VecAXPY(u, 1, full.equilibrium.u));
-  const ShootingStart start{full.equilibrium.u, u, velocity(candidate.state), candidate.period, {}, {}};
+  const Preconditioner preconditioner = reduced_preconditioner(map, orbit.period, orbit.state, full.structure);
+  fitting.result.fidelity.reduced_seconds += MPI_Wtime() - clock;
+  const Owned<Vec> motion = motion_of(full, fitting.reduced.model, orbit.state);
+  check(VecAXPY(displacement(motion), 1, full.equilibrium.u));
+  const ShootingStart start{full.equilibrium.u, displacement(motion), velocity(motion), orbit.period, {}, {}};
+  if (fitting.result.fidelity.asked != "full") return fit(fitting, start, preconditioner, std::move(orbit));
   fitting.result.cycle = shoot_at_model(full.structure, full.interface, full.equilibrium, start, preconditioner,
                                         full.settings, 0, full.probes);
+  return {};
 }
 
 } // namespace
@@ -184,11 +193,7 @@ FittedCycle find_fitted_cycle(const Structure& structure, const Interface& inter
   {
     fidelity.used = from_reduced ? "full" : "reduced";
     fidelity.contact_tolerance = 1e-3 * accuracy;
-    fidelity.reason = start(fitting);
-    if (fidelity.reason.empty() && from_reduced)
-      finish(fitting);
-    else if (fidelity.reason.empty())
-      fidelity.reason = fit(fitting);
+    fidelity.reason = by_reduced_model(fitting);
     if (fidelity.reason.empty())
     {
       if (!settings.save_state.empty()) write_state(result.cycle.start, structure, settings.save_state);

@@ -22,57 +22,30 @@ ReducedOptions read_reduced_options()
   return options;
 }
 
+/// Twice the fluctuating energy.
+double doubled_energy(const ReducedModel& model, const ReducedState& state)
+{
+  return state.v.dot(model.M_z * state.v) + state.q.dot(model.K_z * state.q);
+}
+
 /// One period of the reduced model; returns its end and adds up the mean fluctuating energy.
 ReducedState one_period(ReducedMap& map, double period, const ReducedState& start, double& energy)
 {
-  const ReducedModel& model = map.model;
   energy = 0;
   return integrate(map, period, start,
-                   [&](const ReducedState& now)
-                   { energy += (now.v.dot(model.M_z * now.v) + now.q.dot(model.K_z * now.q)) / (2. * map.steps); });
+                   [&](const ReducedState& now) { energy += doubled_energy(map.model, now) / (2. * map.steps); });
 }
 
-/// One recorded period of the full model from the candidate; returns its defect.
-Owned<Vec> full_period(const Full& full, const Candidate& candidate, int steps, double tolerance, PeriodMap& map,
-                       LimitCycle& cycle, Fidelity& fidelity)
-{
-  const double clock = MPI_Wtime();
-  map.steps = steps;
-  set_period(map, candidate.period);
-  map.step.contact.tolerance = tolerance;
-  cycle = {};
-  cycle.period = candidate.period;
-  cycle.steps_per_period = steps;
-  cycle.theta = map.theta;
-  cycle.start = {copy_of(displacement(candidate.state)), copy_of(velocity(candidate.state)), 0, {}};
-  check(VecAXPY(cycle.start.u, 1, full.equilibrium.u));
-  const State end = measure(map, full.equilibrium, full.probes, 32, cycle);
-  Owned<Vec> defect = state_of(end.u, end.v);
-  check(VecAXPY(displacement(defect), -1, cycle.start.u));
-  check(VecAXPY(velocity(defect), -1, cycle.start.v));
-  cycle.residual_full = energy_norm(full.norm(), defect) / energy_norm(full.norm(), candidate.state);
-  ++fidelity.full_periods;
-  fidelity.full_seconds += MPI_Wtime() - clock;
-  return defect;
-}
-
-} // namespace
-
-Fitting::Fitting(const Full& problem)
-    : full(problem), options(read_reduced_options()), map{problem.structure, problem.interface,
-                                                          problem.settings.steps_per_period, problem.settings.theta}
-{
-  map.reactions = problem.equilibrium.reactions;
-}
-
+/// The reduced model of the active pairs.
 void build(Fitting& fitting)
 {
   const double clock = MPI_Wtime();
   const Full& full = fitting.full;
   Reduced& reduced = fitting.reduced;
-  reduced.model = reduce(
-      full.structure, full.interface, full.equilibrium, full.modes, fitting.active,
-      {static_cast<int>(fitting.options.modes), fitting.options.threshold, fitting.result.fidelity.asked == "full"});
+  // where its own cycle is the answer the friction of each pair has shapes of its own
+  const bool sliding_forces = fitting.result.fidelity.asked != "reduced";
+  reduced.model = reduce(full.structure, full.interface, full.equilibrium, full.modes, fitting.active,
+                         {static_cast<int>(fitting.options.modes), fitting.options.threshold, sliding_forces});
   reduced.norm = small_structure(reduced.model);
   reduced.modes = closed_modes(reduced.model, 3 * full.unstable.front().frequency_hz());
   reduced.sliding = sliding_modes(reduced.model, reduced.modes);
@@ -88,6 +61,47 @@ void build(Fitting& fitting)
   fidelity.reduction_seconds += MPI_Wtime() - clock;
 }
 
+/// Free periods until their energy settles to 1 % a period, or leaves the band of energies; returns the mean energy.
+double settle(Fitting& fitting, ReducedState& state, double period, double most, long last)
+{
+  const double clock = MPI_Wtime();
+  Fidelity& fidelity = fitting.result.fidelity;
+  ReducedMap map = map_of(fitting, fitting.steps);
+  double energy = 0;
+  for (int quiet = 0; quiet < 3 && fidelity.reduced_periods < last;)
+  {
+    const double before = energy;
+    state = one_period(map, period, state, energy);
+    ++fidelity.reduced_periods;
+    quiet = std::abs(energy - before) < .01 * energy ? quiet + 1 : 0;
+    if (energy > most) break;
+  }
+  fidelity.reduced_seconds += MPI_Wtime() - clock;
+  return energy;
+}
+
+/// What rank 0 found, bit by bit: ranks that decide apart would wait for each other.
+void share(ReducedOrbit& orbit, MPI_Comm comm)
+{
+  std::vector<double> values = {orbit.outcome.word == "converged" ? 1. : 0., orbit.period, orbit.energy};
+  values.insert(values.end(), orbit.state.q.begin(), orbit.state.q.end());
+  values.insert(values.end(), orbit.state.v.begin(), orbit.state.v.end());
+  MPI_Bcast(values.data(), static_cast<int>(values.size()), MPI_DOUBLE, 0, comm);
+  if (values[0] > 0)
+    orbit.outcome.word = "converged";
+  else if (orbit.outcome.word == "converged")
+    orbit.outcome.word = "not converged";
+  orbit.period = values[1];
+  orbit.energy = values[2];
+  const Eigen::Index n = orbit.state.q.size();
+  orbit.state.q = Eigen::VectorXd::Map(&values[3], n);
+  orbit.state.v = Eigen::VectorXd::Map(&values[3] + n, n);
+}
+
+} // namespace
+
+Fitting::Fitting(const Full& problem) : full(problem), options(read_reduced_options()) {}
+
 ReducedMap map_of(const Fitting& fitting, int steps)
 {
   ReducedMap map{fitting.reduced.model, steps, fitting.full.settings.theta};
@@ -97,81 +111,69 @@ ReducedMap map_of(const Fitting& fitting, int steps)
   return map;
 }
 
-ReducedOrbit shoot_reduced(Fitting& fitting, const ReducedState& start, const ReducedState& shift, double period,
-                           int steps, int free)
+Owned<Vec> motion_of(const Full& full, const ReducedModel& model, const ReducedState& state)
+{
+  const Owned<Vec> zero = zeros_like(full.structure.load);
+  Owned<Vec> motion = state_of(zero, zero);
+  add_motion(model, 1, state.q, displacement(motion));
+  add_motion(model, 1, state.v, velocity(motion));
+  return motion;
+}
+
+ReducedOrbit shoot_reduced(Fitting& fitting, const ReducedState& start, double period, int steps, int free)
 {
   const double clock = MPI_Wtime();
   const Reduced& reduced = fitting.reduced;
   ReducedMap map = map_of(fitting, steps);
-  map.shift = shift;
   const Owned<Vec> rest = small_vector(Eigen::VectorXd::Zero(reduced.model.size()));
   const Owned<Vec> u = small_vector(start.q), v = small_vector(start.v);
-  ReducedOrbit orbit;
-  orbit.cycle = shoot(flow_of(map, reduced.norm), {rest, u, v, period, {}, {}},
-                      sliding_preconditioner(reduced.sliding, reduced.modes.shapes, reduced.norm.M, steps, map.theta),
-                      fitting.tolerance, free);
-  orbit.state = {entries_of(orbit.cycle.start.u), entries_of(orbit.cycle.start.v)};
-  orbit.period = orbit.cycle.period;
+  const LimitCycle cycle =
+      shoot(flow_of(map, reduced.norm), {rest, u, v, period, {}, {}},
+            sliding_preconditioner(reduced.sliding, reduced.modes.shapes, reduced.norm.M, steps, map.theta),
+            fitting.tolerance, free);
+  ReducedOrbit orbit{cycle.outcome, {entries_of(cycle.start.u), entries_of(cycle.start.v)}, cycle.period, 0};
   (void)one_period(map, orbit.period, orbit.state, orbit.energy);
-  fitting.result.fidelity.reduced_periods += orbit.cycle.periods_integrated + 1;
+  fitting.result.fidelity.reduced_periods += cycle.periods_integrated + 1;
   fitting.result.fidelity.reduced_seconds += MPI_Wtime() - clock;
+  share(orbit, comm_of(fitting.full.structure.load));
   return orbit;
 }
 
-Candidate candidate_of(const Full& full, const Reduced& reduced, const ReducedOrbit& orbit)
-{
-  const Owned<Vec> zero = zeros_like(full.structure.load);
-  Candidate candidate{state_of(zero, zero), orbit.period};
-  add_motion(reduced.model, 1, orbit.state.q, displacement(candidate.state));
-  add_motion(reduced.model, 1, orbit.state.v, velocity(candidate.state));
-  return candidate;
-}
-
-std::vector<int> surprises(const Full& full, const std::vector<int>& active, const LimitCycle& cycle)
-{
-  std::vector<int> pairs;
-  for (int pair = 0; pair < full.interface.pairs; ++pair)
-  {
-    const auto i = static_cast<std::size_t>(pair);
-    if (std::binary_search(active.begin(), active.end(), pair)) continue;
-    const ContactStatus expected = full.equilibrium.closed[i] ? ContactStatus::slip : ContactStatus::open;
-    if (std::any_of(cycle.statuses.begin(), cycle.statuses.end(),
-                    [&](const std::vector<ContactStatus>& status) { return status[i] != expected; }))
-      pairs.push_back(pair);
-  }
-  return pairs;
-}
-
-Correction correct(Fitting& fitting)
+std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
 {
   const Full& full = fitting.full;
-  const ReducedModel& model = fitting.reduced.model;
-  const Candidate& from = fitting.candidate;
-  Fidelity& fidelity = fitting.result.fidelity;
-  const Owned<Vec> defect =
-      full_period(full, from, fitting.steps, fidelity.contact_tolerance, fitting.map, fitting.result.cycle, fidelity);
-  const ReducedState seen = coordinates(model, full.structure, displacement(defect), velocity(defect));
-  const ReducedState here = coordinates(model, full.structure, displacement(from.state), velocity(from.state));
-  ReducedMap own = map_of(fitting, fitting.steps);
-  double energy = 0;
-  const ReducedState end = one_period(own, from.period, here, energy);
-  Correction result;
-  result.shift = {seen.q - (end.q - here.q), seen.v - (end.v - here.v)};
-  result.orbit = shoot_reduced(fitting, here, result.shift, from.period, fitting.steps, 0);
-  // in the shapes by the reduced model, outside them by its own defect
-  result.to = {copy_of(from.state.get()), result.orbit.period};
-  check(VecAXPY(result.to.state, 1, defect));
-  add_motion(model, 1, result.orbit.state.q - here.q - seen.q, displacement(result.to.state));
-  add_motion(model, 1, result.orbit.state.v - here.v - seen.v, velocity(result.to.state));
-
-  // What is still to come is taken as twice the last move, or half of the one before: their signs alternate.
-  const double frequency = std::abs(result.orbit.period / from.period - 1);
-  const double motion = std::abs(result.orbit.energy / energy - 1);
-  fidelity.frequency_error = std::max(2 * frequency, fitting.frequency_move / 2);
-  fidelity.energy_error = std::max(2 * motion, fitting.energy_move / 2);
-  fitting.frequency_move = frequency;
-  fitting.energy_move = motion;
-  return result;
+  const ComplexMode& mode = full.unstable.front();
+  PetscInt dofs = 0;
+  check(VecGetSize(full.structure.load, &dofs));
+  double amplitude = start_amplitude_factor() * start_amplitude(full.estimate);
+  const State first = mode_state(full.equilibrium, mode, amplitude, full.estimate.phase);
+  check(VecAXPY(first.u, -1, full.equilibrium.u));
+  Owned<Vec> motion = state_of(first.u, first.v);
+  double unit = 0; // energy at amplitude 1
+  for (;;)
+  {
+    fitting.active = pairs_that_may_change(full.interface, full.equilibrium, mode, fitting.options.margin * amplitude);
+    const std::size_t shapes = std::min(full.modes.size(), static_cast<std::size_t>(fitting.options.modes)) +
+                               fitting.active.size() * static_cast<std::size_t>(full.interface.block());
+    if (2 * shapes > static_cast<std::size_t>(dofs))
+      return "a reduced model of " + std::to_string(shapes) + " shapes is not small next to " + std::to_string(dofs) +
+             " degrees of freedom";
+    build(fitting);
+    const ReducedModel& model = fitting.reduced.model;
+    ReducedState state = coordinates(model, full.structure, displacement(motion), velocity(motion));
+    if (unit == 0) unit = doubled_energy(model, state) / 2 / (amplitude * amplitude);
+    const double energy = settle(fitting, state, 1 / mode.frequency_hz(), 1.2 * unit * amplitude * amplitude,
+                                 fitting.options.free_periods);
+    const double reached = std::sqrt(energy / unit);
+    motion = motion_of(full, model, state);
+    if (reached > 1.05 * amplitude && fitting.result.fidelity.reduced_periods < fitting.options.free_periods)
+    {
+      amplitude = 1.2 * reached;
+      continue;
+    }
+    orbit = shoot_reduced(fitting, state, 1 / mode.frequency_hz(), fitting.steps, 5);
+    return orbit.outcome.word == "converged" ? "" : "the cycle of the reduced model: " + orbit.outcome.word;
+  }
 }
 
 } // namespace squeal

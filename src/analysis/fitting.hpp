@@ -1,10 +1,8 @@
 #pragma once
-/// The reduced model beside the full one (analysis/fidelity.hpp): its cycle, and what a full period says of it.
+/// The reduced model beside the full one (analysis/fidelity.hpp): its active pairs, its cycles, its derivative.
 #include "squeal/analysis/fidelity.hpp"
 #include "squeal/analysis/reduced.hpp"
 #include "squeal/analysis/shooting.hpp"
-
-#include <deque>
 
 namespace squeal
 {
@@ -12,7 +10,7 @@ namespace squeal
 struct ReducedOptions
 {
   PetscReal margin = 1, threshold = 1e-5;
-  PetscInt modes = 100000, free_periods = 100, corrections = 40;
+  PetscInt modes = 100000, free_periods = 300, corrections = 40;
 };
 
 /// The problem as given.
@@ -26,8 +24,6 @@ struct Full
   const Estimate& estimate;
   const CycleSettings& settings;
   Mat probes = nullptr;
-
-  Flow norm() const { return {nullptr, structure.M, structure.K, {}}; }
 };
 
 /// The reduced model, ready to be shot at.
@@ -41,16 +37,9 @@ struct Reduced
 
 struct ReducedOrbit
 {
-  LimitCycle cycle;
+  Outcome outcome;
   ReducedState state;
   double period = 0, energy = 0; // [s], [J] mean, fluctuating
-};
-
-/// A state of the full model, about the equilibrium, and its period.
-struct Candidate
-{
-  Owned<Vec> state; // nest (u - u0, v)
-  double period = 0;
 };
 
 /// The fitting so far.
@@ -60,48 +49,24 @@ struct Fitting
 
   const Full& full;
   ReducedOptions options;
-  PeriodMap map;
   FittedCycle result;
   std::vector<int> active; // pairs
   Reduced reduced;
   int steps = 0;
   double tolerance = 0; // of the reduced cycles' residual
-  Candidate candidate;
-  double frequency_move = 0, energy_move = 0; // of the last correction, relative
 };
 
-/// The reduced model of the active pairs.
-void build(Fitting& fitting);
+/// The reduced model's first cycle, from the estimate, with as many active pairs as its motion needs: it runs free
+/// until it has settled, and where it outgrows the amplitude that its pairs were chosen for they are chosen anew. Says
+/// what is in the way, or nothing.
+std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit);
 
 ReducedMap map_of(const Fitting& fitting, int steps);
 
-/// The cycle of Phi_r + shift near `start`, after some free periods.
-ReducedOrbit shoot_reduced(Fitting& fitting, const ReducedState& start, const ReducedState& shift, double period,
-                           int steps, int free);
+/// The cycle of the reduced model near `start`, after some free periods. The same on every rank.
+ReducedOrbit shoot_reduced(Fitting& fitting, const ReducedState& start, double period, int steps, int free);
 
-Candidate candidate_of(const Full& full, const Reduced& reduced, const ReducedOrbit& orbit);
-
-/// Pairs taken as sliding, or as open, that were seen to do something else.
-std::vector<int> surprises(const Full& full, const std::vector<int>& active, const LimitCycle& cycle);
-
-/// Candidates and where one correction took them; the next one makes the remaining move least (Anderson).
-struct Acceleration
-{
-  const Full& full;
-  std::deque<std::pair<Candidate, Candidate>> tried{}; // newest first: candidate, corrected
-  std::size_t memory = 6;
-};
-
-Candidate next_candidate(Acceleration& acceleration, Candidate from, Candidate to);
-
-/// A full period from the candidate and the reduced model's answer to it.
-struct Correction
-{
-  Candidate to;
-  ReducedOrbit orbit; // of the shifted reduced model
-  ReducedState shift;
-};
-
-Correction correct(Fitting& fitting);
+/// A motion of the reduced model as one of the full one, about the equilibrium: nest (du, v).
+Owned<Vec> motion_of(const Full& full, const ReducedModel& model, const ReducedState& state);
 
 } // namespace squeal

@@ -177,9 +177,8 @@ Flow flow_of(ReducedMap& map, const Structure& norm)
   const auto period_map = [&map](double period, Vec start, Vec end, Vec rate)
   {
     const Passage passage = pass(map, period, {entries_of(displacement(start)), entries_of(velocity(start))});
-    const bool shifted = map.shift.q.size() > 0;
-    put(shifted ? VectorXd(passage.end.q + map.shift.q) : passage.end.q, displacement(end));
-    put(shifted ? VectorXd(passage.end.v + map.shift.v) : passage.end.v, velocity(end));
+    put(passage.end.q, displacement(end));
+    put(passage.end.v, velocity(end));
     if (!rate) return;
     put(passage.rate.q, displacement(rate));
     put(passage.rate.v, velocity(rate));

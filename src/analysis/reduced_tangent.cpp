@@ -56,12 +56,13 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm 
     b_from_state.row(row).head(n) += (1 - theta) * model.G.row(row);
     b_from_state.row(row).tail(n) += model.G.row(row) / h;
   }
-  // this rank's columns, of (q, v); the rows are (v, q), as in the step
-  const Eigen::Index first = 2 * n * rank_of(comm) / ranks_of(comm),
-                     last = 2 * n * (rank_of(comm) + 1) / ranks_of(comm);
-  MatrixXd X(2 * n, last - first);
-  const MatrixXd one = MatrixXd::Identity(2 * n, 2 * n);
-  X << one.bottomRows(n).middleCols(first, last - first), one.topRows(n).middleCols(first, last - first);
+  // this rank's columns, of the modes' (q, v); the rows are all (v, q), as in the step
+  const Eigen::Index m = model.modes;
+  const Eigen::Index first = 2 * m * rank_of(comm) / ranks_of(comm),
+                     last = 2 * m * (rank_of(comm) + 1) / ranks_of(comm);
+  MatrixXd X = MatrixXd::Zero(2 * n, last - first);
+  for (Eigen::Index column = first; column < last; ++column)
+    X(column < m ? n + column : column - m, column - first) = 1;
   ReducedContact contact{map.reactions};
   for (int i = 0; i < map.steps; ++i)
   {
@@ -72,41 +73,40 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm 
     X.bottomRows(n) += h * (theta * v + (1 - theta) * X.topRows(n));
     X.topRows(n) = v;
   }
-  MatrixXd result = MatrixXd::Zero(2 * n, 2 * n);
-  result.topRows(n).middleCols(first, last - first) = X.bottomRows(n);
-  result.bottomRows(n).middleCols(first, last - first) = X.topRows(n);
+  MatrixXd result = MatrixXd::Zero(2 * m, 2 * m);
+  result.topRows(m).middleCols(first, last - first) = X.middleRows(n, m);
+  result.bottomRows(m).middleCols(first, last - first) = X.topRows(m);
   // every entry is one rank's: a sum of it and zeros has the same bits everywhere
   MPI_Allreduce(MPI_IN_PLACE, result.data(), static_cast<int>(result.size()), MPI_DOUBLE, MPI_SUM, comm);
   return result;
 }
 
-Eigen::MatrixXd inside_of(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm)
+Preconditioner reduced_preconditioner(ReducedMap& map, double period, const ReducedState& state,
+                                      const Structure& structure)
 {
   const ReducedModel& model = map.model;
-  const Eigen::Index n = model.size();
-  MatrixXd J = monodromy(map, period, state, comm);
+  const Eigen::Index n = model.size(), m = model.modes;
+  MatrixXd D = monodromy(map, period, state, comm_of(structure.load));
   const ReducedState f = pass(map, period, state).rate;
-  VectorXd flow(2 * n), image(2 * n);
-  flow << f.q, f.v;
-  image << model.K_z * f.q, model.M_z * f.v;
-  J -= flow * image.transpose() / flow.dot(image);
-  J.diagonal().array() -= 1;
-  MatrixXd D = J.partialPivLu().inverse();
+  VectorXd flow(2 * m), image(2 * m);
+  flow << f.q.head(m), f.v.head(m);
+  image << (model.K_z * f.q).head(m), (model.M_z * f.v).head(m);
+  D -= flow * image.transpose() / flow.dot(image);
+  D.diagonal().array() -= 1;
+  D = D.partialPivLu().inverse();
   D.diagonal().array() += 1;
-  return D;
-}
-
-Preconditioner reduced_preconditioner(const ReducedModel& model, const Structure& structure, MatrixXd inside)
-{
-  return [&model, &structure, D = std::move(inside)](double, Vec x, Vec y)
+  return [&model, &structure, n, m, D = std::move(D)](double, Vec x, Vec y)
   {
     const ReducedState seen = coordinates(model, structure, displacement(x), velocity(x));
-    VectorXd both(D.cols());
-    both << seen.q, seen.v;
+    VectorXd both(2 * m);
+    both << seen.q.head(m), seen.v.head(m);
     both = D * both;
     check(VecAXPBY(y, -1, 0, x));
-    add_motion(model, 1, both.head(model.size()), displacement(y));
-    add_motion(model, 1, both.tail(model.size()), velocity(y));
+    ReducedState inside{VectorXd::Zero(n), VectorXd::Zero(n)};
+    inside.q.head(m) = both.head(m);
+    inside.v.head(m) = both.tail(m);
+    add_motion(model, 1, inside.q, displacement(y));
+    add_motion(model, 1, inside.v, velocity(y));
   };
 }
 

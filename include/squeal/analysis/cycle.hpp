@@ -100,6 +100,7 @@ struct PeriodMap
   ThetaStep step{};
   std::vector<double> reactions{}; // warm start: at the end of the last period integrated with its rate
   long unconverged = 0;            // steps whose contact did not converge
+  double contact_tolerance = 0;    // 0: the option's
 };
 
 /// A and W for this period, unless they are those already.

@@ -81,7 +81,7 @@ struct ReducedContact
   Eigen::VectorXd Wr{};                    // W r; empty: not known
   Eigen::VectorXd w{};                     // [m/s] W r + b
   Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
-  int unread = 0;          // steps since W was read in double precision
+  int unread = 0;                          // steps since W was read in double precision
   Eigen::MatrixXf along{}; // W_nn + W_nt e of those directions e in which friction was then, mu included
 };
 
@@ -101,7 +101,6 @@ struct ReducedMap
   Eigen::MatrixXd G_n{};             // normal rows of G
   std::vector<PairBlock> own{};      // the symmetric part of each pair's own block of W
   Eigen::VectorXd reactions{};       // [N] every period's warm start
-  ReducedState shift{};              // added to the period's end; empty: none
   ContactSettings contact{};
   long unconverged = 0;
 };
@@ -132,16 +131,17 @@ struct Passage
 
 Passage pass(ReducedMap& map, double period, ReducedState state);
 
-/// The derivative of a period's end (q, v) in its start: the product of the steps' own, exact where no pair changes its
-/// state within rounding. Collective: each rank does its share of the columns.
+/// The derivative of a period's end (q, v) in its start along the modes among the shapes, of their coordinates: the
+/// product of the steps' own, exact where no pair changes its state within rounding. What the attachment shapes add to
+/// the start is not asked for: it is quick, and forgotten within a period. 2 modes square. Collective: each rank does
+/// its share of the columns.
 Eigen::MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm comm);
 
-/// D = (dPhi_r/dx - f f^+ - I)^-1 + I at a state: f is the flow, along which the border of the shooting decides.
-Eigen::MatrixXd inside_of(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm);
-
-/// P^-1 x = -x + V D R x on the full model, V the shapes, R the coordinates in them: what lies outside is taken as
-/// forgotten within a period. Borrows both models.
-Preconditioner reduced_preconditioner(const ReducedModel& model, const Structure& structure, Eigen::MatrixXd inside);
+/// P^-1 x = -x + V D R x on the full model, V the modes among the shapes, R the coordinates in them, and
+/// D = (dPhi_r/dx - f f^+ - I)^-1 + I there, f the flow, along which the border of the shooting decides: what lies
+/// outside is taken as forgotten within a period. Borrows the model and the structure. Collective.
+Preconditioner reduced_preconditioner(ReducedMap& map, double period, const ReducedState& state,
+                                      const Structure& structure);
 
 /// The flow for shooting; borrows the map and the matrices of `norm`.
 Flow flow_of(ReducedMap& map, const Structure& norm);

@@ -5,6 +5,9 @@
 /// <a, b> = a_u'K b_u + a_v'M b_v. Each stage returns the best candidate it met.
 #include "squeal/analysis/cycle.hpp"
 #include "squeal/analysis/quadratic.hpp"
+#include "squeal/base/progress.hpp"
+
+#include <deque>
 
 namespace squeal
 {
@@ -35,6 +38,19 @@ struct Orbit
   double residual = 0;    // |defect| / fluctuation
 };
 
+/// A step of the multisecant iteration and what it did to the preconditioned defect.
+struct Secant
+{
+  Owned<Vec> step, change; // dx; P^-1 dF
+  double period = 0;       // dT
+};
+
+/// By how much the iteration still moves, relative.
+struct Moves
+{
+  double frequency = 0, energy = 0;
+};
+
 /// What the stages share.
 struct Shooting
 {
@@ -50,6 +66,9 @@ struct Shooting
   std::vector<NewtonRecord> records{};
   double residual_projected = 0;
   std::function<void(const NewtonRecord&)> announce{};
+  std::deque<Secant> secants{}; // newest first; they serve the next shooting at nearly the same flow as well
+  double wish = 0;              // above 0: converged as soon as what is still to come moves no more than that
+  Moves last{}, to_come{};      // the last step and an estimate of all that would follow
 };
 
 /// States as nests.
@@ -94,6 +113,15 @@ struct Finish
 };
 
 Finish shoot_multisecant(Shooting& shooting, const Orbit& start);
+
+/// What a step from the orbit would do to period and energy, into shooting.last and to_come: twice that, or half of the
+/// step before, since their signs alternate.
+void judge(Shooting& shooting, const Orbit& orbit, const Secant& step);
+Secant next_step(const Shooting& shooting, const Orbit& orbit);
+
+/// Options read, nothing integrated yet. Borrows all three; every record is announced to `progress`.
+Shooting begin_shooting(const Flow& flow, const Preconditioner& preconditioner, const ShootingStart& start,
+                        double tolerance, Progress& progress);
 Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start);
 
 /// Make the solvers' options known to the library even when they never run.
