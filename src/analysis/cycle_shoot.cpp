@@ -71,7 +71,8 @@ Orbit reduce(Shooting& shooting, Orbit orbit, const std::vector<Vec>& shapes)
   return best;
 }
 
-/// Secants; where they give up, ten more free periods and once again; then Newton-Krylov.
+} // namespace
+
 Finish finish_in_full_space(Shooting& shooting, Orbit start)
 {
   Finish finish{std::move(start), Ending::stalled};
@@ -97,6 +98,9 @@ Finish finish_in_full_space(Shooting& shooting, Orbit start)
   if (finish.ending == Ending::stalled) finish.ending = before;
   return finish;
 }
+
+namespace
+{
 
 /// A cycle gone round twice is a solution, too, and no answer: where half the period nearly closes it, that is sought.
 Finish gone_round_once(Shooting& shooting, Finish finish)

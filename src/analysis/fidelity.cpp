@@ -11,28 +11,36 @@ namespace squeal
 namespace
 {
 
-/// Of the step size, from the reduced cycle at twice as many; as if of order 1, which impacts can make it. False
-/// without such a cycle.
-bool judge_steps(Fitting& fitting, const ReducedOrbit& orbit)
-{
-  const ReducedOrbit fine = shoot_reduced(fitting, orbit.state, orbit.period, 2 * fitting.steps, 0);
-  Fidelity& fidelity = fitting.result.fidelity;
-  const bool good = fine.outcome.word == "converged";
-  fidelity.step_frequency_error = good ? 2 * std::abs(fine.period / orbit.period - 1) : std::nan("");
-  fidelity.step_energy_error = good ? 2 * std::abs(fine.energy / orbit.energy - 1) : std::nan("");
-  return good;
-}
-
 double step_error(const Fidelity& fidelity)
 {
   return std::max(fidelity.step_frequency_error, fidelity.step_energy_error);
 }
 
-/// Steps a period for which the step's errors are half the wish, and its growth rate's (omega h)^2/4 is the wish; as if
-/// of the order given.
-int steps_for(const Fidelity& fidelity, int steps, int order)
+/// Of the step size, from the reduced cycle at twice and four times as many, and the order at which it falls: 1 where
+/// impacts make it, 2 else. False without such cycles.
+bool judge_steps(Fitting& fitting, const ReducedOrbit& orbit, double& order)
 {
-  const double measured = 1.1 * steps * std::pow(2 * step_error(fidelity) / fidelity.accuracy, 1. / order);
+  Fidelity& fidelity = fitting.result.fidelity;
+  const ReducedOrbit fine = shoot_reduced(fitting, orbit.state, orbit.period, 2 * fitting.steps, 0);
+  const ReducedOrbit finest = shoot_reduced(fitting, fine.state, fine.period, 4 * fitting.steps, 0);
+  fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
+  if (!fine.converged || !finest.converged) return false;
+  const auto error = [&order](double coarse, double twice, double four_times)
+  {
+    const double first = std::abs(twice / coarse - 1), second = std::abs(four_times / twice - 1);
+    order = std::clamp(std::log2(first / second), 1., 2.);
+    return first / (1 - std::pow(2, -order));
+  };
+  fidelity.step_frequency_error = error(orbit.period, fine.period, finest.period);
+  fidelity.step_energy_error = error(orbit.energy, fine.energy, finest.energy);
+  return true;
+}
+
+/// Steps a period for which the step's error, of this order, is a third of the wish, and its growth rate's (omega
+/// h)^2/4 the wish.
+int steps_for(const Fidelity& fidelity, int steps, double order)
+{
+  const double measured = steps * std::pow(3 * step_error(fidelity) / fidelity.accuracy, 1 / order);
   const double theory = std::numbers::pi / std::sqrt(fidelity.accuracy);
   return 8 * static_cast<int>(std::ceil(std::max(measured, theory) / 8));
 }
@@ -65,13 +73,13 @@ void move_to(Pursuit& pursuit, Vec state, double period)
 }
 
 /// As many steps a period as the wish needs; what they change in the reduced cycle is added to the full one.
-void refine_steps(Pursuit& pursuit, int order)
+void refine_steps(Pursuit& pursuit, double order)
 {
   Fitting& fitting = pursuit.fitting;
   const int steps = std::max(fitting.steps, steps_for(fitting.result.fidelity, fitting.steps, order));
   if (steps == fitting.steps) return;
   ReducedOrbit fine = shoot_reduced(fitting, pursuit.orbit.state, pursuit.orbit.period, steps, 0);
-  if (fine.outcome.word != "converged")
+  if (!fine.converged)
   {
     pursuit.reason = "the reduced model has no cycle at " + std::to_string(steps) + " steps a period";
     return;
@@ -90,6 +98,7 @@ void pursue(Pursuit& pursuit)
 {
   Fitting& fitting = pursuit.fitting;
   const Fidelity& fidelity = fitting.result.fidelity;
+  double order = 0;
   for (bool rough = true; pursuit.reason.empty(); rough = false)
   {
     pursuit.shooting.wish = (rough ? 4 : .5) * fidelity.accuracy; // at first the steps are not what it needs
@@ -98,12 +107,12 @@ void pursue(Pursuit& pursuit)
     if (finish.ending != Ending::converged)
       pursuit.reason =
           "the wish was not met in " + std::to_string(pursuit.shooting.periods) + " periods of the full model";
-    else if (!judge_steps(fitting, pursuit.orbit))
-      pursuit.reason = "the reduced model has no cycle at twice as many steps a period";
+    else if (!judge_steps(fitting, pursuit.orbit, order))
+      pursuit.reason = "the reduced model has no cycle at two and four times as many steps a period";
     else if (!rough && step_error(fidelity) <= fidelity.accuracy / 2)
       return;
     else
-      refine_steps(pursuit, rough ? 2 : 1); // 2 was not enough
+      refine_steps(pursuit, rough ? 2 : order); // far from the limit an order is not seen yet
   }
 }
 
@@ -128,7 +137,8 @@ std::string fit(Fitting& fitting, const ShootingStart& start, const Precondition
   else
   {
     judge(shooting, pursuit.at, next_step(shooting, pursuit.at));
-    (void)judge_steps(fitting, pursuit.orbit);
+    double order = 0;
+    (void)judge_steps(fitting, pursuit.orbit, order);
   }
 
   LimitCycle& cycle = fitting.result.cycle;

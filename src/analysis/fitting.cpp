@@ -42,8 +42,12 @@ void build(Fitting& fitting)
   const double clock = MPI_Wtime();
   const Full& full = fitting.full;
   Reduced& reduced = fitting.reduced;
-  // where its own cycle is the answer the friction of each pair has shapes of its own
-  const bool sliding_forces = fitting.result.fidelity.asked != "reduced";
+  // Friction has shapes of its own where its cycle is the answer, or where that costs nothing; the steps are judged
+  // better with them.
+  constexpr std::size_t costs_nothing = 500;
+  const bool sliding_forces =
+      fitting.result.fidelity.asked != "reduced" &&
+      full.modes.size() + fitting.active.size() * static_cast<std::size_t>(full.interface.block()) > costs_nothing;
   reduced.model = reduce(full.structure, full.interface, full.equilibrium, full.modes, fitting.active,
                          {static_cast<int>(fitting.options.modes), fitting.options.threshold, sliding_forces});
   reduced.norm = small_structure(reduced.model);
@@ -83,14 +87,11 @@ double settle(Fitting& fitting, ReducedState& state, double period, double most,
 /// What rank 0 found, bit by bit: ranks that decide apart would wait for each other.
 void share(ReducedOrbit& orbit, MPI_Comm comm)
 {
-  std::vector<double> values = {orbit.outcome.word == "converged" ? 1. : 0., orbit.period, orbit.energy};
+  std::vector<double> values = {orbit.converged ? 1. : 0., orbit.period, orbit.energy};
   values.insert(values.end(), orbit.state.q.begin(), orbit.state.q.end());
   values.insert(values.end(), orbit.state.v.begin(), orbit.state.v.end());
   MPI_Bcast(values.data(), static_cast<int>(values.size()), MPI_DOUBLE, 0, comm);
-  if (values[0] > 0)
-    orbit.outcome.word = "converged";
-  else if (orbit.outcome.word == "converged")
-    orbit.outcome.word = "not converged";
+  orbit.converged = values[0] > 0;
   orbit.period = values[1];
   orbit.energy = values[2];
   const Eigen::Index n = orbit.state.q.size();
@@ -127,13 +128,21 @@ ReducedOrbit shoot_reduced(Fitting& fitting, const ReducedState& start, double p
   ReducedMap map = map_of(fitting, steps);
   const Owned<Vec> rest = small_vector(Eigen::VectorXd::Zero(reduced.model.size()));
   const Owned<Vec> u = small_vector(start.q), v = small_vector(start.v);
-  const LimitCycle cycle =
-      shoot(flow_of(map, reduced.norm), {rest, u, v, period, {}, {}},
-            sliding_preconditioner(reduced.sliding, reduced.modes.shapes, reduced.norm.M, steps, map.theta),
-            fitting.tolerance, free);
-  ReducedOrbit orbit{cycle.outcome, {entries_of(cycle.start.u), entries_of(cycle.start.v)}, cycle.period, 0};
+  const Flow flow = flow_of(map, reduced.norm);
+  const Preconditioner preconditioner =
+      sliding_preconditioner(reduced.sliding, reduced.modes.shapes, reduced.norm.M, steps, map.theta);
+  Progress progress(PETSC_COMM_SELF, "reduced", free + 20.);
+  Shooting shooting = begin_shooting(flow, preconditioner, {rest, u, v, period, {}, {}}, fitting.tolerance, progress);
+  const Owned<Vec> first = state_of(u, v);
+  Orbit begin = free_periods(shooting, first, period, free);
+  shooting.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
+  const Finish finish = finish_in_full_space(shooting, std::move(begin));
+  ReducedOrbit orbit{finish.ending == Ending::converged,
+                     {entries_of(displacement(finish.orbit.state)), entries_of(velocity(finish.orbit.state))},
+                     finish.orbit.period,
+                     0};
   (void)one_period(map, orbit.period, orbit.state, orbit.energy);
-  fitting.result.fidelity.reduced_periods += cycle.periods_integrated + 1;
+  fitting.result.fidelity.reduced_periods += shooting.periods + 1;
   fitting.result.fidelity.reduced_seconds += MPI_Wtime() - clock;
   share(orbit, comm_of(fitting.full.structure.load));
   return orbit;
@@ -172,7 +181,7 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
       continue;
     }
     orbit = shoot_reduced(fitting, state, 1 / mode.frequency_hz(), fitting.steps, 5);
-    return orbit.outcome.word == "converged" ? "" : "the cycle of the reduced model: " + orbit.outcome.word;
+    return orbit.converged ? "" : "no cycle of the reduced model was found";
   }
 }
 

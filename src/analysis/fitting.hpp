@@ -37,7 +37,7 @@ struct Reduced
 
 struct ReducedOrbit
 {
-  Outcome outcome;
+  bool converged = false;
   ReducedState state;
   double period = 0, energy = 0; // [s], [J] mean, fluctuating
 };

@@ -56,13 +56,11 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm 
     b_from_state.row(row).head(n) += (1 - theta) * model.G.row(row);
     b_from_state.row(row).tail(n) += model.G.row(row) / h;
   }
-  // this rank's columns, of the modes' (q, v); the rows are all (v, q), as in the step
-  const Eigen::Index m = model.modes;
-  const Eigen::Index first = 2 * m * rank_of(comm) / ranks_of(comm),
-                     last = 2 * m * (rank_of(comm) + 1) / ranks_of(comm);
+  // this rank's columns, of (q, v); the rows are (v, q), as in the step
+  const Eigen::Index first = 2 * n * rank_of(comm) / ranks_of(comm),
+                     last = 2 * n * (rank_of(comm) + 1) / ranks_of(comm);
   MatrixXd X = MatrixXd::Zero(2 * n, last - first);
-  for (Eigen::Index column = first; column < last; ++column)
-    X(column < m ? n + column : column - m, column - first) = 1;
+  for (Eigen::Index column = first; column < last; ++column) X((column + n) % (2 * n), column - first) = 1;
   ReducedContact contact{map.reactions};
   for (int i = 0; i < map.steps; ++i)
   {
@@ -73,9 +71,9 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm 
     X.bottomRows(n) += h * (theta * v + (1 - theta) * X.topRows(n));
     X.topRows(n) = v;
   }
-  MatrixXd result = MatrixXd::Zero(2 * m, 2 * m);
-  result.topRows(m).middleCols(first, last - first) = X.middleRows(n, m);
-  result.bottomRows(m).middleCols(first, last - first) = X.topRows(m);
+  MatrixXd result = MatrixXd::Zero(2 * n, 2 * n);
+  result.topRows(n).middleCols(first, last - first) = X.bottomRows(n);
+  result.bottomRows(n).middleCols(first, last - first) = X.topRows(n);
   // every entry is one rank's: a sum of it and zeros has the same bits everywhere
   MPI_Allreduce(MPI_IN_PLACE, result.data(), static_cast<int>(result.size()), MPI_DOUBLE, MPI_SUM, comm);
   return result;
@@ -85,28 +83,25 @@ Preconditioner reduced_preconditioner(ReducedMap& map, double period, const Redu
                                       const Structure& structure)
 {
   const ReducedModel& model = map.model;
-  const Eigen::Index n = model.size(), m = model.modes;
+  const Eigen::Index n = model.size();
   MatrixXd D = monodromy(map, period, state, comm_of(structure.load));
   const ReducedState f = pass(map, period, state).rate;
-  VectorXd flow(2 * m), image(2 * m);
-  flow << f.q.head(m), f.v.head(m);
-  image << (model.K_z * f.q).head(m), (model.M_z * f.v).head(m);
+  VectorXd flow(2 * n), image(2 * n);
+  flow << f.q, f.v;
+  image << model.K_z * f.q, model.M_z * f.v;
   D -= flow * image.transpose() / flow.dot(image);
   D.diagonal().array() -= 1;
-  D = D.partialPivLu().inverse();
+  D = D.partialPivLu().inverse().eval();
   D.diagonal().array() += 1;
-  return [&model, &structure, n, m, D = std::move(D)](double, Vec x, Vec y)
+  return [&model, &structure, D = std::move(D)](double, Vec x, Vec y)
   {
     const ReducedState seen = coordinates(model, structure, displacement(x), velocity(x));
-    VectorXd both(2 * m);
-    both << seen.q.head(m), seen.v.head(m);
+    VectorXd both(D.cols());
+    both << seen.q, seen.v;
     both = D * both;
     check(VecAXPBY(y, -1, 0, x));
-    ReducedState inside{VectorXd::Zero(n), VectorXd::Zero(n)};
-    inside.q.head(m) = both.head(m);
-    inside.v.head(m) = both.tail(m);
-    add_motion(model, 1, inside.q, displacement(y));
-    add_motion(model, 1, inside.v, velocity(y));
+    add_motion(model, 1, both.head(model.size()), displacement(y));
+    add_motion(model, 1, both.tail(model.size()), velocity(y));
   };
 }
 

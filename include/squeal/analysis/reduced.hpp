@@ -131,15 +131,13 @@ struct Passage
 
 Passage pass(ReducedMap& map, double period, ReducedState state);
 
-/// The derivative of a period's end (q, v) in its start along the modes among the shapes, of their coordinates: the
-/// product of the steps' own, exact where no pair changes its state within rounding. What the attachment shapes add to
-/// the start is not asked for: it is quick, and forgotten within a period. 2 modes square. Collective: each rank does
-/// its share of the columns.
+/// The derivative of a period's end (q, v) in its start: the product of the steps' own, exact where no pair changes its
+/// state within rounding. Collective: each rank does its share of the columns.
 Eigen::MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm comm);
 
-/// P^-1 x = -x + V D R x on the full model, V the modes among the shapes, R the coordinates in them, and
+/// P^-1 x = -x + V D R x on the full model, V the shapes, R the coordinates in them, and
 /// D = (dPhi_r/dx - f f^+ - I)^-1 + I there, f the flow, along which the border of the shooting decides: what lies
-/// outside is taken as forgotten within a period. Borrows the model and the structure. Collective.
+/// outside the shapes is taken as forgotten within a period. Borrows the model and the structure. Collective.
 Preconditioner reduced_preconditioner(ReducedMap& map, double period, const ReducedState& state,
                                       const Structure& structure);
 

@@ -114,6 +114,9 @@ struct Finish
 
 Finish shoot_multisecant(Shooting& shooting, const Orbit& start);
 
+/// Secants; where they give up, ten more free periods and once again; then Newton-Krylov. As -cycle_finish says.
+Finish finish_in_full_space(Shooting& shooting, Orbit start);
+
 /// What a step from the orbit would do to period and energy, into shooting.last and to_come: twice that, or half of the
 /// step before, since their signs alternate.
 void judge(Shooting& shooting, const Orbit& orbit, const Secant& step);
