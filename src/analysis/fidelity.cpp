@@ -21,8 +21,8 @@ double step_error(const Fidelity& fidelity)
 bool judge_steps(Fitting& fitting, const ReducedOrbit& orbit, double& order)
 {
   Fidelity& fidelity = fitting.result.fidelity;
-  const ReducedOrbit fine = shoot_reduced(fitting, orbit.state, orbit.period, 2 * fitting.steps, 0);
-  const ReducedOrbit finest = shoot_reduced(fitting, fine.state, fine.period, 4 * fitting.steps, 0);
+  const ReducedOrbit fine = shoot_reduced(fitting, orbit.state, orbit.period, 2 * fitting.steps);
+  const ReducedOrbit finest = shoot_reduced(fitting, fine.state, fine.period, 4 * fitting.steps);
   fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
   if (!fine.converged || !finest.converged) return false;
   const auto error = [&order](double coarse, double twice, double four_times)
@@ -78,7 +78,7 @@ void refine_steps(Pursuit& pursuit, double order)
   Fitting& fitting = pursuit.fitting;
   const int steps = std::max(fitting.steps, steps_for(fitting.result.fidelity, fitting.steps, order));
   if (steps == fitting.steps) return;
-  ReducedOrbit fine = shoot_reduced(fitting, pursuit.orbit.state, pursuit.orbit.period, steps, 0);
+  ReducedOrbit fine = shoot_reduced(fitting, pursuit.orbit.state, pursuit.orbit.period, steps);
   if (!fine.converged)
   {
     pursuit.reason = "the reduced model has no cycle at " + std::to_string(steps) + " steps a period";
@@ -169,10 +169,8 @@ std::string by_reduced_model(Fitting& fitting)
   ReducedOrbit orbit;
   const std::string problem = first_orbit(fitting, orbit);
   if (!problem.empty()) return problem;
-  const double clock = MPI_Wtime();
-  ReducedMap map = map_of(fitting, fitting.steps);
-  const Preconditioner preconditioner = reduced_preconditioner(map, orbit.period, orbit.state, full.structure);
-  fitting.result.fidelity.reduced_seconds += MPI_Wtime() - clock;
+  const Preconditioner preconditioner =
+      reduced_preconditioner(fitting.reduced.model, full.structure, fitting.reduced.inside);
   const Owned<Vec> motion = motion_of(full, fitting.reduced.model, orbit.state);
   check(VecAXPY(displacement(motion), 1, full.equilibrium.u));
   const ShootingStart start{full.equilibrium.u, displacement(motion), velocity(motion), orbit.period, {}, {}};

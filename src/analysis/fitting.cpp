@@ -51,8 +51,6 @@ void build(Fitting& fitting)
   reduced.model = reduce(full.structure, full.interface, full.equilibrium, full.modes, fitting.active,
                          {static_cast<int>(fitting.options.modes), fitting.options.threshold, sliding_forces});
   reduced.norm = small_structure(reduced.model);
-  reduced.modes = closed_modes(reduced.model, 3 * full.unstable.front().frequency_hz());
-  reduced.sliding = sliding_modes(reduced.model, reduced.modes);
   Fidelity& fidelity = fitting.result.fidelity;
   fidelity.size = reduced.model.size();
   fidelity.modes = reduced.model.modes;
@@ -82,6 +80,31 @@ double settle(Fitting& fitting, ReducedState& state, double period, double most,
   }
   fidelity.reduced_seconds += MPI_Wtime() - clock;
   return energy;
+}
+
+/// Five free periods, each of the length at which the last came nearest to its start; returns the last length.
+double recurrence(Fitting& fitting, ReducedState& state, double period)
+{
+  const Reduced& reduced = fitting.reduced;
+  ReducedMap map = map_of(fitting, fitting.steps);
+  for (int i = 0; i < 5; ++i)
+  {
+    const Passage passage = pass(map, period, state);
+    const ReducedState& f = passage.rate;
+    const Eigen::VectorXd u = reduced.model.K_z * f.q, v = reduced.model.M_z * f.v;
+    period -= ((passage.end.q - state.q).dot(u) + (passage.end.v - state.v).dot(v)) / (f.q.dot(u) + f.v.dot(v));
+    state = passage.end;
+  }
+  fitting.result.fidelity.reduced_periods += 5;
+  return period;
+}
+
+void see_inside(Fitting& fitting, const ReducedState& state, double period, int steps)
+{
+  const double clock = MPI_Wtime();
+  ReducedMap map = map_of(fitting, steps);
+  fitting.reduced.inside = inside_of(map, period, state, comm_of(fitting.full.structure.load));
+  fitting.result.fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
 
 /// What rank 0 found, bit by bit: ranks that decide apart would wait for each other.
@@ -121,7 +144,7 @@ Owned<Vec> motion_of(const Full& full, const ReducedModel& model, const ReducedS
   return motion;
 }
 
-ReducedOrbit shoot_reduced(Fitting& fitting, const ReducedState& start, double period, int steps, int free)
+ReducedOrbit shoot_reduced(Fitting& fitting, const ReducedState& start, double period, int steps)
 {
   const double clock = MPI_Wtime();
   const Reduced& reduced = fitting.reduced;
@@ -129,12 +152,11 @@ ReducedOrbit shoot_reduced(Fitting& fitting, const ReducedState& start, double p
   const Owned<Vec> rest = small_vector(Eigen::VectorXd::Zero(reduced.model.size()));
   const Owned<Vec> u = small_vector(start.q), v = small_vector(start.v);
   const Flow flow = flow_of(map, reduced.norm);
-  const Preconditioner preconditioner =
-      sliding_preconditioner(reduced.sliding, reduced.modes.shapes, reduced.norm.M, steps, map.theta);
-  Progress progress(PETSC_COMM_SELF, "reduced", free + 20.);
+  const Preconditioner preconditioner = reduced_preconditioner(reduced.inside);
+  Progress progress(PETSC_COMM_SELF, "reduced", 20);
   Shooting shooting = begin_shooting(flow, preconditioner, {rest, u, v, period, {}, {}}, fitting.tolerance, progress);
   const Owned<Vec> first = state_of(u, v);
-  Orbit begin = free_periods(shooting, first, period, free);
+  Orbit begin = evaluate(shooting, first, period);
   shooting.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
   const Finish finish = finish_in_full_space(shooting, std::move(begin));
   ReducedOrbit orbit{finish.ending == Ending::converged,
@@ -158,7 +180,7 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
   const State first = mode_state(full.equilibrium, mode, amplitude, full.estimate.phase);
   check(VecAXPY(first.u, -1, full.equilibrium.u));
   Owned<Vec> motion = state_of(first.u, first.v);
-  double unit = 0; // energy at amplitude 1
+  double unit = 0, period = 1 / mode.frequency_hz(); // energy at amplitude 1; [s]
   for (;;)
   {
     fitting.active = pairs_that_may_change(full.interface, full.equilibrium, mode, fitting.options.margin * amplitude);
@@ -171,8 +193,8 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
     const ReducedModel& model = fitting.reduced.model;
     ReducedState state = coordinates(model, full.structure, displacement(motion), velocity(motion));
     if (unit == 0) unit = doubled_energy(model, state) / 2 / (amplitude * amplitude);
-    const double energy = settle(fitting, state, 1 / mode.frequency_hz(), 1.2 * unit * amplitude * amplitude,
-                                 fitting.options.free_periods);
+    const double energy =
+        settle(fitting, state, period, 1.2 * unit * amplitude * amplitude, fitting.options.free_periods);
     const double reached = std::sqrt(energy / unit);
     motion = motion_of(full, model, state);
     if (reached > 1.05 * amplitude && fitting.result.fidelity.reduced_periods < fitting.options.free_periods)
@@ -180,7 +202,10 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
       amplitude = 1.2 * reached;
       continue;
     }
-    orbit = shoot_reduced(fitting, state, 1 / mode.frequency_hz(), fitting.steps, 5);
+    period = recurrence(fitting, state, period);
+    see_inside(fitting, state, period, fitting.steps / 2); // on the way, half will do
+    orbit = shoot_reduced(fitting, state, period, fitting.steps);
+    if (orbit.converged) see_inside(fitting, orbit.state, orbit.period, fitting.steps);
     return orbit.converged ? "" : "no cycle of the reduced model was found";
   }
 }

@@ -31,8 +31,7 @@ struct Reduced
 {
   ReducedModel model;
   Structure norm;
-  RealModes modes; // of the preconditioner
-  std::vector<DenseEigenpair> sliding;
+  Eigen::MatrixXd inside; // D of its shooting and of the full model's (analysis/reduced.hpp)
 };
 
 struct ReducedOrbit
@@ -63,8 +62,8 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit);
 
 ReducedMap map_of(const Fitting& fitting, int steps);
 
-/// The cycle of the reduced model near `start`, after some free periods. The same on every rank.
-ReducedOrbit shoot_reduced(Fitting& fitting, const ReducedState& start, double period, int steps, int free);
+/// The cycle of the reduced model near `start`. The same on every rank.
+ReducedOrbit shoot_reduced(Fitting& fitting, const ReducedState& start, double period, int steps);
 
 /// A motion of the reduced model as one of the full one, about the equilibrium: nest (du, v).
 Owned<Vec> motion_of(const Full& full, const ReducedModel& model, const ReducedState& state);

@@ -3,7 +3,6 @@
 #include "squeal/analysis/shooting.hpp"
 #include "squeal/contact/local.hpp"
 
-#include <numbers>
 #include <petscblaslapack.h>
 
 namespace squeal
@@ -14,14 +13,6 @@ namespace
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-void put(const VectorXd& values, Vec x)
-{
-  PetscScalar* entries = nullptr;
-  check(VecGetArrayWrite(x, &entries));
-  std::copy_n(values.data(), values.size(), entries);
-  check(VecRestoreArrayWrite(x, &entries));
-}
 
 Owned<Mat> small_matrix(const MatrixXd& values)
 {
@@ -36,6 +27,14 @@ Owned<Mat> small_matrix(const MatrixXd& values)
 }
 
 } // namespace
+
+void put(const VectorXd& values, Vec x)
+{
+  PetscScalar* entries = nullptr;
+  check(VecGetArrayWrite(x, &entries));
+  std::copy_n(values.data(), values.size(), entries);
+  check(VecRestoreArrayWrite(x, &entries));
+}
 
 VectorXd entries_of(Vec x)
 {
@@ -195,65 +194,6 @@ Structure small_structure(const ReducedModel& model)
   check(MatCreateVecs(structure.M, structure.load.put(), nullptr));
   check(VecSet(structure.load, 0));
   return structure;
-}
-
-std::vector<DenseEigenpair> sliding_modes(const ReducedModel& model, const RealModes& modes)
-{
-  const auto m = static_cast<Eigen::Index>(modes.shapes.size());
-  const auto block = static_cast<std::size_t>(1 + model.directions);
-  MatrixXd right(model.size(), m), pushes(model.size(), static_cast<Eigen::Index>(model.active.size()));
-  for (Eigen::Index i = 0; i < m; ++i) right.col(i) = entries_of(modes.shapes[static_cast<std::size_t>(i)]);
-  Eigen::Index closed = 0;
-  for (std::size_t i = 0; i < model.active.size(); ++i)
-  {
-    if (model.reactions[i * block] <= 0) continue;
-    // friction follows the normal reaction as it does at equilibrium
-    const VectorXd r = VectorXd::Map(&model.reactions[i * block], static_cast<Eigen::Index>(block));
-    pushes.col(closed++) = model.H.middleCols(static_cast<Eigen::Index>(i * block), r.size()) * r / r(0);
-  }
-  // tested by what those forces do no work on
-  MatrixXd left = right;
-  if (closed > 0)
-  {
-    const Eigen::HouseholderQR<MatrixXd> factors(pushes.leftCols(closed));
-    const MatrixXd Q = factors.householderQ() * MatrixXd::Identity(model.size(), closed);
-    left -= Q * (Q.transpose() * right);
-  }
-  const auto on_modes = [&](const MatrixXd& X)
-  {
-    const MatrixXd small = left.transpose() * X * right;
-    return std::vector<double>(small.data(), small.data() + small.size());
-  };
-  return solve_dense_quadratic(static_cast<int>(m), on_modes(model.M), on_modes(model.C), on_modes(model.K));
-}
-
-RealModes closed_modes(const ReducedModel& model, double band)
-{
-  // The null space of the closed pairs' normal rows: the last columns of Q of their transpose.
-  const auto block = static_cast<std::size_t>(1 + model.directions);
-  std::vector<Eigen::Index> closed;
-  for (std::size_t i = 0; i < model.gap.size(); ++i)
-    if (model.reactions[i * block] > 0) closed.push_back(static_cast<Eigen::Index>(i * block));
-  const Eigen::Index n = model.size();
-  MatrixXd N = MatrixXd::Identity(n, n);
-  if (!closed.empty())
-  {
-    const Eigen::ColPivHouseholderQR<MatrixXd> factors(MatrixXd(model.G(closed, Eigen::all).transpose()));
-    N = (factors.householderQ() * N).rightCols(n - factors.rank()).eval();
-  }
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> spectrum(N.transpose() * model.K_z * N,
-                                                                    N.transpose() * model.M_z * N);
-  const double limit = 2 * std::numbers::pi * band;
-  RealModes modes;
-  modes.outcome = {"converged", "", 1, 0};
-  for (Eigen::Index i = 0; i < N.cols(); ++i)
-  {
-    const double square = spectrum.eigenvalues()(i);
-    if (square > limit * limit) break;
-    modes.omega.push_back(std::sqrt(std::max(0., square)));
-    modes.shapes.push_back(small_vector(N * spectrum.eigenvectors().col(i)));
-  }
-  return modes;
 }
 
 } // namespace squeal

@@ -79,12 +79,11 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm 
   return result;
 }
 
-Preconditioner reduced_preconditioner(ReducedMap& map, double period, const ReducedState& state,
-                                      const Structure& structure)
+MatrixXd inside_of(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm)
 {
   const ReducedModel& model = map.model;
   const Eigen::Index n = model.size();
-  MatrixXd D = monodromy(map, period, state, comm_of(structure.load));
+  MatrixXd D = monodromy(map, period, state, comm);
   const ReducedState f = pass(map, period, state).rate;
   VectorXd flow(2 * n), image(2 * n);
   flow << f.q, f.v;
@@ -93,12 +92,29 @@ Preconditioner reduced_preconditioner(ReducedMap& map, double period, const Redu
   D.diagonal().array() -= 1;
   D = D.partialPivLu().inverse().eval();
   D.diagonal().array() += 1;
-  return [&model, &structure, D = std::move(D)](double, Vec x, Vec y)
+  return D;
+}
+
+Preconditioner reduced_preconditioner(const MatrixXd& inside)
+{
+  return [&inside](double, Vec x, Vec y)
+  {
+    VectorXd both(inside.cols());
+    both << entries_of(displacement(x)), entries_of(velocity(x));
+    both = (product(inside, both) - both).eval();
+    put(both.head(both.size() / 2), displacement(y));
+    put(both.tail(both.size() / 2), velocity(y));
+  };
+}
+
+Preconditioner reduced_preconditioner(const ReducedModel& model, const Structure& structure, const MatrixXd& inside)
+{
+  return [&](double, Vec x, Vec y)
   {
     const ReducedState seen = coordinates(model, structure, displacement(x), velocity(x));
-    VectorXd both(D.cols());
+    VectorXd both(inside.cols());
     both << seen.q, seen.v;
-    both = D * both;
+    both = product(inside, both);
     check(VecAXPBY(y, -1, 0, x));
     add_motion(model, 1, both.head(model.size()), displacement(y));
     add_motion(model, 1, both.tail(model.size()), velocity(y));

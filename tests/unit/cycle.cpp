@@ -272,7 +272,8 @@ TEST_CASE("dependent vectors do not enter the base")
 {
   const SmoothModel model = make_model(coupled, {1, 2});
   const Preconditioner none;
-  Shooting shooting{model.flow, none};
+  const ShootingOptions options;
+  Shooting shooting{model.flow, none, options};
   std::vector<Owned<Vec>> base;
   const Owned<Vec> a = state_of(model.axes[0], model.zero), b = state_of(model.axes[1], model.zero);
   extend_base(shooting, base, a);

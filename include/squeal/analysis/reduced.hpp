@@ -72,6 +72,7 @@ void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd&
 
 /// As vectors of this rank's own, and back.
 Owned<Vec> small_vector(const Eigen::VectorXd& values);
+void put(const Eigen::VectorXd& values, Vec x);
 Eigen::VectorXd entries_of(Vec x);
 
 /// The active pairs at the end of a step, and what the next one starts from.
@@ -135,22 +136,21 @@ Passage pass(ReducedMap& map, double period, ReducedState state);
 /// state within rounding. Collective: each rank does its share of the columns.
 Eigen::MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm comm);
 
-/// P^-1 x = -x + V D R x on the full model, V the shapes, R the coordinates in them, and
-/// D = (dPhi_r/dx - f f^+ - I)^-1 + I there, f the flow, along which the border of the shooting decides: what lies
-/// outside the shapes is taken as forgotten within a period. Borrows the model and the structure. Collective.
-Preconditioner reduced_preconditioner(ReducedMap& map, double period, const ReducedState& state,
-                                      const Structure& structure);
+/// D = (dPhi_r/dx - f f^+ - I)^-1 + I at a state: f is the flow, along which the border of the shooting decides.
+Eigen::MatrixXd inside_of(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm);
+
+/// P^-1 x = -x + D x on the reduced model. Borrows D.
+Preconditioner reduced_preconditioner(const Eigen::MatrixXd& inside);
+
+/// P^-1 x = -x + V D R x on the full model, V the shapes, R the coordinates in them: what lies outside is taken as
+/// forgotten within a period. Borrows all three.
+Preconditioner reduced_preconditioner(const ReducedModel& model, const Structure& structure,
+                                      const Eigen::MatrixXd& inside);
 
 /// The flow for shooting; borrows the map and the matrices of `norm`.
 Flow flow_of(ReducedMap& map, const Structure& norm);
 
 /// M_z, C_z, K_z as a structure of one rank's own.
 Structure small_structure(const ReducedModel& model);
-
-/// Sliding motion on the coordinates of those real modes, friction on the reactions it takes included.
-std::vector<DenseEigenpair> sliding_modes(const ReducedModel& model, const RealModes& modes);
-
-/// Real modes of the small structure below `band` [Hz] with the active pairs closed that are closed at equilibrium.
-RealModes closed_modes(const ReducedModel& model, double band);
 
 } // namespace squeal
