@@ -192,7 +192,7 @@ FittedCycle find_fitted_cycle(const Structure& structure, const Interface& inter
   const bool adaptive = asked == "auto", from_reduced = starts_reduced() && asked == "full";
   Fitting fitting(full);
   fitting.steps = adaptive ? std::min(64, settings.steps_per_period) : settings.steps_per_period;
-  fitting.tolerance = from_reduced ? 1e-3 : 1e-3 * accuracy; // a start need not be better
+  fitting.tolerance = from_reduced ? 1e-3 : 3e-4 * accuracy; // a start need not be better; slow motions multiply it
   FittedCycle& result = fitting.result;
   Fidelity& fidelity = result.fidelity;
   fidelity.asked = asked;

@@ -63,12 +63,13 @@ void build(Fitting& fitting)
   fidelity.reduction_seconds += MPI_Wtime() - clock;
 }
 
-/// Free periods until their energy settles to 1 % a period, or leaves the band of energies; returns the mean energy.
+/// Free periods until their mean energy settles to 1 % a period, or exceeds `most`; returns it.
 double settle(Fitting& fitting, ReducedState& state, double period, double most, long last)
 {
   const double clock = MPI_Wtime();
   Fidelity& fidelity = fitting.result.fidelity;
   ReducedMap map = map_of(fitting, fitting.steps);
+  Progress progress(comm_of(fitting.full.structure.load), "settling", static_cast<double>(last));
   double energy = 0;
   for (int quiet = 0; quiet < 3 && fidelity.reduced_periods < last;)
   {
@@ -76,6 +77,7 @@ double settle(Fitting& fitting, ReducedState& state, double period, double most,
     state = one_period(map, period, state, energy);
     ++fidelity.reduced_periods;
     quiet = std::abs(energy - before) < .01 * energy ? quiet + 1 : 0;
+    progress.update(static_cast<double>(fidelity.reduced_periods), format("mean energy %.3g J", energy));
     if (energy > most) break;
   }
   fidelity.reduced_seconds += MPI_Wtime() - clock;

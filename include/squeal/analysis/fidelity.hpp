@@ -1,17 +1,17 @@
 #pragma once
 /// The cycle with no more model than the wish needs (method, section 7).
 ///
-/// The reduced model's cycle y (analysis/reduced.hpp) is tried on the full model for one period: x = u0 + shapes y,
-/// d = Phi(x) - x. What that period saw and the reduced model did not is put back,
-///     Phi_r(y') + c = y',   c = R d - (Phi_r(y) - y),   R: coordinates in the shapes,
-/// which is shooting on the reduced model again, and what lies outside the shapes moves by its own defect. This is the
-/// full model's fixed point, so how far one such correction moves frequency and energy is the error of x, and
-/// corrections repeated (accelerated: Anderson 1965) converge to the full cycle, one full period each.
+/// The reduced model (analysis/reduced.hpp) runs free from the estimate until it has settled, its active pairs chosen
+/// again where it outgrows the amplitude they were chosen for, and is shot at. Its cycle x_r is the start on the full
+/// model, its derivative the preconditioner: P^-1 (Phi(x) - x) is what is left to go, less and less of it by secants, one
+/// period of the full model each. What a step would move frequency and energy by is the error of x: twice that, or half
+/// of the step before, since their signs alternate.
 ///
-/// "reduced": one period of the full model tells the error. "auto": corrections until the wish is met; the number of
-/// steps a period from the reduced model's own cycle at twice as many; what the full period shows to open,
-/// close or stick among the pairs taken as sliding becomes active; where corrections do not contract, where the reduced
-/// model would not be small, or where several modes are unstable, the full model takes over.
+/// "reduced": two periods of the full model tell the reduced cycle's error. "auto": the full model's cycle until the wish
+/// is met; the number of steps a period from the reduced model's cycles at twice and four times as many, whose
+/// difference also carries the full cycle over to more steps. Where that does not converge, where the reduced model
+/// would not be small, or where several modes are unstable, the full model takes over. The active pairs and the reduced
+/// model's errors decide how soon this ends, not where.
 #include "squeal/analysis/cycle.hpp"
 
 namespace squeal
@@ -28,7 +28,7 @@ struct Fidelity
   int steps_per_period = 0;
   double contact_tolerance = 0;
   long reduced_periods = 0, full_periods = 0;
-  double frequency_error = 0, energy_error = 0;           // of the model: what the last correction moved
+  double frequency_error = 0, energy_error = 0;           // of the model: what is still to come would move
   double step_frequency_error = 0, step_energy_error = 0; // of the step size
   double reduction_seconds = 0, reduced_seconds = 0, full_seconds = 0;
 };
