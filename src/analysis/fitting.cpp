@@ -63,42 +63,47 @@ void build(Fitting& fitting)
   fidelity.reduction_seconds += MPI_Wtime() - clock;
 }
 
-/// Free periods until their mean energy settles to 1 % a period, or exceeds `most`; returns it.
-double settle(Fitting& fitting, ReducedState& state, double period, double most, long last)
+/// A motion on its way to the cycle.
+struct Free
+{
+  ReducedState state;
+  double period = 0; // [s] after which it comes nearest to where it was
+  double energy = 0; // [J]
+};
+
+/// Free periods until one comes back to within half a percent, or its energy exceeds `most`.
+void settle(Fitting& fitting, Free& free, double most)
 {
   const double clock = MPI_Wtime();
+  const ReducedModel& model = fitting.reduced.model;
   Fidelity& fidelity = fitting.result.fidelity;
   ReducedMap map = map_of(fitting, fitting.steps);
-  Progress progress(comm_of(fitting.full.structure.load), "settling", static_cast<double>(last));
-  double energy = 0;
-  for (int quiet = 0; quiet < 3 && fidelity.reduced_periods < last;)
+  Progress progress(comm_of(fitting.full.structure.load), "settling",
+                    static_cast<double>(fitting.options.free_periods));
+  double correction = 0;
+  for (double missed = 1; missed > 5e-3 && fidelity.reduced_periods < fitting.options.free_periods;)
   {
-    const double before = energy;
-    state = one_period(map, period, state, energy);
-    ++fidelity.reduced_periods;
-    quiet = std::abs(energy - before) < .01 * energy ? quiet + 1 : 0;
-    progress.update(static_cast<double>(fidelity.reduced_periods), format("mean energy %.3g J", energy));
-    if (energy > most) break;
-  }
-  fidelity.reduced_seconds += MPI_Wtime() - clock;
-  return energy;
-}
-
-/// Five free periods, each of the length at which the last came nearest to its start; returns the last length.
-double recurrence(Fitting& fitting, ReducedState& state, double period)
-{
-  const Reduced& reduced = fitting.reduced;
-  ReducedMap map = map_of(fitting, fitting.steps);
-  for (int i = 0; i < 5; ++i)
-  {
-    const Passage passage = pass(map, period, state);
+    const Passage passage = pass(map, free.period, free.state);
     const ReducedState& f = passage.rate;
-    const Eigen::VectorXd u = reduced.model.K_z * f.q, v = reduced.model.M_z * f.v;
-    period -= ((passage.end.q - state.q).dot(u) + (passage.end.v - state.v).dot(v)) / (f.q.dot(u) + f.v.dot(v));
-    state = passage.end;
+    ReducedState way{passage.end.q - free.state.q, passage.end.v - free.state.v};
+    const double speed = doubled_energy(model, f);
+    correction = -(way.q.dot(model.K_z * f.q) + way.v.dot(model.M_z * f.v)) / speed;
+    way.q += correction * f.q;
+    way.v += correction * f.v;
+    free.state = passage.end;
+    free.energy = doubled_energy(model, free.state) / 2;
+    missed = std::sqrt(doubled_energy(model, way) / (2 * free.energy));
+    ++fidelity.reduced_periods;
+    progress.update(
+        static_cast<double>(fidelity.reduced_periods),
+        format("T %.6g s, energy %.3g J, comes back to %.1e", free.period + correction, free.energy, missed));
+    if (free.energy > most || !std::isfinite(missed)) break;
+    if (std::abs(correction) < 2e-3 * free.period) continue; // a new period costs new matrices
+    free.period += std::clamp(correction, -.2 * free.period, .2 * free.period);
+    correction = 0;
   }
-  fitting.result.fidelity.reduced_periods += 5;
-  return period;
+  free.period += correction;
+  fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
 
 void see_inside(Fitting& fitting, const ReducedState& state, double period, int steps)
@@ -182,7 +187,8 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
   const State first = mode_state(full.equilibrium, mode, amplitude, full.estimate.phase);
   check(VecAXPY(first.u, -1, full.equilibrium.u));
   Owned<Vec> motion = state_of(first.u, first.v);
-  double unit = 0, period = 1 / mode.frequency_hz(); // energy at amplitude 1; [s]
+  Free free{{}, 1 / mode.frequency_hz(), 0};
+  double unit = 0; // [J] energy at amplitude 1
   for (;;)
   {
     fitting.active = pairs_that_may_change(full.interface, full.equilibrium, mode, fitting.options.margin * amplitude);
@@ -193,20 +199,18 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
              " degrees of freedom";
     build(fitting);
     const ReducedModel& model = fitting.reduced.model;
-    ReducedState state = coordinates(model, full.structure, displacement(motion), velocity(motion));
-    if (unit == 0) unit = doubled_energy(model, state) / 2 / (amplitude * amplitude);
-    const double energy =
-        settle(fitting, state, period, 1.2 * unit * amplitude * amplitude, fitting.options.free_periods);
-    const double reached = std::sqrt(energy / unit);
-    motion = motion_of(full, model, state);
+    free.state = coordinates(model, full.structure, displacement(motion), velocity(motion));
+    if (unit == 0) unit = doubled_energy(model, free.state) / 2 / (amplitude * amplitude);
+    settle(fitting, free, 1.2 * unit * amplitude * amplitude);
+    const double reached = std::sqrt(free.energy / unit);
     if (reached > 1.05 * amplitude && fitting.result.fidelity.reduced_periods < fitting.options.free_periods)
     {
+      motion = motion_of(full, model, free.state);
       amplitude = 1.2 * reached;
       continue;
     }
-    period = recurrence(fitting, state, period);
-    see_inside(fitting, state, period, fitting.steps / 2); // on the way, half will do
-    orbit = shoot_reduced(fitting, state, period, fitting.steps);
+    see_inside(fitting, free.state, free.period, fitting.steps / 2); // on the way, half will do
+    orbit = shoot_reduced(fitting, free.state, free.period, fitting.steps);
     if (orbit.converged) see_inside(fitting, orbit.state, orbit.period, fitting.steps);
     return orbit.converged ? "" : "no cycle of the reduced model was found";
   }
