@@ -41,7 +41,7 @@ constexpr std::array options = {
     Option{"-cycle_start_amplitude", "1", "multiple of the estimate's amplitude to start from"},
     Option{"-cycle_start_phase", "0", "degrees, added to the estimate's phase of the start"},
     Option{"-cycle_start_period", "1", "multiple of the mode's period to start from"},
-    Option{"-reduced_margin", "1", "pairs that part at this many times the start's amplitude keep their contact"},
+    Option{"-reduced_margin", "1.5", "pairs that part at this many times the motion's amplitude keep their contact"},
     Option{"-reduced_threshold", "1e-5", "an attachment shape is dropped when less than this part of it is new"},
     Option{"-reduced_modes", "100000", "complex modes taken, the followed one and the nearest in frequency"},
     Option{"-reduced_free_periods", "300", "at most integrated on the reduced model until its motion has settled"},

@@ -11,29 +11,38 @@ namespace squeal
 namespace
 {
 
+/// Reduced cycles at so many steps a period, twice and four times as many.
+struct Doubled
+{
+  ReducedOrbit once, twice, four_times;
+
+  bool converged() const { return once.converged && twice.converged && four_times.converged; }
+
+  /// At which the energy converges: 1 where impacts make it, 2 else.
+  double order() const
+  {
+    const double first = std::abs(once.energy - twice.energy), second = std::abs(twice.energy - four_times.energy);
+    return std::clamp(std::log2(first / second), 1., 2.);
+  }
+};
+
+Doubled double_steps(Fitting& fitting, ReducedOrbit once, int steps)
+{
+  ReducedOrbit twice = shoot_reduced(fitting, once.state, once.period, 2 * steps);
+  ReducedOrbit four_times = shoot_reduced(fitting, twice.state, twice.period, 4 * steps);
+  return {std::move(once), std::move(twice), std::move(four_times)};
+}
+
+/// Errors of a cycle that are 1/part of its difference from the one at twice or half as many steps.
+void judge_steps(Fidelity& fidelity, const ReducedOrbit& orbit, const ReducedOrbit& other, double part)
+{
+  fidelity.step_frequency_error = std::abs(other.period / orbit.period - 1) / part;
+  fidelity.step_energy_error = std::abs(other.energy / orbit.energy - 1) / part;
+}
+
 double step_error(const Fidelity& fidelity)
 {
   return std::max(fidelity.step_frequency_error, fidelity.step_energy_error);
-}
-
-/// Of the step size, from the reduced cycle at twice and four times as many, and the order at which it falls: 1 where
-/// impacts make it, 2 else. False without such cycles.
-bool judge_steps(Fitting& fitting, const ReducedOrbit& orbit, double& order)
-{
-  Fidelity& fidelity = fitting.result.fidelity;
-  const ReducedOrbit fine = shoot_reduced(fitting, orbit.state, orbit.period, 2 * fitting.steps);
-  const ReducedOrbit finest = shoot_reduced(fitting, fine.state, fine.period, 4 * fitting.steps);
-  fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
-  if (!fine.converged || !finest.converged) return false;
-  const auto error = [&order](double coarse, double twice, double four_times)
-  {
-    const double first = std::abs(twice / coarse - 1), second = std::abs(four_times / twice - 1);
-    order = std::clamp(std::log2(first / second), 1., 2.);
-    return first / (1 - std::pow(2, -order));
-  };
-  fidelity.step_frequency_error = error(orbit.period, fine.period, finest.period);
-  fidelity.step_energy_error = error(orbit.energy, fine.energy, finest.energy);
-  return true;
 }
 
 /// Steps a period for which the step's error, of this order, is a third of the wish, and its growth rate's (omega
@@ -42,7 +51,33 @@ int steps_for(const Fidelity& fidelity, int steps, double order)
 {
   const double measured = steps * std::pow(3 * step_error(fidelity) / fidelity.accuracy, 1 / order);
   const double theory = std::numbers::pi / std::sqrt(fidelity.accuracy);
-  return 8 * static_cast<int>(std::ceil(std::max(measured, theory) / 8));
+  return static_cast<int>(std::ceil(std::max(measured, theory)));
+}
+
+/// The reduced cycle with as many steps a period as the wish needs, judged by doublings of the reduced model alone.
+/// Says what is in the way, or nothing.
+std::string choose_steps(Fitting& fitting, ReducedOrbit& orbit)
+{
+  Fidelity& fidelity = fitting.result.fidelity;
+  Doubled cycles = double_steps(fitting, std::move(orbit), fitting.steps);
+  judge_steps(fidelity, cycles.once, cycles.twice, 1 - std::pow(2, -cycles.order()));
+  orbit = cycles.once;
+  for (int tries = 0; cycles.converged() && fidelity.asked == "auto"; ++tries)
+  {
+    if (step_error(fidelity) <= fidelity.accuracy / 2) return {};
+    if (tries == 5) return "the wish needs more than " + std::to_string(fitting.steps) + " steps a period";
+    // far from the limit an order is not seen yet, and the better one costs less to try
+    const int quarter = steps_for(fidelity, fitting.steps, tries == 0 ? 2 : cycles.order()) / 4;
+    fitting.steps = 4 * std::max(quarter, fitting.steps / 4 + 2);
+    const ReducedOrbit& near = cycles.twice;
+    cycles =
+        double_steps(fitting, shoot_reduced(fitting, near.state, near.period, fitting.steps / 4), fitting.steps / 4);
+    judge_steps(fidelity, cycles.four_times, cycles.twice, std::pow(2, cycles.order()) - 1);
+    orbit = cycles.four_times;
+  }
+  if (cycles.converged()) return {};
+  fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
+  return "the reduced model has no cycle at some numbers of steps a period up to " + std::to_string(4 * fitting.steps);
 }
 
 /// -cycle_start: the full shooting starts from the estimate, or from the reduced model's cycle.
@@ -72,48 +107,32 @@ void move_to(Pursuit& pursuit, Vec state, double period)
   record(pursuit.shooting, "full period", full_unknowns(pursuit.at), std::nan(""), pursuit.at);
 }
 
-/// As many steps a period as the wish needs; what they change in the reduced cycle is added to the full one.
-void refine_steps(Pursuit& pursuit, double order)
+/// Shoots until what is still to come is below this part of the wish.
+void shoot_to(Pursuit& pursuit, double part)
 {
-  Fitting& fitting = pursuit.fitting;
-  const int steps = std::max(fitting.steps, steps_for(fitting.result.fidelity, fitting.steps, order));
-  if (steps == fitting.steps) return;
-  ReducedOrbit fine = shoot_reduced(fitting, pursuit.orbit.state, pursuit.orbit.period, steps);
-  if (!fine.converged)
-  {
-    pursuit.reason = "the reduced model has no cycle at " + std::to_string(steps) + " steps a period";
-    return;
-  }
-  fitting.steps = steps;
-  const Owned<Vec> change = motion_of(fitting.full, fitting.reduced.model,
-                                      {fine.state.q - pursuit.orbit.state.q, fine.state.v - pursuit.orbit.state.v});
-  check(VecAXPY(change, 1, pursuit.at.state));
-  const double period = pursuit.at.period + fine.period - pursuit.orbit.period;
-  pursuit.orbit = std::move(fine);
-  move_to(pursuit, change, period);
+  pursuit.shooting.wish = part * pursuit.fitting.result.fidelity.accuracy;
+  Finish finish = shoot_multisecant(pursuit.shooting, pursuit.at);
+  pursuit.at = std::move(finish.orbit);
+  if (finish.ending != Ending::converged)
+    pursuit.reason =
+        "the wish was not met in " + std::to_string(pursuit.shooting.periods) + " periods of the full model";
 }
 
-/// Shoots until the wish is met by the model, then by the steps.
+/// With few steps a period at first; then what more of them change in the reduced cycle is added to the full one.
 void pursue(Pursuit& pursuit)
 {
   Fitting& fitting = pursuit.fitting;
-  const Fidelity& fidelity = fitting.result.fidelity;
-  double order = 0;
-  for (bool rough = true; pursuit.reason.empty(); rough = false)
-  {
-    pursuit.shooting.wish = (rough ? 4 : .5) * fidelity.accuracy; // at first the steps are not what it needs
-    Finish finish = shoot_multisecant(pursuit.shooting, pursuit.at);
-    pursuit.at = std::move(finish.orbit);
-    if (finish.ending != Ending::converged)
-      pursuit.reason =
-          "the wish was not met in " + std::to_string(pursuit.shooting.periods) + " periods of the full model";
-    else if (!judge_steps(fitting, pursuit.orbit, order))
-      pursuit.reason = "the reduced model has no cycle at two and four times as many steps a period";
-    else if (!rough && step_error(fidelity) <= fidelity.accuracy / 2)
-      return;
-    else
-      refine_steps(pursuit, rough ? 2 : order); // far from the limit an order is not seen yet
-  }
+  shoot_to(pursuit, 4);
+  if (!pursuit.reason.empty()) return;
+  ReducedOrbit fine = pursuit.orbit;
+  pursuit.reason = choose_steps(fitting, fine);
+  if (!pursuit.reason.empty()) return;
+  const Owned<Vec> state = motion_of(fitting.full, fitting.reduced.model,
+                                     {fine.state.q - pursuit.orbit.state.q, fine.state.v - pursuit.orbit.state.v});
+  check(VecAXPY(state, 1, pursuit.at.state));
+  if (fitting.steps != pursuit.map.steps)
+    move_to(pursuit, state, pursuit.at.period + fine.period - pursuit.orbit.period);
+  shoot_to(pursuit, .5);
 }
 
 /// The cycle of the full model as far as it is wished for; says what is in the way.
@@ -137,8 +156,7 @@ std::string fit(Fitting& fitting, const ShootingStart& start, const Precondition
   else
   {
     judge(shooting, pursuit.at, next_step(shooting, pursuit.at));
-    double order = 0;
-    (void)judge_steps(fitting, pursuit.orbit, order);
+    (void)choose_steps(fitting, pursuit.orbit);
   }
 
   LimitCycle& cycle = fitting.result.cycle;

@@ -106,10 +106,10 @@ void settle(Fitting& fitting, Free& free, double most)
   fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
 
-void see_inside(Fitting& fitting, const ReducedState& state, double period, int steps)
+void see_inside(Fitting& fitting, const ReducedState& state, double period)
 {
   const double clock = MPI_Wtime();
-  ReducedMap map = map_of(fitting, steps);
+  ReducedMap map = map_of(fitting, fitting.steps);
   fitting.reduced.inside = inside_of(map, period, state, comm_of(fitting.full.structure.load));
   fitting.result.fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
@@ -201,17 +201,17 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
     const ReducedModel& model = fitting.reduced.model;
     free.state = coordinates(model, full.structure, displacement(motion), velocity(motion));
     if (unit == 0) unit = doubled_energy(model, free.state) / 2 / (amplitude * amplitude);
-    settle(fitting, free, 1.2 * unit * amplitude * amplitude);
+    settle(fitting, free, 1.5 * unit * amplitude * amplitude);
     const double reached = std::sqrt(free.energy / unit);
-    if (reached > 1.05 * amplitude && fitting.result.fidelity.reduced_periods < fitting.options.free_periods)
+    if (reached > 1.2 * amplitude && fitting.result.fidelity.reduced_periods < fitting.options.free_periods)
     {
       motion = motion_of(full, model, free.state);
-      amplitude = 1.2 * reached;
+      amplitude = reached;
       continue;
     }
-    see_inside(fitting, free.state, free.period, fitting.steps / 2); // on the way, half will do
+    see_inside(fitting, free.state, free.period);
     orbit = shoot_reduced(fitting, free.state, free.period, fitting.steps);
-    if (orbit.converged) see_inside(fitting, orbit.state, orbit.period, fitting.steps);
+    if (orbit.converged) see_inside(fitting, orbit.state, orbit.period);
     return orbit.converged ? "" : "no cycle of the reduced model was found";
   }
 }

@@ -13,17 +13,24 @@ namespace
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// dr of w = W r + b under the contact law for changes db, where it is smooth: at w and r of the step just made. Open
-/// pairs have none; of the others
+/// Rows of the pairs that touch at the end of a step.
+std::vector<Eigen::Index> closed_rows(const ReducedContact& contact, Eigen::Index block)
+{
+  std::vector<Eigen::Index> closed;
+  for (Eigen::Index i = 0; i < contact.r.size(); i += block)
+    for (Eigen::Index k = 0; k < block && contact.r(i) > 0; ++k) closed.push_back(i + k);
+  return closed;
+}
+
+/// dr of w = W r + b in the closed rows for changes db of these, under the contact law where it is smooth: at w and r
+/// of the step just made. Open pairs have none; of the others
 ///     dw_n = 0,   and dw_t = 0 (stick) or dr_t + mu e dr_n + mu r_n/|s| (I - e e') dw_t = 0, e = s/|s| (slip).
-MatrixXd contact_response(const ReducedMap& map, const ReducedContact& contact, const MatrixXd& db)
+MatrixXd contact_response(const ReducedMap& map, const ReducedContact& contact, const std::vector<Eigen::Index>& closed,
+                          const MatrixXd& db)
 {
   const ReducedModel& model = map.model;
   const Eigen::Index d = model.directions, block = 1 + d;
-  std::vector<Eigen::Index> closed;
-  for (Eigen::Index i = 0; i < contact.w.size(); i += block)
-    for (Eigen::Index k = 0; k < block && contact.r(i) > 0; ++k) closed.push_back(i + k);
-  MatrixXd A = map.W(closed, closed), right = -db(closed, Eigen::all);
+  MatrixXd A = map.W(closed, closed), right = -db;
   for (Eigen::Index i = 0; i < A.rows(); i += block)
   {
     const Eigen::Index pair = closed[static_cast<std::size_t>(i)];
@@ -37,9 +44,7 @@ MatrixXd contact_response(const ReducedMap& map, const ReducedContact& contact, 
     A.block(i + 1, i, d, 1) += model.friction * e;
   }
   A.diagonal() *= 1 + 1e-10; // of pairs that stick there may be more rows than the shapes can tell apart
-  MatrixXd dr = MatrixXd::Zero(db.rows(), db.cols());
-  if (!closed.empty()) dr(closed, Eigen::all) = solve_dense(std::move(A), std::move(right));
-  return dr;
+  return solve_dense(std::move(A), std::move(right));
 }
 
 } // namespace
@@ -66,8 +71,9 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm 
   {
     if (!advance(map, state, contact)) ++map.unconverged;
     MatrixXd v = product(map.from_state, X);
-    if (contact.r.size() > 0)
-      v += product(map.from_reactions, contact_response(map, contact, product(b_from_state, X)));
+    if (const auto closed = closed_rows(contact, block); !closed.empty())
+      v += product(map.from_reactions(Eigen::all, closed),
+                   contact_response(map, contact, closed, product(b_from_state(closed, Eigen::all), X)));
     X.bottomRows(n) += h * (theta * v + (1 - theta) * X.topRows(n));
     X.topRows(n) = v;
   }

@@ -3,12 +3,12 @@
 ///
 /// The reduced model (analysis/reduced.hpp) runs free from the estimate until it has settled, its active pairs chosen
 /// again where it outgrows the amplitude they were chosen for, and is shot at. Its cycle x_r is the start on the full
-/// model, its derivative the preconditioner: P^-1 (Phi(x) - x) is what is left to go, less and less of it by secants, one
-/// period of the full model each. What a step would move frequency and energy by is the error of x: twice that, or half
-/// of the step before, since their signs alternate.
+/// model, its derivative the preconditioner: P^-1 (Phi(x) - x) is what is left to go, less and less of it by secants,
+/// one period of the full model each. What a step would move frequency and energy by is the error of x: twice that, or
+/// half of the step before, since their signs alternate.
 ///
-/// "reduced": two periods of the full model tell the reduced cycle's error. "auto": the full model's cycle until the wish
-/// is met; the number of steps a period from the reduced model's cycles at twice and four times as many, whose
+/// "reduced": two periods of the full model tell the reduced cycle's error. "auto": the full model's cycle until the
+/// wish is met; the number of steps a period from the reduced model's cycles at twice and four times as many, whose
 /// difference also carries the full cycle over to more steps. Where that does not converge, where the reduced model
 /// would not be small, or where several modes are unstable, the full model takes over. The active pairs and the reduced
 /// model's errors decide how soon this ends, not where.
