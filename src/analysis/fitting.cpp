@@ -81,7 +81,9 @@ void settle(Fitting& fitting, Free& free, double most)
   Progress progress(comm_of(fitting.full.structure.load), "settling",
                     static_cast<double>(fitting.options.free_periods));
   double correction = 0;
-  for (double missed = 1; missed > 5e-3 && fidelity.reduced_periods < fitting.options.free_periods;)
+  // judged every tenth period: whatever the rounding, it stops at the same
+  for (double missed = 1; (missed > 5e-3 || fidelity.reduced_periods % 10 != 0) &&
+                          fidelity.reduced_periods < fitting.options.free_periods;)
   {
     const Passage passage = pass(map, free.period, free.state);
     const ReducedState& f = passage.rate;
@@ -211,7 +213,6 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
     }
     see_inside(fitting, free.state, free.period);
     orbit = shoot_reduced(fitting, free.state, free.period, fitting.steps);
-    if (orbit.converged) see_inside(fitting, orbit.state, orbit.period);
     return orbit.converged ? "" : "no cycle of the reduced model was found";
   }
 }
