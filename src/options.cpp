@@ -44,7 +44,7 @@ constexpr std::array options = {
     Option{"-reduced_margin", "1.5", "pairs that part at this many times the motion's amplitude keep their contact"},
     Option{"-reduced_threshold", "1e-5", "an attachment shape is dropped when less than this part of it is new"},
     Option{"-reduced_modes", "100000", "complex modes taken, the followed one and the nearest in frequency"},
-    Option{"-reduced_free_periods", "300", "at most integrated on the reduced model until its motion has settled"},
+    Option{"-reduced_free_periods", "100", "at most integrated on the reduced model until its motion has settled"},
     Option{"-reduced_corrections", "40", "periods of the full model at most from the reduced cycle to the wish"},
     Option{"-cycle_reduced_newtons", "10", "iterations of the reduced system on the mode's shapes; 0: not tried"},
     Option{"-cycle_base_growths", "-1",

@@ -108,6 +108,28 @@ void settle(Fitting& fitting, Free& free, double most)
   fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
 
+/// The state of the next period in which the motion passes through zero along `reference`, upwards: cycles of a given
+/// number of steps differ a little by where among them they begin, and shooting keeps that.
+ReducedState in_phase(const Fitting& fitting, const Free& free, const ReducedState& reference)
+{
+  ReducedMap map = map_of(fitting, fitting.steps);
+  const Eigen::VectorXd image = fitting.reduced.model.K_z * reference.q;
+  ReducedState found = free.state, last = free.state;
+  double before = image.dot(last.q);
+  bool passed = false;
+  integrate(map, free.period, free.state,
+            [&](const ReducedState& now)
+            {
+              const double after = image.dot(now.q), part = before / (before - after);
+              if (!passed && before < 0 && after >= 0)
+                found = {last.q + part * (now.q - last.q), last.v + part * (now.v - last.v)};
+              passed = passed || (before < 0 && after >= 0);
+              before = after;
+              last = now;
+            });
+  return found;
+}
+
 void see_inside(Fitting& fitting, const ReducedState& state, double period)
 {
   const double clock = MPI_Wtime();
@@ -188,7 +210,8 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
   double amplitude = start_amplitude_factor() * start_amplitude(full.estimate);
   const State first = mode_state(full.equilibrium, mode, amplitude, full.estimate.phase);
   check(VecAXPY(first.u, -1, full.equilibrium.u));
-  Owned<Vec> motion = state_of(first.u, first.v);
+  const Owned<Vec> estimated = state_of(first.u, first.v);
+  Owned<Vec> motion = copy_of(estimated.get());
   Free free{{}, 1 / mode.frequency_hz(), 0};
   double unit = 0; // [J] energy at amplitude 1
   for (;;)
@@ -211,6 +234,9 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
       amplitude = reached;
       continue;
     }
+    free.state =
+        in_phase(fitting, free, coordinates(model, full.structure, displacement(estimated), velocity(estimated)));
+    ++fitting.result.fidelity.reduced_periods;
     see_inside(fitting, free.state, free.period);
     orbit = shoot_reduced(fitting, free.state, free.period, fitting.steps);
     return orbit.converged ? "" : "no cycle of the reduced model was found";

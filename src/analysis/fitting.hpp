@@ -10,7 +10,7 @@ namespace squeal
 struct ReducedOptions
 {
   PetscReal margin = 1.5, threshold = 1e-5;
-  PetscInt modes = 100000, free_periods = 300, corrections = 40;
+  PetscInt modes = 100000, free_periods = 100, corrections = 40;
 };
 
 /// The problem as given.
