@@ -232,7 +232,9 @@ FittedCycle find_fitted_cycle(const Structure& structure, const Interface& inter
     result.cycle.outcome.reason = fidelity.reason;
     return std::move(result);
   }
-  fidelity.used = "full";
+  fidelity.used = "full"; // of whose errors nothing is known
+  fidelity.frequency_error = fidelity.energy_error = std::nan("");
+  fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
   const double clock = MPI_Wtime();
   CycleSettings refined = settings;
   refined.steps_per_period = std::max(settings.steps_per_period, fitting.steps);
