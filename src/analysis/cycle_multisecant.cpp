@@ -116,8 +116,8 @@ Finish shoot_multisecant(Shooting& shooting, const Orbit& start)
   while (finish.orbit.residual > shooting.tolerance)
   {
     Secant step = step_from(shooting, orbit, defect);
-    judge(shooting, orbit, step);
-    if (std::max(shooting.to_come.frequency, shooting.to_come.energy) <= shooting.wish)
+    if (shooting.wish > 0) judge(shooting, orbit, step);
+    if (shooting.wish > 0 && std::max(shooting.to_come.frequency, shooting.to_come.energy) <= shooting.wish)
       return {std::move(orbit), Ending::converged};
     if (shooting.periods >= shooting.options.max_periods || since_best >= shooting.options.stall) return finish;
     if (!admissible_period(shooting, orbit.period + step.period))

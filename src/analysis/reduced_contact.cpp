@@ -43,21 +43,26 @@ struct Pairs
   }
 };
 
+/// The pair's reaction becomes `next`, and w follows.
+void react(Pairs& pairs, Eigen::Index i, const PairVector& next)
+{
+  for (Eigen::Index k = 0; k < pairs.block; ++k)
+    if (const double change = next[static_cast<std::size_t>(k)] - pairs.r(i + k); change != 0)
+    {
+      pairs.r(i + k) += change;
+      pairs.w += change * pairs.map.W.col(i + k);
+    }
+}
+
 /// A warm start need not be admissible.
 void admit(Pairs& pairs)
 {
-  VectorXd& r = pairs.r;
-  for (Eigen::Index i = 0; i < r.size(); i += pairs.block)
+  for (Eigen::Index i = 0; i < pairs.r.size(); i += pairs.block)
   {
-    PairVector first = pairs.of(r, i);
+    PairVector first = pairs.of(pairs.r, i);
     first[0] = std::max(first[0], 0.);
     project_on_disc(first, pairs.friction);
-    for (Eigen::Index k = 0; k < pairs.block; ++k)
-      if (const double change = first[static_cast<std::size_t>(k)] - r(i + k); change != 0)
-      {
-        r(i + k) += change;
-        pairs.w += change * pairs.map.W.col(i + k);
-      }
+    react(pairs, i, first);
   }
 }
 
@@ -133,13 +138,7 @@ void sweep_pairs(Pairs& pairs, double limit)
     PairVector q = pairs.of(pairs.w, i);
     for (std::size_t k = 0; k < 3; ++k)
       for (std::size_t l = 0; l < 3; ++l) q[k] -= A[k][l] * last[l];
-    const PairVector next = solve_pair(A, q, map.model.directions, pairs.friction, last);
-    for (Eigen::Index k = 0; k < pairs.block; ++k)
-      if (const double change = next[static_cast<std::size_t>(k)] - pairs.r(i + k); change != 0)
-      {
-        pairs.r(i + k) += change;
-        pairs.w += change * map.W.col(i + k);
-      }
+    react(pairs, i, solve_pair(A, q, map.model.directions, pairs.friction, last));
   }
 }
 
