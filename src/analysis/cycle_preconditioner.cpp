@@ -135,13 +135,11 @@ std::vector<double> corrected(const Sliding& preconditioner, double period, cons
   return result;
 }
 
-} // namespace
-
-Preconditioner sliding_preconditioner(const std::vector<DenseEigenpair>& sliding, const std::vector<Owned<Vec>>& shapes,
-                                      Mat M, int steps, double theta)
+/// From sliding modes y of the shapes' coordinates, all of them; the shapes M-orthonormal. Borrows M.
+Preconditioner preconditioner_of(const std::vector<DenseEigenpair>& sliding, const std::vector<Owned<Vec>>& shapes,
+                                 Mat M, int steps, double theta)
 {
   const Index m = shapes.size();
-  if (m == 0) return {};
   Sliding inside{empty_block(M), {}, 0, real_columns(sliding), {}, steps, theta};
   for (const DenseEigenpair& pair : sliding)
   {
@@ -163,6 +161,8 @@ Preconditioner sliding_preconditioner(const std::vector<DenseEigenpair>& sliding
   };
 }
 
+} // namespace
+
 Preconditioner sliding_preconditioner(const Structure& structure, const Interface& interface,
                                       const Equilibrium& equilibrium, const RealModes& modes, int steps, double theta)
 {
@@ -172,9 +172,9 @@ Preconditioner sliding_preconditioner(const Structure& structure, const Interfac
   const auto friction = friction_of(interface, modes.shapes);
   const Owned<Mat> C = sliding_damping(structure, interface, equilibrium);
   const auto reduced = [&](Mat X) { return on_modes(modes.shapes, friction, contact, X); };
-  return sliding_preconditioner(solve_dense_quadratic_shared(comm_of(structure.load), static_cast<int>(m),
-                                                             reduced(structure.M), reduced(C), reduced(structure.K)),
-                                modes.shapes, structure.M, steps, theta);
+  return preconditioner_of(solve_dense_quadratic_shared(comm_of(structure.load), static_cast<int>(m),
+                                                        reduced(structure.M), reduced(C), reduced(structure.K)),
+                           modes.shapes, structure.M, steps, theta);
 }
 
 void apply(const Preconditioner& preconditioner, double period, Vec x, Vec y)

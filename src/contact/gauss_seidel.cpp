@@ -15,16 +15,30 @@
 namespace squeal
 {
 
-SQUEAL_WIDE void add_rows(const float* __restrict rows, std::size_t count, std::size_t block, const PairVector& change,
-                          float* __restrict target)
+namespace
 {
-  const auto x = static_cast<float>(change[0]), y = static_cast<float>(change[1]), z = static_cast<float>(change[2]);
+
+/// In the precision of the target.
+template <class Entry, class Sum> SQUEAL_INLINE void add_block(const Entry* __restrict rows, std::size_t count,
+                                                               std::size_t block, const PairVector& change,
+                                                               Sum* __restrict target)
+{
+  const auto x = static_cast<Sum>(change[0]), y = static_cast<Sum>(change[1]), z = static_cast<Sum>(change[2]);
+  const Entry *const second = rows + count, *const third = second + count;
   if (block == 1)
     for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j];
   else if (block == 2)
-    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * rows[count + j];
+    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * second[j];
   else
-    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * rows[count + j] + z * rows[2 * count + j];
+    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * second[j] + z * third[j];
+}
+
+} // namespace
+
+SQUEAL_WIDE void add_rows(const float* rows, std::size_t count, std::size_t block, const PairVector& change,
+                          float* target)
+{
+  add_block(rows, count, block, change, target);
 }
 
 namespace
@@ -42,17 +56,6 @@ template <class Entry> struct Sweep
   double relaxation = 1, earlier = 0;
   int in_vain = 0; // products with W that told otherwise than the sweeps
 };
-
-template <class Entry> SQUEAL_INLINE void add_block(const Entry* __restrict rows, std::size_t count, std::size_t block,
-                                                    const PairVector& change, double* __restrict target)
-{
-  const double x = change[0], y = change[1], z = change[2];
-  const Entry *const second = rows + count, *const third = second + count;
-  if (block == 2)
-    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * second[j];
-  else
-    for (std::size_t j = 0; j < count; ++j) target[j] += x * rows[j] + y * second[j] + z * third[j];
-}
 
 SQUEAL_WIDE void add_whole_rows(const double* rows, std::size_t count, std::size_t block, const PairVector& change,
                                 double* target)

@@ -17,7 +17,6 @@
 /// Everything reduced is dense, small, and the same on every rank.
 #include "squeal/analysis/block.hpp"
 #include "squeal/analysis/cycle.hpp"
-#include "squeal/analysis/quadratic.hpp"
 #include "squeal/contact/local.hpp"
 
 #include <Eigen/Dense>

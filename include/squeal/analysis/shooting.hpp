@@ -4,7 +4,6 @@
 /// f the flow's direction: a correction along the orbit would only move the time origin. Products are energy products,
 /// <a, b> = a_u'K b_u + a_v'M b_v. Each stage returns the best candidate it met.
 #include "squeal/analysis/cycle.hpp"
-#include "squeal/analysis/quadratic.hpp"
 #include "squeal/base/progress.hpp"
 
 #include <deque>
@@ -130,10 +129,6 @@ Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start);
 /// Make the solvers' options known to the library even when they never run.
 void declare_reduced_options();
 void declare_fallback_options();
-
-/// From sliding modes y of the shapes' coordinates, all of them; the shapes M-orthonormal. Borrows M.
-Preconditioner sliding_preconditioner(const std::vector<DenseEigenpair>& sliding, const std::vector<Owned<Vec>>& shapes,
-                                      Mat M, int steps, double theta);
 
 void apply(const Preconditioner& preconditioner, double period, Vec x, Vec y);
 
