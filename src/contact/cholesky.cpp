@@ -1,5 +1,6 @@
 #include "cholesky.hpp"
 
+#include "large_pages.hpp"
 #include "panel.hpp"
 
 #include <algorithm>
@@ -107,7 +108,8 @@ bool eliminate_pivots(const Front& front)
 }
 
 /// E E' of the front's border rows into the corner, tile by tile.
-void add_to_corner(const Front& front, const Elimination& order, std::vector<double>& tile, std::vector<double>& corner)
+void add_to_corner(const Front& front, const Elimination& order, std::vector<double>& product,
+                   std::vector<double>& corner)
 {
   PetscBLASInt n = static_cast<PetscBLASInt>(front.height()), pivots = front.supernode.columns,
                bordering = front.supernode.bordering, border = order.border;
@@ -123,12 +125,12 @@ void add_to_corner(const Front& front, const Elimination& order, std::vector<dou
   for (PetscBLASInt first = 0; first < bordering; first += most)
   {
     PetscBLASInt width = std::min(most, bordering - first), height = bordering - first;
-    tile.resize(std::max(tile.size(), at(height) * at(width)));
-    BLASgemm_("N", "T", &height, &width, &pivots, &one, E + first, &n, E + first, &n, &zero, tile.data(), &height);
+    product.resize(std::max(product.size(), at(height) * at(width)));
+    BLASgemm_("N", "T", &height, &width, &pivots, &one, E + first, &n, E + first, &n, &zero, product.data(), &height);
     for (int j = 0; j < width; ++j)
     {
       double* column = &corner[at(rows[first + j] - order.dofs) * at(border)];
-      const double* from = &tile[at(j) * at(height)];
+      const double* from = &product[at(j) * at(height)];
       for (int i = j; i < height; ++i) column[rows[first + i] - order.dofs] += from[i];
     }
   }
@@ -168,10 +170,11 @@ bool Cholesky::factorise(Triplets lower)
   // updates on a stack, since children come before parents; memory is not touched before it is needed
   const auto waiting = std::make_unique_for_overwrite<double[]>(most);
   const auto front_values = std::make_unique_for_overwrite<double[]>(largest);
-  std::vector<double> tile;
+  std::vector<double> product;
   std::vector<int> local(at(order_.dofs + order_.border));
-  values_.reserve(order_.values);
-  corner_.assign(at(order_.border) * at(order_.border), 0.);
+  values_ = on_large_pages(order_.values);
+  corner_ = on_large_pages(at(order_.border) * at(order_.border));
+  corner_.resize(corner_.capacity(), 0.);
   double* top = waiting.get();
   for (const Supernode& supernode : order_.supernodes)
   {
@@ -185,8 +188,10 @@ bool Cholesky::factorise(Triplets lower)
       add_update(front, child, order_.rows.data() + child.rows, top, local);
     }
     if (!eliminate_pivots(front)) return false;
-    values_.insert(values_.end(), front.values, front.column(pivots));
-    if (supernode.bordering > 0) add_to_corner(front, order_, tile, corner_);
+    values_.resize(supernode.values + packed_triangle(pivots) + packed_panel(below, pivots));
+    double* const rest = pack_triangle(front.values, front.height(), pivots, &values_[supernode.values]);
+    pack_panel(front.values + pivots, front.height(), below, pivots, rest);
+    if (supernode.bordering > 0) add_to_corner(front, order_, product, corner_);
     for (std::size_t j = 0; j < at(supernode.inner()); ++j, top += below)
       std::copy_n(front.column(pivots + j) + pivots, below, top);
   }
@@ -201,83 +206,38 @@ Cholesky::Cholesky(Triplets lower, Elimination order) : order_(std::move(order))
 namespace
 {
 
-/// `count` columns of triangle L, of pivots `height` apart: x = L^-1 x.
-void solve_triangle(const double* L, std::size_t height, std::size_t count, std::size_t lanes, double* x)
-{
-  for (std::size_t j = 0; j < count; ++j)
-  {
-    const double* column = L + j * height;
-    const double inverse = 1 / column[j];
-    for (std::size_t l = 0; l < lanes; ++l) x[j * lanes + l] *= inverse;
-    for (std::size_t i = j + 1; i < count; ++i)
-      for (std::size_t l = 0; l < lanes; ++l) x[i * lanes + l] -= column[i] * x[j * lanes + l];
-  }
-}
-
-void solve_transposed_triangle(const double* L, std::size_t height, std::size_t count, std::size_t lanes, double* x)
-{
-  for (std::size_t j = count; j-- > 0;)
-  {
-    const double* column = L + j * height;
-    const double inverse = 1 / column[j];
-    for (std::size_t i = j + 1; i < count; ++i)
-      for (std::size_t l = 0; l < lanes; ++l) x[j * lanes + l] -= column[i] * x[i * lanes + l];
-    for (std::size_t l = 0; l < lanes; ++l) x[j * lanes + l] *= inverse;
-  }
-}
-
-constexpr std::size_t triangle = 16; // columns whose triangle is solved entry by entry
-
 /// x: of all positions, the border's after them.
-void forward_through(const Elimination& order, const std::vector<double>& values, std::size_t lanes, double* x)
+void forward_through(const Elimination& order, const double* values, std::size_t lanes, double* x)
 {
   std::vector<double> part;
   for (const Supernode& supernode : order.supernodes)
   {
-    const std::size_t height = at(supernode.height()), pivots = at(supernode.columns), below = at(supernode.below);
-    const double* L = &values[supernode.values];
+    const std::size_t pivots = at(supernode.columns), below = at(supernode.below);
+    const double* const triangle = values + supernode.values;
     double* own = x + at(supernode.first) * lanes;
-    for (std::size_t j = 0; j < pivots; j += triangle)
-    {
-      const std::size_t count = std::min(triangle, pivots - j), end = j + count;
-      solve_triangle(L + j * height + j, height, count, lanes, own + j * lanes);
-      if (end < pivots)
-        subtract_product(Panel{L + j * height + end, height, pivots - end, count}, lanes, own + j * lanes,
-                         own + end * lanes);
-    }
-    if (below == 0) continue;
-    part.assign(below * lanes, 0.);
-    subtract_product(Panel{L + pivots, height, below, pivots}, lanes, own, part.data());
+    solve_triangle(triangle, pivots, lanes, own);
+    part.assign((below + tile) * lanes, 0.);
+    subtract_product(Panel{triangle + packed_triangle(pivots), below, pivots}, lanes, own, part.data());
     const int* rows = order.rows.data() + supernode.rows;
     for (std::size_t i = 0; i < below; ++i)
       for (std::size_t l = 0; l < lanes; ++l) x[at(rows[i]) * lanes + l] += part[i * lanes + l];
   }
 }
 
-void backward_through(const Elimination& order, const std::vector<double>& values, std::size_t lanes, double* x)
+void backward_through(const Elimination& order, const double* values, std::size_t lanes, double* x)
 {
   std::vector<double> part;
   for (auto supernode = order.supernodes.rbegin(); supernode != order.supernodes.rend(); ++supernode)
   {
-    const std::size_t height = at(supernode->height()), pivots = at(supernode->columns), below = at(supernode->below);
-    const double* L = &values[supernode->values];
+    const std::size_t pivots = at(supernode->columns), below = at(supernode->below);
+    const double* const triangle = values + supernode->values;
     double* own = x + at(supernode->first) * lanes;
-    if (below > 0)
-    {
-      const int* rows = order.rows.data() + supernode->rows;
-      part.resize(below * lanes);
-      for (std::size_t i = 0; i < below; ++i)
-        for (std::size_t l = 0; l < lanes; ++l) part[i * lanes + l] = x[at(rows[i]) * lanes + l];
-      subtract_transposed(Panel{L + pivots, height, below, pivots}, lanes, part.data(), own);
-    }
-    for (std::size_t block = (pivots + triangle - 1) / triangle; block-- > 0;)
-    {
-      const std::size_t j = block * triangle, count = std::min(triangle, pivots - j), end = j + count;
-      if (end < pivots)
-        subtract_transposed(Panel{L + j * height + end, height, pivots - end, count}, lanes, own + end * lanes,
-                            own + j * lanes);
-      solve_transposed_triangle(L + j * height + j, height, count, lanes, own + j * lanes);
-    }
+    const int* rows = order.rows.data() + supernode->rows;
+    part.assign((below + tile) * lanes, 0.);
+    for (std::size_t i = 0; i < below; ++i)
+      for (std::size_t l = 0; l < lanes; ++l) part[i * lanes + l] = x[at(rows[i]) * lanes + l];
+    subtract_transposed(Panel{triangle + packed_triangle(pivots), below, pivots}, lanes, part.data(), own);
+    solve_transposed_triangle(triangle, pivots, lanes, own);
   }
 }
 
@@ -288,10 +248,10 @@ std::vector<double> Cholesky::forward(const std::vector<double>& b, int columns)
   columns_ = at(columns);
   lanes_ = lanes_for(columns_);
   const std::size_t dofs = at(order_.dofs), border = at(order_.border);
-  work_.assign((dofs + border) * lanes_, 0.);
+  work_.assign((dofs + border + tile) * lanes_, 0.);
   for (std::size_t i = 0; i < dofs; ++i)
     for (std::size_t k = 0; k < columns_; ++k) work_[at(order_.position[i]) * lanes_ + k] = b[k * dofs + i];
-  forward_through(order_, values_, lanes_, work_.data());
+  forward_through(order_, values_.data(), lanes_, work_.data());
   std::vector<double> result(border * columns_);
   for (std::size_t i = 0; i < border; ++i)
     for (std::size_t k = 0; k < columns_; ++k) result[k * border + i] = -work_[(dofs + i) * lanes_ + k];
@@ -303,7 +263,7 @@ void Cholesky::backward(const std::vector<double>& lambda, std::vector<double>& 
   const std::size_t dofs = at(order_.dofs), border = at(order_.border);
   for (std::size_t i = 0; i < border; ++i)
     for (std::size_t k = 0; k < columns_; ++k) work_[(dofs + i) * lanes_ + k] = lambda[k * border + i];
-  backward_through(order_, values_, lanes_, work_.data());
+  backward_through(order_, values_.data(), lanes_, work_.data());
   x.resize(dofs * columns_);
   for (std::size_t i = 0; i < dofs; ++i)
     for (std::size_t k = 0; k < columns_; ++k) x[k * dofs + i] = work_[at(order_.position[i]) * lanes_ + k];

@@ -26,13 +26,13 @@ public:
   /// L^-T (L^-1 b - E' lambda) into x.
   void backward(const std::vector<double>& lambda, std::vector<double>& x);
 
-  double entries() const { return static_cast<double>(values_.size()); }
+  double entries() const { return order_.entries; }
 
 private:
   bool factorise(Triplets lower);
 
   Elimination order_;
-  std::vector<double> values_; // L and E, panel by panel
+  std::vector<double> values_; // L and E, packed
   std::vector<double> corner_;
   std::vector<double> work_;            // L^-1 b, the columns' entries of a position side by side
   std::size_t columns_ = 0, lanes_ = 0; // of `work_`: lanes_ - columns_ are idle

@@ -1,5 +1,6 @@
 #include "elimination.hpp"
 
+#include "panel.hpp"
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
@@ -254,7 +255,8 @@ void expand(const std::vector<Run>& runs, const std::vector<int>& starts, Elimin
       else
         for (int row = starts[at(node)]; row < starts[at(node) + 1]; ++row) result.rows.push_back(row);
     supernode.below = static_cast<int>(result.rows.size() - supernode.rows);
-    result.values += at(supernode.height()) * at(supernode.columns);
+    result.values += packed_triangle(at(supernode.columns)) + packed_panel(at(supernode.below), at(supernode.columns));
+    result.entries += .5 * supernode.columns * (supernode.columns + 1) + 1. * supernode.below * supernode.columns;
     if (supernode.inner() > 0)
       result.supernodes[at(run_of[at(runs[k].below.front())])].children.push_back(static_cast<int>(k));
   }

@@ -3,7 +3,9 @@
 #include "wide.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
+#include <type_traits>
 
 namespace squeal
 {
@@ -12,133 +14,234 @@ namespace
 {
 
 using Four = double __attribute__((vector_size(32)));
+using Eight = double __attribute__((vector_size(64)));
 
-SQUEAL_INLINE void get(const double* from, Four& to)
+template <class Vector> SQUEAL_INLINE void get(const double* from, Vector& to)
 {
   std::memcpy(&to, from, sizeof to);
 }
 
-SQUEAL_INLINE void put(const Four& value, double* to)
+template <class Vector> SQUEAL_INLINE void put(const Vector& value, double* to)
 {
   std::memcpy(to, &value, sizeof value);
 }
 
-SQUEAL_INLINE void product_of_one(const Panel& L, const double* __restrict x, double* __restrict y)
+/// How far ahead the lines of a strip are called for: a page [numbers], which the processor does not look beyond.
+constexpr std::size_t ahead = 512;
+
+constexpr std::size_t padded(std::size_t rows)
 {
-  std::size_t j = 0;
-  for (; j + 4 <= L.columns; j += 4)
-  {
-    const double *a = L.values + j * L.height, *b = a + L.height, *c = b + L.height, *d = c + L.height;
-    const double p = x[j], q = x[j + 1], r = x[j + 2], s = x[j + 3];
-    for (std::size_t i = 0; i < L.rows; ++i) y[i] -= p * a[i] + q * b[i] + r * c[i] + s * d[i];
-  }
-  for (; j < L.columns; ++j)
-    for (std::size_t i = 0; i < L.rows; ++i) y[i] -= x[j] * L.values[j * L.height + i];
+  return (rows + tile - 1) / tile * tile;
 }
 
-/// y[k] -= L_k'x, one after the other in four sums, which the compiler may not form by itself.
-template <std::size_t columns>
-SQUEAL_INLINE void subtract_dots(const Panel& L, std::size_t j, const double* x, double* y)
+/// Of the strip that begins at column j.
+constexpr std::size_t width_from(std::size_t j, std::size_t columns)
 {
-  const double* const first = L.values + j * L.height;
-  Four sums[columns] = {}, some_L, some_x;
-  std::size_t i = 0;
-  for (; i + 4 <= L.rows; i += 4)
+  return std::min(tile, std::bit_floor(columns - j));
+}
+
+/// Of the strip that ends before column j.
+constexpr std::size_t width_before(std::size_t j)
+{
+  return std::min(tile, j & -j);
+}
+
+/// Calls work(width), the width known to the compiler.
+template <class Work> SQUEAL_INLINE void with_width(std::size_t width, const Work& work)
+{
+  switch (width)
+  {
+  case 8:
+    return work(std::integral_constant<std::size_t, 8>{});
+  case 4:
+    return work(std::integral_constant<std::size_t, 4>{});
+  case 2:
+    return work(std::integral_constant<std::size_t, 2>{});
+  default:
+    return work(std::integral_constant<std::size_t, 1>{});
+  }
+}
+
+/// y -= L x of a strip and one right-hand side.
+template <std::size_t width>
+SQUEAL_INLINE void subtract_strip(const double* L, std::size_t rows, const double* x, double* y)
+{
+  Eight some_L, some_y;
+  for (std::size_t i = 0; i < rows; i += tile, L += tile * width)
+  {
+    get(y + i, some_y);
+    for (std::size_t k = 0; k < width; ++k)
+    {
+      __builtin_prefetch(L + tile * k + ahead);
+      get(L + tile * k, some_L);
+      some_y -= some_L * x[k];
+    }
+    put(some_y, y + i);
+  }
+}
+
+/// y -= L' x
+template <std::size_t width>
+SQUEAL_INLINE void subtract_transposed_strip(const double* L, std::size_t rows, const double* x, double* y)
+{
+  Eight sums[width] = {}, some_L, some_x;
+  for (std::size_t i = 0; i < rows; i += tile, L += tile * width)
   {
     get(x + i, some_x);
-    for (std::size_t k = 0; k < columns; ++k)
+    for (std::size_t k = 0; k < width; ++k)
     {
-      get(first + k * L.height + i, some_L);
+      __builtin_prefetch(L + tile * k + ahead);
+      get(L + tile * k, some_L);
       sums[k] += some_L * some_x;
     }
   }
-  for (std::size_t k = 0; k < columns; ++k)
+  for (std::size_t k = 0; k < width; ++k)
+    for (std::size_t row = 0; row < tile; ++row) y[k] -= sums[k][row];
+}
+
+/// Where row i of a strip begins.
+constexpr std::size_t row_of(std::size_t i, std::size_t width)
+{
+  return i / tile * tile * width + i % tile;
+}
+
+/// y -= L x of a strip and as many right-hand sides as a vector is wide; those of a row are `lanes` apart.
+template <class Vector, std::size_t width>
+SQUEAL_INLINE void subtract_strip(const double* L, std::size_t rows, std::size_t lanes, const double* x, double* y)
+{
+  Vector some_x[width], some_y;
+  for (std::size_t k = 0; k < width; ++k) get(x + k * lanes, some_x[k]);
+  for (std::size_t i = 0; i < rows; ++i)
   {
-    double sum = sums[k][0] + sums[k][1] + sums[k][2] + sums[k][3];
-    for (std::size_t row = i; row < L.rows; ++row) sum += first[k * L.height + row] * x[row];
-    y[j + k] -= sum;
+    const double* const row = L + row_of(i, width);
+    get(y + i * lanes, some_y);
+    for (std::size_t k = 0; k < width; ++k) some_y -= row[tile * k] * some_x[k];
+    put(some_y, y + i * lanes);
   }
 }
 
-SQUEAL_INLINE void transposed_of_one(const Panel& L, const double* __restrict x, double* __restrict y)
+template <class Vector, std::size_t width> SQUEAL_INLINE void
+subtract_transposed_strip(const double* L, std::size_t rows, std::size_t lanes, const double* x, double* y)
 {
-  std::size_t j = 0;
-  for (; j + 4 <= L.columns; j += 4) subtract_dots<4>(L, j, x, y);
-  for (; j < L.columns; ++j) subtract_dots<1>(L, j, x, y);
-}
-
-constexpr std::size_t strip = 4, block = 64; // rows and columns of what is gathered at a time
-
-/// Rows [i, i + rows) of `count` columns from j on, those of a column side by side; zeros up to a whole strip.
-SQUEAL_INLINE void gather(const Panel& L, std::size_t i, std::size_t rows, std::size_t j, std::size_t count, double* to)
-{
-  const double* from = L.values + j * L.height + i;
-  for (std::size_t k = 0; k < count; ++k)
-    if (rows == strip)
-      std::memcpy(to + strip * k, from + k * L.height, strip * sizeof(double));
-    else
-      for (std::size_t row = 0; row < strip; ++row) to[strip * k + row] = row < rows ? from[k * L.height + row] : 0.;
-}
-
-/// `fours`: how many times four numbers are taken at once of a vector's width.
-template <std::size_t fours>
-SQUEAL_INLINE void product_of_many(const Panel& L, std::size_t lanes, const double* __restrict x, double* __restrict y)
-{
-  double some_L[strip * block];
-  for (std::size_t j = 0; j < L.columns; j += block)
+  Vector sums[width] = {}, some_x, some_y;
+  for (std::size_t i = 0; i < rows; ++i)
   {
-    const std::size_t count = std::min(block, L.columns - j);
-    for (std::size_t i = 0; i < L.rows; i += strip)
-    {
-      const std::size_t rows = std::min(strip, L.rows - i);
-      gather(L, i, rows, j, count, some_L);
-      for (std::size_t lane = 0; lane < lanes; lane += 4 * fours)
-      {
-        Four sums[strip][fours] = {}, some_x[fours], some_y;
-        for (std::size_t k = 0; k < count; ++k)
-        {
-          for (std::size_t f = 0; f < fours; ++f) get(x + (j + k) * lanes + lane + 4 * f, some_x[f]);
-          for (std::size_t row = 0; row < strip; ++row)
-            for (std::size_t f = 0; f < fours; ++f) sums[row][f] += some_L[strip * k + row] * some_x[f];
-        }
-        for (std::size_t row = 0; row < rows; ++row)
-          for (std::size_t f = 0; f < fours; ++f)
-          {
-            double* const target = y + (i + row) * lanes + lane + 4 * f;
-            get(target, some_y);
-            put(some_y - sums[row][f], target);
-          }
-      }
-    }
+    const double* const row = L + row_of(i, width);
+    get(x + i * lanes, some_x);
+    for (std::size_t k = 0; k < width; ++k) sums[k] += row[tile * k] * some_x;
+  }
+  for (std::size_t k = 0; k < width; ++k)
+  {
+    get(y + k * lanes, some_y);
+    put(some_y - sums[k], y + k * lanes);
   }
 }
 
-template <std::size_t fours> SQUEAL_INLINE void transposed_of_many(const Panel& L, std::size_t lanes,
-                                                                   const double* __restrict x, double* __restrict y)
+/// Right-hand sides that are taken at once; of a single one, rows are.
+template <class Vector> constexpr std::size_t taken = sizeof(Vector) / sizeof(double);
+
+template <class Vector> SQUEAL_INLINE void product(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
-  double some_L[strip * block];
-  for (std::size_t j = 0; j < L.columns; j += block)
+  const double* strip = L.values;
+  for (std::size_t j = 0; j < L.columns; j += width_from(j, L.columns))
   {
-    const std::size_t count = std::min(block, L.columns - j);
-    for (std::size_t i = 0; i < L.rows; i += strip)
+    const std::size_t some = width_from(j, L.columns);
+    with_width(some,
+               [&](auto width) SQUEAL_INLINE_LAMBDA
+               {
+                 if constexpr (std::is_same_v<Vector, double>)
+                   subtract_strip<width>(strip, L.rows, x + j, y);
+                 else
+                   for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+                     subtract_strip<Vector, width>(strip, L.rows, lanes, x + j * lanes + lane, y + lane);
+               });
+    strip += some * padded(L.rows);
+  }
+}
+
+template <class Vector> SQUEAL_INLINE void transposed(const Panel& L, std::size_t lanes, const double* x, double* y)
+{
+  const double* strip = L.values;
+  for (std::size_t j = 0; j < L.columns; j += width_from(j, L.columns))
+  {
+    const std::size_t some = width_from(j, L.columns);
+    with_width(some,
+               [&](auto width) SQUEAL_INLINE_LAMBDA
+               {
+                 if constexpr (std::is_same_v<Vector, double>)
+                   subtract_transposed_strip<width>(strip, L.rows, x, y + j);
+                 else
+                   for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+                     subtract_transposed_strip<Vector, width>(strip, L.rows, lanes, x + lane, y + j * lanes + lane);
+               });
+    strip += some * padded(L.rows);
+  }
+}
+
+/// The tile on the diagonal of a strip `width` wide, and what it leaves to its own rows.
+template <class Vector> SQUEAL_INLINE void solve_tile(const double* L, std::size_t width, std::size_t lanes, double* x)
+{
+  for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+    for (std::size_t k = 0; k < width; ++k)
     {
-      const std::size_t rows = std::min(strip, L.rows - i);
-      gather(L, i, rows, j, count, some_L);
-      for (std::size_t lane = 0; lane < lanes; lane += 4 * fours)
+      Vector pivot, other;
+      get(x + k * lanes + lane, pivot);
+      pivot *= 1 / L[(tile + 1) * k];
+      put(pivot, x + k * lanes + lane);
+      for (std::size_t i = k + 1; i < tile; ++i)
       {
-        Four some_x[strip][fours] = {}, some_y[fours];
-        for (std::size_t row = 0; row < rows; ++row)
-          for (std::size_t f = 0; f < fours; ++f) get(x + (i + row) * lanes + lane + 4 * f, some_x[row][f]);
-        for (std::size_t k = 0; k < count; ++k)
-        {
-          double* const target = y + (j + k) * lanes + lane;
-          for (std::size_t f = 0; f < fours; ++f) get(target + 4 * f, some_y[f]);
-          for (std::size_t row = 0; row < strip; ++row)
-            for (std::size_t f = 0; f < fours; ++f) some_y[f] -= some_L[strip * k + row] * some_x[row][f];
-          for (std::size_t f = 0; f < fours; ++f) put(some_y[f], target + 4 * f);
-        }
+        get(x + i * lanes + lane, other);
+        put(other - L[tile * k + i] * pivot, x + i * lanes + lane);
       }
     }
+}
+
+template <class Vector>
+SQUEAL_INLINE void solve_transposed_tile(const double* L, std::size_t width, std::size_t lanes, double* x)
+{
+  for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+    for (std::size_t k = width; k-- > 0;)
+    {
+      Vector pivot, other;
+      get(x + k * lanes + lane, pivot);
+      for (std::size_t i = k + 1; i < tile; ++i)
+      {
+        get(x + i * lanes + lane, other);
+        pivot -= L[tile * k + i] * other;
+      }
+      pivot *= 1 / L[(tile + 1) * k];
+      put(pivot, x + k * lanes + lane);
+    }
+}
+
+/// What is below the tile on the diagonal of the strip of a triangle that begins at column j.
+Panel below_tile(const double* strip, std::size_t j, std::size_t width, std::size_t columns)
+{
+  return {strip + tile * width, columns - std::min(columns, j + tile), width};
+}
+
+template <class Vector> SQUEAL_INLINE void solve(const double* L, std::size_t columns, std::size_t lanes, double* x)
+{
+  for (std::size_t j = 0; j < columns; j += width_from(j, columns))
+  {
+    const std::size_t width = width_from(j, columns);
+    solve_tile<Vector>(L, width, lanes, x + j * lanes);
+    product<Vector>(below_tile(L, j, width, columns), lanes, x + j * lanes, x + (j + tile) * lanes);
+    L += width * padded(columns - j);
+  }
+}
+
+template <class Vector>
+SQUEAL_INLINE void solve_transposed(const double* L, std::size_t columns, std::size_t lanes, double* x)
+{
+  L += packed_triangle(columns);
+  for (std::size_t j = columns; j > 0;)
+  {
+    const std::size_t width = width_before(j);
+    j -= width;
+    L -= width * padded(columns - j);
+    transposed<Vector>(below_tile(L, j, width, columns), lanes, x + (j + tile) * lanes, x + j * lanes);
+    solve_transposed_tile<Vector>(L, width, lanes, x + j * lanes);
   }
 }
 
@@ -186,18 +289,65 @@ SQUEAL_WIDE void symmetric_product(const double* W, std::size_t size, const doub
     for (std::size_t i = j; i < size; ++i) y[k] += W[std::min(i, k) * size + std::max(i, k)] * x[i];
 }
 
+std::size_t packed_panel(std::size_t rows, std::size_t columns)
+{
+  return padded(rows) * columns;
+}
+
+std::size_t packed_triangle(std::size_t columns)
+{
+  std::size_t size = 0;
+  for (std::size_t j = 0; j < columns; j += width_from(j, columns))
+    size += packed_panel(columns - j, width_from(j, columns));
+  return size;
+}
+
+double* pack_panel(const double* from, std::size_t height, std::size_t rows, std::size_t columns, double* to)
+{
+  for (std::size_t j = 0; j < columns; j += width_from(j, columns))
+    for (std::size_t i = 0; i < rows; i += tile)
+      for (std::size_t k = j; k < j + width_from(j, columns); ++k, to += tile)
+      {
+        const std::size_t count = std::min(tile, rows - i);
+        std::copy_n(from + k * height + i, count, to);
+        std::fill(to + count, to + tile, 0.);
+      }
+  return to;
+}
+
+double* pack_triangle(const double* from, std::size_t height, std::size_t columns, double* to)
+{
+  for (std::size_t j = 0; j < columns; j += width_from(j, columns))
+    to = pack_panel(from + j * height + j, height, columns - j, width_from(j, columns), to);
+  return to;
+}
+
 SQUEAL_WIDE void subtract_product(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
-  lanes == 1   ? product_of_one(L, x, y)
-  : lanes == 4 ? product_of_many<1>(L, lanes, x, y)
-               : product_of_many<2>(L, lanes, x, y);
+  lanes == 1   ? product<double>(L, lanes, x, y)
+  : lanes == 4 ? product<Four>(L, lanes, x, y)
+               : product<Eight>(L, lanes, x, y);
 }
 
 SQUEAL_WIDE void subtract_transposed(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
-  lanes == 1   ? transposed_of_one(L, x, y)
-  : lanes == 4 ? transposed_of_many<1>(L, lanes, x, y)
-               : transposed_of_many<2>(L, lanes, x, y);
+  lanes == 1   ? transposed<double>(L, lanes, x, y)
+  : lanes == 4 ? transposed<Four>(L, lanes, x, y)
+               : transposed<Eight>(L, lanes, x, y);
+}
+
+SQUEAL_WIDE void solve_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x)
+{
+  lanes == 1   ? solve<double>(L, columns, lanes, x)
+  : lanes == 4 ? solve<Four>(L, columns, lanes, x)
+               : solve<Eight>(L, columns, lanes, x);
+}
+
+SQUEAL_WIDE void solve_transposed_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x)
+{
+  lanes == 1   ? solve_transposed<double>(L, columns, lanes, x)
+  : lanes == 4 ? solve_transposed<Four>(L, columns, lanes, x)
+               : solve_transposed<Eight>(L, columns, lanes, x);
 }
 
 } // namespace squeal

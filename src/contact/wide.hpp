@@ -7,3 +7,4 @@
 #define SQUEAL_WIDE
 #endif
 #define SQUEAL_INLINE inline __attribute__((always_inline))
+#define SQUEAL_INLINE_LAMBDA __attribute__((always_inline))
