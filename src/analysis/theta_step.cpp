@@ -165,24 +165,12 @@ void account(const ThetaStep& step, const Structure& structure, std::span<const 
   }
 }
 
-/// Null unless A is sparse and whole on one rank: elsewhere the conversion takes seconds.
-Owned<Mat> one_triangle(Mat A)
+/// y_k = A x_k for all k at one reading of A.
+void multiply(Mat A, std::span<const Vec> x, std::span<const Vec> y)
 {
-  Owned<Mat> half;
-  PetscBool whole_here = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(A), MATSEQAIJ, &whole_here));
-  if (!whole_here) return half;
-  check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
-  check(MatConvert(A, MATSEQSBAIJ, MAT_INITIAL_MATRIX, half.put()));
-  return half;
-}
-
-/// y_k = A x_k for all k at one reading of A; `half`: A by one triangle, or null.
-void multiply(Mat A, Mat half, std::span<const Vec> x, std::span<const Vec> y)
-{
-  if (half || x.size() == 1)
+  if (x.size() == 1)
   {
-    for (std::size_t k = 0; k < x.size(); ++k) check(MatMult(half ? half : A, x[k], y[k]));
+    check(MatMult(A, x[0], y[0]));
     return;
   }
   Block X = empty_block(A);
@@ -252,8 +240,7 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.factor_seconds = MPI_Wtime() - start;
   if (rank_of(comm_of(structure.load)) == 0)
     step.W = make_contact_operator(std::move(condensed.W), interface.pairs, interface.directions);
-  step.M = one_triangle(structure.M);
-  step.K = one_triangle(structure.K);
+  step.matrices = paired(structure.M, structure.K);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
   return step;
 }
@@ -305,8 +292,13 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
     Mv.push_back(work.Mv_next);
     Ku.push_back(work.Ku_next);
   }
-  multiply(structure.M, step.M, next, Mv);
-  multiply(structure.K, step.K, u, Ku);
+  if (step.matrices)
+    multiply_both(*step.matrices, next, u, Mv, Ku);
+  else
+  {
+    multiply(structure.M, next, Mv);
+    multiply(structure.K, u, Ku);
+  }
   account(step, structure, states, works, reports);
   for (std::size_t k = 0; k < states.size(); ++k)
   {

@@ -278,7 +278,36 @@ SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j,
   }
 }
 
+/// y = W x of eight rows, or one, of a row-major matrix.
+template <class Vector, std::size_t rows>
+SQUEAL_INLINE void multiply_rows(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y)
+{
+  for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+  {
+    Vector sums[rows] = {}, some_x;
+    for (std::size_t j = 0; j < size; ++j)
+    {
+      get(x + j * lanes + lane, some_x);
+      for (std::size_t row = 0; row < rows; ++row) sums[row] += W[row * size + j] * some_x;
+    }
+    for (std::size_t row = 0; row < rows; ++row) put(sums[row], y + row * lanes + lane);
+  }
+}
+
+template <class Vector>
+SQUEAL_INLINE void multiply(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y)
+{
+  std::size_t i = 0;
+  for (; i + tile <= size; i += tile) multiply_rows<Vector, tile>(W + i * size, size, lanes, x, y + i * lanes);
+  for (; i < size; ++i) multiply_rows<Vector, 1>(W + i * size, size, lanes, x, y + i * lanes);
+}
+
 } // namespace
+
+SQUEAL_WIDE void dense_product(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y)
+{
+  lanes == 4 ? multiply<Four>(W, size, lanes, x, y) : multiply<Eight>(W, size, lanes, x, y);
+}
 
 SQUEAL_WIDE void symmetric_product(const double* W, std::size_t size, const double* x, double* y)
 {

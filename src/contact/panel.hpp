@@ -46,4 +46,7 @@ void solve_transposed_triangle(const double* L, std::size_t columns, std::size_t
 /// y = W x for the lower triangle of a symmetric W, by columns, read once.
 void symmetric_product(const double* W, std::size_t size, const double* x, double* y);
 
+/// y = W x for a W stored by rows, of several `lanes`.
+void dense_product(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y);
+
 } // namespace squeal

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <petscblaslapack.h>
 
 namespace squeal
 {
@@ -62,22 +61,6 @@ double residual_of(const ContactWork& work)
 
 namespace
 {
-
-/// y = W x by columns; one triangle of W is read, once for all of them if they are many.
-void multiply(const ContactOperator& W, const std::vector<double>& x, int columns, std::vector<double>& y)
-{
-  y.resize(x.size());
-  constexpr int few = 8; // up to which packing W for a matrix product costs more than reading it again
-  if (columns <= few)
-  {
-    for (std::size_t first = 0; first < x.size(); first += W.size())
-      symmetric_product(W.W.data(), W.size(), &x[first], &y[first]);
-    return;
-  }
-  const PetscBLASInt n = static_cast<PetscBLASInt>(W.size()), m = columns;
-  const double unit = 1, zero = 0;
-  BLASsymm_("L", "L", &n, &m, &unit, W.W.data(), &n, x.data(), &n, &zero, y.data(), &n);
-}
 
 void fixed_point(ContactWork& work, const ContactSettings& settings)
 {
@@ -173,14 +156,19 @@ void remember(const ContactWork& work, ContactMemory& memory)
 void refresh(std::span<ContactWork* const> works)
 {
   if (works.empty()) return;
-  const std::size_t n = works.front()->W.size();
-  std::vector<double> r, Wr;
-  for (const ContactWork* work : works) r.insert(r.end(), work->r.begin(), work->r.end());
-  multiply(works.front()->W, r, static_cast<int>(works.size()), Wr);
+  const ContactOperator& W = works.front()->W;
+  const std::size_t n = W.size(), lanes = lanes_for(works.size());
+  std::vector<double> r(n * lanes), Wr(n * lanes);
+  for (std::size_t k = 0; k < works.size(); ++k)
+    for (std::size_t i = 0; i < n; ++i) r[i * lanes + k] = works[k]->r[i];
+  if (lanes == 1)
+    symmetric_product(W.W.data(), n, r.data(), Wr.data());
+  else
+    dense_product(W.W.data(), n, lanes, r.data(), Wr.data());
   for (std::size_t k = 0; k < works.size(); ++k)
   {
-    const auto mine = Wr.begin() + static_cast<std::ptrdiff_t>(k * n);
-    works[k]->Wr.assign(mine, mine + static_cast<std::ptrdiff_t>(n));
+    works[k]->Wr.resize(n);
+    for (std::size_t i = 0; i < n; ++i) works[k]->Wr[i] = Wr[i * lanes + k];
     ++works[k]->reads;
   }
 }

@@ -14,7 +14,7 @@ namespace
 
 using Vector = std::vector<double>;
 
-constexpr int pairs = 120;
+constexpr int pairs = 121; // no multiple of what is taken at once
 constexpr std::size_t size = 3 * pairs;
 
 /// Decays with distance like the W of a short step, down to a tail that the near field leaves out. The tail's sum is

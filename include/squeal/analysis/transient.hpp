@@ -4,6 +4,7 @@
 ///     0 <= gap + B_n ut + h B_n v+  _|_  r_n+ >= 0,   ut = u + h(1-theta) v,   r_t+ in the Coulomb disc, opposing s+.
 /// Reactions are implicit, an impulse h r+ of the whole step; theta = 1/2 adds no damping of its own.
 #include "squeal/analysis/estimate.hpp"
+#include "squeal/analysis/paired_matrices.hpp"
 #include "squeal/analysis/step_guards.hpp"
 #include "squeal/contact/condensed.hpp"
 #include "squeal/contact/solver.hpp"
@@ -26,10 +27,10 @@ enum class ContactLaw
 /// Built once per h.
 struct ThetaStep
 {
-  double h = 0, theta = 0.5; // [s], [-]
-  Owned<Mat> M, K;           // the structure's, one triangle stored: read in a third of the time; null on several ranks
-  Factor factor;             // of A bordered by B
-  ContactOperator W;         // on rank 0
+  double h = 0, theta = 0.5;              // [s], [-]
+  std::optional<PairedMatrices> matrices; // M and K; not on several ranks
+  Factor factor;                          // of A bordered by B
+  ContactOperator W;                      // on rank 0
   ContactLaw law = ContactLaw::displacement;
   ContactSettings contact;
   double factor_seconds = 0, condensed_seconds = 0; // to factor A with the corner that W is, to prepare W

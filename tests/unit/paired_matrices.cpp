@@ -1,0 +1,77 @@
+// ranks: 1 2
+#include "squeal/analysis/paired_matrices.hpp"
+
+#include <cmath>
+#include <doctest/doctest.h>
+
+using namespace squeal;
+
+namespace
+{
+
+/// Symmetric, with entries on the diagonals that are a multiple of `every` away.
+Owned<Mat> striped(PetscInt size, PetscInt every)
+{
+  Owned<Mat> A;
+  check(MatCreateAIJ(PETSC_COMM_WORLD, PETSC_DECIDE, PETSC_DECIDE, size, size, size, nullptr, size, nullptr, A.put()));
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(A, &first, &last));
+  for (PetscInt i = first; i < last; ++i)
+    for (PetscInt j = i % every; j < size; j += every)
+      check(MatSetValue(A, i, j, std::cos(static_cast<double>(i + j)) + .1 * static_cast<double>(i * j % 5),
+                        INSERT_VALUES));
+  check(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  return A;
+}
+
+Owned<Vec> wave(Mat A, double number)
+{
+  Owned<Vec> x;
+  check(MatCreateVecs(A, x.put(), nullptr));
+  PetscInt first = 0, last = 0;
+  check(VecGetOwnershipRange(x, &first, &last));
+  for (PetscInt i = first; i < last; ++i)
+    check(VecSetValue(x, i, std::sin(number + .3 * static_cast<double>(i)), INSERT_VALUES));
+  check(VecAssemblyBegin(x));
+  check(VecAssemblyEnd(x));
+  return x;
+}
+
+double difference(Mat A, Vec x, Vec y)
+{
+  Owned<Vec> Ax;
+  check(MatCreateVecs(A, nullptr, Ax.put()));
+  check(MatMult(A, x, Ax));
+  check(VecAXPY(Ax, -1, y));
+  double norm = 0;
+  check(VecNorm(Ax, NORM_INFINITY, &norm));
+  return norm;
+}
+
+} // namespace
+
+TEST_CASE("matrices of different patterns side by side give the products of each, of one trajectory and of many")
+{
+  const auto M = striped(41, 3), K = striped(41, 2);
+  const std::optional<PairedMatrices> matrices = paired(M, K);
+  CHECK(matrices.has_value() == (ranks_of(PETSC_COMM_WORLD) == 1));
+  if (!matrices) return;
+  for (const int count : {1, 3, 11})
+  {
+    std::vector<Owned<Vec>> owned;
+    std::vector<Vec> v, u, Mv, Ku;
+    for (int k = 0; k < count; ++k)
+      for (std::vector<Vec>* all : {&v, &u, &Mv, &Ku})
+      {
+        owned.push_back(wave(M, static_cast<double>(owned.size())));
+        all->push_back(owned.back());
+      }
+    multiply_both(*matrices, v, u, Mv, Ku);
+    for (std::size_t k = 0; k < v.size(); ++k)
+    {
+      CHECK(difference(M, v[k], Mv[k]) < 1e-13); // rounding of sums of 20 numbers of size 1
+      CHECK(difference(K, u[k], Ku[k]) < 1e-13);
+    }
+  }
+}
