@@ -2,7 +2,7 @@
 /// that a pair's rows are read once for all the problems in which it moves.
 ///
 /// With w = w_0 + dw, w_0 = W r_0 + b exact and dw the effect of the changes since, the sweeps update dw alone: from
-/// the near field, kept in single precision, which dw's smallness affords, or from W where that did not converge.
+/// the near field, both in single precision, which dw's smallness affords, or from W where that did not converge.
 /// The residual is believed only after w was formed afresh.
 #include "wide.hpp"
 #include "work.hpp"
@@ -48,7 +48,7 @@ namespace
 template <class Entry> struct Sweep
 {
   ContactWork& work;
-  std::vector<double> dw;
+  std::vector<Entry> dw;
   bool dirty = false; // dw is not zero
   bool done = false;  // the sweeps have met their target, or nothing moves any more
   double fresh_residual = std::numeric_limits<double>::infinity(); // at the last product with W
@@ -64,7 +64,7 @@ SQUEAL_WIDE void add_whole_rows(const double* rows, std::size_t count, std::size
 }
 
 SQUEAL_WIDE void add_runs(const NearField& near, std::size_t pair, std::size_t block, const PairVector& change,
-                          double* target)
+                          float* target)
 {
   const float* values = &near.values[near.values_of[pair]];
   for (std::size_t run = near.runs_of[pair]; run < near.runs_of[pair + 1]; ++run)
@@ -76,7 +76,7 @@ SQUEAL_WIDE void add_runs(const NearField& near, std::size_t pair, std::size_t b
 }
 
 template <class Entry>
-void spread(const ContactOperator& W, std::size_t pair, const PairVector& change, std::vector<double>& dw)
+void spread(const ContactOperator& W, std::size_t pair, const PairVector& change, std::vector<Entry>& dw)
 {
   if constexpr (std::is_same_v<Entry, float>)
     add_runs(W.near, pair, W.block(), change, dw.data());
@@ -149,10 +149,11 @@ template <class Entry> double seen_residual(Sweep<Entry>& sweep)
   return residual;
 }
 
-/// What rounding of the entries allows the sweeps to see of dw, which is as large as the residual at first.
+/// What rounding of the entries and of their sums allows the sweeps to see of dw, which is as large as the residual at
+/// first.
 template <class Entry> void aim(Sweep<Entry>& sweep, const ContactSettings& settings)
 {
-  const double digits = 2 * static_cast<double>(std::numeric_limits<Entry>::epsilon());
+  const double digits = 32 * static_cast<double>(std::numeric_limits<Entry>::epsilon());
   sweep.target = std::max(settings.tolerance / 4, digits * sweep.fresh_residual);
 }
 
@@ -221,7 +222,7 @@ template <class Entry> void refresh(std::span<Sweep<Entry>* const> sweeps)
     if (!sweep->dirty) continue;
     stale.push_back(&sweep->work);
     sweep->dirty = false;
-    std::fill(sweep->dw.begin(), sweep->dw.end(), 0.);
+    std::fill(sweep->dw.begin(), sweep->dw.end(), Entry{0});
   }
   squeal::refresh(stale);
 }
@@ -230,7 +231,7 @@ template <class Entry> void solve(std::span<ContactWork* const> works, const Con
 {
   std::vector<Sweep<Entry>> sweeps;
   sweeps.reserve(works.size());
-  for (ContactWork* work : works) sweeps.push_back({*work, std::vector<double>(work->b.size())});
+  for (ContactWork* work : works) sweeps.push_back({*work, std::vector<Entry>(work->b.size())});
   std::vector<Sweep<Entry>*> active;
   for (Sweep<Entry>& sweep : sweeps)
   {
