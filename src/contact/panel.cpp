@@ -245,21 +245,21 @@ SQUEAL_INLINE void solve_transposed(const double* L, std::size_t columns, std::s
   }
 }
 
-/// Four columns of W: the part of them below their diagonal block acts as it stands and transposed.
+/// Eight columns of W: the part of them below their diagonal block acts as it stands and transposed.
 SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j, const double* __restrict x,
                                double* __restrict y)
 {
   const double* const first = W + j * size;
-  for (std::size_t k = 0; k < 4; ++k)
-    for (std::size_t i = j; i < j + 4; ++i)
+  for (std::size_t k = 0; k < tile; ++k)
+    for (std::size_t i = j; i < j + tile; ++i)
       y[j + k] += first[std::min(k, i - j) * size + j + std::max(k, i - j)] * x[i];
-  Four sums[4] = {}, some_W, some_x, some_y;
-  std::size_t i = j + 4;
-  for (; i + 4 <= size; i += 4)
+  Eight sums[tile] = {}, some_W, some_x, some_y;
+  std::size_t i = j + tile;
+  for (; i + tile <= size; i += tile)
   {
     get(x + i, some_x);
     get(y + i, some_y);
-    for (std::size_t k = 0; k < 4; ++k)
+    for (std::size_t k = 0; k < tile; ++k)
     {
       get(first + k * size + i, some_W);
       some_y += some_W * x[j + k];
@@ -267,9 +267,9 @@ SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j,
     }
     put(some_y, y + i);
   }
-  for (std::size_t k = 0; k < 4; ++k)
+  for (std::size_t k = 0; k < tile; ++k)
   {
-    y[j + k] += sums[k][0] + sums[k][1] + sums[k][2] + sums[k][3];
+    for (std::size_t part = 0; part < tile; ++part) y[j + k] += sums[k][part];
     for (std::size_t row = i; row < size; ++row)
     {
       y[row] += first[k * size + row] * x[j + k];
@@ -313,7 +313,7 @@ SQUEAL_WIDE void symmetric_product(const double* W, std::size_t size, const doub
 {
   std::fill_n(y, size, 0.);
   std::size_t j = 0;
-  for (; j + 4 <= size; j += 4) add_columns(W, size, j, x, y);
+  for (; j + tile <= size; j += tile) add_columns(W, size, j, x, y);
   for (std::size_t k = j; k < size; ++k)
     for (std::size_t i = j; i < size; ++i) y[k] += W[std::min(i, k) * size + std::max(i, k)] * x[i];
 }
