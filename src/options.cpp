@@ -21,7 +21,7 @@ struct Option
 // The one list of squeal's own options: help and nearest-name messages read it, each stage queries its own.
 constexpr std::array options = {
     Option{"-factor", "automatic", "of the step and of equilibrium: supernodal (on rank 0), mumps (on all), dense"},
-    Option{"-factor_limit", "0.25", "GB of a supernodal factor; beyond it several ranks share MUMPS's instead"},
+    Option{"-factor_limit", "0.3", "GB of a supernodal factor; beyond it several ranks share MUMPS's instead"},
     Option{"-equilibrium_max_it", "100", "status iterations before giving up"},
     Option{"-equilibrium_check_max_it", "-1", "of the fixed point run as a check; -1: 20000 up to 600 pairs, else 0"},
     Option{"-equilibrium_check_rho", "1.5", "of that fixed point, over 1/lambda_max, below 2"},

@@ -64,9 +64,9 @@ bool better_dense(Mat A, const Triplets& mine)
 struct Choice
 {
   Factor::Kind kind = Factor::Kind::automatic;
-  /// [GB] that rank 0 may hold for all. Two ranks step an elastic block by MUMPS in 1.2 times the time where it holds
-  /// .065, in .87 times where it holds .30: tools/bench_step with -factor. A brake's steps at .15 take the same.
-  double limit = .25;
+  /// [GB] that rank 0 may hold for all. Two ranks step an elastic block by MUMPS in 1.2 times the time, where it holds
+  /// .06 as where it holds .28, the largest that was timed: tools/bench_step with -factor.
+  double limit = .3;
 };
 
 /// A kind that is asked for in the program goes before the option.
