@@ -52,12 +52,16 @@ SQUEAL_INLINE void add_product(const PairedMatrices& matrices, const double* x, 
   }
 }
 
-/// Of 1, 4 or 8 trajectories.
+/// One trajectory, without fused products: where a body moves as one, K u is then zero to the last bit.
+void add_both(const PairedMatrices& matrices, const double* x, double* y)
+{
+  add_product<1, Two, Two>(matrices, x, y);
+}
+
+/// Of 4 or 8 trajectories.
 SQUEAL_WIDE void add_products(const PairedMatrices& matrices, std::size_t count, const double* x, double* y)
 {
-  count == 1   ? add_product<1, Two, Two>(matrices, x, y)
-  : count == 4 ? add_product<2, double, Four>(matrices, x, y)
-               : add_product<2, double, Eight>(matrices, x, y);
+  count == 4 ? add_product<2, double, Four>(matrices, x, y) : add_product<2, double, Eight>(matrices, x, y);
 }
 
 bool whole_here(Mat A)
@@ -129,7 +133,7 @@ void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::
     for (std::size_t i = 0; i < rows; ++i)
       for (std::size_t k = 0; k < 2 * count; ++k) x[i * 2 * lanes + k / count * lanes + k % count] = from[k][i];
     y.assign(x.size(), 0.);
-    add_products(matrices, lanes, x.data(), y.data());
+    lanes == 1 ? add_both(matrices, x.data(), y.data()) : add_products(matrices, lanes, x.data(), y.data());
     for (std::size_t i = 0; i < rows; ++i)
       for (std::size_t k = 0; k < 2 * count; ++k) to[k][i] = y[i * 2 * lanes + k / count * lanes + k % count];
     for (std::size_t k = 0; k < count; ++k)
