@@ -25,6 +25,7 @@ constexpr std::array options = {
     Option{"-equilibrium_max_it", "100", "status iterations before giving up"},
     Option{"-equilibrium_check_max_it", "-1", "of the fixed point run as a check; -1: 20000 up to 600 pairs, else 0"},
     Option{"-equilibrium_check_rho", "1.5", "of that fixed point, over 1/lambda_max, below 2"},
+    Option{"-transient_friction", "theta", "opposes the sliding velocity at theta, or at the end of the step (end)"},
     Option{"-transient_contact_law", "displacement", "contact on displacements, or on velocities (velocity)"},
     Option{"-transient_contact_solver", "gauss_seidel", "block Gauss-Seidel, or projection fixed point (fixed_point)"},
     Option{"-transient_contact_tolerance", "1e-10", "largest natural map of a pair over the largest reaction"},

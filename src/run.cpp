@@ -111,10 +111,8 @@ Trajectory run_transient(const Scene& scene, const Model& model, const Report& r
   {
     const ComplexMode& mode = report.modes.modes.front();
     const TransientSettings settings = planned(scene.transient, mode);
-    const ComplexMode seen = mode_seen_by_step(model.structure, model.interface, report.equilibrium, report.modes.modes,
-                                               settings.theta, settings.step_size);
-    return integrate(model.structure, model.interface, report.equilibrium, &seen, settings,
-                     transient_start(settings, seen, model, report), model.probes);
+    return integrate(model.structure, model.interface, report.equilibrium, &mode, settings,
+                     transient_start(settings, mode, model, report), model.probes);
   }
   return trajectory;
 }

@@ -30,7 +30,9 @@ Doubled double_steps(Fitting& fitting, ReducedOrbit once, int steps)
 {
   ReducedOrbit twice = shoot_reduced(fitting, once.state, once.period, 2 * steps);
   ReducedOrbit four_times = shoot_reduced(fitting, twice.state, twice.period, 4 * steps);
-  return {std::move(once), std::move(twice), std::move(four_times)};
+               four_times.period, once.energy, twice.energy, four_times.energy, once.converged, twice.converged,
+               four_times.converged);
+               return {std::move(once), std::move(twice), std::move(four_times)};
 }
 
 /// Errors of a cycle that are 1/part of its difference from the one at twice or half as many steps.
@@ -118,7 +120,7 @@ void shoot_to(Pursuit& pursuit, double part)
         "the wish was not met in " + std::to_string(pursuit.shooting.periods) + " periods of the full model";
 }
 
-/// With few steps a period at first; then what more of them change in the reduced cycle is added to the full one.
+/// With few steps a period at first; the reduced model knows what more of them do to the period.
 void pursue(Pursuit& pursuit)
 {
   Fitting& fitting = pursuit.fitting;
@@ -127,11 +129,9 @@ void pursue(Pursuit& pursuit)
   ReducedOrbit fine = pursuit.orbit;
   pursuit.reason = choose_steps(fitting, fine);
   if (!pursuit.reason.empty()) return;
-  const Owned<Vec> state = motion_of(fitting.full, fitting.reduced.model,
-                                     {fine.state.q - pursuit.orbit.state.q, fine.state.v - pursuit.orbit.state.v});
-  check(VecAXPY(state, 1, pursuit.at.state));
+  const Owned<Vec> state = copy_of(pursuit.at.state.get());
   if (fitting.steps != pursuit.map.steps)
-    move_to(pursuit, state, pursuit.at.period + fine.period - pursuit.orbit.period);
+    move_to(pursuit, state, pursuit.at.period * fine.period / pursuit.orbit.period);
   shoot_to(pursuit, .5);
 }
 

@@ -36,20 +36,17 @@ ReducedState one_period(ReducedMap& map, double period, const ReducedState& star
                    [&](const ReducedState& now) { energy += doubled_energy(map.model, now) / (2. * map.steps); });
 }
 
-/// The reduced model of the active pairs.
-void build(Fitting& fitting)
+/// The reduced model of the active pairs of motions up to an amplitude of the followed mode.
+void build(Fitting& fitting, double amplitude)
 {
   const double clock = MPI_Wtime();
   const Full& full = fitting.full;
   Reduced& reduced = fitting.reduced;
-  // Friction has shapes of its own where its cycle is the answer, or where that costs nothing; the steps are judged
-  // better with them.
-  constexpr std::size_t costs_nothing = 500;
-  const bool sliding_forces =
-      fitting.result.fidelity.asked != "reduced" &&
-      full.modes.size() + fitting.active.size() * static_cast<std::size_t>(full.interface.block()) > costs_nothing;
+  // where its cycle is the answer, friction is left free
+  const bool sliding =
+      fitting.result.fidelity.asked != "reduced" && slide_throughout(full.interface, full.unstable.front(), amplitude);
   reduced.model = reduce(full.structure, full.interface, full.equilibrium, full.modes, fitting.active,
-                         {static_cast<int>(fitting.options.modes), fitting.options.threshold, sliding_forces});
+                         {static_cast<int>(fitting.options.modes), fitting.options.threshold, sliding});
   reduced.norm = small_structure(reduced.model);
   Fidelity& fidelity = fitting.result.fidelity;
   fidelity.size = reduced.model.size();
@@ -222,7 +219,7 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
     if (2 * shapes > static_cast<std::size_t>(dofs))
       return "a reduced model of " + std::to_string(shapes) + " shapes is not small next to " + std::to_string(dofs) +
              " degrees of freedom";
-    build(fitting);
+    build(fitting, fitting.options.margin * amplitude);
     const ReducedModel& model = fitting.reduced.model;
     free.state = coordinates(model, full.structure, displacement(motion), velocity(motion));
     if (unit == 0) unit = doubled_energy(model, free.state) / 2 / (amplitude * amplitude);

@@ -31,7 +31,7 @@ struct Reduced
 {
   ReducedModel model;
   Structure norm;
-  Eigen::MatrixXd inside; // D of its shooting and of the full model's (analysis/reduced.hpp)
+  Inside inside; // D of its shooting and of the full model's
 };
 
 struct ReducedOrbit

@@ -228,26 +228,6 @@ double ComplexMode::damping_ratio() const
   return -lambda.real() / std::abs(lambda);
 }
 
-ComplexMode mode_seen_by_step(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                              const std::vector<ComplexMode>& modes, double theta, double h)
-{
-  const ComplexMode& mode = modes.front();
-  ComplexMode seen{mode.lambda, copy_of(mode.real.get()), copy_of(mode.imaginary.get()), mode.reactions,
-                   mode.backward_error};
-  Owned<Mat> Cf;
-  if (interface.direction_damping) Cf = direction_damping(interface, equilibrium);
-  if (!Cf.get() || theta == 1) return seen;
-  SlidingProblem problem = make_problem(structure, interface, equilibrium);
-  const Owned<Mat> added = project(Cf, problem.contact.Y, problem.contact.Z);
-  check(MatAXPY(problem.reduced.M, h * (1 - theta), added, UNKNOWN_NONZERO_PATTERN));
-  const Eigenpair pair = solve_near(problem.reduced, mode.lambda);
-  if (!std::isfinite(pair.backward_error)) return seen;
-  seen.lambda = pair.lambda;
-  seen.backward_error = pair.backward_error;
-  set_shape(seen, problem.contact, pair);
-  return seen;
-}
-
 Modes find_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                  const ModesSettings& settings)
 {

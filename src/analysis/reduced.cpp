@@ -104,7 +104,7 @@ Block transposed(Mat B)
   return result;
 }
 
-/// What each active pair pushes with, B_n' + mu B_t'e: its normal force and the friction that follows it.
+/// What each active pair that slides pushes with, B_n' + mu B_t'e: its normal force and the friction that follows it.
 Block sliding_forces(const Block& rows, const Interface& interface, const std::vector<int>& active)
 {
   const auto directions = static_cast<std::size_t>(interface.directions);
@@ -123,6 +123,15 @@ Block sliding_forces(const Block& rows, const Interface& interface, const std::v
     result.entries.insert(result.entries.end(), force.begin(), force.end());
     ++result.columns;
   }
+  return result;
+}
+
+/// Every `step`-th column from the first on.
+Block every(const Block& X, int step)
+{
+  Block result{X.comm, X.rows, 0, {}};
+  for (PetscInt j = 0; j < X.columns; j += step, ++result.columns)
+    result.entries.insert(result.entries.end(), X.column(j), X.column(j) + X.rows);
   return result;
 }
 
@@ -157,31 +166,59 @@ MatrixXd gram(const Block& X, const Block& Y)
   return MatrixXd::Map(inner(X, Y).data(), X.columns, Y.columns);
 }
 
-std::vector<double> entries_of(const MatrixXd& A)
+/// Own rows of A that are not empty, in order.
+std::vector<PetscInt> own_rows(Mat A)
 {
-  return {A.data(), A.data() + A.size()};
+  PetscInt first = 0;
+  std::vector<PetscInt> rows;
+  check(MatGetOwnershipRange(A, &first, nullptr));
+  for_each_row(A,
+               [&](PetscInt row, std::span<const PetscInt>, std::span<const PetscScalar> values)
+               {
+                 if (std::any_of(values.begin(), values.end(), [](double value) { return value != 0; }))
+                   rows.push_back(row - first);
+               });
+  return rows;
 }
 
-/// What is new in `columns` next to V, orthonormal in the product of E: directions of which less than `threshold` of
-/// the columns' own size is new are dropped. V and EV grow; returns by how many.
-int extend(Block& V, Block& EV, Block columns, Mat E, double threshold)
+Block rows_of(const Block& X, const std::vector<PetscInt>& rows)
 {
+  Block result{X.comm, static_cast<PetscInt>(rows.size()), X.columns, {}};
+  for (PetscInt j = 0; j < X.columns; ++j)
+    for (const PetscInt row : rows) result.entries.push_back(X.column(j)[row]);
+  return result;
+}
+
+/// T of X T orthonormal in the product in which E is the Gram matrix of X, as far as it goes.
+struct Orthonormal
+{
+  const MatrixXd& E;
+  MatrixXd T;
+  Eigen::Index seen = 0; // columns of X
+};
+
+/// Takes in what the next `count` columns of X hold that is new: directions of which less than `threshold` of the
+/// columns' own size is new are dropped. Returns how many came.
+int extend(Orthonormal& basis, Eigen::Index count, double threshold)
+{
+  const MatrixXd& E = basis.E;
+  MatrixXd columns = MatrixXd::Zero(E.rows(), count), image;
+  for (Eigen::Index j = 0; j < count; ++j)
+    columns(basis.seen + j, j) = 1 / std::sqrt(std::max(E(basis.seen + j, basis.seen + j), 1e-300));
   for (int pass = 0; pass < 2; ++pass)
   {
-    if (columns.columns == 0) return 0;
-    const VectorXd size = gram(columns, product(E, columns)).diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    add_combination(columns, -1, V, inner(EV, columns));
-    const MatrixXd scaled = size.asDiagonal() * gram(columns, product(E, columns)) * size.asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((scaled + scaled.transpose()) / 2);
-    const double least = pass == 0 ? threshold * threshold : 0;
-    const auto kept = (spectrum.eigenvalues().array() > least).count();
-    const MatrixXd a = size.asDiagonal() * spectrum.eigenvectors().rightCols(kept) *
-                       spectrum.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
-    columns = combination(columns, entries_of(a), static_cast<PetscInt>(kept));
+    image = product(E, columns);
+    columns -= product(basis.T, product(basis.T.transpose(), image));
   }
-  append(V, columns);
-  append(EV, product(E, columns));
-  return static_cast<int>(columns.columns);
+  image = product(E, columns);
+  const MatrixXd fresh = product(columns.transpose(), image);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((fresh + fresh.transpose()) / 2);
+  const auto kept = (spectrum.eigenvalues().array() > threshold * threshold).count();
+  basis.T.conservativeResize(Eigen::NoChange, basis.T.cols() + kept);
+  basis.T.rightCols(kept) = product(columns, spectrum.eigenvectors().rightCols(kept)) *
+                            spectrum.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+  basis.seen += count;
+  return static_cast<int>(kept);
 }
 
 } // namespace
@@ -204,6 +241,23 @@ std::vector<int> pairs_that_may_change(const Interface& interface, const Equilib
   return pairs;
 }
 
+bool slide_throughout(const Interface& interface, const ComplexMode& mode, double amplitude)
+{
+  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
+  const std::vector<double> real = relative(interface, mode.real), imaginary = relative(interface, mode.imaginary);
+  for (std::size_t i = 0; i < interface.gap.size(); ++i)
+  {
+    double drive = 0, moves = 0;
+    for (std::size_t k = 0; k < directions; ++k)
+    {
+      drive = std::hypot(drive, interface.drive[i * directions + k]);
+      moves = std::hypot(moves, real[i * block + 1 + k], imaginary[i * block + 1 + k]);
+    }
+    if (amplitude * std::abs(mode.lambda) * moves >= drive) return false;
+  }
+  return true;
+}
+
 ReducedModel reduce(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                     const std::vector<ComplexMode>& modes, std::vector<int> active, const Reduction& reduction)
 {
@@ -215,57 +269,78 @@ ReducedModel reduce(const Structure& structure, const Interface& interface, cons
   const ClosedContact contact = eliminate_closed_pairs(structure, interface, sliding);
   const double omega = modes.front().lambda.imag();
 
-  // the basis
+  // the modes and the shapes of the pairs' forces, as they come
   Owned<Mat> E = project_symmetric(structure.K, contact.Z), BZ;
   const Owned<Mat> M_z = project_symmetric(structure.M, contact.Z);
   check(MatAXPY(E, omega * omega, M_z, UNKNOWN_NONZERO_PATTERN));
   check(MatSetOption(E, MAT_SYMMETRIC, PETSC_TRUE));
-  Block V = empty_block(E), EV = V;
-  Block shapes = mode_columns(modes, reduction.modes, contact.Z);
-  Block others = columns_from(shapes, 2);
-  shapes.columns = 2;
-  shapes.entries.resize(static_cast<std::size_t>(2 * shapes.rows));
-  model.modes = extend(V, EV, std::move(shapes), E, 1e-7); // the followed mode is kept whatever else is
-  model.modes += extend(V, EV, std::move(others), E, 1e-6);
   const Owned<Mat> B = rows_of(interface, active);
   check(MatMatMult(B, contact.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
-  Block forces = transposed(BZ);
-  if (reduction.sliding_forces) forces = sliding_forces(forces, interface, active);
-  model.attachments = extend(V, EV, attachment_columns(E, forces), E, reduction.threshold);
+  const auto forces = [&](Mat rows)
+  { return reduction.sliding ? sliding_forces(transposed(rows), interface, active) : transposed(rows); };
+  Block columns = mode_columns(modes, reduction.modes, contact.Z);
+  const Eigen::Index of_modes = columns.columns;
+  append(columns, attachment_columns(E, forces(BZ)));
+  const Block X = product(contact.Z, columns);
 
-  // the projection
-  const Block left = product(contact.Y, V), rows = transposed(B);
-  model.shapes = product(contact.Z, V);
+  // Y is Z but for a few rows, and friction turns at the pairs: products with few rows
+  Owned<Mat> difference;
+  check(MatDuplicate(contact.Y, MAT_COPY_VALUES, difference.put()));
+  check(MatAXPY(difference, -1, contact.Z, DIFFERENT_NONZERO_PATTERN));
+  const std::vector<PetscInt> follow = own_rows(difference);
+  const Block more = rows_of(product(difference, columns), follow);
   for (const auto& [matrix, unsymmetric, symmetric] :
        {std::tuple{structure.M.get(), &model.M, &model.M_z}, std::tuple{structure.C.get(), &model.C, &model.C_z},
         std::tuple{structure.K.get(), &model.K, &model.K_z}})
   {
-    const Block image = product(matrix, model.shapes);
-    *unsymmetric = gram(left, image);
-    *symmetric = gram(model.shapes, image);
+    const Block image = product(matrix, X);
+    *symmetric = gram(X, image);
     *symmetric = (*symmetric + symmetric->transpose()).eval() / 2;
+    *unsymmetric = *symmetric + gram(more, rows_of(image, follow));
   }
-  if (const Owned<Mat> turning = direction_damping(interface, sliding); turning.get())
-    model.C += gram(left, product(turning, model.shapes));
-  model.H = gram(left, rows);
-  model.G = gram(rows, model.shapes);
+  const Block left = product(contact.Y, columns), rows = transposed(B);
+  if (const Owned<Mat> turning = direction_damping(interface, reduction.sliding ? equilibrium : sliding); turning.get())
+  {
+    const std::vector<PetscInt> turns = own_rows(turning);
+    model.C += gram(rows_of(left, turns), rows_of(product(turning, X), turns));
+  }
+  model.H = gram(left, forces(B));
+  model.G = gram(reduction.sliding ? every(rows, interface.block()) : rows, X);
+
+  // the basis
+  const MatrixXd energy = model.K_z + omega * omega * model.M_z;
+  Orthonormal basis{energy, MatrixXd(X.columns, 0)};
+  model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
+  model.modes += extend(basis, of_modes - 2, 1e-6);
+  model.attachments = extend(basis, X.columns - of_modes, reduction.threshold);
+  // of falling period: u'M u against the energy
+  const MatrixXd mass = product(basis.T.transpose(), product(model.M_z, basis.T));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((mass + mass.transpose()) / 2);
+  const MatrixXd T = product(basis.T, spectrum.eigenvectors().rowwise().reverse());
+  constexpr double fastest = 4; // times omega
+  model.slow = (spectrum.eigenvalues().array() * (1 + fastest * fastest) * omega * omega > 1).count();
+  for (MatrixXd* A : {&model.M, &model.M_z, &model.C, &model.C_z, &model.K, &model.K_z})
+    *A = product(T.transpose(), product(*A, T));
+  model.H = product(T.transpose(), model.H);
+  model.G = product(model.G, T);
+  model.shapes = combination(X, {T.data(), T.data() + T.size()}, static_cast<PetscInt>(T.cols()));
   model.E_factor.compute(model.K_z + omega * omega * model.M_z);
   model.M_factor.compute(model.M_z);
 
   // the active pairs
-  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
+  const auto block = static_cast<std::size_t>(interface.block()), kept = reduction.sliding ? 1 : block;
   const std::vector<double> still = relative(interface, equilibrium.u);
   for (const int pair : active)
   {
     const auto i = static_cast<std::size_t>(pair);
     model.gap.push_back(equilibrium.closed[i] ? 0 : interface.gap[i] + still[i * block]);
-    for (std::size_t k = 0; k < block; ++k) model.reactions.push_back(equilibrium.reactions[i * block + k]);
-    for (std::size_t k = 0; k < directions; ++k) model.drive.push_back(interface.drive[i * directions + k]);
+    for (std::size_t k = 0; k < kept; ++k) model.reactions.push_back(equilibrium.reactions[i * block + k]);
+    for (std::size_t k = 0; k + 1 < kept; ++k) model.drive.push_back(interface.drive[i * (block - 1) + k]);
   }
   model.omega = omega;
   model.active = std::move(active);
-  model.directions = interface.directions;
-  model.friction = interface.friction;
+  model.directions = reduction.sliding ? 0 : interface.directions;
+  model.friction = reduction.sliding ? 0 : interface.friction;
   return model;
 }
 

@@ -39,7 +39,7 @@ struct Pairs
   double defect(Eigen::Index i) const
   {
     const PairBlock& A = map.own[static_cast<std::size_t>(i / block)];
-    return natural_map(of(r, i), of(w, i), friction, 1 / A[0][0], 1 / std::max(A[1][1], A[2][2]));
+    return natural_map(of(r, i), of(w, i), friction, 1 / A[0][0], block > 1 ? 1 / std::max(A[1][1], A[2][2]) : 0);
   }
 };
 

@@ -102,27 +102,77 @@ void prepare(ReducedMap& map, double period)
   map.h = h;
 }
 
+namespace
+{
+
+/// s of the pair whose rows begin at `row`.
+VectorXd sliding(const ReducedModel& model, const VectorXd& v, Eigen::Index row)
+{
+  const Eigen::Index d = model.directions;
+  return model.G.middleRows(row + 1, d) * v -
+         VectorXd::Map(&model.drive[static_cast<std::size_t>(row / (1 + d) * d)], d);
+}
+
+/// Closed pairs that stick or turn back oppose s+ alone, as in the full step: b without what s had to say there.
+/// Returns whether there were any.
+bool forget_where_turned(const ReducedMap& map, const VectorXd& v, ReducedContact& contact, VectorXd& b)
+{
+  const Eigen::Index d = map.model.directions, block = 1 + d;
+  bool any = false;
+  for (std::size_t i = 0; d > 0 && i < contact.opposes_end.size(); ++i)
+  {
+    const Eigen::Index row = static_cast<Eigen::Index>(i) * block;
+    if (contact.opposes_end[i] || contact.r(row) <= 0) continue;
+    const VectorXd earlier = (1 - map.theta) / map.theta * sliding(map.model, v, row);
+    if ((contact.w.segment(row + 1, d) - earlier).dot(earlier) >= 0) continue;
+    contact.opposes_end[i] = any = true;
+    b.segment(row + 1, d) -= earlier;
+  }
+  return any;
+}
+
+} // namespace
+
+bool sticks(const VectorXd& r, double friction)
+{
+  return r.tail(r.size() - 1).norm() < (1 - 1e-8) * friction * r(0);
+}
+
 bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact)
 {
   const ReducedModel& model = map.model;
-  const double h = map.h, theta = map.theta;
+  const double h = map.h, theta = map.theta, earlier = (1 - theta) / theta;
   const Eigen::Index n = model.size();
   VectorXd both(2 * n);
   both << state.v, state.q;
   VectorXd next = product(map.from_state, both) + map.from_equilibrium;
 
-  // b of w = W r + b: normal rows are gap rates (g + G_n q~)/h + G_n v, q~ = q + h (1-theta) v, tangential ones s
-  VectorXd b = product(model.G, next);
-  const VectorXd position = product(map.G_n, state.q + h * (1 - theta) * state.v);
+  // b of w = W r + b: tangential rows are s+ + (1-theta)/theta s = s_theta/theta, normal ones gap rates
+  // (g + G_n q~)/h + G_n v, q~ = q + h (1-theta) v
+  VectorXd b = product(model.G, next + earlier * state.v);
+  const VectorXd position = product(map.G_n, state.q + h * (1 - theta - earlier) * state.v);
   const auto block = static_cast<std::size_t>(1 + model.directions), directions = block - 1;
   for (std::size_t i = 0; i < model.gap.size(); ++i)
   {
     const auto row = static_cast<Eigen::Index>(i * block);
     b(row) += (model.gap[i] + position(static_cast<Eigen::Index>(i))) / h;
     for (std::size_t k = 0; k < directions; ++k)
-      b(row + 1 + static_cast<Eigen::Index>(k)) -= model.drive[i * directions + k];
+      b(row + 1 + static_cast<Eigen::Index>(k)) -= (1 + earlier) * model.drive[i * directions + k];
   }
-  const bool converged = solve_contact(map, b, contact);
+  contact.opposes_end.assign(model.gap.size(), false);
+  for (std::size_t i = 0; directions > 0 && i < model.gap.size(); ++i)
+  {
+    const auto row = static_cast<Eigen::Index>(i * block), d = static_cast<Eigen::Index>(directions);
+    if (contact.r(row) <= 0 || !sticks(contact.r.segment(row, 1 + d), model.friction)) continue;
+    contact.opposes_end[i] = true; // its s is rounding
+    b.segment(row + 1, d) -= earlier * sliding(model, state.v, row);
+  }
+  bool converged = solve_contact(map, b, contact);
+  while (forget_where_turned(map, state.v, contact, b))
+  {
+    contact.r_before.resize(0); // no step lies between
+    converged = solve_contact(map, b, contact);
+  }
   next += product(map.from_reactions, contact.r);
   state.q += h * (theta * next + (1 - theta) * state.v);
   state.v = std::move(next);

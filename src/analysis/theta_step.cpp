@@ -11,7 +11,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
+#include <utility>
 
 namespace squeal
 {
@@ -24,10 +26,12 @@ void read_options(ThetaStep& step)
 {
   const std::array<const char*, 2> laws = {"displacement", "velocity"};
   const std::array<const char*, 2> solvers = {"gauss_seidel", "fixed_point"};
-  PetscInt law = 0, solver = 0, max_it = step.contact.max_iterations;
+  const std::array<const char*, 2> slidings = {"theta", "end"};
+  PetscInt law = 0, solver = 0, sliding = 0, max_it = step.contact.max_iterations;
   PetscInt order = step.contact.extrapolation;
   const char* prefix = "transient_";
   check(PetscOptionsGetEList(nullptr, prefix, "-contact_law", laws.data(), 2, &law, nullptr));
+  check(PetscOptionsGetEList(nullptr, prefix, "-friction", slidings.data(), 2, &sliding, nullptr));
   check(PetscOptionsGetEList(nullptr, prefix, "-contact_solver", solvers.data(), 2, &solver, nullptr));
   check(PetscOptionsGetReal(nullptr, prefix, "-contact_tolerance", &step.contact.tolerance, nullptr));
   check(PetscOptionsGetInt(nullptr, prefix, "-contact_max_it", &max_it, nullptr));
@@ -38,6 +42,7 @@ void read_options(ThetaStep& step)
   if (max_it < 1) throw Error("-transient_contact_max_it must be at least 1");
   if (!(step.contact.rho >= 0 && step.contact.rho < 2))
     throw Error("-transient_contact_rho must be at least 0 and below 2: the fixed point contracts nowhere else");
+  step.opposed = sliding == 0 ? Opposed::theta : Opposed::end;
   step.law = law == 0 ? ContactLaw::displacement : ContactLaw::velocity;
   step.contact.solver = solvers[static_cast<std::size_t>(solver)];
   step.contact.max_iterations = static_cast<int>(max_it);
@@ -70,9 +75,48 @@ std::vector<double> free_contact_velocity(const ThetaStep& step, const Interface
   return b;
 }
 
-/// Solves contact on rank 0, where W is, and hands each r to every rank. `b`: one problem's after the other's.
+/// (1-theta)/theta s of the state's sliding velocity s, on tangential rows: friction opposes s+ and that. Nothing for
+/// pairs that stuck, whose s is rounding. Collective; the result is on rank 0.
+std::vector<double> earlier_sliding(const ThetaStep& step, const Interface& interface, const State& state)
+{
+  std::vector<double> s = relative(interface, state.v);
+  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
+  const double part = step.opposed == Opposed::theta ? (1 - step.theta) / step.theta : 0;
+  const std::vector<ContactStatus> status = contact_status(interface, state.reactions);
+  for (std::size_t i = 0; i < interface.gap.size(); ++i)
+  {
+    s[i * block] = 0;
+    for (std::size_t k = 0; k < directions; ++k)
+      s[i * block + 1 + k] =
+          status[i] == ContactStatus::stick ? 0 : part * (s[i * block + 1 + k] - interface.drive[i * directions + k]);
+  }
+  return s;
+}
+
+/// Takes the earlier sliding away from closed pairs that it would bring to rest or turn back: friction does neither by
+/// itself, and a pair at rest must not be one that swings about it. Returns whether there were any. w = W r + b, b with
+/// it.
+bool forget_where_turned(const Interface& interface, const std::vector<double>& r, const std::vector<double>& w,
+                         double* earlier)
+{
+  bool any = false;
+  const auto block = static_cast<std::size_t>(interface.block());
+  for (std::size_t i = 0; i < r.size(); i += block)
+  {
+    double along = 0;
+    for (std::size_t k = i + 1; k < i + block; ++k) along += (w[k] - earlier[k]) * earlier[k];
+    if (r[i] <= 0 || along >= 0) continue;
+    std::fill_n(earlier + i, block, 0.);
+    any = true;
+  }
+  return any;
+}
+
+/// Solves contact on rank 0, where W is, and hands each r to every rank. `b`, `earlier`: one problem's after the
+/// other's.
 void find_reactions(const ThetaStep& step, const Interface& interface, const std::vector<double>& b,
-                    std::span<StepWork> works, std::span<State> states, std::span<StepReport> reports, MPI_Comm comm)
+                    std::vector<double> earlier, std::span<StepWork> works, std::span<State> states,
+                    std::span<StepReport> reports, MPI_Comm comm)
 {
   // One message: iterations, residual, converged, r of each. Latency counts on small models.
   const std::size_t size = interface.size(), length = size + 3;
@@ -80,20 +124,36 @@ void find_reactions(const ThetaStep& step, const Interface& interface, const std
   std::vector<double> told(length * states.size(), -1);
   const auto solve_all = [&]
   {
-    std::vector<std::vector<double>> mine;
-    for (std::size_t k = 0; k < states.size(); ++k) mine.emplace_back(&b[k * size], &b[k * size] + size);
-    std::vector<ContactProblem> problems;
-    for (std::size_t k = 0; k < states.size(); ++k) problems.push_back({mine[k], states[k].reactions, works[k].memory});
-    const auto results = solve_contacts(step.W, interface.friction, step.contact, problems);
-    for (std::size_t k = 0; k < states.size(); ++k)
+    std::vector<std::size_t> open(states.size()); // problems
+    std::iota(open.begin(), open.end(), 0);
+    while (!open.empty())
     {
-      const auto& [iterations, residual, converged] = results[k];
-      double* const entries = &told[k * length];
-      entries[0] = iterations;
-      entries[1] = residual;
-      entries[2] = converged ? 1 : 0;
-      std::copy(states[k].reactions.begin(), states[k].reactions.end(), entries + 3);
+      std::vector<std::vector<double>> mine;
+      std::vector<ContactProblem> problems;
+      for (const std::size_t k : open)
+      {
+        mine.emplace_back(size);
+        std::transform(&b[k * size], &b[k * size] + size, &earlier[k * size], mine.back().begin(), std::plus<>());
+      }
+      for (std::size_t j = 0; j < open.size(); ++j)
+        problems.push_back({mine[j], states[open[j]].reactions, works[open[j]].memory});
+      const auto results = solve_contacts(step.W, interface.friction, step.contact, problems);
+      std::vector<std::size_t> again;
+      for (std::size_t j = 0; j < open.size(); ++j)
+      {
+        const std::size_t k = open[j];
+        double* const entries = &told[k * length];
+        entries[0] = std::max(entries[0], 0.) + results[j].iterations;
+        entries[1] = results[j].residual;
+        entries[2] = results[j].converged ? 1 : 0;
+        const std::vector<double>& Wr = works[k].memory.Wr.front();
+        std::transform(Wr.begin(), Wr.end(), mine[j].begin(), mine[j].begin(), std::plus<>());
+        if (forget_where_turned(interface, states[k].reactions, mine[j], &earlier[k * size])) again.push_back(k);
+      }
+      open = std::move(again);
     }
+    for (std::size_t k = 0; k < states.size(); ++k)
+      std::copy(states[k].reactions.begin(), states[k].reactions.end(), &told[k * length] + 3);
   };
   if (rank_of(comm) == 0)
   {
@@ -192,7 +252,7 @@ std::vector<double> push_apart(const ThetaStep& step, const Interface& interface
                                std::span<StepWork> works, std::span<State> states, std::span<StepReport> reports,
                                MPI_Comm comm)
 {
-  std::vector<double> b, lambda;
+  std::vector<double> b, earlier, lambda;
   const std::size_t size = interface.size();
   for (std::size_t k = 0; k < states.size(); ++k)
   {
@@ -201,8 +261,10 @@ std::vector<double> push_apart(const ThetaStep& step, const Interface& interface
         free_contact_velocity(step, interface, states[k], works[k],
                               {first, Bv_free.empty() ? first : first + static_cast<std::ptrdiff_t>(size)});
     b.insert(b.end(), mine.begin(), mine.end());
+    const std::vector<double> s = earlier_sliding(step, interface, states[k]);
+    earlier.insert(earlier.end(), s.begin(), s.end());
   }
-  find_reactions(step, interface, b, works, states, reports, comm);
+  find_reactions(step, interface, b, std::move(earlier), works, states, reports, comm);
   for (std::size_t k = 0; k < states.size(); ++k)
   {
     check(VecSet(works[k].f, 0));

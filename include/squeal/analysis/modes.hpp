@@ -67,11 +67,4 @@ RealModes find_real_modes_below(const Structure& structure, const Interface& int
 Modes find_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                  const ModesSettings& settings);
 
-/// The first mode as steps of size h and theta see it. They take the direction of friction at their end (method, eq.
-/// 5), as if the mass were M + h (1-theta) C_f with the derivative C_f of that direction: an error of first order in h,
-/// and in sliding the only one beside the theory's lambda_h (step_guards.hpp). The mode itself where C_f is not there
-/// or off.
-ComplexMode mode_seen_by_step(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                              const std::vector<ComplexMode>& modes, double theta, double h);
-
 } // namespace squeal

@@ -5,14 +5,17 @@
 /// The others, the active ones, keep unilateral contact and Coulomb friction. Then y = V q, V dense:
 ///     M q'' + C q' + K q = H (r - r0),   M = (Y V)'M (Z V) ...,  H = (Y V)'B_a',
 ///     g = g0 + G_n q >= 0,   s = G_t q' - v_d,   G = B_a Z V,
-/// all three matrices unsymmetric. V holds the complex modes of the full problem in the band (real and imaginary parts,
-/// so that the reduced model has exactly their growth rates) and the attachment shapes of the active pairs,
+/// all three matrices unsymmetric. V holds the complex modes of the full problem in the band (real and imaginary
+/// parts, so that the reduced model has exactly their growth rates) and the attachment shapes of the active pairs,
 ///     (K_z + w^2 M_z) X = Z'B_a',   K_z = Z'K Z, w the followed mode's,
-/// orthonormal in the energy of K_z + w^2 M_z; of the attachments what is new above a threshold. One shape a pair, of
-/// Z'(B_n' + mu B_t'e) with e along the drive, does for a preconditioner; a cycle of its own needs them all.
+/// orthonormal in the energy of K_z + w^2 M_z; of the attachments what is new above a threshold.
 ///
-/// Caveats: an eliminated pair's friction turns with the sliding direction to first order only (C_f), and it is taken
-/// never to part or stick. What all that is worth is measured: one period of the full model from the reduced cycle.
+/// Active pairs that slide along the drive throughout, e, have one row and one shape each instead of three, of
+/// B_n' + mu B_t'e: the normal force with the friction that it brings along.
+///
+/// Caveats: friction that follows turns with the sliding direction to first order only, by C_f of the reaction at
+/// equilibrium, and an eliminated pair is taken never to part or stick. What all that is worth is measured: one period
+/// of the full model from the reduced cycle.
 ///
 /// Everything reduced is dense, small, and the same on every rank.
 #include "squeal/analysis/block.hpp"
@@ -27,18 +30,19 @@ namespace squeal
 struct ReducedModel
 {
   Eigen::MatrixXd M, C, K;                        // size x size [of kg, N s/m, N/m]
-  Eigen::MatrixXd H, G;                           // size x rows, rows x size; block rows a pair: normal, tangential
+  Eigen::MatrixXd H, G;                           // size x rows, rows x size; of a pair: normal, tangential
   Eigen::MatrixXd M_z, C_z, K_z;                  // symmetric: V'Z'M Z V ..., of the energies
   Eigen::LLT<Eigen::MatrixXd> E_factor, M_factor; // of K_z + omega^2 M_z, M_z
   std::vector<int> active;                        // pairs, ascending
-  int directions = 2;
+  int directions = 2;                             // tangential ones of an active pair; 0: friction follows
   double friction = 0;
   std::vector<double> gap;        // [m] at equilibrium, per active pair
   std::vector<double> drive;      // [m/s]
   std::vector<double> reactions;  // [N] r0
   Block shapes;                   // Z V, dofs x size: u = u0 + shapes q
   double omega = 0;               // [rad/s] of the followed mode
-  int modes = 0, attachments = 0; // columns of V
+  int modes = 0, attachments = 0; // columns that V came from
+  Eigen::Index slow = 0;          // those that swing by less than four times omega, the first ones
 
   int size() const { return static_cast<int>(M.rows()); }
 };
@@ -47,11 +51,14 @@ struct ReducedModel
 std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
                                        const ComplexMode& mode, double amplitude);
 
+/// Whether no pair comes to rest or turns round in that motion's velocity.
+bool slide_throughout(const Interface& interface, const ComplexMode& mode, double amplitude);
+
 struct Reduction
 {
   int modes = 0;           // complex modes taken, nearest in frequency to the followed one, which is the first of all
   double threshold = 1e-5; // an attachment shape is dropped when less than this part of it is new
-  bool sliding_forces = false; // attachments of each pair's normal force with its friction alone
+  bool sliding = false;    // the active pairs slide along the drive throughout
 };
 
 ReducedModel reduce(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
@@ -82,6 +89,7 @@ struct ReducedContact
   Eigen::VectorXd w{};                     // [m/s] W r + b
   Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
   int unread = 0;                          // steps since W was read in double precision
+  std::vector<bool> opposes_end{};         // by pairs: friction opposes s+ there, elsewhere s_theta
   Eigen::MatrixXf along{}; // W_nn + W_nt e of those directions e in which friction was then, mu included
 };
 
@@ -116,6 +124,9 @@ void prepare(ReducedMap& map, double period);
 /// the natural map over the largest reaction. Returns whether it converged.
 bool solve_contact(const ReducedMap& map, const Eigen::VectorXd& b, ReducedContact& contact);
 
+/// Whether a pair's friction stays inside the Coulomb disc.
+bool sticks(const Eigen::VectorXd& r, double friction);
+
 /// One step. Returns whether contact converged.
 bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact);
 
@@ -131,20 +142,25 @@ struct Passage
 
 Passage pass(ReducedMap& map, double period, ReducedState state);
 
-/// The derivative of a period's end (q, v) in its start: the product of the steps' own, exact where no pair changes its
-/// state within rounding. Collective: each rank does its share of the columns.
-Eigen::MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, MPI_Comm comm);
+/// The derivative of a period's end (q, v) in the first `slow` coordinates of q and of v: the product of the steps'
+/// own, exact where no pair changes its state within rounding. Collective: each rank does its share of the columns.
+Eigen::MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, Eigen::Index slow, MPI_Comm comm);
 
-/// D = (dPhi_r/dx - f f^+ - I)^-1 + I at a state: f is the flow, along which the border of the shooting decides.
-Eigen::MatrixXd inside_of(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm);
+/// D = (dPhi_r/dx S S' - f f^+ - I)^-1 + I at a state, as left x right: f is the flow, along which the border of the
+/// shooting decides; S the coordinates of the modes, since those of the attachments are forgotten within a period.
+struct Inside
+{
+  Eigen::MatrixXd left, right;
+};
+
+Inside inside_of(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm);
 
 /// P^-1 x = -x + D x on the reduced model. Borrows D.
-Preconditioner reduced_preconditioner(const Eigen::MatrixXd& inside);
+Preconditioner reduced_preconditioner(const Inside& inside);
 
 /// P^-1 x = -x + V D R x on the full model, V the shapes, R the coordinates in them: what lies outside is taken as
 /// forgotten within a period. Borrows all three.
-Preconditioner reduced_preconditioner(const ReducedModel& model, const Structure& structure,
-                                      const Eigen::MatrixXd& inside);
+Preconditioner reduced_preconditioner(const ReducedModel& model, const Structure& structure, const Inside& inside);
 
 /// The flow for shooting; borrows the map and the matrices of `norm`.
 Flow flow_of(ReducedMap& map, const Structure& norm);

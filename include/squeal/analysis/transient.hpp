@@ -1,8 +1,13 @@
 #pragma once
 /// Exact-contact transient by the modified theta-method (method, section 4):
 ///     A v+ = [M - h(1-theta) C - h^2 theta(1-theta) K] v - h K u + h F + h B'r+,   A = M + h theta C + h^2 theta^2 K,
-///     0 <= gap + B_n ut + h B_n v+  _|_  r_n+ >= 0,   ut = u + h(1-theta) v,   r_t+ in the Coulomb disc, opposing s+.
+///     0 <= gap + B_n ut + h B_n v+  _|_  r_n+ >= 0,   ut = u + h(1-theta) v,   r_t+ in the Coulomb disc.
 /// Reactions are implicit, an impulse h r+ of the whole step; theta = 1/2 adds no damping of its own.
+///
+/// Friction opposes s_theta = theta s+ + (1-theta) s, the velocity that its work is done with: a step is then of second
+/// order in sliding where friction turns, too, and friction never gives energy. Where that would stop a pair or turn
+/// it back it opposes s+ instead, since s_theta = 0 is not rest. (The paper's s+ everywhere is of first order where
+/// friction turns.)
 #include "squeal/analysis/estimate.hpp"
 #include "squeal/analysis/paired_matrices.hpp"
 #include "squeal/analysis/step_guards.hpp"
@@ -23,6 +28,13 @@ enum class ContactLaw
   velocity,
 };
 
+/// What friction opposes: s_theta, or s+.
+enum class Opposed
+{
+  theta,
+  end,
+};
+
 /// Everything that depends on h: factored A and W = h B A^-1 B', so that contact solves w = W r + b for r in N.
 /// Built once per h.
 struct ThetaStep
@@ -32,6 +44,7 @@ struct ThetaStep
   Factor factor;                          // of A bordered by B
   ContactOperator W;                      // on rank 0
   ContactLaw law = ContactLaw::displacement;
+  Opposed opposed = Opposed::theta;
   ContactSettings contact;
   double factor_seconds = 0, condensed_seconds = 0; // to factor A with the corner that W is, to prepare W
 };
@@ -39,7 +52,8 @@ struct ThetaStep
 /// A
 Owned<Mat> step_matrix(const Structure& structure, double h, double theta);
 
-/// Options, prefix -transient_: contact_law (displacement | velocity), contact_solver (gauss_seidel | fixed_point),
+/// Options, prefix -transient_: contact_law (displacement | velocity), friction (theta |
+/// end), contact_solver (gauss_seidel | fixed_point),
 /// contact_tolerance, contact_max_it, contact_rho, contact_extrapolation. Error: h not above 0, theta not in (0, 1].
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta);
 
