@@ -30,9 +30,7 @@ Doubled double_steps(Fitting& fitting, ReducedOrbit once, int steps)
 {
   ReducedOrbit twice = shoot_reduced(fitting, once.state, once.period, 2 * steps);
   ReducedOrbit four_times = shoot_reduced(fitting, twice.state, twice.period, 4 * steps);
-               four_times.period, once.energy, twice.energy, four_times.energy, once.converged, twice.converged,
-               four_times.converged);
-               return {std::move(once), std::move(twice), std::move(four_times)};
+  return {std::move(once), std::move(twice), std::move(four_times)};
 }
 
 /// Errors of a cycle that are 1/part of its difference from the one at twice or half as many steps.
