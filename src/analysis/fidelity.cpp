@@ -100,17 +100,18 @@ struct Pursuit
   std::string reason{}; // what is in the way
 };
 
-void move_to(Pursuit& pursuit, Vec state, double period)
+void move_to(Pursuit& pursuit, Vec state, double period, int steps)
 {
-  pursuit.map.steps = pursuit.fitting.steps;
+  pursuit.map.steps = steps;
   pursuit.at = evaluate(pursuit.shooting, state, period);
   record(pursuit.shooting, "full period", full_unknowns(pursuit.at), std::nan(""), pursuit.at);
 }
 
-/// Shoots until what is still to come is below this part of the wish.
-void shoot_to(Pursuit& pursuit, double part)
+/// Shoots until what is still to come is below half of the wish.
+void shoot_on(Pursuit& pursuit)
 {
-  pursuit.shooting.wish = part * pursuit.fitting.result.fidelity.accuracy;
+  if (!pursuit.reason.empty()) return;
+  pursuit.shooting.wish = pursuit.fitting.result.fidelity.accuracy / 2;
   Finish finish = shoot_multisecant(pursuit.shooting, pursuit.at);
   pursuit.at = std::move(finish.orbit);
   if (finish.ending != Ending::converged)
@@ -118,19 +119,36 @@ void shoot_to(Pursuit& pursuit, double part)
         "the wish was not met in " + std::to_string(pursuit.shooting.periods) + " periods of the full model";
 }
 
-/// With few steps a period at first; the reduced model knows what more of them do to the period.
+/// What errors of second order in the step leave of the difference between a and b steps a period at c, a < b < c.
+double beyond(int a, int b, int c)
+{
+  const auto error = [](int steps) { return 1. / steps / steps; };
+  return (error(b) - error(c)) / (error(a) - error(b));
+}
+
+/// With few steps a period first, as many as are wished for last; where these are many more, with some between, and by
+/// what those changed further on.
 void pursue(Pursuit& pursuit)
 {
   Fitting& fitting = pursuit.fitting;
-  shoot_to(pursuit, 4);
+  const int few = fitting.steps;
+  shoot_on(pursuit);
   if (!pursuit.reason.empty()) return;
-  ReducedOrbit fine = pursuit.orbit;
-  pursuit.reason = choose_steps(fitting, fine);
-  if (!pursuit.reason.empty()) return;
-  const Owned<Vec> state = copy_of(pursuit.at.state.get());
-  if (fitting.steps != pursuit.map.steps)
-    move_to(pursuit, state, pursuit.at.period * fine.period / pursuit.orbit.period);
-  shoot_to(pursuit, .5);
+  const double period = pursuit.orbit.period;
+  pursuit.reason = choose_steps(fitting, pursuit.orbit);
+  if (!pursuit.reason.empty() || fitting.steps == few) return;
+  const int all = fitting.steps, some = 4 * static_cast<int>(std::sqrt(few * all) / 4);
+  const Orbit first = copy_of(pursuit.at);
+  const double change = (pursuit.orbit.period / period - 1) * first.period; // as the reduced model has it
+  Owned<Vec> state = copy_of(first.state);
+  if (all < 4 * few) return move_to(pursuit, state, first.period + change, all), shoot_on(pursuit);
+  const double part = 1 / (1 + beyond(few, some, all));
+  move_to(pursuit, state, first.period + part * change, some);
+  shoot_on(pursuit);
+  state = copy_of(pursuit.at.state);
+  check(VecAXPBY(state, -beyond(few, some, all), 1 + beyond(few, some, all), first.state));
+  move_to(pursuit, state, pursuit.at.period + beyond(few, some, all) * (pursuit.at.period - first.period), all);
+  shoot_on(pursuit);
 }
 
 /// The cycle of the full model as far as it is wished for; says what is in the way.
@@ -148,7 +166,7 @@ std::string fit(Fitting& fitting, const ShootingStart& start, const Precondition
   shooting.options.max_periods = fitting.options.corrections;
   Pursuit pursuit{fitting, map, shooting, {}, std::move(orbit)};
   const Owned<Vec> first = state_of(start.u, start.v);
-  move_to(pursuit, first, start.period);
+  move_to(pursuit, first, start.period, fitting.steps);
   if (fidelity.asked == "auto")
     pursue(pursuit);
   else

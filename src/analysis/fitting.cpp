@@ -228,7 +228,7 @@ std::string first_orbit(Fitting& fitting, ReducedOrbit& orbit)
     if (reached > 1.2 * amplitude && fitting.result.fidelity.reduced_periods < fitting.options.free_periods)
     {
       motion = motion_of(full, model, free.state);
-      amplitude = reached;
+      amplitude = 1.5 * reached; // it was still growing
       continue;
     }
     free.state =
