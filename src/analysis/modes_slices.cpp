@@ -127,21 +127,4 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
   return result;
 }
 
-Eigenpair solve_near(const QuadraticProblem& problem, std::complex<double> lambda)
-{
-  constexpr int count = 50; // V without its neighbours is corrected slowly: brakes have dozens of nearly equal pairs
-  constexpr double near = 2e-2, exact = 1e-15;
-  const double square = std::norm(lambda);
-  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none);
-  move_to(pencil, (1 + 1e-3) * square); // not on it, where there is no factor
-  Eigenpair result{lambda, {}, {}, INFINITY};
-  const Nearest nearest = solve_nearest(pencil, count, 0, invariant);
-  if (!nearest.converged) return result;
-  const Correction correction{{(1 - near) * square, (1 + near) * square}, passes, count, exact, exact, share};
-  for (Eigenpair& pair : solve_on_subspace(problem, nearest.space, *pencil.factor, correction).pairs)
-    if (!result.real.get() || std::abs(pair.lambda - lambda) < std::abs(result.lambda - lambda))
-      result = std::move(pair);
-  return result;
-}
-
 } // namespace squeal

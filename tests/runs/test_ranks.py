@@ -36,8 +36,8 @@ def test_brake_eigenvalues(brakes):
 
 
 def test_brake_transient(brakes):
-    """Growth fitted over two periods of exact contact is the discrete mode's, friction's direction at the end of each
-    step included (0.4 % of it): 1e-6, the contact tolerance seen through the fit."""
+    """Growth fitted over two periods of exact contact is the mode's by the theory of the step, though friction turns:
+    1e-6, the contact tolerance seen through the fit."""
     for run in brakes:
         transient = run["transient"]
         assert transient["energy_defect_max"] < 1e-10

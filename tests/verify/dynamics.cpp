@@ -189,6 +189,61 @@ TEST_CASE("a sliding brick stops where and when Coulomb says")
   CHECK(std::abs(whole(state.u)[1] - v0 * stop / 2) < mu * g * h * h / 8 + 1e-10);
 }
 
+namespace
+{
+
+/// A mass on a belt, pressed with 2 N and held by springs along and across it: sliding, friction turns with its swing
+/// across. Ends after a second, and what friction took beside what it brought; the work it should have taken is
+/// h mu r_n |s_theta|.
+std::vector<double> swung_across(int steps, double& worst)
+{
+  const double mu = .5, h = 1. / steps, theta = .5;
+  const std::vector<double> belt = {1, 0};
+  test::SmallModel model;
+  model.structure =
+      test::make_structure(test::diagonal({1, 1, 1}), test::zeros(3, 3), test::diagonal({1, 30, 50}), {-2, 0, 0});
+  model.interface = test::make_interface({{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, 2, {0}, belt, mu, model.structure.K);
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta);
+  State state = state_of(model.structure, {0, 0, .05}, {0, 0, .3});
+  StepWork work = begin_steps(step, model.structure, model.interface, state);
+  worst = 0;
+  for (int i = 0; i < steps; ++i)
+  {
+    const std::vector<double> before = whole(state.v);
+    const StepReport report = advance(step, model.structure, model.interface, work, state);
+    const std::vector<double> after = whole(state.v), &r = state.reactions;
+    CHECK(report.slip == 1);
+    double speed = 0, work_of_belt = 0;
+    for (std::size_t k = 0; k < 2; ++k)
+    {
+      speed = std::hypot(speed, theta * after[k + 1] + (1 - theta) * before[k + 1] - belt[k]);
+      work_of_belt += h * r[k + 1] * belt[k];
+    }
+    worst = std::max(worst, std::abs(report.contact_work - work_of_belt + h * mu * r[0] * speed));
+  }
+  return whole(state.u);
+}
+
+/// The error across the belt at n steps over that at twice as many, from the change on halving.
+double error_ratio(int steps, double& worst)
+{
+  const double coarse = swung_across(steps, worst)[2], middle = swung_across(2 * steps, worst)[2],
+               fine = swung_across(4 * steps, worst)[2];
+  return std::abs((coarse - middle) / (middle - fine));
+}
+
+} // namespace
+
+TEST_CASE("sliding is of second order where friction turns, and friction takes mu r_n |s_theta|; by s+ of first")
+{
+  double worst = 0;
+  CHECK(error_ratio(50, worst) == doctest::Approx(4).epsilon(.05)); // the next order is h^2 of it, and the least phase
+  CHECK(worst < 1e-14);
+  const WithOption end("-transient_friction", "end");
+  CHECK(error_ratio(50, worst) == doctest::Approx(2).epsilon(.1)); // mixed with the second order of the rest
+  CHECK(worst > 1e-8);
+}
+
 TEST_CASE("the energy identity holds in every step: lift-off, touch, stick and slip, any theta, both laws")
 {
   for (const char* law : {"displacement", "velocity"})

@@ -39,7 +39,4 @@ struct CountedSolution
 /// All pairs below the band [Hz], and a little further for the count, which `real` plans and checks.
 CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real, double band);
 
-/// The pair nearest lambda; its backward error is infinite if none was found.
-Eigenpair solve_near(const QuadraticProblem& problem, std::complex<double> lambda);
-
 } // namespace squeal
