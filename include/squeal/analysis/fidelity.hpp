@@ -8,10 +8,10 @@
 /// half of the step before, since their signs alternate.
 ///
 /// "reduced": two periods of the full model tell the reduced cycle's error. "auto": the full model's cycle until the
-/// wish is met; the number of steps a period from the reduced model's cycles at twice and four times as many, whose
-/// difference also carries the full cycle over to more steps. Where that does not converge, where the reduced model
-/// would not be small, or where several modes are unstable, the full model takes over. The active pairs and the reduced
-/// model's errors decide how soon this ends, not where.
+/// wish is met, with few steps a period first. How many it takes the reduced model's cycles tell, at twice and four
+/// times as many; the full cycle gets there by way of a number between, extrapolated by the step's second order. Where
+/// that does not converge, where the reduced model would not be small, or where several modes are unstable, the full
+/// model takes over. The active pairs and the reduced model's errors decide how soon this ends, not where.
 #include "squeal/analysis/cycle.hpp"
 
 namespace squeal
