@@ -80,10 +80,10 @@ double mean(const std::vector<double>& values)
 
 } // namespace
 
-State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int samples, LimitCycle& cycle)
+State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int samples, Vec rate, LimitCycle& cycle)
 {
-  State state = copy_of(cycle.start);
-  state.reactions = map.reactions;
+  cycle.start.reactions = map.reactions;
+  State state = copy_of(cycle.start), before = copy_of(cycle.start);
   set_period(map, cycle.period);
   int done = 0;
   const auto watch = [&](const State& now, const StepReport&, const StepWork&)
@@ -91,13 +91,24 @@ State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int sa
     cycle.statuses.push_back(contact_status(map.interface, now.reactions));
     // evenly spread over the period whatever the two numbers
     if ((done + 1) * samples / map.steps > done * samples / map.steps) cycle.displacements.push_back(copy_of(now.u));
-    ++done;
+    if (++done + 1 == map.steps) before = copy_of(now);
   };
-  march(map.step, map.structure, map.interface, equilibrium, probes, map.steps, state, cycle.history, watch);
+  const MarchSummary summary =
+      march(map.step, map.structure, map.interface, equilibrium, probes, map.steps, state, cycle.history, watch);
+  map.unconverged += summary.unconverged;
+  if (rate)
+  {
+    map.reactions = state.reactions;
+    State after = copy_of(state);
+    StepWork work = begin_steps(map.step, map.structure, map.interface, after);
+    (void)advance(map.step, map.structure, map.interface, work, after);
+    check(VecWAXPY(displacement(rate), -1, before.u, after.u));
+    check(VecWAXPY(velocity(rate), -1, before.v, after.v));
+    check(VecScale(rate, 0.5 / map.step.h));
+  }
   cycle.factor_seconds = map.step.factor_seconds;
   cycle.condensed_seconds = map.step.condensed_seconds;
   ++cycle.periods_integrated;
-  cycle.start.reactions = map.reactions;
   const History& history = cycle.history;
   if (history.energy.empty()) return state;
   cycle.mean_energy = mean(history.energy);
@@ -170,7 +181,7 @@ LimitCycle shoot_at_model(const Structure& structure, const Interface& interface
   LimitCycle cycle = shoot(flow_of(map), start, preconditioner, settings.tolerance, free_periods);
   cycle.steps_per_period = settings.steps_per_period;
   cycle.theta = settings.theta;
-  measure(map, equilibrium, probes, static_cast<int>(read_options().samples), cycle);
+  (void)measure(map, equilibrium, probes, static_cast<int>(read_options().samples), nullptr, cycle);
   if (map.step.law == ContactLaw::velocity && cycle.outcome.word != "converged")
     cycle.outcome.reason += "; by the velocity law the period map jumps where a step begins open or closed: "
                             "-transient_contact_law displacement";

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
+#include <utility>
 
 namespace squeal
 {
@@ -11,33 +11,25 @@ namespace squeal
 namespace
 {
 
-/// Reduced cycles at so many steps a period, twice and four times as many.
-struct Doubled
+/// What a cycle at some number of steps a period is worth.
+struct Found
 {
-  ReducedOrbit once, twice, four_times;
-
-  bool converged() const { return once.converged && twice.converged && four_times.converged; }
-
-  /// At which the energy converges: 1 where impacts make it, 2 else.
-  double order() const
-  {
-    const double first = std::abs(once.energy - twice.energy), second = std::abs(twice.energy - four_times.energy);
-    return std::clamp(std::log2(first / second), 1., 2.);
-  }
+  int steps = 0;
+  double period = 0, energy = 0; // [s], [J]
 };
 
-Doubled double_steps(Fitting& fitting, ReducedOrbit once, int steps)
+/// Errors that fall with this power of the steps: what of the difference between a and b steps is left at c.
+double left_at(int a, int b, int c, double order)
 {
-  ReducedOrbit twice = shoot_reduced(fitting, once.state, once.period, 2 * steps);
-  ReducedOrbit four_times = shoot_reduced(fitting, twice.state, twice.period, 4 * steps);
-  return {std::move(once), std::move(twice), std::move(four_times)};
+  return std::pow(c, -order) / (std::pow(a, -order) - std::pow(b, -order));
 }
 
-/// Errors of a cycle that are 1/part of its difference from the one at twice or half as many steps.
-void judge_steps(Fidelity& fidelity, const ReducedOrbit& orbit, const ReducedOrbit& other, double part)
+/// The finer one's errors.
+void judge_steps(Fidelity& fidelity, const Found& coarse, const Found& fine, double order)
 {
-  fidelity.step_frequency_error = std::abs(other.period / orbit.period - 1) / part;
-  fidelity.step_energy_error = std::abs(other.energy / orbit.energy - 1) / part;
+  const double left = left_at(coarse.steps, fine.steps, fine.steps, order);
+  fidelity.step_frequency_error = left * std::abs(coarse.period / fine.period - 1);
+  fidelity.step_energy_error = left * std::abs(coarse.energy / fine.energy - 1);
 }
 
 double step_error(const Fidelity& fidelity)
@@ -45,39 +37,18 @@ double step_error(const Fidelity& fidelity)
   return std::max(fidelity.step_frequency_error, fidelity.step_energy_error);
 }
 
-/// Steps a period for which the step's error, of this order, is a third of the wish, and its growth rate's (omega
-/// h)^2/4 the wish.
-int steps_for(const Fidelity& fidelity, int steps, double order)
+/// At which three energies converge: 2 where the motion is smooth, less through impacts, never taken for less than 1.
+double order_of(const Found& coarse, const Found& middle, const Found& fine)
 {
-  const double measured = steps * std::pow(3 * step_error(fidelity) / fidelity.accuracy, 1 / order);
-  const double theory = std::numbers::pi / std::sqrt(fidelity.accuracy);
-  return static_cast<int>(std::ceil(std::max(measured, theory)));
-}
-
-/// The reduced cycle with as many steps a period as the wish needs, judged by doublings of the reduced model alone.
-/// Says what is in the way, or nothing.
-std::string choose_steps(Fitting& fitting, ReducedOrbit& orbit)
-{
-  Fidelity& fidelity = fitting.result.fidelity;
-  Doubled cycles = double_steps(fitting, std::move(orbit), fitting.steps);
-  judge_steps(fidelity, cycles.once, cycles.twice, 1 - std::pow(2, -cycles.order()));
-  orbit = cycles.once;
-  for (int tries = 0; cycles.converged() && fidelity.asked == "auto"; ++tries)
+  const double seen = (coarse.energy - middle.energy) / (middle.energy - fine.energy);
+  double order = 1;
+  const auto expected = [&](double p)
   {
-    if (step_error(fidelity) <= fidelity.accuracy / 2) return {};
-    if (tries == 5) return "the wish needs more than " + std::to_string(fitting.steps) + " steps a period";
-    // far from the limit an order is not seen yet, and the better one costs less to try
-    const int quarter = steps_for(fidelity, fitting.steps, tries == 0 ? 2 : cycles.order()) / 4;
-    fitting.steps = 4 * std::max(quarter, fitting.steps / 4 + 2);
-    const ReducedOrbit& near = cycles.twice;
-    cycles =
-        double_steps(fitting, shoot_reduced(fitting, near.state, near.period, fitting.steps / 4), fitting.steps / 4);
-    judge_steps(fidelity, cycles.four_times, cycles.twice, std::pow(2, cycles.order()) - 1);
-    orbit = cycles.four_times;
-  }
-  if (cycles.converged()) return {};
-  fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
-  return "the reduced model has no cycle at some numbers of steps a period up to " + std::to_string(4 * fitting.steps);
+    return (std::pow(coarse.steps, -p) - std::pow(middle.steps, -p)) /
+           (std::pow(middle.steps, -p) - std::pow(fine.steps, -p));
+  };
+  while (order < 2 && expected(order) < seen) order += .05;
+  return order;
 }
 
 /// -cycle_start: the full shooting starts from the estimate, or from the reduced model's cycle.
@@ -95,9 +66,11 @@ struct Pursuit
   Fitting& fitting;
   PeriodMap& map;
   Shooting& shooting;
-  Orbit at;             // of the full model
-  ReducedOrbit orbit;   // of the reduced one
+  const LimitCycle& seen; // of the last period integrated
+  Orbit at;
   std::string reason{}; // what is in the way
+
+  Found found() const { return {map.steps, at.period, seen.mean_fluctuating_energy}; }
 };
 
 void move_to(Pursuit& pursuit, Vec state, double period, int steps)
@@ -107,79 +80,92 @@ void move_to(Pursuit& pursuit, Vec state, double period, int steps)
   record(pursuit.shooting, "full period", full_unknowns(pursuit.at), std::nan(""), pursuit.at);
 }
 
-/// Shoots until what is still to come is below half of the wish.
-void shoot_on(Pursuit& pursuit)
+/// Shoots until what is still to come is below half of the wish; returns whether it got there.
+bool shoot_on(Pursuit& pursuit)
 {
-  if (!pursuit.reason.empty()) return;
   pursuit.shooting.wish = pursuit.fitting.result.fidelity.accuracy / 2;
   Finish finish = shoot_multisecant(pursuit.shooting, pursuit.at);
   pursuit.at = std::move(finish.orbit);
-  if (finish.ending != Ending::converged)
-    pursuit.reason =
-        "the wish was not met in " + std::to_string(pursuit.shooting.periods) + " periods of the full model";
+  if (finish.ending == Ending::converged) return true;
+  pursuit.reason = "the wish was not met in " + std::to_string(pursuit.shooting.periods) + " periods of the full model";
+  return false;
 }
 
-/// What errors of second order in the step leave of the difference between a and b steps a period at c, a < b < c.
-double beyond(int a, int b, int c)
-{
-  const auto error = [](int steps) { return 1. / steps / steps; };
-  return (error(b) - error(c)) / (error(a) - error(b));
-}
-
-/// With few steps a period first, as many as are wished for last; where these are many more, with some between, and by
-/// what those changed further on.
+/// The cycle at few steps a period and at twice as many; where these are still too few, at as many as the errors of
+/// both foretell, to which both are extrapolated: one or two periods of many steps do.
 void pursue(Pursuit& pursuit)
 {
   Fitting& fitting = pursuit.fitting;
-  const int few = fitting.steps;
-  shoot_on(pursuit);
-  if (!pursuit.reason.empty()) return;
-  const double period = pursuit.orbit.period;
-  pursuit.reason = choose_steps(fitting, pursuit.orbit);
-  if (!pursuit.reason.empty() || fitting.steps == few) return;
-  const int all = fitting.steps, some = 4 * static_cast<int>(std::sqrt(few * all) / 4);
-  const Orbit first = copy_of(pursuit.at);
-  const double change = (pursuit.orbit.period / period - 1) * first.period; // as the reduced model has it
-  Owned<Vec> state = copy_of(first.state);
-  if (all < 4 * few) return move_to(pursuit, state, first.period + change, all), shoot_on(pursuit);
-  const double part = 1 / (1 + beyond(few, some, all));
-  move_to(pursuit, state, first.period + part * change, some);
-  shoot_on(pursuit);
-  state = copy_of(pursuit.at.state);
-  check(VecAXPBY(state, -beyond(few, some, all), 1 + beyond(few, some, all), first.state));
-  move_to(pursuit, state, pursuit.at.period + beyond(few, some, all) * (pursuit.at.period - first.period), all);
-  shoot_on(pursuit);
+  Fidelity& fidelity = fitting.result.fidelity;
+  if (!shoot_on(pursuit)) return;
+  Orbit last = copy_of(pursuit.at);
+  Found coarse = pursuit.found();
+  move_to(pursuit, last.state, last.period, 2 * coarse.steps);
+  if (!shoot_on(pursuit)) return;
+  Found fine = pursuit.found();
+  double sure = 1, likely = 2; // orders, until a third number of steps tells
+  for (int tries = 0;; ++tries)
+  {
+    fitting.steps = fine.steps;
+    judge_steps(fidelity, coarse, fine, likely);
+    const double needed = fine.steps * std::pow(3 * step_error(fidelity) / fidelity.accuracy, 1 / likely);
+    judge_steps(fidelity, coarse, fine, sure);
+    if (step_error(fidelity) <= fidelity.accuracy / 2) return;
+    if (tries == 5) break;
+    const int all = 4 * static_cast<int>(std::ceil(std::max(needed, 1.5 * fine.steps) / 4));
+    const double beyond =
+        left_at(coarse.steps, fine.steps, fine.steps, likely) - left_at(coarse.steps, fine.steps, all, likely);
+    Orbit now = std::exchange(pursuit.at, {});
+    check(VecAXPBY(last.state, 1 + beyond, -beyond, now.state));
+    move_to(pursuit, last.state, now.period + beyond * (now.period - last.period), all);
+    if (!shoot_on(pursuit)) return;
+    sure = likely = order_of(coarse, fine, pursuit.found());
+    coarse = std::exchange(fine, pursuit.found());
+    last = std::move(now);
+  }
+  pursuit.reason = "the wish needs more than " + std::to_string(fine.steps) + " steps a period";
 }
 
 /// The cycle of the full model as far as it is wished for; says what is in the way.
-std::string fit(Fitting& fitting, const ShootingStart& start, const Preconditioner& preconditioner, ReducedOrbit orbit)
+std::string fit(Fitting& fitting, const ShootingStart& start, const Preconditioner& preconditioner,
+                const ReducedOrbit& orbit)
 {
   const double clock = MPI_Wtime();
   const Full& full = fitting.full;
   Fidelity& fidelity = fitting.result.fidelity;
-  const double reduced_before = fidelity.reduced_seconds;
+  if (fidelity.asked == "reduced")
+  {
+    const ReducedOrbit twice = shoot_reduced(fitting, orbit.state, orbit.period, 2 * fitting.steps);
+    judge_steps(fidelity, {2 * fitting.steps, twice.period, twice.energy}, {fitting.steps, orbit.period, orbit.energy},
+                1);
+    if (!twice.converged) fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
+  }
   PeriodMap map{full.structure, full.interface, fitting.steps, full.settings.theta};
   map.reactions = full.equilibrium.reactions;
   map.contact_tolerance = fidelity.contact_tolerance;
-  const Flow flow = flow_of(map);
+  LimitCycle cycle;
+  const auto integrate = [&](double period, Vec from, Vec end, Vec rate)
+  {
+    cycle = {};
+    cycle.period = period;
+    cycle.start = {copy_of(displacement(from)), copy_of(velocity(from)), 0, {}};
+    const State last = measure(map, full.equilibrium, full.probes, 32, rate, cycle);
+    check(VecCopy(last.u, displacement(end)));
+    check(VecCopy(last.v, velocity(end)));
+  };
+  const Flow flow{integrate, full.structure.M, full.structure.K};
   Progress progress(comm_of(start.u), "cycle", 20);
   Shooting shooting = begin_shooting(flow, preconditioner, start, 0, progress);
   shooting.options.max_periods = fitting.options.corrections;
-  Pursuit pursuit{fitting, map, shooting, {}, std::move(orbit)};
+  Pursuit pursuit{fitting, map, shooting, cycle, {}};
   const Owned<Vec> first = state_of(start.u, start.v);
   move_to(pursuit, first, start.period, fitting.steps);
   if (fidelity.asked == "auto")
     pursue(pursuit);
   else
-  {
     judge(shooting, pursuit.at, next_step(shooting, pursuit.at));
-    (void)choose_steps(fitting, pursuit.orbit);
-  }
 
-  LimitCycle& cycle = fitting.result.cycle;
-  cycle.period = pursuit.at.period;
-  cycle.start = {copy_of(displacement(pursuit.at.state)), copy_of(velocity(pursuit.at.state)), 0, {}};
-  cycle.steps_per_period = fitting.steps;
+  cycle.steps_per_period = map.steps;
   cycle.theta = map.theta;
   cycle.newton_iterations = shooting.iterations;
   cycle.periods_integrated = shooting.periods;
@@ -187,12 +173,12 @@ std::string fit(Fitting& fitting, const ShootingStart& start, const Precondition
   cycle.residual_projected = std::nan("");
   cycle.residual_full = pursuit.at.residual;
   cycle.outcome = {"converged", "", shooting.iterations, pursuit.at.residual};
-  (void)measure(map, full.equilibrium, full.probes, 32, cycle);
-  fidelity.steps_per_period = fitting.steps;
-  fidelity.full_periods = cycle.periods_integrated;
+  fitting.result.cycle = std::move(cycle);
+  fidelity.steps_per_period = map.steps;
+  fidelity.full_periods = shooting.periods;
   fidelity.frequency_error = shooting.to_come.frequency;
   fidelity.energy_error = shooting.to_come.energy;
-  fidelity.full_seconds += MPI_Wtime() - clock - (fidelity.reduced_seconds - reduced_before);
+  fidelity.full_seconds += MPI_Wtime() - clock;
   return pursuit.reason;
 }
 
@@ -209,7 +195,7 @@ std::string by_reduced_model(Fitting& fitting)
   const Owned<Vec> motion = motion_of(full, fitting.reduced.model, orbit.state);
   check(VecAXPY(displacement(motion), 1, full.equilibrium.u));
   const ShootingStart start{full.equilibrium.u, displacement(motion), velocity(motion), orbit.period, {}, {}};
-  if (fitting.result.fidelity.asked != "full") return fit(fitting, start, preconditioner, std::move(orbit));
+  if (fitting.result.fidelity.asked != "full") return fit(fitting, start, preconditioner, orbit);
   fitting.result.cycle = shoot_at_model(full.structure, full.interface, full.equilibrium, start, preconditioner,
                                         full.settings, 0, full.probes);
   return {};

@@ -109,9 +109,9 @@ void set_period(PeriodMap& map, double period);
 /// Borrows the map.
 Flow flow_of(PeriodMap& map);
 
-/// Fills what is measured over one more period from the cycle's start, recorded; `samples` displacements are kept.
-/// Returns the period's end.
-State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int samples, LimitCycle& cycle);
+/// Fills what is measured over a period from the cycle's start, recorded; `samples` displacements are kept. Returns the
+/// period's end; `rate`: as the flow's, or null.
+State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int samples, Vec rate, LimitCycle& cycle);
 
 /// -cycle_start_amplitude
 double start_amplitude_factor();
