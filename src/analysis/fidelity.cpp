@@ -24,12 +24,12 @@ double left_at(int a, int b, int c, double order)
   return std::pow(c, -order) / (std::pow(a, -order) - std::pow(b, -order));
 }
 
-/// The finer one's errors.
-void judge_steps(Fidelity& fidelity, const Found& coarse, const Found& fine, double order)
+/// Errors of a cycle beside another with more or fewer steps.
+void judge_steps(Fidelity& fidelity, const Found& other, const Found& cycle, double order)
 {
-  const double left = left_at(coarse.steps, fine.steps, fine.steps, order);
-  fidelity.step_frequency_error = left * std::abs(coarse.period / fine.period - 1);
-  fidelity.step_energy_error = left * std::abs(coarse.energy / fine.energy - 1);
+  const double left = std::abs(left_at(other.steps, cycle.steps, cycle.steps, order));
+  fidelity.step_frequency_error = left * std::abs(other.period / cycle.period - 1);
+  fidelity.step_energy_error = left * std::abs(other.energy / cycle.energy - 1);
 }
 
 double step_error(const Fidelity& fidelity)
@@ -80,9 +80,11 @@ void move_to(Pursuit& pursuit, Vec state, double period, int steps)
   record(pursuit.shooting, "full period", full_unknowns(pursuit.at), std::nan(""), pursuit.at);
 }
 
-/// Shoots until what is still to come is below half of the wish; returns whether it got there.
+/// Shoots until what is still to come is below half of the wish, by two steps' word: one may move the energy by nothing
+/// by chance. Returns whether it got there.
 bool shoot_on(Pursuit& pursuit)
 {
+  pursuit.shooting.last = {HUGE_VAL, HUGE_VAL};
   pursuit.shooting.wish = pursuit.fitting.result.fidelity.accuracy / 2;
   Finish finish = shoot_multisecant(pursuit.shooting, pursuit.at);
   pursuit.at = std::move(finish.orbit);
