@@ -201,6 +201,7 @@ struct Orthonormal
 /// columns' own size is new are dropped. Returns how many came.
 int extend(Orthonormal& basis, Eigen::Index count, double threshold)
 {
+  if (count == 0) return 0;
   const MatrixXd& E = basis.E;
   MatrixXd columns = MatrixXd::Zero(E.rows(), count), image;
   for (Eigen::Index j = 0; j < count; ++j)

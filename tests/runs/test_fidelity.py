@@ -56,6 +56,13 @@ def test_full_periods_are_the_judge(fitted):
     assert residuals[-1] < 0.2 * residuals[0]
 
 
+def test_few_modes_are_told(module_run, reduced):
+    """A single mode makes a poor model, and its period of the full one says so: a residual of twice and more."""
+    run = module_run(*PIN, "--set", "fidelity=reduced", "-reduced_modes", "1", "-cycle_multipliers", "0", ranks=1)
+    assert run["fidelity"]["modes"] <= 2
+    assert run["cycle"]["residual_full"] > 2 * reduced[0]["cycle"]["residual_full"]
+
+
 def test_small_model_is_not_reduced(module_run, tmp_path):
     """Three degrees of freedom: the oscillator is shot at as it is, to its own tolerance."""
     scene = INPUTS / "oscillator" / "scene.toml"
