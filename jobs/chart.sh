@@ -12,7 +12,7 @@ output=${OUTPUT:-results/chart/tgv_33k}
 mkdir -p "$output"
 for group in ${GROUPS_OF_RUNS:-auto modes step_64 start growth step full reduced direct seven near far contact}; do
   tools/chart inputs/tgv/scene.toml --runs "$output" --picture "$output/chart.png" --only "$group" \
-    --ranks "${RANKS:-${SLURM_NTASKS:-1}}" --limit "${LIMIT:-3600}" --steps 64 128 --reference 256 --periods 200 \
+    --ranks "${RANKS:-${SLURM_NTASKS:-1}}" --limit "${LIMIT:-3600}" --steps 64 128 256 --reference 512 --periods 200 \
     --real-modes 50 100 200 --reduced 20 60 --residuals 1e-2 1e-4 --contact 1e-2 1e-4 1e-6 \
-    -- --set modes.method=full "$@" || echo "$group: exit code $?"
+    --direct 64 -- --set modes.method=full "$@" || echo "$group: exit code $?"
 done
