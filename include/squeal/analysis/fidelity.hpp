@@ -9,10 +9,10 @@
 ///
 /// "reduced": a period of the full model tells the reduced cycle's error, a cycle at twice as many steps the step's.
 /// "auto": the full model's cycle until the wish is met, at few steps a period and at twice as many; from both, by the
-/// scheme's order, how many the wish needs and the cycle to be expected there, from which one or two periods correct it.
-/// Three such cycles tell the order. Where that does not converge, where the reduced model would not be small, or where
-/// several modes are unstable, the full model takes over. The active pairs and the reduced model's errors decide how
-/// soon this ends, not where.
+/// scheme's order, how many the wish needs and the cycle to be expected there, from which one or two periods correct
+/// it. Three such cycles tell the order. Where that does not converge, where the reduced model would not be small, or
+/// where several modes are unstable, the full model takes over. The active pairs and the reduced model's errors decide
+/// how soon this ends, not where.
 #include "squeal/analysis/cycle.hpp"
 
 namespace squeal
