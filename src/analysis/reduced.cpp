@@ -222,6 +222,50 @@ int extend(Orthonormal& basis, Eigen::Index count, double threshold)
   return static_cast<int>(kept);
 }
 
+/// M, C and K on X = Z columns, tested by Z and by Y, which is Z but for a few rows.
+void project(ReducedModel& model, const Structure& structure, const ClosedContact& contact, const Block& columns,
+             const Block& X)
+{
+  Owned<Mat> difference;
+  check(MatDuplicate(contact.Y, MAT_COPY_VALUES, difference.put()));
+  check(MatAXPY(difference, -1, contact.Z, DIFFERENT_NONZERO_PATTERN));
+  const std::vector<PetscInt> follow = own_rows(difference);
+  const Block more = rows_of(product(difference, columns), follow);
+  for (const auto& [matrix, unsymmetric, symmetric] :
+       {std::tuple{structure.M.get(), &model.M, &model.M_z}, std::tuple{structure.C.get(), &model.C, &model.C_z},
+        std::tuple{structure.K.get(), &model.K, &model.K_z}})
+  {
+    const Block image = product(matrix, X);
+    *symmetric = gram(X, image);
+    *symmetric = (*symmetric + symmetric->transpose()).eval() / 2;
+    *unsymmetric = *symmetric + gram(more, rows_of(image, follow));
+  }
+}
+
+/// From the columns X to the basis: the modes, the attachments next to them, all by falling period.
+void choose_basis(ReducedModel& model, const Block& X, Eigen::Index of_modes, double threshold)
+{
+  const double omega = model.omega;
+  const MatrixXd energy = model.K_z + omega * omega * model.M_z;
+  Orthonormal basis{energy, MatrixXd(X.columns, 0)};
+  model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
+  model.modes += extend(basis, of_modes - 2, 1e-6);
+  model.attachments = extend(basis, X.columns - of_modes, threshold);
+  // of falling period: u'M u against the energy
+  const MatrixXd mass = product(basis.T.transpose(), product(model.M_z, basis.T));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((mass + mass.transpose()) / 2);
+  const MatrixXd T = product(basis.T, spectrum.eigenvectors().rowwise().reverse());
+  constexpr double fastest = 4; // times omega
+  model.slow = (spectrum.eigenvalues().array() * (1 + fastest * fastest) * omega * omega > 1).count();
+  for (MatrixXd* A : {&model.M, &model.M_z, &model.C, &model.C_z, &model.K, &model.K_z})
+    *A = product(T.transpose(), product(*A, T));
+  model.H = product(T.transpose(), model.H);
+  model.G = product(model.G, T);
+  model.shapes = combination(X, {T.data(), T.data() + T.size()}, static_cast<PetscInt>(T.cols()));
+  model.E_factor.compute(model.K_z + omega * omega * model.M_z);
+  model.M_factor.compute(model.M_z);
+}
+
 } // namespace
 
 std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
@@ -284,21 +328,7 @@ ReducedModel reduce(const Structure& structure, const Interface& interface, cons
   append(columns, attachment_columns(E, forces(BZ)));
   const Block X = product(contact.Z, columns);
 
-  // Y is Z but for a few rows, and friction turns at the pairs: products with few rows
-  Owned<Mat> difference;
-  check(MatDuplicate(contact.Y, MAT_COPY_VALUES, difference.put()));
-  check(MatAXPY(difference, -1, contact.Z, DIFFERENT_NONZERO_PATTERN));
-  const std::vector<PetscInt> follow = own_rows(difference);
-  const Block more = rows_of(product(difference, columns), follow);
-  for (const auto& [matrix, unsymmetric, symmetric] :
-       {std::tuple{structure.M.get(), &model.M, &model.M_z}, std::tuple{structure.C.get(), &model.C, &model.C_z},
-        std::tuple{structure.K.get(), &model.K, &model.K_z}})
-  {
-    const Block image = product(matrix, X);
-    *symmetric = gram(X, image);
-    *symmetric = (*symmetric + symmetric->transpose()).eval() / 2;
-    *unsymmetric = *symmetric + gram(more, rows_of(image, follow));
-  }
+  project(model, structure, contact, columns, X);
   const Block left = product(contact.Y, columns), rows = transposed(B);
   if (const Owned<Mat> turning = direction_damping(interface, reduction.sliding ? equilibrium : sliding); turning.get())
   {
@@ -308,25 +338,8 @@ ReducedModel reduce(const Structure& structure, const Interface& interface, cons
   model.H = gram(left, forces(B));
   model.G = gram(reduction.sliding ? every(rows, interface.block()) : rows, X);
 
-  // the basis
-  const MatrixXd energy = model.K_z + omega * omega * model.M_z;
-  Orthonormal basis{energy, MatrixXd(X.columns, 0)};
-  model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
-  model.modes += extend(basis, of_modes - 2, 1e-6);
-  model.attachments = extend(basis, X.columns - of_modes, reduction.threshold);
-  // of falling period: u'M u against the energy
-  const MatrixXd mass = product(basis.T.transpose(), product(model.M_z, basis.T));
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((mass + mass.transpose()) / 2);
-  const MatrixXd T = product(basis.T, spectrum.eigenvectors().rowwise().reverse());
-  constexpr double fastest = 4; // times omega
-  model.slow = (spectrum.eigenvalues().array() * (1 + fastest * fastest) * omega * omega > 1).count();
-  for (MatrixXd* A : {&model.M, &model.M_z, &model.C, &model.C_z, &model.K, &model.K_z})
-    *A = product(T.transpose(), product(*A, T));
-  model.H = product(T.transpose(), model.H);
-  model.G = product(model.G, T);
-  model.shapes = combination(X, {T.data(), T.data() + T.size()}, static_cast<PetscInt>(T.cols()));
-  model.E_factor.compute(model.K_z + omega * omega * model.M_z);
-  model.M_factor.compute(model.M_z);
+  model.omega = omega;
+  choose_basis(model, X, of_modes, reduction.threshold);
 
   // the active pairs
   const auto block = static_cast<std::size_t>(interface.block()), kept = reduction.sliding ? 1 : block;
@@ -338,7 +351,6 @@ ReducedModel reduce(const Structure& structure, const Interface& interface, cons
     for (std::size_t k = 0; k < kept; ++k) model.reactions.push_back(equilibrium.reactions[i * block + k]);
     for (std::size_t k = 0; k + 1 < kept; ++k) model.drive.push_back(interface.drive[i * (block - 1) + k]);
   }
-  model.omega = omega;
   model.active = std::move(active);
   model.directions = reduction.sliding ? 0 : interface.directions;
   model.friction = reduction.sliding ? 0 : interface.friction;
