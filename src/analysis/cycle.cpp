@@ -23,9 +23,18 @@ void set_period(PeriodMap& map, double period)
 namespace
 {
 
+/// `rate` holds the state of a step before the period's end and becomes dPhi/dperiod there; `end` goes a step on.
+void close_rate(PeriodMap& map, StepWork& work, State& end, Vec rate)
+{
+  const double half = 0.5 / map.step.h;
+  map.reactions = end.reactions;
+  (void)advance(map.step, map.structure, map.interface, work, end);
+  check(VecAXPBY(displacement(rate), half, -half, end.u));
+  check(VecAXPBY(velocity(rate), half, -half, end.v));
+}
+
 void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
 {
-  const double h = period / map.steps;
   set_period(map, period);
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
   StepWork work = begin_steps(map.step, map.structure, map.interface, state);
@@ -41,10 +50,7 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
   check(VecCopy(state.u, displacement(end)));
   check(VecCopy(state.v, velocity(end)));
   if (!rate) return;
-  map.reactions = state.reactions;
-  (void)advance(map.step, map.structure, map.interface, work, state);
-  check(VecAXPBY(displacement(rate), 0.5 / h, -0.5 / h, state.u));
-  check(VecAXPBY(velocity(rate), 0.5 / h, -0.5 / h, state.v));
+  close_rate(map, work, state, rate);
 }
 
 /// Several trajectories over one period, together as far as their memory allows.
@@ -83,7 +89,13 @@ double mean(const std::vector<double>& values)
 State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int samples, Vec rate, LimitCycle& cycle)
 {
   cycle.start.reactions = map.reactions;
-  State state = copy_of(cycle.start), before = copy_of(cycle.start);
+  State state = copy_of(cycle.start);
+  const auto keep = [&](const State& now)
+  {
+    check(VecCopy(now.u, displacement(rate)));
+    check(VecCopy(now.v, velocity(rate)));
+  };
+  if (rate) keep(state);
   set_period(map, cycle.period);
   int done = 0;
   const auto watch = [&](const State& now, const StepReport&, const StepWork&)
@@ -91,20 +103,16 @@ State measure(PeriodMap& map, const Equilibrium& equilibrium, Mat probes, int sa
     cycle.statuses.push_back(contact_status(map.interface, now.reactions));
     // evenly spread over the period whatever the two numbers
     if ((done + 1) * samples / map.steps > done * samples / map.steps) cycle.displacements.push_back(copy_of(now.u));
-    if (++done + 1 == map.steps) before = copy_of(now);
+    if (++done + 1 == map.steps && rate) keep(now);
   };
   const MarchSummary summary =
       march(map.step, map.structure, map.interface, equilibrium, probes, map.steps, state, cycle.history, watch);
   map.unconverged += summary.unconverged;
   if (rate)
   {
-    map.reactions = state.reactions;
     State after = copy_of(state);
     StepWork work = begin_steps(map.step, map.structure, map.interface, after);
-    (void)advance(map.step, map.structure, map.interface, work, after);
-    check(VecWAXPY(displacement(rate), -1, before.u, after.u));
-    check(VecWAXPY(velocity(rate), -1, before.v, after.v));
-    check(VecScale(rate, 0.5 / map.step.h));
+    close_rate(map, work, after, rate);
   }
   cycle.factor_seconds = map.step.factor_seconds;
   cycle.condensed_seconds = map.step.condensed_seconds;
