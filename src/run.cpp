@@ -1,8 +1,8 @@
 #include "squeal/run.hpp"
 
-#include "squeal/analysis/step_guards.hpp"
 #include "squeal/options.hpp"
 #include "squeal/report/report.hpp"
+#include "squeal/transient/step_guards.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 /// Trajectory k starts from STATE with its velocity scaled by 1 + k/1000. `dump`: the first trajectory's u and v after
 /// every step, raw doubles. Seconds are the processor's, of this rank, waiting included. Contact options as in squeal
 /// (-transient_…).
-#include "squeal/analysis/transient.hpp"
+#include "squeal/transient/transient.hpp"
 
 #include <algorithm>
 #include <array>

@@ -4,8 +4,8 @@
 /// With w = w_0 + dw, w_0 = W r_0 + b exact and dw the effect of the changes since, the sweeps update dw alone: from
 /// the near field, both in single precision, which dw's smallness affords, or from W where that did not converge.
 /// The residual is believed only after w was formed afresh.
-#include "wide.hpp"
-#include "work.hpp"
+#include "contact_work.hpp"
+#include "squeal/algebra/simd.hpp"
 
 #include <algorithm>
 #include <cmath>

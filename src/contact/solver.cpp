@@ -1,9 +1,9 @@
 #include "squeal/contact/solver.hpp"
 
-#include "panel.hpp"
+#include "contact_work.hpp"
+#include "squeal/algebra/panel.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/contact/complementarity.hpp"
-#include "work.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // Where eigenvalues crowd, a pair moves like the square root of a change.
 #include "../support/flutter_chain.hpp"
-#include "squeal/analysis/projection.hpp"
-#include "squeal/analysis/shift_invert.hpp"
-#include "squeal/analysis/slices.hpp"
+#include "squeal/modes/projection.hpp"
+#include "squeal/algebra/shift_invert.hpp"
+#include "squeal/modes/slices.hpp"
 
 #include <algorithm>
 #include <cmath>

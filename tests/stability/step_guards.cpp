@@ -1,7 +1,7 @@
 // Where theta and the step size make growth rates lie: the boundary from both sides, and the refusals that guard it.
 #include "../support/oscillator_mode.hpp"
-#include "squeal/analysis/growth.hpp"
-#include "squeal/analysis/transient.hpp"
+#include "squeal/transient/growth.hpp"
+#include "squeal/transient/transient.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

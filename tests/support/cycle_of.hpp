@@ -1,7 +1,7 @@
 #pragma once
 /// The chain from equilibrium to cycle on a small model, as the program runs it.
 #include "small_models.hpp"
-#include "squeal/analysis/cycle.hpp"
+#include "squeal/cycle/cycle.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,7 +1,7 @@
 #pragma once
 /// The followed mode of the unilateral oscillator, from its own three equations, and states that start on it.
 #include "sliding_oscillator.hpp"
-#include "squeal/analysis/transient.hpp"
+#include "squeal/transient/transient.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

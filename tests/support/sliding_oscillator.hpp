@@ -1,7 +1,7 @@
 #pragma once
 /// The unilateral oscillator in steady sliding, its equilibrium solved by hand.
 #include "small_models.hpp"
-#include "squeal/analysis/equilibrium.hpp"
+#include "squeal/equilibrium/equilibrium.hpp"
 
 namespace squeal::test
 {

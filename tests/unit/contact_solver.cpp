@@ -1,4 +1,4 @@
-#include "squeal/contact/local.hpp"
+#include "squeal/contact/pair_law.hpp"
 #include "squeal/contact/solver.hpp"
 
 #include <algorithm>

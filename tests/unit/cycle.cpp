@@ -1,5 +1,5 @@
 #include "../support/option.hpp"
-#include "squeal/analysis/shooting.hpp"
+#include "squeal/shooting/shooting.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

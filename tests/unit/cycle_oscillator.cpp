@@ -2,7 +2,7 @@
 #include "../support/about.hpp"
 #include "../support/cycle_of.hpp"
 #include "../support/small_models.hpp"
-#include "squeal/analysis/shooting.hpp"
+#include "squeal/shooting/shooting.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

@@ -1,5 +1,5 @@
 // ranks: 1 2 3
-#include "squeal/analysis/equilibrium.hpp"
+#include "squeal/equilibrium/equilibrium.hpp"
 
 #include "../support/small_models.hpp"
 

@@ -1,5 +1,5 @@
 // ranks: 1 2 3
-#include "squeal/analysis/estimate.hpp"
+#include "squeal/transient/estimate.hpp"
 #include "../support/about.hpp"
 #include "../support/sliding_oscillator.hpp"
 

@@ -1,8 +1,8 @@
 // ranks: 1 2 3
-#include "squeal/analysis/modes.hpp"
+#include "squeal/modes/modes.hpp"
 #include "../support/sliding_oscillator.hpp"
-#include "squeal/analysis/closed_contact.hpp"
-#include "squeal/analysis/quadratic.hpp"
+#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/modes/quadratic.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

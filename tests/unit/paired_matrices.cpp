@@ -1,5 +1,5 @@
 // ranks: 1 2
-#include "squeal/analysis/paired_matrices.hpp"
+#include "squeal/algebra/paired_matrices.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

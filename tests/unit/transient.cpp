@@ -1,5 +1,5 @@
 // ranks: 1 2 3
-#include "squeal/analysis/transient.hpp"
+#include "squeal/transient/transient.hpp"
 #include "../support/about.hpp"
 #include "../support/option.hpp"
 #include "../support/oscillator_mode.hpp"

@@ -4,7 +4,7 @@
 #include "../support/cycle_of.hpp"
 #include "../support/option.hpp"
 #include "../support/small_models.hpp"
-#include "squeal/analysis/shooting.hpp"
+#include "squeal/shooting/shooting.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,8 +2,8 @@
 // Exact-contact dynamics against exact answers, on models small enough to have them.
 #include "../support/about.hpp"
 #include "../support/oscillator_mode.hpp"
-#include "squeal/analysis/growth.hpp"
-#include "squeal/analysis/transient.hpp"
+#include "squeal/transient/growth.hpp"
+#include "squeal/transient/transient.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

@@ -2,8 +2,8 @@
 // Published and exact eigenvalues of sliding systems.
 #include "../support/flutter_chain.hpp"
 #include "../support/sliding_oscillator.hpp"
-#include "squeal/analysis/modes.hpp"
-#include "squeal/analysis/quadratic.hpp"
+#include "squeal/modes/modes.hpp"
+#include "squeal/modes/quadratic.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

@@ -1,7 +1,7 @@
 #pragma once
 /// The condensed contact operator W = scale B A^-1 B' (dense, symmetric, whole on rank 0) and the factor of A it came
 /// with.
-#include "squeal/contact/factor.hpp"
+#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/contact/interface.hpp"
 
 #include <optional>

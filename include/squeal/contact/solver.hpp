@@ -14,7 +14,7 @@
 /// Problems with the same W are solved together: each row of W that is read serves all of them.
 ///
 /// Caveat: neither is sure to converge where mu couples sliding and pressure strongly; the result says so.
-#include "squeal/contact/local.hpp"
+#include "squeal/contact/pair_law.hpp"
 
 #include <cstddef>
 #include <span>

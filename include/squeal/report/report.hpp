@@ -1,8 +1,8 @@
 #pragma once
 /// What a run leaves behind: report.json, fields.h5 + fields.xdmf, history.h5, scene.toml (resolved), options.txt, and
 /// the printed table. Every number comes with its unit and with what it is worth (residual, backward error, defect).
-#include "squeal/analysis/fidelity.hpp"
-#include "squeal/contact/model.hpp"
+#include "squeal/cycle/fidelity.hpp"
+#include "squeal/model.hpp"
 
 #include <filesystem>
 #include <string>

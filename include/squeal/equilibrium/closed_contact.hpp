@@ -1,0 +1,53 @@
+#pragma once
+/// The closed pairs taken out of the equations without multipliers (method, section 3).
+///
+/// While the pairs that are closed at equilibrium stay closed, B_n du = 0 on them, and a normal reaction lambda_n of a
+/// sliding pair enters the equations as R' lambda_n with the row R = B_n + mu e.B_t, e the direction of the drive:
+///     du = Z y,  B_n Z = 0,      Y'(equations),  R Y = 0.
+/// Both bases follow from one sparse Gauss-Jordan elimination of one degree of freedom a pair, its pivot, the same in
+/// both: they are the identity on the degrees of freedom that remain, so y is du there.
+#include "squeal/equilibrium/equilibrium.hpp"
+
+#include <complex>
+
+namespace squeal
+{
+
+struct ClosedContact
+{
+  Owned<Mat> Z, Y;        // dofs x (dofs - closed pairs)
+  Owned<Mat> reaction;    // pairs x dofs: lambda_n = reaction f of forces f = R' lambda_n + g, g = 0 on the pivots
+  std::vector<int> pairs; // the closed ones, ascending
+};
+
+/// Error: a closed pair whose normal motion the other closed pairs already fix, or that the friction coefficient jams
+/// (which pair).
+ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface& interface,
+                                     const Equilibrium& equilibrium);
+
+/// Z'A Z, marked symmetric.
+Owned<Mat> project_symmetric(Mat A, Mat Z);
+
+/// Y'A Z
+Owned<Mat> project(Mat A, Mat Y, Mat Z);
+
+/// The derivative of the friction direction, C_f = sum mu r_n0/|v_d| B_t'(I - e e')B_t [N s/m]; no matrix for pairs
+/// with one tangential row, which cannot turn, without friction, or when nothing is closed.
+Owned<Mat> direction_damping(const Interface& interface, const Equilibrium& equilibrium);
+
+/// C, and C_f with it where the interface has it on.
+Owned<Mat> sliding_damping(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium);
+
+/// Normal reactions lambda_n per pair that a motion phi e^{s t} takes are (s^2 M + s C + K) phi, from the pivots' rows
+/// of (s^2 M + s C + K) phi = R' lambda_n; 0 on open pairs. Every choice of rows agrees if s and phi are an eigenpair.
+struct ReactionOperator
+{
+  Owned<Mat> M, C, K; // pairs x dofs
+};
+
+ReactionOperator reaction_operator(const ClosedContact& contact, const Structure& structure, Mat C);
+
+std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
+                                                   Vec imaginary);
+
+} // namespace squeal

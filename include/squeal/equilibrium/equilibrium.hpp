@@ -1,0 +1,42 @@
+#pragma once
+/// Sliding equilibrium in unilateral contact with Coulomb friction (method, section 2):
+///     K u0 = F + B_n' r_n + B_t' r_t,   0 <= g _|_ r_n >= 0,   r_t = mu r_n e,   e = v_d/|v_d|.
+/// Status (active set) iteration on the condensed compliance D = B K^-1 B'; projection fixed point as the check.
+///
+/// With D_nn and D_nt the blocks of D, the gaps are g = q + (D_nn + mu D_nt e) r_n, q those without reactions. Where
+/// contact alone holds a body, K is singular. Springs kappa across every pair are then added and their force is taken
+/// off again: with K' = K + kappa B_n' B_n and its compliance D', exactly,
+///     (1 - kappa D'_nn) g = q' + (D'_nn + mu D'_nt e) r_n.
+///
+/// Springs so soft that rounding would spoil the reactions are treated in the same way.
+///
+/// Caveat: at large mu an equilibrium may not exist, or not be the only one. It is the only one if the symmetric part
+/// of D_nn + mu D_nt e is positive definite, which is checked where K alone is regular; whether it is stable, modes
+/// say.
+#include "squeal/equilibrium/state.hpp"
+
+namespace squeal
+{
+
+/// outcome: "converged", "no equilibrium" (the status sets cycle, or no set balances the load: mu is too large),
+/// "not converged". u and the reactions are zero without an equilibrium.
+/// residual: the largest natural map of a pair, |r_n - max(0, r_n - g/D_nn)|, over the largest reaction.
+struct Equilibrium
+{
+  Outcome outcome;
+  Owned<Vec> u;                   // [m]
+  std::vector<double> reactions;  // [N] block entries a pair
+  std::vector<char> closed;       // per pair
+  double force_residual = 0;      // |K u - F - B'r| / |F|
+  double check_residual = 0;      // the natural map with the fixed point's rho = 1/lambda_max(D_nn)
+  int check_iterations = 0;       // of an independent run of the fixed point; 0: not run
+  double check_difference = 0;    // of its reactions, over the largest; NaN if it did not converge
+  double auxiliary_stiffness = 0; // kappa [N/m]; 0: K holds the structure by itself
+  std::string uniqueness;         // "assured", "not assured", "not checked"
+};
+
+/// Options, prefix -equilibrium_: max_it (100), check_max_it (of the fixed point; -1: 20000 up to 600 pairs, else 0).
+/// Errors: K singular on a body that contact does not hold either (which body).
+Equilibrium find_equilibrium(const Structure& structure, const Interface& interface);
+
+} // namespace squeal

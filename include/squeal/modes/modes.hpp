@@ -1,0 +1,70 @@
+#pragma once
+/// Complex modes of the structure linearised about steady sliding (method, section 3):
+///     (lambda^2 Y'M Z + lambda Y'(C + C_f) Z + Y'K Z) phi = 0,   u(t) ~ phi exp(lambda t),   Re(lambda) > 0:
+///     squeal-prone.
+/// Z keeps closed pairs closed, Y removes their normal reactions; all three matrices are unsymmetric.
+#include "squeal/equilibrium/equilibrium.hpp"
+
+#include <complex>
+
+namespace squeal
+{
+
+/// Errors are backward errors in the full problem, whichever route found the mode:
+///     eta = |Q(lambda) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|), phi = Z y, Q and 1-norms of the matrices
+///     Y'.Z, 2-norms of the vectors.
+struct ComplexMode
+{
+  std::complex<double> lambda;                 // [1/s]
+  Owned<Vec> real, imaginary;                  // in the structure's dofs; largest entry of |phi| is 1
+  std::vector<std::complex<double>> reactions; // normal reaction per pair [N per m of the mode]; 0 on open pairs
+  double backward_error = 0;
+
+  double frequency_hz() const; // |Im(lambda)| / 2 pi
+  double growth_rate() const { return lambda.real(); }
+  double damping_ratio() const; // -Re/|lambda|
+};
+
+/// Frictionless undamped modes with closed pairs kept closed, M-normalised, ascending.
+/// outcome: "converged", or "not converged": fewer than asked, or fewer than the inertia of K - omega^2 M counts.
+struct RealModes
+{
+  Outcome outcome;                // residual: largest |K x - omega^2 M x| / (|K| |x|)
+  std::vector<double> omega;      // [rad/s]
+  std::vector<Owned<Vec>> shapes; // in the structure's dofs
+};
+
+/// How it is known that no mode is missing.
+struct ModeCount
+{
+  std::string certified_by;    // "inertia" of the frictionless structure; empty: not certified
+  double frequency = 0;        // [Hz], the band or just above, where no pair crossed the edge for friction
+  int expected = 0, found = 0; // pairs below it
+};
+
+/// outcome: "converged", "not converged" (fewer than expected, or backward errors above 1e-8), "skipped".
+/// residual: the largest backward error reported.
+struct Modes
+{
+  Outcome outcome;
+  std::string method;                 // "full", "projection", "both"
+  double band = 0;                    // [Hz] covered: every mode below is here
+  std::vector<ComplexMode> modes;     // Im(lambda) >= 0, largest growth first
+  std::vector<ComplexMode> projected; // the other route's, when both ran
+  std::vector<double> beyond_band;    // [Hz] pairs between the band and count.frequency
+  int unstable_count = 0;
+  bool routes_disagree = false; // on unstable_count, when both ran
+  ModeCount count;
+  std::string count_check; // in words: unstable modes by either route, all modes by inertia
+};
+
+/// Real modes with frequency below `band` [Hz], as many as there are. Option: -modes_dense_limit, as below.
+RealModes find_real_modes_below(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                                double band);
+
+/// Options, prefix -modes_: dense_limit (200, problems up to this size are solved whole by LAPACK), candidates (20,
+/// pairs a residual pass of the projection corrects), solver (slices, or toar with the options of pep_ and st_).
+Modes find_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                 const ModesSettings& settings);
+
+} // namespace squeal

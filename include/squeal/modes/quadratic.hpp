@@ -1,0 +1,74 @@
+#pragma once
+/// The quadratic eigenproblem of real unsymmetric sparse matrices, (lambda^2 M + lambda C + K) y = 0.
+///
+/// Small problems are solved whole: on the companion matrix of mu = 1/(lambda - shift), which bears a singular M or K,
+/// by LAPACK's QR. Large ones by SLEPc's two-level Arnoldi (TOAR; Lu, Su, Bai 2016), shift-inverted near zero; time is
+/// scaled by the band, lambda = 2 pi band nu, without which growth rates lose their third digit.
+///
+/// Backward error of a pair (Tisseur 2000), in 1-norms of the matrices and 2-norms of the vectors:
+///     eta = |(lambda^2 M + lambda C + K) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|)
+#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/equilibrium/state.hpp"
+
+#include <complex>
+
+namespace squeal
+{
+
+struct QuadraticProblem
+{
+  Owned<Mat> M, C, K; // AIJ, of one layout
+};
+
+struct Eigenpair
+{
+  std::complex<double> lambda; // [1/s]
+  Owned<Vec> real, imaginary;  // of y; 2-norm of y is 1
+  double backward_error = 0;
+};
+
+/// Which eigenvalues are sought: least <= |lambda|^2 < limit [1/s2], Im > 0, or real and positive.
+struct Window
+{
+  double least = 0, limit = 0;
+  bool holds(std::complex<double> lambda) const;
+};
+
+/// The solver's own options have the prefix -modes_: -modes_pep_tol, -modes_st_…
+struct QuadraticSettings
+{
+  double band = 0;  // [Hz] every pair with |lambda| <= 2 pi band
+  double shift = 0; // of large problems: real, near zero, in parts of 2 pi band, not an eigenvalue; 0 if K is regular
+  int expected = 0; // pairs in the band, for a start
+  int dense_limit = 0; // up to which size a problem is solved whole
+};
+
+/// outcome: "converged" or "not converged" (the band was not covered); residual: the largest backward error.
+struct QuadraticSolution
+{
+  Outcome outcome;
+  std::vector<Eigenpair> pairs; // Im > 0 in the band, and real positive ones; largest real part first
+};
+
+/// Motions of a free body (|lambda|^2 below 1e-12 |K|/|M|) are no vibration and are left out, as are real negative
+/// lambda.
+QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings);
+
+/// Largest real part first; outcome.residual becomes the largest backward error.
+void settle(QuadraticSolution& solution);
+
+/// Real part large enough to call unstable: rounding shows up to 1e-8 |lambda| on a mode without damping.
+bool is_unstable(std::complex<double> lambda);
+
+struct QuadraticNorms
+{
+  double M = 0, C = 0, K = 0; // 1-norms
+};
+
+QuadraticNorms norms_of(const QuadraticProblem& problem);
+
+/// |lambda|^2 up to which a motion is that of a free body, not a vibration: 1e-12 |K|/|M| [1/s2].
+double vibration_floor(const QuadraticNorms& norms);
+double backward_error(const QuadraticProblem& problem, const QuadraticNorms& norms, const Eigenpair& pair);
+
+} // namespace squeal

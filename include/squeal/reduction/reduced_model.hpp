@@ -1,0 +1,171 @@
+#pragma once
+/// A model no larger than its cycle needs, about the sliding equilibrium (u0, r0).
+///
+/// Pairs that stay closed and sliding are eliminated as in the modes (paper, eq. 5): du = Z y, equations tested by Y.
+/// The others, the active ones, keep unilateral contact and Coulomb friction. Then y = V q, V dense:
+///     M q'' + C q' + K q = H (r - r0),   M = (Y V)'M (Z V) ...,  H = (Y V)'B_a',
+///     g = g0 + G_n q >= 0,   s = G_t q' - v_d,   G = B_a Z V,
+/// all three matrices unsymmetric. V holds the complex modes of the full problem in the band (real and imaginary
+/// parts, so that the reduced model has exactly their growth rates) and the attachment shapes of the active pairs,
+///     (K_z + w^2 M_z) X = Z'B_a',   K_z = Z'K Z, w the followed mode's,
+/// orthonormal in the energy of K_z + w^2 M_z; of the attachments what is new above a threshold.
+///
+/// Active pairs that slide along the drive throughout, e, have one row and one shape each instead of three, of
+/// B_n' + mu B_t'e: the normal force with the friction that it brings along.
+///
+/// Caveats: friction that follows turns with the sliding direction to first order only, by C_f of the reaction at
+/// equilibrium, and an eliminated pair is taken never to part or stick. What all that is worth is measured: one period
+/// of the full model from the reduced cycle.
+///
+/// Everything reduced is dense, small, and the same on every rank.
+#include "squeal/algebra/multivector.hpp"
+#include "squeal/contact/pair_law.hpp"
+#include "squeal/cycle/cycle.hpp"
+
+#include <Eigen/Dense>
+
+namespace squeal
+{
+
+struct ReducedModel
+{
+  Eigen::MatrixXd M, C, K;                        // size x size [of kg, N s/m, N/m]
+  Eigen::MatrixXd H, G;                           // size x rows, rows x size; of a pair: normal, tangential
+  Eigen::MatrixXd M_z, C_z, K_z;                  // symmetric: V'Z'M Z V ..., of the energies
+  Eigen::LLT<Eigen::MatrixXd> E_factor, M_factor; // of K_z + omega^2 M_z, M_z
+  std::vector<int> active;                        // pairs, ascending
+  int directions = 2;                             // tangential ones of an active pair; 0: friction follows
+  double friction = 0;
+  std::vector<double> gap;        // [m] at equilibrium, per active pair
+  std::vector<double> drive;      // [m/s]
+  std::vector<double> reactions;  // [N] r0
+  Block shapes;                   // Z V, dofs x size: u = u0 + shapes q
+  double omega = 0;               // [rad/s] of the followed mode
+  int modes = 0, attachments = 0; // columns that V came from
+  Eigen::Index slow = 0;          // those that swing by less than four times omega, the first ones
+
+  int size() const { return static_cast<int>(M.rows()); }
+};
+
+/// Pairs whose normal reaction in u0 + amplitude Re(phi e^{iwt}) falls below zero, or whose gap does.
+std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
+                                       const ComplexMode& mode, double amplitude);
+
+/// Whether no pair comes to rest or turns round in that motion's velocity.
+bool slide_throughout(const Interface& interface, const ComplexMode& mode, double amplitude);
+
+struct Reduction
+{
+  int modes = 0;           // complex modes taken, nearest in frequency to the followed one, which is the first of all
+  double threshold = 1e-5; // an attachment shape is dropped when less than this part of it is new
+  bool sliding = false;    // the active pairs slide along the drive throughout
+};
+
+ReducedModel reduce(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                    const std::vector<ComplexMode>& modes, std::vector<int> active, const Reduction& reduction);
+
+/// Position and velocity about the equilibrium.
+struct ReducedState
+{
+  Eigen::VectorXd q, v;
+};
+
+/// Coordinates of du and v: of the nearest shape in the energy of K + omega^2 M, and in that of M.
+ReducedState coordinates(const ReducedModel& model, const Structure& structure, Vec du, Vec v);
+
+/// target += factor shapes q
+void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd& q, Vec target);
+
+/// As vectors of this rank's own, and back.
+Owned<Vec> small_vector(const Eigen::VectorXd& values);
+void put(const Eigen::VectorXd& values, Vec x);
+Eigen::VectorXd entries_of(Vec x);
+
+/// The active pairs at the end of a step, and what the next one starts from.
+struct ReducedContact
+{
+  Eigen::VectorXd r;                       // [N]
+  Eigen::VectorXd Wr{};                    // W r; empty: not known
+  Eigen::VectorXd w{};                     // [m/s] W r + b
+  Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
+  int unread = 0;                          // steps since W was read in double precision
+  std::vector<bool> opposes_end{};         // by pairs: friction opposes s+ there, elsewhere s_theta
+  Eigen::MatrixXf along{}; // W_nn + W_nt e of those directions e in which friction was then, mu included
+};
+
+/// The period map of the reduced model by theta steps (method as analysis/transient.hpp), whose matrices are formed
+/// once per step size:  (v, q) -> v_free,  r -> v+ - v_free,  W r.
+struct ReducedMap
+{
+  const ReducedModel& model;
+  int steps = 0;
+  double theta = 0.5;
+  double h = 0;                 // [s] of the matrices below
+  Eigen::MatrixXd from_state{}; // v_free = from_state (v, q) + from_equilibrium
+  Eigen::VectorXd from_equilibrium{};
+  Eigen::MatrixXd from_reactions{};  // h A^-1 H
+  Eigen::MatrixXd W{};               // G h A^-1 H
+  Eigen::MatrixXf W_single{}, W_n{}; // the same for changes; its normal rows
+  Eigen::MatrixXd G_n{};             // normal rows of G
+  std::vector<PairBlock> own{};      // the symmetric part of each pair's own block of W
+  Eigen::VectorXd reactions{};       // [N] every period's warm start
+  ContactSettings contact{};
+  long unconverged = 0;
+};
+
+/// A B and A^-1 B, by the library's kernels: several times faster than Eigen's own at these sizes.
+Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+Eigen::MatrixXd solve_dense(Eigen::MatrixXd A, Eigen::MatrixXd B);
+
+/// The matrices of the period's step size, unless they are those already.
+void prepare(ReducedMap& map, double period);
+
+/// The reactions after a step whose contact velocities are b without them; `contact` is of the step before. Residual:
+/// the natural map over the largest reaction. Returns whether it converged.
+bool solve_contact(const ReducedMap& map, const Eigen::VectorXd& b, ReducedContact& contact);
+
+/// Whether a pair's friction stays inside the Coulomb disc.
+bool sticks(const Eigen::VectorXd& r, double friction);
+
+/// One step. Returns whether contact converged.
+bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact);
+
+/// N steps of the period; `watch` after each.
+ReducedState integrate(ReducedMap& map, double period, ReducedState state,
+                       const std::function<void(const ReducedState&)>& watch);
+
+/// A period's end and dPhi/dT there.
+struct Passage
+{
+  ReducedState end, rate;
+};
+
+Passage pass(ReducedMap& map, double period, ReducedState state);
+
+/// The derivative of a period's end (q, v) in the first `slow` coordinates of q and of v: the product of the steps'
+/// own, exact where no pair changes its state within rounding. Collective: each rank does its share of the columns.
+Eigen::MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, Eigen::Index slow, MPI_Comm comm);
+
+/// D = (dPhi_r/dx S S' - f f^+ - I)^-1 + I at a state, as left x right: f is the flow, along which the border of the
+/// shooting decides; S the coordinates of the modes, since those of the attachments are forgotten within a period.
+struct Inside
+{
+  Eigen::MatrixXd left, right;
+};
+
+Inside inside_of(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm);
+
+/// P^-1 x = -x + D x on the reduced model. Borrows D.
+Preconditioner reduced_preconditioner(const Inside& inside);
+
+/// P^-1 x = -x + V D R x on the full model, V the shapes, R the coordinates in them: what lies outside is taken as
+/// forgotten within a period. Borrows all three.
+Preconditioner reduced_preconditioner(const ReducedModel& model, const Structure& structure, const Inside& inside);
+
+/// The flow for shooting; borrows the map and the matrices of `norm`.
+Flow flow_of(ReducedMap& map, const Structure& norm);
+
+/// M_z, C_z, K_z as a structure of one rank's own.
+Structure small_structure(const ReducedModel& model);
+
+} // namespace squeal

@@ -1,0 +1,57 @@
+#pragma once
+/// Energy estimate of the cycle's amplitude (paper, eqs. 9-19; method, section 5): the motion is taken to be
+///     u = u0 + q Re(phi e^{i w t}),  w = Im(lambda),
+/// and q is sought for which the interface gives what the damping takes, P_R(q)/E = P_C/E, means over a period:
+///     P_C = mean u'.C u',   P_R = mean sum w.(r_t - r_t0),  w = B_t u',
+///     r_n = max(0, r_n0 + q Re(rho e^{i w t})),   r_t = -mu r_n s/|s|,   s = w - v_d:
+/// the interface force saturates by lift-off and by reversal of the sliding. rho is what this motion takes in the rows
+/// of the eliminated degrees of freedom at s = i w: it differs from the mode's own reaction, at lambda, by
+/// Re(lambda)/w.
+///
+/// E is twice the mean kinetic energy, which is the mean energy of a free vibration (friction makes the mean potential
+/// energy of the mode differ). Then (P_R - P_C)/E -> 2 Re(lambda) as q -> 0, up to that difference of rho, provided the
+/// modes have the damping of the friction direction, which the law above always has.
+/// Caveat: a start for the shooting, not a prediction. On the oscillator of inputs/oscillator it is .4 of the cycle
+/// where pairs stick, 1.1 to 4 of it otherwise, and 300 where slip reversal alone holds it far above first lift-off.
+#include "squeal/modes/modes.hpp"
+
+#include <span>
+
+namespace squeal
+{
+
+/// outcome: "balance", "no balance" (the curve has no root; never a number that is not one), "skipped" (the mode does
+/// not vibrate). residual: |P_R - P_C| over the larger of P_C and the linear P_R, at the root; iterations: of the root.
+struct Estimate
+{
+  Outcome outcome;
+  double amplitude = 0;            // q [m], the mode's largest entry being 1; 0 without balance
+  double mean_energy = 0;          // [J] E at that amplitude; compare with the cycle's mean fluctuating energy
+  double lift_off_amplitude = 0;   // [m] min r_n0/|rho|; infinite where no reaction fluctuates
+  double reversal_amplitude = 0;   // [m] first q at which some pair's sliding along the drive stops; or infinite
+  double damping_rate = 0;         // P_C/E [1/s], independent of q
+  double friction_rate_linear = 0; // P_R/E as q -> 0 [1/s]; friction - damping = 2 Re(lambda)
+  double phase = 0;                // [rad] turn of phi for which the smallest normal reaction at t = 0 is largest
+  std::vector<double> curve_amplitude, curve_rate; // q [m] and P_R/E [1/s]
+};
+
+/// No options. The phase is that of the amplitude found, or of first lift-off without balance.
+Estimate estimate_amplitude(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                            const ComplexMode& mode);
+
+/// Where vibrations start from: the balance, or -estimate_lift_off_multiple (2) times first lift-off without one [m].
+/// A start well above the cycle falls onto it; one below may fall onto the equilibrium.
+double start_amplitude(const Estimate& estimate);
+
+/// State u0 + q Re(phi e^{i phase}), v = q Re(lambda phi e^{i phase}) (paper, eqs. 18-19).
+State mode_state(const Equilibrium& equilibrium, const ComplexMode& mode, double amplitude, double phase);
+
+/// What each mode that oscillates adds to a start, from its own estimate: q Re(phi e^{i phase}) and its velocity,
+/// without u0.
+std::vector<State> estimated_motions(const Structure& structure, const Interface& interface,
+                                     const Equilibrium& equilibrium, std::span<const ComplexMode> modes);
+
+/// state += factor motion
+void add_motion(const State& motion, double factor, State& state);
+
+} // namespace squeal

@@ -1,0 +1,27 @@
+#pragma once
+/// When theta and the step size h would tell a lie (method, section 4). In sliding an eigenvalue lambda is marched as
+///     lambda_h = ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h,   Re(lambda_h) = 0 where
+///     2 Re(lambda) = (2 theta - 1) h |lambda|^2:
+/// - theta > 1/2 with fewer than 2 pi (theta - 1/2) |lambda|^2/(omega sigma) steps a period: what grows looks stable;
+/// - theta < 1/2 with fewer than 2 pi (1/2 - theta) |lambda|^2/(omega sigma): most of the growth is the scheme's own;
+/// - theta < 1/2 also amplifies every stable mode with -Re(lambda) < (1/2 - theta) h |lambda|^2, up to the highest one
+///   of the mesh. With C = beta K that is h > beta/(1 - 2 theta), or h > 2/((1 - 2 theta) |lambda|) where the mode is
+///   overdamped, lambda its faster root.
+/// All refusals are lifted by -transient_refuse false.
+#include "squeal/modes/modes.hpp"
+
+namespace squeal
+{
+
+/// ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h
+std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h);
+
+/// Growth of the energy norm in one step of the structure free of load and contact, asymptotically: the logarithm,
+/// per step, by 300 steps from a state that excites every mode. Collective; factors A anew.
+double free_growth(const Structure& structure, double theta, double h);
+
+/// Why a run with this theta and h is refused, in a sentence with the remedy; empty if it is not. `mode`: the followed
+/// one, or null.
+std::string step_refusal(const Structure& structure, const ComplexMode* mode, double theta, double h);
+
+} // namespace squeal

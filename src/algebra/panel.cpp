@@ -1,0 +1,382 @@
+#include "squeal/algebra/panel.hpp"
+
+#include "squeal/algebra/simd.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <type_traits>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Four = double __attribute__((vector_size(32)));
+using Eight = double __attribute__((vector_size(64)));
+
+template <class Vector> SQUEAL_INLINE void get(const double* from, Vector& to)
+{
+  std::memcpy(&to, from, sizeof to);
+}
+
+template <class Vector> SQUEAL_INLINE void put(const Vector& value, double* to)
+{
+  std::memcpy(to, &value, sizeof value);
+}
+
+/// How far ahead the lines of a strip are called for: a page [numbers], which the processor does not look beyond.
+constexpr std::size_t ahead = 512;
+
+constexpr std::size_t padded(std::size_t rows)
+{
+  return (rows + tile - 1) / tile * tile;
+}
+
+/// Of the strip that begins at column j.
+constexpr std::size_t width_from(std::size_t j, std::size_t columns)
+{
+  return std::min(tile, std::bit_floor(columns - j));
+}
+
+/// Of the strip that ends before column j.
+constexpr std::size_t width_before(std::size_t j)
+{
+  return std::min(tile, j & -j);
+}
+
+/// Calls work(width), the width known to the compiler.
+template <class Work> SQUEAL_INLINE void with_width(std::size_t width, const Work& work)
+{
+  switch (width)
+  {
+  case 8:
+    return work(std::integral_constant<std::size_t, 8>{});
+  case 4:
+    return work(std::integral_constant<std::size_t, 4>{});
+  case 2:
+    return work(std::integral_constant<std::size_t, 2>{});
+  default:
+    return work(std::integral_constant<std::size_t, 1>{});
+  }
+}
+
+/// y -= L x of a strip and one right-hand side.
+template <std::size_t width>
+SQUEAL_INLINE void subtract_strip(const double* L, std::size_t rows, const double* x, double* y)
+{
+  Eight some_L, some_y;
+  for (std::size_t i = 0; i < rows; i += tile, L += tile * width)
+  {
+    get(y + i, some_y);
+    for (std::size_t k = 0; k < width; ++k)
+    {
+      __builtin_prefetch(L + tile * k + ahead);
+      get(L + tile * k, some_L);
+      some_y -= some_L * x[k];
+    }
+    put(some_y, y + i);
+  }
+}
+
+/// y -= L' x
+template <std::size_t width>
+SQUEAL_INLINE void subtract_transposed_strip(const double* L, std::size_t rows, const double* x, double* y)
+{
+  Eight sums[width] = {}, some_L, some_x;
+  for (std::size_t i = 0; i < rows; i += tile, L += tile * width)
+  {
+    get(x + i, some_x);
+    for (std::size_t k = 0; k < width; ++k)
+    {
+      __builtin_prefetch(L + tile * k + ahead);
+      get(L + tile * k, some_L);
+      sums[k] += some_L * some_x;
+    }
+  }
+  for (std::size_t k = 0; k < width; ++k)
+    for (std::size_t row = 0; row < tile; ++row) y[k] -= sums[k][row];
+}
+
+/// Where row i of a strip begins.
+constexpr std::size_t row_of(std::size_t i, std::size_t width)
+{
+  return i / tile * tile * width + i % tile;
+}
+
+/// y -= L x of a strip and as many right-hand sides as a vector is wide; those of a row are `lanes` apart.
+template <class Vector, std::size_t width>
+SQUEAL_INLINE void subtract_strip(const double* L, std::size_t rows, std::size_t lanes, const double* x, double* y)
+{
+  Vector some_x[width], some_y;
+  for (std::size_t k = 0; k < width; ++k) get(x + k * lanes, some_x[k]);
+  for (std::size_t i = 0; i < rows; ++i)
+  {
+    const double* const row = L + row_of(i, width);
+    get(y + i * lanes, some_y);
+    for (std::size_t k = 0; k < width; ++k) some_y -= row[tile * k] * some_x[k];
+    put(some_y, y + i * lanes);
+  }
+}
+
+template <class Vector, std::size_t width> SQUEAL_INLINE void
+subtract_transposed_strip(const double* L, std::size_t rows, std::size_t lanes, const double* x, double* y)
+{
+  Vector sums[width] = {}, some_x, some_y;
+  for (std::size_t i = 0; i < rows; ++i)
+  {
+    const double* const row = L + row_of(i, width);
+    get(x + i * lanes, some_x);
+    for (std::size_t k = 0; k < width; ++k) sums[k] += row[tile * k] * some_x;
+  }
+  for (std::size_t k = 0; k < width; ++k)
+  {
+    get(y + k * lanes, some_y);
+    put(some_y - sums[k], y + k * lanes);
+  }
+}
+
+/// Right-hand sides that are taken at once; of a single one, rows are.
+template <class Vector> constexpr std::size_t taken = sizeof(Vector) / sizeof(double);
+
+template <class Vector> SQUEAL_INLINE void product(const Panel& L, std::size_t lanes, const double* x, double* y)
+{
+  const double* strip = L.values;
+  for (std::size_t j = 0; j < L.columns; j += width_from(j, L.columns))
+  {
+    const std::size_t some = width_from(j, L.columns);
+    with_width(some,
+               [&](auto width) SQUEAL_INLINE_LAMBDA
+               {
+                 if constexpr (std::is_same_v<Vector, double>)
+                   subtract_strip<width>(strip, L.rows, x + j, y);
+                 else
+                   for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+                     subtract_strip<Vector, width>(strip, L.rows, lanes, x + j * lanes + lane, y + lane);
+               });
+    strip += some * padded(L.rows);
+  }
+}
+
+template <class Vector> SQUEAL_INLINE void transposed(const Panel& L, std::size_t lanes, const double* x, double* y)
+{
+  const double* strip = L.values;
+  for (std::size_t j = 0; j < L.columns; j += width_from(j, L.columns))
+  {
+    const std::size_t some = width_from(j, L.columns);
+    with_width(some,
+               [&](auto width) SQUEAL_INLINE_LAMBDA
+               {
+                 if constexpr (std::is_same_v<Vector, double>)
+                   subtract_transposed_strip<width>(strip, L.rows, x, y + j);
+                 else
+                   for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+                     subtract_transposed_strip<Vector, width>(strip, L.rows, lanes, x + lane, y + j * lanes + lane);
+               });
+    strip += some * padded(L.rows);
+  }
+}
+
+/// The tile on the diagonal of a strip `width` wide, and what it leaves to its own rows.
+template <class Vector> SQUEAL_INLINE void solve_tile(const double* L, std::size_t width, std::size_t lanes, double* x)
+{
+  for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+    for (std::size_t k = 0; k < width; ++k)
+    {
+      Vector pivot, other;
+      get(x + k * lanes + lane, pivot);
+      pivot *= 1 / L[(tile + 1) * k];
+      put(pivot, x + k * lanes + lane);
+      for (std::size_t i = k + 1; i < tile; ++i)
+      {
+        get(x + i * lanes + lane, other);
+        put(other - L[tile * k + i] * pivot, x + i * lanes + lane);
+      }
+    }
+}
+
+template <class Vector>
+SQUEAL_INLINE void solve_transposed_tile(const double* L, std::size_t width, std::size_t lanes, double* x)
+{
+  for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+    for (std::size_t k = width; k-- > 0;)
+    {
+      Vector pivot, other;
+      get(x + k * lanes + lane, pivot);
+      for (std::size_t i = k + 1; i < tile; ++i)
+      {
+        get(x + i * lanes + lane, other);
+        pivot -= L[tile * k + i] * other;
+      }
+      pivot *= 1 / L[(tile + 1) * k];
+      put(pivot, x + k * lanes + lane);
+    }
+}
+
+/// What is below the tile on the diagonal of the strip of a triangle that begins at column j.
+Panel below_tile(const double* strip, std::size_t j, std::size_t width, std::size_t columns)
+{
+  return {strip + tile * width, columns - std::min(columns, j + tile), width};
+}
+
+template <class Vector> SQUEAL_INLINE void solve(const double* L, std::size_t columns, std::size_t lanes, double* x)
+{
+  for (std::size_t j = 0; j < columns; j += width_from(j, columns))
+  {
+    const std::size_t width = width_from(j, columns);
+    solve_tile<Vector>(L, width, lanes, x + j * lanes);
+    product<Vector>(below_tile(L, j, width, columns), lanes, x + j * lanes, x + (j + tile) * lanes);
+    L += width * padded(columns - j);
+  }
+}
+
+template <class Vector>
+SQUEAL_INLINE void solve_transposed(const double* L, std::size_t columns, std::size_t lanes, double* x)
+{
+  L += packed_triangle(columns);
+  for (std::size_t j = columns; j > 0;)
+  {
+    const std::size_t width = width_before(j);
+    j -= width;
+    L -= width * padded(columns - j);
+    transposed<Vector>(below_tile(L, j, width, columns), lanes, x + (j + tile) * lanes, x + j * lanes);
+    solve_transposed_tile<Vector>(L, width, lanes, x + j * lanes);
+  }
+}
+
+/// Eight columns of W: the part of them below their diagonal block acts as it stands and transposed.
+SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j, const double* __restrict x,
+                               double* __restrict y)
+{
+  const double* const first = W + j * size;
+  for (std::size_t k = 0; k < tile; ++k)
+    for (std::size_t i = j; i < j + tile; ++i)
+      y[j + k] += first[std::min(k, i - j) * size + j + std::max(k, i - j)] * x[i];
+  Eight sums[tile] = {}, some_W, some_x, some_y;
+  std::size_t i = j + tile;
+  for (; i + tile <= size; i += tile)
+  {
+    get(x + i, some_x);
+    get(y + i, some_y);
+    for (std::size_t k = 0; k < tile; ++k)
+    {
+      get(first + k * size + i, some_W);
+      some_y += some_W * x[j + k];
+      sums[k] += some_W * some_x;
+    }
+    put(some_y, y + i);
+  }
+  for (std::size_t k = 0; k < tile; ++k)
+  {
+    for (std::size_t part = 0; part < tile; ++part) y[j + k] += sums[k][part];
+    for (std::size_t row = i; row < size; ++row)
+    {
+      y[row] += first[k * size + row] * x[j + k];
+      y[j + k] += first[k * size + row] * x[row];
+    }
+  }
+}
+
+/// y = W x of eight rows, or one, of a row-major matrix.
+template <class Vector, std::size_t rows>
+SQUEAL_INLINE void multiply_rows(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y)
+{
+  for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+  {
+    Vector sums[rows] = {}, some_x;
+    for (std::size_t j = 0; j < size; ++j)
+    {
+      get(x + j * lanes + lane, some_x);
+      for (std::size_t row = 0; row < rows; ++row) sums[row] += W[row * size + j] * some_x;
+    }
+    for (std::size_t row = 0; row < rows; ++row) put(sums[row], y + row * lanes + lane);
+  }
+}
+
+template <class Vector>
+SQUEAL_INLINE void multiply(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y)
+{
+  std::size_t i = 0;
+  for (; i + tile <= size; i += tile) multiply_rows<Vector, tile>(W + i * size, size, lanes, x, y + i * lanes);
+  for (; i < size; ++i) multiply_rows<Vector, 1>(W + i * size, size, lanes, x, y + i * lanes);
+}
+
+} // namespace
+
+SQUEAL_WIDE void dense_product(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y)
+{
+  lanes == 4 ? multiply<Four>(W, size, lanes, x, y) : multiply<Eight>(W, size, lanes, x, y);
+}
+
+SQUEAL_WIDE void symmetric_product(const double* W, std::size_t size, const double* x, double* y)
+{
+  std::fill_n(y, size, 0.);
+  std::size_t j = 0;
+  for (; j + tile <= size; j += tile) add_columns(W, size, j, x, y);
+  for (std::size_t k = j; k < size; ++k)
+    for (std::size_t i = j; i < size; ++i) y[k] += W[std::min(i, k) * size + std::max(i, k)] * x[i];
+}
+
+std::size_t packed_panel(std::size_t rows, std::size_t columns)
+{
+  return padded(rows) * columns;
+}
+
+std::size_t packed_triangle(std::size_t columns)
+{
+  std::size_t size = 0;
+  for (std::size_t j = 0; j < columns; j += width_from(j, columns))
+    size += packed_panel(columns - j, width_from(j, columns));
+  return size;
+}
+
+double* pack_panel(const double* from, std::size_t height, std::size_t rows, std::size_t columns, double* to)
+{
+  for (std::size_t j = 0; j < columns; j += width_from(j, columns))
+    for (std::size_t i = 0; i < rows; i += tile)
+      for (std::size_t k = j; k < j + width_from(j, columns); ++k, to += tile)
+      {
+        const std::size_t count = std::min(tile, rows - i);
+        std::copy_n(from + k * height + i, count, to);
+        std::fill(to + count, to + tile, 0.);
+      }
+  return to;
+}
+
+double* pack_triangle(const double* from, std::size_t height, std::size_t columns, double* to)
+{
+  for (std::size_t j = 0; j < columns; j += width_from(j, columns))
+    to = pack_panel(from + j * height + j, height, columns - j, width_from(j, columns), to);
+  return to;
+}
+
+SQUEAL_WIDE void subtract_product(const Panel& L, std::size_t lanes, const double* x, double* y)
+{
+  lanes == 1   ? product<double>(L, lanes, x, y)
+  : lanes == 4 ? product<Four>(L, lanes, x, y)
+               : product<Eight>(L, lanes, x, y);
+}
+
+SQUEAL_WIDE void subtract_transposed(const Panel& L, std::size_t lanes, const double* x, double* y)
+{
+  lanes == 1   ? transposed<double>(L, lanes, x, y)
+  : lanes == 4 ? transposed<Four>(L, lanes, x, y)
+               : transposed<Eight>(L, lanes, x, y);
+}
+
+SQUEAL_WIDE void solve_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x)
+{
+  lanes == 1   ? solve<double>(L, columns, lanes, x)
+  : lanes == 4 ? solve<Four>(L, columns, lanes, x)
+               : solve<Eight>(L, columns, lanes, x);
+}
+
+SQUEAL_WIDE void solve_transposed_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x)
+{
+  lanes == 1   ? solve_transposed<double>(L, columns, lanes, x)
+  : lanes == 4 ? solve_transposed<Four>(L, columns, lanes, x)
+               : solve_transposed<Eight>(L, columns, lanes, x);
+}
+
+} // namespace squeal

@@ -1,0 +1,101 @@
+#include "squeal/algebra/pencil_factor.hpp"
+
+#include "elimination.hpp"
+#include "mumps.hpp"
+
+namespace squeal
+{
+
+namespace
+{
+
+using Index = std::size_t;
+
+int room_option()
+{
+  PetscInt room = 30;
+  check(PetscOptionsGetInt(nullptr, "modes_", "-factor_room", &room, nullptr));
+  return static_cast<int>(room);
+}
+
+} // namespace
+
+struct PencilFactor::Parts
+{
+  MPI_Comm comm = MPI_COMM_NULL;
+  Shares shares;
+  Triplets entries; // those of K, then those of M: MUMPS sums what is of one place
+  Index first_of_M = 0;
+  std::vector<double> values, right;
+  Mumps mumps;
+};
+
+PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry) : parts_(std::make_unique<Parts>())
+{
+  Parts& parts = *parts_;
+  parts.comm = comm_of(K);
+  parts.shares = shares_of(K);
+  const auto append = [&](Mat A)
+  { symmetry == Symmetry::none ? append_rows(A, 0, parts.entries) : append_lower_triangle(A, parts.entries); };
+  append(K);
+  parts.first_of_M = parts.entries.value.size();
+  append(M);
+  parts.values.resize(parts.entries.value.size());
+  Triplets pattern = gathered(lower_triangle(K), Triplets::Part::pattern, parts.comm);
+  std::vector<MUMPS_INT> order;
+  on_rank_zero(parts.comm,
+               [&]
+               {
+                 for (const int position : eliminate(pattern, parts.shares.total(), 0).position)
+                   order.push_back(position + 1);
+               });
+  parts.mumps = start_mumps(parts.comm, symmetry == Symmetry::none ? 0 : 2);
+  DMUMPS_STRUC_C& mumps = *parts.mumps;
+  control(mumps, 14) = room_option();
+  set_entries(mumps, parts.entries, parts.shares.total());
+  mumps.a_loc = parts.values.data();
+  mumps.perm_in = order.data();
+  run(mumps, MumpsJob::analyse);
+  mumps.perm_in = nullptr;
+}
+
+PencilFactor::~PencilFactor() = default;
+
+bool PencilFactor::factorise(double shift)
+{
+  Parts& parts = *parts_;
+  for (Index k = 0; k < parts.values.size(); ++k)
+    parts.values[k] = (k < parts.first_of_M ? 1 : -shift) * parts.entries.value[k];
+  return squeal::factorise(*parts.mumps);
+}
+
+int PencilFactor::negative_pivots() const
+{
+  return parts_->mumps->infog[11];
+}
+
+Block PencilFactor::solved(const Block& X) const
+{
+  Parts& parts = *parts_;
+  Block Y = X;
+  const bool here = rank_of(parts.comm) == 0;
+  const auto total = static_cast<Index>(parts.shares.total()), columns = static_cast<Index>(X.columns);
+  if (columns == 0) return Y;
+  if (here) parts.right.resize(total * columns);
+  const auto whole = [&](PetscInt j) { return parts.right.data() + (here ? static_cast<Index>(j) * total : 0); };
+  for (PetscInt j = 0; j < X.columns; ++j)
+    MPI_Gatherv(X.column(j), static_cast<int>(X.rows), MPI_DOUBLE, whole(j), parts.shares.counts.data(),
+                parts.shares.starts.data(), MPI_DOUBLE, 0, parts.comm);
+  DMUMPS_STRUC_C& mumps = *parts.mumps;
+  control(mumps, 27) = static_cast<MUMPS_INT>(columns); // all of them at each reading of the factor
+  mumps.rhs = parts.right.data();
+  mumps.nrhs = static_cast<MUMPS_INT>(columns);
+  mumps.lrhs = parts.shares.total();
+  run(mumps, MumpsJob::solve);
+  for (PetscInt j = 0; j < X.columns; ++j)
+    MPI_Scatterv(whole(j), parts.shares.counts.data(), parts.shares.starts.data(), MPI_DOUBLE, Y.column(j),
+                 static_cast<int>(X.rows), MPI_DOUBLE, 0, parts.comm);
+  return Y;
+}
+
+} // namespace squeal

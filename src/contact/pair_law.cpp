@@ -1,0 +1,208 @@
+#include "squeal/contact/pair_law.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace squeal
+{
+
+namespace
+{
+
+constexpr double round_off = 1e-13; // a few hundred units in the last place of the terms summed
+
+/// std::hypot guards against squares out of range, which reactions and velocities never have, at ten times the cost.
+double length(double x, double y)
+{
+  return std::sqrt(x * x + y * y);
+}
+
+PairVector apply(const PairBlock& A, const PairVector& r, const PairVector& q)
+{
+  PairVector w = q;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) w[i] += A[i][j] * r[j];
+  return w;
+}
+
+/// A r = -q by elimination of r_n; a tangential direction that cannot move gets no reaction, and no stick if it slides.
+std::optional<PairVector> stick(const PairBlock& A, const PairVector& q)
+{
+  const double a = A[0][0], b1 = A[0][1] / a, b2 = A[0][2] / a;
+  const double s11 = A[1][1] - b1 * A[0][1], s22 = A[2][2] - b2 * A[0][2], s12 = A[1][2] - b1 * A[0][2];
+  const double c1 = q[1] - b1 * q[0], c2 = q[2] - b2 * q[0];
+  const double trace = s11 + s22, determinant = s11 * s22 - s12 * s12;
+  PairVector r{};
+  if (determinant > round_off * trace * trace)
+  {
+    r[1] = -(s22 * c1 - s12 * c2) / determinant;
+    r[2] = -(s11 * c2 - s12 * c1) / determinant;
+  }
+  else if (trace > round_off * (a + A[1][1] + A[2][2]))
+  {
+    // rank one, S = v v': r_t = -(v.c) v / |v|^4
+    const double v1 = s11 >= s22 ? s11 : s12, v2 = s11 >= s22 ? s12 : s22;
+    const double factor = -(v1 * c1 + v2 * c2) / (trace * (v1 * v1 + v2 * v2));
+    r[1] = factor * v1;
+    r[2] = factor * v2;
+  }
+  r[0] = -(q[0] + A[0][1] * r[1] + A[0][2] * r[2]) / a;
+  const PairVector w = apply(A, r, q);
+  const double scale = std::abs(q[0]) + std::abs(q[1]) + std::abs(q[2]);
+  if (length(w[1], w[2]) > 10 * round_off * scale) return std::nullopt;
+  return r;
+}
+
+/// Slip along the unit vector d: z is w_t times the positive denominator of r_n.
+struct Slip
+{
+  double denominator, z1, z2;
+};
+
+Slip slip_along(const PairBlock& A, const PairVector& q, double mu, double d1, double d2)
+{
+  const double denominator = A[0][0] + mu * (A[0][1] * d1 + A[0][2] * d2);
+  return {denominator, q[1] * denominator - q[0] * (A[0][1] + mu * (A[1][1] * d1 + A[1][2] * d2)),
+          q[2] * denominator - q[0] * (A[0][2] + mu * (A[1][2] * d1 + A[2][2] * d2))};
+}
+
+PairVector slip_reaction(const PairVector& q, double mu, double denominator, double d1, double d2)
+{
+  const double r_n = -q[0] / denominator;
+  return {r_n, mu * r_n * d1, mu * r_n * d2};
+}
+
+PairVector slip_in_plane(const PairBlock& A, const PairVector& q, double mu, const PairVector& last)
+{
+  // of both senses, the one that opposes the sliding best: at the edge of stick neither does beyond round-off
+  const double first = last[1] < 0 ? -1. : 1.;
+  double chosen = 0, denominator = A[0][0], least = 0;
+  for (const double d : {first, -first})
+  {
+    const Slip slip = slip_along(A, q, mu, d, 0);
+    const double along = d * slip.z1;
+    if (slip.denominator <= 0 || (chosen != 0 && along >= least)) continue;
+    chosen = d;
+    denominator = slip.denominator;
+    least = along;
+    if (along <= 0) break;
+  }
+  return slip_reaction(q, mu, denominator, chosen, 0);
+}
+
+/// d x w_t as a function of the angle of d, and its derivative.
+struct SlipAngle
+{
+  const PairBlock& A;
+  const PairVector& q;
+  double mu, tolerance;
+
+  double cross(double angle, double& derivative) const
+  {
+    const double d1 = std::cos(angle), d2 = std::sin(angle);
+    const Slip slip = slip_along(A, q, mu, d1, d2);
+    const double turn = mu * (-A[0][1] * d2 + A[0][2] * d1);
+    const double y1 = q[1] * turn - q[0] * mu * (-A[1][1] * d2 + A[1][2] * d1);
+    const double y2 = q[2] * turn - q[0] * mu * (-A[1][2] * d2 + A[2][2] * d1);
+    derivative = -(d1 * slip.z1 + d2 * slip.z2) - d2 * y1 + d1 * y2;
+    return -d2 * slip.z1 + d1 * slip.z2;
+  }
+
+  std::optional<PairVector> reaction(double angle) const
+  {
+    const double d1 = std::cos(angle), d2 = std::sin(angle);
+    const Slip slip = slip_along(A, q, mu, d1, d2);
+    if (slip.denominator <= 0 || d1 * slip.z1 + d2 * slip.z2 > tolerance) return std::nullopt;
+    return slip_reaction(q, mu, slip.denominator, d1, d2);
+  }
+
+  std::optional<PairVector> newton(double angle) const
+  {
+    for (int iteration = 0; iteration < 12; ++iteration)
+    {
+      double derivative = 0;
+      const double value = cross(angle, derivative);
+      const double change = derivative != 0 ? -value / derivative : 0;
+      angle += std::clamp(change, -.5, .5);
+      if (std::abs(change) < 1e-9)
+      {
+        // quadratic convergence: the last step was below the root of round-off
+        double slope = 0;
+        if (std::abs(cross(angle, slope)) <= tolerance) return reaction(angle);
+        return std::nullopt;
+      }
+    }
+    return std::nullopt;
+  }
+
+  /// Of all slip directions on the circle, the one nearest to `start`.
+  std::optional<PairVector> scan(double start) const
+  {
+    constexpr int intervals = 64;
+    std::optional<PairVector> best;
+    double nearest = -2;
+    for (int i = 0; i < intervals; ++i)
+    {
+      double unused = 0, low = start + 2 * M_PI * i / intervals, high = start + 2 * M_PI * (i + 1) / intervals;
+      const bool positive = cross(low, unused) > 0;
+      if (positive == (cross(high, unused) > 0)) continue;
+      for (int halving = 0; halving < 60; ++halving)
+      {
+        const double middle = (low + high) / 2;
+        ((cross(middle, unused) > 0) == positive ? low : high) = middle;
+      }
+      const auto found = reaction(low);
+      const double closeness = std::cos(low - start);
+      if (!found || closeness < nearest) continue;
+      best = found;
+      nearest = closeness;
+    }
+    return best;
+  }
+};
+
+PairVector slip_in_space(const PairBlock& A, const PairVector& q, double mu, const PairVector& last)
+{
+  const double size = length(q[1], q[2]) * (A[0][0] + mu * length(A[0][1], A[0][2])) +
+                      std::abs(q[0]) * (length(A[0][1], A[0][2]) + mu * (A[1][1] + A[2][2]));
+  const SlipAngle slip{A, q, mu, round_off * size};
+  double start = std::atan2(last[2], last[1]);
+  if (last[1] == 0 && last[2] == 0)
+  {
+    const PairVector sliding = apply(A, {-q[0] / A[0][0], 0, 0}, q); // without friction
+    start = std::atan2(-sliding[2], -sliding[1]);
+  }
+  if (const auto found = slip.newton(start)) return *found;
+  if (const auto found = slip.scan(start)) return *found;
+  return last; // the residual says that this pair is not solved
+}
+
+} // namespace
+
+void project_on_disc(PairVector& r, double friction)
+{
+  const double radius = friction * std::max(0., r[0]), size = length(r[1], r[2]);
+  if (size <= radius) return;
+  r[1] *= radius / size;
+  r[2] *= radius / size;
+}
+
+PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, double friction, const PairVector& last)
+{
+  if (q[0] >= 0 || A[0][0] <= 0) return {};
+  if (friction == 0) return {-q[0] / A[0][0], 0, 0};
+  if (const auto r = stick(A, q); r && (*r)[0] >= 0 && length((*r)[1], (*r)[2]) <= friction * (*r)[0]) return *r;
+  return directions == 1 ? slip_in_plane(A, q, friction, last) : slip_in_space(A, q, friction, last);
+}
+
+double natural_map(const PairVector& r, const PairVector& w, double friction, double rho_n, double rho_t)
+{
+  // the disc's radius is that of the reaction itself: r_n is judged by its own row
+  PairVector moved = {std::max(0., r[0]), r[1] - rho_t * w[1], r[2] - rho_t * w[2]};
+  project_on_disc(moved, friction);
+  moved[0] = std::max(0., r[0] - rho_n * w[0]);
+  return length(r[0] - moved[0], length(r[1] - moved[1], r[2] - moved[2]));
+}
+
+} // namespace squeal

@@ -1,0 +1,323 @@
+#include "squeal/equilibrium/closed_contact.hpp"
+
+#include "squeal/algebra/dense_eigenproblems.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace squeal
+{
+
+namespace
+{
+
+// Coefficients of one degree of freedom in B_n and in B_n + mu e.B_t: both are eliminated side by side.
+struct Coefficients
+{
+  double normal = 0, sliding = 0;
+};
+
+// Columns from `dofs` on record the elimination itself: they start as the identity and end as its inverse.
+using Row = std::map<PetscInt, Coefficients>;
+
+// The rows of B of the closed pairs, whole on every rank: they are few, and the elimination is the same everywhere.
+std::vector<Row> read_rows(const Interface& interface, const std::vector<int>& pairs)
+{
+  const int block = interface.block();
+  std::vector<PetscInt> indices;
+  for (const int pair : pairs)
+    for (int k = 0; k < block; ++k) indices.push_back(static_cast<PetscInt>(pair) * block + k);
+  PetscInt dofs = 0;
+  check(MatGetSize(interface.B, nullptr, &dofs));
+  Owned<IS> row_set, column_set;
+  check(ISCreateGeneral(PETSC_COMM_SELF, static_cast<PetscInt>(indices.size()), indices.data(), PETSC_COPY_VALUES,
+                        row_set.put()));
+  check(ISCreateStride(PETSC_COMM_SELF, dofs, 0, 1, column_set.put()));
+  const IS wanted_rows = row_set, wanted_columns = column_set;
+  Mat* parts = nullptr;
+  check(MatCreateSubMatrices(interface.B, 1, &wanted_rows, &wanted_columns, MAT_INITIAL_MATRIX, &parts));
+  const std::vector<double> e = drive_directions(interface);
+  std::vector<Row> result(pairs.size());
+  for_each_row(parts[0],
+               [&](PetscInt row, std::span<const PetscInt> column, std::span<const PetscScalar> value)
+               {
+                 const auto i = static_cast<std::size_t>(row / block);
+                 const int k = static_cast<int>(row % block), direction = pairs[i] * interface.directions + k - 1;
+                 const double weight = k == 0 ? 1 : interface.friction * e[static_cast<std::size_t>(direction)];
+                 for (std::size_t j = 0; j < column.size(); ++j)
+                 {
+                   if (value[j] == 0) continue;
+                   Coefficients& entry = result[i][column[j]];
+                   if (k == 0) entry.normal += value[j];
+                   entry.sliding += weight * value[j];
+                 }
+               });
+  check(MatDestroySubMatrices(1, &parts));
+  return result;
+}
+
+// The degree of freedom large in both rows; one that no other row holds is preferred, since nothing then fills in.
+PetscInt choose_pivot(const Row& row, const std::map<PetscInt, int>& holders, PetscInt dofs, double vanishing)
+{
+  double largest_normal = 0, largest_sliding = 0;
+  for (const auto& [column, value] : row)
+    if (column < dofs)
+    {
+      largest_normal = std::max(largest_normal, std::abs(value.normal));
+      largest_sliding = std::max(largest_sliding, std::abs(value.sliding));
+    }
+  if (largest_normal <= vanishing || largest_sliding <= vanishing) return -1;
+  PetscInt best = -1;
+  double best_score = 1e-6;
+  for (const auto& [column, value] : row)
+  {
+    if (column >= dofs) continue;
+    const double score = std::min(std::abs(value.normal) / largest_normal, std::abs(value.sliding) / largest_sliding) *
+                         (holders.at(column) == 1 ? 1 : 0.1);
+    if (score < best_score * (1 - 1e-9)) continue; // of equals the last, whatever the rounding
+    best = column;
+    best_score = score;
+  }
+  return best;
+}
+
+// row -= row[pivot] * pivot_row, which holds 1 at the pivot
+void subtract(Row& row, const Row& pivot_row, PetscInt pivot, std::map<PetscInt, int>& holders)
+{
+  const Coefficients factor = row.at(pivot);
+  for (const auto& [column, value] : pivot_row)
+  {
+    const auto [entry, is_new] = row.try_emplace(column);
+    if (is_new) ++holders[column];
+    entry->second.normal -= factor.normal * value.normal;
+    entry->second.sliding -= factor.sliding * value.sliding;
+  }
+  row.erase(pivot);
+  --holders[pivot];
+}
+
+double size_of(const Row& row)
+{
+  double largest = 0;
+  for (const auto& [column, value] : row) largest = std::max(largest, std::abs(value.normal));
+  return largest;
+}
+
+// Gauss-Jordan: on return row i holds 1 at pivots[i], and no other row holds that column.
+std::vector<PetscInt> eliminate(std::vector<Row>& rows, const std::vector<int>& pairs, PetscInt dofs)
+{
+  std::map<PetscInt, int> holders;
+  std::vector<double> size(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i)
+  {
+    size[i] = size_of(rows[i]);
+    rows[i][dofs + static_cast<PetscInt>(i)] = {1, 1};
+    for (const auto& [column, value] : rows[i]) ++holders[column];
+  }
+  std::vector<PetscInt> pivots;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+  {
+    const PetscInt pivot = choose_pivot(rows[i], holders, dofs, 1e-10 * size[i]);
+    if (pivot < 0)
+      throw Error("contact pair " + std::to_string(pairs[i]) +
+                  " cannot be eliminated: the other closed pairs or the supports already fix its normal motion, or the "
+                  "friction coefficient jams it; remove the pair, or free one of its nodes");
+    const Coefficients scale = rows[i].at(pivot);
+    for (auto& [column, value] : rows[i]) value = {value.normal / scale.normal, value.sliding / scale.sliding};
+    pivots.push_back(pivot);
+    if (holders.at(pivot) == 1) continue;
+    for (std::size_t j = 0; j < rows.size(); ++j)
+      if (j != i && rows[j].count(pivot)) subtract(rows[j], rows[i], pivot, holders);
+  }
+  return pivots;
+}
+
+struct Elimination
+{
+  const std::vector<Row>& rows;
+  std::map<PetscInt, std::size_t> row_of; // of a pivot
+  std::vector<PetscInt> pivots;           // ascending
+  PetscInt dofs = 0;
+
+  PetscInt kept_before(PetscInt dof) const
+  {
+    return dof - static_cast<PetscInt>(std::lower_bound(pivots.begin(), pivots.end(), dof) - pivots.begin());
+  }
+};
+
+// A row of Z or Y: du at `dof` from the kept degrees of freedom.
+void basis_row(const Elimination& elimination, PetscInt dof, double Coefficients::*kind, std::vector<PetscInt>& columns,
+               std::vector<double>& values)
+{
+  columns.clear();
+  values.clear();
+  const auto row = elimination.row_of.find(dof);
+  if (row == elimination.row_of.end())
+  {
+    columns.push_back(elimination.kept_before(dof));
+    values.push_back(1);
+    return;
+  }
+  for (const auto& [column, value] : elimination.rows[row->second])
+  {
+    if (column == dof || column >= elimination.dofs) continue;
+    columns.push_back(elimination.kept_before(column));
+    values.push_back(-(value.*kind));
+  }
+}
+
+Owned<Mat> assemble_basis(const Elimination& elimination, double Coefficients::*kind, Mat pattern)
+{
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(pattern, &first, &last));
+  const PetscInt first_column = elimination.kept_before(first), last_column = elimination.kept_before(last);
+  std::vector<PetscInt> columns, inside, outside;
+  std::vector<double> values;
+  for (PetscInt dof = first; dof < last; ++dof)
+  {
+    basis_row(elimination, dof, kind, columns, values);
+    inside.push_back(static_cast<PetscInt>(std::count_if(
+        columns.begin(), columns.end(), [&](PetscInt c) { return c >= first_column && c < last_column; })));
+    outside.push_back(static_cast<PetscInt>(columns.size()) - inside.back());
+  }
+  Owned<Mat> result;
+  check(MatCreateAIJ(comm_of(pattern), last - first, last_column - first_column, PETSC_DETERMINE, PETSC_DETERMINE, 0,
+                     inside.data(), 0, outside.data(), result.put()));
+  for (PetscInt dof = first; dof < last; ++dof)
+  {
+    basis_row(elimination, dof, kind, columns, values);
+    check(MatSetValues(result, 1, &dof, static_cast<PetscInt>(columns.size()), columns.data(), values.data(),
+                       INSERT_VALUES));
+  }
+  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
+  return result;
+}
+
+// R'[pivots] lambda = f[pivots], and the elimination found T with T R[pivots] = I: lambda = T' f[pivots].
+Owned<Mat> assemble_reaction(const std::vector<Row>& rows, const std::vector<PetscInt>& pivots,
+                             const std::vector<int>& pairs, const Interface& interface)
+{
+  PetscInt first = 0, last = 0, dofs = 0;
+  check(MatGetOwnershipRangeColumn(interface.B, &first, &last));
+  check(MatGetSize(interface.B, nullptr, &dofs));
+  Owned<Mat> result;
+  check(MatCreate(comm_of(interface.B), result.put()));
+  check(MatSetSizes(result, PETSC_DECIDE, last - first, interface.pairs, dofs));
+  check(MatSetType(result, MATAIJ));
+  check(MatSetUp(result));
+  check(MatSetOption(result, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE)); // rows that share pivots fill in
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (pivots[i] >= first && pivots[i] < last)
+      for (auto entry = rows[i].lower_bound(dofs); entry != rows[i].end(); ++entry)
+        check(MatSetValue(result, pairs[static_cast<std::size_t>(entry->first - dofs)], pivots[i],
+                          entry->second.sliding, INSERT_VALUES));
+  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
+  return result;
+}
+
+} // namespace
+
+ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface& interface,
+                                     const Equilibrium& equilibrium)
+{
+  ClosedContact result;
+  for (int pair = 0; pair < interface.pairs; ++pair)
+    if (equilibrium.closed[static_cast<std::size_t>(pair)]) result.pairs.push_back(pair);
+  std::vector<Row> rows = read_rows(interface, result.pairs);
+  PetscInt dofs = 0;
+  check(MatGetSize(structure.K, &dofs, nullptr));
+  const std::vector<PetscInt> pivots = eliminate(rows, result.pairs, dofs);
+  Elimination elimination{rows, {}, pivots, dofs};
+  for (std::size_t i = 0; i < pivots.size(); ++i) elimination.row_of[pivots[i]] = i;
+  std::sort(elimination.pivots.begin(), elimination.pivots.end());
+  result.Z = assemble_basis(elimination, &Coefficients::normal, structure.K);
+  result.Y = assemble_basis(elimination, &Coefficients::sliding, structure.K);
+  result.reaction = assemble_reaction(rows, pivots, result.pairs, interface);
+  return result;
+}
+
+Owned<Mat> project_symmetric(Mat A, Mat Z)
+{
+  Owned<Mat> result = project(A, Z, Z); // MatPtAP takes three times as long
+  check(MatSetOption(result, MAT_SYMMETRIC, PETSC_TRUE));
+  return result;
+}
+
+Owned<Mat> project(Mat A, Mat Y, Mat Z)
+{
+  Owned<Mat> AZ, result;
+  check(MatMatMult(A, Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, AZ.put()));
+  check(MatTransposeMatMult(Y, AZ, MAT_INITIAL_MATRIX, PETSC_DEFAULT, result.put()));
+  return result;
+}
+
+Owned<Mat> direction_damping(const Interface& interface, const Equilibrium& equilibrium)
+{
+  if (interface.directions < 2 || interface.friction == 0) return {};
+  const std::vector<double> e = drive_directions(interface);
+  std::vector<double> weight(static_cast<std::size_t>(interface.pairs));
+  for (std::size_t i = 0; i < weight.size(); ++i)
+  {
+    const double reaction = equilibrium.reactions[3 * i];
+    const double speed = std::hypot(interface.drive[2 * i], interface.drive[2 * i + 1]);
+    if (equilibrium.closed[i] && reaction > 0) weight[i] = std::sqrt(interface.friction * reaction / speed);
+  }
+  if (std::all_of(weight.begin(), weight.end(), [](double w) { return w == 0; })) return {};
+  // Across the drive: S = sqrt(mu r_n0/|v_d|) (-e_2 B_t1 + e_1 B_t2), C_f = S'S.
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(interface.B, &first, &last));
+  Owned<Mat> across, S, Cf;
+  check(MatCreateAIJ(comm_of(interface.B), PETSC_DECIDE, last - first, interface.pairs, PETSC_DETERMINE, 2, nullptr, 2,
+                     nullptr, across.put()));
+  PetscInt first_pair = 0, last_pair = 0;
+  check(MatGetOwnershipRange(across, &first_pair, &last_pair));
+  for (PetscInt pair = first_pair; pair < last_pair; ++pair)
+  {
+    const auto i = static_cast<std::size_t>(pair);
+    const PetscInt columns[2] = {3 * pair + 1, 3 * pair + 2};
+    const PetscScalar values[2] = {-e[2 * i + 1] * weight[i], e[2 * i] * weight[i]};
+    check(MatSetValues(across, 1, &pair, 2, columns, values, INSERT_VALUES));
+  }
+  check(MatAssemblyBegin(across, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(across, MAT_FINAL_ASSEMBLY));
+  check(MatMatMult(across, interface.B, MAT_INITIAL_MATRIX, PETSC_DEFAULT, S.put()));
+  check(MatTransposeMatMult(S, S, MAT_INITIAL_MATRIX, PETSC_DEFAULT, Cf.put()));
+  return Cf;
+}
+
+Owned<Mat> sliding_damping(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium)
+{
+  Owned<Mat> C;
+  check(MatDuplicate(structure.C, MAT_COPY_VALUES, C.put()));
+  if (!interface.direction_damping) return C;
+  const Owned<Mat> Cf = direction_damping(interface, equilibrium);
+  if (Cf.get()) check(MatAXPY(C, 1, Cf, UNKNOWN_NONZERO_PATTERN));
+  return C;
+}
+
+ReactionOperator reaction_operator(const ClosedContact& contact, const Structure& structure, Mat C)
+{
+  ReactionOperator result;
+  for (const auto& [A, rows] :
+       {std::pair{structure.M.get(), &result.M}, {C, &result.C}, {structure.K.get(), &result.K}})
+    check(MatMatMult(contact.reaction, A, MAT_INITIAL_MATRIX, PETSC_DEFAULT, rows->put()));
+  return result;
+}
+
+std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
+                                                   Vec imaginary)
+{
+  Owned<Vec> re, im;
+  check(MatCreateVecs(reaction.K, nullptr, re.put()));
+  check(MatCreateVecs(reaction.K, nullptr, im.put()));
+  quadratic_residual(reaction.M, reaction.C, reaction.K, s, real, imaginary, re, im);
+  const std::vector<double> first = whole(re), second = whole(im);
+  std::vector<std::complex<double>> result;
+  for (std::size_t i = 0; i < first.size(); ++i) result.emplace_back(first[i], second[i]);
+  return result;
+}
+
+} // namespace squeal

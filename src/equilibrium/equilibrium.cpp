@@ -1,0 +1,419 @@
+#include "squeal/equilibrium/equilibrium.hpp"
+
+#include "squeal/contact/complementarity.hpp"
+#include "squeal/contact/condensed.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace squeal
+{
+
+namespace
+{
+
+struct Options
+{
+  int max_iterations = 100, check_iterations = 0;
+  double check_rho = 1.5; // over 1/lambda_max
+};
+
+/// What the options mean is said in the program's option table.
+Options read_options(int pairs)
+{
+  PetscInt max_it = 100, check_max_it = -1;
+  check(PetscOptionsGetInt(nullptr, "equilibrium_", "-max_it", &max_it, nullptr));
+  check(PetscOptionsGetInt(nullptr, "equilibrium_", "-check_max_it", &check_max_it, nullptr));
+  PetscReal check_rho = 1.5;
+  check(PetscOptionsGetReal(nullptr, "equilibrium_", "-check_rho", &check_rho, nullptr));
+  if (max_it < 1) throw Error("-equilibrium_max_it must be at least 1");
+  if (!(check_rho > 0 && check_rho < 2))
+    throw Error("-equilibrium_check_rho must be between 0 and 2: the fixed point contracts nowhere else");
+  if (check_max_it < 0) check_max_it = pairs <= 600 ? 20000 : 0;
+  return {static_cast<int>(max_it), static_cast<int>(check_max_it), check_rho};
+}
+
+/// K, or K + kappa B_n' B_n where contact alone holds a body, factored.
+struct Held
+{
+  Owned<Mat> augmented; // null when kappa = 0
+  Factor factor;
+  double kappa = 0; // [N/m]
+};
+
+/// B_n' B_n, from the normal rows of B.
+Owned<Mat> normal_springs(const Interface& interface)
+{
+  const PetscInt block = interface.block();
+  PetscInt first = 0, last = 0, first_dof = 0, last_dof = 0;
+  check(MatGetOwnershipRange(interface.B, &first, &last));
+  check(MatGetOwnershipRangeColumn(interface.B, &first_dof, &last_dof));
+  std::vector<PetscInt> normals;
+  for (PetscInt row = first; row < last; ++row)
+    if (row % block == 0) normals.push_back(row);
+  const auto comm = comm_of(interface.B);
+  Owned<IS> rows, columns;
+  check(ISCreateGeneral(comm, static_cast<PetscInt>(normals.size()), normals.data(), PETSC_COPY_VALUES, rows.put()));
+  check(ISCreateStride(comm, last_dof - first_dof, first_dof, 1, columns.put()));
+  Owned<Mat> B_n, product;
+  check(MatCreateSubMatrix(interface.B, rows, columns, MAT_INITIAL_MATRIX, B_n.put()));
+  check(MatTransposeMatMult(B_n, B_n, MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.put()));
+  return product;
+}
+
+/// Any kappa is exact; one of the size of the structure's own stiffness keeps the digits.
+double typical_stiffness(Mat K)
+{
+  Owned<Vec> diagonal;
+  check(MatCreateVecs(K, diagonal.put(), nullptr));
+  check(MatGetDiagonal(K, diagonal));
+  double largest = 0;
+  check(VecNorm(diagonal, NORM_INFINITY, &largest));
+  return largest > 0 ? largest : 1;
+}
+
+Held hold(const Structure& structure, const Interface& interface)
+{
+  // Springs this soft beside the rest lose the digits of the reactions, which contact would hold.
+  constexpr double soft = 1e-10;
+  Factored first = factor_positive(structure.K, interface);
+  Held held;
+  if (interface.pairs > 0 && (first.loose || first.resistance < soft))
+  {
+    first.factor = Factor(); // two of them side by side would be the most that a run ever holds
+    held.kappa = typical_stiffness(structure.K);
+    check(MatDuplicate(structure.K, MAT_COPY_VALUES, held.augmented.put()));
+    check(MatAXPY(held.augmented, held.kappa, normal_springs(interface), DIFFERENT_NONZERO_PATTERN));
+    check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
+    Factored second = factor_positive(held.augmented, interface);
+    if (!second.loose && second.resistance > 10 * first.resistance)
+    {
+      held.factor = std::move(second.factor);
+      return held;
+    }
+    held = {};
+    if (first.loose)
+    {
+      first.loose = second.loose;
+      first.indefinite = second.indefinite;
+    }
+    else
+    {
+      second.factor = Factor();
+      first = factor_positive(structure.K, interface);
+    }
+  }
+  if (first.loose && first.indefinite)
+    throw Error("equilibrium: the stiffness is not positive definite: a motion that is largest at " +
+                describe(structure.names, *first.loose) +
+                " is driven on, not back, and the structure diverges (buckles) from any rest; look for a stiffness of "
+                "the wrong sign, or a load beyond the critical one");
+  if (first.loose)
+    throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
+                describe(structure.names, *first.loose) + "; give it a support or a spring");
+  held.factor = std::move(first.factor);
+  return held;
+}
+
+/// Block entries of every pair: normal r_n + kappa (g - g0), tangential mu r_n e.
+std::vector<double> pair_forces(const Interface& interface, const std::vector<double>& reaction,
+                                const std::vector<double>& gap, double kappa)
+{
+  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
+  const auto e = drive_directions(interface);
+  std::vector<double> forces(interface.size());
+  for (std::size_t i = 0; i < reaction.size(); ++i)
+  {
+    forces[i * block] = reaction[i] + kappa * (gap[i] - interface.gap[i]);
+    for (std::size_t k = 0; k < directions; ++k)
+      forces[i * block + 1 + k] = interface.friction * reaction[i] * e[i * directions + k];
+  }
+  return forces;
+}
+
+/// K' u = F + B' forces, with one step of iterative refinement.
+void displace(const Held& held, const Structure& structure, const Interface& interface,
+              const std::vector<double>& forces, Vec u)
+{
+  const auto rhs = copy_of(structure.load);
+  if (interface.pairs > 0) add_reactions(interface, forces, rhs);
+  const auto residual = zeros_like(rhs), correction = zeros_like(rhs);
+  Mat K = held.augmented ? held.augmented.get() : structure.K.get();
+  solve(held.factor, rhs, u);
+  check(MatMult(K, u, residual));
+  check(VecAYPX(residual, -1, rhs));
+  solve(held.factor, residual, correction);
+  check(VecAXPY(u, 1, correction));
+}
+
+std::vector<double> gaps_of(const Interface& interface, Vec u)
+{
+  std::vector<double> gap = interface.gap;
+  if (gap.empty()) return gap;
+  const auto motion = relative(interface, u);
+  for (std::size_t i = 0; i < gap.size(); ++i) gap[i] += motion[i * static_cast<std::size_t>(interface.block())];
+  return gap;
+}
+
+/// D_nn of the block matrix D.
+std::vector<double> normal_block(const std::vector<double>& D, const Interface& interface)
+{
+  const auto block = static_cast<std::size_t>(interface.block()), pairs = interface.gap.size(), n = pairs * block;
+  std::vector<double> D_nn(pairs * pairs);
+  for (std::size_t i = 0; i < pairs; ++i)
+    for (std::size_t j = 0; j < pairs; ++j) D_nn[i * pairs + j] = D[i * block * n + j * block];
+  return D_nn;
+}
+
+/// On rank 0, where D is.
+ComplementarityProblem problem_of(const std::vector<double>& D, const std::vector<double>& D_nn,
+                                  const Interface& interface, double kappa, const std::vector<double>& q)
+{
+  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
+  const std::size_t pairs = q.size(), n = pairs * block;
+  const auto e = drive_directions(interface);
+  ComplementarityProblem problem;
+  problem.q = q;
+  problem.M = D_nn;
+  for (std::size_t i = 0; i < pairs; ++i)
+  {
+    problem.compliance = std::max(problem.compliance, D_nn[i * pairs + i]);
+    for (std::size_t j = 0; j < pairs; ++j)
+      for (std::size_t k = 0; k < directions; ++k)
+        problem.M[i * pairs + j] += interface.friction * D[i * block * n + j * block + 1 + k] * e[j * directions + k];
+  }
+  if (kappa == 0) return problem;
+  problem.N.resize(pairs * pairs);
+  for (std::size_t i = 0; i < pairs * pairs; ++i) problem.N[i] = -kappa * D_nn[i];
+  for (std::size_t i = 0; i < pairs; ++i) problem.N[i * pairs + i] += 1;
+  for (double& value : problem.N)
+    if (std::abs(value) < 1e-12) value = 0; // rounding of 1 - 1: the pair alone holds its body
+  return problem;
+}
+
+/// Pairs that touch or would without reactions; all of them where contact must hold a body.
+std::vector<char> first_split(const ComplementarityProblem& problem, const Interface& interface)
+{
+  std::vector<char> closed(problem.q.size());
+  for (std::size_t i = 0; i < closed.size(); ++i)
+    closed[i] = !problem.N.empty() || interface.gap[i] <= 0 || problem.q[i] < 0;
+  return closed;
+}
+
+/// The status iteration, with a second chance from the fixed point's set where friction makes it cycle.
+StatusSolution find_split(const ComplementarityProblem& problem, const Interface& interface, int max_iterations,
+                          double rho)
+{
+  StatusSolution solution = solve_by_status(problem, first_split(problem, interface), max_iterations);
+  if (solution.outcome == "converged" || !problem.N.empty()) return solution;
+  const auto projected = solve_by_projection(problem, rho, 1e-8, 5000);
+  if (projected.residual > 1e-8) return solution;
+  std::vector<char> closed(problem.q.size());
+  std::transform(projected.reaction.begin(), projected.reaction.end(), closed.begin(), [](double r) { return r > 0; });
+  StatusSolution again = solve_by_status(problem, std::move(closed), max_iterations);
+  again.iterations += solution.iterations;
+  return again;
+}
+
+void broadcast(std::vector<double>& values, std::size_t size, MPI_Comm comm)
+{
+  values.resize(size);
+  MPI_Bcast(values.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm);
+}
+
+/// The residual with each pair's own 1/D_nn, and with the fixed point's rho.
+double natural_map(const std::vector<double>& reaction, const std::vector<double>& gap, const std::vector<double>& rho)
+{
+  double error = 0, scale = 0, pull = 0;
+  for (std::size_t i = 0; i < gap.size(); ++i)
+  {
+    error = std::max(error, std::abs(reaction[i] - std::max(0., reaction[i] - rho[i] * gap[i])));
+    scale = std::max(scale, reaction[i]);
+    pull = std::max(pull, rho[i] * std::abs(gap[i]));
+  }
+  return error == 0 ? 0 : error / (scale > 0 ? scale : pull);
+}
+
+/// Sets the force residual; returns whether it is small, or all that rounding of K u allows (a soft support lets u be
+/// large next to the strains).
+bool balances(const Structure& structure, const Interface& interface, Equilibrium& equilibrium)
+{
+  const auto residual = zeros_like(structure.load);
+  double load = 0, stress = 0, defect = 0, stiffness = 0, motion = 0;
+  check(MatMult(structure.K, equilibrium.u, residual));
+  check(VecNorm(residual, NORM_2, &stress));
+  check(VecScale(residual, -1));
+  check(VecAXPY(residual, 1, structure.load));
+  if (interface.pairs > 0) add_reactions(interface, equilibrium.reactions, residual);
+  check(VecNorm(residual, NORM_2, &defect));
+  check(VecNorm(structure.load, NORM_2, &load));
+  check(VecNorm(equilibrium.u, NORM_2, &motion));
+  check(MatNorm(structure.K, NORM_INFINITY, &stiffness));
+  equilibrium.force_residual = defect == 0 ? 0 : defect / (load > 0 ? load : stress);
+  return equilibrium.force_residual <= 1e-9 || defect <= 4 * PETSC_MACHINE_EPSILON * stiffness * motion;
+}
+
+/// What the search shares between ranks; D and the problem live on rank 0.
+struct Search
+{
+  std::vector<double> D_nn;
+  ComplementarityProblem problem;
+  StatusSolution solution;
+  double rho = 0; // 1/lambda_max(D_nn)
+};
+
+/// u, and gaps and reactions corrected by what u's own gaps say: the rounding of D drops out.
+void settle(const Held& held, const Structure& structure, const Interface& interface, Search& search,
+            Equilibrium& equilibrium, MPI_Comm comm)
+{
+  auto& [outcome, iterations, closed, gap, reaction] = search.solution;
+  for (int pass = 0;; ++pass)
+  {
+    displace(held, structure, interface, pair_forces(interface, reaction, gap, held.kappa), equilibrium.u);
+    if (pass == 2 || interface.pairs == 0) break;
+    std::vector<double> error = gaps_of(interface, equilibrium.u);
+    for (std::size_t i = 0; i < error.size(); ++i) error[i] -= gap[i];
+    on_rank_zero(comm,
+                 [&]
+                 {
+                   const auto change = solve_split(search.problem, closed, error);
+                   for (std::size_t i = 0; i < error.size(); ++i)
+                   {
+                     gap[i] = std::max(0., gap[i] + change.gap[i]);
+                     reaction[i] = std::max(0., reaction[i] + change.reaction[i]);
+                   }
+                 });
+    broadcast(gap, error.size(), comm);
+    broadcast(reaction, error.size(), comm);
+  }
+}
+
+void judge(const Structure& structure, const Interface& interface, const Search& search, const Options& options,
+           Equilibrium& equilibrium, MPI_Comm comm)
+{
+  const bool balanced = balances(structure, interface, equilibrium);
+  const auto gap = gaps_of(interface, equilibrium.u);
+  const std::vector<double>& reaction = search.solution.reaction;
+  std::array<double, 5> told{};
+  on_rank_zero(comm,
+               [&]
+               {
+                 const std::size_t pairs = gap.size();
+                 std::vector<double> rho(pairs, search.rho);
+                 told[1] = natural_map(reaction, gap, rho);
+                 for (std::size_t i = 0; i < pairs; ++i)
+                   if (search.D_nn[i * pairs + i] > 0) rho[i] = 1 / search.D_nn[i * pairs + i];
+                 told[0] = natural_map(reaction, gap, rho);
+                 if (search.problem.N.empty()) told[4] = has_one_solution(search.problem) ? 1 : 2;
+                 if (options.check_iterations == 0 || pairs == 0 || !search.problem.N.empty()) return;
+                 const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12,
+                                                      options.check_iterations);
+                 told[2] = run.iterations;
+                 const double largest = *std::max_element(reaction.begin(), reaction.end());
+                 for (std::size_t i = 0; i < pairs && largest > 0; ++i)
+                   told[3] = std::max(told[3], std::abs(run.reaction[i] - reaction[i]) / largest);
+                 if (!(run.residual <= 1e-12)) told[3] = std::numeric_limits<double>::quiet_NaN();
+               });
+  MPI_Bcast(told.data(), 5, MPI_DOUBLE, 0, comm);
+  equilibrium.outcome.residual = told[0];
+  equilibrium.check_residual = told[1];
+  equilibrium.check_iterations = static_cast<int>(told[2]);
+  equilibrium.check_difference = told[3];
+  equilibrium.uniqueness = told[4] == 0 ? "not checked" : told[4] == 1 ? "assured" : "not assured";
+  const bool good = told[0] <= 1e-9 && balanced;
+  equilibrium.outcome.word = good ? "converged" : "not converged";
+  if (!good) equilibrium.outcome.reason = "the closed set was found, but rounding leaves residuals above 1e-9";
+}
+
+/// The words of a search that found nothing.
+Outcome failure(const StatusSolution& solution, double friction)
+{
+  Outcome outcome{"no equilibrium", "", solution.iterations, 1};
+  if (solution.outcome == "cycles")
+    outcome.reason = format("the sets of closed pairs repeat without end at mu = %g: friction is too large", friction);
+  else if (solution.outcome == "singular")
+    outcome.reason = format("no set of closed pairs balances the load at mu = %g: the structure tips, slides away or "
+                            "lifts off",
+                            friction);
+  else
+    outcome = {"not converged", "no fitting set of closed pairs within -equilibrium_max_it", solution.iterations, 1};
+  return outcome;
+}
+
+void share(StatusSolution& solution, std::size_t pairs, MPI_Comm comm)
+{
+  const std::array<std::string, 4> words = {"converged", "cycles", "singular", "not converged"};
+  std::array<int, 2> told = {static_cast<int>(std::find(words.begin(), words.end(), solution.outcome) - words.begin()),
+                             solution.iterations};
+  MPI_Bcast(told.data(), 2, MPI_INT, 0, comm);
+  solution.outcome = words.at(static_cast<std::size_t>(told[0]));
+  solution.iterations = told[1];
+  solution.closed.resize(pairs);
+  MPI_Bcast(solution.closed.data(), static_cast<int>(pairs), MPI_CHAR, 0, comm);
+  broadcast(solution.gap, pairs, comm);
+  broadcast(solution.reaction, pairs, comm);
+}
+
+/// What nothing touches and nothing loads stays where it is, held or free: the modes of a free body need no support.
+bool stays_at_rest(const Structure& structure, const Interface& interface)
+{
+  double load = 0;
+  check(VecNorm(structure.load, NORM_INFINITY, &load));
+  return interface.pairs == 0 && load == 0;
+}
+
+} // namespace
+
+Equilibrium find_equilibrium(const Structure& structure, const Interface& interface)
+{
+  const MPI_Comm comm = comm_of(structure.load);
+  const Options options = read_options(interface.pairs);
+  const auto pairs = static_cast<std::size_t>(interface.pairs);
+
+  Equilibrium equilibrium;
+  equilibrium.u = zeros_like(structure.load);
+  if (stays_at_rest(structure, interface))
+  {
+    equilibrium.outcome = {"converged", "", 0, 0};
+    return equilibrium;
+  }
+  Held held = hold(structure, interface);
+  equilibrium.auxiliary_stiffness = held.kappa;
+  const std::vector<double> nothing(pairs, 0.);
+  displace(held, structure, interface, pair_forces(interface, nothing, nothing, held.kappa), equilibrium.u);
+  const std::vector<double> q = gaps_of(interface, equilibrium.u);
+
+  Search search;
+  search.solution.outcome = "converged";
+  if (pairs > 0)
+  {
+    const std::vector<double> D = held.factor.condensed(1);
+    on_rank_zero(comm,
+                 [&]
+                 {
+                   search.D_nn = normal_block(D, interface);
+                   search.problem = problem_of(D, search.D_nn, interface, held.kappa, q);
+                   search.rho = 1 / largest_eigenvalue(search.D_nn, pairs, 30);
+                   search.solution = find_split(search.problem, interface, options.max_iterations, 1.5 * search.rho);
+                 });
+    share(search.solution, pairs, comm);
+  }
+
+  equilibrium.closed = search.solution.closed;
+  if (search.solution.outcome != "converged")
+  {
+    equilibrium.outcome = failure(search.solution, interface.friction);
+    equilibrium.reactions.assign(interface.size(), 0.);
+    check(VecSet(equilibrium.u, 0));
+    return equilibrium;
+  }
+  settle(held, structure, interface, search, equilibrium, comm);
+  equilibrium.reactions = pair_forces(interface, search.solution.reaction, interface.gap, 0);
+  judge(structure, interface, search, options, equilibrium, comm);
+  equilibrium.outcome.iterations = search.solution.iterations;
+  return equilibrium;
+}
+
+} // namespace squeal

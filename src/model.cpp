@@ -1,0 +1,56 @@
+#include "squeal/model.hpp"
+
+#include "squeal/algebra/bordered_factor.hpp"
+
+namespace squeal
+{
+
+namespace
+{
+
+Model model_of_matrices(const Scene& scene, MPI_Comm comm)
+{
+  Model model;
+  model.structure = read_structure(*scene.matrices, comm);
+  model.interface = read_interface(*scene.matrices, model.structure, scene.friction, comm);
+  model.probes = probe_rows(scene.probes, model.structure, comm);
+  return model;
+}
+
+Model model_of_mesh(const Scene& scene, MPI_Comm comm)
+{
+  Model model;
+  model.mesh = read_mesh(scene, comm);
+  const std::vector<NodePair> pairs = match_pairs(model.mesh, scene.contacts);
+  const Partition partition = partition_mesh(model.mesh, pairs, comm);
+  model.dofs = number_dofs(model.mesh, scene, partition, comm);
+  model.structure = assemble(model.mesh, scene, partition, model.dofs, comm);
+  model.interface = make_interface(model.mesh, pairs, scene, model.dofs, comm);
+  model.probes = probe_rows(scene.probes, model.mesh, model.dofs, comm);
+  return model;
+}
+
+} // namespace
+
+Model build_model(const Scene& scene, MPI_Comm comm)
+{
+  return scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, comm);
+}
+
+MemoryForecast forecast_memory(const Model& model)
+{
+  MemoryForecast forecast;
+  const Structure& structure = model.structure;
+  for (Mat matrix : {structure.M.get(), structure.C.get(), structure.K.get()})
+  {
+    MatInfo info;
+    check(MatGetInfo(matrix, MAT_GLOBAL_SUM, &info));
+    forecast.matrices += info.nz_used * (sizeof(PetscScalar) + sizeof(PetscInt)); // info.memory is 0 in most builds
+  }
+  forecast.factor = factor_memory(structure.K, model.interface.pairs > 0 ? model.interface.B.get() : nullptr);
+  const double contact_size = static_cast<double>(model.interface.size());
+  forecast.condensed_operator = 8 * contact_size * contact_size;
+  return forecast;
+}
+
+} // namespace squeal

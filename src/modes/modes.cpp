@@ -1,0 +1,271 @@
+#include "squeal/modes/modes.hpp"
+
+#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/modes/projection.hpp"
+#include "squeal/modes/quadratic.hpp"
+#include "squeal/modes/real_modes.hpp"
+#include "squeal/modes/slices.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+struct SlidingProblem
+{
+  ClosedContact contact;
+  Owned<Mat> C;             // with the friction direction's, in the structure's dofs
+  QuadraticProblem reduced; // Y'.Z
+  Owned<Mat> M, K;          // Z'.Z, symmetric
+};
+
+SlidingProblem make_problem(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium)
+{
+  SlidingProblem problem;
+  problem.contact = eliminate_closed_pairs(structure, interface, equilibrium);
+  const Mat Y = problem.contact.Y, Z = problem.contact.Z;
+  problem.C = sliding_damping(structure, interface, equilibrium);
+  problem.reduced = {project(structure.M, Y, Z), project(problem.C, Y, Z), project(structure.K, Y, Z)};
+  problem.M = project_symmetric(structure.M, Z);
+  problem.K = project_symmetric(structure.K, Z);
+  return problem;
+}
+
+// The entry of phi of largest modulus; of nearly equal ones the first, so that every rank count turns phi alike.
+std::complex<double> largest_entry(Vec real, Vec imaginary)
+{
+  PetscInt first = 0, last = 0;
+  const PetscScalar *re = nullptr, *im = nullptr;
+  check(VecGetOwnershipRange(real, &first, &last));
+  check(VecGetArrayRead(real, &re));
+  check(VecGetArrayRead(imaginary, &im));
+  MPI_Comm comm = comm_of(real);
+  double largest = 0;
+  for (PetscInt i = 0; i < last - first; ++i) largest = std::max(largest, std::hypot(re[i], im[i]));
+  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm);
+  struct
+  {
+    double entry[2] = {0, 0};
+    int rank = 0;
+  } mine;
+  mine.rank = ranks_of(comm);
+  for (PetscInt i = last - first - 1; i >= 0; --i)
+    if (std::hypot(re[i], im[i]) >= largest * (1 - 1e-6)) mine = {{re[i], im[i]}, rank_of(comm)};
+  check(VecRestoreArrayRead(real, &re));
+  check(VecRestoreArrayRead(imaginary, &im));
+  int holder = 0;
+  MPI_Allreduce(&mine.rank, &holder, 1, MPI_INT, MPI_MIN, comm);
+  MPI_Bcast(mine.entry, 2, MPI_DOUBLE, holder, comm);
+  return {mine.entry[0], mine.entry[1]};
+}
+
+// phi = Z y turned and scaled so that its largest entry is 1
+void set_shape(ComplexMode& mode, const ClosedContact& contact, const Eigenpair& pair)
+{
+  check(MatCreateVecs(contact.Z, nullptr, mode.real.put()));
+  check(MatMult(contact.Z, pair.real, mode.real));
+  mode.imaginary = zeros_like(mode.real);
+  check(MatMult(contact.Z, pair.imaginary, mode.imaginary));
+  const std::complex<double> turn = 1.0 / largest_entry(mode.real, mode.imaginary);
+  const Owned<Vec> real = copy_of(mode.real);
+  check(VecAXPBY(mode.real, -turn.imag(), turn.real(), mode.imaginary));
+  check(VecAXPBY(mode.imaginary, turn.imag(), turn.real(), real));
+}
+
+std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const Structure& structure,
+                                  const SlidingProblem& problem)
+{
+  std::vector<ComplexMode> modes;
+  const ReactionOperator reaction = reaction_operator(problem.contact, structure, problem.C);
+  for (const Eigenpair& pair : solution.pairs)
+  {
+    ComplexMode mode;
+    mode.lambda = pair.lambda;
+    mode.backward_error = pair.backward_error;
+    set_shape(mode, problem.contact, pair);
+    mode.reactions = normal_reactions(reaction, mode.lambda, mode.real, mode.imaginary);
+    modes.push_back(std::move(mode));
+  }
+  return modes;
+}
+
+struct ModesOptions
+{
+  PetscInt dense_limit = 200, candidates = 20;
+  std::string solver = "slices";
+};
+
+ModesOptions read_options()
+{
+  ModesOptions options;
+  char solver[16] = "slices";
+  options.dense_limit = dense_limit_option();
+  check(PetscOptionsGetInt(nullptr, "modes_", "-candidates", &options.candidates, nullptr));
+  check(PetscOptionsGetString(nullptr, "modes_", "-solver", solver, sizeof solver, nullptr));
+  options.solver = solver;
+  if (options.solver != "slices" && options.solver != "toar")
+    throw Error("option -modes_solver is \"" + options.solver + "\": it takes slices or toar");
+  return options;
+}
+
+// Friction may move a pair across the band's edge: a little below it both counts agree, then.
+PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution& solution, RealCount& real,
+                        double band)
+{
+  const double end = 2 * std::numbers::pi * band;
+  const int free = count_below(real, std::sqrt(vibration_floor(norms_of(problem))));
+  return count_pairs(solution, real, free, .8 * end, end);
+}
+
+CountedSolution solve_full(const SlidingProblem& problem, RealCount& real, const ModesSettings& settings,
+                           const ModesOptions& options)
+{
+  const int limit = static_cast<int>(options.dense_limit);
+  const double band = settings.band, end = 2 * std::numbers::pi * band;
+  PetscInt n = 0;
+  check(MatGetSize(problem.K, &n, nullptr));
+  CountedSolution result;
+  if (n > limit && options.solver == "slices")
+  {
+    result = solve_by_slices(problem.reduced, real, band);
+    if (result.count.expected == result.count.found) return result;
+    result.count = count_in_band(problem.reduced, result.solution, real, band);
+    if (result.count.found >= result.count.expected) return result;
+    result.solution.outcome.word = "not converged";
+    result.solution.outcome.reason =
+        "fewer pairs were found than are expected; -modes_solver toar seeks them otherwise";
+    return result;
+  }
+  QuadraticSettings quadratic{band, 0, n > limit ? count_below(real, end) : 0, limit};
+  if (n > limit) quadratic.shift = std::sqrt(-shift_below_zero(problem.M, problem.K)) / end;
+  result.solution = solve_quadratic(problem.reduced, quadratic);
+  result.count = count_in_band(problem.reduced, result.solution, real, band);
+  return result;
+}
+
+// As many real modes as the scene says, or those up to a little beyond the band, at least twenty.
+QuadraticSolution solve_by_projection(const SlidingProblem& problem, const ModesSettings& settings,
+                                      const ModesOptions& options)
+{
+  constexpr int fewest = 20;
+  const Mat M = problem.M, K = problem.K;
+  const int limit = static_cast<int>(options.dense_limit);
+  RealModes basis;
+  if (settings.real_modes == 0) basis = solve_real_modes_below(M, K, 1.05 * settings.band, limit);
+  const int wanted = settings.real_modes > 0 ? settings.real_modes : fewest;
+  if (static_cast<int>(basis.omega.size()) < wanted) basis = solve_real_modes(M, K, wanted, limit);
+  return solve_projected(problem.reduced, M, K, basis,
+                         {settings.band, settings.residual_passes, static_cast<int>(options.candidates)});
+}
+
+int unstable_in(const std::vector<ComplexMode>& modes)
+{
+  return static_cast<int>(
+      std::count_if(modes.begin(), modes.end(), [](const ComplexMode& mode) { return is_unstable(mode.lambda); }));
+}
+
+std::string text_of(const ModeCount& count)
+{
+  char text[200];
+  std::snprintf(text, sizeof text, "%d pairs below %.6g Hz, %d expected by the inertia of the frictionless structure",
+                count.found, count.frequency, count.expected);
+  return text;
+}
+
+// Unstable modes by either route; all modes by inertia.
+std::string count_check(const Modes& modes)
+{
+  const bool confirmed = !modes.count.certified_by.empty() && !modes.routes_disagree;
+  std::string text = confirmed ? "confirmed: " : "NOT confirmed: ";
+  if (modes.method == "both")
+    text += std::to_string(modes.unstable_count) + " unstable by the full problem, " +
+            std::to_string(unstable_in(modes.projected)) + " by projection on real modes; ";
+  return text + text_of(modes.count);
+}
+
+void judge(Modes& modes)
+{
+  for (const ComplexMode& mode : modes.modes)
+    modes.outcome.residual = std::max(modes.outcome.residual, mode.backward_error);
+  modes.unstable_count = unstable_in(modes.modes);
+  modes.routes_disagree = modes.method == "both" && unstable_in(modes.projected) != modes.unstable_count;
+  modes.count_check = count_check(modes);
+  if (modes.outcome.residual <= 1e-8 || modes.outcome.word != "converged") return;
+  modes.outcome.word = "not converged";
+  modes.outcome.reason = "a backward error exceeds 1e-8";
+}
+
+ModeCount certificate(const PairCount& count)
+{
+  return {count.expected == count.found ? "inertia" : "", count.frequency, count.expected, count.found};
+}
+
+// Pairs that were found beyond the band, for the count, are told by their frequency only.
+void keep_band(Modes& modes)
+{
+  const auto beyond = std::stable_partition(modes.modes.begin(), modes.modes.end(),
+                                            [&](const ComplexMode& mode)
+                                            { return std::abs(mode.lambda) < 2 * std::numbers::pi * modes.band; });
+  for (auto mode = beyond; mode != modes.modes.end(); ++mode) modes.beyond_band.push_back(mode->frequency_hz());
+  modes.modes.erase(beyond, modes.modes.end());
+}
+
+} // namespace
+
+double ComplexMode::frequency_hz() const
+{
+  return std::abs(lambda.imag()) / (2 * std::numbers::pi);
+}
+
+double ComplexMode::damping_ratio() const
+{
+  return -lambda.real() / std::abs(lambda);
+}
+
+Modes find_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                 const ModesSettings& settings)
+{
+  const ModesOptions options = read_options();
+  const SlidingProblem problem = make_problem(structure, interface, equilibrium);
+  Modes modes;
+  modes.method = settings.method;
+  modes.band = settings.band;
+  PetscInt free = 0;
+  check(MatGetSize(problem.K, &free, nullptr));
+  if (free == 0)
+  {
+    modes.outcome = {"converged", "closed contact leaves nothing free to vibrate", 0, 0};
+    modes.count_check = "confirmed: there is no mode to count";
+    return modes;
+  }
+  RealCount real = make_real_count(problem.M, problem.K, static_cast<int>(options.dense_limit));
+  CountedSolution found;
+  if (settings.method != "full")
+  {
+    found.solution = solve_by_projection(problem, settings, options);
+    modes.projected = modes_of(found.solution, structure, problem);
+  }
+  if (settings.method == "projection")
+  {
+    found.count = count_in_band(problem.reduced, found.solution, real, settings.band);
+    modes.modes = std::exchange(modes.projected, {});
+  }
+  else
+  {
+    found = solve_full(problem, real, settings, options);
+    modes.modes = modes_of(found.solution, structure, problem);
+  }
+  modes.outcome = found.solution.outcome;
+  modes.count = certificate(found.count);
+  keep_band(modes);
+  judge(modes);
+  return modes;
+}
+
+} // namespace squeal

@@ -1,0 +1,200 @@
+#include "squeal/modes/quadratic.hpp"
+
+#include "squeal/algebra/shift_invert.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+void normalise(Eigenpair& pair)
+{
+  double a = 0, b = 0;
+  check(VecNorm(pair.real, NORM_2, &a));
+  check(VecNorm(pair.imaginary, NORM_2, &b));
+  const double norm = std::hypot(a, b);
+  check(VecScale(pair.real, 1 / norm));
+  check(VecScale(pair.imaginary, 1 / norm));
+}
+
+Owned<Mat> scaled(Mat A, double factor)
+{
+  Owned<Mat> result;
+  check(MatDuplicate(A, MAT_COPY_VALUES, result.put()));
+  check(MatScale(result, factor));
+  return result;
+}
+
+QuadraticSolution solve_whole(const QuadraticProblem& problem, const Window& window)
+{
+  PetscInt n = 0, first = 0, last = 0;
+  check(MatGetSize(problem.K, &n, nullptr));
+  check(MatGetOwnershipRange(problem.K, &first, &last));
+  QuadraticSolution result;
+  result.outcome = {"converged", "", 1, 0};
+  for (const DenseEigenpair& found :
+       solve_dense_quadratic_shared(comm_of(problem.K), static_cast<int>(n), dense_copy(problem.M),
+                                    dense_copy(problem.C), dense_copy(problem.K)))
+  {
+    if (!window.holds(found.lambda)) continue;
+    Eigenpair pair;
+    pair.lambda = found.lambda;
+    check(MatCreateVecs(problem.K, pair.real.put(), pair.imaginary.put()));
+    for (PetscInt i = first; i < last; ++i)
+    {
+      const std::complex<double> value = found.y[static_cast<std::size_t>(i)];
+      check(VecSetValue(pair.real, i, value.real(), INSERT_VALUES));
+      check(VecSetValue(pair.imaginary, i, value.imag(), INSERT_VALUES));
+    }
+    check(VecAssemblyBegin(pair.real));
+    check(VecAssemblyEnd(pair.real));
+    check(VecAssemblyBegin(pair.imaginary));
+    check(VecAssemblyEnd(pair.imaginary));
+    result.pairs.push_back(std::move(pair));
+  }
+  return result;
+}
+
+Owned<PEP> make_solver(Mat M, Mat C, Mat K, PetscInt count, double shift)
+{
+  Owned<PEP> pep;
+  check(PEPCreate(comm_of(K), pep.put()));
+  Mat coefficients[3] = {K, C, M};
+  check(PEPSetOperators(pep, 3, coefficients));
+  check(PEPSetProblemType(pep, PEP_GENERAL));
+  check(PEPSetType(pep, PEPTOAR));
+  check(PEPSetWhichEigenpairs(pep, PEP_TARGET_MAGNITUDE));
+  check(PEPSetTarget(pep, shift));
+  check(PEPSetDimensions(pep, count, PETSC_DEFAULT, PETSC_DEFAULT));
+  check(PEPSetTolerances(pep, 1e-11, 200));
+  ST transformation = nullptr;
+  check(PEPGetST(pep, &transformation));
+  use_mumps(transformation);
+  check(PEPSetOptionsPrefix(pep, "modes_"));
+  check(PEPSetFromOptions(pep));
+  return pep;
+}
+
+// Pairs of a solved PEP; returns the farthest |nu - shift| found.
+double collect(PEP pep, double omega, double shift, const Window& window, std::vector<Eigenpair>& pairs)
+{
+  PetscInt converged = 0;
+  check(PEPGetConverged(pep, &converged));
+  Mat K = nullptr;
+  check(PEPGetOperators(pep, 0, &K));
+  double farthest = 0;
+  for (PetscInt i = 0; i < converged; ++i)
+  {
+    Eigenpair pair;
+    PetscScalar re = 0, im = 0;
+    check(MatCreateVecs(K, pair.real.put(), pair.imaginary.put()));
+    check(PEPGetEigenpair(pep, i, &re, &im, pair.real, pair.imaginary));
+    farthest = std::max(farthest, std::hypot(re - shift, im));
+    pair.lambda = omega * std::complex<double>(re, im);
+    if (window.holds(pair.lambda)) pairs.push_back(std::move(pair));
+  }
+  return farthest;
+}
+
+QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSettings& settings, const Window& window)
+{
+  PetscInt n = 0;
+  check(MatGetSize(problem.K, &n, nullptr));
+  const double omega = std::sqrt(window.limit);
+  const Owned<Mat> M = scaled(problem.M, omega * omega), C = scaled(problem.C, omega);
+  QuadraticSolution result;
+  PetscInt count = std::min<PetscInt>(2 * settings.expected + 20, 2 * n);
+  for (int attempt = 0; attempt < 6; ++attempt)
+  {
+    const Owned<PEP> pep = make_solver(M, C, problem.K, count, settings.shift);
+    check(PEPSolve(pep));
+    PetscInt iterations = 0, converged = 0;
+    check(PEPGetIterationNumber(pep, &iterations));
+    check(PEPGetConverged(pep, &converged));
+    result.pairs.clear();
+    const double farthest = collect(pep, omega, settings.shift, window, result.pairs);
+    result.outcome.iterations += static_cast<int>(iterations);
+    result.outcome.word = "converged";
+    result.outcome.reason.clear();
+    if (farthest >= 1 + std::abs(settings.shift) || converged >= 2 * n) return result;
+    result.outcome.word = "not converged";
+    result.outcome.reason = std::to_string(converged) + " eigenvalues reach " +
+                            std::to_string(farthest * omega / (2 * std::numbers::pi)) + " Hz only";
+    if (converged < count) break;
+    count = std::min<PetscInt>(2 * count, 2 * n);
+  }
+  return result;
+}
+
+} // namespace
+
+bool Window::holds(std::complex<double> lambda) const
+{
+  const double square = std::norm(lambda);
+  return square >= least && square < limit && (lambda.imag() > 0 || (lambda.imag() == 0 && lambda.real() > 0));
+}
+
+QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings)
+{
+  PetscInt n = 0;
+  check(MatGetSize(problem.K, &n, nullptr));
+  const QuadraticNorms norms = norms_of(problem);
+  const double omega = 2 * std::numbers::pi * settings.band;
+  const Window window{vibration_floor(norms), omega * omega};
+  QuadraticSolution result =
+      n <= settings.dense_limit ? solve_whole(problem, window) : solve_large(problem, settings, window);
+  for (Eigenpair& pair : result.pairs)
+  {
+    normalise(pair);
+    pair.backward_error = backward_error(problem, norms, pair);
+  }
+  settle(result);
+  return result;
+}
+
+void settle(QuadraticSolution& solution)
+{
+  for (const Eigenpair& pair : solution.pairs)
+    solution.outcome.residual = std::max(solution.outcome.residual, pair.backward_error);
+  std::stable_sort(solution.pairs.begin(), solution.pairs.end(),
+                   [](const Eigenpair& a, const Eigenpair& b) { return a.lambda.real() > b.lambda.real(); });
+}
+
+bool is_unstable(std::complex<double> lambda)
+{
+  return lambda.real() > 1e-8 * std::abs(lambda);
+}
+
+QuadraticNorms norms_of(const QuadraticProblem& problem)
+{
+  QuadraticNorms norms;
+  check(MatNorm(problem.M, NORM_1, &norms.M));
+  check(MatNorm(problem.C, NORM_1, &norms.C));
+  check(MatNorm(problem.K, NORM_1, &norms.K));
+  return norms;
+}
+
+double vibration_floor(const QuadraticNorms& norms)
+{
+  return norms.M > 0 ? 1e-12 * norms.K / norms.M : 0;
+}
+
+double backward_error(const QuadraticProblem& problem, const QuadraticNorms& norms, const Eigenpair& pair)
+{
+  const Owned<Vec> r = zeros_like(pair.real), s = zeros_like(pair.real);
+  quadratic_residual(problem.M, problem.C, problem.K, pair.lambda, pair.real, pair.imaginary, r, s);
+  double residual[2], size[2];
+  check(VecNorm(r, NORM_2, &residual[0]));
+  check(VecNorm(s, NORM_2, &residual[1]));
+  check(VecNorm(pair.real, NORM_2, &size[0]));
+  check(VecNorm(pair.imaginary, NORM_2, &size[1]));
+  const double lambda = std::abs(pair.lambda), scale = lambda * lambda * norms.M + lambda * norms.C + norms.K;
+  return std::hypot(residual[0], residual[1]) / (scale * std::hypot(size[0], size[1]));
+}
+
+} // namespace squeal

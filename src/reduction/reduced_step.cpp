@@ -1,0 +1,249 @@
+/// The modified theta-method on the reduced model: the scheme of analysis/transient.hpp, in few dense products.
+#include "squeal/contact/pair_law.hpp"
+#include "squeal/reduction/reduced_model.hpp"
+#include "squeal/shooting/shooting.hpp"
+
+#include <petscblaslapack.h>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+Owned<Mat> small_matrix(const MatrixXd& values)
+{
+  Owned<Mat> result;
+  const auto n = static_cast<PetscInt>(values.rows());
+  check(MatCreateSeqDense(PETSC_COMM_SELF, n, n, nullptr, result.put()));
+  double* entries = nullptr;
+  check(MatDenseGetArrayWrite(result, &entries));
+  std::copy_n(values.data(), values.size(), entries);
+  check(MatDenseRestoreArrayWrite(result, &entries));
+  return result;
+}
+
+} // namespace
+
+void put(const VectorXd& values, Vec x)
+{
+  PetscScalar* entries = nullptr;
+  check(VecGetArrayWrite(x, &entries));
+  std::copy_n(values.data(), values.size(), entries);
+  check(VecRestoreArrayWrite(x, &entries));
+}
+
+VectorXd entries_of(Vec x)
+{
+  const std::vector<double> values = whole(x);
+  return VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+Owned<Vec> small_vector(const VectorXd& values)
+{
+  Owned<Vec> x;
+  check(VecCreateSeq(PETSC_COMM_SELF, static_cast<PetscInt>(values.size()), x.put()));
+  put(values, x);
+  return x;
+}
+
+MatrixXd product(const MatrixXd& A, const MatrixXd& B)
+{
+  MatrixXd result(A.rows(), B.cols());
+  const auto rows = static_cast<PetscBLASInt>(A.rows()), columns = static_cast<PetscBLASInt>(B.cols()),
+             inside = static_cast<PetscBLASInt>(A.cols());
+  const PetscBLASInt once = 1;
+  const double one = 1, zero = 0;
+  if (result.size() == 0 || inside == 0) return MatrixXd::Zero(A.rows(), B.cols());
+  if (columns == 1)
+    BLASgemv_("N", &rows, &inside, &one, A.data(), &rows, B.data(), &once, &zero, result.data(), &once);
+  else
+    BLASgemm_("N", "N", &rows, &columns, &inside, &one, A.data(), &rows, B.data(), &inside, &zero, result.data(),
+              &rows);
+  return result;
+}
+
+MatrixXd solve_dense(MatrixXd A, MatrixXd B)
+{
+  const auto n = static_cast<PetscBLASInt>(A.rows()), columns = static_cast<PetscBLASInt>(B.cols());
+  std::vector<PetscBLASInt> pivots(static_cast<std::size_t>(n));
+  PetscBLASInt info = 0;
+  LAPACKgesv_(&n, &columns, A.data(), &n, pivots.data(), B.data(), &n, &info);
+  if (info != 0) throw Error("reduced model: a motion has neither mass nor stiffness");
+  return B;
+}
+
+void prepare(ReducedMap& map, double period)
+{
+  const double h = period / map.steps;
+  if (h == map.h) return;
+  const ReducedModel& model = map.model;
+  const double theta = map.theta;
+  const Eigen::Index n = model.size(), rows = model.G.rows();
+  MatrixXd right(n, 2 * n + rows);
+  right << model.M - h * (1 - theta) * model.C - h * h * theta * (1 - theta) * model.K, -h * model.K, h * model.H;
+  right = solve_dense(model.M + h * theta * model.C + h * h * theta * theta * model.K, std::move(right));
+  map.from_state = right.leftCols(2 * n);
+  map.from_reactions = right.rightCols(rows);
+  map.from_equilibrium = -map.from_reactions * VectorXd::Map(model.reactions.data(), rows);
+  map.W = product(model.G, map.from_reactions);
+  map.G_n = model.G(Eigen::seq(0, Eigen::last, 1 + model.directions), Eigen::all);
+  map.W_single = map.W.cast<float>();
+  map.W_n = map.W_single(Eigen::seq(0, Eigen::last, 1 + model.directions), Eigen::all);
+  map.own.assign(model.active.size(), {});
+  const Eigen::Index block = 1 + model.directions;
+  for (Eigen::Index row = 0; row < rows; ++row)
+    for (Eigen::Index k = 0, first = row - row % block; k < block; ++k)
+      map.own[static_cast<std::size_t>(row / block)][static_cast<std::size_t>(row % block)]
+             [static_cast<std::size_t>(k)] = (map.W(row, first + k) + map.W(first + k, row)) / 2;
+  map.h = h;
+}
+
+namespace
+{
+
+/// s of the pair whose rows begin at `row`.
+VectorXd sliding(const ReducedModel& model, const VectorXd& v, Eigen::Index row)
+{
+  const Eigen::Index d = model.directions;
+  return model.G.middleRows(row + 1, d) * v -
+         VectorXd::Map(&model.drive[static_cast<std::size_t>(row / (1 + d) * d)], d);
+}
+
+/// Closed pairs that stick or turn back oppose s+ alone, as in the full step: b without what s had to say there.
+/// Returns whether there were any.
+bool forget_where_turned(const ReducedMap& map, const VectorXd& v, ReducedContact& contact, VectorXd& b)
+{
+  const Eigen::Index d = map.model.directions, block = 1 + d;
+  bool any = false;
+  for (std::size_t i = 0; d > 0 && i < contact.opposes_end.size(); ++i)
+  {
+    const Eigen::Index row = static_cast<Eigen::Index>(i) * block;
+    if (contact.opposes_end[i] || contact.r(row) <= 0) continue;
+    const VectorXd earlier = (1 - map.theta) / map.theta * sliding(map.model, v, row);
+    if ((contact.w.segment(row + 1, d) - earlier).dot(earlier) >= 0) continue;
+    contact.opposes_end[i] = any = true;
+    b.segment(row + 1, d) -= earlier;
+  }
+  return any;
+}
+
+} // namespace
+
+bool sticks(const VectorXd& r, double friction)
+{
+  return r.tail(r.size() - 1).norm() < (1 - 1e-8) * friction * r(0);
+}
+
+bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact)
+{
+  const ReducedModel& model = map.model;
+  const double h = map.h, theta = map.theta, earlier = (1 - theta) / theta;
+  const Eigen::Index n = model.size();
+  VectorXd both(2 * n);
+  both << state.v, state.q;
+  VectorXd next = product(map.from_state, both) + map.from_equilibrium;
+
+  // b of w = W r + b: tangential rows are s+ + (1-theta)/theta s = s_theta/theta, normal ones gap rates
+  // (g + G_n q~)/h + G_n v, q~ = q + h (1-theta) v
+  VectorXd b = product(model.G, next + earlier * state.v);
+  const VectorXd position = product(map.G_n, state.q + h * (1 - theta - earlier) * state.v);
+  const auto block = static_cast<std::size_t>(1 + model.directions), directions = block - 1;
+  for (std::size_t i = 0; i < model.gap.size(); ++i)
+  {
+    const auto row = static_cast<Eigen::Index>(i * block);
+    b(row) += (model.gap[i] + position(static_cast<Eigen::Index>(i))) / h;
+    for (std::size_t k = 0; k < directions; ++k)
+      b(row + 1 + static_cast<Eigen::Index>(k)) -= (1 + earlier) * model.drive[i * directions + k];
+  }
+  contact.opposes_end.assign(model.gap.size(), false);
+  for (std::size_t i = 0; directions > 0 && i < model.gap.size(); ++i)
+  {
+    const auto row = static_cast<Eigen::Index>(i * block), d = static_cast<Eigen::Index>(directions);
+    if (contact.r(row) <= 0 || !sticks(contact.r.segment(row, 1 + d), model.friction)) continue;
+    contact.opposes_end[i] = true; // its s is rounding
+    b.segment(row + 1, d) -= earlier * sliding(model, state.v, row);
+  }
+  bool converged = solve_contact(map, b, contact);
+  while (forget_where_turned(map, state.v, contact, b))
+  {
+    contact.r_before.resize(0); // no step lies between
+    converged = solve_contact(map, b, contact);
+  }
+  next += product(map.from_reactions, contact.r);
+  state.q += h * (theta * next + (1 - theta) * state.v);
+  state.v = std::move(next);
+  return converged;
+}
+
+namespace
+{
+
+/// N steps from `state` on.
+void march(ReducedMap& map, ReducedState& state, ReducedContact& contact,
+           const std::function<void(const ReducedState&)>& watch)
+{
+  for (int i = 0; i < map.steps; ++i)
+  {
+    if (!advance(map, state, contact)) ++map.unconverged;
+    if (watch) watch(state);
+  }
+}
+
+} // namespace
+
+ReducedState integrate(ReducedMap& map, double period, ReducedState state,
+                       const std::function<void(const ReducedState&)>& watch)
+{
+  prepare(map, period);
+  ReducedContact contact{map.reactions};
+  march(map, state, contact, watch);
+  return state;
+}
+
+Passage pass(ReducedMap& map, double period, ReducedState state)
+{
+  prepare(map, period);
+  ReducedContact contact{map.reactions};
+  ReducedState last_but_one;
+  int done = 0;
+  march(map, state, contact,
+        [&](const ReducedState& now)
+        {
+          if (++done == map.steps - 1) last_but_one = now;
+        });
+  Passage result{state, {}};
+  (void)advance(map, state, contact);
+  result.rate = {(state.q - last_but_one.q) / (2 * map.h), (state.v - last_but_one.v) / (2 * map.h)};
+  return result;
+}
+
+Flow flow_of(ReducedMap& map, const Structure& norm)
+{
+  const auto period_map = [&map](double period, Vec start, Vec end, Vec rate)
+  {
+    const Passage passage = pass(map, period, {entries_of(displacement(start)), entries_of(velocity(start))});
+    put(passage.end.q, displacement(end));
+    put(passage.end.v, velocity(end));
+    if (!rate) return;
+    put(passage.rate.q, displacement(rate));
+    put(passage.rate.v, velocity(rate));
+  };
+  return {period_map, norm.M, norm.K, {}};
+}
+
+Structure small_structure(const ReducedModel& model)
+{
+  Structure structure;
+  structure.M = small_matrix(model.M_z);
+  structure.C = small_matrix(model.C_z);
+  structure.K = small_matrix(model.K_z);
+  check(MatCreateVecs(structure.M, structure.load.put(), nullptr));
+  check(VecSet(structure.load, 0));
+  return structure;
+}
+
+} // namespace squeal

@@ -1,0 +1,362 @@
+#include "squeal/transient/estimate.hpp"
+
+#include "squeal/equilibrium/closed_contact.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Complex = std::complex<double>;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// A sliding pair as the mode shakes it, per metre of q and w t = 0 .. 2 pi; friction law with |r_t| = mu r_n.
+struct ShakenPair
+{
+  int directions = 1;
+  double friction = 0;                    // mu
+  double reaction0 = 0;                   // [N] r_n0
+  Complex reaction;                       // [N/m] rho at i w
+  Complex mode_reaction;                  // [N/m] the mode's own, at lambda
+  std::array<Complex, 2> velocity{};      // [1/s] i w B_t phi
+  std::array<double, 2> drive{}, along{}; // [m/s] v_d, and its direction e
+};
+
+double real_part(Complex z, Complex turn)
+{
+  return z.real() * turn.real() - z.imag() * turn.imag();
+}
+
+// w.(r_t - r_t0) at the instant, over q^2: the small differences are formed before the division.
+double power_at(const ShakenPair& pair, double q, double angle)
+{
+  const Complex turn = std::polar(1.0, angle);
+  const double change = std::max(real_part(pair.reaction, turn), -pair.reaction0 / q); // of r_n, over q
+  double slide[2] = {0, 0}, shake[2] = {0, 0}, speed = 0;
+  for (int k = 0; k < pair.directions; ++k)
+  {
+    const auto i = static_cast<std::size_t>(k);
+    shake[i] = real_part(pair.velocity[i], turn);
+    slide[i] = q * shake[i] - pair.drive[i];
+    speed = std::hypot(speed, slide[i]);
+  }
+  if (speed == 0) return 0; // an instant of no measure
+  double power = 0;
+  for (int k = 0; k < pair.directions; ++k)
+  {
+    const auto i = static_cast<std::size_t>(k);
+    const double heading = -slide[i] / speed;
+    power += shake[i] * pair.friction * (change * heading + pair.reaction0 * (heading - pair.along[i]) / q);
+  }
+  return power;
+}
+
+// 7-15 points of Gauss and Kronrod (Piessens et al. 1983).
+constexpr std::array<double, 8> kronrod_nodes = {0,
+                                                 .207784955007898467600689403773245,
+                                                 .405845151377397166906606412076961,
+                                                 .586087235467691130294144428697265,
+                                                 .741531185599394439863864773280788,
+                                                 .864864423359769072789712788640926,
+                                                 .949107912342758524526189684047851,
+                                                 .991455371120812639206854697526329};
+constexpr std::array<double, 8> kronrod_weights = {
+    .209482141084727828012999174891714, .204432940075298892414161999234649, .190350578064785409913256402421014,
+    .169004726639267902826583426598550, .140653259715525918745189590510238, .104790010322250183839876322541518,
+    .063092092629978553290700663189204, .022935322010529224963732008058970};
+constexpr std::array<double, 4> gauss_weights = {.417959183673469387755102040816327, .381830050505118944950369775488975,
+                                                 .279705391489276667901467771423780,
+                                                 .129484966168869693270611432679082};
+
+double integrate_between(const ShakenPair& pair, double q, double from, double to, double tolerance, int depth)
+{
+  const double middle = (from + to) / 2, half = (to - from) / 2;
+  double fine = 0, coarse = 0;
+  for (std::size_t i = 0; i < kronrod_nodes.size(); ++i)
+  {
+    double value = power_at(pair, q, middle + half * kronrod_nodes[i]);
+    if (i > 0) value += power_at(pair, q, middle - half * kronrod_nodes[i]);
+    fine += kronrod_weights[i] * value;
+    if (i % 2 == 0) coarse += gauss_weights[i / 2] * value;
+  }
+  if (half * std::abs(fine - coarse) <= tolerance || depth == 0) return half * fine;
+  return integrate_between(pair, q, from, middle, tolerance / 2, depth - 1) +
+         integrate_between(pair, q, middle, to, tolerance / 2, depth - 1);
+}
+
+// Angles in (0, 2 pi) where level + q Re(amplitude e^{i angle}) changes sign.
+void add_sign_changes(double level, double q, Complex amplitude, std::vector<double>& angles)
+{
+  const double size = q * std::abs(amplitude);
+  if (size <= std::abs(level)) return;
+  const double half = std::acos(-level / size), argument = std::arg(amplitude);
+  for (const double angle : {half - argument, -half - argument})
+    angles.push_back(angle - 2 * std::numbers::pi * std::floor(angle / (2 * std::numbers::pi)));
+}
+
+Complex along_drive(const ShakenPair& pair)
+{
+  return pair.along[0] * pair.velocity[0] + pair.along[1] * pair.velocity[1];
+}
+
+// Mean power over a period, over q^2. Between its kinks, at lift-off and where the sliding reverses, it is smooth.
+double mean_power(const ShakenPair& pair, double q, double tolerance)
+{
+  std::vector<double> angles = {0, 2 * std::numbers::pi};
+  add_sign_changes(pair.reaction0, q, pair.reaction, angles);
+  add_sign_changes(-std::hypot(pair.drive[0], pair.drive[1]), q, along_drive(pair), angles);
+  std::sort(angles.begin(), angles.end());
+  double sum = 0;
+  for (std::size_t i = 0; i + 1 < angles.size(); ++i)
+    if (angles[i + 1] > angles[i]) sum += integrate_between(pair, q, angles[i], angles[i + 1], tolerance, 20);
+  return sum / (2 * std::numbers::pi);
+}
+
+// As q -> 0: mu rho along the drive, and mu r_n0/|v_d| against motion across it.
+double linear_power(const ShakenPair& pair)
+{
+  const Complex along = along_drive(pair), across = pair.along[0] * pair.velocity[1] - pair.along[1] * pair.velocity[0];
+  const double speed = std::hypot(pair.drive[0], pair.drive[1]);
+  return pair.friction / 2 * (std::real(std::conj(along) * pair.reaction) - pair.reaction0 / speed * std::norm(across));
+}
+
+std::vector<ShakenPair> shaken_pairs(const Structure& structure, const Interface& interface,
+                                     const Equilibrium& equilibrium, const ComplexMode& mode)
+{
+  const Complex s(0, mode.lambda.imag()); // the motion assumed neither grows nor decays, and its reactions are those
+  const std::vector<Complex> reactions =
+      normal_reactions(reaction_operator(eliminate_closed_pairs(structure, interface, equilibrium), structure,
+                                         sliding_damping(structure, interface, equilibrium)),
+                       s, mode.real, mode.imaginary);
+  const std::vector<double> e = drive_directions(interface), real = relative(interface, mode.real),
+                            imaginary = relative(interface, mode.imaginary);
+  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
+  std::vector<ShakenPair> pairs;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(interface.pairs); ++i)
+  {
+    if (!equilibrium.closed[i]) continue;
+    ShakenPair pair;
+    pair.directions = interface.directions;
+    pair.friction = interface.friction;
+    pair.reaction0 = equilibrium.reactions[i * block];
+    pair.reaction = reactions[i];
+    pair.mode_reaction = mode.reactions[i];
+    for (std::size_t k = 0; k < directions; ++k)
+    {
+      pair.velocity[k] =
+          Complex(0, mode.lambda.imag()) * Complex(real[i * block + 1 + k], imaginary[i * block + 1 + k]);
+      pair.drive[k] = interface.drive[i * directions + k];
+      pair.along[k] = e[i * directions + k];
+    }
+    pairs.push_back(pair);
+  }
+  return pairs;
+}
+
+// (Re(phi).A Re(phi) + Im(phi).A Im(phi))
+double quadratic_form(Mat A, const ComplexMode& mode)
+{
+  const Owned<Vec> product = zeros_like(mode.real);
+  double sum = 0;
+  for (const Vec part : {mode.real.get(), mode.imaginary.get()})
+  {
+    double value = 0;
+    check(MatMult(A, part, product));
+    check(VecDot(part, product, &value));
+    sum += value;
+  }
+  return sum;
+}
+
+// Phase at which the smallest reaction at t = 0, min over pairs of r_n0 + q Re(rho e^{i phase}), is largest; the start
+// is on the mode itself, so rho is the mode's own.
+double best_phase(const std::vector<ShakenPair>& pairs, double q)
+{
+  const auto smallest = [&](double phase)
+  {
+    double least = infinity;
+    for (const ShakenPair& pair : pairs)
+      least = std::min(least, pair.reaction0 + q * real_part(pair.mode_reaction, std::polar(1.0, phase)));
+    return least;
+  };
+  constexpr int count = 720;
+  double best = 0, highest = smallest(0);
+  for (int i = 1; i < count; ++i)
+  {
+    const double phase = 2 * std::numbers::pi * i / count, height = smallest(phase);
+    if (height <= highest + 1e-6 * std::abs(highest)) continue; // of equals, as a symmetric brake has, the first
+    best = phase;
+    highest = height;
+  }
+  double from = best - 2 * std::numbers::pi / count, to = best + 2 * std::numbers::pi / count;
+  while (to - from > 1e-10)
+  {
+    const double low = from + (to - from) / 3, high = to - (to - from) / 3;
+    (smallest(low) < smallest(high) ? from : to) = smallest(low) < smallest(high) ? low : high;
+  }
+  return (from + to) / 2;
+}
+
+// Root of a continuous f, positive at `low` and not at `high`: false position that halves the value of an end kept
+// twice (Illinois; Dowell and Jarratt 1971), to |f| <= small.
+template <class Function> double find_root(const Function& f, double low, double high, double small, Outcome& outcome)
+{
+  double at = low, value = infinity, at_low = f(low), at_high = f(high);
+  int kept = 0;
+  for (outcome.iterations = 0; std::abs(value) > small && outcome.iterations < 100; ++outcome.iterations)
+  {
+    at = (low * at_high - high * at_low) / (at_high - at_low);
+    value = f(at);
+    if (value > 0)
+    {
+      low = at;
+      at_low = value;
+      if (kept == 1) at_high /= 2;
+      kept = 1;
+    }
+    else
+    {
+      high = at;
+      at_high = value;
+      if (kept == -1) at_low /= 2;
+      kept = -1;
+    }
+  }
+  outcome.residual = std::abs(value);
+  return at;
+}
+
+// The least q of six decades at which the interface stops giving more than the damping takes.
+template <class Rate> void find_balance(Estimate& result, const Rate& rate, double first_event)
+{
+  constexpr int per_decade = 10, decades_below = 2, decades_above = 4;
+  for (int i = -decades_below * per_decade; i <= decades_above * per_decade; ++i)
+  {
+    result.curve_amplitude.push_back(first_event * std::pow(10., static_cast<double>(i) / per_decade));
+    result.curve_rate.push_back(rate(result.curve_amplitude.back()));
+  }
+  const double damping = result.damping_rate;
+  std::size_t above = 0; // first sample where damping has won after friction did
+  for (std::size_t i = 1; i < result.curve_rate.size() && above == 0; ++i)
+    if (result.curve_rate[i - 1] > damping && result.curve_rate[i] <= damping) above = i;
+  if (above == 0)
+  {
+    result.outcome = {"no balance",
+                      result.curve_rate.back() > damping ? "friction gives more than damping takes at any amplitude"
+                                                         : "damping takes more than friction gives at any amplitude",
+                      0, 0};
+    return;
+  }
+  const double larger = std::max(damping, std::abs(result.friction_rate_linear));
+  result.outcome.word = "balance";
+  result.amplitude = std::exp(find_root([&](double log_q) { return (rate(std::exp(log_q)) - damping) / larger; },
+                                        std::log(result.curve_amplitude[above - 1]),
+                                        std::log(result.curve_amplitude[above]), 1e-13, result.outcome));
+}
+
+double first_amplitude(double level, double size)
+{
+  return size > 0 ? level / size : infinity;
+}
+
+} // namespace
+
+Estimate estimate_amplitude(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                            const ComplexMode& mode)
+{
+  Estimate result;
+  const double omega = mode.lambda.imag();
+  if (omega == 0)
+  {
+    result.outcome = {"skipped", "the mode grows without vibrating", 0, 0};
+    return result;
+  }
+  const std::vector<ShakenPair> pairs = shaken_pairs(structure, interface, equilibrium, mode);
+  const double energy = omega * omega * quadratic_form(structure.M, mode) / 2; // E/q^2
+  result.damping_rate = omega * omega * quadratic_form(structure.C, mode) / 2 / energy;
+  double linear = 0, scale = 0;
+  result.lift_off_amplitude = result.reversal_amplitude = infinity;
+  for (const ShakenPair& pair : pairs)
+  {
+    linear += linear_power(pair);
+    scale += std::abs(linear_power(pair));
+    result.lift_off_amplitude =
+        std::min(result.lift_off_amplitude, first_amplitude(pair.reaction0, std::abs(pair.mode_reaction)));
+    result.reversal_amplitude =
+        std::min(result.reversal_amplitude,
+                 first_amplitude(std::hypot(pair.drive[0], pair.drive[1]), std::abs(along_drive(pair))));
+  }
+  result.friction_rate_linear = linear / energy;
+  const double first_event = std::min(result.lift_off_amplitude, result.reversal_amplitude);
+  if (first_event == infinity || first_event <= 0)
+  {
+    result.outcome = {"no balance", "nothing saturates the interface force", 0, 0};
+    return result;
+  }
+  // Each pair's share of an absolute tolerance; the rule's finer half is far better than the difference it is held to.
+  const double tolerance = 1e-9 * std::max(scale, energy * result.damping_rate) / static_cast<double>(pairs.size());
+  MPI_Comm comm = comm_of(structure.K);
+  const auto rank = static_cast<std::size_t>(rank_of(comm)), ranks = static_cast<std::size_t>(ranks_of(comm));
+  const auto rate = [&](double q)
+  {
+    double power = 0;
+    for (std::size_t i = rank; i < pairs.size(); i += ranks) power += mean_power(pairs[i], q, tolerance);
+    MPI_Allreduce(MPI_IN_PLACE, &power, 1, MPI_DOUBLE, MPI_SUM, comm);
+    return power / energy;
+  };
+  find_balance(result, rate, first_event);
+  result.mean_energy = energy * result.amplitude * result.amplitude;
+  const double q = result.outcome.word == "balance" ? result.amplitude : result.lift_off_amplitude;
+  if (q < infinity) result.phase = best_phase(pairs, q);
+  return result;
+}
+
+double start_amplitude(const Estimate& estimate)
+{
+  double multiple = 2;
+  check(PetscOptionsGetReal(nullptr, "estimate_", "-lift_off_multiple", &multiple, nullptr));
+  return estimate.outcome.word == "balance" ? estimate.amplitude : multiple * estimate.lift_off_amplitude;
+}
+
+std::vector<State> estimated_motions(const Structure& structure, const Interface& interface,
+                                     const Equilibrium& equilibrium, std::span<const ComplexMode> modes)
+{
+  std::vector<State> motions;
+  for (const ComplexMode& mode : modes)
+  {
+    const Estimate estimate = estimate_amplitude(structure, interface, equilibrium, mode);
+    const double amplitude = start_amplitude(estimate);
+    if (!(amplitude > 0) || !std::isfinite(amplitude) || mode.lambda.imag() == 0) continue;
+    motions.push_back(mode_state(equilibrium, mode, amplitude, estimate.phase));
+    check(VecAXPY(motions.back().u, -1, equilibrium.u));
+  }
+  return motions;
+}
+
+void add_motion(const State& motion, double factor, State& state)
+{
+  check(VecAXPY(state.u, factor, motion.u));
+  check(VecAXPY(state.v, factor, motion.v));
+}
+
+State mode_state(const Equilibrium& equilibrium, const ComplexMode& mode, double amplitude, double phase)
+{
+  const Complex shape = amplitude * std::polar(1.0, phase), speed = mode.lambda * shape;
+  State state;
+  state.u = copy_of(equilibrium.u);
+  state.v = zeros_like(equilibrium.u);
+  check(VecAXPY(state.u, shape.real(), mode.real));
+  check(VecAXPY(state.u, -shape.imag(), mode.imaginary));
+  check(VecAXPY(state.v, speed.real(), mode.real));
+  check(VecAXPY(state.v, -speed.imag(), mode.imaginary));
+  state.reactions = equilibrium.reactions;
+  return state;
+}
+
+} // namespace squeal

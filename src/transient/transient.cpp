@@ -1,0 +1,220 @@
+/// The time loop: marching with a history, and the run that follows one mode (headers: the equations).
+#include "squeal/transient/transient.hpp"
+
+#include "squeal/base/progress.hpp"
+#include "squeal/transient/growth.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+constexpr double two_pi = 2 * std::numbers::pi;
+
+/// Distance of a state to the equilibrium, and its products, at the current step.
+struct Fluctuation
+{
+  Vec u0 = nullptr;
+  Owned<Vec> Ku0, du, Kdu;
+};
+
+Fluctuation about(const Structure& structure, const Equilibrium& equilibrium)
+{
+  Fluctuation fluctuation{equilibrium.u, zeros_like(structure.load), zeros_like(structure.load),
+                          zeros_like(structure.load)};
+  check(MatMult(structure.K, equilibrium.u, fluctuation.Ku0));
+  return fluctuation;
+}
+
+/// Differences are taken before products: near equilibrium du'K du is a small part of u'K u.
+void update(Fluctuation& fluctuation, const State& state, const StepWork& work)
+{
+  check(VecWAXPY(fluctuation.du, -1, fluctuation.u0, state.u));
+  check(VecWAXPY(fluctuation.Kdu, -1, fluctuation.Ku0, work.Ku));
+}
+
+double energy(const Fluctuation& fluctuation, const State& state, const StepWork& work)
+{
+  double kinetic = 0, potential = 0;
+  check(VecDotBegin(state.v, work.Mv, &kinetic));
+  check(VecDotBegin(fluctuation.du, fluctuation.Kdu, &potential));
+  check(VecDotEnd(state.v, work.Mv, &kinetic));
+  check(VecDotEnd(fluctuation.du, fluctuation.Kdu, &potential));
+  return (kinetic + potential) / 2;
+}
+
+void record(const StepReport& report, double h, const State& state, std::size_t block, Mat probes, Vec probe_values,
+            History& history)
+{
+  history.time.push_back(state.time);
+  history.energy.push_back(report.energy);
+  history.damping_power.push_back(report.damping_work / h);
+  history.contact_power.push_back(report.contact_work / h);
+  history.load_power.push_back(report.load_work / h);
+  double normal_force = 0;
+  for (std::size_t i = 0; i < state.reactions.size(); i += block) normal_force += state.reactions[i];
+  history.normal_force.push_back(normal_force);
+  history.open.push_back(report.open);
+  history.stick.push_back(report.stick);
+  history.slip.push_back(report.slip);
+  if (!probes) return;
+  check(MatMult(probes, state.u, probe_values));
+  const std::vector<double> values = whole(probe_values);
+  for (std::size_t i = 0; i < values.size(); ++i) history.probes[i].push_back(values[i]);
+}
+
+/// Persistent sliding: the pairs closed at equilibrium are closed, none sticks, none slips backwards.
+bool slides_as_at_equilibrium(const Interface& interface, const Equilibrium& equilibrium,
+                              const std::vector<double>& drive, const std::vector<double>& reactions)
+{
+  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
+  const std::vector<ContactStatus> status = contact_status(interface, reactions);
+  for (std::size_t i = 0; i < status.size(); ++i)
+  {
+    if (equilibrium.closed[i] != (status[i] != ContactStatus::open)) return false;
+    if (status[i] == ContactStatus::stick) return false;
+    double along = 0;
+    for (std::size_t k = 0; k < directions; ++k) along += drive[i * directions + k] * reactions[i * block + 1 + k];
+    if (along < 0) return false;
+  }
+  return true;
+}
+
+bool counts_steps(const TransientSettings& settings)
+{
+  return settings.steps > 0 && settings.step_size > 0;
+}
+
+/// Step size and number of steps; refuses where the rule does.
+long plan(Trajectory& trajectory, const Structure& structure, const ComplexMode* mode, TransientSettings settings)
+{
+  if (mode) settings = planned(settings, *mode);
+  if (!counts_steps(settings))
+    throw Error("transient.periods counts periods of a mode, and there is none to follow: give transient.steps and "
+                "transient.step_size");
+  trajectory.theta = settings.theta;
+  trajectory.step_size = settings.step_size;
+  trajectory.growth_rate_fit = std::numeric_limits<double>::quiet_NaN();
+  trajectory.predicted = mode ? discrete_eigenvalue(mode->lambda, settings.theta, settings.step_size)
+                              : std::complex<double>(std::numeric_limits<double>::quiet_NaN(), 0);
+  trajectory.outcome.reason = step_refusal(structure, mode, settings.theta, trajectory.step_size);
+  if (!trajectory.outcome.reason.empty()) trajectory.outcome.word = "refused";
+  return settings.steps;
+}
+
+void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
+{
+  Outcome& outcome = trajectory.outcome;
+  outcome.word = "completed";
+  if (trajectory.theta < 0.5) outcome.reason = "theta below 1/2 adds (1/2 - theta) h omega^2 to every growth rate";
+  if (summary.unconverged > 0)
+  {
+    outcome.word = "not converged";
+    outcome.reason =
+        format("contact did not converge in %ld of %ld steps, first at t = %.4g s (largest residual %.4g): "
+               "raise -transient_contact_max_it or shorten the step",
+               summary.unconverged, summary.steps, summary.first_unconverged, summary.contact_residual_max);
+  }
+  if (summary.steps < asked)
+  {
+    outcome.word = "not converged";
+    outcome.reason = format("the energy is no longer finite at t = %.4g s", trajectory.end.time);
+  }
+  outcome.residual = summary.contact_residual_max;
+  outcome.iterations = static_cast<int>(summary.contact_iterations_mean * static_cast<double>(summary.steps) + 0.5);
+}
+
+} // namespace
+
+MarchSummary march(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                   const Equilibrium& equilibrium, Mat probes, long steps, State& state, History& history,
+                   const Monitor& monitor)
+{
+  MarchSummary summary;
+  Fluctuation fluctuation = about(structure, equilibrium);
+  Owned<Vec> probe_values;
+  if (probes)
+  {
+    PetscInt rows = 0;
+    check(MatCreateVecs(probes, nullptr, probe_values.put()));
+    check(VecGetSize(probe_values, &rows));
+    history.probes.resize(static_cast<std::size_t>(rows));
+  }
+  StepWork work = begin_steps(step, structure, interface, state);
+  double iterations = 0;
+  while (summary.steps < steps)
+  {
+    const StepReport report = advance(step, structure, interface, work, state);
+    ++summary.steps;
+    if (!report.contact_converged && summary.unconverged++ == 0) summary.first_unconverged = state.time;
+    summary.contact_residual_max = std::max(summary.contact_residual_max, report.contact_residual);
+    iterations += report.contact_iterations;
+    const double defect = std::abs(report.energy_defect);
+    const double scale = std::max({report.energy, std::abs(report.contact_work), std::abs(report.load_work)});
+    if (defect > 0) summary.energy_defect_max = std::max(summary.energy_defect_max, defect / scale);
+    update(fluctuation, state, work);
+    record(report, step.h, state, static_cast<std::size_t>(interface.block()), probes, probe_values, history);
+    history.fluctuating_energy.push_back(energy(fluctuation, state, work));
+    if (monitor) monitor(state, report, work);
+    if (!std::isfinite(report.energy)) break;
+  }
+  summary.contact_iterations_mean = iterations / static_cast<double>(std::max(summary.steps, 1L));
+  return summary;
+}
+
+TransientSettings planned(TransientSettings settings, const ComplexMode& mode)
+{
+  if (counts_steps(settings)) return settings;
+  settings.step_size = two_pi / (std::abs(mode.lambda.imag()) * settings.steps_per_period);
+  settings.steps = std::lround(settings.periods * settings.steps_per_period);
+  return settings;
+}
+
+Trajectory integrate(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
+                     const ComplexMode* mode, const TransientSettings& settings, State start, Mat probes)
+{
+  Trajectory trajectory;
+  const long steps = plan(trajectory, structure, mode, settings);
+  trajectory.end = std::move(start);
+  if (trajectory.outcome.word == "refused") return trajectory;
+
+  const ThetaStep step = make_theta_step(structure, interface, trajectory.step_size, settings.theta);
+  const std::vector<double> drive = drive_directions(interface);
+  ModeAmplitude amplitude;
+  if (mode) amplitude = follow(structure, equilibrium, *mode);
+  bool sliding = mode != nullptr; // so far
+  Progress progress(comm_of(structure.load), "transient", static_cast<double>(steps));
+  const Monitor watch = [&](const State& state, const StepReport& report, const StepWork& work)
+  {
+    sliding = sliding && slides_as_at_equilibrium(interface, equilibrium, drive, state.reactions);
+    if (sliding) observe(amplitude, state.time, work.Ku, work.Mv);
+    progress.update(static_cast<double>(trajectory.history.time.size()),
+                    format("energy %.4g J, open %d, stick %d", report.energy, report.open, report.stick));
+  };
+  const double wall = MPI_Wtime();
+  const MarchSummary summary =
+      march(step, structure, interface, equilibrium, probes, steps, trajectory.end, trajectory.history, watch);
+  trajectory.seconds_per_step = (MPI_Wtime() - wall) / static_cast<double>(std::max(summary.steps, 1L));
+  trajectory.factor_seconds = step.factor_seconds;
+  trajectory.condensed_seconds = step.condensed_seconds;
+  trajectory.steps = summary.steps;
+  trajectory.law = step.law;
+  trajectory.energy_defect_max = summary.energy_defect_max;
+  trajectory.contact_iterations_mean = summary.contact_iterations_mean;
+  if (mode)
+  {
+    trajectory.periods = static_cast<double>(summary.steps) * step.h * std::abs(mode->lambda.imag()) / two_pi;
+    trajectory.growth_rate_fit = growth_rate(amplitude, two_pi / std::abs(trajectory.predicted.imag()));
+  }
+  conclude(trajectory, summary, steps);
+  if (!settings.save_state.empty()) write_state(trajectory.end, structure, settings.save_state);
+  return trajectory;
+}
+
+} // namespace squeal
