@@ -1,5 +1,5 @@
 #pragma once
-/// The reduced model beside the full one (analysis/fidelity.hpp): its active pairs, its cycles, its derivative.
+/// The reduced model beside the full one (cycle/fidelity.hpp): its active pairs, its cycles, its derivative.
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 #include "squeal/shooting/shooting.hpp"

@@ -1,4 +1,4 @@
-/// The modified theta-method on the reduced model: the scheme of analysis/transient.hpp, in few dense products.
+/// The modified theta-method on the reduced model: the scheme of transient/transient.hpp, in few dense products.
 #include "squeal/contact/pair_law.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 #include "squeal/shooting/shooting.hpp"

@@ -1,7 +1,7 @@
 #pragma once
 /// Unilateral contact with friction of known direction, as a linear complementarity problem in gaps and reactions:
 ///     N g = q + M r,   0 <= g _|_ r >= 0.
-/// N is the identity, unless the structure is held by contact only (analysis/equilibrium.hpp says how it arises).
+/// N is the identity, unless the structure is held by contact only (equilibrium/equilibrium.hpp says how it arises).
 ///
 /// Status iteration: with the pairs split into closed (g = 0) and open (r = 0) the problem is linear; every pair whose
 /// sign is wrong changes status. When that stops reducing their number, only the last one does: block principal

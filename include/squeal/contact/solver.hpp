@@ -1,5 +1,5 @@
 #pragma once
-/// Contact with Coulomb friction on the condensed operator (method, section 4): find r with w = W r + b,
+/// Contact with Coulomb friction on the condensed operator (src/README.md, section 4): find r with w = W r + b,
 ///     0 <= w_n _|_ r_n >= 0,   |r_t| <= mu r_n,   r_t opposes w_t.
 /// Residual, one measure for every solver: the natural map per pair, |r - proj(r - rho w)| with rho = 1/W_ii, over the
 /// largest reaction, or over rho max|b| where that is smaller. It is always that of W itself, in double precision.

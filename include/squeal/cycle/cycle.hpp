@@ -1,5 +1,6 @@
 #pragma once
-/// The limit cycle by shooting (method, section 6): Phi_T(x0) = x0 for the period T and the initial state x0 = (u, v).
+/// The limit cycle by shooting (src/README.md, section 6): Phi_T(x0) = x0 for the period T and the initial state x0 =
+/// (u, v).
 ///
 /// The solver sees a flow only, so that any model with a period map can be shot at: the brake's exact-contact theta
 /// step, or a smooth oscillator in a test. States are compared in the energy norm sqrt(u'K u + v'M v) only.
@@ -75,7 +76,7 @@ struct ShootingStart
 /// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; states are nests. Empty: P = -I.
 using Preconditioner = std::function<void(double period, Vec x, Vec y)>;
 
-/// From sliding motion about equilibrium on the frictionless bilateral real modes (method, section 6).
+/// From sliding motion about equilibrium on the frictionless bilateral real modes (src/README.md, section 6).
 Preconditioner sliding_preconditioner(const Structure& structure, const Interface& interface,
                                       const Equilibrium& equilibrium, const RealModes& modes, int steps, double theta);
 

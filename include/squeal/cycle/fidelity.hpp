@@ -1,11 +1,11 @@
 #pragma once
-/// The cycle with no more model than the wish needs (method, section 7).
+/// The cycle with no more model than the wish needs (src/README.md, section 7).
 ///
-/// The reduced model (analysis/reduced.hpp) runs free from the estimate until it has settled, its active pairs chosen
-/// again where it outgrows the amplitude they were chosen for, and is shot at. Its cycle x_r is the start on the full
-/// model, its derivative the preconditioner: P^-1 (Phi(x) - x) is what is left to go, less and less of it by secants,
-/// one period of the full model each. What a step would move frequency and energy by is the error of x: twice that, or
-/// half of the step before, since their signs alternate.
+/// The reduced model (reduction/reduced_model.hpp) runs free from the estimate until it has settled, its active pairs
+/// chosen again where it outgrows the amplitude they were chosen for, and is shot at. Its cycle x_r is the start on the
+/// full model, its derivative the preconditioner: P^-1 (Phi(x) - x) is what is left to go, less and less of it by
+/// secants, one period of the full model each. What a step would move frequency and energy by is the error of x: twice
+/// that, or half of the step before, since their signs alternate.
 ///
 /// "reduced": a period of the full model tells the reduced cycle's error, a cycle at twice as many steps the step's.
 /// "auto": the full model's cycle until the wish is met, at few steps a period and at twice as many; from both, by the

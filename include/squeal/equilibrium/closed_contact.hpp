@@ -1,5 +1,5 @@
 #pragma once
-/// The closed pairs taken out of the equations without multipliers (method, section 3).
+/// The closed pairs taken out of the equations without multipliers (src/README.md, section 3).
 ///
 /// While the pairs that are closed at equilibrium stay closed, B_n du = 0 on them, and a normal reaction lambda_n of a
 /// sliding pair enters the equations as R' lambda_n with the row R = B_n + mu e.B_t, e the direction of the drive:

@@ -1,5 +1,5 @@
 #pragma once
-/// Sliding equilibrium in unilateral contact with Coulomb friction (method, section 2):
+/// Sliding equilibrium in unilateral contact with Coulomb friction (src/README.md, section 2):
 ///     K u0 = F + B_n' r_n + B_t' r_t,   0 <= g _|_ r_n >= 0,   r_t = mu r_n e,   e = v_d/|v_d|.
 /// Status (active set) iteration on the condensed compliance D = B K^-1 B'; projection fixed point as the check.
 ///

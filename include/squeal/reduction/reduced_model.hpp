@@ -93,7 +93,7 @@ struct ReducedContact
   Eigen::MatrixXf along{}; // W_nn + W_nt e of those directions e in which friction was then, mu included
 };
 
-/// The period map of the reduced model by theta steps (method as analysis/transient.hpp), whose matrices are formed
+/// The period map of the reduced model by theta steps (src/README.md, section 4), whose matrices are formed
 /// once per step size:  (v, q) -> v_free,  r -> v+ - v_free,  W r.
 struct ReducedMap
 {

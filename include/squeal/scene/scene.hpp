@@ -110,7 +110,7 @@ struct Contact
 struct FrictionLaw
 {
   double coefficient = 0;        // [-]
-  bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (method: C_f)
+  bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3)
 };
 
 struct MeshSource

@@ -1,5 +1,5 @@
 #pragma once
-/// The stages of the shooting solver (method, section 6), on states x = (u, v) held as VecNest:
+/// The stages of the shooting solver (src/README.md, section 6), on states x = (u, v) held as VecNest:
 ///     F(x, T) = Phi_T(x) - x = 0,   <f, dx> = 0,
 /// f the flow's direction: a correction along the orbit would only move the time origin. Products are energy products,
 /// <a, b> = a_u'K b_u + a_v'M b_v. Each stage returns the best candidate it met.

@@ -1,5 +1,5 @@
 #pragma once
-/// Energy estimate of the cycle's amplitude (paper, eqs. 9-19; method, section 5): the motion is taken to be
+/// Energy estimate of the cycle's amplitude (paper, eqs. 9-19; src/README.md, section 5): the motion is taken to be
 ///     u = u0 + q Re(phi e^{i w t}),  w = Im(lambda),
 /// and q is sought for which the interface gives what the damping takes, P_R(q)/E = P_C/E, means over a period:
 ///     P_C = mean u'.C u',   P_R = mean sum w.(r_t - r_t0),  w = B_t u',

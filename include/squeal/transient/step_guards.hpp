@@ -1,5 +1,6 @@
 #pragma once
-/// When theta and the step size h would tell a lie (method, section 4). In sliding an eigenvalue lambda is marched as
+/// When theta and the step size h would tell a lie (src/README.md, section 4). In sliding an eigenvalue lambda is
+/// marched as
 ///     lambda_h = ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h,   Re(lambda_h) = 0 where
 ///     2 Re(lambda) = (2 theta - 1) h |lambda|^2:
 /// - theta > 1/2 with fewer than 2 pi (theta - 1/2) |lambda|^2/(omega sigma) steps a period: what grows looks stable;

@@ -1,5 +1,5 @@
 #pragma once
-/// Exact-contact transient by the modified theta-method (method, section 4):
+/// Exact-contact transient by the modified theta-method (src/README.md, section 4):
 ///     A v+ = [M - h(1-theta) C - h^2 theta(1-theta) K] v - h K u + h F + h B'r+,   A = M + h theta C + h^2 theta^2 K,
 ///     0 <= gap + B_n ut + h B_n v+  _|_  r_n+ >= 0,   ut = u + h(1-theta) v,   r_t+ in the Coulomb disc.
 /// Reactions are implicit, an impulse h r+ of the whole step; theta = 1/2 adds no damping of its own.
