@@ -27,18 +27,15 @@ template <class Work> auto timed(Report& report, const char* name, MPI_Comm comm
   return result;
 }
 
-Outcome not_run(const char* word, const std::string& reason)
+Outcome not_run(OutcomeKind kind, const std::string& reason)
 {
-  Outcome outcome;
-  outcome.word = word;
-  outcome.reason = reason;
-  return outcome;
+  return {kind, reason, 0, 0};
 }
 
 /// Why a stage that follows an unstable mode cannot run; empty if it can.
 std::string no_mode_to_follow(const Report& report)
 {
-  if (report.equilibrium.outcome.word != "converged") return "there is no equilibrium to start from";
+  if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "there is no equilibrium to start from";
   if (report.modes.modes.empty()) return "no mode was found in the band";
   if (report.modes.modes.front().growth_rate() <= 0) return "the equilibrium is stable: no mode grows in the band";
   if (report.modes.modes.front().frequency_hz() == 0) return "the equilibrium diverges without oscillating";
@@ -54,7 +51,7 @@ std::span<const ComplexMode> growing_modes(const Report& report)
 State transient_start(const TransientSettings& settings, const ComplexMode& mode, const Model& model,
                       const Report& report)
 {
-  if (settings.start == "estimate")
+  if (settings.start.kind == StartKind::estimate)
   {
     State start = mode_state(report.equilibrium, mode, start_amplitude(report.estimate), report.estimate.phase);
     for (const State& other :
@@ -62,17 +59,17 @@ State transient_start(const TransientSettings& settings, const ComplexMode& mode
       add_motion(other, 1, start);
     return start;
   }
-  if (settings.start == "mode")
+  if (settings.start.kind == StartKind::mode)
   {
     const double amplitude = settings.amplitude > 0 ? settings.amplitude : 0.1 * report.estimate.lift_off_amplitude;
     return mode_state(report.equilibrium, mode, amplitude, report.estimate.phase);
   }
-  return read_state(settings.start, model.structure);
+  return read_state(settings.start.file, model.structure);
 }
 
 bool starts_on_a_mode(const TransientSettings& settings)
 {
-  return settings.start == "mode" || settings.start == "estimate";
+  return settings.start.kind != StartKind::file;
 }
 
 /// From a state file for so many steps, the transient needs no mode.
@@ -87,9 +84,9 @@ Estimate run_estimate(const Scene& scene, const Model& model, const Report& repo
   const bool needed = scene.estimate.enabled || scene.cycle.enabled || follows_a_mode(scene.transient);
   const std::string reason = no_mode_to_follow(report);
   if (!needed)
-    estimate.outcome = not_run("off", "the scene turns it off");
+    estimate.outcome = not_run(OutcomeKind::off, "the scene turns it off");
   else if (!reason.empty())
-    estimate.outcome = not_run("skipped", reason);
+    estimate.outcome = not_run(OutcomeKind::skipped, reason);
   else
     return estimate_amplitude(model.structure, model.interface, report.equilibrium, report.modes.modes.front());
   return estimate;
@@ -101,12 +98,12 @@ Trajectory run_transient(const Scene& scene, const Model& model, const Report& r
   const bool from_file = !starts_on_a_mode(scene.transient);
   const std::string reason = no_mode_to_follow(report);
   if (!scene.transient.enabled)
-    trajectory.outcome = not_run("off", "the scene has no [transient]");
-  else if (report.equilibrium.outcome.word != "converged" || (!reason.empty() && !from_file))
-    trajectory.outcome = not_run("skipped", reason);
+    trajectory.outcome = not_run(OutcomeKind::off, "the scene has no [transient]");
+  else if (report.equilibrium.outcome.kind != OutcomeKind::converged || (!reason.empty() && !from_file))
+    trajectory.outcome = not_run(OutcomeKind::skipped, reason);
   else if (!reason.empty())
     return integrate(model.structure, model.interface, report.equilibrium, nullptr, scene.transient,
-                     read_state(scene.transient.start, model.structure), model.probes);
+                     read_state(scene.transient.start.file, model.structure), model.probes);
   else
   {
     const ComplexMode& mode = report.modes.modes.front();
@@ -130,11 +127,11 @@ LimitCycle run_cycle(const Scene& scene, const Model& model, Report& report)
   LimitCycle cycle;
   const std::string reason = no_mode_to_follow(report);
   if (!scene.cycle.enabled)
-    cycle.outcome = not_run("off", "the scene has no [cycle]");
+    cycle.outcome = not_run(OutcomeKind::off, "the scene has no [cycle]");
   else if (!reason.empty())
-    cycle.outcome = not_run("skipped", reason);
+    cycle.outcome = not_run(OutcomeKind::skipped, reason);
   else if (const std::string lie = cycle_refusal(scene, model, report); !lie.empty())
-    cycle.outcome = not_run("refused", lie);
+    cycle.outcome = not_run(OutcomeKind::refused, lie);
   else
   {
     FittedCycle fitted = find_fitted_cycle(model.structure, model.interface, report.equilibrium, report.modes,
@@ -148,10 +145,10 @@ LimitCycle run_cycle(const Scene& scene, const Model& model, Report& report)
 Modes run_modes(const Scene& scene, const Model& model, const Report& report)
 {
   Modes modes;
-  if (report.equilibrium.outcome.word != "converged")
-    modes.outcome = not_run("skipped", "there is no equilibrium to linearise about");
+  if (report.equilibrium.outcome.kind != OutcomeKind::converged)
+    modes.outcome = not_run(OutcomeKind::skipped, "there is no equilibrium to linearise about");
   else if (!scene.modes.enabled && !scene.cycle.enabled && !follows_a_mode(scene.transient))
-    modes.outcome = not_run("off", "the scene turns it off");
+    modes.outcome = not_run(OutcomeKind::off, "the scene turns it off");
   else
     return find_modes(model.structure, model.interface, report.equilibrium, scene.modes);
   return modes;
@@ -176,7 +173,7 @@ void describe_model(const Model& model, Report& report, MPI_Comm comm)
 /// What the report tells of the equilibrium beside its own result: each contact's clamp force, its torque, the probes.
 void describe_equilibrium(const Scene& scene, const Model& model, Report& report)
 {
-  if (report.equilibrium.outcome.word != "converged") return;
+  if (report.equilibrium.outcome.kind != OutcomeKind::converged) return;
   const Interface& interface = model.interface;
   const auto directions = static_cast<std::size_t>(interface.directions);
   report.contact_forces.assign(scene.contacts.size(), 0);
@@ -201,7 +198,7 @@ std::vector<std::string> stages_run(const Report& report)
   std::vector<std::string> stages;
   const auto add = [&](const char* name, const Outcome& outcome)
   {
-    if (outcome.word != "off" && outcome.word != "skipped") stages.emplace_back(name);
+    if (has_run(outcome)) stages.emplace_back(name);
   };
   add("equilibrium", report.equilibrium.outcome);
   add("modes", report.modes.outcome);
@@ -214,14 +211,9 @@ std::vector<std::string> stages_run(const Report& report)
 /// A skipped stage is no failure by itself: the stage it waited for answers for it.
 Verdict verdict_of(const Report& report)
 {
-  const auto good = [](const Outcome& outcome)
-  {
-    for (const char* word : {"off", "skipped", "converged", "completed", "balance", "no balance"})
-      if (outcome.word == word) return true;
-    return false;
-  };
-  const bool all_good = good(report.equilibrium.outcome) && good(report.modes.outcome) &&
-                        good(report.estimate.outcome) && good(report.transient.outcome) && good(report.cycle.outcome);
+  const bool all_good = succeeded(report.equilibrium.outcome) && succeeded(report.modes.outcome) &&
+                        succeeded(report.estimate.outcome) && succeeded(report.transient.outcome) &&
+                        succeeded(report.cycle.outcome);
   return all_good ? Verdict::converged : Verdict::not_converged;
 }
 

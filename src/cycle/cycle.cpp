@@ -190,7 +190,7 @@ LimitCycle shoot_at_model(const Structure& structure, const Interface& interface
   cycle.steps_per_period = settings.steps_per_period;
   cycle.theta = settings.theta;
   (void)measure(map, equilibrium, probes, static_cast<int>(read_options().samples), nullptr, cycle);
-  if (map.step.law == ContactLaw::velocity && cycle.outcome.word != "converged")
+  if (map.step.law == ContactLaw::velocity && cycle.outcome.kind != OutcomeKind::converged)
     cycle.outcome.reason += "; by the velocity law the period map jumps where a step begins open or closed: "
                             "-transient_contact_law displacement";
   if (map.unconverged > 0)
@@ -210,7 +210,8 @@ LimitCycle find_cycle(const Structure& structure, const Interface& interface, co
   if (!(amplitude > 0) || !std::isfinite(amplitude) || mode.lambda.imag() == 0)
   {
     LimitCycle skipped;
-    skipped.outcome = {"skipped", "no amplitude to start from: no energy balance and no lift-off, or no oscillation", 0,
+    skipped.outcome = {OutcomeKind::skipped,
+                       "no amplitude to start from: no energy balance and no lift-off, or no oscillation", 0,
                        std::nan("")};
     return skipped;
   }

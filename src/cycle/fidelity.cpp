@@ -135,7 +135,7 @@ std::string fit(Fitting& fitting, const ShootingStart& start, const Precondition
   const double clock = MPI_Wtime();
   const Full& full = fitting.full;
   Fidelity& fidelity = fitting.result.fidelity;
-  if (fidelity.asked == "reduced")
+  if (fidelity.asked == CycleModel::reduced)
   {
     const ReducedOrbit twice = shoot_reduced(fitting, orbit.state, orbit.period, 2 * fitting.steps);
     judge_steps(fidelity, {2 * fitting.steps, twice.period, twice.energy}, {fitting.steps, orbit.period, orbit.energy},
@@ -162,7 +162,7 @@ std::string fit(Fitting& fitting, const ShootingStart& start, const Precondition
   Pursuit pursuit{fitting, map, shooting, cycle, {}};
   const Owned<Vec> first = state_of(start.u, start.v);
   move_to(pursuit, first, start.period, fitting.steps);
-  if (fidelity.asked == "auto")
+  if (fidelity.asked == CycleModel::automatic)
     pursue(pursuit);
   else
     judge(shooting, pursuit.at, next_step(shooting, pursuit.at));
@@ -174,7 +174,7 @@ std::string fit(Fitting& fitting, const ShootingStart& start, const Precondition
   cycle.records = shooting.records;
   cycle.residual_projected = std::nan("");
   cycle.residual_full = pursuit.at.residual;
-  cycle.outcome = {"converged", "", shooting.iterations, pursuit.at.residual};
+  cycle.outcome = {OutcomeKind::converged, "", shooting.iterations, pursuit.at.residual};
   fitting.result.cycle = std::move(cycle);
   fidelity.steps_per_period = map.steps;
   fidelity.full_periods = shooting.periods;
@@ -197,7 +197,7 @@ std::string by_reduced_model(Fitting& fitting)
   const Owned<Vec> motion = motion_of(full, fitting.reduced.model, orbit.state);
   check(VecAXPY(displacement(motion), 1, full.equilibrium.u));
   const ShootingStart start{full.equilibrium.u, displacement(motion), velocity(motion), orbit.period, {}, {}};
-  if (fitting.result.fidelity.asked != "full") return fit(fitting, start, preconditioner, orbit);
+  if (fitting.result.fidelity.asked != CycleModel::full) return fit(fitting, start, preconditioner, orbit);
   fitting.result.cycle = shoot_at_model(full.structure, full.interface, full.equilibrium, start, preconditioner,
                                         full.settings, 0, full.probes);
   return {};
@@ -207,12 +207,12 @@ std::string by_reduced_model(Fitting& fitting)
 
 FittedCycle find_fitted_cycle(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                               const Modes& modes, const Estimate& estimate, const CycleSettings& settings,
-                              const std::string& asked, double accuracy, Mat probes)
+                              CycleModel asked, double accuracy, Mat probes)
 {
   const auto unstable = static_cast<std::size_t>(std::max(modes.unstable_count, 1));
   const Full full{structure, interface, equilibrium, modes.modes, std::span(modes.modes).first(unstable),
                   estimate,  settings,  probes};
-  const bool adaptive = asked == "auto", from_reduced = starts_reduced() && asked == "full";
+  const bool adaptive = asked == CycleModel::automatic, from_reduced = starts_reduced() && asked == CycleModel::full;
   Fitting fitting(full);
   fitting.steps = adaptive ? std::min(64, settings.steps_per_period) : settings.steps_per_period;
   fitting.tolerance = from_reduced ? 1e-3 : 3e-4 * accuracy; // a start need not be better; slow motions multiply it
@@ -220,9 +220,9 @@ FittedCycle find_fitted_cycle(const Structure& structure, const Interface& inter
   Fidelity& fidelity = result.fidelity;
   fidelity.asked = asked;
   fidelity.accuracy = accuracy;
-  if (asked != "full" || from_reduced)
+  if (asked != CycleModel::full || from_reduced)
   {
-    fidelity.used = from_reduced ? "full" : "reduced";
+    fidelity.used = from_reduced ? CycleModel::full : CycleModel::reduced;
     fidelity.contact_tolerance = 1e-3 * accuracy;
     fidelity.reason = by_reduced_model(fitting);
     if (fidelity.reason.empty())
@@ -231,13 +231,13 @@ FittedCycle find_fitted_cycle(const Structure& structure, const Interface& inter
       return std::move(result);
     }
   }
-  if (asked == "reduced")
+  if (asked == CycleModel::reduced)
   {
-    result.cycle.outcome.word = unstable > 1 ? "refused" : "not converged";
+    result.cycle.outcome.kind = unstable > 1 ? OutcomeKind::refused : OutcomeKind::not_converged;
     result.cycle.outcome.reason = fidelity.reason;
     return std::move(result);
   }
-  fidelity.used = "full"; // of whose errors nothing is known
+  fidelity.used = CycleModel::full; // of whose errors nothing is known
   fidelity.frequency_error = fidelity.energy_error = std::nan("");
   fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
   const double clock = MPI_Wtime();

@@ -43,8 +43,8 @@ void build(Fitting& fitting, double amplitude)
   const Full& full = fitting.full;
   Reduced& reduced = fitting.reduced;
   // where its cycle is the answer, friction is left free
-  const bool sliding =
-      fitting.result.fidelity.asked != "reduced" && slide_throughout(full.interface, full.unstable.front(), amplitude);
+  const bool sliding = fitting.result.fidelity.asked != CycleModel::reduced &&
+                       slide_throughout(full.interface, full.unstable.front(), amplitude);
   reduced.model = reduce(full.structure, full.interface, full.equilibrium, full.modes, fitting.active,
                          {static_cast<int>(fitting.options.modes), fitting.options.threshold, sliding});
   reduced.norm = small_structure(reduced.model);

@@ -323,14 +323,14 @@ void judge(const Structure& structure, const Interface& interface, const Search&
   equilibrium.check_difference = told[3];
   equilibrium.uniqueness = told[4] == 0 ? "not checked" : told[4] == 1 ? "assured" : "not assured";
   const bool good = told[0] <= 1e-9 && balanced;
-  equilibrium.outcome.word = good ? "converged" : "not converged";
+  equilibrium.outcome.kind = good ? OutcomeKind::converged : OutcomeKind::not_converged;
   if (!good) equilibrium.outcome.reason = "the closed set was found, but rounding leaves residuals above 1e-9";
 }
 
 /// The words of a search that found nothing.
 Outcome failure(const StatusSolution& solution, double friction)
 {
-  Outcome outcome{"no equilibrium", "", solution.iterations, 1};
+  Outcome outcome{OutcomeKind::no_equilibrium, "", solution.iterations, 1};
   if (solution.outcome == "cycles")
     outcome.reason = format("the sets of closed pairs repeat without end at mu = %g: friction is too large", friction);
   else if (solution.outcome == "singular")
@@ -338,7 +338,8 @@ Outcome failure(const StatusSolution& solution, double friction)
                             "lifts off",
                             friction);
   else
-    outcome = {"not converged", "no fitting set of closed pairs within -equilibrium_max_it", solution.iterations, 1};
+    outcome = {OutcomeKind::not_converged, "no fitting set of closed pairs within -equilibrium_max_it",
+               solution.iterations, 1};
   return outcome;
 }
 
@@ -376,7 +377,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   equilibrium.u = zeros_like(structure.load);
   if (stays_at_rest(structure, interface))
   {
-    equilibrium.outcome = {"converged", "", 0, 0};
+    equilibrium.outcome = {OutcomeKind::converged, "", 0, 0};
     return equilibrium;
   }
   Held held = hold(structure, interface);

@@ -137,7 +137,7 @@ CountedSolution solve_full(const SlidingProblem& problem, RealCount& real, const
     if (result.count.expected == result.count.found) return result;
     result.count = count_in_band(problem.reduced, result.solution, real, band);
     if (result.count.found >= result.count.expected) return result;
-    result.solution.outcome.word = "not converged";
+    result.solution.outcome.kind = OutcomeKind::not_converged;
     result.solution.outcome.reason =
         "fewer pairs were found than are expected; -modes_solver toar seeks them otherwise";
     return result;
@@ -183,7 +183,7 @@ std::string count_check(const Modes& modes)
 {
   const bool confirmed = !modes.count.certified_by.empty() && !modes.routes_disagree;
   std::string text = confirmed ? "confirmed: " : "NOT confirmed: ";
-  if (modes.method == "both")
+  if (modes.method == ModesMethod::both)
     text += std::to_string(modes.unstable_count) + " unstable by the full problem, " +
             std::to_string(unstable_in(modes.projected)) + " by projection on real modes; ";
   return text + text_of(modes.count);
@@ -194,10 +194,10 @@ void judge(Modes& modes)
   for (const ComplexMode& mode : modes.modes)
     modes.outcome.residual = std::max(modes.outcome.residual, mode.backward_error);
   modes.unstable_count = unstable_in(modes.modes);
-  modes.routes_disagree = modes.method == "both" && unstable_in(modes.projected) != modes.unstable_count;
+  modes.routes_disagree = modes.method == ModesMethod::both && unstable_in(modes.projected) != modes.unstable_count;
   modes.count_check = count_check(modes);
-  if (modes.outcome.residual <= 1e-8 || modes.outcome.word != "converged") return;
-  modes.outcome.word = "not converged";
+  if (modes.outcome.residual <= 1e-8 || modes.outcome.kind != OutcomeKind::converged) return;
+  modes.outcome.kind = OutcomeKind::not_converged;
   modes.outcome.reason = "a backward error exceeds 1e-8";
 }
 
@@ -240,18 +240,18 @@ Modes find_modes(const Structure& structure, const Interface& interface, const E
   check(MatGetSize(problem.K, &free, nullptr));
   if (free == 0)
   {
-    modes.outcome = {"converged", "closed contact leaves nothing free to vibrate", 0, 0};
+    modes.outcome = {OutcomeKind::converged, "closed contact leaves nothing free to vibrate", 0, 0};
     modes.count_check = "confirmed: there is no mode to count";
     return modes;
   }
   RealCount real = make_real_count(problem.M, problem.K, static_cast<int>(options.dense_limit));
   CountedSolution found;
-  if (settings.method != "full")
+  if (settings.method != ModesMethod::full)
   {
     found.solution = solve_by_projection(problem, settings, options);
     modes.projected = modes_of(found.solution, structure, problem);
   }
-  if (settings.method == "projection")
+  if (settings.method == ModesMethod::projection)
   {
     found.count = count_in_band(problem.reduced, found.solution, real, settings.band);
     modes.modes = std::exchange(modes.projected, {});

@@ -192,7 +192,7 @@ QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K,
     result = solve_on_subspace(problem, std::move(shapes), *stiffness.factor,
                                {window, settings.passes, settings.candidates, 1e-15, 1e-15, 0});
   }
-  result.outcome.word = modes.outcome.word;
+  result.outcome.kind = modes.outcome.kind;
   result.outcome.reason = modes.outcome.reason;
   return result;
 }

@@ -36,7 +36,7 @@ QuadraticSolution solve_whole(const QuadraticProblem& problem, const Window& win
   check(MatGetSize(problem.K, &n, nullptr));
   check(MatGetOwnershipRange(problem.K, &first, &last));
   QuadraticSolution result;
-  result.outcome = {"converged", "", 1, 0};
+  result.outcome = {OutcomeKind::converged, "", 1, 0};
   for (const DenseEigenpair& found :
        solve_dense_quadratic_shared(comm_of(problem.K), static_cast<int>(n), dense_copy(problem.M),
                                     dense_copy(problem.C), dense_copy(problem.K)))
@@ -119,10 +119,10 @@ QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSe
     result.pairs.clear();
     const double farthest = collect(pep, omega, settings.shift, window, result.pairs);
     result.outcome.iterations += static_cast<int>(iterations);
-    result.outcome.word = "converged";
+    result.outcome.kind = OutcomeKind::converged;
     result.outcome.reason.clear();
     if (farthest >= 1 + std::abs(settings.shift) || converged >= 2 * n) return result;
-    result.outcome.word = "not converged";
+    result.outcome.kind = OutcomeKind::not_converged;
     result.outcome.reason = std::to_string(converged) + " eigenvalues reach " +
                             std::to_string(farthest * omega / (2 * std::numbers::pi)) + " Hz only";
     if (converged < count) break;

@@ -55,7 +55,7 @@ RealModes first_of(const DenseModes& all, Mat K, int count)
   check(MatGetOwnershipRange(K, &first, &last));
   RealModes modes;
   const int given = std::min(count, static_cast<int>(all.lambda.size()));
-  modes.outcome = {"converged", "", 1, 0};
+  modes.outcome = {OutcomeKind::converged, "", 1, 0};
   for (int k = 0; k < given; ++k)
   {
     Owned<Vec> shape;
@@ -229,10 +229,10 @@ Found sweep(Mat M, Mat K, const Sought& sought)
 RealModes to_modes(const Found& found, Mat M, Mat K, const Sought& sought)
 {
   RealModes modes;
-  modes.outcome = {"converged", "", found.iterations, largest_residual(found, M, K)};
+  modes.outcome = {OutcomeKind::converged, "", found.iterations, largest_residual(found, M, K)};
   if (!found.complete)
   {
-    modes.outcome.word = "not converged";
+    modes.outcome.kind = OutcomeKind::not_converged;
     modes.outcome.reason = std::to_string(found.count()) + " real modes found, and more are missing";
   }
   for (int k = 0; k < std::min(found.count(), sought.count); ++k)
@@ -320,7 +320,7 @@ RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  if (count <= 0) return {{"converged", "", 0, 0}, {}, {}};
+  if (count <= 0) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (n <= dense_limit) return first_of(solve_whole(M, K), K, count);
   const Sought sought{INFINITY, std::min(count, static_cast<int>(n))};
   return to_modes(sweep(M, K, sought), M, K, sought);

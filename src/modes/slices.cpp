@@ -71,7 +71,7 @@ void find_pairs(Slice& slice, const QuadraticProblem& problem, ShiftInvert& penc
 QuadraticSolution joined(std::vector<Slice>& slices)
 {
   QuadraticSolution solution;
-  solution.outcome = {"converged", "", static_cast<int>(slices.size()), 0};
+  solution.outcome = {OutcomeKind::converged, "", static_cast<int>(slices.size()), 0};
   for (Slice& slice : slices)
     for (const Eigenpair& pair : slice.pairs)
       solution.pairs.push_back({pair.lambda, copy_of(pair.real), copy_of(pair.imaginary), pair.backward_error});

@@ -51,8 +51,8 @@ void write_statuses(Hdf5File& file, const std::vector<std::vector<ContactStatus>
 void write_history(const Report& report, const Scene& scene, const std::filesystem::path& place)
 {
   Hdf5File file(place);
-  if (ran(report.transient.outcome)) write_group(file, "transient", report.transient.history, scene);
-  if (ran(report.cycle.outcome))
+  if (has_run(report.transient.outcome)) write_group(file, "transient", report.transient.history, scene);
+  if (has_run(report.cycle.outcome))
   {
     write_group(file, "cycle", report.cycle.history, scene);
     write_statuses(file, report.cycle.statuses);

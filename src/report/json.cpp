@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 /// The outcome of a stage, the start of its entry.
 Json entry_of(const Outcome& outcome)
 {
-  Json entry = {{"outcome", outcome.word.empty() ? "skipped" : outcome.word}};
+  Json entry = {{"outcome", word(outcome.kind)}};
   if (!outcome.reason.empty()) entry["reason"] = outcome.reason;
   return entry;
 }
@@ -24,7 +24,7 @@ Json equilibrium_entry(const Report& report, const Scene& scene)
 {
   const Equilibrium& equilibrium = report.equilibrium;
   Json entry = entry_of(equilibrium.outcome);
-  if (!ran(equilibrium.outcome)) return entry;
+  if (!has_run(equilibrium.outcome)) return entry;
   const NormalForces normal = normal_forces(equilibrium);
   entry["iterations"] = equilibrium.outcome.iterations;
   entry["closed"] = normal.closed;
@@ -64,8 +64,8 @@ Json mode_list(const std::vector<ComplexMode>& modes)
 Json modes_entry(const Modes& modes)
 {
   Json entry = entry_of(modes.outcome);
-  if (!ran(modes.outcome)) return entry;
-  entry["method"] = modes.method;
+  if (!has_run(modes.outcome)) return entry;
+  entry["method"] = word(modes.method);
   entry["iterations"] = modes.outcome.iterations;
   entry["residual"] = modes.outcome.residual;
   entry["band_hz"] = modes.band;
@@ -84,8 +84,8 @@ Json modes_entry(const Modes& modes)
 Json estimate_entry(const Estimate& estimate)
 {
   Json entry = entry_of(estimate.outcome);
-  if (!ran(estimate.outcome)) return entry;
-  const bool balance = estimate.outcome.word == "balance";
+  if (!has_run(estimate.outcome)) return entry;
+  const bool balance = estimate.outcome.kind == OutcomeKind::balance;
   entry["amplitude"] = balance ? Json(estimate.amplitude) : Json(nullptr); // no balance is no amplitude of zero
   entry["mean_energy"] = balance ? Json(estimate.mean_energy) : Json(nullptr);
   entry["lift_off_amplitude"] = estimate.lift_off_amplitude;
@@ -102,7 +102,7 @@ Json transient_entry(const Report& report)
 {
   const Trajectory& transient = report.transient;
   Json entry = entry_of(transient.outcome);
-  if (!ran(transient.outcome)) return entry;
+  if (!has_run(transient.outcome)) return entry;
   entry["theta"] = transient.theta;
   entry["steps"] = transient.steps;
   entry["step_size"] = transient.step_size;
@@ -148,7 +148,7 @@ Json cycle_entry(const Report& report, const Scene& scene)
 {
   const LimitCycle& cycle = report.cycle;
   Json entry = entry_of(cycle.outcome);
-  if (!ran(cycle.outcome) || cycle.outcome.word == "refused") return entry;
+  if (!has_run(cycle.outcome) || cycle.outcome.kind == OutcomeKind::refused) return entry;
   entry["period"] = cycle.period;
   entry["frequency_hz"] = 1 / cycle.period;
   entry["steps_per_period"] = cycle.steps_per_period;
@@ -176,9 +176,9 @@ Json cycle_entry(const Report& report, const Scene& scene)
 
 Json fidelity_entry(const Fidelity& fidelity)
 {
-  Json entry = {{"asked", fidelity.asked}, {"used", fidelity.used}};
+  Json entry = {{"asked", word(fidelity.asked)}, {"used", word(fidelity.used)}};
   if (!fidelity.reason.empty()) entry["reason"] = fidelity.reason;
-  if (fidelity.asked == "full") return entry;
+  if (fidelity.asked == CycleModel::full) return entry;
   entry["accuracy"] = fidelity.accuracy;
   entry["size"] = fidelity.size;
   entry["modes"] = fidelity.modes;
@@ -200,11 +200,6 @@ Json fidelity_entry(const Fidelity& fidelity)
 }
 
 } // namespace
-
-bool ran(const Outcome& outcome)
-{
-  return !outcome.word.empty() && outcome.word != "off" && outcome.word != "skipped";
-}
 
 NormalForces normal_forces(const Equilibrium& equilibrium)
 {

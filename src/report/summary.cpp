@@ -29,18 +29,16 @@ std::string warnings(const std::vector<std::string>& sentences)
 /// "converged", "NOT CONVERGED: reason": what is not a success must not look like one.
 std::string outcome_text(const Outcome& outcome)
 {
-  if (outcome.word.empty()) return "skipped";
-  std::string word = outcome.word;
-  const bool good =
-      word == "converged" || word == "balance" || word == "completed" || word == "no balance" || !ran(outcome);
-  if (!good) std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::toupper(c); });
-  return word + (outcome.reason.empty() ? "" : ": " + outcome.reason);
+  std::string text = word(outcome.kind);
+  if (!succeeded(outcome))
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
+  return text + (outcome.reason.empty() ? "" : ": " + outcome.reason);
 }
 
 std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
 {
   std::string text = row("equilibrium", outcome_text(equilibrium.outcome));
-  if (!ran(equilibrium.outcome) || equilibrium.outcome.word == "no equilibrium") return text;
+  if (!has_run(equilibrium.outcome) || equilibrium.outcome.kind == OutcomeKind::no_equilibrium) return text;
   const NormalForces normal = normal_forces(equilibrium);
   text += row(
       "", format("%d of %d pairs closed after %d iterations", normal.closed, pairs, equilibrium.outcome.iterations));
@@ -63,10 +61,10 @@ std::string mode_line(const ComplexMode& mode)
 std::string modes_text(const Modes& modes)
 {
   std::string text = row("modes", outcome_text(modes.outcome));
-  if (!ran(modes.outcome)) return text;
-  text += row("", format("%d unstable of %zu modes below %.5g Hz, method \"%s\", largest backward error %.1e",
-                         modes.unstable_count, modes.modes.size(), modes.band, modes.method.c_str(),
-                         modes.outcome.residual));
+  if (!has_run(modes.outcome)) return text;
+  text +=
+      row("", format("%d unstable of %zu modes below %.5g Hz, method \"%s\", largest backward error %.1e",
+                     modes.unstable_count, modes.modes.size(), modes.band, word(modes.method), modes.outcome.residual));
   if (!modes.count_check.empty()) text += row("", "count: " + modes.count_check);
   text += row("", format("%12s %14s %12s %16s", "frequency", "growth rate", "damping", "backward error"));
   text += row("", format("%12s %14s %12s %16s", "[Hz]", "[1/s]", "[%]", "[-]"));
@@ -81,8 +79,8 @@ std::string modes_text(const Modes& modes)
 std::string estimate_text(const Estimate& estimate)
 {
   std::string text = row("estimate", outcome_text(estimate.outcome));
-  if (!ran(estimate.outcome)) return text;
-  if (estimate.outcome.word == "balance") text += row("", format("amplitude %.5g m", estimate.amplitude));
+  if (!has_run(estimate.outcome)) return text;
+  if (estimate.outcome.kind == OutcomeKind::balance) text += row("", format("amplitude %.5g m", estimate.amplitude));
   text += row("", format("first lift-off at %.5g m, first slip reversal at %.5g m", estimate.lift_off_amplitude,
                          estimate.reversal_amplitude));
   text += row("", format("friction injects %.5g 1/s, damping takes %.5g 1/s of the energy",
@@ -94,7 +92,7 @@ std::string transient_text(const Report& report)
 {
   const Trajectory& transient = report.transient;
   std::string text = row("transient", outcome_text(transient.outcome));
-  if (!ran(transient.outcome)) return text;
+  if (!has_run(transient.outcome)) return text;
   text += row("", format("%ld steps of %.5g s, %.5g periods, theta %.4g", transient.steps, transient.step_size,
                          transient.periods, transient.theta));
   const std::string fit = std::isfinite(transient.growth_rate_fit) ? format("%.6g 1/s", transient.growth_rate_fit)
@@ -113,7 +111,7 @@ std::string cycle_text(const Report& report, const Scene& scene)
 {
   const LimitCycle& cycle = report.cycle;
   std::string text = row("cycle", outcome_text(cycle.outcome));
-  if (!ran(cycle.outcome) || cycle.outcome.word == "refused") return text;
+  if (!has_run(cycle.outcome) || cycle.outcome.kind == OutcomeKind::refused) return text;
   const std::string projected =
       std::isfinite(cycle.residual_projected) ? format("%.2e", cycle.residual_projected) : std::string("not tried");
   text += row(
@@ -121,7 +119,7 @@ std::string cycle_text(const Report& report, const Scene& scene)
               projected);
   text += row("", format("%d Newton steps, %ld periods integrated, %d steps a period", cycle.newton_iterations,
                          cycle.periods_integrated, cycle.steps_per_period));
-  if (cycle.outcome.word != "converged") return text; // the figures of no cycle would mislead
+  if (cycle.outcome.kind != OutcomeKind::converged) return text; // the figures of no cycle would mislead
   text += row("", format("period %.10g s, frequency %.8g Hz", cycle.period, 1 / cycle.period));
   text += row("", format("the step's own error of the period: about %+.1e", -cycle_bias(report).frequency));
   text += row("", format("mean energy %.7g J, fluctuating %.7g J", cycle.mean_energy, cycle.mean_fluctuating_energy));
@@ -138,10 +136,10 @@ std::string cycle_text(const Report& report, const Scene& scene)
 
 std::string fidelity_text(const Fidelity& fidelity)
 {
-  if (fidelity.asked == "full") return "";
-  std::string text = row("fidelity", fidelity.asked + ": " + fidelity.used + " model used" +
+  if (fidelity.asked == CycleModel::full) return "";
+  std::string text = row("fidelity", format("%s: %s model used", word(fidelity.asked), word(fidelity.used)) +
                                          (fidelity.reason.empty() ? "" : ", " + fidelity.reason));
-  if (fidelity.used == "full" || fidelity.full_periods == 0) return text;
+  if (fidelity.used == CycleModel::full || fidelity.full_periods == 0) return text;
   text +=
       row("", format("%d shapes: %d of modes, %d of attachment; %d pairs in contact with friction, %d taken to slide",
                      fidelity.size, fidelity.modes, fidelity.attachment_shapes, fidelity.active_pairs,

@@ -41,8 +41,9 @@ Sentences of_modes(const Report& report)
   if (modes.count.certified_by.empty() && modes.count.expected != modes.count.found)
     said.push_back(format("%d pairs were found where %d are expected, so an unstable one may be missing: %s",
                           modes.count.found, modes.count.expected,
-                          modes.method == "projection" ? "raise modes.real_modes, or take modes.method = \"full\""
-                                                       : "-modes_solver toar seeks them otherwise"));
+                          modes.method == ModesMethod::projection
+                              ? "raise modes.real_modes, or take modes.method = \"full\""
+                              : "-modes_solver toar seeks them otherwise"));
   return said;
 }
 
@@ -50,12 +51,12 @@ Sentences of_estimate(const Report& report)
 {
   const Estimate& estimate = report.estimate;
   const double lift_off = estimate.lift_off_amplitude;
-  if (estimate.outcome.word == "no balance" && std::isfinite(lift_off))
+  if (estimate.outcome.kind == OutcomeKind::no_balance && std::isfinite(lift_off))
     return {format("no amplitude is predicted; shooting starts from first lift-off times -estimate_lift_off_multiple, "
                    "%.5g m by default",
                    2 * lift_off)};
   Sentences said;
-  if (estimate.outcome.word != "balance") return said;
+  if (estimate.outcome.kind != OutcomeKind::balance) return said;
   if (estimate.amplitude > 3 * lift_off)
     said.push_back(format("%.2g times first lift-off: the cycle itself may be far smaller, down to that",
                           estimate.amplitude / lift_off));
@@ -97,12 +98,12 @@ Sentences of_cycle(const Report& report)
 {
   Sentences said;
   const LimitCycle& cycle = report.cycle;
-  if (cycle.outcome.word != "converged") return said;
+  if (cycle.outcome.kind != OutcomeKind::converged) return said;
   const StepBias bias = cycle_bias(report);
   if (std::abs(bias.growth) > .1)
     said.push_back(format("theta and the step change the growth rate by %+.0f %%: the cycle's amplitude suffers",
                           100 * bias.growth));
-  if (cycle.residual_full > 1e-3 && report.fidelity.used == "full")
+  if (cycle.residual_full > 1e-3 && report.fidelity.used == CycleModel::full)
     said.push_back("a residual this large is no proof of a periodic motion");
   add_chatter(cycle.history, said);
   if (cycle.stability == "undecided")
@@ -150,12 +151,12 @@ double chatter(const History& history)
 Verdicts verdicts_of(const Report& report)
 {
   Verdicts verdicts;
-  if (ran(report.equilibrium.outcome)) verdicts.equilibrium = of_equilibrium(report);
-  if (ran(report.modes.outcome)) verdicts.modes = of_modes(report);
-  if (ran(report.estimate.outcome)) verdicts.estimate = of_estimate(report);
-  if (ran(report.transient.outcome) && report.transient.outcome.word != "refused")
+  if (has_run(report.equilibrium.outcome)) verdicts.equilibrium = of_equilibrium(report);
+  if (has_run(report.modes.outcome)) verdicts.modes = of_modes(report);
+  if (has_run(report.estimate.outcome)) verdicts.estimate = of_estimate(report);
+  if (has_run(report.transient.outcome) && report.transient.outcome.kind != OutcomeKind::refused)
     verdicts.transient = of_transient(report);
-  if (ran(report.cycle.outcome)) verdicts.cycle = of_cycle(report);
+  if (has_run(report.cycle.outcome)) verdicts.cycle = of_cycle(report);
   return verdicts;
 }
 

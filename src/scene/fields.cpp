@@ -19,239 +19,192 @@ bool has_unit(const std::string& unit)
 Fields fields(Scene& scene)
 {
   return {
-      {"title", &scene.title, optional, Rule::any, "text", "what the scene shows", {}},
-      {"fidelity",
-       &scene.fidelity,
-       optional,
-       Rule::word,
-       "word",
-       "of the cycle's model: full, reduced, or auto (reduced as far as the accuracy allows)",
-       {"full", "reduced", "auto"}},
-      {"accuracy", &scene.accuracy, optional, Rule::positive, "-", "wished, of the cycle's frequency and energy", {}},
+      {"title", &scene.title, optional, Rule::any, "text", "what the scene shows"},
+      {"fidelity", choice_of(scene.fidelity), optional, Rule::any, "word",
+       "of the cycle's model: full, reduced, or auto (reduced as far as the accuracy allows)"},
+      {"accuracy", &scene.accuracy, optional, Rule::positive, "-", "wished, of the cycle's frequency and energy"},
   };
 }
 
 Fields fields(MeshSource& m)
 {
   return {
-      {"file", &m.file, required, Rule::file, "path", "a .geo to mesh, or a mesh gmsh reads, with named groups", {}},
-      {"scale", &m.scale, optional, Rule::positive, "m", "length unit of the file", {}},
-      {"parameters", &m.parameters, optional, Rule::any, "table", "values for the DefineConstant of a .geo", {}},
+      {"file", &m.file, required, Rule::file, "path", "a .geo to mesh, or a mesh gmsh reads, with named groups"},
+      {"scale", &m.scale, optional, Rule::positive, "m", "length unit of the file"},
+      {"parameters", &m.parameters, optional, Rule::any, "table", "values for the DefineConstant of a .geo"},
   };
 }
 
 Fields fields(std::filesystem::path& matrices)
 {
-  return {{"folder", &matrices, required, Rule::folder, "path", "folder of M C K B F gap drive .petsc", {}}};
+  return {{"folder", &matrices, required, Rule::folder, "path", "folder of M C K B F gap drive .petsc"}};
 }
 
 Fields fields(Part& p)
 {
   return {
-      {"name", &p.name, required, Rule::any, "text", "named group of the mesh", {}},
-      {"young", &p.material.young, required, Rule::positive, "Pa", "Young's modulus", {}},
-      {"poisson", &p.material.poisson, required, Rule::poisson, "-", "Poisson's ratio", {}},
-      {"density", &p.material.density, required, Rule::positive, "kg/m3", "mass density", {}},
-      {"thickness", &p.thickness, optional, Rule::not_negative, "m", "of a shell; 0 is a solid", {}},
-      {"alpha",
-       DampingTarget{&p.damping, &RayleighDamping::alpha},
-       optional,
-       Rule::not_negative,
-       "1/s",
-       "own Rayleigh damping, mass part",
-       {}},
-      {"beta",
-       DampingTarget{&p.damping, &RayleighDamping::beta},
-       optional,
-       Rule::not_negative,
-       "s",
-       "own Rayleigh damping, stiffness part",
-       {}},
+      {"name", &p.name, required, Rule::any, "text", "named group of the mesh"},
+      {"young", &p.material.young, required, Rule::positive, "Pa", "Young's modulus"},
+      {"poisson", &p.material.poisson, required, Rule::poisson, "-", "Poisson's ratio"},
+      {"density", &p.material.density, required, Rule::positive, "kg/m3", "mass density"},
+      {"thickness", &p.thickness, optional, Rule::not_negative, "m", "of a shell; 0 is a solid"},
+      {"alpha", DampingTarget{&p.damping, &RayleighDamping::alpha}, optional, Rule::not_negative, "1/s",
+       "own Rayleigh damping, mass part"},
+      {"beta", DampingTarget{&p.damping, &RayleighDamping::beta}, optional, Rule::not_negative, "s",
+       "own Rayleigh damping, stiffness part"},
   };
 }
 
 Fields fields(Point& p)
 {
   return {
-      {"name", &p.name, required, Rule::any, "text", "name for springs, forces, contacts, probes", {}},
-      {"at", &p.at, required, Rule::any, "m", "position", {}},
-      {"mass", &p.mass, optional, Rule::not_negative, "kg", "point mass", {}},
-      {"free", &p.free, required, Rule::any, "motions", "free motions: any of x y z rx ry rz, all, none", {}},
+      {"name", &p.name, required, Rule::any, "text", "name for springs, forces, contacts, probes"},
+      {"at", &p.at, required, Rule::any, "m", "position"},
+      {"mass", &p.mass, optional, Rule::not_negative, "kg", "point mass"},
+      {"free", &p.free, required, Rule::any, "motions", "free motions: any of x y z rx ry rz, all, none"},
   };
 }
 
 Fields fields(RigidBody& b)
 {
   return {
-      {"name", &b.name, required, Rule::any, "text", "name for springs, forces, probes", {}},
-      {"surfaces", &b.surfaces, required, Rule::any, "texts", "named surface, or a list of them", {}},
-      {"at", &b.at, required, Rule::any, "m", "reference point", {}},
-      {"mass", &b.mass, optional, Rule::not_negative, "kg", "mass at the reference point", {}},
-      {"inertia", &b.inertia, optional, Rule::any, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about that point", {}},
-      {"free", &b.free, required, Rule::any, "motions", "free motions: any of x y z rx ry rz, all, none", {}},
+      {"name", &b.name, required, Rule::any, "text", "name for springs, forces, probes"},
+      {"surfaces", &b.surfaces, required, Rule::any, "texts", "named surface, or a list of them"},
+      {"at", &b.at, required, Rule::any, "m", "reference point"},
+      {"mass", &b.mass, optional, Rule::not_negative, "kg", "mass at the reference point"},
+      {"inertia", &b.inertia, optional, Rule::any, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about that point"},
+      {"free", &b.free, required, Rule::any, "motions", "free motions: any of x y z rx ry rz, all, none"},
   };
 }
 
 Fields fields(Spring& s)
 {
   return {
-      {"from", &s.from, required, Rule::any, "text", "point or rigid body", {}},
-      {"to", &s.to, optional, Rule::any, "text", "point, rigid body or ground", {}},
-      {"direction", &s.direction, required, Rule::direction, "-", "line of action: x, y, z or a vector", {}},
-      {"stiffness", &s.stiffness, optional, Rule::not_negative, "N/m", "of the spring", {}},
-      {"damping", &s.damping, optional, Rule::not_negative, "N s/m", "of the dashpot", {}},
+      {"from", &s.from, required, Rule::any, "text", "point or rigid body"},
+      {"to", &s.to, optional, Rule::any, "text", "point, rigid body or ground"},
+      {"direction", &s.direction, required, Rule::direction, "-", "line of action: x, y, z or a vector"},
+      {"stiffness", &s.stiffness, optional, Rule::not_negative, "N/m", "of the spring"},
+      {"damping", &s.damping, optional, Rule::not_negative, "N s/m", "of the dashpot"},
   };
 }
 
 Fields fields(Support& s)
 {
   return {
-      {"on", &s.on, required, Rule::any, "text", "named group or point", {}},
-      {"fixed", &s.fixed, required, Rule::any, "motions", "motions held still: any of x y z rx ry rz, all", {}},
+      {"on", &s.on, required, Rule::any, "text", "named group or point"},
+      {"fixed", &s.fixed, required, Rule::any, "motions", "motions held still: any of x y z rx ry rz, all"},
   };
 }
 
 Fields fields(Force& f)
 {
   return {
-      {"on", &f.on, required, Rule::any, "text", "point, rigid body, or named group (force shared by its nodes)", {}},
-      {"vector", &f.vector, required, Rule::any, "N", "the whole force", {}},
+      {"on", &f.on, required, Rule::any, "text", "point, rigid body, or named group (force shared by its nodes)"},
+      {"vector", &f.vector, required, Rule::any, "N", "the whole force"},
   };
 }
 
 Fields fields(Pressure& p)
 {
   return {
-      {"on", &p.on, required, Rule::any, "text", "named surface", {}},
-      {"value", &p.value, required, Rule::any, "Pa", "positive presses onto the solid", {}},
+      {"on", &p.on, required, Rule::any, "text", "named surface"},
+      {"value", &p.value, required, Rule::any, "Pa", "positive presses onto the solid"},
   };
 }
 
 Fields fields(Rotation& r)
 {
   return {
-      {"axis", &r.axis, required, Rule::direction, "-", "of rotation: x, y, z or a vector", {}},
-      {"centre", &r.centre, optional, Rule::any, "m", "a point of the axis", {}},
-      {"rate", &r.rate, required, Rule::any, "rad/s", "angular velocity", {}},
+      {"axis", &r.axis, required, Rule::direction, "-", "of rotation: x, y, z or a vector"},
+      {"centre", &r.centre, optional, Rule::any, "m", "a point of the axis"},
+      {"rate", &r.rate, required, Rule::any, "rad/s", "angular velocity"},
   };
 }
 
 Fields fields(Contact& c)
 {
   return {
-      {"rotor", &c.rotor, required, Rule::any, "text", "named surface or point that the drive moves", {}},
-      {"stator", &c.stator, required, Rule::any, "text", "named surface or point that rubs on it", {}},
-      {"gap", &c.gap, optional, Rule::any, "m", "initial gap, positive when open", {}},
-      {"reach", &c.reach, optional, Rule::not_negative, "m", "partners may be so far apart, which adds to the gap", {}},
-      {"normal", &c.normal, optional, Rule::direction, "-", "out of the rotor; points need it, surfaces have it", {}},
-      {"tangents", &c.tangents, optional, Rule::direction, "-", "one direction: plane friction along it; or two", {}},
-      {"rotation", &c.rotation, optional, Rule::any, "table", "of the rotor: {axis, centre, rate}", {}},
-      {"velocity", &c.velocity, optional, Rule::any, "m/s", "of the rotor's surface, instead of a rotation", {}},
+      {"rotor", &c.rotor, required, Rule::any, "text", "named surface or point that the drive moves"},
+      {"stator", &c.stator, required, Rule::any, "text", "named surface or point that rubs on it"},
+      {"gap", &c.gap, optional, Rule::any, "m", "initial gap, positive when open"},
+      {"reach", &c.reach, optional, Rule::not_negative, "m", "partners may be so far apart, which adds to the gap"},
+      {"normal", &c.normal, optional, Rule::direction, "-", "out of the rotor; points need it, surfaces have it"},
+      {"tangents", &c.tangents, optional, Rule::direction, "-", "one direction: plane friction along it; or two"},
+      {"rotation", &c.rotation, optional, Rule::any, "table", "of the rotor: {axis, centre, rate}"},
+      {"velocity", &c.velocity, optional, Rule::any, "m/s", "of the rotor's surface, instead of a rotation"},
   };
 }
 
 Fields fields(FrictionLaw& f)
 {
   return {
-      {"coefficient", &f.coefficient, optional, Rule::not_negative, "-", "Coulomb's mu", {}},
-      {"direction_damping",
-       &f.direction_damping,
-       optional,
-       Rule::any,
-       "switch",
-       "keep mu r_n/|v_d| (I - e e') in the modes",
-       {}},
+      {"coefficient", &f.coefficient, optional, Rule::not_negative, "-", "Coulomb's mu"},
+      {"direction_damping", &f.direction_damping, optional, Rule::any, "switch",
+       "keep mu r_n/|v_d| (I - e e') in the modes"},
   };
 }
 
 Fields fields(RayleighDamping& d)
 {
   return {
-      {"alpha", &d.alpha, optional, Rule::not_negative, "1/s", "mass part", {}},
-      {"beta", &d.beta, optional, Rule::not_negative, "s", "stiffness part", {}},
+      {"alpha", &d.alpha, optional, Rule::not_negative, "1/s", "mass part"},
+      {"beta", &d.beta, optional, Rule::not_negative, "s", "stiffness part"},
   };
 }
 
 Fields fields(ModesSettings& m)
 {
   return {
-      {"enabled", &m.enabled, optional, Rule::any, "switch", "run this stage", {}},
-      {"method",
-       &m.method,
-       optional,
-       Rule::word,
-       "word",
-       "projection on real modes, full sparse problem, or both",
-       {"projection", "full", "both"}},
-      {"real_modes",
-       &m.real_modes,
-       optional,
-       Rule::not_negative,
-       "-",
-       "real modes of the projection; 0: those of the band",
-       {}},
-      {"residual_passes", &m.residual_passes, optional, Rule::not_negative, "-", "corrections of the projection", {}},
-      {"band", &m.band, optional, Rule::positive, "Hz", "every mode below is reported", {}},
+      {"enabled", &m.enabled, optional, Rule::any, "switch", "run this stage"},
+      {"method", choice_of(m.method), optional, Rule::any, "word",
+       "projection on real modes, full sparse problem, or both"},
+      {"real_modes", &m.real_modes, optional, Rule::not_negative, "-",
+       "real modes of the projection; 0: those of the band"},
+      {"residual_passes", &m.residual_passes, optional, Rule::not_negative, "-", "corrections of the projection"},
+      {"band", &m.band, optional, Rule::positive, "Hz", "every mode below is reported"},
   };
 }
 
 Fields fields(EstimateSettings& e)
 {
-  return {{"enabled", &e.enabled, optional, Rule::any, "switch", "run this stage", {}}};
+  return {{"enabled", &e.enabled, optional, Rule::any, "switch", "run this stage"}};
 }
 
 Fields fields(TransientSettings& t)
 {
   return {
-      {"enabled", &t.enabled, optional, Rule::any, "switch", "run this stage", {}},
-      {"start",
-       &t.start,
-       optional,
-       Rule::word_or_file,
-       "word",
-       "mode, estimate, or a state file",
-       {"mode", "estimate"}},
-      {"amplitude",
-       &t.amplitude,
-       optional,
-       Rule::not_negative,
-       "m",
-       "largest displacement at start = \"mode\"; 0: a tenth of first lift-off",
-       {}},
-      {"periods", &t.periods, optional, Rule::positive, "-", "length, in periods of the followed mode", {}},
-      {"steps_per_period", &t.steps_per_period, optional, Rule::positive, "-", "time steps a period", {}},
-      {"steps", &t.steps, optional, Rule::not_negative, "-", "with step_size, instead of periods", {}},
-      {"step_size", &t.step_size, optional, Rule::not_negative, "s", "with steps, instead of periods", {}},
-      {"theta", &t.theta, optional, Rule::fraction, "-", "of the theta-method; 0.5 conserves energy", {}},
-      {"save_state", &t.save_state, optional, Rule::any, "path", "state file written at the end", {}},
+      {"enabled", &t.enabled, optional, Rule::any, "switch", "run this stage"},
+      {"start", &t.start, optional, Rule::any, "word", "mode, estimate, or a state file"},
+      {"amplitude", &t.amplitude, optional, Rule::not_negative, "m",
+       "largest displacement at start = \"mode\"; 0: a tenth of first lift-off"},
+      {"periods", &t.periods, optional, Rule::positive, "-", "length, in periods of the followed mode"},
+      {"steps_per_period", &t.steps_per_period, optional, Rule::positive, "-", "time steps a period"},
+      {"steps", &t.steps, optional, Rule::not_negative, "-", "with step_size, instead of periods"},
+      {"step_size", &t.step_size, optional, Rule::not_negative, "s", "with steps, instead of periods"},
+      {"theta", &t.theta, optional, Rule::fraction, "-", "of the theta-method; 0.5 conserves energy"},
+      {"save_state", &t.save_state, optional, Rule::any, "path", "state file written at the end"},
   };
 }
 
 Fields fields(CycleSettings& c)
 {
   return {
-      {"enabled", &c.enabled, optional, Rule::any, "switch", "run this stage", {}},
-      {"steps_per_period", &c.steps_per_period, optional, Rule::positive, "-", "time steps a period", {}},
-      {"tolerance", &c.tolerance, optional, Rule::positive, "-", "on the full-space residual", {}},
-      {"free_periods",
-       &c.free_periods,
-       optional,
-       Rule::not_negative,
-       "-",
-       "integrated before the first Newton step",
-       {}},
-      {"theta", &c.theta, optional, Rule::fraction, "-", "of the theta-method; 0.5 conserves energy", {}},
-      {"save_state", &c.save_state, optional, Rule::any, "path", "state file of the cycle's start", {}},
+      {"enabled", &c.enabled, optional, Rule::any, "switch", "run this stage"},
+      {"steps_per_period", &c.steps_per_period, optional, Rule::positive, "-", "time steps a period"},
+      {"tolerance", &c.tolerance, optional, Rule::positive, "-", "on the full-space residual"},
+      {"free_periods", &c.free_periods, optional, Rule::not_negative, "-", "integrated before the first Newton step"},
+      {"theta", &c.theta, optional, Rule::fraction, "-", "of the theta-method; 0.5 conserves energy"},
+      {"save_state", &c.save_state, optional, Rule::any, "path", "state file of the cycle's start"},
   };
 }
 
 Fields fields(Probe& p)
 {
   return {
-      {"name", &p.name, required, Rule::any, "text", "name in the results", {}},
-      {"on", &p.on, required, Rule::any, "text", "point, rigid body or named group; dof:N on a matrix scene", {}},
-      {"at", &p.at, optional, Rule::any, "m", "the group's node nearest to this position", {}},
-      {"direction", &p.direction, optional, Rule::direction, "-", "x, y, z or a vector; not for dof:N", {}},
+      {"name", &p.name, required, Rule::any, "text", "name in the results"},
+      {"on", &p.on, required, Rule::any, "text", "point, rigid body or named group; dof:N on a matrix scene"},
+      {"at", &p.at, optional, Rule::any, "m", "the group's node nearest to this position"},
+      {"direction", &p.direction, optional, Rule::direction, "-", "x, y, z or a vector; not for dof:N"},
   };
 }
 

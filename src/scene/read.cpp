@@ -124,6 +124,7 @@ private:
           }
           else
             read(node, target);
+          if constexpr (std::is_same_v<decltype(target), Choice>) places_.given[target.member] = place_of(node);
         },
         field.target);
   }
@@ -217,20 +218,37 @@ private:
   void read(const toml::node& node, std::string& target) const
   {
     target = text(node);
-    const auto& words = field_->words;
-    const bool listed = std::find(words.begin(), words.end(), target) != words.end();
-    if (field_->rule == Rule::word && !listed)
-      throw Error(place_of(node) + ": " + label_ + field_->key + " = '" + target + "' is none of " + joined(words) +
-                  suggestion_or_list(target, words));
-    if (field_->rule == Rule::word_or_file && !listed)
-    {
-      const auto file = absolute(target);
-      if (!std::filesystem::is_regular_file(file))
-        throw Error(place_of(node) + ": " + label_ + field_->key + " = '" + target + "' is none of " + joined(words) +
-                    ", and there is no file " + file.string());
-      target = file.string();
-    }
     if (field_->need == Need::required && target.empty()) fail(node, "a name that is not empty");
+  }
+
+  void read(const toml::node& node, const Choice& target) const
+  {
+    const std::string given = text(node);
+    const std::vector<std::string> words(target.words.begin(), target.words.end());
+    const auto found = std::find(words.begin(), words.end(), given);
+    if (found == words.end())
+      throw Error(place_of(node) + ": " + label_ + field_->key + " = '" + given + "' is none of " + joined(words) +
+                  suggestion_or_list(given, words));
+    target.set(target.member, static_cast<std::size_t>(found - words.begin()));
+  }
+
+  void read(const toml::node& node, Start& target) const
+  {
+    const std::string given = text(node);
+    std::vector<std::string> words;
+    for (std::size_t place = 0; place < start_kind_words.size(); ++place)
+    {
+      const auto kind = static_cast<StartKind>(place);
+      if (kind == StartKind::file) continue;
+      words.emplace_back(word(kind));
+      if (given != words.back()) continue;
+      target = {kind, {}};
+      return;
+    }
+    target = {StartKind::file, absolute(given)};
+    if (!std::filesystem::is_regular_file(target.file))
+      throw Error(place_of(node) + ": " + label_ + field_->key + " = '" + given + "' is none of " + joined(words) +
+                  ", and there is no file " + target.file.string());
   }
 
   void read(const toml::node& node, std::filesystem::path& target) const

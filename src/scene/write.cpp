@@ -118,6 +118,16 @@ std::string print(const DampingTarget& target)
   return *target.damping ? print((**target.damping).*target.member) : "";
 }
 
+std::string print(const Choice& target)
+{
+  return print(std::string(target.words[target.get(target.member)]));
+}
+
+std::string print(const Start& start)
+{
+  return print(start.kind == StartKind::file ? start.file.string() : std::string(word(start.kind)));
+}
+
 /// Directions and drives that were not given are zero, which is no value of theirs.
 bool says_nothing(const Field& field)
 {

@@ -149,11 +149,11 @@ Finish attracting(Shooting& shooting, Finish finish, const std::vector<Owned<Vec
 /// A cycle that repels is no answer; with more than one unstable mode the motion need not be periodic at all.
 void judge(LimitCycle& cycle, std::size_t asleep)
 {
-  if (cycle.outcome.word != "converged" || cycle.stability != "unstable") return;
+  if (cycle.outcome.kind != OutcomeKind::converged || cycle.stability != "unstable") return;
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(), "the cycle found repels: a small motion beside it grows %.4g times a period",
                 std::abs(cycle.multipliers.front()));
-  cycle.outcome.word = asleep == 0 ? "unstable cycle" : "not periodic";
+  cycle.outcome.kind = asleep == 0 ? OutcomeKind::unstable_cycle : OutcomeKind::not_periodic;
   cycle.outcome.reason = text.data();
   cycle.outcome.reason += asleep == 0 ? "; try another start (-cycle_start_amplitude) or more free periods"
                                       : "; " + std::to_string(asleep + 1) +
@@ -162,18 +162,18 @@ void judge(LimitCycle& cycle, std::size_t asleep)
 
 Outcome outcome_of(const Shooting& shooting, const Finish& finish)
 {
-  Outcome outcome{"not converged", "", shooting.iterations, finish.orbit.residual};
+  Outcome outcome{OutcomeKind::not_converged, "", shooting.iterations, finish.orbit.residual};
   if (finish.ending == Ending::vanished)
   {
-    outcome.word = "collapsed to equilibrium";
+    outcome.kind = OutcomeKind::collapsed_to_equilibrium;
     outcome.reason =
         "the fluctuation fell below a tenth of the energy at the start and at first lift-off or slip reversal";
   }
   else if (finish.ending == Ending::converged)
-    outcome.word = "converged";
+    outcome.kind = OutcomeKind::converged;
   else if (finish.ending == Ending::not_periodic)
   {
-    outcome.word = "not periodic";
+    outcome.kind = OutcomeKind::not_periodic;
     outcome.reason = "the period left the range between half and twice the mode's";
   }
   else

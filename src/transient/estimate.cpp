@@ -247,14 +247,14 @@ template <class Rate> void find_balance(Estimate& result, const Rate& rate, doub
     if (result.curve_rate[i - 1] > damping && result.curve_rate[i] <= damping) above = i;
   if (above == 0)
   {
-    result.outcome = {"no balance",
+    result.outcome = {OutcomeKind::no_balance,
                       result.curve_rate.back() > damping ? "friction gives more than damping takes at any amplitude"
                                                          : "damping takes more than friction gives at any amplitude",
                       0, 0};
     return;
   }
   const double larger = std::max(damping, std::abs(result.friction_rate_linear));
-  result.outcome.word = "balance";
+  result.outcome.kind = OutcomeKind::balance;
   result.amplitude = std::exp(find_root([&](double log_q) { return (rate(std::exp(log_q)) - damping) / larger; },
                                         std::log(result.curve_amplitude[above - 1]),
                                         std::log(result.curve_amplitude[above]), 1e-13, result.outcome));
@@ -274,7 +274,7 @@ Estimate estimate_amplitude(const Structure& structure, const Interface& interfa
   const double omega = mode.lambda.imag();
   if (omega == 0)
   {
-    result.outcome = {"skipped", "the mode grows without vibrating", 0, 0};
+    result.outcome = {OutcomeKind::skipped, "the mode grows without vibrating", 0, 0};
     return result;
   }
   const std::vector<ShakenPair> pairs = shaken_pairs(structure, interface, equilibrium, mode);
@@ -296,7 +296,7 @@ Estimate estimate_amplitude(const Structure& structure, const Interface& interfa
   const double first_event = std::min(result.lift_off_amplitude, result.reversal_amplitude);
   if (first_event == infinity || first_event <= 0)
   {
-    result.outcome = {"no balance", "nothing saturates the interface force", 0, 0};
+    result.outcome = {OutcomeKind::no_balance, "nothing saturates the interface force", 0, 0};
     return result;
   }
   // Each pair's share of an absolute tolerance; the rule's finer half is far better than the difference it is held to.
@@ -312,7 +312,7 @@ Estimate estimate_amplitude(const Structure& structure, const Interface& interfa
   };
   find_balance(result, rate, first_event);
   result.mean_energy = energy * result.amplitude * result.amplitude;
-  const double q = result.outcome.word == "balance" ? result.amplitude : result.lift_off_amplitude;
+  const double q = result.outcome.kind == OutcomeKind::balance ? result.amplitude : result.lift_off_amplitude;
   if (q < infinity) result.phase = best_phase(pairs, q);
   return result;
 }
@@ -321,7 +321,7 @@ double start_amplitude(const Estimate& estimate)
 {
   double multiple = 2;
   check(PetscOptionsGetReal(nullptr, "estimate_", "-lift_off_multiple", &multiple, nullptr));
-  return estimate.outcome.word == "balance" ? estimate.amplitude : multiple * estimate.lift_off_amplitude;
+  return estimate.outcome.kind == OutcomeKind::balance ? estimate.amplitude : multiple * estimate.lift_off_amplitude;
 }
 
 std::vector<State> estimated_motions(const Structure& structure, const Interface& interface,

@@ -104,18 +104,18 @@ long plan(Trajectory& trajectory, const Structure& structure, const ComplexMode*
   trajectory.predicted = mode ? discrete_eigenvalue(mode->lambda, settings.theta, settings.step_size)
                               : std::complex<double>(std::numeric_limits<double>::quiet_NaN(), 0);
   trajectory.outcome.reason = step_refusal(structure, mode, settings.theta, trajectory.step_size);
-  if (!trajectory.outcome.reason.empty()) trajectory.outcome.word = "refused";
+  if (!trajectory.outcome.reason.empty()) trajectory.outcome.kind = OutcomeKind::refused;
   return settings.steps;
 }
 
 void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
 {
   Outcome& outcome = trajectory.outcome;
-  outcome.word = "completed";
+  outcome.kind = OutcomeKind::completed;
   if (trajectory.theta < 0.5) outcome.reason = "theta below 1/2 adds (1/2 - theta) h omega^2 to every growth rate";
   if (summary.unconverged > 0)
   {
-    outcome.word = "not converged";
+    outcome.kind = OutcomeKind::not_converged;
     outcome.reason =
         format("contact did not converge in %ld of %ld steps, first at t = %.4g s (largest residual %.4g): "
                "raise -transient_contact_max_it or shorten the step",
@@ -123,7 +123,7 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
   }
   if (summary.steps < asked)
   {
-    outcome.word = "not converged";
+    outcome.kind = OutcomeKind::not_converged;
     outcome.reason = format("the energy is no longer finite at t = %.4g s", trajectory.end.time);
   }
   outcome.residual = summary.contact_residual_max;
@@ -182,7 +182,7 @@ Trajectory integrate(const Structure& structure, const Interface& interface, con
   Trajectory trajectory;
   const long steps = plan(trajectory, structure, mode, settings);
   trajectory.end = std::move(start);
-  if (trajectory.outcome.word == "refused") return trajectory;
+  if (trajectory.outcome.kind == OutcomeKind::refused) return trajectory;
 
   const ThetaStep step = make_theta_step(structure, interface, trajectory.step_size, settings.theta);
   const std::vector<double> drive = drive_directions(interface);

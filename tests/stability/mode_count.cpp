@@ -1,7 +1,7 @@
 // Where eigenvalues crowd, a pair moves like the square root of a change.
 #include "../support/flutter_chain.hpp"
-#include "squeal/modes/projection.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/modes/projection.hpp"
 #include "squeal/modes/slices.hpp"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ TEST_CASE("slices miss none of a hundred crowded pairs, and the frictionless str
   const int cells = 50;
   const QuadraticProblem frictionless = flutter_chain(cells, 0);
   const RealModes real = solve_real_modes_below(frictionless.M, frictionless.K, band, 0);
-  REQUIRE(real.outcome.word == "converged");
+  REQUIRE(real.outcome.kind == OutcomeKind::converged);
   REQUIRE(real.omega.size() == 100);
   for (const auto& [mu, flutter] : {std::pair{.38, 44}, std::pair{.36, 17}, std::pair{0., 0}})
   {
@@ -97,7 +97,7 @@ TEST_CASE("real modes of ten equal bodies are all found, though every frequency 
   const QuadraticProblem problem =
       problem_of(diagonal(std::vector<double>(K.size(), 1.)), zeros(K.size(), K.size()), K);
   const RealModes modes = solve_real_modes(problem.M, problem.K, 35, 0);
-  REQUIRE(modes.outcome.word == "converged");
+  REQUIRE(modes.outcome.kind == OutcomeKind::converged);
   REQUIRE(modes.omega.size() == 35);
   for (std::size_t k = 0; k < 35; ++k) // omega_j = 2 sin(j pi / 2 (masses + 1))
     CHECK(
@@ -157,6 +157,6 @@ TEST_CASE("a shift that is an eigenvalue moves just below it, and the counts are
   CHECK(pencil.factor->negative_pivots() == 2);
   const double edge = std::sqrt(3.) / (2 * M_PI), omega = 2 * M_PI * edge; // rounding decides if 3 lies below
   const RealModes modes = solve_real_modes_below(problem.M, problem.K, edge, 0);
-  CHECK(modes.outcome.word == "converged");
+  CHECK(modes.outcome.kind == OutcomeKind::converged);
   CHECK(modes.omega.size() == (3 < omega * omega ? 3u : 2u));
 }

@@ -11,9 +11,9 @@ namespace squeal::test
 inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance)
 {
   const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface);
-  REQUIRE(equilibrium.outcome.word == "converged");
+  REQUIRE(equilibrium.outcome.kind == OutcomeKind::converged);
   ModesSettings modes_settings;
-  modes_settings.method = "full";
+  modes_settings.method = ModesMethod::full;
   const Modes modes = find_modes(model.structure, model.interface, equilibrium, modes_settings);
   REQUIRE(!modes.modes.empty());
   const ComplexMode& mode = modes.modes.front();

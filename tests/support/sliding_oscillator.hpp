@@ -12,7 +12,7 @@ inline Equilibrium sliding_equilibrium(const SmallModel& oscillator)
   const double mu = oscillator.interface.friction;
   const double y = -1 / (1.7 - .1 * (.1 - 1.2 * mu) / 1.1), x = (.1 - 1.2 * mu) * y / 1.1, r = -1.2 * y;
   Equilibrium equilibrium;
-  equilibrium.outcome.word = "converged";
+  equilibrium.outcome.kind = OutcomeKind::converged;
   equilibrium.u = vector_like(oscillator.structure.K, {x, y, y});
   equilibrium.reactions = {r, mu * r};
   equilibrium.closed = {1};

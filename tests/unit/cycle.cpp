@@ -173,7 +173,7 @@ TEST_CASE("reduced shooting spans a one-degree system and finds the van der Pol 
   const SmoothModel model = make_model(van_der_pol, {1});
   const Option finish("-cycle_finish", "none");
   const LimitCycle cycle = shoot_from(model, {1.5}, 6.3, 0);
-  CHECK(cycle.outcome.word == "converged");
+  CHECK(cycle.outcome.kind == OutcomeKind::converged);
   CHECK(cycle.period == doctest::Approx(vdp_period).epsilon(1e-8));
   // 400 samples of a parabola at its top miss at most (pi/400)^2 of it
   CHECK(largest_amplitude(model, cycle) == doctest::Approx(vdp_amplitude).epsilon(1e-4));
@@ -203,7 +203,7 @@ TEST_CASE("the full-space finishes agree with each other and with the reference"
     CAPTURE(method);
     const Option finish("-cycle_finish", method);
     const LimitCycle cycle = shoot_from(model, {1.5}, 6.3, 2);
-    CHECK(cycle.outcome.word == "converged");
+    CHECK(cycle.outcome.kind == OutcomeKind::converged);
     CHECK(cycle.residual_full < 1e-9);
     CHECK(cycle.period == doctest::Approx(vdp_period).epsilon(1e-8));
     CHECK(cycle.records.back().stage == (method == std::string("multisecant") ? "multisecant" : "newton-krylov"));
@@ -214,11 +214,11 @@ TEST_CASE("of two coexisting cycles the start decides")
 {
   const SmoothModel model = make_model(coupled, {1, 2});
   const LimitCycle first = shoot_from(model, {1.8, 0.2}, 6.3, 10);
-  CHECK(first.outcome.word == "converged");
+  CHECK(first.outcome.kind == OutcomeKind::converged);
   CHECK(first.period == doctest::Approx(6.287111272289).epsilon(1e-8));
   CHECK(first.stability == "stable");
   const LimitCycle second = shoot_from(model, {0.2, 1.8}, 4.44, 10);
-  CHECK(second.outcome.word == "converged");
+  CHECK(second.outcome.kind == OutcomeKind::converged);
   CHECK(second.period == doctest::Approx(4.444271158025).epsilon(1e-8));
 }
 
@@ -229,7 +229,7 @@ TEST_CASE("a decaying oscillation has no cycle: collapsed, not converged")
   };
   const SmoothModel model = make_model(damped, {1});
   const LimitCycle cycle = shoot_from(model, {1}, 6.3, 2);
-  CHECK(cycle.outcome.word == "collapsed to equilibrium");
+  CHECK(cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium);
 }
 
 TEST_CASE("a cycle that repels is no result: van der Pol in reversed time has no other")
@@ -240,7 +240,7 @@ TEST_CASE("a cycle that repels is no result: van der Pol in reversed time has no
   const SmoothModel model = make_model(reversed, {1});
   const LimitCycle cycle = shoot_from(model, {vdp_amplitude}, vdp_period, 0);
   CHECK(cycle.residual_full < 1e-9);
-  CHECK(cycle.outcome.word == "unstable cycle");
+  CHECK(cycle.outcome.kind == OutcomeKind::unstable_cycle);
   CHECK(cycle.outcome.reason.find("repels") != std::string::npos);
   CHECK(cycle.stability == "unstable");
   REQUIRE(cycle.multipliers.size() == 1);
@@ -259,7 +259,7 @@ TEST_CASE("a cycle that repels is left for one that attracts")
   };
   const SmoothModel model = make_model(rate_of, {1});
   const LimitCycle cycle = shoot_from(model, {1}, 6.28, 0);
-  CHECK(cycle.outcome.word == "converged");
+  CHECK(cycle.outcome.kind == OutcomeKind::converged);
   CHECK(cycle.stability == "stable");
   CHECK(largest_amplitude(model, cycle) == doctest::Approx(2).epsilon(0.01)); // first order in d
   // the one that repels was met first

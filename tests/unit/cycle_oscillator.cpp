@@ -16,7 +16,7 @@ TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
   SmallModel twice = unilateral_oscillator(.3, 2);
   check(VecScale(twice.structure.load, 2));
   const LimitCycle a = cycle_of(once, 100, 5, 1e-11);
-  REQUIRE(a.outcome.word == "converged");
+  REQUIRE(a.outcome.kind == OutcomeKind::converged);
   // The doubled state must return after the same period. A cycle found anew would do for its period only: a discrete
   // orbit depends a little on where between the events its steps fall.
   const Owned<Vec> start = state_of(a.start.u, a.start.v), end = zeros_like(start);
@@ -28,7 +28,7 @@ TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
   check(VecAXPY(end, -1, start));
   CHECK(energy_norm(flow, end) < 1e-10 * energy_norm(flow, start));
   const LimitCycle b = cycle_of(twice, 100, 5, 1e-11);
-  REQUIRE(b.outcome.word == "converged");
+  REQUIRE(b.outcome.kind == OutcomeKind::converged);
   CHECK(b.period == about(a.period, 1e-6));
   CHECK(b.mean_energy == about(4 * a.mean_energy, 1e-6));
 }
@@ -37,5 +37,5 @@ TEST_CASE("without instability the oscillator falls back to rest: collapsed, not
 {
   // mu_c = .1765: at .1 every motion decays
   const LimitCycle cycle = cycle_of(unilateral_oscillator(.1, 1), 100, 5, 1e-8);
-  CHECK(cycle.outcome.word == "collapsed to equilibrium");
+  CHECK(cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium);
 }

@@ -47,7 +47,7 @@ TEST_CASE("the energy balance of the unilateral oscillator has its exact roots")
   for (const auto& [V, exact, published] : cases)
   {
     const Found found = estimate_of(.3, V);
-    CHECK(found.estimate.outcome.word == "balance");
+    CHECK(found.estimate.outcome.kind == OutcomeKind::balance);
     CHECK(found.estimate.amplitude * found.per_y == doctest::Approx(exact).epsilon(1e-10));
     CHECK(found.estimate.amplitude * found.per_y == doctest::Approx(published).epsilon(2e-5));
     CHECK(found.estimate.outcome.residual < 1e-11);
@@ -59,7 +59,7 @@ TEST_CASE("lift-off alone balances weak friction and not strong friction")
 {
   const Found weak = estimate_of(.18, 1e9), strong = estimate_of(.3, 1e9);
   CHECK(weak.estimate.amplitude * weak.per_y == doctest::Approx(1.574918604).epsilon(2e-9));
-  CHECK(strong.estimate.outcome.word == "no balance");
+  CHECK(strong.estimate.outcome.kind == OutcomeKind::no_balance);
   CHECK(strong.estimate.amplitude == 0);
 }
 

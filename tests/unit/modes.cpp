@@ -52,7 +52,7 @@ SmallModel crowded_model(int dofs, int pairs)
 Equilibrium all_closed(const SmallModel& model)
 {
   Equilibrium equilibrium;
-  equilibrium.outcome.word = "converged";
+  equilibrium.outcome.kind = OutcomeKind::converged;
   equilibrium.u = zeros_like(model.structure.load);
   for (int i = 0; i < model.interface.pairs; ++i)
     equilibrium.reactions.insert(equilibrium.reactions.end(), {2, .36, .48});
@@ -60,7 +60,7 @@ Equilibrium all_closed(const SmallModel& model)
   return equilibrium;
 }
 
-ModesSettings settings_of(const char* method)
+ModesSettings settings_of(ModesMethod method)
 {
   ModesSettings settings;
   settings.method = method;
@@ -95,7 +95,7 @@ TEST_CASE("the equations of the structure hold with the reactions of each mode, 
 {
   const SmallModel model = crowded_model(12, 3);
   const Equilibrium equilibrium = all_closed(model);
-  const Modes modes = find_modes(model.structure, model.interface, equilibrium, settings_of("full"));
+  const Modes modes = find_modes(model.structure, model.interface, equilibrium, settings_of(ModesMethod::full));
   Owned<Mat> C;
   check(MatDuplicate(model.structure.C, MAT_COPY_VALUES, C.put()));
   check(MatAXPY(C, 1, direction_damping(model.interface, equilibrium), UNKNOWN_NONZERO_PATTERN));
@@ -150,7 +150,7 @@ TEST_CASE("a pair that the others already hold is an error that names it")
 TEST_CASE("projection on all real modes is the full problem")
 {
   const SmallModel model = crowded_model(30, 3);
-  const Modes modes = find_modes(model.structure, model.interface, all_closed(model), settings_of("both"));
+  const Modes modes = find_modes(model.structure, model.interface, all_closed(model), settings_of(ModesMethod::both));
   REQUIRE(modes.modes.size() == 27);
   REQUIRE(modes.projected.size() == 27);
   for (std::size_t i = 0; i < modes.modes.size(); ++i)
@@ -164,7 +164,7 @@ TEST_CASE("projection on all real modes is the full problem")
 TEST_CASE("residual passes bring the growth rate of a truncated basis to that of the full problem")
 {
   const SmallModel model = crowded_model(60, 3);
-  ModesSettings settings = settings_of("both");
+  ModesSettings settings = settings_of(ModesMethod::both);
   settings.band = 2; // lower part of the spectrum
   settings.real_modes = 20;
   double before = INFINITY;
@@ -191,7 +191,7 @@ TEST_CASE("Krylov and LAPACK find the same real modes, M-normalised and closed")
   check(PetscOptionsSetValue(nullptr, "-modes_dense_limit", "0"));
   const RealModes krylov = below((all.omega[9] + 1e-6) / (2 * M_PI));
   check(PetscOptionsClearValue(nullptr, "-modes_dense_limit"));
-  CHECK(krylov.outcome.word == "converged");
+  CHECK(krylov.outcome.kind == OutcomeKind::converged);
   REQUIRE(krylov.omega.size() == 10);
   for (std::size_t k = 0; k < 10; ++k)
   {
@@ -207,7 +207,7 @@ TEST_CASE("a free body moves at no cost: its real mode is 0, and no complex mode
 {
   const SmallModel bar = mass_spring_chain(30, 1, 100, 1, 0);
   Equilibrium apart;
-  apart.outcome.word = "converged";
+  apart.outcome.kind = OutcomeKind::converged;
   apart.u = zeros_like(bar.structure.load);
   apart.reactions = {0, 0};
   apart.closed = {0};
@@ -216,7 +216,7 @@ TEST_CASE("a free body moves at no cost: its real mode is 0, and no complex mode
     check(PetscOptionsSetValue(nullptr, "-modes_dense_limit", limit));
     // 20 sin(4 pi/58) = 4.3, 20 sin(5 pi/58) = 5.4
     const RealModes real = find_real_modes_below(bar.structure, bar.interface, apart, 5 / (2 * M_PI));
-    ModesSettings settings = settings_of("both");
+    ModesSettings settings = settings_of(ModesMethod::both);
     settings.band = 3;
     settings.real_modes = 10;
     const Modes modes = find_modes(bar.structure, bar.interface, apart, settings);

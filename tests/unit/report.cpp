@@ -128,23 +128,23 @@ Report full_report(const Model& model)
   report.dofs = model.dofs.size;
   report.pairs = 2;
   report.elements = static_cast<long>(model.mesh.elements.size());
-  report.equilibrium.outcome = {"converged", "", 3, 1e-12};
+  report.equilibrium.outcome = {OutcomeKind::converged, "", 3, 1e-12};
   report.equilibrium.u = ramp(model, 1);
   report.equilibrium.reactions = {3, 0.6, 0, 0, 0, 0, 7, 1.4, 0};
   report.equilibrium.closed = {1, 0, 1};
-  report.modes.outcome = {"converged", "", 1, 1e-13};
-  report.modes.method = "full";
+  report.modes.outcome = {OutcomeKind::converged, "", 1, 1e-13};
+  report.modes.method = ModesMethod::full;
   ComplexMode mode;
   mode.lambda = {5, 2 * std::acos(-1.) * 100};
   mode.real = ramp(model, 2);
   mode.imaginary = ramp(model, 3);
   report.modes.modes.push_back(std::move(mode));
   report.modes.unstable_count = 1;
-  report.estimate.outcome = {"no balance", "the curve has no root", 0, 0};
-  report.transient.outcome = {"completed", "", 10, 1e-11};
+  report.estimate.outcome = {OutcomeKind::no_balance, "the curve has no root", 0, 0};
+  report.transient.outcome = {OutcomeKind::completed, "", 10, 1e-11};
   report.transient.growth_rate_fit = std::numeric_limits<double>::quiet_NaN();
   report.transient.history = history_of(11);
-  report.cycle.outcome = {"converged", "", 4, 1e-6};
+  report.cycle.outcome = {OutcomeKind::converged, "", 4, 1e-6};
   report.cycle.period = 0.01;
   report.cycle.steps_per_period = 5;
   report.cycle.history = history_of(5);
@@ -274,7 +274,7 @@ TEST_CASE("report.json has the documented keys; what is not a number is null; a 
   for (const auto& [stage, keys] : documented)
     for (const auto& key : keys) CHECK_MESSAGE(json[stage].contains(key), stage, ".", key);
 
-  report.cycle.outcome = {"skipped", "no mode is unstable", 0, 0};
+  report.cycle.outcome = {OutcomeKind::skipped, "no mode is unstable", 0, 0};
   const Json skipped = Json::parse(report_json(report, scene_of_test()));
   CHECK(skipped["cycle"] == Json{{"outcome", "skipped"}, {"reason", "no mode is unstable"}});
 }
@@ -284,7 +284,7 @@ TEST_CASE("the table never shows figures of a cycle that did not converge")
   const Model model = one_of_each();
   Report report = full_report(model);
   CHECK(summary(report, scene_of_test()).find("mean energy") != std::string::npos);
-  report.cycle.outcome = {"not converged", "the residual stalled", 9, 0.1};
+  report.cycle.outcome = {OutcomeKind::not_converged, "the residual stalled", 9, 0.1};
   const std::string text = summary(report, scene_of_test());
   CHECK(text.find("mean energy") == std::string::npos);
   CHECK(text.find("NOT CONVERGED: the residual stalled") != std::string::npos);

@@ -196,10 +196,11 @@ TEST_CASE("every key reaches its member, in SI units, with unit directions and a
   CHECK(s.friction.coefficient == 0.2);
   CHECK_FALSE(s.friction.direction_damping);
   CHECK(s.damping.beta == 1.1e-6);
-  CHECK(s.modes.method == "full");
+  CHECK(s.modes.method == ModesMethod::full);
   CHECK(s.modes.enabled);
   CHECK(s.transient.enabled);
-  CHECK(s.transient.start == (folder.path / "state.bin").string());
+  CHECK(s.transient.start.kind == StartKind::file);
+  CHECK(s.transient.start.file == folder.path / "state.bin");
   CHECK(s.transient.steps == 10);
   CHECK(s.cycle.enabled);
   CHECK(s.cycle.tolerance == 1e-8);
@@ -254,7 +255,7 @@ TEST_CASE("an override reaches any key: by table, by name in a list, by index, a
   CHECK(s.contacts[0].rotation->rate == -3);
   CHECK(s.mesh->parameters.at("size") == 32000);
   CHECK(s.mesh->parameters.at("pin height") == 0.04);
-  CHECK(s.transient.start == "mode");
+  CHECK(s.transient.start.kind == StartKind::mode);
   CHECK(s.title == "quoted");
 }
 

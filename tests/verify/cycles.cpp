@@ -41,7 +41,7 @@ TEST_CASE("exact limit cycles: stick, lift-off, touch, backward slip")
   {
     CAPTURE(row.belt);
     const LimitCycle cycle = cycle_of(unilateral_oscillator(row.friction, row.belt), 400, 0, 1e-8);
-    CHECK(cycle.outcome.word == "converged");
+    CHECK(cycle.outcome.kind == OutcomeKind::converged);
     CHECK(cycle.residual_full < 1e-8);
     // the theta step is of second order in the period: 400 steps a period leave 1e-5 to 1e-4, whatever the events
     CHECK(cycle.period == about(row.period, 1e-4));
@@ -59,7 +59,7 @@ TEST_CASE("the paper's base is rank-deficient here, and the reduced system is so
 {
   const Option finish("-cycle_finish", "none");
   const LimitCycle cycle = cycle_of(unilateral_oscillator(.3, 1), 400, 0, 1e-8);
-  CHECK(cycle.outcome.word == "converged"); // the contact space has two dimensions, and the base spans it
+  CHECK(cycle.outcome.kind == OutcomeKind::converged); // the contact space has two dimensions, and the base spans it
   CHECK(cycle.records.front().unknowns == 5);
   CHECK(cycle.period == about(5.984555109780, 1e-4));
 }

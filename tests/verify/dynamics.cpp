@@ -300,7 +300,7 @@ TEST_CASE("a mode grows in persistent sliding at its discrete rate, fitted over 
   settings.steps_per_period = 50;
   const Trajectory run = integrate(model.structure, model.interface, sliding.equilibrium, &sliding.mode, settings,
                                    mode_start(sliding, .05), nullptr);
-  CHECK(run.outcome.word == "completed");
+  CHECK(run.outcome.kind == OutcomeKind::completed);
   CHECK(run.steps == 260);
   CHECK(run.history.open.back() + run.history.stick.back() == 0);
   CHECK(run.growth_rate_fit == about(run.predicted.real(), 1e-6));
@@ -322,7 +322,7 @@ TEST_CASE("theta = .51 with 50 steps a period hides a weak instability, as predi
   settings.theta = .51;
   const Trajectory run = integrate(model.structure, model.interface, sliding.equilibrium, &sliding.mode, settings,
                                    mode_start(sliding, .05), nullptr);
-  CHECK(run.outcome.word == "refused");
+  CHECK(run.outcome.kind == OutcomeKind::refused);
   CHECK(run.outcome.reason.find("2 pi (theta - 1/2) omega/sigma") != std::string::npos);
   CHECK(run.steps == 0);
 
@@ -388,7 +388,7 @@ TEST_CASE("contact that does not converge is an outcome, not a crash")
   settings.step_size = .05;
   const Trajectory run = integrate(model.structure, model.interface, sliding.equilibrium, nullptr, settings,
                                    mode_start(sliding, .05), nullptr);
-  CHECK(run.outcome.word == "not converged");
+  CHECK(run.outcome.kind == OutcomeKind::not_converged);
   CHECK(run.outcome.reason.find("first at t = ") != std::string::npos);
   CHECK(run.steps == 20);
   CHECK(std::isnan(run.growth_rate_fit));

@@ -21,9 +21,9 @@ namespace squeal
 /// What was used, what was left out, and how that is known. Errors are relative; energy: the mean fluctuating one.
 struct Fidelity
 {
-  std::string asked = "full", used = "full"; // full, reduced; asked: auto as well
-  std::string reason;                        // in a sentence
-  double accuracy = 0;                       // the wish
+  CycleModel asked = CycleModel::full, used = CycleModel::full; // used: full or reduced
+  std::string reason;                                           // in a sentence
+  double accuracy = 0;                                          // the wish
   int size = 0, modes = 0, attachment_shapes = 0;
   int active_pairs = 0, sliding_pairs = 0; // sliding: eliminated; the rest stays open
   int steps_per_period = 0;
@@ -43,6 +43,6 @@ struct FittedCycle
 /// Options, prefix -reduced_: margin, modes, threshold, free_periods, corrections.
 FittedCycle find_fitted_cycle(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
                               const Modes& modes, const Estimate& estimate, const CycleSettings& settings,
-                              const std::string& fidelity, double accuracy, Mat probes);
+                              CycleModel fidelity, double accuracy, Mat probes);
 
 } // namespace squeal

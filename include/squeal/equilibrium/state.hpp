@@ -1,20 +1,12 @@
 #pragma once
-/// State of the structure, and the outcome that every result carries.
+/// State of the structure: displacements, velocities and the reactions that they came with.
+#include "squeal/base/outcome.hpp"
 #include "squeal/contact/interface.hpp"
 
 #include <filesystem>
 
 namespace squeal
 {
-
-/// "converged", or why not; `words` of each stage are listed in its header and in the README.
-struct Outcome
-{
-  std::string word;   // "converged", "not converged", …
-  std::string reason; // one sentence when the word is not enough
-  int iterations = 0;
-  double residual = 0; // what it measures is said by each result
-};
 
 struct State
 {

@@ -47,7 +47,7 @@ struct ModeCount
 struct Modes
 {
   Outcome outcome;
-  std::string method;                 // "full", "projection", "both"
+  ModesMethod method = ModesMethod::both;
   double band = 0;                    // [Hz] covered: every mode below is here
   std::vector<ComplexMode> modes;     // Im(lambda) >= 0, largest growth first
   std::vector<ComplexMode> projected; // the other route's, when both ran

@@ -22,7 +22,7 @@ struct Correction
   double share = 0;             // of the residuals' largest direction: what is smaller waits for a later pass
 };
 
-/// `basis` spans the first V. Backward errors are those of `problem` itself; outcome.word is the
+/// `basis` spans the first V. Backward errors are those of `problem` itself; outcome.kind is the
 /// caller's.
 QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Block basis, const PencilFactor& P,
                                     const Correction& correction);

@@ -53,7 +53,4 @@ struct Verdicts
 
 Verdicts verdicts_of(const Report& report);
 
-/// A stage that was off or skipped has nothing but its reason.
-bool ran(const Outcome& outcome);
-
 } // namespace squeal

@@ -15,9 +15,10 @@ struct DampingTarget
   double RayleighDamping::*member;
 };
 
-using Target = std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*,
-                            std::optional<Vec3>*, std::vector<Vec3>*, std::vector<std::string>*, std::array<double, 6>*,
-                            Motions*, std::map<std::string, double>*, std::optional<Rotation>*, DampingTarget>;
+using Target =
+    std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*, std::optional<Vec3>*,
+                 std::vector<Vec3>*, std::vector<std::string>*, std::array<double, 6>*, Motions*,
+                 std::map<std::string, double>*, std::optional<Rotation>*, DampingTarget, Start*, Choice>;
 
 enum class Need
 {
@@ -31,13 +32,11 @@ enum class Rule
   any,
   positive,
   not_negative,
-  poisson,      // in (-1, 0.5)
-  fraction,     // in [0, 1]
-  direction,    // a vector, made a unit one; "x", "-y", … for short
-  word,         // one of the field's words
-  word_or_file, // one of the field's words, or an existing file
-  file,         // an existing file
-  folder,       // an existing folder
+  poisson,   // in (-1, 0.5)
+  fraction,  // in [0, 1]
+  direction, // a vector, made a unit one; "x", "-y", … for short
+  file,      // an existing file
+  folder,    // an existing folder
 };
 
 struct Field
@@ -48,7 +47,6 @@ struct Field
   Rule rule;
   std::string unit;
   std::string meaning;
-  std::vector<std::string> words; // of Rule::word and Rule::word_or_file
 };
 
 using Fields = std::vector<Field>;

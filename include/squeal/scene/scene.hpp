@@ -1,6 +1,8 @@
 #pragma once
 /// A scene: everything physical that a run needs, as plain data in SI units. No PETSc, no MPI.
 /// Algorithms are not here: they are PETSc options, one prefix per stage.
+#include "squeal/base/words.hpp"
+
 #include <array>
 #include <filesystem>
 #include <map>
@@ -120,14 +122,65 @@ struct MeshSource
   double scale = 1;                         // [m] per length unit of the file
 };
 
+/// By which route the complex modes are found.
+enum class ModesMethod
+{
+  projection, // on real modes (the paper's)
+  full,       // the full sparse quadratic problem
+  both,       // the full problem, and the projection beside it
+};
+
+inline constexpr std::array modes_method_words = {"projection", "full", "both"};
+
+inline Words words_of(ModesMethod)
+{
+  return modes_method_words;
+}
+
+/// The model that the limit cycle is computed on.
+enum class CycleModel
+{
+  full,
+  reduced,
+  automatic, // reduced as far as the accuracy asked for allows
+};
+
+inline constexpr std::array cycle_model_words = {"full", "reduced", "auto"};
+
+inline Words words_of(CycleModel)
+{
+  return cycle_model_words;
+}
+
+/// What a motion starts from.
+enum class StartKind
+{
+  mode,     // the unstable mode at a given amplitude
+  estimate, // the unstable modes at their estimated amplitudes
+  file,     // a state file
+};
+
+inline constexpr std::array start_kind_words = {"mode", "estimate", "file"};
+
+inline Words words_of(StartKind)
+{
+  return start_kind_words;
+}
+
+struct Start
+{
+  StartKind kind = StartKind::estimate;
+  std::filesystem::path file; // of kind file; absolute
+};
+
 /// What one stage needs to know. A stage runs when enabled, or when a later enabled stage needs it.
 struct ModesSettings
 {
   bool enabled = true;
-  std::string method = "both"; // "projection" (paper), "full" (sparse quadratic problem), "both" (full judges)
-  int real_modes = 0;          // of the projection; 0: those below the band
-  int residual_passes = 3;     // of the projection
-  double band = 20000;         // [Hz] report every mode below
+  ModesMethod method = ModesMethod::both;
+  int real_modes = 0;      // of the projection; 0: those below the band
+  int residual_passes = 3; // of the projection
+  double band = 20000;     // [Hz] report every mode below
 };
 
 struct EstimateSettings
@@ -138,9 +191,9 @@ struct EstimateSettings
 struct TransientSettings
 {
   bool enabled = false;
-  std::string start = "estimate"; // "mode", "estimate" or a state file (PETSc binary: Vec u, then Vec v)
-  double amplitude = 0;           // largest displacement of the mode at "mode" [m]; 0: a tenth of first lift-off
-  double periods = 20;            // of the followed mode, with steps_per_period; or:
+  Start start;
+  double amplitude = 0; // largest displacement of the mode at "mode" [m]; 0: a tenth of first lift-off
+  double periods = 20;  // of the followed mode, with steps_per_period; or:
   double steps_per_period = 100;
   long steps = 0;       // with step_size, when > 0 overrides periods
   double step_size = 0; // [s]
@@ -170,9 +223,9 @@ struct Probe
 struct Scene
 {
   std::string title;
-  std::string fidelity = "full"; // of the cycle: "full", "reduced" or "auto" model
-  double accuracy = 1e-3;        // [-] wished, of the cycle's frequency and energy
-  std::filesystem::path file;    // absolute
+  CycleModel fidelity = CycleModel::full;
+  double accuracy = 1e-3;     // [-] wished, of the cycle's frequency and energy
+  std::filesystem::path file; // absolute
   std::optional<MeshSource> mesh;
   std::optional<std::filesystem::path> matrices; // folder; absolute
   std::vector<Part> parts;
