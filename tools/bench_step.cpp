@@ -4,6 +4,7 @@
 /// Trajectory k starts from STATE with its velocity scaled by 1 + k/1000. `dump`: the first trajectory's u and v after
 /// every step, raw doubles. Seconds are the processor's, of this rank, waiting included. Contact options as in squeal
 /// (-transient_…).
+#include "bench_timing.hpp"
 #include "squeal/transient/transient.hpp"
 
 #include <algorithm>
@@ -15,25 +16,6 @@ using namespace squeal;
 
 namespace
 {
-
-double median(std::vector<double> values)
-{
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
-
-template <class Work> double seconds(int times, Work work)
-{
-  std::vector<double> all;
-  for (int i = 0; i < times; ++i)
-  {
-    const double start = processor_time();
-    work();
-    all.push_back(processor_time() - start);
-  }
-  return median(all);
-}
 
 /// b of the first step, by the displacement law; on rank 0.
 std::vector<double> first_problem(const ThetaStep& step, const Structure& structure, const Interface& interface,

@@ -1,0 +1,33 @@
+#pragma once
+/// Processor time of repeated work, for the programs of tools/bench.
+#include "squeal/base/petsc.hpp"
+
+#include <algorithm>
+
+namespace squeal
+{
+
+inline double median(std::vector<double> values)
+{
+  if (values.empty()) return 0;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+/// Processor seconds of one call [s].
+template <class Work> double seconds_of(Work work)
+{
+  const double start = processor_time();
+  work();
+  return processor_time() - start;
+}
+
+/// Median processor seconds of `times` calls [s].
+template <class Work> double seconds(int times, Work work)
+{
+  std::vector<double> all;
+  for (int i = 0; i < times; ++i) all.push_back(seconds_of(work));
+  return median(all);
+}
+
+} // namespace squeal
