@@ -1,7 +1,9 @@
-/// From a mesh file's blocks to the scene's parts, surfaces and groups.
+/// Extraction of the scene's parts, surfaces and groups from the element blocks of a mesh file.
 ///
-/// A solid is outside-out when the volume its faces enclose, by the divergence theorem, is positive.
-/// Faces are turned so that they are counter-clockwise seen from outside the solid that has the same corners.
+/// Orientation: the volume enclosed by the corner faces of a solid follows from the divergence theorem,
+///     V = 1/6 sum (a - c) . ((b - a) x (d - a))   over triangles a b d, c the centre.
+/// A negative V means that the element is numbered inside out; it is then mirrored. A surface face is mirrored where
+/// needed so that it is counter-clockwise seen from outside the solid that has the same corners.
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/shapes.hpp"
@@ -17,46 +19,7 @@ namespace squeal
 namespace
 {
 
-std::optional<Shape> element_shape(int gmsh_type)
-{
-  switch (gmsh_type)
-  {
-  case 2:
-    return Shape::shell3;
-  case 3:
-    return Shape::shell4;
-  case 5:
-    return Shape::hex8;
-  case 6:
-    return Shape::wedge6;
-  case 11:
-    return Shape::tet10;
-  case 17:
-    return Shape::hex20;
-  default:
-    return {};
-  }
-}
-
-std::optional<FaceShape> face_shape(int gmsh_type)
-{
-  switch (gmsh_type)
-  {
-  case 2:
-    return FaceShape::triangle3;
-  case 3:
-    return FaceShape::quad4;
-  case 9:
-    return FaceShape::triangle6;
-  case 10:
-    return FaceShape::quad9;
-  case 16:
-    return FaceShape::quad8;
-  default:
-    return {};
-  }
-}
-
+/// What to do about elements of a type that squeal has no kernel for.
 std::string remedy(int gmsh_type)
 {
   switch (gmsh_type)
@@ -74,8 +37,8 @@ std::string remedy(int gmsh_type)
   }
 }
 
-// Six times the volume inside the element's corner faces: negative when the numbering turns the solid inside out.
-double enclosed(const Element& element, const std::vector<Vec3>& nodes)
+/// Six times the volume that the element's corner faces enclose [m3]; negative if it is numbered inside out.
+double six_volumes(const Element& element, const std::vector<Vec3>& nodes)
 {
   double sum = 0;
   const int corners = corner_count(element.shape);
@@ -86,12 +49,13 @@ double enclosed(const Element& element, const std::vector<Vec3>& nodes)
     {
       const Vec3& a = nodes[element.nodes[face[0]]];
       const Vec3& b = nodes[element.nodes[face[i]]];
-      const Vec3& c = nodes[element.nodes[face[i + 1]]];
-      sum += dot(a - centre, cross(b - a, c - a));
+      const Vec3& d = nodes[element.nodes[face[i + 1]]];
+      sum += dot(a - centre, cross(b - a, d - a));
     }
   return sum;
 }
 
+/// Reverses the orientation of an element or a face.
 template <class Cell> void mirror(Cell& cell)
 {
   const auto before = cell.nodes;
@@ -99,8 +63,8 @@ template <class Cell> void mirror(Cell& cell)
   for (std::size_t i = 0; i < order.size(); ++i) cell.nodes[i] = before[order[i]];
 }
 
-// Which part claims a block; -1: none.
-int part_of(const FileBlock& block, const Scene& scene)
+/// Index of the part whose name is one of the block's groups; -1 if there is none.
+int part_of(const ElementBlock& block, const Scene& scene)
 {
   int found = -1;
   for (std::size_t p = 0; p < scene.parts.size(); ++p)
@@ -110,32 +74,33 @@ int part_of(const FileBlock& block, const Scene& scene)
     if (dimension != block.dimension) continue;
     if (std::find(block.groups.begin(), block.groups.end(), part.name) == block.groups.end()) continue;
     if (found >= 0)
-      throw Error("parts '" + scene.parts[found].name + "' and '" + part.name + "' claim the same elements");
+      throw Error("parts '" + scene.parts[found].name + "' and '" + part.name + "' have the same elements");
     found = static_cast<int>(p);
   }
   return found;
 }
 
-void add_elements(const FileBlock& block, int part, const Scene& scene, Mesh& mesh)
+void add_elements(const ElementBlock& block, int part, const Scene& scene, Mesh& mesh)
 {
   const std::optional<Shape> shape = element_shape(block.type);
   if (!shape)
     throw Error("part '" + scene.parts[part].name + "' has elements '" + block.type_name +
-                "', which are not on offer: " + remedy(block.type));
+                "', for which there is no kernel: " + remedy(block.type));
   const int n = block.nodes_per_element;
   for (std::size_t first = 0; first < block.nodes.size(); first += n)
   {
     Element element{*shape, part, {}};
     std::copy_n(block.nodes.begin() + first, n, element.nodes.begin());
-    if (!is_shell(*shape) && enclosed(element, mesh.nodes) < 0) mirror(element);
+    if (!is_shell(*shape) && six_volumes(element, mesh.nodes) < 0) mirror(element);
     mesh.elements.push_back(element);
   }
 }
 
+/// Throws Error if a part has no elements.
 void check_parts(const FileMesh& file, const Mesh& mesh, const Scene& scene)
 {
-  std::array<std::set<std::string>, 4> names;
-  for (const FileBlock& block : file.blocks) names[block.dimension].insert(block.groups.begin(), block.groups.end());
+  std::array<std::set<std::string>, 4> names; // of the groups of each dimension
+  for (const ElementBlock& block : file.blocks) names[block.dimension].insert(block.groups.begin(), block.groups.end());
   std::vector<char> has_elements(scene.parts.size());
   for (const Element& element : mesh.elements) has_elements[element.part] = 1;
   for (std::size_t p = 0; p < scene.parts.size(); ++p)
@@ -154,9 +119,9 @@ void check_parts(const FileMesh& file, const Mesh& mesh, const Scene& scene)
 
 void read_elements(const FileMesh& file, const Scene& scene, Mesh& mesh)
 {
-  std::map<std::string, std::size_t> unclaimed;
-  std::size_t lost = 0;
-  for (const FileBlock& block : file.blocks)
+  std::map<std::string, std::size_t> without_part; // number of solid elements by group
+  std::size_t total = 0;
+  for (const ElementBlock& block : file.blocks)
   {
     const int part = part_of(block, scene);
     if (part >= 0)
@@ -164,29 +129,30 @@ void read_elements(const FileMesh& file, const Scene& scene, Mesh& mesh)
     else if (block.dimension == 3)
     {
       const std::size_t count = block.nodes.size() / block.nodes_per_element;
-      lost += count;
-      unclaimed[block.groups.empty() ? "" : block.groups.front()] += count;
+      total += count;
+      without_part[block.groups.empty() ? "" : block.groups.front()] += count;
     }
   }
   check_parts(file, mesh, scene);
-  if (!lost) return;
+  if (total == 0) return;
   std::string where;
-  for (const auto& [group, count] : unclaimed)
+  for (const auto& [group, count] : without_part)
     where += (where.empty() ? "" : ", ") + std::to_string(count) + " in " +
              (group.empty() ? "no physical group" : "physical group '" + group + "'");
-  throw Error(std::to_string(lost) + " solid elements belong to no part (" + where +
+  throw Error(std::to_string(total) + " solid elements belong to no part (" + where +
               "): name their physical volume in a [[part]]");
 }
 
-// What a face bounds: the same corners, counter-clockwise from outside, and how many solids have them.
-struct Boundary
+/// A side of an element on which a surface face may lie.
+struct ElementSide
 {
-  std::vector<int> corners;
-  int solids = 0;
+  std::vector<int> corners; // counter-clockwise seen from outside the solid
+  int solids = 0;           // number of solid elements that have these corners
 };
 
-using Boundaries = std::map<std::array<int, 4>, Boundary>;
+using ElementSides = std::map<std::array<int, 4>, ElementSide>;
 
+/// The key of ElementSides: corners in ascending order, after a -1 for a triangle.
 std::array<int, 4> sorted_corners(const std::vector<int>& corners)
 {
   std::array<int, 4> key{-1, -1, -1, -1};
@@ -195,16 +161,16 @@ std::array<int, 4> sorted_corners(const std::vector<int>& corners)
   return key;
 }
 
-// Of the faces all of whose corners are marked: the others cannot be asked for, and there are many.
-Boundaries boundaries_of(const Mesh& mesh, const std::vector<char>& marked)
+/// Returns the sides of elements all of whose corners are marked. The others are many and never looked up.
+ElementSides marked_sides(const Mesh& mesh, const std::vector<char>& marked)
 {
-  Boundaries found;
+  ElementSides sides;
   const auto add = [&](const std::vector<int>& corners, int solids)
   {
     if (!std::all_of(corners.begin(), corners.end(), [&](int node) { return marked[node]; })) return;
-    Boundary& boundary = found[sorted_corners(corners)];
-    if (!boundary.solids) boundary.corners = corners;
-    boundary.solids += solids;
+    ElementSide& side = sides[sorted_corners(corners)];
+    if (!side.solids) side.corners = corners;
+    side.solids += solids;
   };
   for (const Element& element : mesh.elements)
   {
@@ -217,62 +183,65 @@ Boundaries boundaries_of(const Mesh& mesh, const std::vector<char>& marked)
       add(corners, 1);
     }
   }
-  return found;
+  return sides;
 }
 
-void turn_outward(Face& face, const Boundary& boundary)
+void orient_outward(Face& face, const ElementSide& side)
 {
-  const auto& corners = boundary.corners;
+  const auto& corners = side.corners;
   const auto first = std::find(corners.begin(), corners.end(), face.nodes[0]);
   const auto next = first + 1 == corners.end() ? corners.begin() : first + 1;
   if (*next != face.nodes[1]) mirror(face);
 }
 
-struct SurfaceUse
+/// Names of the surfaces that the scene uses; errors in the others do not matter.
+struct UsedSurfaces
 {
-  std::set<std::string> any, contact;
+  std::set<std::string> all;
+  std::set<std::string> in_contact;
 };
 
-SurfaceUse surfaces_used(const Scene& scene)
+UsedSurfaces used_surfaces(const Scene& scene)
 {
-  SurfaceUse use;
-  for (const Contact& contact : scene.contacts) use.contact.insert({contact.rotor, contact.stator});
-  use.any = use.contact;
-  for (const RigidBody& body : scene.rigid_bodies) use.any.insert(body.surfaces.begin(), body.surfaces.end());
-  for (const Pressure& pressure : scene.pressures) use.any.insert(pressure.on);
-  return use;
+  UsedSurfaces used;
+  for (const Contact& contact : scene.contacts) used.in_contact.insert({contact.rotor, contact.stator});
+  used.all = used.in_contact;
+  for (const RigidBody& body : scene.rigid_bodies) used.all.insert(body.surfaces.begin(), body.surfaces.end());
+  for (const Pressure& pressure : scene.pressures) used.all.insert(pressure.on);
+  return used;
 }
 
-void add_faces(const FileBlock& block, const std::string& name, const SurfaceUse& use, const Boundaries& boundaries,
+void add_faces(const ElementBlock& block, const std::string& name, const UsedSurfaces& used, const ElementSides& sides,
                Mesh& mesh)
 {
   const std::optional<FaceShape> shape = face_shape(block.type);
   if (!shape)
   {
-    if (!use.any.count(name)) return;
-    throw Error("surface '" + name + "' has faces '" + block.type_name + "', which are not on offer");
+    if (!used.all.count(name)) return;
+    throw Error("surface '" + name + "' has faces '" + block.type_name + "', which squeal cannot integrate over");
   }
   const int n = block.nodes_per_element, corners = corner_count(*shape);
-  std::size_t loose = 0, inside = 0;
+  std::size_t without_element = 0, between_solids = 0;
   std::vector<Face>& faces = mesh.surfaces[name];
   for (std::size_t first = 0; first < block.nodes.size(); first += n)
   {
     Face face{*shape, {}};
     std::copy_n(block.nodes.begin() + first, n, face.nodes.begin());
-    const auto found = boundaries.find(sorted_corners({face.nodes.begin(), face.nodes.begin() + corners}));
-    if (found == boundaries.end())
+    const auto side = sides.find(sorted_corners({face.nodes.begin(), face.nodes.begin() + corners}));
+    if (side == sides.end())
     {
-      ++loose;
+      ++without_element;
       continue;
     }
-    inside += found->second.solids > 1;
-    turn_outward(face, found->second);
+    between_solids += side->second.solids > 1;
+    orient_outward(face, side->second);
     faces.push_back(face);
   }
-  if (loose && use.any.count(name))
-    throw Error("surface '" + name + "': " + std::to_string(loose) + " faces are not on an element of any part");
-  if (inside && use.contact.count(name))
-    throw Error("contact surface '" + name + "': " + std::to_string(inside) +
+  if (without_element && used.all.count(name))
+    throw Error("surface '" + name + "': " + std::to_string(without_element) +
+                " faces are not on an element of any part");
+  if (between_solids && used.in_contact.count(name))
+    throw Error("contact surface '" + name + "': " + std::to_string(between_solids) +
                 " faces have a solid on both sides, so the bodies are joined there: give each body its own copy of the "
                 "surface and its nodes");
   if (faces.empty()) mesh.surfaces.erase(name);
@@ -280,23 +249,23 @@ void add_faces(const FileBlock& block, const std::string& name, const SurfaceUse
 
 void read_surfaces(const FileMesh& file, const Scene& scene, Mesh& mesh)
 {
-  std::vector<char> marked(file.nodes.size());
-  for (const FileBlock& block : file.blocks)
+  std::vector<char> marked(file.nodes.size()); // nodes of named surfaces
+  for (const ElementBlock& block : file.blocks)
     if (block.dimension == 2 && !block.groups.empty())
       for (const int node : block.nodes) marked[node] = 1;
-  const Boundaries boundaries = boundaries_of(mesh, marked);
-  const SurfaceUse use = surfaces_used(scene);
-  for (const FileBlock& block : file.blocks)
+  const ElementSides sides = marked_sides(mesh, marked);
+  const UsedSurfaces used = used_surfaces(scene);
+  for (const ElementBlock& block : file.blocks)
     if (block.dimension == 2)
-      for (const std::string& name : block.groups) add_faces(block, name, use, boundaries, mesh);
+      for (const std::string& name : block.groups) add_faces(block, name, used, sides, mesh);
 }
 
-// New numbers of the nodes that elements use, in the file's order; -1 for the others, which are dropped.
+/// Drops the nodes that no element uses. Returns the new number of each node in the file's order; -1 if dropped.
 std::vector<int> drop_unused_nodes(Mesh& mesh)
 {
   std::vector<int> number(mesh.nodes.size(), -1);
   for (const Element& element : mesh.elements)
-    for (int i = 0; i < node_count(element.shape); ++i) number[element.nodes[i]] = 0;
+    for (const int node : nodes_of(element)) number[node] = 0;
   int kept = 0;
   for (std::size_t i = 0; i < number.size(); ++i)
     if (number[i] == 0)
@@ -315,17 +284,18 @@ std::vector<int> drop_unused_nodes(Mesh& mesh)
 
 } // namespace
 
-Mesh mesh_of(const FileMesh& file, const Scene& scene)
+Mesh build_mesh(const FileMesh& file, const Scene& scene)
 {
   Mesh mesh;
   mesh.nodes = file.nodes;
-  if (std::none_of(file.blocks.begin(), file.blocks.end(), [](const FileBlock& block) { return block.dimension > 1; }))
+  if (std::none_of(file.blocks.begin(), file.blocks.end(),
+                   [](const ElementBlock& block) { return block.dimension > 1; }))
     throw Error("the mesh has no elements: is the geometry empty?");
   read_elements(file, scene, mesh);
   read_surfaces(file, scene, mesh);
   const std::vector<int> number = drop_unused_nodes(mesh);
   std::map<std::string, std::set<int>> groups;
-  for (const FileBlock& block : file.blocks)
+  for (const ElementBlock& block : file.blocks)
     for (const std::string& name : block.groups)
       for (const int node : block.nodes)
         if (number[node] >= 0) groups[name].insert(number[node]);

@@ -1,3 +1,4 @@
+/// Mesh files and geometries read through libgmsh.
 #include "squeal/mesh/mesh_file.hpp"
 
 #include "squeal/base/error.hpp"
@@ -18,15 +19,16 @@ namespace squeal
 namespace
 {
 
-std::string text_of(const std::filesystem::path& file)
+std::string content_of(const std::filesystem::path& file)
 {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-// Without comments, strings, and what stands in braces: what is left of a DefineConstant list are names and "=". One
-// pass by hand, since std::regex recurses once a character and a long comment would exhaust the stack.
-std::string bare(const std::string& text)
+/// Returns the text without comments, strings and what stands in braces.
+/// Names and "=" remain of a DefineConstant list. std::regex is not used because it recurses once per character, and a
+/// long comment would exhaust the stack.
+std::string without_nested_text(const std::string& text)
 {
   std::string result;
   int depth = 0;
@@ -56,10 +58,10 @@ std::vector<std::string> geometry_parameters(const std::filesystem::path& file)
 {
   static const std::regex include("Include\\s+\"([^\"\\n]+)\""), entry(R"((?:^|,)\s*([A-Za-z_]\w*)\s*(?==|,|$))");
   std::vector<std::string> names;
-  const std::string text = text_of(file);
+  const std::string text = content_of(file);
   for (std::sregex_iterator it(text.begin(), text.end(), include), end; it != end; ++it)
     for (std::string& name : geometry_parameters(file.parent_path() / (*it)[1].str())) names.push_back(std::move(name));
-  const std::string definitions = bare(text), word = "DefineConstant";
+  const std::string definitions = without_nested_text(text), word = "DefineConstant";
   for (std::size_t at = definitions.find(word); at != std::string::npos; at = definitions.find(word, at + 1))
   {
     const std::size_t first = definitions.find('[', at), last = definitions.find(']', at);
@@ -75,6 +77,7 @@ std::vector<std::string> geometry_parameters(const std::filesystem::path& file)
 namespace
 {
 
+/// Throws Error if the geometry does not define one of the given parameters.
 void check_parameters(const MeshSource& source)
 {
   if (source.parameters.empty()) return;
@@ -87,22 +90,22 @@ void check_parameters(const MeshSource& source)
                   suggestion(name, known));
 }
 
-// libgmsh lives from here to the end of the read, mute. It keeps -setnumber values as long as the process lives, which
-// is harmless to a program that reads one mesh.
+/// Initialises libgmsh without output, and finalises it at the end of the read.
+/// Caveat: libgmsh keeps -setnumber values as long as the process lives, so a second mesh would see them too.
 class GmshSession
 {
 public:
   explicit GmshSession(const std::map<std::string, double>& parameters)
   {
-    std::vector<std::string> words = {"squeal"};
+    std::vector<std::string> arguments = {"squeal"};
     for (const auto& [name, value] : parameters)
     {
       char digits[32];
       std::snprintf(digits, sizeof digits, "%.17g", value);
-      words.insert(words.end(), {"-setnumber", name, digits});
+      arguments.insert(arguments.end(), {"-setnumber", name, digits});
     }
     std::vector<char*> argv;
-    for (std::string& word : words) argv.push_back(word.data());
+    for (std::string& argument : arguments) argv.push_back(argument.data());
     gmsh::initialize(static_cast<int>(argv.size()), argv.data(), false);
     gmsh::option::setNumber("General.Terminal", 0);
   }
@@ -120,6 +123,7 @@ public:
   GmshSession& operator=(const GmshSession&) = delete;
 };
 
+/// Reads all nodes. Returns the index of each gmsh node tag; -1 for tags that are not used.
 std::vector<int> read_nodes(double scale, FileMesh& mesh)
 {
   std::vector<std::size_t> tags;
@@ -134,6 +138,7 @@ std::vector<int> read_nodes(double scale, FileMesh& mesh)
   return index_of;
 }
 
+/// Names of the physical groups that an entity belongs to.
 std::vector<std::string> groups_of(int dimension, int entity)
 {
   std::vector<int> tags;
@@ -159,7 +164,7 @@ void read_blocks(const std::vector<int>& index_of, FileMesh& mesh)
     gmsh::model::mesh::getElements(types, elements, nodes, dimension, entity);
     for (std::size_t k = 0; k < types.size(); ++k)
     {
-      FileBlock block{dimension, types[k], {}, 0, {}, groups_of(dimension, entity)};
+      ElementBlock block{dimension, types[k], {}, 0, {}, groups_of(dimension, entity)};
       int order = 0, primary = 0, d = 0;
       std::vector<double> local;
       gmsh::model::mesh::getElementProperties(types[k], block.type_name, d, order, block.nodes_per_element, local,
@@ -170,6 +175,7 @@ void read_blocks(const std::vector<int>& index_of, FileMesh& mesh)
   }
 }
 
+/// Whether the file brought elements of surfaces or volumes.
 bool has_elements()
 {
   for (const int dimension : {2, 3})
@@ -223,7 +229,7 @@ FileMesh read_mesh_file(const MeshSource& source)
 FileMesh read_mesh_file(const MeshSource& source)
 {
   throw Error(source.file.string() + ": this squeal was built without libgmsh and reads no meshes; rebuild with "
-                                     "-DSQUEAL_GMSH=ON, or bring matrices or points");
+                                     "-DSQUEAL_GMSH=ON, or give matrices or points");
 }
 
 #endif

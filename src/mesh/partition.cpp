@@ -1,5 +1,7 @@
-/// METIS (Karypis and Kumar 1998) on the node graph: two nodes are neighbours when an element has both. The nodes of a
-/// contact pair are one vertex, so that no pair straddles ranks. A vertex weighs its degrees of freedom.
+/// Partition of the mesh by METIS (Karypis and Kumar 1998).
+///
+/// Graph: two nodes are neighbours when an element has both. The nodes of a contact pair are merged into one vertex, so
+/// that both have the same owner. The weight of a vertex is the number of its nodal degrees of freedom.
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/shapes.hpp"
 
@@ -13,8 +15,14 @@ namespace squeal
 namespace
 {
 
-// Vertex of every node: nodes of a pair, and of pairs that share a node, have one.
-std::vector<int> merge_pairs(std::size_t nodes, const std::vector<NodePair>& pairs, int& vertices)
+struct Vertices
+{
+  std::vector<int> of_node;
+  int count = 0;
+};
+
+/// Merges the nodes of each pair, and of pairs that share a node, into one vertex by union-find.
+Vertices merge_pairs(std::size_t nodes, const std::vector<NodePair>& pairs)
 {
   std::vector<int> parent(nodes);
   std::iota(parent.begin(), parent.end(), 0);
@@ -28,53 +36,49 @@ std::vector<int> merge_pairs(std::size_t nodes, const std::vector<NodePair>& pai
     const int a = root(pair.a), b = root(pair.b);
     parent[std::max(a, b)] = std::min(a, b);
   }
-  std::vector<int> vertex(nodes);
-  vertices = 0;
-  for (std::size_t i = 0; i < nodes; ++i) // a root comes before the nodes that hang on it
-    vertex[i] = root(static_cast<int>(i)) == static_cast<int>(i) ? vertices++ : vertex[root(static_cast<int>(i))];
-  return vertex;
+  Vertices vertices{std::vector<int>(nodes), 0};
+  for (int i = 0; i < static_cast<int>(nodes); ++i) // a root has the smallest number of its set
+    vertices.of_node[i] = root(i) == i ? vertices.count++ : vertices.of_node[root(i)];
+  return vertices;
 }
 
+/// Adjacency in compressed rows, as METIS takes it.
 struct Graph
 {
   std::vector<idx_t> offsets, neighbours, weights;
 };
 
-Graph node_graph(const Mesh& mesh, const std::vector<int>& vertex, int vertices)
+Graph node_graph(const Mesh& mesh, const Vertices& vertices)
 {
   std::vector<int> dofs(mesh.nodes.size(), 3);
-  std::vector<std::vector<int>> elements_of(vertices);
+  std::vector<std::vector<int>> elements_of(vertices.count);
   for (std::size_t e = 0; e < mesh.elements.size(); ++e)
-  {
-    const Element& element = mesh.elements[e];
-    for (int i = 0; i < node_count(element.shape); ++i)
+    for (const int node : nodes_of(mesh.elements[e]))
     {
-      if (is_shell(element.shape)) dofs[element.nodes[i]] = 6;
-      elements_of[vertex[element.nodes[i]]].push_back(static_cast<int>(e));
+      if (is_shell(mesh.elements[e].shape)) dofs[node] = 6;
+      elements_of[vertices.of_node[node]].push_back(static_cast<int>(e));
     }
-  }
   Graph graph;
-  graph.weights.assign(vertices, 0);
-  for (std::size_t i = 0; i < vertex.size(); ++i) graph.weights[vertex[i]] += dofs[i];
+  graph.weights.assign(vertices.count, 0);
+  for (std::size_t i = 0; i < dofs.size(); ++i) graph.weights[vertices.of_node[i]] += dofs[i];
   graph.offsets = {0};
-  std::vector<idx_t> around;
-  for (int v = 0; v < vertices; ++v)
+  std::vector<idx_t> neighbours;
+  for (int v = 0; v < vertices.count; ++v)
   {
-    around.clear();
+    neighbours.clear();
     for (const int e : elements_of[v])
-      for (int i = 0; i < node_count(mesh.elements[e].shape); ++i)
-      {
-        const int other = vertex[mesh.elements[e].nodes[i]];
-        if (other != v) around.push_back(other);
-      }
-    std::sort(around.begin(), around.end());
-    graph.neighbours.insert(graph.neighbours.end(), around.begin(), std::unique(around.begin(), around.end()));
+      for (const int node : nodes_of(mesh.elements[e]))
+        if (const int other = vertices.of_node[node]; other != v) neighbours.push_back(other);
+    std::sort(neighbours.begin(), neighbours.end());
+    graph.neighbours.insert(graph.neighbours.end(), neighbours.begin(),
+                            std::unique(neighbours.begin(), neighbours.end()));
     graph.offsets.push_back(static_cast<idx_t>(graph.neighbours.size()));
   }
   return graph;
 }
 
-std::vector<int> split(Graph graph, int ranks)
+/// Returns the owner of each vertex. Each rank owns at least one vertex; `graph` must have as many.
+std::vector<int> partition_graph(Graph graph, int ranks)
 {
   idx_t vertices = static_cast<idx_t>(graph.weights.size()), constraints = 1, parts = ranks, cut = 0;
   idx_t options[METIS_NOPTIONS];
@@ -84,10 +88,10 @@ std::vector<int> split(Graph graph, int ranks)
   const int code =
       METIS_PartGraphKway(&vertices, &constraints, graph.offsets.data(), graph.neighbours.data(), graph.weights.data(),
                           nullptr, nullptr, &parts, nullptr, nullptr, options, &cut, part.data());
-  if (code != METIS_OK) throw Error("METIS could not split the mesh into " + std::to_string(ranks) + " parts");
+  if (code != METIS_OK) throw Error("METIS could not partition the mesh into " + std::to_string(ranks) + " parts");
   std::vector<int> rank(part.begin(), part.end());
   for (int r = 0; r < ranks; ++r)
-    if (std::find(rank.begin(), rank.end(), r) == rank.end()) // METIS leaves ranks empty on tiny graphs
+    if (std::find(rank.begin(), rank.end(), r) == rank.end()) // METIS may leave a rank empty on a small graph
     {
       for (idx_t v = 0; v < vertices; ++v) rank[v] = static_cast<int>(v * ranks / vertices);
       break;
@@ -95,6 +99,7 @@ std::vector<int> split(Graph graph, int ranks)
   return rank;
 }
 
+/// Returns the most frequent value, the smallest of several.
 int most_frequent(std::vector<int> values)
 {
   std::sort(values.begin(), values.end());
@@ -121,18 +126,16 @@ Partition partition_mesh(const Mesh& mesh, const std::vector<NodePair>& pairs, M
   if (nodes < static_cast<std::size_t>(ranks))
     throw Error(std::to_string(ranks) + " ranks are too many for a model of " + std::to_string(nodes) +
                 " nodes: use at most " + std::to_string(nodes));
-  int vertices = 0;
-  const std::vector<int> vertex = merge_pairs(nodes, pairs, vertices);
-  std::vector<int> vertex_rank(vertices);
-  std::iota(vertex_rank.begin(), vertex_rank.end(), 0); // stands where pairs leave fewer vertices than ranks
-  if (vertices >= ranks) on_rank_zero(comm, [&] { vertex_rank = split(node_graph(mesh, vertex, vertices), ranks); });
-  MPI_Bcast(vertex_rank.data(), vertices, MPI_INT, 0, comm);
-  for (std::size_t i = 0; i < vertex.size(); ++i) partition.node_rank[i] = vertex_rank[vertex[i]];
+  const Vertices vertices = merge_pairs(nodes, pairs);
+  std::vector<int> owner(vertices.count);
+  std::iota(owner.begin(), owner.end(), 0); // used as it is where pairs leave fewer vertices than ranks
+  if (vertices.count >= ranks) on_rank_zero(comm, [&] { owner = partition_graph(node_graph(mesh, vertices), ranks); });
+  MPI_Bcast(owner.data(), vertices.count, MPI_INT, 0, comm);
+  for (std::size_t i = 0; i < nodes; ++i) partition.node_rank[i] = owner[vertices.of_node[i]];
   for (std::size_t e = 0; e < mesh.elements.size(); ++e)
   {
-    const Element& element = mesh.elements[e];
     std::vector<int> owners;
-    for (int i = 0; i < node_count(element.shape); ++i) owners.push_back(partition.node_rank[element.nodes[i]]);
+    for (const int node : nodes_of(mesh.elements[e])) owners.push_back(partition.node_rank[node]);
     partition.element_rank[e] = most_frequent(owners);
   }
   return partition;

@@ -5,7 +5,8 @@
 /// straddle ranks travel at the end. All three matrices receive every block, zeros too: that is their one pattern.
 #include "loads.hpp"
 #include "matrices.hpp"
-#include "nodes.hpp"
+#include "squeal/mesh/names.hpp"
+#include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/vector.hpp"
 #include "squeal/solid/element.hpp"
 
@@ -71,7 +72,7 @@ Block spring_block(const Mesh& mesh, const Spring& spring)
   for (const auto& [name, sign] : {std::pair{spring.from, -1.}, std::pair{spring.to, 1.}})
   {
     if (name == "ground") continue;
-    const int node = point_named(mesh, name, "spring from " + spring.from + " to " + spring.to);
+    const int node = point_node(mesh, name, "spring from " + spring.from + " to " + spring.to);
     for (int c = 0; c < 3; ++c)
     {
       motions.push_back(6 * node + c);
@@ -92,9 +93,9 @@ std::vector<Block> lumped_blocks(const Mesh& mesh, const Scene& scene)
 {
   std::vector<Block> blocks;
   for (const Point& point : scene.points)
-    blocks.push_back(body_block(point_named(mesh, point.name, "point"), point.mass, {}));
+    blocks.push_back(body_block(point_node(mesh, point.name, "point"), point.mass, {}));
   for (const RigidBody& body : scene.rigid_bodies)
-    blocks.push_back(body_block(point_named(mesh, body.name, "rigid body"), body.mass, body.inertia));
+    blocks.push_back(body_block(point_node(mesh, body.name, "rigid body"), body.mass, body.inertia));
   for (const Spring& spring : scene.springs) blocks.push_back(spring_block(mesh, spring));
   return blocks;
 }
@@ -223,8 +224,8 @@ std::string fill_element(const Mesh& mesh, const Scene& scene, std::size_t index
   }
   catch (const std::runtime_error& error)
   {
-    return "part " + part.name + ", element " + std::to_string(index) + " with " + node_text(mesh, element.nodes[0]) +
-           ": " + error.what();
+    return "part " + part.name + ", element " + std::to_string(index) + " with " +
+           node_text(element.nodes[0], mesh.nodes[element.nodes[0]]) + ": " + error.what();
   }
   const RayleighDamping damping = part.damping.value_or(scene.damping);
   block.motions = motions_of(element);

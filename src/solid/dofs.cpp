@@ -5,7 +5,8 @@
 ///                   theta = I^-1 sum r_i x u_i,   r_i = x_i - mean x,   I = sum |r_i|^2 1 - r_i r_i^T,
 ///                   their least-squares rotation, exact for rigid motions; by virtue of u = T q the shell's moment
 ///                   acts on them as the couple r_i x (I^-1 moment). I is regular because no solid element is a line.
-#include "nodes.hpp"
+#include "squeal/mesh/names.hpp"
+#include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/vector.hpp"
 #include "squeal/solid/element.hpp"
 #include "squeal/solid/structure.hpp"
@@ -69,9 +70,9 @@ MotionTable all_motions(const Mesh& mesh, const Scene& scene)
     for (int k = 0; k < node_count(element.shape); ++k)
       for (int c = 0; c < dofs_per_node(element.shape); ++c)
         kind_of(table, element.nodes[static_cast<std::size_t>(k)], c) = Kind::free;
-  for (const Point& point : scene.points) give_motions(table, point_named(mesh, point.name, "point"), point.free);
+  for (const Point& point : scene.points) give_motions(table, point_node(mesh, point.name, "point"), point.free);
   for (const RigidBody& body : scene.rigid_bodies)
-    give_motions(table, point_named(mesh, body.name, "rigid body"), body.free);
+    give_motions(table, point_node(mesh, body.name, "rigid body"), body.free);
   return table;
 }
 
@@ -99,15 +100,15 @@ void tie_rigid_bodies(MotionTable& table, const Mesh& mesh, const std::vector<Ri
   for (std::size_t i = 0; i < bodies.size(); ++i)
   {
     const std::string asker = "rigid body " + bodies[i].name;
-    const int reference = point_named(mesh, bodies[i].name, asker);
+    const int reference = point_node(mesh, bodies[i].name, asker);
     for (const std::string& surface : bodies[i].surfaces)
-      for (const int node : nodes_named(mesh, surface, asker))
+      for (const int node : named_nodes(mesh, surface, asker))
       {
         const auto [place, is_new] = table.body_of.emplace(node, static_cast<int>(i));
         const auto other = static_cast<std::size_t>(place->second);
         if (other != i)
-          throw Error(node_text(mesh, node) + " belongs to rigid body " + bodies[other].name + " and to " + asker +
-                      "; give each a surface of its own, or make them one body");
+          throw Error(node_text(node, mesh.nodes[node]) + " belongs to rigid body " + bodies[other].name + " and to " +
+                      asker + "; give each a surface of its own, or make them one body");
         if (is_new) tie_node(table, mesh, node, reference);
       }
   }
@@ -121,7 +122,7 @@ void check_held_slave(const MotionTable& table, const Mesh& mesh, const Scene& s
   if (slave == table.slaves.end()) return;
   for (const MotionTerm& term : slave->second)
     if (term.factor != 0 && table.kind[static_cast<std::size_t>(term.motion)] == Kind::free)
-      throw Error(node_text(mesh, motion / 6) + ": the support on " + support + " holds its " +
+      throw Error(node_text(motion / 6, mesh.nodes[motion / 6]) + ": the support on " + support + " holds its " +
                   direction_names[motion % 6] + ", which rigid body " +
                   scene.rigid_bodies[static_cast<std::size_t>(table.body_of.at(motion / 6))].name + " moves by its " +
                   direction_names[term.motion % 6] +
@@ -130,7 +131,7 @@ void check_held_slave(const MotionTable& table, const Mesh& mesh, const Scene& s
 
 void check_holds_something(MotionTable& table, const Mesh& mesh, const Support& support)
 {
-  for (const int node : nodes_named(mesh, support.on, "support"))
+  for (const int node : named_nodes(mesh, support.on, "support"))
     for (int c = 0; c < 6; ++c)
       if (support.fixed[static_cast<std::size_t>(c)] && kind_of(table, node, c) != Kind::absent) return;
   throw Error("support on " + support.on +
@@ -142,7 +143,7 @@ void hold_supports(MotionTable& table, const Mesh& mesh, const Scene& scene)
   const auto each = [&](auto work)
   {
     for (const Support& support : scene.supports)
-      for (const int node : nodes_named(mesh, support.on, "support"))
+      for (const int node : named_nodes(mesh, support.on, "support"))
         for (int c = 0; c < 6; ++c)
           if (support.fixed[static_cast<std::size_t>(c)]) work(support.on, 6 * node + c);
   };

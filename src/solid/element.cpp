@@ -25,24 +25,8 @@ double positive(double determinant, std::size_t point)
 
 ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Material& material, double thickness)
 {
-  const NodePositions X = columns_of(x);
+  const NodePositions X = position_matrix(x);
   return dofs_per_node(shape) == 6 ? shell_matrices(shape, X, material, thickness) : solid_matrices(shape, X, material);
-}
-
-/// n dA = (dx/dxi x dx/deta) dxi deta
-std::vector<Vec3> face_weights(FaceShape shape, std::span<const Vec3> x)
-{
-  const NodePositions X = columns_of(x);
-  std::vector<Vec3> weights(x.size(), Vec3{});
-  for (const auto& [xi, weight] : area_rule(shape))
-  {
-    const Interpolation at = interpolate(shape, xi);
-    const Eigen::Vector3d along = X * at.dN.row(0).transpose(), across = X * at.dN.row(1).transpose();
-    const Eigen::Vector3d area = weight * along.cross(across);
-    for (std::size_t i = 0; i < x.size(); ++i)
-      for (int k = 0; k < 3; ++k) weights[i][k] += at.N(static_cast<Eigen::Index>(i)) * area(k);
-  }
-  return weights;
 }
 
 } // namespace squeal

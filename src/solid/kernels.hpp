@@ -1,6 +1,6 @@
 #pragma once
 /// The two families of element kernels behind element.hpp.
-#include "interpolation.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 #include "squeal/solid/element.hpp"
 
 namespace squeal

@@ -2,7 +2,9 @@
 /// dA, n outward. What acts on a held motion goes into the support.
 #include "loads.hpp"
 
-#include "nodes.hpp"
+#include "squeal/mesh/names.hpp"
+#include "squeal/mesh/shape_functions.hpp"
+#include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/vector.hpp"
 #include "squeal/solid/element.hpp"
 
@@ -17,15 +19,6 @@ void add_force(Vec load, const DofMap& dofs, int node, const Vec3& force)
   for (int c = 0; c < 3; ++c)
     for (const DofTerm& term : dofs.of(node, c))
       check(VecSetValue(load, term.dof, force[static_cast<std::size_t>(c)] * term.factor, ADD_VALUES));
-}
-
-const std::vector<Face>& faces_under(const Mesh& mesh, const Pressure& pressure)
-{
-  if (const auto surface = mesh.surfaces.find(pressure.on); surface != mesh.surfaces.end()) return surface->second;
-  std::vector<std::string> known;
-  for (const auto& [name, faces] : mesh.surfaces) known.push_back(name);
-  throw Error("pressure on \"" + pressure.on + "\": the mesh has no such surface of a solid" +
-              suggestion(pressure.on, known));
 }
 
 void add_pressure(Vec load, const DofMap& dofs, const Mesh& mesh, const Face& face, double pressure)
@@ -49,12 +42,12 @@ Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const Partition& 
   check(VecSetType(load, VECSTANDARD));
   for (const Force& force : scene.forces)
   {
-    const auto nodes = nodes_named(mesh, force.on, "force");
+    const auto nodes = named_nodes(mesh, force.on, "force");
     if (rank != 0) continue;
     for (const int node : nodes) add_force(load, dofs, node, (1. / static_cast<double>(nodes.size())) * force.vector);
   }
   for (const Pressure& pressure : scene.pressures)
-    for (const Face& face : faces_under(mesh, pressure))
+    for (const Face& face : named_faces(mesh, pressure.on, "pressure"))
       if (partition.node_rank[static_cast<std::size_t>(face.nodes[0])] == rank)
         add_pressure(load, dofs, mesh, face, pressure.value);
   check(VecAssemblyBegin(load));

@@ -1,7 +1,7 @@
 /// Structures that come as matrices: M C K F of a folder, PETSc binary.
 #include "matrices.hpp"
 
-#include "nodes.hpp"
+#include "squeal/mesh/names.hpp"
 #include "squeal/solid/binary.hpp"
 
 #include <cmath>

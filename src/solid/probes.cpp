@@ -1,4 +1,4 @@
-#include "nodes.hpp"
+#include "squeal/mesh/names.hpp"
 #include "squeal/mesh/vector.hpp"
 #include "squeal/solid/rows.hpp"
 
@@ -15,7 +15,7 @@ namespace
 int probed_node(const Probe& probe, const Mesh& mesh)
 {
   const std::string asker = "probe " + probe.name;
-  const auto nodes = nodes_named(mesh, probe.on, asker);
+  const auto nodes = named_nodes(mesh, probe.on, asker);
   if (nodes.empty()) throw Error(asker + ": group \"" + probe.on + "\" has no nodes");
   if (nodes.size() > 1 && !probe.at)
     throw Error(asker + ": group \"" + probe.on + "\" has " + std::to_string(nodes.size()) +

@@ -9,6 +9,7 @@
 #include "condensation.hpp"
 #include "kernels.hpp"
 #include "shell_strains.hpp"
+#include "squeal/mesh/quadrature.hpp"
 
 #include <stdexcept>
 
@@ -82,13 +83,13 @@ std::vector<StrainPoint<ShellStrains>> strain_points(Shape shape, const PlanePos
   const Quadrature& rule = stiffness_rule(shape);
   const bool quad = shape == Shape::shell4;
   const double slenderness = 2 * h * h / (shear_correction * (1 - material.poisson));
-  const auto jacobian = [&](const Interpolation& at) { return Eigen::Matrix2d(at.dN.topRows<2>() * X.transpose()); };
-  const Eigen::Matrix2d J0 = jacobian(interpolate(shape, Eigen::Vector3d::Zero()));
+  const auto jacobian = [&](const ShapeFunctions& at) { return Eigen::Matrix2d(at.dN.topRows<2>() * X.transpose()); };
+  const Eigen::Matrix2d J0 = jacobian(shape_functions(shape, Eigen::Vector3d::Zero()));
   std::vector<StrainPoint<ShellStrains>> points(rule.size());
   std::vector<ShellStrains> modes(quad ? rule.size() : 0);
   for (std::size_t p = 0; p < rule.size(); ++p)
   {
-    const Interpolation at = interpolate(shape, rule[p].xi);
+    const ShapeFunctions& at = rule[p].at;
     const Eigen::Matrix2d J = jacobian(at);
     const double determinant = positive(J.determinant(), p);
     points[p] = {ShellStrains::Zero(9, 6 * X.cols()), determinant * rule[p].weight};
@@ -107,12 +108,12 @@ std::vector<StrainPoint<ShellStrains>> strain_points(Shape shape, const PlanePos
 
 /// Displacement of the plane's points: sides bow as the rotations of their ends ask, u' = r x t, so that a curved
 /// element's mass is as accurate as its stiffness (the linear field alone is out by (k L)^2 / 12 in frequency).
-Columns<3, 24> displacement(Shape shape, const PlanePositions& X, const Eigen::Vector3d& xi)
+BoundedMatrix<3, 24> displacement(Shape shape, const PlanePositions& X, const Eigen::Vector3d& xi)
 {
   const auto nodes = X.cols();
-  const NodeValues N = interpolate(shape, xi).N;
-  const NodeValues bow = interpolate(nodes == 3 ? FaceShape::triangle6 : FaceShape::quad8, xi).N.tail(nodes) / 8;
-  Columns<3, 24> U = Columns<3, 24>::Zero(3, 6 * nodes);
+  const NodeValues N = shape_functions(shape, xi).N;
+  const NodeValues bow = shape_functions(nodes == 3 ? FaceShape::triangle6 : FaceShape::quad8, xi).N.tail(nodes) / 8;
+  BoundedMatrix<3, 24> U = BoundedMatrix<3, 24>::Zero(3, 6 * nodes);
   for (Eigen::Index i = 0; i < nodes; ++i)
   {
     const auto j = (i + 1) % nodes;
@@ -130,11 +131,10 @@ Eigen::MatrixXd plane_mass(Shape shape, const PlanePositions& X, double density,
 {
   const auto nodes = X.cols();
   Eigen::MatrixXd M = Eigen::MatrixXd::Zero(6 * nodes, 6 * nodes);
-  for (const auto& [xi, weight] : mass_rule(shape))
+  for (const auto& [xi, weight, at] : mass_rule(shape))
   {
-    const Interpolation at = interpolate(shape, xi);
     const double mass = density * h * weight * Eigen::Matrix2d(at.dN.topRows<2>() * X.transpose()).determinant();
-    const Columns<3, 24> U = displacement(shape, X, xi);
+    const BoundedMatrix<3, 24> U = displacement(shape, X, xi);
     M += mass * U.transpose() * U;
     for (Eigen::Index i = 0; i < nodes; ++i)
       for (Eigen::Index j = 0; j < nodes; ++j)
@@ -162,7 +162,7 @@ ElementMatrices shell_matrices(Shape shape, const NodePositions& X, const Materi
 std::vector<std::array<double, 6>> shell_resultants(Shape shape, std::span<const Vec3> x, const Material& material,
                                                     double thickness, const Vec3& axis1, std::span<const double> u)
 {
-  const Facet f = facet(columns_of(x), Eigen::Vector3d(axis1[0], axis1[1], axis1[2]));
+  const Facet f = facet(position_matrix(x), Eigen::Vector3d(axis1[0], axis1[1], axis1[2]));
   const Matrix9 D = elasticity(material, thickness);
   const Eigen::Map<const Eigen::VectorXd> displacement(u.data(), static_cast<Eigen::Index>(u.size()));
   const Eigen::VectorXd local = to_plane(f) * displacement;

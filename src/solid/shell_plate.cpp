@@ -30,8 +30,8 @@ Eigen::Vector2d edge_function(Eigen::Index k, const NodeValues& N, const PlaneGr
 void add_plate(ShellStrains& B, const PlanePositions& X, const Eigen::Vector3d& xi, double slenderness)
 {
   const auto nodes = X.cols();
-  const Interpolation at = interpolate(nodes == 3 ? FaceShape::triangle3 : FaceShape::quad4, xi);
-  const Interpolation quadratic = interpolate(nodes == 3 ? FaceShape::triangle6 : FaceShape::quad8, xi);
+  const ShapeFunctions at = shape_functions(nodes == 3 ? FaceShape::triangle3 : FaceShape::quad4, xi);
+  const ShapeFunctions quadratic = shape_functions(nodes == 3 ? FaceShape::triangle6 : FaceShape::quad8, xi);
   const Eigen::Matrix2d inverse = (at.dN.topRows<2>() * X.transpose()).inverse();
   const PlaneGradients g = inverse * at.dN.topRows<2>();
   const PlaneGradients P = inverse * quadratic.dN.topRows<2>().rightCols(nodes);

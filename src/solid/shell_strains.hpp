@@ -1,15 +1,15 @@
 #pragma once
 /// Strains of a flat shell element in its own plane, local axes x y z.
-#include "interpolation.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 namespace squeal
 {
 
 /// Local degrees of freedom of a node: u v w rx ry rz, six columns each.
 /// Rows: membrane exx eyy gxy; drilling; curvature kxx kyy kxy; transverse shear gxz gyz.
-using ShellStrains = Columns<9, 24>;
-using PlanePositions = Columns<2, 4>; // one node a column [m]
-using PlaneGradients = Columns<2, 8>; // d/dx, d/dy of shape functions, one node a column
+using ShellStrains = BoundedMatrix<9, 24>;
+using PlanePositions = BoundedMatrix<2, 4>; // one node a column [m]
+using PlaneGradients = BoundedMatrix<2, 8>; // d/dx, d/dy of shape functions, one node a column
 
 /// Membrane of shell4 and its drilling strain  (dv/dx - du/dy)/2 - rz.
 void add_quad_membrane(ShellStrains& B, const NodeValues& N, const PlaneGradients& g);

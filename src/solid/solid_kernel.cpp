@@ -12,6 +12,7 @@
 /// all 8-node bricks.
 #include "condensation.hpp"
 #include "kernels.hpp"
+#include "squeal/mesh/quadrature.hpp"
 
 namespace squeal
 {
@@ -20,7 +21,7 @@ namespace
 {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Strains = Columns<6, 60>;
+using Strains = BoundedMatrix<6, 60>;
 
 Matrix6 elasticity(const Material& material)
 {
@@ -32,7 +33,7 @@ Matrix6 elasticity(const Material& material)
 }
 
 /// Strains of displacements whose gradients in x, y, z are the columns of `g`.
-Strains strains_of(const Columns<3, 20>& g)
+Strains strains_of(const BoundedMatrix<3, 20>& g)
 {
   Strains B = Strains::Zero(6, 3 * g.cols());
   for (Eigen::Index i = 0; i < g.cols(); ++i)
@@ -44,11 +45,11 @@ Strains strains_of(const Columns<3, 20>& g)
 }
 
 /// Natural gradients of the incompatible modes, one a column, less their mean over the parent element.
-Columns<3, 20> incompatible_gradients(Shape shape, const Eigen::Vector3d& xi)
+BoundedMatrix<3, 20> incompatible_gradients(Shape shape, const Eigen::Vector3d& xi)
 {
   if (shape == Shape::hex8) return Eigen::Matrix3d((-2 * xi).asDiagonal());
   const double r = xi(0) - 1. / 3, s = xi(1) - 1. / 3;
-  Columns<3, 20> g(3, 4);
+  BoundedMatrix<3, 20> g(3, 4);
   g << 2 * r, 0, s, 0, /**/ 0, 2 * s, r, 0, /**/ 0, 0, 0, -2 * xi(2);
   return g;
 }
@@ -75,12 +76,12 @@ Kinematics kinematics(Shape shape, const NodePositions& X, const Matrix6& D)
 {
   const Quadrature& rule = stiffness_rule(shape);
   const Eigen::Vector3d centre = shape == Shape::wedge6 ? Eigen::Vector3d(1. / 3, 1. / 3, 0) : Eigen::Vector3d(0, 0, 0);
-  const Eigen::Matrix3d J0 = interpolate(shape, centre).dN * X.transpose();
+  const Eigen::Matrix3d J0 = shape_functions(shape, centre).dN * X.transpose();
   std::vector<StrainPoint<Strains>> points(rule.size());
   std::vector<Strains> incompatible(is_enriched(shape) ? rule.size() : 0);
   for (std::size_t p = 0; p < rule.size(); ++p)
   {
-    const Interpolation at = interpolate(shape, rule[p].xi);
+    const ShapeFunctions& at = rule[p].at;
     const Eigen::Matrix3d J = at.dN * X.transpose(); // J(k, l) = dx_l / dxi_k
     const double determinant = positive(J.determinant(), p);
     points[p] = {strains_of(J.inverse() * at.dN), determinant * rule[p].weight};
@@ -99,9 +100,9 @@ Eigen::MatrixXd solid_mass(Shape shape, const NodePositions& X, const Eigen::Mat
   Eigen::MatrixXd M = Eigen::MatrixXd::Zero(3 * X.cols(), 3 * X.cols());
   for (std::size_t p = 0; p < rule.size(); ++p)
   {
-    const Interpolation at = interpolate(shape, rule[p].xi);
+    const ShapeFunctions& at = rule[p].at;
     const double volume = rule[p].weight * positive((at.dN * X.transpose()).determinant(), p);
-    Columns<3, 60> U = Columns<3, 60>::Zero(3, 3 * X.cols()); // displacement at the point
+    BoundedMatrix<3, 60> U = BoundedMatrix<3, 60>::Zero(3, 3 * X.cols()); // displacement at the point
     for (Eigen::Index i = 0; i < X.cols(); ++i) U.middleCols<3>(3 * i).diagonal().setConstant(at.N(i));
     if (is_enriched(shape))
     {
@@ -128,7 +129,7 @@ std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec
   const Matrix6 D = elasticity(material);
   const Eigen::Map<const Eigen::VectorXd> displacement(u.data(), static_cast<Eigen::Index>(u.size()));
   std::vector<std::array<double, 6>> stress;
-  for (const auto& point : kinematics(shape, columns_of(x), D).points)
+  for (const auto& point : kinematics(shape, position_matrix(x), D).points)
   {
     std::array<double, 6>& s = stress.emplace_back();
     Eigen::Map<Eigen::Matrix<double, 6, 1>>(s.data()) = D * (point.B * displacement);

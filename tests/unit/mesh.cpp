@@ -152,12 +152,12 @@ TEST_CASE("a solid numbered inside out is mended, mid-sides too")
   {
     FileMesh file;
     file.nodes = reference(shape);
-    FileBlock block{3, gmsh_type(shape), "", node_count(shape), {}, {"body"}};
+    ElementBlock block{3, gmsh_type(shape), "", node_count(shape), {}, {"body"}};
     block.nodes = mirrored_order(shape);
     file.blocks = {block};
     Scene scene;
     scene.parts = {{"body", {}, 0, {}}};
-    const Mesh mesh = mesh_of(file, scene);
+    const Mesh mesh = build_mesh(file, scene);
     const Element& mended = mesh.elements.at(0);
     const auto x = [&](int i) { return mesh.nodes[mended.nodes[i]]; };
     CHECK(dot(cross(x(1) - x(0), x(shape == Shape::hex8 || shape == Shape::hex20 ? 3 : 2) - x(0)),

@@ -2,6 +2,7 @@
 /// A finite element program of a page, to hold the kernels to exact answers: meshes by formula, one material, sparse
 /// matrices on one process, prescribed displacements by elimination, eigenpairs by subspace iteration.
 #include "../support/about.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 #include "squeal/solid/element.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 #pragma once
-/// A mesh file as libgmsh gives it, before parts and surfaces are made of it.
+/// The content of a mesh file, before the scene's parts and surfaces are extracted from it.
 #include "squeal/mesh/mesh.hpp"
 
 #include <string>
@@ -8,31 +8,32 @@
 namespace squeal
 {
 
-/// The elements of one type on one entity of the file.
-struct FileBlock
+/// The elements of one type on one geometrical entity of the file.
+struct ElementBlock
 {
   int dimension = 0; // 0 to 3
-  int type = 0;      // gmsh's element type number
+  int type = 0;      // gmsh's number of the element type
   std::string type_name;
   int nodes_per_element = 0;
-  std::vector<int> nodes;          // indices into FileMesh::nodes
-  std::vector<std::string> groups; // physical groups of the entity; one without a name is called by its number
+  std::vector<int> nodes;          // indices in FileMesh::nodes, element by element
+  std::vector<std::string> groups; // physical groups of the entity; a group without a name is named by its number
 };
 
 struct FileMesh
 {
   std::vector<Vec3> nodes; // [m]
-  std::vector<FileBlock> blocks;
+  std::vector<ElementBlock> blocks;
 };
 
-/// On one rank. Opens what libgmsh opens; meshes a geometry that brings no elements. Errors: file missing, gmsh's own
-/// messages, a parameter that the .geo does not define, a build without libgmsh.
+/// Returns the content of a mesh file, or of the mesh that libgmsh generates on a geometry. To be called on one rank.
+/// Throws Error for: a missing file; a failure of libgmsh, with its message; a parameter that the .geo does not define;
+/// a build without libgmsh.
 FileMesh read_mesh_file(const MeshSource& source);
 
-/// Parts, surfaces and groups of a file, by the names the scene gives. Errors: read_mesh lists them.
-Mesh mesh_of(const FileMesh& file, const Scene& scene);
+/// Returns the parts, surfaces and groups of a file under the names that the scene gives. Throws Error as read_mesh.
+Mesh build_mesh(const FileMesh& file, const Scene& scene);
 
-/// Names in the DefineConstant lists of a .geo and of the files it includes.
+/// Returns the names in the DefineConstant lists of a .geo file and of the files it includes.
 std::vector<std::string> geometry_parameters(const std::filesystem::path& file);
 
 } // namespace squeal

@@ -1,22 +1,36 @@
 #pragma once
-/// Topology of the elements on offer, in gmsh's node order (gmsh reference manual, "Node ordering").
+/// Topology of element and face shapes, in gmsh's node order (gmsh reference manual, "Node ordering").
+/// Node numbers count from 0 within the element or face.
 #include "squeal/mesh/mesh.hpp"
 
+#include <optional>
 #include <span>
 
 namespace squeal
 {
 
+/// Returns the shape of a gmsh element type; nothing if squeal has no kernel for it.
+std::optional<Shape> element_shape(int gmsh_type);
+std::optional<FaceShape> face_shape(int gmsh_type);
+
+int node_count(Shape shape);
+int node_count(FaceShape shape);
 int corner_count(Shape shape);
 int corner_count(FaceShape shape);
+bool is_shell(Shape shape);
 
-/// The two corners on either side of each mid-side node, in the order of the mid-side nodes. Empty if there are none.
+/// Returns the nodes that the element or face uses.
+std::span<const int> nodes_of(const Element& element);
+std::span<const int> nodes_of(const Face& face);
+
+/// Returns the two end nodes of the side of each mid-side node, in the order of the mid-side nodes.
 std::span<const std::array<int, 2>> mid_sides(Shape shape);
 
-/// Corners of each face of a solid, counter-clockwise seen from outside; -1 after the third of a triangle.
+/// Returns the corners of each face of a solid, counter-clockwise seen from outside. A triangle has -1 as its fourth.
 std::span<const std::array<int, 4>> corner_faces(Shape shape);
 
-/// For each place, which node goes there so that the element is mirrored: turns an inside-out solid outside-out.
+/// Returns the node order of the mirrored element or face: entry i is the old number of the new node i.
+/// An element numbered inside out has a positive Jacobian in this order.
 std::vector<int> mirrored_order(Shape shape);
 std::vector<int> mirrored_order(FaceShape shape);
 

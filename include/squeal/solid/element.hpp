@@ -39,7 +39,4 @@ std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec
 std::vector<std::array<double, 6>> shell_resultants(Shape shape, std::span<const Vec3> x, const Material& material,
                                                     double thickness, const Vec3& axis1, std::span<const double> u);
 
-/// Consistent nodal weights of a face, integral of N_i dA times unit normal [m2], outward for outward-ordered faces.
-std::vector<Vec3> face_weights(FaceShape shape, std::span<const Vec3> x);
-
 } // namespace squeal

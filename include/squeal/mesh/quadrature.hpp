@@ -1,0 +1,26 @@
+#pragma once
+/// Quadrature rules on the reference elements, each with the shape functions at its points.
+#include "squeal/mesh/shape_functions.hpp"
+
+namespace squeal
+{
+
+struct QuadraturePoint
+{
+  Eigen::Vector3d xi; // [-] natural coordinates
+  double weight = 0;  // [-] natural volume or area
+  ShapeFunctions at;  // shape functions of the rule's shape at xi
+};
+
+using Quadrature = std::vector<QuadraturePoint>;
+
+/// Returns the full integration of the stiffness; it is exact where the Jacobian is constant.
+const Quadrature& stiffness_rule(Shape shape);
+
+/// Returns a rule that is exact for N_i N_j det(J) where the sides are straight.
+const Quadrature& mass_rule(Shape shape);
+
+/// Returns a rule that is exact for N_i times the area vector, whether the sides are straight or curved.
+const Quadrature& area_rule(FaceShape shape);
+
+} // namespace squeal
