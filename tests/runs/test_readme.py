@@ -1,0 +1,173 @@
+"""README.md and inputs/README.md, held against what the program prints and writes."""
+
+import json
+import re
+
+import h5py
+import pytest
+from conftest import INPUTS, ROOT, Run
+
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?(?!\w)")
+# Relative tolerance of the numbers of a line. Iterations, and which pair opens in which step, move with the rounding.
+LOOSE = {"Newton steps": 0.25, "open pairs": 0.03, "multipliers": 0.03}
+
+
+def block_of(file, first_words):
+    """The lines of the fenced or indented block of a page that starts with these words."""
+    lines = file.read_text().splitlines()
+    start = next(i for i, line in enumerate(lines) if line.strip().startswith(first_words))
+    indent = "    " if lines[start].startswith("    ") else ""
+    end = next(i for i in range(start, len(lines)) if lines[i] == "```" or not lines[i].startswith(indent))
+    return [line[len(indent):] for line in lines[start:end]]
+
+
+def words_of(line):
+    return " ".join(NUMBER.sub("#", line).split())
+
+
+def agree(quoted, printed, tolerance):
+    """An error measure, two digits or three and an exponent, may be another one of its order; what is rounding stays so."""
+    a, b = float(quoted), float(printed)
+    if re.fullmatch(r"[-+]?\d(\.\d{1,2})?e-\d+", quoted):
+        return max(abs(a), abs(b)) < 1e-9 or 0.2 <= a / b <= 5
+    return abs(a - b) <= tolerance * abs(a)
+
+
+def same(quoted, printed):
+    if words_of(quoted) != words_of(printed):
+        return False
+    tolerance = next((loose for words, loose in LOOSE.items() if words in quoted), 1e-3)
+    return all(agree(a, b, tolerance) for a, b in zip(NUMBER.findall(quoted), NUMBER.findall(printed)))
+
+
+def test_readme_prints_what_the_program_prints(converged):
+    """Every line that README quotes of the pin on a disc is printed, in this order; rows of modes may be left out."""
+    run = converged(INPUTS / "pin_on_disc" / "scene.toml")
+    left = iter(run.printed.splitlines())
+    for quoted in block_of(ROOT / "README.md", "pin on disc"):
+        near = [line for line in run.printed.splitlines() if words_of(line) == words_of(quoted)]
+        assert any(same(quoted, line) for line in left), f"README says\n{quoted}\nsqueal prints\n" + "\n".join(near[:3])
+
+
+def test_own_model_runs(converged, tmp_path):
+    """README's own model in ten lines, on the mesh whose groups it names."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text("\n".join(block_of(ROOT / "README.md", "mesh = ")))
+    run = converged(scene, "--set", f"mesh.file={INPUTS / 'pin_on_disc' / 'pin.geo'}")
+    assert run.report["cycle"]["outcome"] == "converged"
+
+
+def tables(page):
+    """(heading, cells) of every row of the page's tables, without their heads; code marks are taken off."""
+    heading, head = "", True
+    for line in page.read_text().splitlines():
+        if line.startswith("#"):
+            heading = (re.findall(r"`([^`]+)`", line) or [line.lstrip("# ")])[0]
+        if not line.startswith("|"):
+            head = True
+            continue
+        cells = [cell.strip().strip("`") for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+        if not head:
+            yield heading, cells
+        head = head and not set(line) <= set("|-")
+
+
+def split_unit(text):
+    """Unit and default of the bracket at the end of a line of the help."""
+    unit, _, standard = text.partition(", ")
+    return unit, standard
+
+
+@pytest.fixture(scope="module")
+def helped(tmp_path_factory):
+    return Run(["-help"], 1, tmp_path_factory.mktemp("help")).printed
+
+
+def test_every_scene_key_is_explained(helped):
+    section, known = "scene", {}
+    for line in helped.partition("Keys of a scene file")[2].partition("Algorithm options")[0].splitlines()[1:]:
+        if head := re.match(r"(\[+\w+\]+|rotation = )", line):
+            section = head[1]
+        elif key := re.match(r"  (\w+) .*?\[([^\[\]]*(?:\[.*\])?)\]$", line):
+            known[section, key[1]] = split_unit(key[2])
+    page = {}
+    for heading, cells in tables(INPUTS / "README.md"):
+        section = "rotation = " if heading.startswith("rotation") else heading
+        if section in {name for name, _ in known}:
+            assert cells[3], f"{section} {cells[0]} has no meaning"
+            page[section, cells[0]] = (cells[1], cells[2])
+    assert len(known) > 60
+    assert page == known
+
+
+def test_every_option_is_explained(helped):
+    known = dict(re.findall(r"^  (-\w+) .* \[(.*)\]$", helped, re.M))
+    page = {cells[0]: cells[1] for heading, cells in tables(INPUTS / "README.md") if heading == "Options"}
+    assert len(known) > 30
+    assert page == known
+
+
+RUNS = {
+    # every stage, from points; too small to be reduced, with the reason
+    "oscillator": [INPUTS / "oscillator" / "scene.toml", "--set", "cycle.steps_per_period=100", "--set",
+                   "transient.periods=20", "--set", "transient.steps_per_period=50", "--set", "fidelity=auto"],
+    # the reduced model, a rotation, a mesh; coarse, and damped like this, its cycle is found in a second
+    "pin_on_disc": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
+                    "damping.beta=6e-7", "--set", "cycle.steps_per_period=40", "--set", "fidelity=auto"],
+    # stages that are skipped, with their reasons
+    "stable": [INPUTS / "oscillator" / "scene.toml", "--set", "friction.coefficient=0"],
+}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Folders of these runs."""
+    runs = [Run(arguments, 1, tmp_path_factory.mktemp(name)) for name, arguments in RUNS.items()]
+    assert [run.code for run in runs] == [0, 0, 0], [run.errors for run in runs]
+    return [run.output for run in runs]
+
+
+def paths_of(value, path=""):
+    """Dotted names of what a JSON value holds."""
+    if isinstance(value, dict):
+        return {name for key, entry in value.items() for name in paths_of(entry, f"{path}.{key}" if path else key)}
+    if isinstance(value, list):
+        return {name for entry in value for name in paths_of(entry, path + "[]")}
+    return {path}
+
+
+def data_sets_of(file):
+    """Names and units of an HDF5 file's data sets."""
+    found = {}
+    with h5py.File(file) as content:
+        content.visititems(lambda name, item: found.update({name: item.attrs["unit"].decode()})
+                           if isinstance(item, h5py.Dataset) else None)
+    return found
+
+
+def compare(documented, written):
+    """Both ways; documented names may hold <placeholders>."""
+    patterns = {name: re.compile(re.sub(r"<\w+>", r"[^./]+", re.escape(name).replace(r"\<", "<").replace(r"\>", ">")))
+                for name in documented}
+    assert len(patterns) == len(documented)
+    unknown = {name for name in written if not any(pattern.fullmatch(name) for pattern in patterns.values())}
+    assert not unknown, f"written and not explained: {sorted(unknown)}"
+    missing = {name for name, pattern in patterns.items() if not any(pattern.fullmatch(path) for path in written)}
+    assert not missing, f"explained and never written: {sorted(missing)}"
+    return patterns
+
+
+def test_every_key_of_the_report_is_explained(written):
+    found = set.union(*(paths_of(json.loads((folder / "report.json").read_text())) for folder in written))
+    compare([cells[0] for heading, cells in tables(INPUTS / "README.md") if heading == "report.json"], found)
+
+
+@pytest.mark.parametrize("name", ["history.h5", "fields.h5"])
+def test_every_data_set_is_explained(written, name):
+    page = {cells[0]: cells[1] for heading, cells in tables(INPUTS / "README.md") if heading == name}
+    found = {}
+    for folder in written:
+        found.update(data_sets_of(folder / name))
+    for documented, pattern in compare(page, found).items():
+        units = {unit for data, unit in found.items() if pattern.fullmatch(data)}
+        assert units == {page[documented]}, documented
