@@ -122,7 +122,7 @@ std::string cycle_refusal(const Scene& scene, const Model& model, const Report& 
   return step_refusal(model.structure, &mode, scene.cycle.theta, period / scene.cycle.steps_per_period);
 }
 
-LimitCycle run_cycle(const Scene& scene, const Model& model, Report& report)
+LimitCycle run_cycle(const Scene& scene, const CycleOptions& options, const Model& model, Report& report)
 {
   LimitCycle cycle;
   const std::string reason = no_mode_to_follow(report);
@@ -130,12 +130,13 @@ LimitCycle run_cycle(const Scene& scene, const Model& model, Report& report)
     cycle.outcome = not_run(OutcomeKind::off, "the scene has no [cycle]");
   else if (!reason.empty())
     cycle.outcome = not_run(OutcomeKind::skipped, reason);
-  else if (const std::string lie = cycle_refusal(scene, model, report); !lie.empty())
-    cycle.outcome = not_run(OutcomeKind::refused, lie);
+  else if (const std::string refusal = cycle_refusal(scene, model, report); !refusal.empty())
+    cycle.outcome = not_run(OutcomeKind::refused, refusal);
   else
   {
-    FittedCycle fitted = find_fitted_cycle(model.structure, model.interface, report.equilibrium, report.modes,
-                                           report.estimate, scene.cycle, scene.fidelity, scene.accuracy, model.probes);
+    const CycleProblem problem{model.structure,       model.interface, report.equilibrium, report.modes.modes,
+                               growing_modes(report), report.estimate, scene.cycle,        model.probes};
+    FittedCycle fitted = find_fitted_cycle(problem, {scene.fidelity, scene.accuracy}, options);
     report.fidelity = fitted.fidelity;
     return std::move(fitted.cycle);
   }
@@ -222,6 +223,8 @@ Verdict verdict_of(const Report& report)
 Verdict run(const Scene& scene, const std::filesystem::path& output, MPI_Comm comm)
 {
   Report report;
+  CycleOptions cycle_options;
+  read_options(options_of(cycle_options));
   const Model model = timed(report, "model", comm, [&] { return build_model(scene, comm); });
   describe_model(model, report, comm);
 
@@ -231,7 +234,7 @@ Verdict run(const Scene& scene, const std::filesystem::path& output, MPI_Comm co
   report.modes = timed(report, "modes", comm, [&] { return run_modes(scene, model, report); });
   report.estimate = timed(report, "estimate", comm, [&] { return run_estimate(scene, model, report); });
   report.transient = timed(report, "transient", comm, [&] { return run_transient(scene, model, report); });
-  report.cycle = timed(report, "cycle", comm, [&] { return run_cycle(scene, model, report); });
+  report.cycle = timed(report, "cycle", comm, [&] { return run_cycle(scene, cycle_options, model, report); });
 
   report.memory_bytes = peak_memory(comm);
   write_results(report, scene, model, output, comm);

@@ -1,5 +1,6 @@
 #include "squeal/reduction/reduced_model.hpp"
 
+#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/equilibrium/closed_contact.hpp"
 
 #include <algorithm>

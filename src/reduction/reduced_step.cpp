@@ -1,7 +1,6 @@
 /// The modified theta-method on the reduced model: the scheme of transient/transient.hpp, in few dense products.
 #include "squeal/contact/pair_law.hpp"
 #include "squeal/reduction/reduced_model.hpp"
-#include "squeal/shooting/shooting.hpp"
 
 #include <petscblaslapack.h>
 
@@ -14,41 +13,7 @@ namespace
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-Owned<Mat> small_matrix(const MatrixXd& values)
-{
-  Owned<Mat> result;
-  const auto n = static_cast<PetscInt>(values.rows());
-  check(MatCreateSeqDense(PETSC_COMM_SELF, n, n, nullptr, result.put()));
-  double* entries = nullptr;
-  check(MatDenseGetArrayWrite(result, &entries));
-  std::copy_n(values.data(), values.size(), entries);
-  check(MatDenseRestoreArrayWrite(result, &entries));
-  return result;
-}
-
 } // namespace
-
-void put(const VectorXd& values, Vec x)
-{
-  PetscScalar* entries = nullptr;
-  check(VecGetArrayWrite(x, &entries));
-  std::copy_n(values.data(), values.size(), entries);
-  check(VecRestoreArrayWrite(x, &entries));
-}
-
-VectorXd entries_of(Vec x)
-{
-  const std::vector<double> values = whole(x);
-  return VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
-Owned<Vec> small_vector(const VectorXd& values)
-{
-  Owned<Vec> x;
-  check(VecCreateSeq(PETSC_COMM_SELF, static_cast<PetscInt>(values.size()), x.put()));
-  put(values, x);
-  return x;
-}
 
 MatrixXd product(const MatrixXd& A, const MatrixXd& B)
 {
@@ -219,31 +184,6 @@ Passage pass(ReducedMap& map, double period, ReducedState state)
   (void)advance(map, state, contact);
   result.rate = {(state.q - last_but_one.q) / (2 * map.h), (state.v - last_but_one.v) / (2 * map.h)};
   return result;
-}
-
-Flow flow_of(ReducedMap& map, const Structure& norm)
-{
-  const auto period_map = [&map](double period, Vec start, Vec end, Vec rate)
-  {
-    const Passage passage = pass(map, period, {entries_of(displacement(start)), entries_of(velocity(start))});
-    put(passage.end.q, displacement(end));
-    put(passage.end.v, velocity(end));
-    if (!rate) return;
-    put(passage.rate.q, displacement(rate));
-    put(passage.rate.v, velocity(rate));
-  };
-  return {period_map, norm.M, norm.K, {}};
-}
-
-Structure small_structure(const ReducedModel& model)
-{
-  Structure structure;
-  structure.M = small_matrix(model.M_z);
-  structure.C = small_matrix(model.C_z);
-  structure.K = small_matrix(model.K_z);
-  check(MatCreateVecs(structure.M, structure.load.put(), nullptr));
-  check(VecSet(structure.load, 0));
-  return structure;
 }
 
 } // namespace squeal

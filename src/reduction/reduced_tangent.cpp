@@ -1,6 +1,5 @@
-/// The reduced period map's derivative, and the full one's approximate inverse from it.
+/// The reduced period map's derivative.
 #include "squeal/reduction/reduced_model.hpp"
-#include "squeal/shooting/shooting.hpp"
 
 #include <petscblaslapack.h>
 
@@ -89,51 +88,6 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, Eigen::In
   // every entry is one rank's: a sum of it and zeros has the same bits everywhere
   MPI_Allreduce(MPI_IN_PLACE, result.data(), static_cast<int>(result.size()), MPI_DOUBLE, MPI_SUM, comm);
   return result;
-}
-
-Inside inside_of(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm)
-{
-  const ReducedModel& model = map.model;
-  const Eigen::Index n = model.size(), slow = model.slow;
-  const ReducedState f = pass(map, period, state).rate;
-  VectorXd flow(2 * n), image(2 * n);
-  flow << f.q, f.v;
-  image << model.K_z * f.q, model.M_z * f.v;
-  // dPhi S S' - f f^+ = U V', and (U V' - I)^-1 + I = -U (I - V'U)^-1 V'
-  MatrixXd U(2 * n, 2 * slow + 1), V = MatrixXd::Zero(2 * slow + 1, 2 * n);
-  U << monodromy(map, period, state, slow, comm), -flow;
-  V.topLeftCorner(slow, slow).diagonal().setOnes();
-  V.block(slow, n, slow, slow).diagonal().setOnes();
-  V.bottomRows(1) = image.transpose() / flow.dot(image);
-  MatrixXd right = product(V, U);
-  right = (MatrixXd::Identity(right.rows(), right.cols()) - right).eval();
-  return {-U, solve_dense(std::move(right), std::move(V))};
-}
-
-Preconditioner reduced_preconditioner(const Inside& inside)
-{
-  return [&inside](double, Vec x, Vec y)
-  {
-    VectorXd both(inside.right.cols());
-    both << entries_of(displacement(x)), entries_of(velocity(x));
-    both = (product(inside.left, product(inside.right, both)) - both).eval();
-    put(both.head(both.size() / 2), displacement(y));
-    put(both.tail(both.size() / 2), velocity(y));
-  };
-}
-
-Preconditioner reduced_preconditioner(const ReducedModel& model, const Structure& structure, const Inside& inside)
-{
-  return [&](double, Vec x, Vec y)
-  {
-    const ReducedState seen = coordinates(model, structure, displacement(x), velocity(x));
-    VectorXd both(inside.right.cols());
-    both << seen.q, seen.v;
-    both = product(inside.left, product(inside.right, both));
-    check(VecAXPBY(y, -1, 0, x));
-    add_motion(model, 1, both.head(model.size()), displacement(y));
-    add_motion(model, 1, both.tail(model.size()), velocity(y));
-  };
 }
 
 } // namespace squeal

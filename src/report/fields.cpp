@@ -220,8 +220,8 @@ void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Mode
 /// Samples are spread evenly over the steps of the period and end with its last one [s].
 double sample_time(const LimitCycle& cycle, std::size_t sample)
 {
-  const double steps = cycle.steps_per_period, samples = static_cast<double>(cycle.displacements.size());
-  return std::ceil(static_cast<double>(sample + 1) * steps / samples) * cycle.period / steps;
+  const double steps = cycle.steps_per_period, samples = static_cast<double>(cycle.measured.displacements.size());
+  return std::ceil(static_cast<double>(sample + 1) * steps / samples) * cycle.orbit.period / steps;
 }
 
 } // namespace
@@ -251,7 +251,7 @@ void write_fields(const Report& report, const Scene& scene, const Model& model, 
     on_rank_zero(comm, [&] { write_contact(*file, report, scene, model.mesh, layout); });
   }
   write_modes(file, gather, report.modes, layout, comm);
-  const auto& samples = report.cycle.displacements;
+  const auto& samples = report.cycle.measured.displacements;
   for (std::size_t i = 0; i < samples.size(); ++i)
   {
     write_displacement(file, gather, samples[i], cycle_data(i), comm);

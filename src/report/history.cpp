@@ -54,8 +54,8 @@ void write_history(const Report& report, const Scene& scene, const std::filesyst
   if (has_run(report.transient.outcome)) write_group(file, "transient", report.transient.history, scene);
   if (has_run(report.cycle.outcome))
   {
-    write_group(file, "cycle", report.cycle.history, scene);
-    write_statuses(file, report.cycle.statuses);
+    write_group(file, "cycle", report.cycle.measured.history, scene);
+    write_statuses(file, report.cycle.measured.statuses);
   }
   file.keep();
 }

@@ -124,7 +124,7 @@ Json newton_list(const std::vector<NewtonRecord>& records)
 {
   Json list = Json::array();
   for (const NewtonRecord& record : records)
-    list.push_back({{"stage", record.stage},
+    list.push_back({{"stage", word(record.stage)},
                     {"unknowns", record.unknowns},
                     {"periods", record.periods},
                     {"period", record.period},
@@ -133,14 +133,14 @@ Json newton_list(const std::vector<NewtonRecord>& records)
   return list;
 }
 
-Json multiplier_entry(const LimitCycle& cycle)
+Json multiplier_entry(const Multipliers& multipliers)
 {
   Json list = Json::array();
-  for (const std::complex<double>& multiplier : cycle.multipliers)
+  for (const std::complex<double>& multiplier : multipliers.values)
     list.push_back({{"real", multiplier.real()}, {"imaginary", multiplier.imag()}});
-  return {{"stability", cycle.stability},
-          {"trivial_error", cycle.trivial_error},
-          {"periods_integrated", cycle.multiplier_periods},
+  return {{"stability", word(multipliers.stability)},
+          {"trivial_error", multipliers.trivial_error},
+          {"periods_integrated", multipliers.periods},
           {"values", list}};
 }
 
@@ -149,28 +149,28 @@ Json cycle_entry(const Report& report, const Scene& scene)
   const LimitCycle& cycle = report.cycle;
   Json entry = entry_of(cycle.outcome);
   if (!has_run(cycle.outcome) || cycle.outcome.kind == OutcomeKind::refused) return entry;
-  entry["period"] = cycle.period;
-  entry["frequency_hz"] = 1 / cycle.period;
+  entry["period"] = cycle.orbit.period;
+  entry["frequency_hz"] = 1 / cycle.orbit.period;
   entry["steps_per_period"] = cycle.steps_per_period;
   entry["tolerance"] = scene.cycle.tolerance;
-  entry["residual_projected"] = cycle.residual_projected;
-  entry["residual_full"] = cycle.residual_full;
+  entry["residual_projected"] = cycle.convergence.residual_projected;
+  entry["residual_full"] = cycle.orbit.residual;
   entry["growth_rate_bias"] = cycle_bias(report).growth;
   entry["frequency_bias"] = cycle_bias(report).frequency;
-  entry["normal_force_chatter"] = chatter(cycle.history);
-  entry["newton_iterations"] = cycle.newton_iterations;
-  entry["periods_integrated"] = cycle.periods_integrated;
-  entry["mean_energy"] = cycle.mean_energy;
-  entry["mean_fluctuating_energy"] = cycle.mean_fluctuating_energy;
-  entry["open_pairs_mean"] = cycle.open_pairs_mean;
-  entry["open_pairs_max"] = cycle.open_pairs_max;
-  entry["stick_pairs_max"] = cycle.stick_pairs_max;
+  entry["normal_force_chatter"] = chatter(cycle.measured.history);
+  entry["newton_iterations"] = cycle.convergence.iterations;
+  entry["periods_integrated"] = cycle.convergence.periods;
+  entry["mean_energy"] = cycle.measured.mean_energy;
+  entry["mean_fluctuating_energy"] = cycle.measured.mean_fluctuating_energy;
+  entry["open_pairs_mean"] = cycle.measured.open_pairs_mean;
+  entry["open_pairs_max"] = cycle.measured.open_pairs_max;
+  entry["stick_pairs_max"] = cycle.measured.stick_pairs_max;
   Json swings = Json::object();
-  const std::size_t probes = std::min(scene.probes.size(), cycle.peak_to_peak.size());
-  for (std::size_t i = 0; i < probes; ++i) swings[scene.probes[i].name] = cycle.peak_to_peak[i];
+  const std::size_t probes = std::min(scene.probes.size(), cycle.measured.peak_to_peak.size());
+  for (std::size_t i = 0; i < probes; ++i) swings[scene.probes[i].name] = cycle.measured.peak_to_peak[i];
   entry["peak_to_peak"] = swings;
-  if (!cycle.multipliers.empty()) entry["multipliers"] = multiplier_entry(cycle);
-  entry["newton"] = newton_list(cycle.records);
+  if (!cycle.multipliers.values.empty()) entry["multipliers"] = multiplier_entry(cycle.multipliers);
+  entry["newton"] = newton_list(cycle.convergence.records);
   return entry;
 }
 
@@ -229,12 +229,12 @@ std::string report_json(const Report& report, const Scene& scene)
                    {"ranks", report.ranks},
                    {"memory_bytes", report.memory_bytes},
                    {"rounding_hz", report.rounding_hz}};
-  const double factor = std::max(report.transient.factor_seconds, report.cycle.factor_seconds);
+  const double factor = std::max(report.transient.factor_seconds, report.cycle.costs.factor_seconds);
   if (factor > 0) // A was factored: what one step size costs before the first step
   {
     json["model"]["factor_seconds"] = factor;
     json["model"]["condensed_operator_seconds"] =
-        std::max(report.transient.condensed_seconds, report.cycle.condensed_seconds);
+        std::max(report.transient.condensed_seconds, report.cycle.costs.condensed_seconds);
   }
   json["equilibrium"] = equilibrium_entry(report, scene);
   json["modes"] = modes_entry(report.modes);

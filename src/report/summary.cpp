@@ -112,25 +112,30 @@ std::string cycle_text(const Report& report, const Scene& scene)
   const LimitCycle& cycle = report.cycle;
   std::string text = row("cycle", outcome_text(cycle.outcome));
   if (!has_run(cycle.outcome) || cycle.outcome.kind == OutcomeKind::refused) return text;
-  const std::string projected =
-      std::isfinite(cycle.residual_projected) ? format("%.2e", cycle.residual_projected) : std::string("not tried");
-  text += row(
-      "", format("residual: full space %.2e (tolerance %.0e), projected ", cycle.residual_full, scene.cycle.tolerance) +
-              projected);
-  text += row("", format("%d Newton steps, %ld periods integrated, %d steps a period", cycle.newton_iterations,
-                         cycle.periods_integrated, cycle.steps_per_period));
+  const std::string projected = std::isfinite(cycle.convergence.residual_projected)
+                                    ? format("%.2e", cycle.convergence.residual_projected)
+                                    : std::string("not tried");
+  text += row("", format("residual: full space %.2e (tolerance %.0e), projected ", cycle.orbit.residual,
+                         scene.cycle.tolerance) +
+                      projected);
+  text += row("", format("%d Newton steps, %ld periods integrated, %d steps a period", cycle.convergence.iterations,
+                         cycle.convergence.periods, cycle.steps_per_period));
   if (cycle.outcome.kind != OutcomeKind::converged) return text; // the figures of no cycle would mislead
-  text += row("", format("period %.10g s, frequency %.8g Hz", cycle.period, 1 / cycle.period));
+  text += row("", format("period %.10g s, frequency %.8g Hz", cycle.orbit.period, 1 / cycle.orbit.period));
   text += row("", format("the step's own error of the period: about %+.1e", -cycle_bias(report).frequency));
-  text += row("", format("mean energy %.7g J, fluctuating %.7g J", cycle.mean_energy, cycle.mean_fluctuating_energy));
-  text += row("", format("open pairs: %.2f on average, %d at most; sticking: %d at most", cycle.open_pairs_mean,
-                         cycle.open_pairs_max, cycle.stick_pairs_max));
-  if (!cycle.multipliers.empty())
-    text += row("", format("%s by %zu multipliers: the largest is %.6f, error bar %.1e", cycle.stability.c_str(),
-                           cycle.multipliers.size(), std::abs(cycle.multipliers.front()), cycle.trivial_error));
-  const std::size_t probes = std::min(scene.probes.size(), cycle.peak_to_peak.size());
+  text += row("", format("mean energy %.7g J, fluctuating %.7g J", cycle.measured.mean_energy,
+                         cycle.measured.mean_fluctuating_energy));
+  text +=
+      row("", format("open pairs: %.2f on average, %d at most; sticking: %d at most", cycle.measured.open_pairs_mean,
+                     cycle.measured.open_pairs_max, cycle.measured.stick_pairs_max));
+  if (!cycle.multipliers.values.empty())
+    text += row("", format("%s by %zu multipliers: the largest is %.6f, error bar %.1e",
+                           word(cycle.multipliers.stability), cycle.multipliers.values.size(),
+                           std::abs(cycle.multipliers.values.front()), cycle.multipliers.trivial_error));
+  const std::size_t probes = std::min(scene.probes.size(), cycle.measured.peak_to_peak.size());
   for (std::size_t i = 0; i < probes; ++i)
-    text += row("", format("probe %s: %.6g m peak to peak", scene.probes[i].name.c_str(), cycle.peak_to_peak[i]));
+    text +=
+        row("", format("probe %s: %.6g m peak to peak", scene.probes[i].name.c_str(), cycle.measured.peak_to_peak[i]));
   return text;
 }
 
@@ -146,7 +151,7 @@ std::string fidelity_text(const Fidelity& fidelity)
                      fidelity.sliding_pairs));
   text += row("", format("%ld periods of the reduced model, %ld of the full one", fidelity.reduced_periods,
                          fidelity.full_periods));
-  text += row("", format("error estimates (wish %.0e): frequency %.1e, energy %.1e; of the steps %.1e, %.1e",
+  text += row("", format("error estimates (asked for %.0e): frequency %.1e, energy %.1e; of the steps %.1e, %.1e",
                          fidelity.accuracy, fidelity.frequency_error, fidelity.energy_error,
                          fidelity.step_frequency_error, fidelity.step_energy_error));
   return text;

@@ -103,13 +103,13 @@ Sentences of_cycle(const Report& report)
   if (std::abs(bias.growth) > .1)
     said.push_back(format("theta and the step change the growth rate by %+.0f %%: the cycle's amplitude suffers",
                           100 * bias.growth));
-  if (cycle.residual_full > 1e-3 && report.fidelity.used == CycleModel::full)
+  if (cycle.orbit.residual > 1e-3 && report.fidelity.used == CycleModel::full)
     said.push_back("a residual this large is no proof of a periodic motion");
-  add_chatter(cycle.history, said);
-  if (cycle.stability == "undecided")
+  add_chatter(cycle.measured.history, said);
+  if (cycle.multipliers.stability == Stability::undecided)
     said.push_back(
         "whether a vibration settles on this cycle is undecided: its largest multiplier is 1 to within its error");
-  if (cycle.multipliers.empty())
+  if (cycle.multipliers.values.empty())
     said.push_back("whether this cycle attracts was not examined: -cycle_multipliers 20 does");
   return said;
 }
@@ -130,8 +130,8 @@ StepBias transient_bias(const Report& report)
 
 StepBias cycle_bias(const Report& report)
 {
-  if (report.modes.modes.empty() || !(report.cycle.period > 0)) return {};
-  const double h = report.cycle.period / report.cycle.steps_per_period;
+  if (report.modes.modes.empty() || !(report.cycle.orbit.period > 0)) return {};
+  const double h = report.cycle.orbit.period / report.cycle.steps_per_period;
   return bias_of(report, discrete_eigenvalue(report.modes.modes.front().lambda, report.cycle.theta, h));
 }
 

@@ -1,12 +1,10 @@
-/// Fallback of the finish: Newton with a line search on the bordered system, GMRES on directional differences,
-/// preconditioned from the right by the sliding modes (options -cycle_full_snes_..., -cycle_full_ksp_...).
-/// The unknown is one Vec z = (omega sqrt(m) u, sqrt(m) v, speed T) with m the diagonal of M: its plain norm, which
-/// PETSc's solvers take, then stands for the energy norm. Convergence is judged in the energy norm itself.
-#include "squeal/shooting/shooting.hpp"
+#include "newton_krylov.hpp"
+
+#include "bordered_system.hpp"
+#include "squeal/base/callback.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 
 namespace squeal
 {
@@ -14,39 +12,28 @@ namespace squeal
 namespace
 {
 
-struct FullSpace
+/// What PETSc's callbacks share.
+struct FullSpaceSystem
 {
-  Shooting& shooting;
+  const OrbitProblem& problem;
+  const ShootingOptions& options;
+  ConvergenceLog& log;
   Owned<Vec> scale; // (omega sqrt(m), sqrt(m))
   double speed = 0;
-  Orbit orbit; // evaluated last, at state `at`
-  Owned<Vec> at, anchor;
+  Orbit orbit;           // evaluated last
+  Owned<Vec> at, anchor; // z and the state of that orbit; the state where the phase row belongs
   Border border;
   Orbit best;
-  int vanished = 0; // points met whose fluctuation is next to nothing
+  int collapses = 0; // points met that fall onto the equilibrium
   std::exception_ptr failure;
 };
 
-template <class Work> PetscErrorCode guarded(FullSpace& full, Work work)
-{
-  try
-  {
-    work();
-  }
-  catch (...)
-  {
-    full.failure = std::current_exception();
-    return PETSC_ERR_LIB;
-  }
-  return PETSC_SUCCESS;
-}
-
-/// z = (scaled state, speed * border); the border lives on rank 0, after this rank's part of the state.
-void pack(const FullSpace& full, Vec state, double border, Vec z)
+/// z = (scaled state, speed * border). The border is an entry of rank 0, after this rank's part of the state.
+void pack(const FullSpaceSystem& system, Vec state, double border, Vec z)
 {
   const Owned<Vec> scaled = zeros_like(state);
-  check(VecPointwiseMult(displacement(scaled), displacement(full.scale), displacement(state)));
-  check(VecPointwiseMult(velocity(scaled), velocity(full.scale), velocity(state)));
+  check(VecPointwiseMult(displacement(scaled), displacement(system.scale), displacement(state)));
+  check(VecPointwiseMult(velocity(scaled), velocity(system.scale), velocity(state)));
   double* to = nullptr;
   check(VecGetArray(z, &to));
   PetscInt offset = 0;
@@ -60,11 +47,11 @@ void pack(const FullSpace& full, Vec state, double border, Vec z)
     check(VecRestoreArrayRead(part, &from));
     offset += size;
   }
-  if (rank_of(comm_of(z)) == 0) to[offset] = full.speed * border;
+  if (rank_of(comm_of(z)) == 0) to[offset] = system.speed * border;
   check(VecRestoreArray(z, &to));
 }
 
-double unpack(const FullSpace& full, Vec z, Vec state)
+double unpack(const FullSpaceSystem& system, Vec z, Vec state)
 {
   const double* from = nullptr;
   check(VecGetArrayRead(z, &from));
@@ -80,20 +67,20 @@ double unpack(const FullSpace& full, Vec z, Vec state)
     offset += size;
   }
   const MPI_Comm comm = comm_of(z);
-  double border = rank_of(comm) == 0 ? from[offset] / full.speed : 0;
+  double border = rank_of(comm) == 0 ? from[offset] / system.speed : 0;
   MPI_Bcast(&border, 1, MPI_DOUBLE, 0, comm);
   check(VecRestoreArrayRead(z, &from));
-  check(VecPointwiseDivide(displacement(state), displacement(state), displacement(full.scale)));
-  check(VecPointwiseDivide(velocity(state), velocity(state), velocity(full.scale)));
+  check(VecPointwiseDivide(displacement(state), displacement(state), displacement(system.scale)));
+  check(VecPointwiseDivide(velocity(state), velocity(state), velocity(system.scale)));
   return border;
 }
 
-Owned<Vec> make_scale(const Shooting& shooting, double period)
+Owned<Vec> make_scale(const OrbitProblem& problem, double period)
 {
-  Owned<Vec> scale = zeros_like(shooting.equilibrium);
+  Owned<Vec> scale = zeros_like(problem.equilibrium);
   const Vec mass = velocity(scale);
   double largest = 0;
-  check(MatGetDiagonal(shooting.flow.M, mass));
+  check(MatGetDiagonal(problem.flow.M, mass));
   check(VecMax(mass, nullptr, &largest));
   // a motion with next to no mass still needs a scale
   const Owned<Vec> floor = zeros_like(mass);
@@ -105,119 +92,122 @@ Owned<Vec> make_scale(const Shooting& shooting, double period)
   return scale;
 }
 
-PetscErrorCode function(SNES, Vec z, Vec R, void* context)
+/// R = (F, <f, x - anchor>/speed), or large values where the point is outside the solver's bounds.
+void form_residual(FullSpaceSystem& system, Vec z, Vec R)
 {
-  FullSpace& full = *static_cast<FullSpace*>(context);
-  return guarded(full,
-                 [&]
-                 {
-                   const Owned<Vec> state = zeros_like(full.orbit.state);
-                   const double period = unpack(full, z, state);
-                   check(VecSet(R, 1e6 * full.orbit.fluctuation)); // far outside: the line search comes back
-                   if (!admissible_period(full.shooting, period)) return;
-                   PetscBool same = PETSC_FALSE;
-                   check(VecEqual(z, full.at, &same));
-                   if (!same)
-                   {
-                     Orbit orbit = evaluate(full.shooting, state, period);
-                     if (vanishing(full.shooting, orbit)) ++full.vanished;
-                     if (!std::isfinite(orbit.residual) || vanishing(full.shooting, orbit)) return;
-                     full.orbit = std::move(orbit);
-                     check(VecCopy(z, full.at));
-                     if (full.orbit.residual < full.best.residual) full.best = copy_of(full.orbit);
-                   }
-                   double along = 0;
-                   const Owned<Vec> moved = copy_of(state);
-                   check(VecAXPY(moved, -1, full.anchor));
-                   check(VecDot(full.border.phase, moved, &along));
-                   pack(full, full.orbit.defect, along / full.speed, R);
-                 });
+  const Owned<Vec> state = zeros_like(system.orbit.state);
+  const double period = unpack(system, z, state);
+  check(VecSet(R, 1e6 * system.orbit.fluctuation)); // far outside: the line search comes back
+  if (!admissible_period(system.problem, period)) return;
+  PetscBool same = PETSC_FALSE;
+  check(VecEqual(z, system.at, &same));
+  if (!same)
+  {
+    Orbit orbit = evaluate(system.problem, system.log, state, period);
+    const bool collapses = collapsing(system.problem, orbit);
+    if (collapses) ++system.collapses;
+    if (collapses || !std::isfinite(orbit.residual)) return;
+    system.orbit = std::move(orbit);
+    check(VecCopy(z, system.at));
+    if (system.orbit.residual < system.best.residual) system.best = copy_of(system.orbit);
+  }
+  double along = 0;
+  const Owned<Vec> moved = copy_of(state);
+  check(VecAXPY(moved, -1, system.anchor));
+  check(VecDot(system.border.phase, moved, &along));
+  pack(system, system.orbit.defect, along / system.speed, R);
 }
 
-/// Before each linear solve: the phase row and the T column belong to the current point.
-PetscErrorCode jacobian(SNES, Vec z, Mat, Mat, void* context)
+/// Moves the phase row and the T column to z.
+void form_border(FullSpaceSystem& system, Vec z)
 {
-  FullSpace& full = *static_cast<FullSpace*>(context);
-  return guarded(full,
-                 [&]
-                 {
-                   PetscBool same = PETSC_FALSE;
-                   check(VecEqual(z, full.at, &same));
-                   if (!same)
-                   {
-                     const Owned<Vec> state = zeros_like(full.orbit.state);
-                     const double period = unpack(full, z, state);
-                     full.orbit = evaluate(full.shooting, state, period);
-                     check(VecCopy(z, full.at));
-                   }
-                   full.anchor = copy_of(full.orbit.state);
-                   full.border = border_at(full.shooting, full.orbit);
-                 });
+  PetscBool same = PETSC_FALSE;
+  check(VecEqual(z, system.at, &same));
+  if (!same)
+  {
+    const Owned<Vec> state = zeros_like(system.orbit.state);
+    const double period = unpack(system, z, state);
+    system.orbit = evaluate(system.problem, system.log, state, period);
+    check(VecCopy(z, system.at));
+  }
+  system.anchor = copy_of(system.orbit.state);
+  system.border = border_at(system.problem, system.orbit);
 }
 
 /// (dPhi/dx - I) dx + d dT by one difference in dx, and the phase row.
-PetscErrorCode multiply(Mat J, Vec dz, Vec product)
+void apply_jacobian(FullSpaceSystem& system, Vec dz, Vec product)
 {
-  FullSpace* full = nullptr;
-  PetscCall(MatShellGetContext(J, &full));
-  return guarded(*full,
-                 [&]
-                 {
-                   const Flow& flow = full->shooting.flow;
-                   const Owned<Vec> direction = zeros_like(full->orbit.state), end = zeros_like(full->orbit.state);
-                   const double period = unpack(*full, dz, direction);
-                   const double length = energy_norm(flow, direction);
-                   double along = 0;
-                   check(VecDot(full->border.phase, direction, &along));
-                   if (length > 0)
-                   {
-                     const double step = full->shooting.options.difference * full->orbit.fluctuation / length;
-                     const Owned<Vec> moved = copy_of(full->orbit.state);
-                     check(VecAXPY(moved, step, direction));
-                     flow.integrate(full->orbit.period, moved, end, nullptr);
-                     ++full->shooting.periods;
-                     check(VecAXPY(end, -1, moved));
-                     check(VecAXPY(end, -1, full->orbit.defect));
-                     check(VecScale(end, 1 / step));
-                   }
-                   check(VecAXPY(end, period, full->orbit.rate));
-                   pack(*full, end, along / full->speed, product);
-                 });
+  const Flow& flow = system.problem.flow;
+  const Owned<Vec> direction = zeros_like(system.orbit.state), end = zeros_like(system.orbit.state);
+  const double period = unpack(system, dz, direction);
+  const double length = energy_norm(flow, direction);
+  double along = 0;
+  check(VecDot(system.border.phase, direction, &along));
+  if (length > 0)
+  {
+    const double step = system.options.difference * system.orbit.fluctuation / length;
+    const Owned<Vec> moved = copy_of(system.orbit.state);
+    check(VecAXPY(moved, step, direction));
+    flow.integrate(system.orbit.period, moved, end, nullptr);
+    ++system.log.convergence.periods;
+    check(VecAXPY(end, -1, moved));
+    check(VecAXPY(end, -1, system.orbit.defect));
+    check(VecScale(end, 1 / step));
+  }
+  check(VecAXPY(end, period, system.orbit.rate));
+  pack(system, end, along / system.speed, product);
 }
 
-PetscErrorCode precondition(PC pc, Vec b, Vec z)
+void apply_bordered_preconditioner(const FullSpaceSystem& system, Vec b, Vec z)
 {
-  FullSpace* full = nullptr;
-  PetscCall(PCShellGetContext(pc, &full));
-  return guarded(*full,
-                 [&]
-                 {
-                   const Owned<Vec> rhs = zeros_like(full->orbit.state), x = zeros_like(full->orbit.state);
-                   const double row = unpack(*full, b, rhs) * full->speed;
-                   apply(full->shooting.preconditioner, full->orbit.period, rhs, x);
-                   const double period = close_border(full->border, x, row);
-                   pack(*full, x, period, z);
-                 });
+  const Owned<Vec> rhs = zeros_like(system.orbit.state), x = zeros_like(system.orbit.state);
+  const double row = unpack(system, b, rhs) * system.speed;
+  apply(system.problem.preconditioner, system.orbit.period, rhs, x);
+  const double period = close_border(system.border, x, row);
+  pack(system, x, period, z);
 }
 
-PetscErrorCode converged(SNES, PetscInt iteration, PetscReal, PetscReal, PetscReal, SNESConvergedReason* reason,
-                         void* context)
+SNESConvergedReason reason_to_stop(FullSpaceSystem& system, PetscInt iteration)
 {
-  FullSpace& full = *static_cast<FullSpace*>(context);
-  Shooting& shooting = full.shooting;
-  return guarded(full,
-                 [&]
-                 {
-                   record(shooting, "newton-krylov", full_unknowns(full.orbit), std::nan(""), full.orbit);
-                   if (iteration > 0) ++shooting.iterations;
-                   *reason = SNES_CONVERGED_ITERATING;
-                   if (full.orbit.residual <= shooting.tolerance)
-                     *reason = SNES_CONVERGED_FNORM_ABS;
-                   else if (full.vanished > 1)
-                     *reason = SNES_DIVERGED_FUNCTION_DOMAIN; // Newton leads to rest
-                   else if (shooting.periods >= shooting.options.max_periods)
-                     *reason = SNES_DIVERGED_FUNCTION_COUNT;
-                 });
+  record_full(system.log, ShootingStage::newton_krylov, system.orbit);
+  if (iteration > 0) ++system.log.convergence.iterations;
+  if (system.orbit.residual <= system.problem.tolerance) return SNES_CONVERGED_FNORM_ABS;
+  if (system.collapses > 1) return SNES_DIVERGED_FUNCTION_DOMAIN; // Newton leads to rest
+  if (system.log.convergence.periods >= system.options.max_periods) return SNES_DIVERGED_FUNCTION_COUNT;
+  return SNES_CONVERGED_ITERATING;
+}
+
+PetscErrorCode residual_callback(SNES, Vec z, Vec R, void* context)
+{
+  FullSpaceSystem& system = *static_cast<FullSpaceSystem*>(context);
+  return guarded(system.failure, [&] { form_residual(system, z, R); });
+}
+
+PetscErrorCode jacobian_callback(SNES, Vec z, Mat, Mat, void* context)
+{
+  FullSpaceSystem& system = *static_cast<FullSpaceSystem*>(context);
+  return guarded(system.failure, [&] { form_border(system, z); });
+}
+
+PetscErrorCode multiply_callback(Mat J, Vec dz, Vec product)
+{
+  FullSpaceSystem* system = nullptr;
+  PetscCall(MatShellGetContext(J, &system));
+  return guarded(system->failure, [&] { apply_jacobian(*system, dz, product); });
+}
+
+PetscErrorCode precondition_callback(PC pc, Vec b, Vec z)
+{
+  FullSpaceSystem* system = nullptr;
+  PetscCall(PCShellGetContext(pc, &system));
+  return guarded(system->failure, [&] { apply_bordered_preconditioner(*system, b, z); });
+}
+
+PetscErrorCode convergence_callback(SNES, PetscInt iteration, PetscReal, PetscReal, PetscReal,
+                                    SNESConvergedReason* reason, void* context)
+{
+  FullSpaceSystem& system = *static_cast<FullSpaceSystem*>(context);
+  return guarded(system.failure, [&] { *reason = reason_to_stop(system, iteration); });
 }
 
 /// The solver with its defaults and the user's options.
@@ -227,7 +217,7 @@ Owned<SNES> make_solver(MPI_Comm comm)
   check(SNESCreate(comm, snes.put()));
   check(SNESSetOptionsPrefix(snes, "cycle_full_"));
   check(SNESSetTolerances(snes, 0, 0, 0, 30, 10000));
-  check(SNESSetMaxLinearSolveFailures(snes, 30)); // an inexact step is still one down the residual
+  check(SNESSetMaxLinearSolveFailures(snes, 30)); // an inexact step still reduces the residual
   KSP ksp = nullptr;
   PC pc = nullptr;
   check(SNESGetKSP(snes, &ksp));
@@ -241,11 +231,11 @@ Owned<SNES> make_solver(MPI_Comm comm)
   return snes;
 }
 
-void set_up(SNES snes, FullSpace& full, Mat J, Vec R)
+void set_callbacks(SNES snes, FullSpaceSystem& system, Mat J, Vec R)
 {
-  check(SNESSetFunction(snes, R, function, &full));
-  check(SNESSetJacobian(snes, J, J, jacobian, &full));
-  check(SNESSetConvergenceTest(snes, converged, &full, nullptr));
+  check(SNESSetFunction(snes, R, residual_callback, &system));
+  check(SNESSetJacobian(snes, J, J, jacobian_callback, &system));
+  check(SNESSetConvergenceTest(snes, convergence_callback, &system, nullptr));
   KSP ksp = nullptr;
   PC pc = nullptr;
   check(SNESGetKSP(snes, &ksp));
@@ -253,30 +243,33 @@ void set_up(SNES snes, FullSpace& full, Mat J, Vec R)
   PetscBool standard = PETSC_FALSE;
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &standard));
   if (!standard) return; // the user's choice
-  check(PCShellSetContext(pc, &full));
-  check(PCShellSetName(pc, "sliding modes, bordered"));
-  check(PCShellSetApply(pc, precondition));
+  check(PCShellSetContext(pc, &system));
+  check(PCShellSetName(pc, "of the period map, bordered"));
+  check(PCShellSetApply(pc, precondition_callback));
 }
 
 } // namespace
 
-void declare_fallback_options()
+void declare_newton_krylov_options()
 {
   (void)make_solver(PETSC_COMM_WORLD);
 }
 
-Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start)
+StageResult shoot_by_newton_krylov(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
+                                   const Orbit& start)
 {
-  FullSpace full{shooting,
-                 make_scale(shooting, start.period),
-                 energy_norm(shooting.flow, start.rate),
-                 copy_of(start),
-                 {},
-                 copy_of(start.state),
-                 border_at(shooting, start),
-                 copy_of(start),
-                 0,
-                 {}};
+  FullSpaceSystem system{problem,
+                         options,
+                         log,
+                         make_scale(problem, start.period),
+                         energy_norm(problem.flow, start.rate),
+                         copy_of(start),
+                         {},
+                         copy_of(start.state),
+                         border_at(problem, start),
+                         copy_of(start),
+                         0,
+                         {}};
   const MPI_Comm comm = comm_of(displacement(start.state));
   PetscInt local = 0;
   check(VecGetLocalSize(displacement(start.state), &local));
@@ -284,20 +277,18 @@ Finish shoot_newton_krylov(Shooting& shooting, const Orbit& start)
   Owned<Vec> z, R;
   check(VecCreateMPI(comm, local, PETSC_DETERMINE, z.put()));
   R = zeros_like(z);
-  full.at = zeros_like(z);
-  pack(full, start.state, start.period, z);
-  check(VecCopy(z, full.at));
+  system.at = zeros_like(z);
+  pack(system, start.state, start.period, z);
+  check(VecCopy(z, system.at));
   Owned<Mat> J;
-  check(MatCreateShell(comm, local, local, PETSC_DETERMINE, PETSC_DETERMINE, &full, J.put()));
-  check(MatShellSetOperation(J, MATOP_MULT, reinterpret_cast<void (*)(void)>(multiply)));
+  check(MatCreateShell(comm, local, local, PETSC_DETERMINE, PETSC_DETERMINE, &system, J.put()));
+  check(MatShellSetOperation(J, MATOP_MULT, reinterpret_cast<void (*)(void)>(multiply_callback)));
   const Owned<SNES> snes = make_solver(comm);
-  set_up(snes, full, J, R);
-  const PetscErrorCode code = SNESSolve(snes, nullptr, z);
-  if (full.failure) std::rethrow_exception(full.failure);
-  check(code);
-  const bool done = full.best.residual <= shooting.tolerance;
-  const Ending other = full.vanished > 1 ? Ending::vanished : Ending::stalled;
-  return {std::move(full.best), done ? Ending::converged : other};
+  set_callbacks(snes, system, J, R);
+  check_after_callbacks(SNESSolve(snes, nullptr, z), system.failure);
+  const bool done = system.best.residual <= problem.tolerance;
+  const StageEnding other = system.collapses > 1 ? StageEnding::collapsed : StageEnding::stalled;
+  return {std::move(system.best), done ? StageEnding::converged : other};
 }
 
 } // namespace squeal

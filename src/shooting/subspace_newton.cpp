@@ -1,40 +1,26 @@
-/// The paper's reduced shooting, on any base: x = x_k + E c with E energy-orthonormal, unknowns y = (T, c),
-///     R_0 = <f, x - anchor>,   R_i = <e_i, Phi_T(x) - x>,   i = 1 ... n.
-/// f and the anchor are those of the last Jacobian: the Newton correction is orthogonal to the flow where it starts.
-/// Everything is scaled by the fluctuation, so that y and R are of order one. The system is small, dense and held by
-/// every rank; the flow underneath is collective.
-#include "squeal/shooting/shooting.hpp"
+#include "subspace_newton.hpp"
+
+#include "squeal/base/callback.hpp"
 
 #include <cmath>
-#include <exception>
-#include <petscblaslapack.h>
+#include <Eigen/Dense>
 
 namespace squeal
 {
 
-void extend_base(const Shooting& shooting, std::vector<Owned<Vec>>& base, Vec candidate)
-{
-  const double length = energy_norm(shooting.flow, candidate);
-  if (!(length > 0)) return;
-  Owned<Vec> fresh = copy_of(candidate);
-  for (int pass = 0; pass < 2; ++pass) // the second removes what rounding left
-    for (const auto& member : base) check(VecAXPY(fresh, -energy_product(shooting.flow, member, fresh), member));
-  const double left = energy_norm(shooting.flow, fresh);
-  if (left < shooting.options.rank_tolerance * length) return;
-  check(VecScale(fresh, 1 / left));
-  base.push_back(std::move(fresh));
-}
-
 namespace
 {
 
-struct Reduced
+/// What PETSc's callbacks share.
+struct SubspaceSystem
 {
-  Shooting& shooting;
+  const OrbitProblem& problem;
+  const ShootingOptions& options;
+  ConvergenceLog& log;
+  ShootingStage stage;
   std::vector<Owned<Vec>> base, image; // e_i and their energy images
-  std::string stage;
   Owned<Vec> origin;
-  double period = 0, period_scale = 0, scale = 0; // of the origin; of one unit of y_0, y_i
+  double period = 0, period_scale = 0, scale = 0; // of the origin; of one unit of y_0; of one unit of y_i
   Orbit orbit;                                    // evaluated last, at `at`
   std::vector<double> at;
   Owned<Vec> anchor, phase; // phase: energy image of the unit flow
@@ -43,22 +29,7 @@ struct Reduced
   PetscInt size() const { return static_cast<PetscInt>(base.size()) + 1; }
 };
 
-// PETSc calls back through C: an exception waits here until the solver has returned.
-template <class Work> PetscErrorCode guarded(Reduced& reduced, Work work)
-{
-  try
-  {
-    work();
-  }
-  catch (...)
-  {
-    reduced.failure = std::current_exception();
-    return PETSC_ERR_LIB;
-  }
-  return PETSC_SUCCESS;
-}
-
-std::vector<double> entries_of(const Reduced& reduced, Vec y)
+std::vector<double> entries_of(const SubspaceSystem& system, Vec y)
 {
   const double* entries = nullptr;
   PetscInt size = 0;
@@ -67,55 +38,50 @@ std::vector<double> entries_of(const Reduced& reduced, Vec y)
   std::vector<double> result(entries, entries + size);
   check(VecRestoreArrayRead(y, &entries));
   // all ranks go the same way in the solver only if they hold the same bits
-  MPI_Bcast(result.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm_of(reduced.origin));
+  MPI_Bcast(result.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm_of(system.origin));
   return result;
 }
 
-/// Makes `orbit` the one at y; false when T has left its bounds.
-bool evaluate_at(Reduced& reduced, const std::vector<double>& y)
+/// Makes `orbit` the one at y. Returns false when T has left its bounds.
+bool evaluate_at(SubspaceSystem& system, const std::vector<double>& y)
 {
-  if (y == reduced.at) return true;
-  const double period = reduced.period + y[0] * reduced.period_scale;
-  if (!admissible_period(reduced.shooting, period)) return false;
-  const Owned<Vec> state = copy_of(reduced.origin);
-  for (std::size_t i = 0; i < reduced.base.size(); ++i)
-    check(VecAXPY(state, y[i + 1] * reduced.scale, reduced.base[i]));
-  reduced.orbit = evaluate(reduced.shooting, state, period);
-  reduced.at = y;
-  return std::isfinite(reduced.orbit.residual);
+  if (y == system.at) return true;
+  const double period = system.period + y[0] * system.period_scale;
+  if (!admissible_period(system.problem, period)) return false;
+  const Owned<Vec> state = copy_of(system.origin);
+  for (std::size_t i = 0; i < system.base.size(); ++i) check(VecAXPY(state, y[i + 1] * system.scale, system.base[i]));
+  system.orbit = evaluate(system.problem, system.log, state, period);
+  system.at = y;
+  return std::isfinite(system.orbit.residual);
 }
 
-std::vector<double> projections(const Reduced& reduced, Vec x)
+/// <e_i, x>
+std::vector<double> projections(const SubspaceSystem& system, Vec x)
 {
   std::vector<double> result;
-  for (const auto& image : reduced.image) check(VecDot(image, x, &result.emplace_back()));
+  for (const auto& image : system.image) check(VecDot(image, x, &result.emplace_back()));
   return result;
 }
 
-PetscErrorCode function(SNES, Vec y, Vec R, void* context)
+void form_residual(SubspaceSystem& system, Vec y, Vec R)
 {
-  Reduced& reduced = *static_cast<Reduced*>(context);
-  return guarded(reduced,
-                 [&]
-                 {
-                   // far outside: large enough for the line search to come back
-                   check(VecSet(R, 1e6));
-                   if (!evaluate_at(reduced, entries_of(reduced, y))) return;
-                   std::vector<double> rows = projections(reduced, reduced.orbit.defect);
-                   double along = 0;
-                   if (reduced.phase.get())
-                   {
-                     const Owned<Vec> moved = copy_of(reduced.orbit.state);
-                     check(VecAXPY(moved, -1, reduced.anchor));
-                     check(VecDot(reduced.phase, moved, &along));
-                   }
-                   rows.insert(rows.begin(), along);
-                   MPI_Bcast(rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, 0, comm_of(reduced.origin));
-                   for (PetscInt i = 0; i < reduced.size(); ++i)
-                     check(VecSetValue(R, i, rows[static_cast<std::size_t>(i)] / reduced.scale, INSERT_VALUES));
-                   check(VecAssemblyBegin(R));
-                   check(VecAssemblyEnd(R));
-                 });
+  // far outside: large enough for the line search to come back
+  check(VecSet(R, 1e6));
+  if (!evaluate_at(system, entries_of(system, y))) return;
+  std::vector<double> rows = projections(system, system.orbit.defect);
+  double along = 0;
+  if (system.phase.get())
+  {
+    const Owned<Vec> moved = copy_of(system.orbit.state);
+    check(VecAXPY(moved, -1, system.anchor));
+    check(VecDot(system.phase, moved, &along));
+  }
+  rows.insert(rows.begin(), along);
+  MPI_Bcast(rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, 0, comm_of(system.origin));
+  for (PetscInt i = 0; i < system.size(); ++i)
+    check(VecSetValue(R, i, rows[static_cast<std::size_t>(i)] / system.scale, INSERT_VALUES));
+  check(VecAssemblyBegin(R));
+  check(VecAssemblyEnd(R));
 }
 
 /// The columns are independent trajectories of one step size.
@@ -131,117 +97,130 @@ void integrate_all(const Flow& flow, double period, const std::vector<Owned<Vec>
   for (std::size_t i = 0; i < starts.size(); ++i) flow.integrate(period, starts[i], ends[i], nullptr);
 }
 
-void set_column(const Reduced& reduced, Mat J, PetscInt column, double first, const std::vector<double>& rest,
+void set_column(const SubspaceSystem& system, Mat J, PetscInt column, double first, const std::vector<double>& rest,
                 double factor)
 {
   std::vector<double> rows = {first};
   for (const double value : rest) rows.push_back(value * factor);
-  MPI_Bcast(rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, 0, comm_of(reduced.origin));
+  MPI_Bcast(rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, 0, comm_of(system.origin));
   for (std::size_t i = 0; i < rows.size(); ++i)
     check(MatSetValue(J, static_cast<PetscInt>(i), column, rows[i], INSERT_VALUES));
 }
 
-PetscErrorCode jacobian(SNES, Vec y, Mat J, Mat, void* context)
+void form_jacobian(SubspaceSystem& system, Vec y, Mat J)
 {
-  Reduced& reduced = *static_cast<Reduced*>(context);
-  return guarded(reduced,
-                 [&]
-                 {
-                   evaluate_at(reduced, entries_of(reduced, y));
-                   const Flow& flow = reduced.shooting.flow;
-                   const Orbit& orbit = reduced.orbit;
-                   const double speed = energy_norm(flow, orbit.rate);
-                   reduced.anchor = copy_of(orbit.state);
-                   reduced.phase = zeros_like(orbit.rate);
-                   energy_image(flow, orbit.rate, reduced.phase);
-                   check(VecScale(reduced.phase, 1 / speed));
-                   set_column(reduced, J, 0, 0, projections(reduced, orbit.rate), reduced.period_scale / reduced.scale);
-                   const double step = reduced.shooting.options.difference * orbit.fluctuation;
-                   std::vector<Owned<Vec>> moved, ends;
-                   for (const auto& member : reduced.base)
-                   {
-                     moved.push_back(copy_of(orbit.state));
-                     check(VecAXPY(moved.back(), step, member));
-                     ends.push_back(zeros_like(orbit.state));
-                   }
-                   integrate_all(flow, orbit.period, moved, ends);
-                   reduced.shooting.periods += static_cast<long>(ends.size());
-                   for (std::size_t i = 0; i < ends.size(); ++i)
-                   {
-                     check(VecAXPY(ends[i], -1, moved[i]));
-                     check(VecAXPY(ends[i], -1, orbit.defect));
-                     double along = 0;
-                     check(VecDot(reduced.phase, reduced.base[i], &along));
-                     set_column(reduced, J, static_cast<PetscInt>(i) + 1, along, projections(reduced, ends[i]),
-                                1 / step);
-                   }
-                   check(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
-                   check(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
-                 });
+  evaluate_at(system, entries_of(system, y));
+  const Flow& flow = system.problem.flow;
+  const Orbit& orbit = system.orbit;
+  system.anchor = copy_of(orbit.state);
+  system.phase = zeros_like(orbit.rate);
+  energy_image(flow, orbit.rate, system.phase);
+  check(VecScale(system.phase, 1 / energy_norm(flow, orbit.rate)));
+  set_column(system, J, 0, 0, projections(system, orbit.rate), system.period_scale / system.scale);
+  const double step = system.options.difference * orbit.fluctuation;
+  std::vector<Owned<Vec>> moved, ends;
+  for (const auto& member : system.base)
+  {
+    moved.push_back(copy_of(orbit.state));
+    check(VecAXPY(moved.back(), step, member));
+    ends.push_back(zeros_like(orbit.state));
+  }
+  integrate_all(flow, orbit.period, moved, ends);
+  system.log.convergence.periods += static_cast<long>(ends.size());
+  for (std::size_t i = 0; i < ends.size(); ++i)
+  {
+    check(VecAXPY(ends[i], -1, moved[i]));
+    check(VecAXPY(ends[i], -1, orbit.defect));
+    double along = 0;
+    check(VecDot(system.phase, system.base[i], &along));
+    set_column(system, J, static_cast<PetscInt>(i) + 1, along, projections(system, ends[i]), 1 / step);
+  }
+  check(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
 }
 
 /// Least squares of least norm by singular values: a small interface makes the base, and the system, rank-deficient.
-PetscErrorCode solve_least_squares(PC pc, Vec b, Vec x)
+void solve_least_squares(Mat J, Vec b, Vec x, double rank_tolerance)
 {
-  Reduced* reduced = nullptr;
-  PetscCall(PCShellGetContext(pc, &reduced));
-  return guarded(*reduced,
+  PetscInt n = 0;
+  check(VecGetSize(b, &n));
+  const double *matrix = nullptr, *right = nullptr;
+  double* result = nullptr;
+  check(MatDenseGetArrayRead(J, &matrix));
+  check(VecGetArrayRead(b, &right));
+  check(VecGetArrayWrite(x, &result));
+  Eigen::JacobiSVD<Eigen::MatrixXd> decomposition(Eigen::MatrixXd::Map(matrix, n, n),
+                                                  Eigen::ComputeThinU | Eigen::ComputeThinV);
+  decomposition.setThreshold(rank_tolerance);
+  const Eigen::VectorXd solution = decomposition.solve(Eigen::VectorXd::Map(right, n));
+  Eigen::VectorXd::Map(result, n) = solution;
+  check(VecRestoreArrayWrite(x, &result));
+  check(VecRestoreArrayRead(b, &right));
+  check(MatDenseRestoreArrayRead(J, &matrix));
+  if (!solution.allFinite()) throw Error("shooting: the Jacobian on the subspace is not finite");
+}
+
+/// Adds a record and sets `reason`, besides the library's own reasons: when the iterate falls onto the equilibrium
+/// (where any residual vanishes), and when what is left lies outside the base, or hardly shrinks, and a full-space
+/// finish follows.
+void decide_convergence(SubspaceSystem& system, PetscInt iteration, PetscReal norm, SNESConvergedReason* reason)
+{
+  Convergence& convergence = system.log.convergence;
+  const double projected = norm * system.scale / system.orbit.fluctuation;
+  const double before = iteration > 0 ? convergence.records.back().residual_full : HUGE_VAL;
+  record(system.log, system.stage, system.orbit, static_cast<int>(system.size()), projected);
+  convergence.residual_projected = projected;
+  if (iteration > 0) ++convergence.iterations;
+  if (*reason != SNES_CONVERGED_ITERATING) return;
+  const double residual = system.orbit.residual;
+  if (collapsing(system.problem, system.orbit))
+    *reason = SNES_DIVERGED_DTOL;
+  else if (convergence.periods >= system.options.max_periods)
+    *reason = SNES_DIVERGED_FUNCTION_COUNT;
+  else if (system.options.finish != Finish::none && (projected < 0.1 * residual || residual > 0.5 * before))
+    *reason = SNES_CONVERGED_FNORM_RELATIVE;
+}
+
+PetscErrorCode residual_callback(SNES, Vec y, Vec R, void* context)
+{
+  SubspaceSystem& system = *static_cast<SubspaceSystem*>(context);
+  return guarded(system.failure, [&] { form_residual(system, y, R); });
+}
+
+PetscErrorCode jacobian_callback(SNES, Vec y, Mat J, Mat, void* context)
+{
+  SubspaceSystem& system = *static_cast<SubspaceSystem*>(context);
+  return guarded(system.failure, [&] { form_jacobian(system, y, J); });
+}
+
+PetscErrorCode least_squares_callback(PC pc, Vec b, Vec x)
+{
+  SubspaceSystem* system = nullptr;
+  PetscCall(PCShellGetContext(pc, &system));
+  return guarded(system->failure,
                  [&]
                  {
                    Mat J = nullptr;
                    check(PCGetOperators(pc, &J, nullptr));
-                   Owned<Mat> copy;
-                   check(MatDuplicate(J, MAT_COPY_VALUES, copy.put()));
-                   check(VecCopy(b, x));
-                   const PetscBLASInt n = static_cast<PetscBLASInt>(reduced->size()), one = 1, work_size = 64 * n;
-                   std::vector<double> singular(static_cast<std::size_t>(n)), work(static_cast<std::size_t>(work_size));
-                   double rank_tolerance = reduced->shooting.options.rank_tolerance;
-                   PetscBLASInt rank = 0, info = 0, size = n, nrhs = one, lwork = work_size;
-                   double *matrix = nullptr, *rhs = nullptr;
-                   check(MatDenseGetArray(copy, &matrix));
-                   check(VecGetArray(x, &rhs));
-                   LAPACKgelss_(&size, &size, &nrhs, matrix, &size, rhs, &size, singular.data(), &rank_tolerance, &rank,
-                                work.data(), &lwork, &info);
-                   check(VecRestoreArray(x, &rhs));
-                   check(MatDenseRestoreArray(copy, &matrix));
-                   if (info != 0) throw Error("cycle: the singular values of the reduced Jacobian did not converge");
+                   solve_least_squares(J, b, x, system->options.rank_tolerance);
                  });
 }
 
-/// Stops, besides the usual reasons, when the iterate falls onto the equilibrium (where any residual vanishes), and
-/// when what is left lies outside the base, or hardly shrinks, and a full-space finish follows.
-PetscErrorCode converged(SNES snes, PetscInt iteration, PetscReal step, PetscReal change, PetscReal norm,
-                         SNESConvergedReason* reason, void* context)
+PetscErrorCode convergence_callback(SNES snes, PetscInt iteration, PetscReal step, PetscReal change, PetscReal norm,
+                                    SNESConvergedReason* reason, void* context)
 {
-  Reduced& reduced = *static_cast<Reduced*>(context);
+  SubspaceSystem& system = *static_cast<SubspaceSystem*>(context);
   PetscCall(SNESConvergedDefault(snes, iteration, step, change, norm, reason, nullptr));
-  return guarded(reduced,
-                 [&]
-                 {
-                   Shooting& shooting = reduced.shooting;
-                   const double projected = norm * reduced.scale / reduced.orbit.fluctuation;
-                   const double before = iteration > 0 ? shooting.records.back().residual_full : HUGE_VAL;
-                   record(shooting, reduced.stage, static_cast<int>(reduced.size()), projected, reduced.orbit);
-                   shooting.residual_projected = projected;
-                   if (iteration > 0) ++shooting.iterations;
-                   if (*reason != SNES_CONVERGED_ITERATING) return;
-                   if (vanishing(shooting, reduced.orbit))
-                     *reason = SNES_DIVERGED_DTOL;
-                   else if (shooting.periods >= shooting.options.max_periods)
-                     *reason = SNES_DIVERGED_FUNCTION_COUNT;
-                   else if (shooting.options.finish != "none" &&
-                            (projected < 0.1 * reduced.orbit.residual || reduced.orbit.residual > 0.5 * before))
-                     *reason = SNES_CONVERGED_FNORM_RELATIVE;
-                 });
+  return guarded(system.failure, [&] { decide_convergence(system, iteration, norm, reason); });
 }
 
 /// The solver with its defaults and the user's options.
-Owned<SNES> make_solver(const ShootingOptions& options, double tolerance)
+Owned<SNES> make_solver(PetscInt iterations, double tolerance)
 {
   Owned<SNES> snes;
   check(SNESCreate(PETSC_COMM_SELF, snes.put()));
   check(SNESSetOptionsPrefix(snes, "cycle_"));
-  check(SNESSetTolerances(snes, 0.1 * tolerance, 0, 0, options.reduced_newtons, 1000));
+  check(SNESSetTolerances(snes, 0.1 * tolerance, 0, 0, iterations, 1000));
   KSP ksp = nullptr;
   PC pc = nullptr;
   check(SNESGetKSP(snes, &ksp));
@@ -257,11 +236,11 @@ Owned<SNES> make_solver(const ShootingOptions& options, double tolerance)
   return snes;
 }
 
-void set_up(SNES snes, Reduced& reduced, Mat J, Vec R)
+void set_callbacks(SNES snes, SubspaceSystem& system, Mat J, Vec R)
 {
-  check(SNESSetFunction(snes, R, function, &reduced));
-  check(SNESSetJacobian(snes, J, J, jacobian, &reduced));
-  check(SNESSetConvergenceTest(snes, converged, &reduced, nullptr));
+  check(SNESSetFunction(snes, R, residual_callback, &system));
+  check(SNESSetJacobian(snes, J, J, jacobian_callback, &system));
+  check(SNESSetConvergenceTest(snes, convergence_callback, &system, nullptr));
   KSP ksp = nullptr;
   PC pc = nullptr;
   PetscBool standard = PETSC_FALSE;
@@ -269,43 +248,41 @@ void set_up(SNES snes, Reduced& reduced, Mat J, Vec R)
   check(KSPGetPC(ksp, &pc));
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &standard));
   if (!standard) return; // the user's choice
-  check(PCShellSetContext(pc, &reduced));
+  check(PCShellSetContext(pc, &system));
   check(PCShellSetName(pc, "least squares by singular values"));
-  check(PCShellSetApply(pc, solve_least_squares));
+  check(PCShellSetApply(pc, least_squares_callback));
 }
 
 } // namespace
 
-void declare_reduced_options()
+void declare_subspace_options()
 {
-  (void)make_solver({}, 0);
+  (void)make_solver(1, 0);
 }
 
-Orbit shoot_reduced(Shooting& shooting, const Orbit& start, const std::vector<Owned<Vec>>& base,
-                    const std::string& stage)
+Orbit shoot_on_subspace(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
+                        const Orbit& start, const std::vector<Owned<Vec>>& base, ShootingStage stage)
 {
-  Reduced reduced{shooting, {}, {}, stage, copy_of(start.state), start.period, 0, start.fluctuation, copy_of(start),
-                  {},       {}, {}, {}};
+  SubspaceSystem system{problem,           options,        log, stage, {}, {}, copy_of(start.state), start.period, 0,
+                        start.fluctuation, copy_of(start), {},  {},    {}, {}};
   for (const auto& member : base)
   {
-    reduced.base.push_back(copy_of(member));
-    reduced.image.push_back(zeros_like(member));
-    energy_image(shooting.flow, member, reduced.image.back());
+    system.base.push_back(copy_of(member));
+    system.image.push_back(zeros_like(member));
+    energy_image(problem.flow, member, system.image.back());
   }
-  reduced.period_scale = start.fluctuation / energy_norm(shooting.flow, start.rate);
-  reduced.at.assign(base.size() + 1, 0.);
+  system.period_scale = start.fluctuation / energy_norm(problem.flow, start.rate);
+  system.at.assign(base.size() + 1, 0.);
   Owned<Mat> J;
   Owned<Vec> y, R;
-  check(MatCreateSeqDense(PETSC_COMM_SELF, reduced.size(), reduced.size(), nullptr, J.put()));
+  check(MatCreateSeqDense(PETSC_COMM_SELF, system.size(), system.size(), nullptr, J.put()));
   check(MatCreateVecs(J, y.put(), R.put()));
   check(VecSet(y, 0));
-  const Owned<SNES> snes = make_solver(shooting.options, shooting.tolerance);
-  set_up(snes, reduced, J, R);
-  const PetscErrorCode code = SNESSolve(snes, nullptr, y);
-  if (reduced.failure) std::rethrow_exception(reduced.failure);
-  check(code);
-  evaluate_at(reduced, entries_of(reduced, y));
-  return std::move(reduced.orbit);
+  const Owned<SNES> snes = make_solver(options.subspace_newtons, problem.tolerance);
+  set_callbacks(snes, system, J, R);
+  check_after_callbacks(SNESSolve(snes, nullptr, y), system.failure);
+  evaluate_at(system, entries_of(system, y));
+  return std::move(system.orbit);
 }
 
 } // namespace squeal

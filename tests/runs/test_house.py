@@ -34,6 +34,24 @@ def test_scene_and_mesh_know_nothing_of_petsc():
     assert not [f for f in sources("src", "include") if f.parent.name in ("scene", "mesh") and petsc.search(f.read_text())]
 
 
+def includes_of(room):
+    files = [f for f in sources("src", "include") if f.parent.name == room]
+    return files, {(f.name, target) for f in files for target in re.findall(r'#include "squeal/(\w+)/', f.read_text())}
+
+
+def test_shooting_knows_no_brake():
+    """The shooting solver sees a flow: states, an energy product and a period map, whatever they belong to."""
+    files, includes = includes_of("shooting")
+    assert files and {target for _, target in includes} <= {"base", "algebra", "shooting"}, includes
+    brake = re.compile(r"\b(structure|interface|equilibrium|contact|scene|transient|modes)/\w+\.hpp|Structure&|Interface&")
+    assert not [f.name for f in files if brake.search(f.read_text())]
+
+
+def test_the_reduced_model_knows_no_flow():
+    files, includes = includes_of("reduction")
+    assert files and not {target for _, target in includes} & {"cycle", "shooting"}, includes
+
+
 def test_sources_are_formatted():
     files = [str(f) for f in sources("src", "include", "tests")]
     done = subprocess.run(["clang-format", "--dry-run", "--Werror", *files], capture_output=True, text=True)

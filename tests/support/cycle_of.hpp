@@ -1,14 +1,14 @@
 #pragma once
 /// The chain from equilibrium to cycle on a small model, as the program runs it.
 #include "small_models.hpp"
-#include "squeal/cycle/cycle.hpp"
+#include "squeal/cycle/limit_cycle.hpp"
 
 #include <doctest/doctest.h>
 
 namespace squeal::test
 {
 
-inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance)
+inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance, const CycleOptions& options)
 {
   const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface);
   REQUIRE(equilibrium.outcome.kind == OutcomeKind::converged);
@@ -22,7 +22,14 @@ inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double 
   settings.steps_per_period = steps;
   settings.free_periods = free;
   settings.tolerance = tolerance;
-  return find_cycle(model.structure, model.interface, equilibrium, {&mode, 1}, estimate, settings, nullptr);
+  const CycleProblem problem{model.structure, model.interface, equilibrium, modes.modes,
+                             {&mode, 1},      estimate,        settings};
+  return find_cycle_from_estimate(problem, options);
+}
+
+inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance)
+{
+  return cycle_of(model, steps, free, tolerance, {});
 }
 
 } // namespace squeal::test

@@ -2,7 +2,6 @@
 #include "../support/about.hpp"
 #include "../support/cycle_of.hpp"
 #include "../support/small_models.hpp"
-#include "squeal/shooting/shooting.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>
@@ -19,18 +18,18 @@ TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
   REQUIRE(a.outcome.kind == OutcomeKind::converged);
   // The doubled state must return after the same period. A cycle found anew would do for its period only: a discrete
   // orbit depends a little on where between the events its steps fall.
-  const Owned<Vec> start = state_of(a.start.u, a.start.v), end = zeros_like(start);
+  const Owned<Vec> start = copy_of(a.orbit.state.get()), end = zeros_like(start);
   check(VecScale(displacement(start), 2));
   check(VecScale(velocity(start), 2));
   PeriodMap map{twice.structure, twice.interface, 100, 0.5};
   const Flow flow = flow_of(map);
-  flow.integrate(a.period, start, end, nullptr);
+  flow.integrate(a.orbit.period, start, end, nullptr);
   check(VecAXPY(end, -1, start));
   CHECK(energy_norm(flow, end) < 1e-10 * energy_norm(flow, start));
   const LimitCycle b = cycle_of(twice, 100, 5, 1e-11);
   REQUIRE(b.outcome.kind == OutcomeKind::converged);
-  CHECK(b.period == about(a.period, 1e-6));
-  CHECK(b.mean_energy == about(4 * a.mean_energy, 1e-6));
+  CHECK(b.orbit.period == about(a.orbit.period, 1e-6));
+  CHECK(b.measured.mean_energy == about(4 * a.measured.mean_energy, 1e-6));
 }
 
 TEST_CASE("without instability the oscillator falls back to rest: collapsed, not converged")

@@ -145,12 +145,13 @@ Report full_report(const Model& model)
   report.transient.growth_rate_fit = std::numeric_limits<double>::quiet_NaN();
   report.transient.history = history_of(11);
   report.cycle.outcome = {OutcomeKind::converged, "", 4, 1e-6};
-  report.cycle.period = 0.01;
+  report.cycle.orbit.period = 0.01;
   report.cycle.steps_per_period = 5;
-  report.cycle.history = history_of(5);
-  report.cycle.peak_to_peak = {1e-6};
-  report.cycle.statuses = {{ContactStatus::open, ContactStatus::slip}, {ContactStatus::stick, ContactStatus::slip}};
-  for (int i = 0; i < 4; ++i) report.cycle.displacements.push_back(ramp(model, i));
+  report.cycle.measured.history = history_of(5);
+  report.cycle.measured.peak_to_peak = {1e-6};
+  report.cycle.measured.statuses = {{ContactStatus::open, ContactStatus::slip},
+                                    {ContactStatus::stick, ContactStatus::slip}};
+  for (int i = 0; i < 4; ++i) report.cycle.measured.displacements.push_back(ramp(model, i));
   report.timings = {{"modes", 1.5, 1.25}};
   return report;
 }

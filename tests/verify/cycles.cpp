@@ -2,9 +2,7 @@
 // Limit cycles of the three-degree unilateral oscillator against exact ones (matrix exponentials between events).
 #include "../support/about.hpp"
 #include "../support/cycle_of.hpp"
-#include "../support/option.hpp"
 #include "../support/small_models.hpp"
-#include "squeal/shooting/shooting.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -42,24 +40,25 @@ TEST_CASE("exact limit cycles: stick, lift-off, touch, backward slip")
     CAPTURE(row.belt);
     const LimitCycle cycle = cycle_of(unilateral_oscillator(row.friction, row.belt), 400, 0, 1e-8);
     CHECK(cycle.outcome.kind == OutcomeKind::converged);
-    CHECK(cycle.residual_full < 1e-8);
+    CHECK(cycle.orbit.residual < 1e-8);
     // the theta step is of second order in the period: 400 steps a period leave 1e-5 to 1e-4, whatever the events
-    CHECK(cycle.period == about(row.period, 1e-4));
-    CHECK(cycle.mean_energy == about(row.mean_energy, .01));
-    CHECK(cycle.stability == "stable");
+    CHECK(cycle.orbit.period == about(row.period, 1e-4));
+    CHECK(cycle.measured.mean_energy == about(row.mean_energy, .01));
+    CHECK(cycle.multipliers.stability == Stability::stable);
     // the trivial multiplier comes out between .990 and 1.001 here: so good are the others
-    CHECK(cycle.trivial_error < 0.01);
-    CHECK(std::abs(nearest(cycle.multipliers, row.multiplier) - row.multiplier) < 0.01);
-    CHECK((cycle.open_pairs_max == 1) == (row.belt > .3));
-    if (row.belt < 2) CHECK(cycle.stick_pairs_max == 1);
+    CHECK(cycle.multipliers.trivial_error < 0.01);
+    CHECK(std::abs(nearest(cycle.multipliers.values, row.multiplier) - row.multiplier) < 0.01);
+    CHECK((cycle.measured.open_pairs_max == 1) == (row.belt > .3));
+    if (row.belt < 2) CHECK(cycle.measured.stick_pairs_max == 1);
   }
 }
 
 TEST_CASE("the paper's base is rank-deficient here, and the reduced system is solved all the same")
 {
-  const Option finish("-cycle_finish", "none");
-  const LimitCycle cycle = cycle_of(unilateral_oscillator(.3, 1), 400, 0, 1e-8);
+  CycleOptions options;
+  options.shooting.finish = Finish::none;
+  const LimitCycle cycle = cycle_of(unilateral_oscillator(.3, 1), 400, 0, 1e-8, options);
   CHECK(cycle.outcome.kind == OutcomeKind::converged); // the contact space has two dimensions, and the base spans it
-  CHECK(cycle.records.front().unknowns == 5);
-  CHECK(cycle.period == about(5.984555109780, 1e-4));
+  CHECK(cycle.convergence.records.front().unknowns == 5);
+  CHECK(cycle.orbit.period == about(5.984555109780, 1e-4));
 }

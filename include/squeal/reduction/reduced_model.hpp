@@ -20,9 +20,11 @@
 /// Everything reduced is dense, small, and the same on every rank.
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/contact/pair_law.hpp"
-#include "squeal/cycle/cycle.hpp"
+#include "squeal/contact/solver.hpp"
+#include "squeal/modes/modes.hpp"
 
 #include <Eigen/Dense>
+#include <functional>
 
 namespace squeal
 {
@@ -75,11 +77,6 @@ ReducedState coordinates(const ReducedModel& model, const Structure& structure, 
 
 /// target += factor shapes q
 void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd& q, Vec target);
-
-/// As vectors of this rank's own, and back.
-Owned<Vec> small_vector(const Eigen::VectorXd& values);
-void put(const Eigen::VectorXd& values, Vec x);
-Eigen::VectorXd entries_of(Vec x);
 
 /// The active pairs at the end of a step, and what the next one starts from.
 struct ReducedContact
@@ -145,27 +142,5 @@ Passage pass(ReducedMap& map, double period, ReducedState state);
 /// The derivative of a period's end (q, v) in the first `slow` coordinates of q and of v: the product of the steps'
 /// own, exact where no pair changes its state within rounding. Collective: each rank does its share of the columns.
 Eigen::MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, Eigen::Index slow, MPI_Comm comm);
-
-/// D = (dPhi_r/dx S S' - f f^+ - I)^-1 + I at a state, as left x right: f is the flow, along which the border of the
-/// shooting decides; S the coordinates of the modes, since those of the attachments are forgotten within a period.
-struct Inside
-{
-  Eigen::MatrixXd left, right;
-};
-
-Inside inside_of(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm);
-
-/// P^-1 x = -x + D x on the reduced model. Borrows D.
-Preconditioner reduced_preconditioner(const Inside& inside);
-
-/// P^-1 x = -x + V D R x on the full model, V the shapes, R the coordinates in them: what lies outside is taken as
-/// forgotten within a period. Borrows all three.
-Preconditioner reduced_preconditioner(const ReducedModel& model, const Structure& structure, const Inside& inside);
-
-/// The flow for shooting; borrows the map and the matrices of `norm`.
-Flow flow_of(ReducedMap& map, const Structure& norm);
-
-/// M_z, C_z, K_z as a structure of one rank's own.
-Structure small_structure(const ReducedModel& model);
 
 } // namespace squeal

@@ -1,0 +1,51 @@
+#pragma once
+/// The brake's limit cycle by shooting at its period map (src/README.md, section 6). States are compared in the energy
+/// norm sqrt(u'K u + v'M v) only.
+#include "squeal/cycle/measured_period.hpp"
+#include "squeal/cycle/options.hpp"
+#include "squeal/shooting/shooting.hpp"
+
+namespace squeal
+{
+
+/// What one factorisation of the step costs.
+struct StepCosts
+{
+  double factor_seconds = 0, condensed_seconds = 0;
+};
+
+/// outcome: as of shooting (shooting/shooting.hpp); "skipped", "refused" or "off" where nothing was integrated.
+struct LimitCycle
+{
+  Outcome outcome;
+  int steps_per_period = 0;
+  double theta = 0.5;
+  Orbit orbit;             // the cycle, or the best candidate met
+  Convergence convergence; // its periods include the measured one
+  Multipliers multipliers;
+  MeasuredPeriod measured; // from the orbit's state
+  StepCosts costs;         // of the last theta step made
+};
+
+/// The brake about its sliding equilibrium, and what is asked of its cycle.
+struct CycleProblem
+{
+  const Structure& structure;
+  const Interface& interface;
+  const Equilibrium& equilibrium;
+  const std::vector<ComplexMode>& modes;
+  std::span<const ComplexMode> unstable; // the first of the modes; the cycle follows the very first
+  const Estimate& estimate;              // of the followed mode
+  const CycleSettings& settings;
+  Mat probes = nullptr;
+};
+
+/// The cycle from the energy estimate of the followed mode, with those of the other unstable modes added: none may
+/// start unexcited.
+LimitCycle find_cycle_from_estimate(const CycleProblem& problem, const CycleOptions& options);
+
+/// The cycle from any start, without or with free periods.
+LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
+                           const Preconditioner& preconditioner, int free_periods);
+
+} // namespace squeal

@@ -1,0 +1,31 @@
+#pragma once
+/// One period of the brake, recorded, and what is measured on it.
+#include "squeal/cycle/period_map.hpp"
+
+namespace squeal
+{
+
+struct MeasuredPeriod
+{
+  State start, end;                                    // with the reactions there
+  double mean_energy = 0, mean_fluctuating_energy = 0; // [J] fluctuating: with u - u0
+  double open_pairs_mean = 0;
+  int open_pairs_max = 0, stick_pairs_max = 0;
+  std::vector<double> peak_to_peak; // [m] per probe
+  History history;
+  std::vector<Owned<Vec>> displacements;            // [m] samples of u, evenly spread over the period
+  std::vector<std::vector<ContactStatus>> statuses; // [step][pair]
+};
+
+/// What is kept of a period.
+struct Recording
+{
+  Mat probes = nullptr; // a row for each probe, or null
+  int samples = 0;      // of the displacements
+};
+
+/// Integrates a period from the state `start`. `rate`: dPhi/dperiod at its end, or null.
+MeasuredPeriod measure_period(PeriodMap& map, const Equilibrium& equilibrium, const Recording& recording, double period,
+                              Vec start, Vec rate);
+
+} // namespace squeal

@@ -1,0 +1,34 @@
+#pragma once
+/// The brake's period map Phi_T in N theta steps of h = T/N (src/README.md, section 4).
+///
+/// The derivative in the period is (x_(N+1) - x_(N-1))/2h. That is exact for theta = 1/2 and a linear structure, stiff
+/// modes included.
+#include "squeal/shooting/flow.hpp"
+#include "squeal/transient/transient.hpp"
+
+namespace squeal
+{
+
+/// Keeps A and W of the last period length: one factorisation for each, none for difference quotients.
+struct PeriodMap
+{
+  const Structure& structure;
+  const Interface& interface;
+  int steps = 0;
+  double theta = 0.5;
+  ThetaStep step{};
+  std::vector<double> reactions{}; // warm start: at the end of the last period integrated with its rate
+  long unconverged = 0;            // steps whose contact did not converge
+  double contact_tolerance = 0;    // 0: the option's
+};
+
+/// Makes A and W those of this period, unless they are already.
+void set_period(PeriodMap& map, double period);
+
+/// The map as a flow for shooting. Borrows the map.
+Flow flow_of(PeriodMap& map);
+
+/// Turns `rate`, which holds x_(N-1), into dPhi/dT. `end`, the state x_N, goes a step on.
+void complete_rate(PeriodMap& map, StepWork& work, State& end, Vec rate);
+
+} // namespace squeal

@@ -1,0 +1,49 @@
+#pragma once
+/// The flow of an autonomous system x' = f(x) with states x = (u, v), held as VecNest, and their energy product
+///     <a, b> = a_u'K b_u + a_v'M b_v   [twice J for a = b].
+/// The shooting solver sees nothing else of a model.
+#include "squeal/base/petsc.hpp"
+
+#include <functional>
+#include <span>
+
+namespace squeal
+{
+
+/// The period map Phi_T: the state a time T after a start.
+struct Flow
+{
+  /// end = Phi_period(start); unless `rate` is null, rate = dPhi/dperiod at the end.
+  std::function<void(double period, Vec start, Vec end, Vec rate)> integrate;
+  Mat M = nullptr, K = nullptr; // of the energy product
+  /// end_k = Phi_period(start_k), all at once. Empty: starts are integrated one after the other.
+  std::function<void(double period, std::span<const Vec> starts, std::span<const Vec> ends)> integrate_many{};
+};
+
+/// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; x and y are states. Empty: P = -I.
+using Preconditioner = std::function<void(double period, Vec x, Vec y)>;
+
+/// A state made of copies of u and v.
+Owned<Vec> state_of(Vec u, Vec v);
+
+/// The parts of a state, borrowed.
+Vec displacement(Vec state);
+Vec velocity(Vec state);
+
+/// image = (K u, M v)
+void energy_image(const Flow& flow, Vec x, Vec image);
+
+/// <a, b>
+double energy_product(const Flow& flow, Vec a, Vec b);
+
+/// sqrt(<a, a>)
+double energy_norm(const Flow& flow, Vec a);
+
+/// Scales x to an energy norm of 1.
+void normalise(const Flow& flow, Vec x);
+
+/// Appends to the energy-orthonormal base what `candidate` adds to its span. A candidate of which less than
+/// `rank_tolerance` is new is dropped.
+void extend_base(const Flow& flow, double rank_tolerance, std::vector<Owned<Vec>>& base, Vec candidate);
+
+} // namespace squeal

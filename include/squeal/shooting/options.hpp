@@ -1,0 +1,42 @@
+#pragma once
+/// Options of the shooting solver, prefix -cycle_.
+#include "squeal/base/options.hpp"
+
+#include <array>
+
+namespace squeal
+{
+
+/// The solver of the full-space equations that ends a shooting.
+enum class Finish
+{
+  multisecant,   // and Newton-Krylov where it gives up
+  newton_krylov, // alone
+  none,          // the orbit of the subspace is the result
+};
+
+inline constexpr std::array finish_words = {"multisecant", "newton_krylov", "none"};
+
+inline Words words_of(Finish)
+{
+  return finish_words;
+}
+
+struct ShootingOptions
+{
+  Finish finish = Finish::multisecant;
+  PetscInt subspace_newtons = 10; // iterations on a subspace; 0: it is not tried
+  PetscInt base_growths = -1;     // of the subspace; below 0: 4 without a finish; none with one, which is cheaper
+  double difference = 1e-6;       // step of difference quotients over the fluctuation
+  double rank_tolerance = 1e-7;   // of the subspace's base and of its least-squares solve
+  PetscInt secants = 60;          // kept
+  double secant_drop = 1e-4;      // a secant is dropped when less than this part of it is new
+  double clamp = 0.3;             // longest multisecant step over the fluctuation
+  PetscInt stall = 30;            // iterations without progress before the multisecant stage gives up
+  PetscInt max_periods = 400;     // integrated in all
+  PetscInt multipliers = -1;      // Krylov dimension; 0: none; below 0: as many as find_multipliers says
+};
+
+OptionList options_of(ShootingOptions& options);
+
+} // namespace squeal

@@ -1,0 +1,120 @@
+#pragma once
+/// The periodic-orbit problem (src/README.md, section 6): find a state x and a period T with
+///     F(x, T) = Phi_T(x) - x = 0,   <f, dx> = 0,
+/// where f is the flow's direction. A correction dx along the orbit would only move the time origin.
+///
+/// "Orbit" is a candidate of the solver, whether it closes or not.
+#include "squeal/base/progress.hpp"
+#include "squeal/base/words.hpp"
+#include "squeal/shooting/flow.hpp"
+
+#include <array>
+#include <limits>
+#include <vector>
+
+namespace squeal
+{
+
+/// A candidate and what one evaluation of the flow says about it.
+struct Orbit
+{
+  Owned<Vec> state;
+  double period = 0;      // [s]
+  Owned<Vec> defect;      // Phi_T(x) - x
+  Owned<Vec> rate;        // dPhi_T/dT
+  double fluctuation = 0; // |x - equilibrium| in the energy norm
+  double residual = 0;    // |defect| / fluctuation
+};
+
+Orbit copy_of(const Orbit& orbit);
+
+/// What is sought. A stage borrows it and never changes it.
+struct OrbitProblem
+{
+  const Flow& flow;
+  const Preconditioner& preconditioner;
+  Owned<Vec> equilibrium{};     // the state of rest (u0, 0)
+  double first_period = 0;      // [s] T may differ from it by a factor of two
+  double tolerance = 0;         // on the residual
+  double least_fluctuation = 0; // an orbit with less is falling onto the equilibrium
+};
+
+/// The stages of the solver, as the records of convergence name them.
+enum class ShootingStage
+{
+  free_periods,   // integration without correction
+  subspace,       // Newton on the coordinates of a few given shapes
+  grown_subspace, // the same with the defects of earlier stages among the shapes
+  multisecant,
+  newton_krylov,
+  full_period, // one evaluation of a full model's flow
+};
+
+inline constexpr std::array shooting_stage_words = {"free",        "reduced",       "grown base",
+                                                    "multisecant", "newton-krylov", "full period"};
+
+inline Words words_of(ShootingStage)
+{
+  return shooting_stage_words;
+}
+
+/// One line of the history of convergence.
+struct NewtonRecord
+{
+  ShootingStage stage = ShootingStage::free_periods;
+  int unknowns = 0;
+  long periods = 0;  // integrated so far
+  double period = 0; // [s]
+  double residual_projected = 0, residual_full = 0;
+};
+
+/// What the solver has done.
+struct Convergence
+{
+  std::vector<NewtonRecord> records;
+  int iterations = 0; // Newton and secant steps
+  long periods = 0;   // integrated: every evaluation of the flow, difference quotients included
+  double residual_projected = std::numeric_limits<double>::quiet_NaN(); // where the subspace was left; NaN: not tried
+};
+
+/// The convergence so far, and where each new record is shown.
+struct ConvergenceLog
+{
+  Progress& progress;
+  Convergence convergence{};
+};
+
+enum class StageEnding
+{
+  converged,
+  stalled,
+  collapsed,         // onto the equilibrium
+  period_left_range, // of a factor of two about the first one
+};
+
+/// The best orbit that a stage met, and why it stopped.
+struct StageResult
+{
+  Orbit orbit;
+  StageEnding ending = StageEnding::stalled;
+};
+
+/// One evaluation of the flow.
+Orbit evaluate(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period);
+
+/// Adds a record. `unknowns`: of the stage's system; 0 where nothing is solved for.
+void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, int unknowns, double residual_projected);
+
+/// The same for a stage whose unknowns are u, v and T.
+void record_full(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit);
+
+/// Whether T is within a factor of two of the first period.
+bool admissible_period(const OrbitProblem& problem, double period);
+
+/// Whether the orbit is falling onto the equilibrium.
+bool collapsing(const OrbitProblem& problem, const Orbit& orbit);
+
+/// x - equilibrium
+Owned<Vec> fluctuation_of(const OrbitProblem& problem, const Orbit& orbit);
+
+} // namespace squeal

@@ -1,0 +1,105 @@
+#include "squeal/cycle/limit_cycle.hpp"
+
+#include "preconditioner.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Of the state about the equilibrium, in the energy norm.
+double fluctuation_norm(const CycleProblem& problem, const State& state)
+{
+  const Owned<Vec> moved = copy_of(state.u.get());
+  check(VecAXPY(moved, -1, problem.equilibrium.u));
+  return std::sqrt(2 * (potential_energy(problem.structure, moved) + kinetic_energy(problem.structure, state.v)));
+}
+
+/// Adds to the reason of an outcome what the brake's options can do about it.
+void add_remedies(const PeriodMap& map, Outcome& outcome)
+{
+  if (outcome.kind == OutcomeKind::unstable_cycle) outcome.reason += " (-cycle_start_amplitude, cycle.free_periods)";
+  if (map.step.law == ContactLaw::velocity && outcome.kind != OutcomeKind::converged)
+    outcome.reason += "; by the velocity law the period map jumps where a step begins open or closed: "
+                      "-transient_contact_law displacement";
+  if (map.unconverged > 0)
+    outcome.reason += (outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) +
+                      " steps left the contact unconverged (-transient_contact_max_it)";
+}
+
+/// From the real modes up to a multiple of the followed mode's frequency; none for a factor of 0.
+Preconditioner estimated_preconditioner(const CycleProblem& problem, double band_factor)
+{
+  if (!(band_factor > 0)) return {};
+  const double band = band_factor * problem.unstable.front().frequency_hz();
+  return sliding_preconditioner(problem,
+                                find_real_modes_below(problem.structure, problem.interface, problem.equilibrium, band));
+}
+
+} // namespace
+
+LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
+                           const Preconditioner& preconditioner, int free_periods)
+{
+  const CycleSettings& settings = problem.settings;
+  PeriodMap map{problem.structure, problem.interface, settings.steps_per_period, settings.theta};
+  map.reactions = problem.equilibrium.reactions;
+  ShootingResult found =
+      shoot(flow_of(map), preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
+  LimitCycle cycle{std::move(found.outcome),
+                   settings.steps_per_period,
+                   settings.theta,
+                   std::move(found.orbit),
+                   std::move(found.convergence),
+                   std::move(found.multipliers),
+                   {},
+                   {}};
+  cycle.measured = measure_period(map, problem.equilibrium, {problem.probes, static_cast<int>(options.samples)},
+                                  cycle.orbit.period, cycle.orbit.state, nullptr);
+  ++cycle.convergence.periods;
+  cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
+  add_remedies(map, cycle.outcome);
+  if (!settings.save_state.empty()) write_state(cycle.measured.start, problem.structure, settings.save_state);
+  return cycle;
+}
+
+LimitCycle find_cycle_from_estimate(const CycleProblem& problem, const CycleOptions& options)
+{
+  const ComplexMode& mode = problem.unstable.front();
+  const Estimate& estimate = problem.estimate;
+  const Equilibrium& equilibrium = problem.equilibrium;
+  const double amplitude = options.start_amplitude * start_amplitude(estimate);
+  if (!(amplitude > 0) || !std::isfinite(amplitude) || mode.lambda.imag() == 0)
+  {
+    LimitCycle skipped;
+    skipped.outcome = {OutcomeKind::skipped,
+                       "no amplitude to start from: no energy balance and no lift-off, or no oscillation", 0,
+                       std::nan("")};
+    return skipped;
+  }
+  State first = mode_state(equilibrium, mode, amplitude, estimate.phase + options.start_phase * std::numbers::pi / 180);
+  const double first_event =
+      std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude) / amplitude * fluctuation_norm(problem, first);
+  ShootingStart start{equilibrium.u,
+                      first.u,
+                      first.v,
+                      options.start_period / mode.frequency_hz(),
+                      {mode.real, mode.imaginary, equilibrium.u},
+                      {},
+                      first_event};
+  for (const State& motion :
+       estimated_motions(problem.structure, problem.interface, equilibrium, problem.unstable.subspan(1)))
+  {
+    add_motion(motion, options.start_amplitude, first);
+    start.other_unstable.push_back(state_of(motion.u, motion.v));
+  }
+  return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),
+                         problem.settings.free_periods);
+}
+
+} // namespace squeal

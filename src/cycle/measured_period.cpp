@@ -1,0 +1,71 @@
+#include "squeal/cycle/measured_period.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace squeal
+{
+
+namespace
+{
+
+double mean(const std::vector<double>& values)
+{
+  return std::accumulate(values.begin(), values.end(), 0.) / static_cast<double>(values.size());
+}
+
+/// Means and extremes from the history.
+void summarise(MeasuredPeriod& measured)
+{
+  const History& history = measured.history;
+  if (history.energy.empty()) return;
+  measured.mean_energy = mean(history.energy);
+  measured.mean_fluctuating_energy = mean(history.fluctuating_energy);
+  measured.open_pairs_mean = mean({history.open.begin(), history.open.end()});
+  measured.open_pairs_max = *std::max_element(history.open.begin(), history.open.end());
+  measured.stick_pairs_max = *std::max_element(history.stick.begin(), history.stick.end());
+  for (const auto& probe : history.probes)
+  {
+    const auto [least, largest] = std::minmax_element(probe.begin(), probe.end());
+    measured.peak_to_peak.push_back(*largest - *least);
+  }
+}
+
+} // namespace
+
+MeasuredPeriod measure_period(PeriodMap& map, const Equilibrium& equilibrium, const Recording& recording, double period,
+                              Vec start, Vec rate)
+{
+  MeasuredPeriod measured;
+  measured.start = {copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
+  measured.end = copy_of(measured.start);
+  const auto keep_for_rate = [&](const State& now)
+  {
+    check(VecCopy(now.u, displacement(rate)));
+    check(VecCopy(now.v, velocity(rate)));
+  };
+  if (rate) keep_for_rate(measured.start);
+  set_period(map, period);
+  const int samples = recording.samples;
+  int done = 0;
+  const auto watch = [&](const State& now, const StepReport&, const StepWork&)
+  {
+    measured.statuses.push_back(contact_status(map.interface, now.reactions));
+    // evenly spread over the period whatever the two numbers
+    if ((done + 1) * samples / map.steps > done * samples / map.steps) measured.displacements.push_back(copy_of(now.u));
+    if (++done + 1 == map.steps && rate) keep_for_rate(now);
+  };
+  const MarchSummary summary = march(map.step, map.structure, map.interface, equilibrium, recording.probes, map.steps,
+                                     measured.end, measured.history, watch);
+  map.unconverged += summary.unconverged;
+  if (rate)
+  {
+    State after = copy_of(measured.end);
+    StepWork work = begin_steps(map.step, map.structure, map.interface, after);
+    complete_rate(map, work, after, rate);
+  }
+  summarise(measured);
+  return measured;
+}
+
+} // namespace squeal

@@ -1,0 +1,35 @@
+#include "squeal/cycle/options.hpp"
+
+namespace squeal
+{
+
+OptionList options_of(CycleOptions& options)
+{
+  ReducedOptions& reduced = options.reduced;
+  OptionList list = {
+      {"-cycle_start", choice_of(options.start), Range::any,
+       "of the full model's shooting: estimate, or reduced (that model's cycle)"},
+      {"-cycle_start_amplitude", &options.start_amplitude, Range::positive,
+       "multiple of the estimate's amplitude to start from"},
+      {"-cycle_start_phase", &options.start_phase, Range::any, "degrees, added to the estimate's phase of the start"},
+      {"-cycle_start_period", &options.start_period, Range::positive, "multiple of the mode's period to start from"},
+      {"-cycle_band_factor", &options.band_factor, Range::not_negative,
+       "real modes of the preconditioner reach this many times the mode's frequency"},
+      {"-cycle_samples", &options.samples, Range::natural,
+       "displacements kept over the last period, for the fields file"},
+      {"-reduced_margin", &reduced.margin, Range::positive,
+       "pairs that part at this many times the motion's amplitude keep their contact"},
+      {"-reduced_threshold", &reduced.threshold, Range::not_negative,
+       "an attachment shape is dropped when less than this part of it is new"},
+      {"-reduced_modes", &reduced.modes, Range::natural,
+       "complex modes taken, the followed one and the nearest in frequency"},
+      {"-reduced_free_periods", &reduced.free_periods, Range::not_negative,
+       "at most integrated on the reduced model until its motion is periodic"},
+      {"-reduced_corrections", &reduced.corrections, Range::not_negative,
+       "periods of the full model at most, from the reduced model's cycle on"},
+  };
+  for (Option& option : options_of(options.shooting)) list.push_back(std::move(option));
+  return list;
+}
+
+} // namespace squeal

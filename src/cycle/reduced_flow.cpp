@@ -1,0 +1,129 @@
+#include "reduced_flow.hpp"
+
+namespace squeal
+{
+
+namespace
+{
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+Owned<Mat> matrix_of(const MatrixXd& values)
+{
+  Owned<Mat> result;
+  const auto n = static_cast<PetscInt>(values.rows());
+  check(MatCreateSeqDense(PETSC_COMM_SELF, n, n, nullptr, result.put()));
+  double* entries = nullptr;
+  check(MatDenseGetArrayWrite(result, &entries));
+  std::copy_n(values.data(), values.size(), entries);
+  check(MatDenseRestoreArrayWrite(result, &entries));
+  return result;
+}
+
+void put(const VectorXd& values, Vec x)
+{
+  PetscScalar* entries = nullptr;
+  check(VecGetArrayWrite(x, &entries));
+  std::copy_n(values.data(), values.size(), entries);
+  check(VecRestoreArrayWrite(x, &entries));
+}
+
+void put(const ReducedState& state, Vec x)
+{
+  put(state.q, displacement(x));
+  put(state.v, velocity(x));
+}
+
+Owned<Vec> vector_of(const VectorXd& values)
+{
+  Owned<Vec> x;
+  check(VecCreateSeq(PETSC_COMM_SELF, static_cast<PetscInt>(values.size()), x.put()));
+  put(values, x);
+  return x;
+}
+
+VectorXd entries_of(Vec x)
+{
+  const std::vector<double> values = whole(x);
+  return VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+/// (q, v) in one vector.
+VectorXd stacked(const ReducedState& state)
+{
+  VectorXd both(state.q.size() + state.v.size());
+  both << state.q, state.v;
+  return both;
+}
+
+} // namespace
+
+Owned<Vec> vector_of(const ReducedState& state)
+{
+  const Owned<Vec> q = vector_of(state.q), v = vector_of(state.v);
+  return state_of(q, v);
+}
+
+ReducedState reduced_state(Vec state)
+{
+  return {entries_of(displacement(state)), entries_of(velocity(state))};
+}
+
+EnergyMatrices energy_matrices(const ReducedModel& model)
+{
+  return {matrix_of(model.M_z), matrix_of(model.K_z)};
+}
+
+Flow flow_of(ReducedMap& map, const EnergyMatrices& energy)
+{
+  const auto period_map = [&map](double period, Vec start, Vec end, Vec rate)
+  {
+    const Passage passage = pass(map, period, reduced_state(start));
+    put(passage.end, end);
+    if (rate) put(passage.rate, rate);
+  };
+  return {period_map, energy.M, energy.K, {}};
+}
+
+MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm)
+{
+  const ReducedModel& model = map.model;
+  const Eigen::Index n = model.size(), slow = model.slow;
+  const ReducedState f = pass(map, period, state).rate;
+  const VectorXd flow = stacked(f), image = stacked({model.K_z * f.q, model.M_z * f.v});
+  // dPhi S S' - f f^+ = U V', and (U V' - I)^-1 + I = -U (I - V'U)^-1 V'
+  MatrixXd U(2 * n, 2 * slow + 1), V = MatrixXd::Zero(2 * slow + 1, 2 * n);
+  U << monodromy(map, period, state, slow, comm), -flow;
+  V.topLeftCorner(slow, slow).diagonal().setOnes();
+  V.block(slow, n, slow, slow).diagonal().setOnes();
+  V.bottomRows(1) = image.transpose() / flow.dot(image);
+  MatrixXd right = product(V, U);
+  right = (MatrixXd::Identity(right.rows(), right.cols()) - right).eval();
+  return {-U, solve_dense(std::move(right), std::move(V))};
+}
+
+Preconditioner preconditioner_of(const MonodromyCorrection& correction)
+{
+  return [&correction](double, Vec x, Vec y)
+  {
+    const VectorXd both = stacked(reduced_state(x));
+    const VectorXd result = product(correction.left, product(correction.right, both)) - both;
+    put(ReducedState{result.head(result.size() / 2), result.tail(result.size() / 2)}, y);
+  };
+}
+
+Preconditioner preconditioner_of(const MonodromyCorrection& correction, const ReducedModel& model,
+                                 const Structure& structure)
+{
+  return [&](double, Vec x, Vec y)
+  {
+    const VectorXd seen = stacked(coordinates(model, structure, displacement(x), velocity(x)));
+    const VectorXd result = product(correction.left, product(correction.right, seen));
+    check(VecAXPBY(y, -1, 0, x));
+    add_motion(model, 1, result.head(model.size()), displacement(y));
+    add_motion(model, 1, result.tail(model.size()), velocity(y));
+  };
+}
+
+} // namespace squeal

@@ -1,0 +1,44 @@
+#pragma once
+/// The reduced model as a flow for shooting, and the approximate inverse of a period map's dPhi_T/dx - I from the
+/// reduced model's monodromy matrix (src/README.md, section 7).
+#include "squeal/reduction/reduced_model.hpp"
+#include "squeal/shooting/flow.hpp"
+
+namespace squeal
+{
+
+/// A reduced state as a state of one rank's own, and back.
+Owned<Vec> vector_of(const ReducedState& state);
+ReducedState reduced_state(Vec state);
+
+/// M_z and K_z as matrices of one rank's own, for the energy product.
+struct EnergyMatrices
+{
+  Owned<Mat> M, K;
+};
+
+EnergyMatrices energy_matrices(const ReducedModel& model);
+
+/// Borrows both.
+Flow flow_of(ReducedMap& map, const EnergyMatrices& energy);
+
+/// D = (dPhi_r/dx S S' - f f^+ - I)^-1 + I at a state of the reduced model, as left x right. f is the flow, along which
+/// the border of the shooting decides. S are the coordinates of the slow shapes, since motion in the others is damped
+/// out within a period.
+struct MonodromyCorrection
+{
+  Eigen::MatrixXd left, right;
+};
+
+/// Collective: each rank does its share of the columns.
+MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm);
+
+/// P^-1 x = -x + D x on the reduced model. Borrows D.
+Preconditioner preconditioner_of(const MonodromyCorrection& correction);
+
+/// P^-1 x = -x + V D R x on the full model: V the shapes, R the coordinates in them. What lies outside is taken as
+/// damped out within a period. Borrows all three.
+Preconditioner preconditioner_of(const MonodromyCorrection& correction, const ReducedModel& model,
+                                 const Structure& structure);
+
+} // namespace squeal

@@ -1,0 +1,31 @@
+#include "squeal/shooting/options.hpp"
+
+namespace squeal
+{
+
+OptionList options_of(ShootingOptions& options)
+{
+  return {
+      {"-cycle_subspace_newtons", &options.subspace_newtons, Range::not_negative,
+       "iterations on the subspace of the mode's shapes; 0: not tried"},
+      {"-cycle_base_growths", &options.base_growths, Range::any,
+       "times the subspace may grow by what it missed; below 0: 4 without a finish, else 0"},
+      {"-cycle_rank_tolerance", &options.rank_tolerance, Range::not_negative,
+       "relative, of the subspace's base and of its least-squares solve"},
+      {"-cycle_difference", &options.difference, Range::positive,
+       "difference step over the fluctuation, in the energy norm"},
+      {"-cycle_finish", choice_of(options.finish), Range::any, "full-space finish: multisecant, newton_krylov or none"},
+      {"-cycle_secants", &options.secants, Range::not_negative, "secants kept by the finish"},
+      {"-cycle_secant_drop", &options.secant_drop, Range::not_negative,
+       "a secant is dropped when less than this part of it is new"},
+      {"-cycle_clamp", &options.clamp, Range::positive, "longest step of the finish over the fluctuation"},
+      {"-cycle_stall", &options.stall, Range::not_negative,
+       "iterations without progress before the finish starts again, or falls back"},
+      {"-cycle_max_periods", &options.max_periods, Range::not_negative, "periods that may be integrated in all"},
+      {"-cycle_multipliers", &options.multipliers, Range::any,
+       "Floquet multipliers' Krylov dimension, 0: none; below 0: all up to 25 dofs, else 8 and 2 a further unstable "
+       "mode"},
+  };
+}
+
+} // namespace squeal

@@ -1,0 +1,23 @@
+#pragma once
+/// The paper's shooting on a subspace: x = x_k + E c with E energy-orthonormal, unknowns y = (T, c),
+///     R_0 = <f, x - anchor>,   R_i = <e_i, Phi_T(x) - x>,   i = 1 ... n.
+/// f and the anchor are those of the last Jacobian: the Newton correction is orthogonal to the flow where it starts.
+/// Everything is scaled by the fluctuation, so that y and R are of order one. The system is small, dense and held by
+/// every rank; the flow underneath is collective. With the paper's three shapes there are seven unknowns.
+///
+/// Caveat: a solution of the projected equations leaves a defect outside the subspace, which need not be small.
+#include "squeal/shooting/options.hpp"
+#include "squeal/shooting/orbit.hpp"
+
+namespace squeal
+{
+
+/// Damped Newton on T and the coordinates in `base` about the start (options -cycle_snes_...). Returns the last orbit,
+/// which may be collapsing.
+Orbit shoot_on_subspace(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
+                        const Orbit& start, const std::vector<Owned<Vec>>& base, ShootingStage stage);
+
+/// Makes the options of its solver known to PETSc even where it never runs.
+void declare_subspace_options();
+
+} // namespace squeal
