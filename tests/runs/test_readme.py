@@ -171,3 +171,21 @@ def test_every_data_set_is_explained(written, name):
     for documented, pattern in compare(page, found).items():
         units = {unit for data, unit in found.items() if pattern.fullmatch(data)}
         assert units == {page[documented]}, documented
+
+
+def anchors_of(page):
+    """Names by which headings are linked: small letters, digits, hyphens for spaces."""
+    heads = re.findall(r"^#+ (.*)", page.read_text(), re.M)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+def test_links_lead_somewhere():
+    """Every relative link and picture of every README exists, and so does the heading that a link names."""
+    pages = [page for page in ROOT.rglob("README.md") if "build" not in page.relative_to(ROOT).parts]
+    assert len(pages) >= 8
+    for page in pages:
+        for target, anchor in re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)\)", page.read_text()):
+            if "://" not in target:
+                aim = (page.parent / target) if target else page
+                assert aim.exists(), f"{page.relative_to(ROOT)}: {target}"
+                assert not anchor or anchor in anchors_of(aim), f"{page.relative_to(ROOT)}: {target}#{anchor}"
