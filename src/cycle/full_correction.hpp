@@ -1,6 +1,6 @@
 #pragma once
 /// The full model's cycle from the reduced one's: secants on the full model's periods, and as many steps a period as
-/// the accuracy needs.
+/// the accuracy needs (src/README.md, section 7.8).
 #include "reduced_cycle.hpp"
 
 namespace squeal

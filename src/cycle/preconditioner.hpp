@@ -1,5 +1,5 @@
 #pragma once
-/// An approximate inverse of dPhi_T/dx - I from sliding motion: P^-1 x = -x + E D E^+ x (src/README.md, section 6).
+/// An approximate inverse of dPhi_T/dx - I from sliding motion: P^-1 x = -x + E D E^+ x (src/README.md, section 6.6).
 ///
 /// The bulk of the period map is linear and known. A state outside the span of the frictionless bilateral real modes
 /// Phi is taken as damped out within a period (dPhi/dx = 0, inverse -1); inside it motion is sliding about equilibrium,

@@ -1,5 +1,5 @@
 #pragma once
-/// The Newton system of an orbit bordered by the period and the phase condition,
+/// The Newton system of an orbit bordered by the period and the phase condition (src/README.md, section 6.5),
 ///     [J d; f' 0] (x, t) = (b, row),   J = dPhi_T/dx - I,   d = dPhi_T/dT,
 /// with J replaced by the preconditioner P:   x = P^-1 b - t P^-1 d,   t = (<f, P^-1 b> - row)/<f, P^-1 d>.
 /// Here f is the unit vector along d.

@@ -1,5 +1,6 @@
 #pragma once
-/// Integration without correction: the flow itself brings the motion nearer to an orbit that attracts.
+/// Integration without correction (src/README.md, section 6.3): the flow itself brings the motion nearer to an orbit
+/// that attracts.
 #include "squeal/shooting/orbit.hpp"
 
 namespace squeal

@@ -1,5 +1,6 @@
 #pragma once
-/// The paper's shooting on a subspace: x = x_k + E c with E energy-orthonormal, unknowns y = (T, c),
+/// The paper's shooting on a subspace (src/README.md, section 6.4): x = x_k + E c with E energy-orthonormal, unknowns y
+/// = (T, c),
 ///     R_0 = <f, x - anchor>,   R_i = <e_i, Phi_T(x) - x>,   i = 1 ... n.
 /// f and the anchor are those of the last Jacobian: the Newton correction is orthogonal to the flow where it starts.
 /// Everything is scaled by the fluctuation, so that y and R are of order one. The system is small, dense and held by

@@ -17,8 +17,8 @@ def reduced(module_run):
 
 @pytest.fixture(scope="module")
 def fitted(module_run):
-    """To a wish of 3e-2 and, as the judge, of 1e-2."""
-    return [module_run(*PIN, "--set", "fidelity=auto", "--set", f"accuracy={wish}", ranks=2) for wish in (3e-2, 1e-2)]
+    """To an accuracy of 3e-2 and, as the reference, of 1e-2."""
+    return [module_run(*PIN, "--set", "fidelity=auto", "--set", f"accuracy={accuracy}", ranks=2) for accuracy in (3e-2, 1e-2)]
 
 
 def test_ranks_agree(reduced):
@@ -31,32 +31,32 @@ def test_ranks_agree(reduced):
 
 
 def test_error_estimates_hold(reduced, fitted):
-    """The cycle at the finer wish lies within the estimates of the coarser one, and of the mere reduced model."""
-    judge = fitted[1]
+    """The cycle at the finer accuracy lies within the estimates of the coarser one, and of the mere reduced model."""
+    reference = fitted[1]
     for run in (reduced[0], fitted[0]):
         estimates = run["fidelity"]["error_estimates"]
-        off = abs(energy(run) / energy(judge) - 1)
+        off = abs(energy(run) / energy(reference) - 1)
         assert off < estimates["energy"] + estimates["step_energy"] + 1e-2
-        off = abs(run["cycle"]["period"] / judge["cycle"]["period"] - 1)
+        off = abs(run["cycle"]["period"] / reference["cycle"]["period"] - 1)
         assert off < estimates["frequency"] + estimates["step_frequency"] + 1e-2
 
 
-def test_wish_is_met(fitted):
-    for run, wish in zip(fitted, (3e-2, 1e-2)):
+def test_accuracy_is_met(fitted):
+    for run, accuracy in zip(fitted, (3e-2, 1e-2)):
         fidelity = run["fidelity"]
         assert fidelity["used"] == "reduced" and run["cycle"]["outcome"] == "converged"
         assert fidelity["size"] < run["model"]["dofs"] / 10
-        assert max(fidelity["error_estimates"].values()) <= wish
+        assert max(fidelity["error_estimates"].values()) <= accuracy
     assert energy(fitted[0]) == pytest.approx(energy(fitted[1]), rel=4e-2)
 
 
-def test_full_periods_are_the_judge(fitted):
+def test_corrections_converge_to_the_full_cycle(fitted):
     """Corrections converge to the full model's cycle: its own full-space residual ends far below the reduced cycle's."""
     residuals = [record["residual_full"] for record in fitted[1]["cycle"]["newton"]]
     assert residuals[-1] < 0.2 * residuals[0]
 
 
-def test_few_modes_are_told(module_run, reduced):
+def test_few_modes_show_in_the_residual(module_run, reduced):
     """A single mode makes a poor model, and its period of the full one says so: a residual of twice and more."""
     run = module_run(*PIN, "--set", "fidelity=reduced", "-reduced_modes", "1", "-cycle_multipliers", "0", ranks=1)
     assert run["fidelity"]["modes"] <= 2

@@ -1,5 +1,5 @@
 #pragma once
-/// One period of the brake, recorded, and what is measured on it.
+/// One period of the brake, recorded, and what is measured on it (src/README.md, section 6.10).
 #include "squeal/cycle/period_map.hpp"
 
 namespace squeal

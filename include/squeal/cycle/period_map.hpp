@@ -1,5 +1,5 @@
 #pragma once
-/// The brake's period map Phi_T in N theta steps of h = T/N (src/README.md, section 4).
+/// The brake's period map Phi_T in N theta steps of h = T/N (src/README.md, sections 4 and 6.2).
 ///
 /// The derivative in the period is (x_(N+1) - x_(N-1))/2h. That is exact for theta = 1/2 and a linear structure, stiff
 /// modes included.

@@ -1,6 +1,6 @@
 #pragma once
-/// Floquet multipliers: eigenvalues of the monodromy matrix dPhi_T/dx at a periodic orbit, by Arnoldi in the energy
-/// product on difference quotients of the flow.
+/// Floquet multipliers (src/README.md, section 6.9): eigenvalues of the monodromy matrix dPhi_T/dx at a periodic orbit,
+/// by Arnoldi in the energy product on difference quotients of the flow.
 ///
 /// With as many steps as the state has entries it is the whole matrix. With fewer it starts from the motions that may
 /// grow: a change of amplitude and the other unstable modes, which the orbit may leave unexcited. The flow's own

@@ -1,7 +1,7 @@
 #pragma once
-/// Full-space solution by secants (Anderson 1965; Eyert 1996) about the preconditioner: one period a step, no
-/// difference columns. States are bordered by T and by the phase row <f, dx>; B is the bordered P, G = B^-1 (F, 0) the
-/// preconditioned defect. With the last steps X and their changes of G, Y = Q R,
+/// Full-space solution by secants (src/README.md, section 6.7; Anderson 1965, Eyert 1996) about the preconditioner: one
+/// period a step, no difference columns. States are bordered by T and by the phase row <f, dx>; B is the bordered P, G
+/// = B^-1 (F, 0) the preconditioned defect. With the last steps X and their changes of G, Y = Q R,
 ///     dx = -X R^-1 Q'G - (1 - Q Q') G.
 /// Q is orthogonal in the energy norm of G, not of F: there the slow motions weigh what they are worth, and what the
 /// next period damps out anyhow does not hide them.

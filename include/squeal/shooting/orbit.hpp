@@ -1,5 +1,5 @@
 #pragma once
-/// The periodic-orbit problem (src/README.md, section 6): find a state x and a period T with
+/// The periodic-orbit problem (src/README.md, section 6.1): find a state x and a period T with
 ///     F(x, T) = Phi_T(x) - x = 0,   <f, dx> = 0,
 /// where f is the flow's direction. A correction dx along the orbit would only move the time origin.
 ///
