@@ -1,4 +1,5 @@
 // ranks: 1 2 3
+#include "squeal/base/callback.hpp"
 #include "squeal/base/petsc.hpp"
 
 #include <doctest/doctest.h>
@@ -20,6 +21,24 @@ TEST_CASE("a failed library call throws PETSc's own text")
   Owned<Vec> x;
   check(VecCreate(PETSC_COMM_WORLD, x.put()));
   CHECK_THROWS_AS(check(VecSetSizes(x, 3, 2)), Error); // more local entries than there are in all
+}
+
+TEST_CASE("an exception in a callback comes out of the library call that led there")
+{
+  const auto multiply = [](Mat A, Vec, Vec) -> PetscErrorCode
+  {
+    std::exception_ptr* failure = nullptr;
+    PetscCall(MatShellGetContext(A, &failure));
+    return guarded(*failure, [] { throw Error("no such motion"); });
+  };
+  std::exception_ptr failure;
+  Owned<Mat> A;
+  Owned<Vec> x, y;
+  check(MatCreateShell(PETSC_COMM_WORLD, 1, 1, PETSC_DETERMINE, PETSC_DETERMINE, &failure, A.put()));
+  check(MatShellSetOperation(A, MATOP_MULT, reinterpret_cast<void (*)(void)>(+multiply)));
+  check(MatCreateVecs(A, x.put(), y.put()));
+  CHECK_THROWS_WITH_AS(check_after_callbacks(MatMult(A, x, y), failure), "no such motion", Error);
+  CHECK_NOTHROW(check_after_callbacks(PETSC_SUCCESS, {}));
 }
 
 TEST_CASE("the nearest word is the misspelt one, and a far word has none")
