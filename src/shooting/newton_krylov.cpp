@@ -1,6 +1,7 @@
 #include "newton_krylov.hpp"
 
 #include "bordered_system.hpp"
+#include "shell_preconditioner.hpp"
 #include "squeal/base/callback.hpp"
 
 #include <algorithm>
@@ -236,16 +237,7 @@ void set_callbacks(SNES snes, FullSpaceSystem& system, Mat J, Vec R)
   check(SNESSetFunction(snes, R, residual_callback, &system));
   check(SNESSetJacobian(snes, J, J, jacobian_callback, &system));
   check(SNESSetConvergenceTest(snes, convergence_callback, &system, nullptr));
-  KSP ksp = nullptr;
-  PC pc = nullptr;
-  check(SNESGetKSP(snes, &ksp));
-  check(KSPGetPC(ksp, &pc));
-  PetscBool standard = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &standard));
-  if (!standard) return; // the user's choice
-  check(PCShellSetContext(pc, &system));
-  check(PCShellSetName(pc, "of the period map, bordered"));
-  check(PCShellSetApply(pc, precondition_callback));
+  set_shell_preconditioner(snes, {"of the period map, bordered", &system, precondition_callback});
 }
 
 } // namespace

@@ -1,5 +1,6 @@
 #include "subspace_newton.hpp"
 
+#include "shell_preconditioner.hpp"
 #include "squeal/base/callback.hpp"
 
 #include <cmath>
@@ -241,16 +242,7 @@ void set_callbacks(SNES snes, SubspaceSystem& system, Mat J, Vec R)
   check(SNESSetFunction(snes, R, residual_callback, &system));
   check(SNESSetJacobian(snes, J, J, jacobian_callback, &system));
   check(SNESSetConvergenceTest(snes, convergence_callback, &system, nullptr));
-  KSP ksp = nullptr;
-  PC pc = nullptr;
-  PetscBool standard = PETSC_FALSE;
-  check(SNESGetKSP(snes, &ksp));
-  check(KSPGetPC(ksp, &pc));
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &standard));
-  if (!standard) return; // the user's choice
-  check(PCShellSetContext(pc, &system));
-  check(PCShellSetName(pc, "least squares by singular values"));
-  check(PCShellSetApply(pc, least_squares_callback));
+  set_shell_preconditioner(snes, {"least squares by singular values", &system, least_squares_callback});
 }
 
 } // namespace
