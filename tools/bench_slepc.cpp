@@ -1,0 +1,340 @@
+/// Times squeal's real modes and slices beside SLEPc's own solvers on one band of one scene, for tools/bench: one line
+/// of JSON on standard output.
+///     bench_slepc SCENE band rounds [key=value …]
+/// All alternate in every round; figures are medians of processor seconds. SLEPc's factors are MUMPS's.
+///     real modes: Krylov-Schur with spectrum slicing (EPSSetInterval), and around one shift;
+///     subspace:   of the undamped problem with friction, around the band's middle: the start of a slice;
+///     quadratic:  TOAR, shift-inverted near zero, as -modes_solver toar asks for it.
+/// -bench_write FOLDER writes M, C, K of the quadratic problem and the sizes |lambda| of its pairs, for another solver.
+#include "bench_timing.hpp"
+#include "squeal/algebra/shift_invert.hpp"
+#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/model.hpp"
+#include "squeal/modes/real_modes.hpp"
+#include "squeal/modes/slices.hpp"
+#include "squeal/scene/scene.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <numbers>
+
+using namespace squeal;
+
+namespace
+{
+
+using Figures = std::map<std::string, std::vector<double>>;
+
+struct Problem
+{
+  QuadraticProblem quadratic;
+  Owned<Mat> M, K; // symmetric, of the real modes
+};
+
+Problem read_problem(const char* file, const std::vector<std::string>& overrides)
+{
+  const Scene scene = read_scene(file, overrides);
+  const Model model = build_model(scene, PETSC_COMM_WORLD);
+  const Structure& structure = model.structure;
+  const Equilibrium equilibrium = find_equilibrium(structure, model.interface);
+  const ClosedContact contact = eliminate_closed_pairs(structure, model.interface, equilibrium);
+  const Owned<Mat> C = sliding_damping(structure, model.interface, equilibrium);
+  return {{project(structure.M, contact.Y, contact.Z), project(C, contact.Y, contact.Z),
+           project(structure.K, contact.Y, contact.Z)},
+          project_symmetric(structure.M, contact.Z),
+          project_symmetric(structure.K, contact.Z)};
+}
+
+struct Answer
+{
+  int found = 0;
+  double residual = 0, seconds = 0;
+};
+
+/// theta below a limit, and their x.
+struct Found
+{
+  std::vector<double> theta;
+  std::vector<Owned<Vec>> x;
+};
+
+/// Largest |K x - theta M x| / (|K| |x|).
+double largest_residual(const Found& found, Mat M, Mat K)
+{
+  Owned<Vec> left, inertia;
+  check(MatCreateVecs(K, left.put(), inertia.put()));
+  double stiffness = 0, largest = 0;
+  check(MatNorm(K, NORM_1, &stiffness));
+  for (std::size_t i = 0; i < found.x.size(); ++i)
+  {
+    double residual = 0, size = 0;
+    check(MatMult(K, found.x[i], left));
+    check(MatMult(M, found.x[i], inertia));
+    check(VecAXPY(left, -found.theta[i], inertia));
+    check(VecNorm(left, NORM_2, &residual));
+    check(VecNorm(found.x[i], NORM_2, &size));
+    largest = std::max(largest, residual / (stiffness * size));
+  }
+  return largest;
+}
+
+/// A Krylov-Schur solver of SLEPc's for K x = theta M x.
+EPS make_solver(const Problem& problem)
+{
+  EPS eps = nullptr;
+  check(EPSCreate(PETSC_COMM_WORLD, &eps));
+  check(EPSSetOperators(eps, problem.K, problem.M));
+  check(EPSSetProblemType(eps, EPS_GHEP));
+  check(EPSSetType(eps, EPSKRYLOVSCHUR));
+  check(EPSSetTolerances(eps, 1e-9, 200));
+  return eps;
+}
+
+/// Shift and inverse by MUMPS's L D L'.
+void use_cholesky(ST transformation, KSP solver)
+{
+  PC factor = nullptr;
+  check(STSetType(transformation, STSINVERT));
+  check(KSPSetType(solver, KSPPREONLY));
+  check(KSPGetPC(solver, &factor));
+  check(PCSetType(factor, PCCHOLESKY));
+  check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
+}
+
+/// Adds what a solve found below `limit`.
+void take(EPS eps, double limit, Found& found)
+{
+  check(EPSSetOptionsPrefix(eps, "bench_"));
+  check(EPSSetFromOptions(eps));
+  check(EPSSolve(eps));
+  PetscInt converged = 0;
+  Mat K = nullptr;
+  check(EPSGetConverged(eps, &converged));
+  check(EPSGetOperators(eps, &K, nullptr));
+  for (PetscInt i = 0; i < converged; ++i)
+  {
+    double theta = 0;
+    check(EPSGetEigenvalue(eps, i, &theta, nullptr));
+    if (theta >= limit) continue;
+    found.theta.push_back(theta);
+    check(MatCreateVecs(K, found.x.emplace_back().put(), nullptr));
+    check(EPSGetEigenvector(eps, i, found.x.back(), nullptr));
+  }
+}
+
+/// Spectrum slicing: shifts of SLEPc's own, with `subspace` modes sought at each.
+Found modes_by_interval(const Problem& problem, double limit, PetscInt subspace)
+{
+  Found found;
+  EPS eps = make_solver(problem);
+  ST transformation = nullptr;
+  KSP solver = nullptr;
+  check(EPSGetST(eps, &transformation));
+  check(STSetType(transformation, STSINVERT));
+  check(EPSSetWhichEigenpairs(eps, EPS_ALL));
+  check(EPSSetInterval(eps, shift_below_zero(problem.M, problem.K), limit));
+  check(EPSKrylovSchurSetDimensions(eps, subspace, 2 * subspace, 2 * subspace));
+  check(EPSKrylovSchurGetKSP(eps, &solver));
+  use_cholesky(transformation, solver);
+  take(eps, limit, found);
+  check(EPSDestroy(&eps));
+  return found;
+}
+
+/// One factor just below zero and one at the limit, whose inertia says how many modes there are; what is missing is
+/// sought again beside those found.
+Found modes_by_one_shift(const Problem& problem, double limit)
+{
+  Found found;
+  RealCount real = make_real_count(problem.M, problem.K, 0);
+  const int expected = count_below(real, std::sqrt(limit));
+  EPS eps = make_solver(problem);
+  ST transformation = nullptr;
+  KSP solver = nullptr;
+  check(EPSGetST(eps, &transformation));
+  check(STGetKSP(transformation, &solver));
+  use_cholesky(transformation, solver);
+  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
+  check(EPSSetTarget(eps, shift_below_zero(problem.M, problem.K)));
+  for (int attempt = 0; attempt < 4 && static_cast<int>(found.theta.size()) < expected; ++attempt)
+  {
+    const int missing = expected - static_cast<int>(found.theta.size());
+    std::vector<Vec> known(found.x.begin(), found.x.end());
+    if (attempt > 0) check(EPSSetDeflationSpace(eps, static_cast<PetscInt>(known.size()), known.data()));
+    check(EPSSetDimensions(eps, missing + 1, PETSC_DEFAULT, PETSC_DEFAULT));
+    take(eps, limit, found);
+  }
+  check(EPSDestroy(&eps));
+  return found;
+}
+
+template <class Search> Answer real_modes_by(const Search& search, const Problem& problem)
+{
+  const double start = processor_time();
+  const Found found = search();
+  return {static_cast<int>(found.theta.size()), largest_residual(found, problem.M, problem.K),
+          processor_time() - start};
+}
+
+Answer real_modes_by_squeal(const Problem& problem, double band)
+{
+  const double start = processor_time();
+  const RealModes modes = solve_real_modes_below(problem.M, problem.K, band, 0);
+  return {static_cast<int>(modes.omega.size()), modes.outcome.residual, processor_time() - start};
+}
+
+/// The eigenvalues theta of K x = theta M x with friction, which a slice of the whole band starts from: the number of
+/// those with sqrt(|theta|) below omega. `search` gets the middle of the band, how many there are without friction and
+/// how far the band reaches.
+template <class Search> Answer subspace_by(const Search& search, const Problem& problem, double omega)
+{
+  const double start = processor_time(), limit = omega * omega;
+  RealCount real = make_real_count(problem.M, problem.K, 0);
+  const std::vector<std::complex<double>> theta = search(limit / 2, count_below(real, omega), 1.06 * limit / 2);
+  return {static_cast<int>(
+              std::count_if(theta.begin(), theta.end(), [&](std::complex<double> t) { return std::abs(t) < limit; })),
+          0, processor_time() - start};
+}
+
+std::vector<std::complex<double>> theta_by_squeal(const Problem& problem, double middle, int count, double radius)
+{
+  ShiftInvert pencil = make_shift_invert(problem.quadratic.K, problem.quadratic.M, Symmetry::none);
+  move_to(pencil, middle);
+  return solve_nearest(pencil, count, radius, 1e-9).theta;
+}
+
+/// More are sought until one lies beyond the radius.
+std::vector<std::complex<double>> theta_by_slepc(const Problem& problem, double middle, int count, double radius)
+{
+  std::vector<std::complex<double>> theta;
+  EPS eps = nullptr;
+  check(EPSCreate(PETSC_COMM_WORLD, &eps));
+  check(EPSSetOperators(eps, problem.quadratic.K, problem.quadratic.M));
+  check(EPSSetProblemType(eps, EPS_GNHEP));
+  check(EPSSetType(eps, EPSKRYLOVSCHUR));
+  check(EPSSetTolerances(eps, 1e-9, 200));
+  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
+  check(EPSSetTarget(eps, middle));
+  ST transformation = nullptr;
+  check(EPSGetST(eps, &transformation));
+  use_mumps(transformation);
+  check(EPSSetOptionsPrefix(eps, "bench_"));
+  check(EPSSetFromOptions(eps));
+  for (double farthest = 0; farthest < radius; count += count / 2)
+  {
+    check(EPSSetDimensions(eps, count + 1, PETSC_DEFAULT, PETSC_DEFAULT));
+    check(EPSSolve(eps));
+    PetscInt converged = 0;
+    check(EPSGetConverged(eps, &converged));
+    theta.assign(static_cast<std::size_t>(converged), 0);
+    for (PetscInt i = 0; i < converged; ++i)
+    {
+      double real = 0, imaginary = 0;
+      check(EPSGetEigenvalue(eps, i, &real, &imaginary));
+      theta[static_cast<std::size_t>(i)] = {real, imaginary};
+      farthest = std::max(farthest, std::hypot(real - middle, imaginary));
+    }
+  }
+  check(EPSDestroy(&eps));
+  return theta;
+}
+
+Answer pairs_by_slices(const Problem& problem, double band)
+{
+  const double start = processor_time();
+  RealCount real = make_real_count(problem.M, problem.K, 0);
+  const CountedSolution result = solve_by_slices(problem.quadratic, real, band);
+  const double limit = 2 * std::numbers::pi * band;
+  const auto& pairs = result.solution.pairs;
+  return {static_cast<int>(std::count_if(pairs.begin(), pairs.end(),
+                                         [&](const Eigenpair& p) { return std::abs(p.lambda) < limit; })),
+          result.solution.outcome.residual, processor_time() - start};
+}
+
+Answer pairs_by_toar(const Problem& problem, double band)
+{
+  const double start = processor_time(), end = 2 * std::numbers::pi * band;
+  RealCount real = make_real_count(problem.M, problem.K, 0);
+  const QuadraticSolution solution = solve_quadratic(
+      problem.quadratic, {band, std::sqrt(-shift_below_zero(problem.M, problem.K)) / end, count_below(real, end), 0});
+  return {static_cast<int>(solution.pairs.size()), solution.outcome.residual, processor_time() - start};
+}
+
+/// K.petsc, C.petsc, M.petsc, and pairs.txt: |lambda| of the pairs, one a line, ascending.
+void write_problem(const Problem& problem, double band, const std::filesystem::path& folder)
+{
+  for (const auto& [name, matrix] : {std::pair{"M.petsc", problem.quadratic.M.get()},
+                                     {"C.petsc", problem.quadratic.C.get()},
+                                     {"K.petsc", problem.quadratic.K.get()}})
+  {
+    Owned<PetscViewer> viewer;
+    check(PetscViewerBinaryOpen(PETSC_COMM_WORLD, (folder / name).c_str(), FILE_MODE_WRITE, viewer.put()));
+    check(MatView(matrix, viewer));
+  }
+  RealCount real = make_real_count(problem.M, problem.K, 0);
+  std::vector<double> sizes;
+  for (const Eigenpair& pair : solve_by_slices(problem.quadratic, real, band).solution.pairs)
+    if (std::abs(pair.lambda) < 2 * std::numbers::pi * band) sizes.push_back(std::abs(pair.lambda));
+  std::sort(sizes.begin(), sizes.end());
+  std::ofstream file(folder / "pairs.txt");
+  file.precision(17);
+  for (const double size : sizes) file << size << "\n";
+}
+
+void run(int argc, char** argv)
+{
+  if (argc < 4) throw Error("bench_slepc SCENE band rounds [key=value …]");
+  std::vector<std::string> overrides;
+  for (int i = 4; i < argc && argv[i][0] != '-'; ++i) overrides.emplace_back(argv[i]);
+  const double band = std::stod(argv[2]), omega = 2 * std::numbers::pi * band;
+  const int rounds = std::stoi(argv[3]);
+  const Problem problem = read_problem(argv[1], overrides);
+  PetscInt subspace = 40;
+  check(PetscOptionsGetInt(nullptr, nullptr, "-bench_subspace", &subspace, nullptr));
+  char folder[PETSC_MAX_PATH_LEN] = "";
+  check(PetscOptionsGetString(nullptr, nullptr, "-bench_write", folder, sizeof folder, nullptr));
+  if (*folder) write_problem(problem, band, folder);
+  Figures figures;
+  std::map<std::string, Answer> last;
+  const auto note = [&](const std::string& name, const Answer& answer)
+  {
+    figures[name].push_back(answer.seconds);
+    last[name] = answer;
+  };
+  for (int round = 0; round < rounds; ++round)
+  {
+    note("real modes", real_modes_by_squeal(problem, band));
+    note("interval", real_modes_by([&] { return modes_by_interval(problem, omega * omega, subspace); }, problem));
+    note("one shift", real_modes_by([&] { return modes_by_one_shift(problem, omega * omega); }, problem));
+    note("subspace", subspace_by([&](auto... what) { return theta_by_squeal(problem, what...); }, problem, omega));
+    note("subspace, Krylov-Schur",
+         subspace_by([&](auto... what) { return theta_by_slepc(problem, what...); }, problem, omega));
+    note("slices", pairs_by_slices(problem, band));
+    note("TOAR", pairs_by_toar(problem, band));
+  }
+  PetscInt size = 0;
+  check(MatGetSize(problem.K, &size, nullptr));
+  std::printf("{\"size\": %d", static_cast<int>(size));
+  for (const auto& [name, answer] : last)
+    std::printf(", \"%s\": {\"seconds\": %.4g, \"found\": %d, \"residual\": %.2g}", name.c_str(), median(figures[name]),
+                answer.found, answer.residual);
+  std::printf("}\n");
+}
+
+} // namespace
+
+int main(int argc, char** argv)
+{
+  Session session(argc, argv, nullptr);
+  try
+  {
+    run(argc, argv);
+  }
+  catch (const std::exception& error)
+  {
+    std::fprintf(stderr, "bench_slepc: %s\n", error.what());
+    MPI_Abort(PETSC_COMM_WORLD, 1);
+  }
+}
