@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <Eigen/Cholesky>
 #include <optional>
-#include <petscblaslapack.h>
 
 namespace squeal
 {
+
+using Eigen::MatrixXd;
 
 /// `cholesky`, `distributed` or `L`, by kind; all but `distributed` and the layout on rank 0.
 struct Factor::Parts
@@ -23,7 +25,7 @@ struct Factor::Parts
   std::vector<double> corner;        // B A^-1 B', lower triangle by columns
   mutable std::optional<Cholesky> cholesky;
   mutable std::optional<Distributed> distributed; // on all ranks
-  std::vector<double> L, influence;               // dense, column-major: dofs x dofs, A^-1 B' of dofs x border
+  MatrixXd L, influence;                          // dense: the factor and A^-1 B'
 
   bool here() const { return rank_of(comm) == 0; }
   int own() const { return shares.counts[static_cast<std::size_t>(rank_of(comm))]; }
@@ -116,38 +118,23 @@ std::size_t area(int rows, int columns)
   return static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
 }
 
-/// L, A^-1 B' and B A^-1 B' on rank 0; false if A is not positive definite.
-bool factorise_dense(const Triplets& all, int dofs, int border, std::vector<double>& L, std::vector<double>& influence,
+/// On rank 0: A = L L', the influence A^-1 B' and the Schur complement B A^-1 B'. False if A is not positive definite.
+bool factorise_dense(const Triplets& all, int dofs, int border, MatrixXd& L, MatrixXd& influence,
                      std::vector<double>& corner)
 {
-  L.assign(area(dofs, dofs), 0.);
-  influence.assign(area(dofs, border), 0.);
+  L.setZero(dofs, dofs);
+  influence.setZero(dofs, border);
   corner.assign(area(border, border), 0.);
-  const auto place = [&](std::vector<double>& matrix, int i, int j) -> double&
-  { return matrix[area(dofs, j) + static_cast<std::size_t>(i)]; };
   for (std::size_t k = 0; k < all.row.size(); ++k)
   {
     const int i = all.row[k] - 1, j = all.column[k] - 1;
-    (i < dofs ? place(L, i, j) : place(influence, j, i - dofs)) += all.value[k];
+    (i < dofs ? L(i, j) : influence(j, i - dofs)) += all.value[k];
   }
-  PetscBLASInt n = dofs, m = border, info = 0;
-  double one = 1, zero = 0;
-  LAPACKpotrf_("L", &n, L.data(), &n, &info);
-  if (info != 0) return false;
-  if (m == 0) return true;
-  BLAStrsm_("L", "L", "N", "N", &n, &m, &one, L.data(), &n, influence.data(), &n);
-  BLASsyrk_("L", "T", &m, &n, &one, influence.data(), &n, &zero, corner.data(), &m);
-  BLAStrsm_("L", "L", "T", "N", &n, &m, &one, L.data(), &n, influence.data(), &n);
+  if (Eigen::LLT<Eigen::Ref<MatrixXd>>(L).info() != Eigen::Success) return false;
+  L.triangularView<Eigen::Lower>().solveInPlace(influence);
+  MatrixXd::Map(corner.data(), border, border).selfadjointView<Eigen::Lower>().rankUpdate(influence.transpose());
+  L.transpose().triangularView<Eigen::Upper>().solveInPlace(influence);
   return true;
-}
-
-/// c = alpha op(A) b + beta c, for `count` columns.
-void product(const char* op, const std::vector<double>& A, int rows, int columns, double alpha,
-             const std::vector<double>& b, int count, double beta, std::vector<double>& c)
-{
-  const bool transposed = *op == 'T';
-  PetscBLASInt m = transposed ? columns : rows, k = transposed ? rows : columns, n = count, leading = rows;
-  BLASgemm_(op, "N", &m, &n, &k, &alpha, A.data(), &leading, b.data(), &k, &beta, c.data(), &m);
 }
 
 /// Lower triangle by columns times `factor`, and its mirror image, by tiles that fit the cache.
@@ -232,8 +219,8 @@ std::vector<double> Factor::forward(std::span<const Vec> b) const
   if (!parts.here()) return {};
   if (parts.cholesky) return parts.cholesky->forward(parts.right, parts.columns);
   std::vector<double> reduced(area(parts.border, parts.columns));
-  if (parts.border > 0)
-    product("T", parts.influence, parts.dofs, parts.border, 1, parts.right, parts.columns, 0, reduced);
+  MatrixXd::Map(reduced.data(), parts.border, parts.columns).noalias() =
+      parts.influence.transpose() * MatrixXd::Map(parts.right.data(), parts.dofs, parts.columns);
   return reduced;
 }
 
@@ -246,10 +233,11 @@ void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x)
     parts.cholesky->backward(lambda, parts.right);
   else if (parts.here())
   {
-    PetscBLASInt n = parts.dofs, m = parts.columns, info = 0;
-    LAPACKpotrs_("L", &n, &m, parts.L.data(), &n, parts.right.data(), &n, &info);
+    auto right = MatrixXd::Map(parts.right.data(), parts.dofs, parts.columns);
+    parts.L.triangularView<Eigen::Lower>().solveInPlace(right);
+    parts.L.transpose().triangularView<Eigen::Upper>().solveInPlace(right);
     if (parts.border > 0)
-      product("N", parts.influence, parts.dofs, parts.border, -1, lambda, parts.columns, 1, parts.right);
+      right.noalias() -= parts.influence * MatrixXd::Map(lambda.data(), parts.border, parts.columns);
   }
   for (std::size_t column = 0; column < x.size(); ++column)
   {

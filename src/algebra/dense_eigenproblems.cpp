@@ -1,8 +1,10 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 
-#include <algorithm>
+#include "squeal/base/integers.hpp"
+
 #include <cmath>
-#include <petscblaslapack.h>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 namespace squeal
 {
@@ -10,181 +12,134 @@ namespace squeal
 namespace
 {
 
-using Index = std::size_t;
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
-double norm_of(int n, const std::vector<double>& A)
+double norm_1(const MatrixXd& A)
 {
-  double largest = 0;
-  for (int j = 0; j < n; ++j)
-  {
-    double sum = 0;
-    for (int i = 0; i < n; ++i) sum += std::abs(A[static_cast<Index>(i + j * n)]);
-    largest = std::max(largest, sum);
-  }
-  return largest;
+  return A.cwiseAbs().colwise().sum().maxCoeff();
 }
 
-// With nu = shift + 1/mu and Q = Q(shift):  Q mu^2 + (C + 2 shift M) mu + M = 0, whose companion matrix is
-// [-Q^-1 (C + 2 shift M), -Q^-1 M; I, 0] on (mu y, y).
-std::vector<double> companion(int n, const std::vector<double>& M, const std::vector<double>& C,
-                              const std::vector<double>& K, double shift)
+/// With nu = shift + 1/mu and Q = Q(shift),  Q mu^2 + (C + 2 shift M) mu + M = 0. Its companion matrix is
+/// [-Q^-1 (C + 2 shift M), -Q^-1 M; I, 0] on (mu y, y).
+MatrixXd companion(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, double shift)
 {
-  const Index size = static_cast<Index>(n) * static_cast<Index>(n);
-  std::vector<double> Q(size), right(2 * size);
-  for (Index i = 0; i < size; ++i)
-  {
-    Q[i] = K[i] + shift * (C[i] + shift * M[i]);
-    right[i] = -C[i] - 2 * shift * M[i];
-    right[size + i] = -M[i];
-  }
-  const PetscBLASInt order = n, columns = 2 * n;
-  PetscBLASInt info = 0;
-  std::vector<PetscBLASInt> pivots(static_cast<Index>(n));
-  LAPACKgesv_(&order, &columns, Q.data(), &order, pivots.data(), right.data(), &order, &info);
-  if (info != 0) throw Error("the quadratic eigenproblem is singular: some motion has neither mass nor stiffness");
-  std::vector<double> A(4 * size, 0.0);
-  for (int j = 0; j < 2 * n; ++j)
-    std::copy_n(right.begin() + static_cast<std::ptrdiff_t>(j) * n, n,
-                A.begin() + static_cast<std::ptrdiff_t>(j) * 2 * n);
-  for (int j = 0; j < n; ++j) A[static_cast<Index>(n + j + j * 2 * n)] = 1;
+  const Index n = K.rows();
+  MatrixXd right(n, 2 * n), A(2 * n, 2 * n);
+  right << -C - 2 * shift * M, -M;
+  A << solve_dense(K + shift * (C + shift * M), right,
+                   "the quadratic eigenproblem is singular: some motion has neither mass nor stiffness"),
+      MatrixXd::Identity(n, n), MatrixXd::Zero(n, n);
   return A;
 }
 
-struct Spectrum
+/// Reorders a Schur form by LAPACK's trsen, since Eigen has no such function, and reads the eigenvalues from it.
+bool order_and_read(SchurForm& schur, const std::vector<lapack_logical>& chosen)
 {
-  std::vector<double> real, imaginary, vectors;
-};
-
-Spectrum eigenvalues_of(int size, std::vector<double> A)
-{
-  const PetscBLASInt order = size, one = 1;
-  const auto count = static_cast<Index>(size);
-  Spectrum result{std::vector<double>(count), std::vector<double>(count), std::vector<double>(count * count)};
-  PetscBLASInt info = 0, work_size = -1;
-  double wanted = 0, unused = 0;
-  LAPACKgeev_("N", "V", &order, A.data(), &order, result.real.data(), result.imaginary.data(), &unused, &one,
-              result.vectors.data(), &order, &wanted, &work_size, &info);
-  work_size = static_cast<PetscBLASInt>(wanted);
-  std::vector<double> work(static_cast<Index>(work_size));
-  LAPACKgeev_("N", "V", &order, A.data(), &order, result.real.data(), result.imaginary.data(), &unused, &one,
-              result.vectors.data(), &order, work.data(), &work_size, &info);
-  if (info != 0) throw Error("LAPACK's QR algorithm (geev) failed on the dense quadratic eigenproblem");
-  return result;
+  const int n = to_int(schur.T.rows());
+  VectorXd real(n), imaginary(n), work(std::max(1, n));
+  int count = 0, integers = 0;
+  double condition = 0, separation = 0;
+  const int info = LAPACKE_dtrsen_work(LAPACK_COL_MAJOR, 'N', 'V', chosen.data(), n, schur.T.data(), n, schur.Q.data(),
+                                       n, real.data(), imaginary.data(), &count, &condition, &separation, work.data(),
+                                       to_int(work.size()), &integers, 1);
+  schur.eigenvalues.clear();
+  for (Index i = 0; i < n; ++i) schur.eigenvalues.emplace_back(real(i), imaginary(i));
+  return info == 0;
 }
 
 } // namespace
 
-std::vector<DenseEigenpair> solve_dense_quadratic(int n, const std::vector<double>& M, const std::vector<double>& C,
-                                                  const std::vector<double>& K)
+std::vector<DenseEigenpair> solve_dense_quadratic(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
 {
   std::vector<DenseEigenpair> result;
+  const Index n = K.rows();
   if (n == 0) return result;
-  const double stiffness = norm_of(n, K), mass = norm_of(n, M);
+  const double stiffness = norm_1(K), mass = norm_1(M);
   if (mass == 0 || stiffness == 0) return result;
-  const double omega = std::sqrt(stiffness / mass), shift = 1e-2; // of nu = lambda / omega; any non-eigenvalue serves
-  std::vector<double> scaled_M = M, scaled_C = C, scaled_K = K;
-  for (double& entry : scaled_M) entry *= omega * omega / stiffness;
-  for (double& entry : scaled_C) entry *= omega / stiffness;
-  for (double& entry : scaled_K) entry /= stiffness;
-  const int size = 2 * n;
-  const Spectrum spectrum = eigenvalues_of(size, companion(n, scaled_M, scaled_C, scaled_K, shift));
-  for (int k = 0; k < size; ++k)
+  const double omega = std::sqrt(stiffness / mass), shift = 1e-2; // of nu = lambda/omega: any that is no eigenvalue
+  const Eigen::EigenSolver<MatrixXd> solver(
+      companion(omega * omega / stiffness * M, omega / stiffness * C, K / stiffness, shift));
+  if (solver.info() != Eigen::Success)
+    throw Error("the QR algorithm did not converge on the dense quadratic eigenproblem");
+  // The columns of a pair with Im(mu) > 0 are the real and the imaginary part of its vector.
+  const MatrixXd& vectors = solver.pseudoEigenvectors();
+  for (Index k = 0; k < 2 * n; ++k)
   {
-    const std::complex<double> mu(spectrum.real[static_cast<Index>(k)], spectrum.imaginary[static_cast<Index>(k)]);
-    const bool pair = mu.imag() != 0;
-    if (mu.imag() < 0 || std::abs(mu) < 1e-12) continue; // the conjugate was taken; lambda is infinite without mass
-    // Im(1/mu) < 0 where Im(mu) > 0: take the conjugate of both. The better scaled of mu y and y is y.
-    const Index part = std::abs(mu) > 1 ? 0 : static_cast<Index>(n);
-    DenseEigenpair found{std::conj(omega * (shift + 1.0 / mu)),
-                         std::vector<std::complex<double>>(static_cast<Index>(n))};
-    const double* first = spectrum.vectors.data() + static_cast<Index>(k) * static_cast<Index>(size) + part;
-    for (int i = 0; i < n; ++i) found.y[static_cast<Index>(i)] = {first[i], pair ? -first[i + size] : 0.0};
-    result.push_back(std::move(found));
+    const Complex mu = solver.eigenvalues()(k);
+    if (mu.imag() < 0 || std::abs(mu) < 1e-12) continue; // a conjugate; or lambda is infinite, without mass
+    // Of mu y and y the one of larger entries is taken. Im(1/mu) < 0 where Im(mu) > 0: the pair's conjugate is taken.
+    const auto part = std::abs(mu) > 1 ? vectors.topRows(n) : vectors.bottomRows(n);
+    DenseEigenpair pair{std::conj(omega * (shift + 1.0 / mu)), part.col(k).cast<Complex>()};
+    if (mu.imag() != 0) pair.y.imag() = -part.col(k + 1);
+    pair.y.normalize();
+    result.push_back(std::move(pair));
   }
   return result;
 }
 
-std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, int n, const std::vector<double>& M,
-                                                         const std::vector<double>& C, const std::vector<double>& K)
+std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C,
+                                                         const MatrixXd& K)
 {
   std::vector<DenseEigenpair> pairs;
-  on_rank_zero(comm, [&] { pairs = solve_dense_quadratic(n, M, C, K); });
-  int count = static_cast<int>(pairs.size());
+  on_rank_zero(comm, [&] { pairs = solve_dense_quadratic(M, C, K); });
+  int count = to_int(pairs.size());
   MPI_Bcast(&count, 1, MPI_INT, 0, comm);
-  pairs.resize(static_cast<Index>(count));
+  pairs.resize(static_cast<std::size_t>(count));
   for (DenseEigenpair& pair : pairs)
   {
-    pair.y.resize(static_cast<Index>(n));
+    pair.y.resize(K.rows());
     MPI_Bcast(&pair.lambda, 1, MPI_CXX_DOUBLE_COMPLEX, 0, comm);
-    MPI_Bcast(pair.y.data(), n, MPI_CXX_DOUBLE_COMPLEX, 0, comm);
+    MPI_Bcast(pair.y.data(), to_int(pair.y.size()), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
   }
   return pairs;
 }
 
-void solve_dense_symmetric(int n, const std::vector<double>& M, const std::vector<double>& K, double shift,
-                           std::vector<double>& lambda, std::vector<double>& y)
+SymmetricEigenpairs solve_dense_symmetric(const MatrixXd& M, const MatrixXd& K, double shift)
 {
-  // M y = theta (K - shift M) y, theta = 1/(lambda - shift): bears a singular M.
-  lambda.clear();
-  y.clear();
-  if (n == 0) return;
-  std::vector<double> A = M, B = K, theta(static_cast<Index>(n));
-  for (Index i = 0; i < B.size(); ++i) B[i] -= shift * M[i];
-  const PetscBLASInt order = n, kind = 1;
-  PetscBLASInt info = 0, work_size = -1;
-  double wanted = 0;
-  LAPACKsygv_(&kind, "V", "U", &order, A.data(), &order, B.data(), &order, theta.data(), &wanted, &work_size, &info);
-  work_size = static_cast<PetscBLASInt>(wanted);
-  std::vector<double> work(static_cast<Index>(work_size));
-  LAPACKsygv_(&kind, "V", "U", &order, A.data(), &order, B.data(), &order, theta.data(), work.data(), &work_size,
-              &info);
-  if (info != 0)
+  // M y = theta (K - shift M) y with theta = 1/(lambda - shift) allows a singular M. With K - shift M = L L' it is
+  // L^-1 M L^-T z = theta z.
+  if (K.rows() == 0) return {};
+  const Eigen::LLT<MatrixXd> factor(K - shift * M);
+  if (factor.info() != Eigen::Success)
     throw Error("the real modes fail: stiffness is not positive semidefinite, or some motion has neither "
                 "mass nor stiffness");
-  for (int k = n - 1; k >= 0; --k)
-  {
-    const double value = theta[static_cast<Index>(k)];
-    if (value <= 1e-14 * theta.back()) break;
-    lambda.push_back(shift + 1 / value);
-    const double* shape = A.data() + static_cast<Index>(k) * static_cast<Index>(n);
-    for (int i = 0; i < n; ++i) y.push_back(shape[i] / std::sqrt(value));
-  }
+  const MatrixXd half = factor.matrixL().solve(M);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(factor.matrixL().solve(half.transpose()));
+  if (solver.info() != Eigen::Success) throw Error("the eigenvalues of the real modes did not converge");
+  const VectorXd theta = solver.eigenvalues().reverse();
+  const Index finite = (theta.array() > 1e-14 * theta(0)).count();
+  const VectorXd kept = theta.head(finite);
+  return {(shift + kept.array().inverse()).matrix(),
+          factor.matrixU().solve(solver.eigenvectors().rowwise().reverse().leftCols(finite)) *
+              kept.cwiseSqrt().cwiseInverse().asDiagonal()};
 }
 
-std::vector<double> dense_copy(Mat A)
+SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& K, double shift)
 {
-  PetscInt rows = 0, columns = 0;
-  check(MatGetSize(A, &rows, &columns));
-  Owned<IS> all_rows, all_columns;
-  check(ISCreateStride(PETSC_COMM_SELF, rows, 0, 1, all_rows.put()));
-  check(ISCreateStride(PETSC_COMM_SELF, columns, 0, 1, all_columns.put()));
-  const IS row_set = all_rows, column_set = all_columns;
-  Mat* parts = nullptr;
-  check(MatCreateSubMatrices(A, 1, &row_set, &column_set, MAT_INITIAL_MATRIX, &parts));
-  std::vector<double> result(static_cast<Index>(rows) * static_cast<Index>(columns), 0.0);
-  for_each_row(parts[0],
-               [&](PetscInt i, std::span<const PetscInt> column, std::span<const PetscScalar> value)
-               {
-                 for (Index k = 0; k < column.size(); ++k)
-                   result[static_cast<Index>(i) + static_cast<Index>(column[k]) * static_cast<Index>(rows)] = value[k];
-               });
-  check(MatDestroySubMatrices(1, &parts));
-  return result;
+  SymmetricEigenpairs pairs;
+  on_rank_zero(comm, [&] { pairs = solve_dense_symmetric(M, K, shift); });
+  broadcast(pairs.lambda, comm);
+  broadcast(pairs.y, comm);
+  return pairs;
 }
 
-void quadratic_residual(Mat M, Mat C, Mat K, std::complex<double> lambda, Vec y_r, Vec y_i, Vec real, Vec imaginary)
+std::optional<SchurForm> schur_form(const MatrixXd& A)
 {
-  const std::complex<double> square = lambda * lambda;
-  const Owned<Vec> a = zeros_like(real), b = zeros_like(real);
-  check(MatMult(K, y_r, real));
-  check(MatMult(K, y_i, imaginary));
-  for (const auto& [A, factor] : {std::pair{C, lambda}, std::pair{M, square}})
-  {
-    check(MatMult(A, y_r, a));
-    check(MatMult(A, y_i, b));
-    check(VecAXPBYPCZ(real, factor.real(), -factor.imag(), 1, a, b));
-    check(VecAXPBYPCZ(imaginary, factor.imag(), factor.real(), 1, a, b));
-  }
+  const Eigen::RealSchur<MatrixXd> solver(A);
+  if (solver.info() != Eigen::Success) return std::nullopt;
+  SchurForm schur{solver.matrixT(), solver.matrixU(), {}};
+  order_and_read(schur, std::vector<lapack_logical>(static_cast<std::size_t>(A.rows()), 0));
+  return schur;
+}
+
+bool reorder(SchurForm& schur, const std::function<bool(Complex)>& chosen)
+{
+  std::vector<lapack_logical> marks;
+  for (const Complex eigenvalue : schur.eigenvalues) marks.push_back(chosen(eigenvalue));
+  return order_and_read(schur, marks);
 }
 
 } // namespace squeal

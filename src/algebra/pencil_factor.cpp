@@ -2,6 +2,7 @@
 
 #include "elimination.hpp"
 #include "mumps.hpp"
+#include "squeal/base/integers.hpp"
 
 namespace squeal
 {
@@ -26,7 +27,8 @@ struct PencilFactor::Parts
   Shares shares;
   Triplets entries; // those of K, then those of M: MUMPS sums what is of one place
   Index first_of_M = 0;
-  std::vector<double> values, right;
+  std::vector<double> values; // K - shift M
+  Eigen::MatrixXd right;      // on rank 0
   Mumps mumps;
 };
 
@@ -74,27 +76,27 @@ int PencilFactor::negative_pivots() const
   return parts_->mumps->infog[11];
 }
 
-Block PencilFactor::solved(const Block& X) const
+MultiVector PencilFactor::solve(const MultiVector& X) const
 {
   Parts& parts = *parts_;
-  Block Y = X;
+  MultiVector Y = X;
   const bool here = rank_of(parts.comm) == 0;
-  const auto total = static_cast<Index>(parts.shares.total()), columns = static_cast<Index>(X.columns);
+  const int rows = to_int(X.entries.rows()), columns = to_int(X.columns());
   if (columns == 0) return Y;
-  if (here) parts.right.resize(total * columns);
-  const auto whole = [&](PetscInt j) { return parts.right.data() + (here ? static_cast<Index>(j) * total : 0); };
-  for (PetscInt j = 0; j < X.columns; ++j)
-    MPI_Gatherv(X.column(j), static_cast<int>(X.rows), MPI_DOUBLE, whole(j), parts.shares.counts.data(),
+  if (here) parts.right.resize(parts.shares.total(), columns);
+  const auto whole = [&](int j) { return here ? parts.right.col(j).data() : nullptr; };
+  for (int j = 0; j < columns; ++j)
+    MPI_Gatherv(X.entries.col(j).data(), rows, MPI_DOUBLE, whole(j), parts.shares.counts.data(),
                 parts.shares.starts.data(), MPI_DOUBLE, 0, parts.comm);
   DMUMPS_STRUC_C& mumps = *parts.mumps;
-  control(mumps, 27) = static_cast<MUMPS_INT>(columns); // all of them at each reading of the factor
+  control(mumps, 27) = columns; // all of them at each reading of the factor
   mumps.rhs = parts.right.data();
-  mumps.nrhs = static_cast<MUMPS_INT>(columns);
+  mumps.nrhs = columns;
   mumps.lrhs = parts.shares.total();
   run(mumps, MumpsJob::solve);
-  for (PetscInt j = 0; j < X.columns; ++j)
-    MPI_Scatterv(whole(j), parts.shares.counts.data(), parts.shares.starts.data(), MPI_DOUBLE, Y.column(j),
-                 static_cast<int>(X.rows), MPI_DOUBLE, 0, parts.comm);
+  for (int j = 0; j < columns; ++j)
+    MPI_Scatterv(whole(j), parts.shares.counts.data(), parts.shares.starts.data(), MPI_DOUBLE, Y.entries.col(j).data(),
+                 rows, MPI_DOUBLE, 0, parts.comm);
   return Y;
 }
 

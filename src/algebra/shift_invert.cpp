@@ -1,8 +1,10 @@
 #include "squeal/algebra/shift_invert.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <slepcblaslapack.h>
+#include <optional>
 
 namespace squeal
 {
@@ -10,63 +12,58 @@ namespace squeal
 namespace
 {
 
-using Index = std::size_t;
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXd;
 
-constexpr PetscInt block_size = 12;     // solved for at once
+constexpr PetscInt block_size = 12;     // vectors in the starting block
 constexpr PetscInt largest_space = 600; // vectors
 
-// A^-1 M V_k = V H: the columns of H are those of V multiplied so far, its rows all of V.
+/// (K - shift M)^-1 M V_k = V H. V_k are the columns of V that were multiplied so far, one for each column of H.
 struct Krylov
 {
-  Block V;
-  std::vector<double> H;
-  PetscInt order = 0; // columns of H
+  MultiVector V;
+  MatrixXd H{};
+
+  Index order() const { return H.cols(); }
 };
 
-// Multiplies the newest block and appends what is new in the answer.
+/// Multiplies the newest block and appends to V what the product adds to its span.
 void grow(Krylov& krylov, const ShiftInvert& pencil)
 {
-  Block& V = krylov.V;
-  const PetscInt size = V.columns, fresh = size - krylov.order;
-  const Block S = pencil.factor->solved(product(pencil.M, columns_from(V, krylov.order)));
-  const std::vector<double> inside = inner(V, S);
-  const PetscInt gained = extend_orthonormal(V, S);
-  const std::vector<double> outside = inner(columns_from(V, size), S);
-  std::vector<double> H(static_cast<Index>(V.columns) * static_cast<Index>(size));
-  const auto column = [&](PetscInt j) { return H.begin() + static_cast<std::ptrdiff_t>(j) * V.columns; };
-  for (PetscInt j = 0; j < krylov.order; ++j)
-    std::copy_n(krylov.H.begin() + static_cast<std::ptrdiff_t>(j) * size, size, column(j));
-  for (PetscInt j = 0; j < fresh; ++j)
-  {
-    std::copy_n(inside.begin() + static_cast<std::ptrdiff_t>(j) * size, size, column(krylov.order + j));
-    std::copy_n(outside.begin() + static_cast<std::ptrdiff_t>(j) * gained, gained, column(krylov.order + j) + size);
-  }
-  krylov.H = std::move(H);
-  krylov.order = size;
+  MultiVector& V = krylov.V;
+  const Index size = V.columns(), order = krylov.order();
+  const MultiVector S = pencil.factor->solve(product(pencil.M, columns_from(V, order)));
+  const MatrixXd inside = inner_products(V, S);
+  const Index gained = extend_orthonormal(V, S);
+  krylov.H.conservativeResizeLike(MatrixXd::Zero(size + gained, size));
+  krylov.H.rightCols(size - order) << inside, inner_products(columns_from(V, size), S);
 }
 
-// The leading columns of a Schur basis of the square part of H, and by how much they miss being invariant.
+/// The leading columns of a Schur basis of the square part of H, and the residual of their span.
 struct Leading
 {
-  std::vector<std::complex<double>> nu; // eigenvalues of (K - shift M)^-1 M, largest first
-  std::vector<double> Q;                // order x nu.size()
-  double next = 0;                      // |nu| of the first that was left out
-  double residual = INFINITY;           // over the smallest |nu|
+  Eigen::VectorXcd nu{};      // eigenvalues of (K - shift M)^-1 M, none smaller in modulus than those left out
+  MatrixXd Q{};               // order x nu.size()
+  double next = 0;            // the largest |nu| that was left out
+  double residual = HUGE_VAL; // over the smallest |nu|
 };
 
-// How many of the largest to take: those of at least `least`, `count` or up to half as many again, cut at the widest
-// ratio, where the space converges fastest and no conjugates or multiples are parted.
-Index how_many(const std::vector<double>& descending, PetscInt count, double least, double rounding)
+/// The number of eigenvalues to take: those of at least `least` in modulus, at least `count`, and up to half as many
+/// again. It ends at the widest ratio of neighbours, where the space converges fastest and neither conjugates nor
+/// multiples are parted.
+std::size_t number_to_take(const std::vector<double>& descending, PetscInt count, double least)
 {
-  const auto kept = std::find_if(descending.begin(), descending.end(), [&](double nu) { return nu < rounding; });
-  const auto size = static_cast<Index>(kept - descending.begin());
-  const auto required = std::find_if(descending.begin(), kept, [&](double nu) { return nu < least; });
-  const Index low =
-      std::min(size, std::max(static_cast<Index>(count), static_cast<Index>(required - descending.begin())));
+  const double rounding = 1e-13 * descending[0]; // below, a mode has no mass and does not vibrate
+  const auto end = std::find_if(descending.begin(), descending.end(), [&](double nu) { return nu < rounding; });
+  const auto size = static_cast<std::size_t>(end - descending.begin());
+  const auto required = std::find_if(descending.begin(), end, [&](double nu) { return nu < least; });
+  const auto low = std::min(
+      size, std::max(static_cast<std::size_t>(count), static_cast<std::size_t>(required - descending.begin())));
   if (low == 0) return 0;
-  Index best = low;
+  std::size_t best = low;
   double widest = 1;
-  for (Index k = low; k < std::min(size, low + low / 2 + 2); ++k)
+  for (std::size_t k = low; k < std::min(size, low + low / 2 + 2); ++k)
     if (descending[k - 1] > descending[k] * widest)
     {
       widest = descending[k - 1] / descending[k];
@@ -77,83 +74,40 @@ Index how_many(const std::vector<double>& descending, PetscInt count, double lea
 
 Leading leading_subspace(const Krylov& krylov, PetscInt count, double least)
 {
-  const PetscBLASInt order = static_cast<PetscBLASInt>(krylov.order),
-                     rows = static_cast<PetscBLASInt>(krylov.V.columns);
-  const auto size = static_cast<Index>(order);
-  std::vector<double> T(size * size), Q(size * size), re(size), im(size), work(40 * size + size * size);
-  for (PetscBLASInt j = 0; j < order; ++j)
-    std::copy_n(krylov.H.begin() + static_cast<std::ptrdiff_t>(j) * rows, order,
-                T.begin() + static_cast<std::ptrdiff_t>(j) * order);
-  PetscBLASInt found = 0, info = 0, work_size = static_cast<PetscBLASInt>(work.size());
-  LAPACKgees_("V", "N", nullptr, &order, T.data(), &order, &found, re.data(), im.data(), Q.data(), &order, work.data(),
-              &work_size, nullptr, &info);
+  const Index order = krylov.order();
   Leading result;
-  if (info != 0) return result;
-  std::vector<double> sizes;
-  for (Index i = 0; i < size; ++i) sizes.push_back(std::hypot(re[i], im[i]));
-  std::vector<double> descending = sizes;
+  result.Q.resize(order, 0);
+  std::optional<SchurForm> schur = schur_form(krylov.H.topRows(order));
+  if (!schur) return result;
+  std::vector<double> descending;
+  for (const Complex nu : schur->eigenvalues) descending.push_back(std::abs(nu));
   std::sort(descending.rbegin(), descending.rend());
-  const double rounding = 1e-13 * descending[0]; // without mass there is no vibration
-  const Index wanted = how_many(descending, count, least, rounding);
-  if (wanted == 0) return result;
-  const double smallest = descending[wanted - 1] * (1 - 1e-12);
-  result.next = wanted < size ? descending[wanted] : 0;
-  std::vector<PetscBLASInt> chosen(size), integers(1);
-  for (Index i = 0; i < size; ++i) chosen[i] = sizes[i] >= smallest;
-  double condition = 0, separation = 0;
-  const PetscBLASInt one = 1;
-  LAPACKtrsen_("N", "V", chosen.data(), &order, T.data(), &order, Q.data(), &order, re.data(), im.data(), &found,
-               &condition, &separation, work.data(), &work_size, integers.data(), &one, &info);
-  if (info != 0) return result;
-  const auto taken = static_cast<Index>(found);
-  result.Q.assign(Q.begin(), Q.begin() + static_cast<std::ptrdiff_t>(size * taken));
-  double largest = 0;
-  for (Index k = 0; k < taken; ++k)
-  {
-    result.nu.emplace_back(re[k], im[k]);
-    double square = 0;
-    for (PetscBLASInt i = order; i < rows; ++i)
-    {
-      double miss = 0;
-      for (PetscBLASInt j = 0; j < order; ++j)
-        miss += krylov.H[static_cast<Index>(i) + static_cast<Index>(j) * static_cast<Index>(rows)] *
-                Q[static_cast<Index>(j) + k * size];
-      square += miss * miss;
-    }
-    largest = std::max(largest, std::sqrt(square));
-  }
-  result.residual = largest / smallest;
+  const std::size_t taken = number_to_take(descending, count, least);
+  if (taken == 0) return result;
+  const double smallest = descending[taken - 1] * (1 - 1e-12);
+  result.next = taken < descending.size() ? descending[taken] : 0;
+  const auto chosen = [&](Complex nu) { return std::abs(nu) >= smallest; };
+  const Index number = std::count_if(schur->eigenvalues.begin(), schur->eigenvalues.end(), chosen);
+  if (!reorder(*schur, chosen)) return result;
+  result.nu = Eigen::VectorXcd::Map(schur->eigenvalues.data(), number);
+  result.Q = schur->Q.leftCols(number);
+  const MatrixXd outside = krylov.H.bottomRows(krylov.H.rows() - order) * result.Q;
+  result.residual = std::sqrt(outside.colwise().squaredNorm().maxCoeff()) / smallest;
   return result;
 }
 
-// On rank 0, told to all: what follows must be the same everywhere.
+/// Computed on rank 0 and broadcast, since what follows must be the same on every rank.
 Leading leading_subspace_shared(const Krylov& krylov, PetscInt count, double least)
 {
   Leading leading;
   const MPI_Comm comm = krylov.V.comm;
   on_rank_zero(comm, [&] { leading = leading_subspace(krylov, count, least); });
-  int size = static_cast<int>(leading.nu.size());
-  double scalars[2] = {leading.next, leading.residual};
-  MPI_Bcast(&size, 1, MPI_INT, 0, comm);
-  MPI_Bcast(scalars, 2, MPI_DOUBLE, 0, comm);
-  leading.nu.resize(static_cast<Index>(size));
-  leading.Q.resize(static_cast<Index>(size) * static_cast<Index>(krylov.order));
-  MPI_Bcast(leading.nu.data(), size, MPI_CXX_DOUBLE_COMPLEX, 0, comm);
-  MPI_Bcast(leading.Q.data(), static_cast<int>(leading.Q.size()), MPI_DOUBLE, 0, comm);
-  leading.next = scalars[0];
-  leading.residual = scalars[1];
+  broadcast(leading.Q, comm);
+  leading.nu.resize(leading.Q.cols());
+  MPI_Bcast(leading.nu.data(), static_cast<int>(leading.nu.size()), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
+  MPI_Bcast(&leading.next, 1, MPI_DOUBLE, 0, comm);
+  MPI_Bcast(&leading.residual, 1, MPI_DOUBLE, 0, comm);
   return leading;
-}
-
-// Zeros for the columns of V that are not multiplied yet.
-std::vector<double> padded(const std::vector<double>& Q, const Krylov& krylov)
-{
-  const auto order = static_cast<Index>(krylov.order), rows = static_cast<Index>(krylov.V.columns);
-  std::vector<double> result(Q.size() / std::max<Index>(order, 1) * rows);
-  for (Index k = 0; k * order < Q.size(); ++k)
-    std::copy_n(Q.begin() + static_cast<std::ptrdiff_t>(k * order), order,
-                result.begin() + static_cast<std::ptrdiff_t>(k * rows));
-  return result;
 }
 
 } // namespace
@@ -175,7 +129,6 @@ ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry)
   return {K, M, 0, std::make_unique<PencilFactor>(K, M, symmetry)};
 }
 
-// On an eigenvalue there is no factor: below it there is.
 void move_to(ShiftInvert& pencil, double shift)
 {
   for (double step = 1e-6; step < 1e-2; step *= 10)
@@ -191,28 +144,27 @@ Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, 
 {
   PetscInt n = 0;
   check(MatGetSize(pencil.K, &n, nullptr));
-  Krylov krylov;
-  krylov.V = empty_block(pencil.K);
-  extend_orthonormal(krylov.V, uneven_block(pencil.K, std::min(n, block_size)));
-  const PetscInt room = std::max(largest_space, 4 * count);
-  const double least = radius > 0 ? 1 / radius : INFINITY;
+  Krylov krylov{empty_multivector(pencil.K)};
+  extend_orthonormal(krylov.V, random_multivector(pencil.K, std::min(n, block_size)));
+  const PetscInt limit = std::max(largest_space, 4 * count);
+  const double least = radius > 0 ? 1 / radius : HUGE_VAL;
   Nearest result;
-  for (int round = 0; !result.converged && krylov.V.columns < room; ++round)
+  for (int round = 0; !result.converged && krylov.V.columns() < limit; ++round)
   {
     grow(krylov, pencil);
-    const bool exhausted = krylov.V.columns == krylov.order;
-    if (!exhausted && (krylov.order < 2 * count || round % (1 + krylov.order / 150) != 0)) continue;
-    Leading leading = leading_subspace_shared(krylov, count, least);
+    const bool exhausted = krylov.V.columns() == krylov.order();
+    if (!exhausted && (krylov.order() < 2 * count || round % (1 + krylov.order() / 150) != 0)) continue;
+    const Leading leading = leading_subspace_shared(krylov, count, least);
     result.converged = exhausted || leading.residual < tolerance;
     if (!result.converged) continue;
-    double smallest = leading.next > 0 ? INFINITY : 0; // nothing is left out: everything is reached
-    for (const std::complex<double> nu : leading.nu)
+    double smallest = leading.next > 0 ? HUGE_VAL : 0; // where nothing is left out the reach is unlimited
+    for (const Complex nu : leading.nu)
     {
       result.theta.push_back(pencil.shift + 1.0 / nu);
       smallest = std::min(smallest, std::abs(nu));
     }
     result.reach = 1 / smallest;
-    result.space = combination(krylov.V, padded(leading.Q, krylov), static_cast<PetscInt>(leading.nu.size()));
+    result.space = {krylov.V.comm, krylov.V.entries.leftCols(krylov.order()) * leading.Q};
   }
   return result;
 }

@@ -4,8 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <Eigen/Core>
-#include <petscblaslapack.h>
+#include <Eigen/Dense>
 #include <set>
 
 namespace squeal
@@ -17,7 +16,7 @@ namespace
 constexpr double sign_tolerance = 1e-10; // of the largest unknown: what rounding leaves of a grazing pair
 constexpr double defect_tolerance = 1e-9;
 
-using Dense = std::vector<double>; // column-major, as LAPACK wants it
+using Dense = std::vector<double>; // column-major
 
 Dense split_matrix(const ComplementarityProblem& problem, const std::vector<char>& closed)
 {
@@ -47,36 +46,29 @@ double relative_defect(const Dense& matrix, const Dense& x, const std::vector<do
   return scale > 0 ? defect / scale : 0;
 }
 
-/// False if a pivot is lost in rounding.
-bool solve_by_lu(Dense matrix, std::vector<double>& x)
+Eigen::Map<const Eigen::MatrixXd> square(const Dense& matrix, std::size_t n)
 {
-  PetscBLASInt n = 0, one = 1, info = 0;
-  check(PetscBLASIntCast(static_cast<PetscInt>(x.size()), &n));
-  std::vector<PetscBLASInt> pivots(x.size());
-  LAPACKgetrf_(&n, &n, matrix.data(), &n, pivots.data(), &info);
-  if (info != 0) return false;
-  double least = std::abs(matrix[0]), largest = 0;
-  for (std::size_t i = 0; i < x.size(); ++i)
-  {
-    least = std::min(least, std::abs(matrix[i * x.size() + i]));
-    largest = std::max(largest, std::abs(matrix[i * x.size() + i]));
-  }
-  if (!(least > 1e-13 * largest)) return false;
-  LAPACKgetrs_("N", &n, &one, matrix.data(), &n, pivots.data(), x.data(), &n, &info);
-  return info == 0;
+  return Eigen::MatrixXd::Map(matrix.data(), static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
+}
+
+/// False if a pivot is lost in rounding.
+bool solve_by_lu(const Dense& matrix, std::vector<double>& x)
+{
+  const Eigen::PartialPivLU<Eigen::MatrixXd> factor(square(matrix, x.size()));
+  const Eigen::ArrayXd pivots = factor.matrixLU().diagonal().cwiseAbs();
+  if (!(pivots.minCoeff() > 1e-13 * pivots.maxCoeff())) return false;
+  auto unknowns = Eigen::VectorXd::Map(x.data(), pivots.size());
+  unknowns = factor.solve(unknowns).eval();
+  return true;
 }
 
 /// The shortest of the least-squares solutions: pairs that share a rigid face share its load evenly.
-void solve_by_svd(Dense matrix, std::vector<double>& x)
+void solve_by_svd(const Dense& matrix, std::vector<double>& x)
 {
-  PetscBLASInt n = 0, one = 1, rank = 0, info = 0;
-  check(PetscBLASIntCast(static_cast<PetscInt>(x.size()), &n));
-  PetscBLASInt length = 10 * n + 64;
-  const PetscReal cut = 1e-12;
-  std::vector<PetscReal> singular(x.size()), work(static_cast<std::size_t>(length));
-  LAPACKgelss_(&n, &n, &one, matrix.data(), &n, x.data(), &n, singular.data(), &cut, &rank, work.data(), &length,
-               &info);
-  if (info != 0) throw Error("LAPACK gelss: the singular values of a contact matrix did not converge");
+  Eigen::JacobiSVD<Eigen::MatrixXd> values(square(matrix, x.size()), Eigen::ComputeThinU | Eigen::ComputeThinV);
+  values.setThreshold(1e-12);
+  auto unknowns = Eigen::VectorXd::Map(x.data(), static_cast<Eigen::Index>(x.size()));
+  unknowns = values.solve(unknowns).eval();
 }
 
 std::vector<double> gaps(const ComplementarityProblem& problem, const std::vector<double>& r)
@@ -101,7 +93,7 @@ SplitSolution solve_split(const ComplementarityProblem& problem, const std::vect
   if (n == 0) return solution;
   const Dense matrix = split_matrix(problem, closed);
   std::vector<double> x = rhs;
-  // LAPACK's singular values do not come to an end on what is not a number
+  // the singular values of a matrix with an entry that is not a number do not converge
   const auto finite = [](double value) { return std::isfinite(value); };
   if (!std::all_of(matrix.begin(), matrix.end(), finite) || !std::all_of(x.begin(), x.end(), finite))
     throw Error("contact at rest: the compliance of the pairs is not a finite number");
@@ -167,10 +159,7 @@ bool has_one_solution(const ComplementarityProblem& problem)
   Dense symmetric(n * n);
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t j = 0; j < n; ++j) symmetric[j * n + i] = (problem.M[i * n + j] + problem.M[j * n + i]) / 2;
-  PetscBLASInt size = 0, info = 0;
-  check(PetscBLASIntCast(static_cast<PetscInt>(n), &size));
-  if (n > 0) LAPACKpotrf_("L", &size, symmetric.data(), &size, &info);
-  return info == 0;
+  return n == 0 || Eigen::LLT<Eigen::MatrixXd>(square(symmetric, n)).info() == Eigen::Success;
 }
 
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,

@@ -1,10 +1,11 @@
 #include "preconditioner.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/equilibrium/closed_contact.hpp"
 #include "squeal/modes/quadratic.hpp"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 #include <Eigen/Dense>
 #include <numbers>
@@ -22,7 +23,7 @@ using Eigen::VectorXd;
 /// The sliding modes on the span of the real ones.
 struct SlidingModes
 {
-  Block shapes;                // Phi
+  MultiVector shapes;          // Phi
   std::vector<Complex> lambda; // [1/s] Im >= 0
   std::size_t followed = 0;    // the one that grows most
   MatrixXd right, left;        // columns Re and Im of (y, lambda y); the inverse
@@ -76,8 +77,7 @@ MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Eigen::Index siz
     const bool complex = pair.lambda.imag() > 0;
     if (column + (complex ? 2 : 1) > result.cols()) throw Error("cycle: the preconditioner has too many sliding modes");
     Eigen::VectorXcd both(2 * size);
-    both.head(size) = Eigen::VectorXcd::Map(pair.y.data(), size);
-    both.tail(size) = pair.lambda * both.head(size);
+    both << pair.y, pair.lambda * pair.y;
     result.col(column++) = both.real();
     if (complex) result.col(column++) = both.imag();
   }
@@ -118,35 +118,29 @@ VectorXd corrected(const SlidingModes& modes, double period, const VectorXd& z)
 
 /// From sliding modes y in the coordinates of M-orthonormal shapes, all of them.
 SlidingModes make_sliding_modes(const std::vector<DenseEigenpair>& sliding, const std::vector<Owned<Vec>>& shapes,
-                                Mat M, const CycleSettings& settings)
+                                const CycleSettings& settings)
 {
-  SlidingModes modes{empty_block(M),
-                     {},
-                     0,
-                     real_columns(sliding, static_cast<Eigen::Index>(shapes.size())),
-                     {},
-                     settings.steps_per_period,
+  const auto size = static_cast<Eigen::Index>(shapes.size());
+  const std::vector<Vec> all(shapes.begin(), shapes.end());
+  SlidingModes modes{columns_of(all), {}, 0, real_columns(sliding, size), {}, settings.steps_per_period,
                      settings.theta};
   for (const DenseEigenpair& pair : sliding)
   {
     modes.lambda.push_back(pair.lambda);
     if (pair.lambda.real() > modes.lambda[modes.followed].real()) modes.followed = modes.lambda.size() - 1;
   }
-  modes.left = modes.right.partialPivLu().inverse();
-  if (!modes.left.allFinite()) throw Error("cycle: the sliding modes of the preconditioner depend on each other");
-  for (const Owned<Vec>& shape : shapes) append(modes.shapes, shape);
+  modes.left = solve_dense(modes.right, MatrixXd::Identity(2 * size, 2 * size),
+                           "cycle: the sliding modes of the preconditioner depend on each other");
   return modes;
 }
 
 /// y = -x + E D E^+ x with E^+ = Phi'M.
 void apply_inverse(const SlidingModes& modes, Mat M, double period, Vec x, Vec y)
 {
-  Block sum = empty_block(M);
-  for (const Vec half : {displacement(x), velocity(x)}) append(sum, half);
-  const std::vector<double> seen = inner(modes.shapes, product(M, sum));
-  const VectorXd turned = corrected(modes, period, VectorXd::Map(seen.data(), static_cast<Eigen::Index>(seen.size())));
-  std::transform(sum.entries.begin(), sum.entries.end(), sum.entries.begin(), std::negate());
-  add_combination(sum, 1, modes.shapes, {turned.data(), turned.data() + turned.size()});
+  MultiVector sum = columns_of(std::array{displacement(x), velocity(x)});
+  const MatrixXd seen = inner_products(modes.shapes, product(M, sum));
+  const VectorXd turned = corrected(modes, period, seen.reshaped());
+  sum.entries = modes.shapes.entries * turned.reshaped(seen.rows(), 2) - sum.entries;
   copy_column(sum, 0, displacement(y));
   copy_column(sum, 1, velocity(y));
 }
@@ -160,15 +154,10 @@ Preconditioner sliding_preconditioner(const CycleProblem& problem, const RealMod
   const ClosedContact contact = eliminate_closed_pairs(structure, problem.interface, problem.equilibrium);
   const MatrixXd friction = friction_of(problem.interface, modes.shapes);
   const Owned<Mat> C = sliding_damping(structure, problem.interface, problem.equilibrium);
-  const auto on_shapes = [&](Mat X)
-  {
-    const MatrixXd Xc = on_modes(modes.shapes, friction, contact, X);
-    return std::vector<double>(Xc.data(), Xc.data() + Xc.size());
-  };
-  const std::vector<DenseEigenpair> sliding =
-      solve_dense_quadratic_shared(comm_of(structure.load), static_cast<int>(modes.shapes.size()),
-                                   on_shapes(structure.M), on_shapes(C), on_shapes(structure.K));
-  SlidingModes inside = make_sliding_modes(sliding, modes.shapes, structure.M, problem.settings);
+  const auto on_shapes = [&](Mat X) { return on_modes(modes.shapes, friction, contact, X); };
+  const std::vector<DenseEigenpair> sliding = solve_dense_quadratic_shared(
+      comm_of(structure.load), on_shapes(structure.M), on_shapes(C), on_shapes(structure.K));
+  SlidingModes inside = make_sliding_modes(sliding, modes.shapes, problem.settings);
   return [inside = std::move(inside), M = structure.M.get()](double period, Vec x, Vec y)
   { apply_inverse(inside, M, period, x, y); };
 }

@@ -1,5 +1,7 @@
 #include "reduced_flow.hpp"
 
+#include "squeal/algebra/dense_matrix.hpp"
+
 namespace squeal
 {
 
@@ -98,9 +100,8 @@ MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const R
   V.topLeftCorner(slow, slow).diagonal().setOnes();
   V.block(slow, n, slow, slow).diagonal().setOnes();
   V.bottomRows(1) = image.transpose() / flow.dot(image);
-  MatrixXd right = product(V, U);
-  right = (MatrixXd::Identity(right.rows(), right.cols()) - right).eval();
-  return {-U, solve_dense(std::move(right), std::move(V))};
+  return {-U, solve_dense(MatrixXd::Identity(V.rows(), V.rows()) - V * U, V,
+                          "reduced model: the period map has a second multiplier 1")};
 }
 
 Preconditioner preconditioner_of(const MonodromyCorrection& correction)
@@ -108,7 +109,7 @@ Preconditioner preconditioner_of(const MonodromyCorrection& correction)
   return [&correction](double, Vec x, Vec y)
   {
     const VectorXd both = stacked(reduced_state(x));
-    const VectorXd result = product(correction.left, product(correction.right, both)) - both;
+    const VectorXd result = correction.left * (correction.right * both) - both;
     put(ReducedState{result.head(result.size() / 2), result.tail(result.size() / 2)}, y);
   };
 }
@@ -119,7 +120,7 @@ Preconditioner preconditioner_of(const MonodromyCorrection& correction, const Re
   return [&](double, Vec x, Vec y)
   {
     const VectorXd seen = stacked(coordinates(model, structure, displacement(x), velocity(x)));
-    const VectorXd result = product(correction.left, product(correction.right, seen));
+    const VectorXd result = correction.left * (correction.right * seen);
     check(VecAXPBY(y, -1, 0, x));
     add_motion(model, 1, result.head(model.size()), displacement(y));
     add_motion(model, 1, result.tail(model.size()), velocity(y));

@@ -1,6 +1,6 @@
 #include "squeal/equilibrium/closed_contact.hpp"
 
-#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/algebra/quadratic_residual.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,6 @@
 #include "squeal/modes/projection.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/shift_invert.hpp"
 
 #include <algorithm>
@@ -12,163 +13,145 @@ namespace squeal
 namespace
 {
 
-using Index = std::size_t;
+using Eigen::Index;
+using Eigen::MatrixXd;
 
-// A matrix of the problem, A V and V'A V, which grow with V.
+/// A matrix A of the problem with A V and V'A V, which grow with V.
 struct Projected
 {
   Mat matrix = nullptr;
-  Block image;
-  std::vector<double> entries;
+  MultiVector image;
+  MatrixXd entries{};
 };
 
-// V has gained its last columns, W: V'A V gains the columns V'(A W) and the rows W'(A V).
-void extend(Projected& projected, const Block& V, PetscInt gained)
+/// V has gained its last columns, W: V'A V gains the columns V'(A W) and the rows W'(A V).
+void extend(Projected& projected, const MultiVector& V, Index gained)
 {
-  const Block W = columns_from(V, V.columns - gained), AW = product(projected.matrix, W);
-  const std::vector<double> right = inner(V, AW), left = inner(W, projected.image);
+  const MultiVector W = columns_from(V, V.columns() - gained), AW = product(projected.matrix, W);
+  const MatrixXd below = inner_products(W, projected.image);
   append(projected.image, AW);
-  const auto size = static_cast<Index>(V.columns), fresh = static_cast<Index>(gained), before = size - fresh;
-  std::vector<double> entries(size * size);
-  for (Index j = 0; j < before; ++j)
-  {
-    std::copy_n(projected.entries.begin() + static_cast<std::ptrdiff_t>(j * before), before,
-                entries.begin() + static_cast<std::ptrdiff_t>(j * size));
-    std::copy_n(left.begin() + static_cast<std::ptrdiff_t>(j * fresh), fresh,
-                entries.begin() + static_cast<std::ptrdiff_t>(j * size + before));
-  }
-  std::copy(right.begin(), right.end(), entries.begin() + static_cast<std::ptrdiff_t>(before * size));
-  projected.entries = std::move(entries);
+  projected.entries.conservativeResize(V.columns(), V.columns());
+  projected.entries.bottomLeftCorner(below.rows(), below.cols()) = below;
+  projected.entries.rightCols(gained) = inner_products(V, AW);
 }
 
 struct Subspace
 {
-  Block V;
+  MultiVector V;
   Projected M, C, K;
 };
 
-// What is new in X joins V; false if nothing is.
-bool extend(Subspace& space, Block X)
+/// V gains what X adds to its span. Returns false if that is nothing.
+bool extend(Subspace& space, MultiVector X)
 {
   PetscInt n = 0;
   check(MatGetSize(space.K.matrix, &n, nullptr));
-  if (X.columns == 0 || space.V.columns >= n) return false;
-  const PetscInt gained = extend_orthonormal(space.V, std::move(X));
+  if (X.columns() == 0 || space.V.columns() >= n) return false;
+  const Index gained = extend_orthonormal(space.V, std::move(X));
   if (gained == 0) return false;
   for (Projected* projected : {&space.M, &space.C, &space.K}) extend(*projected, space.V, gained);
   return true;
 }
 
-// The pairs of the small problem in the window, a of 2-norm 1, largest growth ratio first.
+/// The pairs of the small problem in the window, largest growth ratio first.
 std::vector<DenseEigenpair> solve_small(const Subspace& space, const Window& window)
 {
-  std::vector<DenseEigenpair> found = solve_dense_quadratic_shared(space.V.comm, static_cast<int>(space.V.columns),
-                                                                   space.M.entries, space.C.entries, space.K.entries);
+  std::vector<DenseEigenpair> found =
+      solve_dense_quadratic_shared(space.V.comm, space.M.entries, space.C.entries, space.K.entries);
   std::erase_if(found, [&](const DenseEigenpair& pair) { return !window.holds(pair.lambda); });
   std::sort(found.begin(), found.end(),
             [](const DenseEigenpair& a, const DenseEigenpair& b)
             { return a.lambda.real() * std::abs(b.lambda) > b.lambda.real() * std::abs(a.lambda); });
-  for (DenseEigenpair& pair : found)
-  {
-    double square = 0;
-    for (const std::complex<double>& a : pair.y) square += std::norm(a);
-    for (std::complex<double>& a : pair.y) a /= std::sqrt(square);
-  }
   return found;
 }
 
-constexpr Index at_once = 64;      // pairs expanded at a time
-constexpr double critical = -1e-3; // growth ratio
+constexpr std::size_t at_once = 64; // pairs expanded at a time
+constexpr double critical = -1e-3;  // growth ratio
 using Pairs = std::span<const DenseEigenpair>;
 
-// lambda^power a of each pair: real parts, then imaginary ones
-std::vector<double> coefficients(Pairs pairs, int power)
+/// lambda^power y of each pair: the real parts of all, then the imaginary parts.
+MatrixXd coefficients(Pairs pairs, int power)
 {
-  std::vector<double> re, im;
-  for (const DenseEigenpair& pair : pairs)
-    for (const std::complex<double>& a : pair.y)
-    {
-      const std::complex<double> value = std::pow(pair.lambda, power) * a;
-      re.push_back(value.real());
-      im.push_back(value.imag());
-    }
-  re.insert(re.end(), im.begin(), im.end());
-  return re;
+  const auto count = static_cast<Index>(pairs.size());
+  MatrixXd result(pairs.front().y.size(), 2 * count);
+  for (Index k = 0; k < count; ++k)
+  {
+    const DenseEigenpair& pair = pairs[static_cast<std::size_t>(k)];
+    const Eigen::VectorXcd column = std::pow(pair.lambda, power) * pair.y;
+    result.col(k) = column.real();
+    result.col(count + k) = column.imag();
+  }
+  return result;
 }
 
-// Pairs y = V a join `solution`, and of their residuals what is not good enough joins `residuals`.
+/// Appends the pairs y = V a to `solution` and, of their residuals, those that are not small enough to `residuals`.
 void expand(const Subspace& space, const QuadraticNorms& norms, Pairs pairs, const Correction& correction,
-            std::vector<Eigenpair>& solution, Block& residuals)
+            std::vector<Eigenpair>& solution, MultiVector& residuals)
 {
-  const auto count = static_cast<PetscInt>(pairs.size());
-  const std::vector<double> a = coefficients(pairs, 0);
-  const Block y = combination(space.V, a, 2 * count);
-  Block residual = combination(space.K.image, a, 2 * count);
-  add_combination(residual, 1, space.C.image, coefficients(pairs, 1));
-  add_combination(residual, 1, space.M.image, coefficients(pairs, 2));
-  const std::vector<double> left = column_norms(residual);
-  for (PetscInt k = 0; k < count; ++k)
+  const auto count = static_cast<Index>(pairs.size());
+  const MatrixXd a = coefficients(pairs, 0);
+  const MultiVector y = combination(space.V, a);
+  MultiVector residual = combination(space.K.image, a);
+  residual.entries.noalias() += space.C.image.entries * coefficients(pairs, 1);
+  residual.entries.noalias() += space.M.image.entries * coefficients(pairs, 2);
+  const Eigen::VectorXd left = column_norms(residual);
+  std::vector<Index> kept;
+  for (Index k = 0; k < count; ++k)
   {
-    const std::complex<double> lambda = pairs[static_cast<Index>(k)].lambda;
+    const std::complex<double> lambda = pairs[static_cast<std::size_t>(k)].lambda;
     const double w = std::abs(lambda), scale = w * w * norms.M + w * norms.C + norms.K;
-    const double re = left[static_cast<Index>(k)] / scale, im = left[static_cast<Index>(count + k)] / scale;
-    Eigenpair pair{lambda, {}, {}, std::hypot(re, im)};
+    Eigenpair pair{lambda, {}, {}, std::hypot(left(k), left(count + k)) / scale};
     check(MatCreateVecs(space.K.matrix, pair.real.put(), pair.imaginary.put()));
     copy_column(y, k, pair.real);
     copy_column(y, count + k, pair.imaginary);
     solution.push_back(std::move(pair));
     const double enough = lambda.real() > critical * w ? correction.sharp : correction.enough;
-    for (const auto& [error, column] : {std::pair{re, k}, std::pair{im, count + k}})
-    {
-      if (error <= enough) continue;
-      residuals.entries.insert(residuals.entries.end(), residual.column(column), residual.column(column + 1));
-      ++residuals.columns;
-    }
+    for (const Index column : {k, count + k})
+      if (left(column) > enough * scale) kept.push_back(column);
   }
+  append(residuals, {residual.comm, residual.entries(Eigen::all, kept)});
 }
 
-// Directions down to `share` of the largest. No column counts for more than 30 times the median: a combination of
-// corrections that is no pair and happens to lie in the window would outweigh all others.
-Block largest_directions(Block residuals, double share)
+/// An orthonormal basis of the residuals' directions, down to `share` of the largest. No column counts for more than
+/// 30 times the median: a combination of corrections that is no pair but lies in the window would outweigh all others.
+MultiVector largest_directions(MultiVector residuals, double share)
 {
   constexpr double outstanding = 30;
   if (share == 0) return residuals;
-  const std::vector<double> sizes = column_norms(residuals);
-  std::vector<double> sorted = sizes;
-  const auto middle = sorted.begin() + residuals.columns / 2;
+  const Eigen::VectorXd sizes = column_norms(residuals);
+  std::vector<double> sorted(sizes.begin(), sizes.end());
+  const auto middle = sorted.begin() + residuals.columns() / 2;
   std::nth_element(sorted.begin(), middle, sorted.end());
-  for (PetscInt j = 0; j < residuals.columns; ++j)
-    if (const double size = sizes[static_cast<Index>(j)]; size > outstanding * *middle)
-      std::transform(residuals.column(j), residuals.column(j + 1), residuals.column(j),
-                     [&](double entry) { return entry * outstanding * *middle / size; });
+  for (Index j = 0; j < residuals.columns(); ++j)
+    if (sizes(j) > outstanding * *middle) residuals.entries.col(j) *= outstanding * *middle / sizes(j);
   orthonormalise(residuals, share * share);
   return residuals;
 }
 
 } // namespace
 
-QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Block basis, const PencilFactor& P,
+QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector basis, const PencilFactor& P,
                                     const Correction& correction)
 {
   QuadraticSolution result;
   const QuadraticNorms norms = norms_of(problem);
-  const Block none = empty_block(problem.K);
+  const MultiVector none = empty_multivector(problem.K);
   Subspace space{none, {problem.M, none, {}}, {problem.C, none, {}}, {problem.K, none, {}}};
   extend(space, std::move(basis));
   for (int pass = 0;; ++pass)
   {
     const std::vector<DenseEigenpair> found = solve_small(space, correction.window);
-    Block residuals = none;
+    MultiVector residuals = none;
     result.pairs.clear();
-    const auto expand_until = [&](Index end)
+    const auto expand_until = [&](std::size_t end)
     {
-      for (Index first = result.pairs.size(); first < end; first = result.pairs.size())
+      for (std::size_t first = result.pairs.size(); first < end; first = result.pairs.size())
         expand(space, norms, Pairs(found).subspan(first, std::min(at_once, end - first)), correction, result.pairs,
                residuals);
     };
-    if (pass < correction.passes) expand_until(std::min(found.size(), static_cast<Index>(correction.pairs)));
-    const bool better = pass < correction.passes && residuals.columns > 0 &&
-                        extend(space, P.solved(largest_directions(std::move(residuals), correction.share)));
+    if (pass < correction.passes) expand_until(std::min(found.size(), static_cast<std::size_t>(correction.pairs)));
+    const bool better = pass < correction.passes && residuals.columns() > 0 &&
+                        extend(space, P.solve(largest_directions(std::move(residuals), correction.share)));
     result.outcome.iterations = pass + better;
     if (better) continue;
     expand_until(found.size());
@@ -183,7 +166,7 @@ QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K,
   QuadraticSolution result;
   if (!modes.shapes.empty())
   {
-    Block shapes = empty_block(K);
+    MultiVector shapes = empty_multivector(K);
     for (const Owned<Vec>& shape : modes.shapes) append(shapes, shape);
     ShiftInvert stiffness = make_shift_invert(K, M, Symmetry::symmetric);
     if (settings.passes > 0) move_to(stiffness, shift_below_zero(M, K));

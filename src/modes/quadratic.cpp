@@ -1,5 +1,7 @@
 #include "squeal/modes/quadratic.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/algebra/quadratic_residual.hpp"
 #include "squeal/algebra/shift_invert.hpp"
 
 #include <algorithm>
@@ -30,33 +32,24 @@ Owned<Mat> scaled(Mat A, double factor)
   return result;
 }
 
+/// This rank's share of a vector that is whole on every rank.
+Owned<Vec> distributed(const Eigen::VectorXd& whole, Mat layout)
+{
+  Owned<Vec> result;
+  check(MatCreateVecs(layout, nullptr, result.put()));
+  set_whole(result, {whole.data(), static_cast<std::size_t>(whole.size())});
+  return result;
+}
+
 QuadraticSolution solve_whole(const QuadraticProblem& problem, const Window& window)
 {
-  PetscInt n = 0, first = 0, last = 0;
-  check(MatGetSize(problem.K, &n, nullptr));
-  check(MatGetOwnershipRange(problem.K, &first, &last));
   QuadraticSolution result;
   result.outcome = {OutcomeKind::converged, "", 1, 0};
-  for (const DenseEigenpair& found :
-       solve_dense_quadratic_shared(comm_of(problem.K), static_cast<int>(n), dense_copy(problem.M),
-                                    dense_copy(problem.C), dense_copy(problem.K)))
-  {
-    if (!window.holds(found.lambda)) continue;
-    Eigenpair pair;
-    pair.lambda = found.lambda;
-    check(MatCreateVecs(problem.K, pair.real.put(), pair.imaginary.put()));
-    for (PetscInt i = first; i < last; ++i)
-    {
-      const std::complex<double> value = found.y[static_cast<std::size_t>(i)];
-      check(VecSetValue(pair.real, i, value.real(), INSERT_VALUES));
-      check(VecSetValue(pair.imaginary, i, value.imag(), INSERT_VALUES));
-    }
-    check(VecAssemblyBegin(pair.real));
-    check(VecAssemblyEnd(pair.real));
-    check(VecAssemblyBegin(pair.imaginary));
-    check(VecAssemblyEnd(pair.imaginary));
-    result.pairs.push_back(std::move(pair));
-  }
+  for (const DenseEigenpair& found : solve_dense_quadratic_shared(comm_of(problem.K), dense_copy(problem.M),
+                                                                  dense_copy(problem.C), dense_copy(problem.K)))
+    if (window.holds(found.lambda))
+      result.pairs.push_back(
+          {found.lambda, distributed(found.y.real(), problem.K), distributed(found.y.imag(), problem.K), 0});
   return result;
 }
 

@@ -1,5 +1,6 @@
 #include "squeal/modes/real_modes.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/equilibrium/closed_contact.hpp"
 #include "squeal/modes/quadratic.hpp"
@@ -14,6 +15,8 @@ namespace squeal
 namespace
 {
 
+using Eigen::Index;
+
 double trace(Mat A)
 {
   double result = 0;
@@ -21,50 +24,21 @@ double trace(Mat A)
   return result;
 }
 
-struct DenseModes
+SymmetricEigenpairs solve_whole(Mat M, Mat K)
 {
-  std::vector<double> lambda, y;
-};
-
-// On rank 0, told to all.
-DenseModes solve_dense_shared(MPI_Comm comm, int n, const std::vector<double>& M, const std::vector<double>& K,
-                              double shift)
-{
-  DenseModes modes;
-  on_rank_zero(comm, [&] { solve_dense_symmetric(n, M, K, shift, modes.lambda, modes.y); });
-  int count = static_cast<int>(modes.lambda.size());
-  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
-  modes.lambda.resize(static_cast<std::size_t>(count));
-  modes.y.resize(static_cast<std::size_t>(count) * static_cast<std::size_t>(n));
-  MPI_Bcast(modes.lambda.data(), count, MPI_DOUBLE, 0, comm);
-  MPI_Bcast(modes.y.data(), static_cast<int>(modes.y.size()), MPI_DOUBLE, 0, comm);
-  return modes;
+  return solve_dense_symmetric_shared(comm_of(K), dense_copy(M), dense_copy(K), shift_below_zero(M, K));
 }
 
-DenseModes solve_whole(Mat M, Mat K)
+RealModes first_of(const SymmetricEigenpairs& all, Mat K, Index count)
 {
-  PetscInt n = 0;
-  check(MatGetSize(K, &n, nullptr));
-  return solve_dense_shared(comm_of(K), static_cast<int>(n), dense_copy(M), dense_copy(K), shift_below_zero(M, K));
-}
-
-RealModes first_of(const DenseModes& all, Mat K, int count)
-{
-  PetscInt n = 0, first = 0, last = 0;
-  check(MatGetSize(K, &n, nullptr));
-  check(MatGetOwnershipRange(K, &first, &last));
   RealModes modes;
-  const int given = std::min(count, static_cast<int>(all.lambda.size()));
   modes.outcome = {OutcomeKind::converged, "", 1, 0};
-  for (int k = 0; k < given; ++k)
+  for (Index k = 0; k < std::min(count, all.lambda.size()); ++k)
   {
     Owned<Vec> shape;
     check(MatCreateVecs(K, shape.put(), nullptr));
-    for (PetscInt i = first; i < last; ++i)
-      check(VecSetValue(shape, i, all.y[static_cast<std::size_t>(k * n + i)], INSERT_VALUES));
-    check(VecAssemblyBegin(shape));
-    check(VecAssemblyEnd(shape));
-    modes.omega.push_back(std::sqrt(std::max(0.0, all.lambda[static_cast<std::size_t>(k)])));
+    set_whole(shape, {all.y.col(k).data(), static_cast<std::size_t>(all.y.rows())});
+    modes.omega.push_back(std::sqrt(std::max(0.0, all.lambda(k))));
     modes.shapes.push_back(std::move(shape));
   }
   return modes;
@@ -80,7 +54,7 @@ struct Sought
 struct Found
 {
   std::vector<double> theta;
-  Block shapes;
+  MultiVector shapes;
   double covered = -INFINITY; // every theta below is here
   bool complete = false;      // by count
   int iterations = 0;
@@ -101,49 +75,44 @@ double widest_gap(const std::vector<double>& values)
   return (values[best] + values[best - 1]) / 2;
 }
 
-// theta and M-normalised shapes of the symmetric problem on an invariant subspace
-DenseModes ritz_modes(const Nearest& nearest, Mat M, Mat K)
+/// theta and M-normalised shapes of the symmetric problem on an invariant subspace.
+SymmetricEigenpairs ritz_modes(const Nearest& nearest, Mat M, Mat K)
 {
-  const Block& space = nearest.space;
+  const MultiVector& space = nearest.space;
   double largest = 0;
   for (const std::complex<double> theta : nearest.theta) largest = std::max(largest, std::abs(theta));
-  return solve_dense_shared(space.comm, static_cast<int>(space.columns), inner(space, product(M, space)),
-                            inner(space, product(K, space)), -largest);
+  return solve_dense_symmetric_shared(space.comm, inner_products(space, product(M, space)),
+                                      inner_products(space, product(K, space)), -largest);
 }
 
-// Takes over what lies between found.covered and a gap before `end`.
-void take(Found& found, const DenseModes& ritz, const Block& space, double end, const Sought& sought)
+/// Appends to `found` the values between found.covered and a gap before `end`.
+void take(Found& found, const SymmetricEigenpairs& ritz, const MultiVector& space, double end, const Sought& sought)
 {
   std::vector<double> values = {found.covered};
   for (const double theta : ritz.lambda)
     if (theta > found.covered && theta < end) values.push_back(theta);
   values.push_back(end);
   found.covered = end >= sought.limit ? sought.limit : widest_gap(values);
-  std::vector<double> chosen;
-  PetscInt count = 0;
-  for (std::size_t k = 0; k < ritz.lambda.size(); ++k)
-  {
-    if (ritz.lambda[k] <= values.front() || ritz.lambda[k] >= found.covered) continue;
-    const auto column = ritz.y.begin() + static_cast<std::ptrdiff_t>(k) * space.columns;
-    chosen.insert(chosen.end(), column, column + space.columns);
-    found.theta.push_back(ritz.lambda[k]);
-    ++count;
-  }
-  append(found.shapes, combination(space, chosen, count));
+  std::vector<Index> chosen;
+  for (Index k = 0; k < ritz.lambda.size(); ++k)
+    if (ritz.lambda(k) > values.front() && ritz.lambda(k) < found.covered)
+    {
+      chosen.push_back(k);
+      found.theta.push_back(ritz.lambda(k));
+    }
+  append(found.shapes, combination(space, ritz.y(Eigen::all, chosen)));
 }
 
-// The largest |K x - theta M x| / (|K| |x|)
+/// The largest |K x - theta M x| / (|K| |x|).
 double largest_residual(const Found& found, Mat M, Mat K)
 {
-  Block residual = product(K, found.shapes), inertia = product(M, found.shapes);
-  for (PetscInt k = 0; k < residual.columns; ++k)
-    for (PetscInt i = 0; i < residual.rows; ++i)
-      residual.column(k)[i] -= found.theta[static_cast<std::size_t>(k)] * inertia.column(k)[i];
-  double stiffness = 0, largest = 0;
+  MultiVector residual = product(K, found.shapes);
+  const auto theta = Eigen::VectorXd::Map(found.theta.data(), found.shapes.columns());
+  residual.entries -= product(M, found.shapes).entries * theta.asDiagonal();
+  double stiffness = 0;
   check(MatNorm(K, NORM_1, &stiffness));
-  const std::vector<double> left = column_norms(residual), size = column_norms(found.shapes);
-  for (std::size_t k = 0; k < left.size(); ++k) largest = std::max(largest, left[k] / (stiffness * size[k]));
-  return largest;
+  const Eigen::ArrayXd ratio = column_norms(residual).array() / (stiffness * column_norms(found.shapes).array());
+  return ratio.size() > 0 ? ratio.maxCoeff() : 0;
 }
 
 constexpr int ahead = 20, above = 40; // values from what is found to the next shift, and beyond it
@@ -168,8 +137,7 @@ void fall_back(Found& found, double verified)
 {
   const int kept = found.below(verified);
   found.theta.resize(static_cast<std::size_t>(kept));
-  found.shapes.columns = static_cast<PetscInt>(kept);
-  found.shapes.entries.resize(static_cast<std::size_t>(kept) * static_cast<std::size_t>(found.shapes.rows));
+  found.shapes.entries.conservativeResize(Eigen::NoChange, kept);
   found.covered = verified;
 }
 
@@ -179,7 +147,7 @@ bool advance(Found& found, const ShiftInvert& pencil, PetscInt count, int betwee
   const Nearest nearest = solve_nearest(pencil, count, pencil.shift - found.covered, 1e-9);
   ++found.iterations;
   if (!nearest.converged) return false;
-  const DenseModes ritz = ritz_modes(nearest, pencil.M, pencil.K);
+  const SymmetricEigenpairs ritz = ritz_modes(nearest, pencil.M, pencil.K);
   const auto below = std::count_if(ritz.lambda.begin(), ritz.lambda.end(),
                                    [&](double theta) { return theta > found.covered && theta < pencil.shift; });
   if (below != between) return false;
@@ -194,7 +162,7 @@ Found sweep(Mat M, Mat K, const Sought& sought)
   check(MatGetSize(K, &n, nullptr));
   ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric);
   Found found;
-  found.shapes = empty_block(K);
+  found.shapes = empty_multivector(K);
   double verified = shift_below_zero(M, K); // all below is found for sure
   found.covered = verified;
   move_to(pencil, verified);
@@ -283,7 +251,11 @@ RealCount make_real_count(Mat M, Mat K, int dense_limit)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  if (n <= dense_limit) return {{}, solve_whole(M, K).lambda, {}};
+  if (n <= dense_limit)
+  {
+    const SymmetricEigenpairs all = solve_whole(M, K);
+    return {{}, {all.lambda.begin(), all.lambda.end()}, {}};
+  }
   return {make_shift_invert(K, M, Symmetry::symmetric), {}, {{0, 0}}};
 }
 
@@ -333,9 +305,9 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit)
   const double omega = 2 * std::numbers::pi * band;
   if (n <= dense_limit)
   {
-    const DenseModes all = solve_whole(M, K);
+    const SymmetricEigenpairs all = solve_whole(M, K);
     const auto below = std::lower_bound(all.lambda.begin(), all.lambda.end(), omega * omega);
-    return first_of(all, K, static_cast<int>(below - all.lambda.begin()));
+    return first_of(all, K, below - all.lambda.begin());
   }
   const Sought sought{omega * omega, static_cast<int>(n)};
   return to_modes(sweep(M, K, sought), M, K, sought);

@@ -168,7 +168,7 @@ void extrapolate(const ReducedMap& map, ReducedContact& contact)
 {
   if (contact.unread >= unread_at_most || contact.Wr.size() == 0)
   {
-    contact.Wr = product(map.W, contact.r);
+    contact.Wr = map.W * contact.r;
     contact.r_before.resize(0); // the step before's product has gathered rounding, too
     contact.unread = 0;
   }

@@ -4,6 +4,7 @@
 #include "squeal/equilibrium/closed_contact.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -13,6 +14,7 @@ namespace squeal
 namespace
 {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
@@ -62,7 +64,7 @@ Owned<VecScatter> to_kept(Mat Z, Vec u, Vec y)
 }
 
 /// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts.
-Block mode_columns(const std::vector<ComplexMode>& modes, int count, Mat Z)
+MultiVector mode_columns(const std::vector<ComplexMode>& modes, int count, Mat Z)
 {
   const double omega = modes.front().lambda.imag();
   std::vector<const ComplexMode*> taken;
@@ -74,7 +76,7 @@ Block mode_columns(const std::vector<ComplexMode>& modes, int count, Mat Z)
   Owned<Vec> y;
   check(MatCreateVecs(Z, y.put(), nullptr));
   const Owned<VecScatter> scatter = to_kept(Z, modes.front().real, y);
-  Block columns = empty_block(Z);
+  MultiVector columns = empty_multivector(Z);
   for (const ComplexMode* mode : taken)
     for (const Vec part : {mode->real.get(), mode->imaginary.get()})
     {
@@ -86,9 +88,9 @@ Block mode_columns(const std::vector<ComplexMode>& modes, int count, Mat Z)
 }
 
 /// The rows of a matrix of few, as columns.
-Block transposed(Mat B)
+MultiVector transposed(Mat B)
 {
-  Block result = empty_block(B);
+  MultiVector result = empty_multivector(B);
   Owned<Vec> row, unit;
   check(MatCreateVecs(B, row.put(), unit.put()));
   PetscInt rows = 0;
@@ -105,50 +107,40 @@ Block transposed(Mat B)
   return result;
 }
 
-/// What each active pair that slides pushes with, B_n' + mu B_t'e: its normal force and the friction that follows it.
-Block sliding_forces(const Block& rows, const Interface& interface, const std::vector<int>& active)
+/// Every `step`-th column from the first on.
+MultiVector every(const MultiVector& X, int step)
 {
-  const auto directions = static_cast<std::size_t>(interface.directions);
+  return {X.comm, X.entries(Eigen::all, Eigen::seq(0, Eigen::last, step))};
+}
+
+/// What each active pair that slides pushes with, B_n' + mu B_t'e: its normal force and the friction that follows it.
+MultiVector sliding_forces(const MultiVector& rows, const Interface& interface, const std::vector<int>& active)
+{
   const std::vector<double> e = drive_directions(interface);
-  Block result{rows.comm, rows.rows, 0, {}};
-  for (std::size_t i = 0; i < active.size(); ++i)
+  const Index directions = interface.directions, block = 1 + directions;
+  MultiVector result = every(rows, interface.block());
+  for (Index i = 0; i < result.columns(); ++i)
   {
-    const double* row = rows.column(static_cast<PetscInt>(i * (1 + directions)));
-    std::vector<double> force(row, row + rows.rows);
-    for (std::size_t k = 0; k < directions; ++k)
-    {
-      row += rows.rows;
-      const double friction = interface.friction * e[static_cast<std::size_t>(active[i]) * directions + k];
-      for (std::size_t j = 0; j < force.size(); ++j) force[j] += friction * row[j];
-    }
-    result.entries.insert(result.entries.end(), force.begin(), force.end());
-    ++result.columns;
+    const double* direction = &e[static_cast<std::size_t>(active[static_cast<std::size_t>(i)] * directions)];
+    result.entries.col(i) += rows.entries.middleCols(i * block + 1, directions) *
+                             (interface.friction * VectorXd::Map(direction, directions));
   }
   return result;
 }
 
-/// Every `step`-th column from the first on.
-Block every(const Block& X, int step)
-{
-  Block result{X.comm, X.rows, 0, {}};
-  for (PetscInt j = 0; j < X.columns; j += step, ++result.columns)
-    result.entries.insert(result.entries.end(), X.column(j), X.column(j) + X.rows);
-  return result;
-}
-
 /// (K_z + w^2 M_z)^-1 forces
-Block attachment_columns(Mat A, const Block& forces)
+MultiVector attachment_columns(Mat A, const MultiVector& forces)
 {
   const Factor factor(A, nullptr, Factor::Kind::automatic);
   if (factor.failed()) throw Error("reduced model: K + omega^2 M is not positive definite with the active pairs open");
   Owned<Vec> pattern;
   check(MatCreateVecs(A, pattern.put(), nullptr));
-  Block result = empty_block(A);
-  constexpr PetscInt at_once = 64;
-  for (PetscInt begin = 0; begin < forces.columns; begin += at_once)
+  MultiVector result = empty_multivector(A);
+  constexpr Index at_once = 64;
+  for (Index begin = 0; begin < forces.columns(); begin += at_once)
   {
     std::vector<Owned<Vec>> force, shape;
-    for (PetscInt i = begin; i < std::min(begin + at_once, forces.columns); ++i)
+    for (Index i = begin; i < std::min(begin + at_once, forces.columns()); ++i)
     {
       force.push_back(zeros_like(pattern));
       shape.push_back(zeros_like(pattern));
@@ -159,12 +151,6 @@ Block attachment_columns(Mat A, const Block& forces)
     for (const Owned<Vec>& column : shape) append(result, column);
   }
   return result;
-}
-
-/// X'Y
-MatrixXd gram(const Block& X, const Block& Y)
-{
-  return MatrixXd::Map(inner(X, Y).data(), X.columns, Y.columns);
 }
 
 /// Own rows of A that are not empty, in order.
@@ -182,12 +168,9 @@ std::vector<PetscInt> own_rows(Mat A)
   return rows;
 }
 
-Block rows_of(const Block& X, const std::vector<PetscInt>& rows)
+MultiVector rows_of(const MultiVector& X, const std::vector<PetscInt>& rows)
 {
-  Block result{X.comm, static_cast<PetscInt>(rows.size()), X.columns, {}};
-  for (PetscInt j = 0; j < X.columns; ++j)
-    for (const PetscInt row : rows) result.entries.push_back(X.column(j)[row]);
-  return result;
+  return {X.comm, X.entries(rows, Eigen::all)};
 }
 
 /// T of X T orthonormal in the product in which E is the Gram matrix of X, as far as it goes.
@@ -195,74 +178,73 @@ struct Orthonormal
 {
   const MatrixXd& E;
   MatrixXd T;
-  Eigen::Index seen = 0; // columns of X
+  Index seen = 0; // columns of X
 };
 
 /// Takes in what the next `count` columns of X hold that is new: directions of which less than `threshold` of the
 /// columns' own size is new are dropped. Returns how many came.
-int extend(Orthonormal& basis, Eigen::Index count, double threshold)
+int extend(Orthonormal& basis, Index count, double threshold)
 {
   if (count == 0) return 0;
   const MatrixXd& E = basis.E;
   MatrixXd columns = MatrixXd::Zero(E.rows(), count), image;
-  for (Eigen::Index j = 0; j < count; ++j)
+  for (Index j = 0; j < count; ++j)
     columns(basis.seen + j, j) = 1 / std::sqrt(std::max(E(basis.seen + j, basis.seen + j), 1e-300));
   for (int pass = 0; pass < 2; ++pass)
   {
-    image = product(E, columns);
-    columns -= product(basis.T, product(basis.T.transpose(), image));
+    image.noalias() = E * columns;
+    columns -= basis.T * (basis.T.transpose() * image);
   }
-  image = product(E, columns);
-  const MatrixXd fresh = product(columns.transpose(), image);
+  image.noalias() = E * columns;
+  const MatrixXd fresh = columns.transpose() * image;
   const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((fresh + fresh.transpose()) / 2);
   const auto kept = (spectrum.eigenvalues().array() > threshold * threshold).count();
   basis.T.conservativeResize(Eigen::NoChange, basis.T.cols() + kept);
-  basis.T.rightCols(kept) = product(columns, spectrum.eigenvectors().rightCols(kept)) *
+  basis.T.rightCols(kept) = columns * spectrum.eigenvectors().rightCols(kept) *
                             spectrum.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
   basis.seen += count;
   return static_cast<int>(kept);
 }
 
 /// M, C and K on X = Z columns, tested by Z and by Y, which is Z but for a few rows.
-void project(ReducedModel& model, const Structure& structure, const ClosedContact& contact, const Block& columns,
-             const Block& X)
+void project(ReducedModel& model, const Structure& structure, const ClosedContact& contact, const MultiVector& columns,
+             const MultiVector& X)
 {
   Owned<Mat> difference;
   check(MatDuplicate(contact.Y, MAT_COPY_VALUES, difference.put()));
   check(MatAXPY(difference, -1, contact.Z, DIFFERENT_NONZERO_PATTERN));
   const std::vector<PetscInt> follow = own_rows(difference);
-  const Block more = rows_of(product(difference, columns), follow);
+  const MultiVector more = rows_of(product(difference, columns), follow);
   for (const auto& [matrix, unsymmetric, symmetric] :
        {std::tuple{structure.M.get(), &model.M, &model.M_z}, std::tuple{structure.C.get(), &model.C, &model.C_z},
         std::tuple{structure.K.get(), &model.K, &model.K_z}})
   {
-    const Block image = product(matrix, X);
-    *symmetric = gram(X, image);
+    const MultiVector image = product(matrix, X);
+    *symmetric = inner_products(X, image);
     *symmetric = (*symmetric + symmetric->transpose()).eval() / 2;
-    *unsymmetric = *symmetric + gram(more, rows_of(image, follow));
+    *unsymmetric = *symmetric + inner_products(more, rows_of(image, follow));
   }
 }
 
 /// From the columns X to the basis: the modes, the attachments next to them, all by falling period.
-void choose_basis(ReducedModel& model, const Block& X, Eigen::Index of_modes, double threshold)
+void choose_basis(ReducedModel& model, const MultiVector& X, Index of_modes, double threshold)
 {
   const double omega = model.omega;
   const MatrixXd energy = model.K_z + omega * omega * model.M_z;
-  Orthonormal basis{energy, MatrixXd(X.columns, 0)};
+  Orthonormal basis{energy, MatrixXd(X.columns(), 0)};
   model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
   model.modes += extend(basis, of_modes - 2, 1e-6);
-  model.attachments = extend(basis, X.columns - of_modes, threshold);
+  model.attachments = extend(basis, X.columns() - of_modes, threshold);
   // of falling period: u'M u against the energy
-  const MatrixXd mass = product(basis.T.transpose(), product(model.M_z, basis.T));
+  const MatrixXd mass = basis.T.transpose() * (model.M_z * basis.T);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((mass + mass.transpose()) / 2);
-  const MatrixXd T = product(basis.T, spectrum.eigenvectors().rowwise().reverse());
+  const MatrixXd T = basis.T * spectrum.eigenvectors().rowwise().reverse();
   constexpr double fastest = 4; // times omega
   model.slow = (spectrum.eigenvalues().array() * (1 + fastest * fastest) * omega * omega > 1).count();
-  for (MatrixXd* A : {&model.M, &model.M_z, &model.C, &model.C_z, &model.K, &model.K_z})
-    *A = product(T.transpose(), product(*A, T));
-  model.H = product(T.transpose(), model.H);
-  model.G = product(model.G, T);
-  model.shapes = combination(X, {T.data(), T.data() + T.size()}, static_cast<PetscInt>(T.cols()));
+  for (MatrixXd* A : {&model.M, &model.M_z, &model.C, &model.C_z, &model.K, &model.K_z}) *A = T.transpose() * (*A * T);
+  model.H = T.transpose() * model.H;
+  model.G = model.G * T;
+  model.shapes = combination(X, T);
   model.E_factor.compute(model.K_z + omega * omega * model.M_z);
   model.M_factor.compute(model.M_z);
 }
@@ -324,20 +306,20 @@ ReducedModel reduce(const Structure& structure, const Interface& interface, cons
   check(MatMatMult(B, contact.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
   const auto forces = [&](Mat rows)
   { return reduction.sliding ? sliding_forces(transposed(rows), interface, active) : transposed(rows); };
-  Block columns = mode_columns(modes, reduction.modes, contact.Z);
-  const Eigen::Index of_modes = columns.columns;
+  MultiVector columns = mode_columns(modes, reduction.modes, contact.Z);
+  const Index of_modes = columns.columns();
   append(columns, attachment_columns(E, forces(BZ)));
-  const Block X = product(contact.Z, columns);
+  const MultiVector X = product(contact.Z, columns);
 
   project(model, structure, contact, columns, X);
-  const Block left = product(contact.Y, columns), rows = transposed(B);
+  const MultiVector left = product(contact.Y, columns), rows = transposed(B);
   if (const Owned<Mat> turning = direction_damping(interface, reduction.sliding ? equilibrium : sliding); turning.get())
   {
     const std::vector<PetscInt> turns = own_rows(turning);
-    model.C += gram(rows_of(left, turns), rows_of(product(turning, X), turns));
+    model.C += inner_products(rows_of(left, turns), rows_of(product(turning, X), turns));
   }
-  model.H = gram(left, forces(B));
-  model.G = gram(reduction.sliding ? every(rows, interface.block()) : rows, X);
+  model.H = inner_products(left, forces(B));
+  model.G = inner_products(reduction.sliding ? every(rows, interface.block()) : rows, X);
 
   model.omega = omega;
   choose_basis(model, X, of_modes, reduction.threshold);
@@ -365,19 +347,16 @@ ReducedState coordinates(const ReducedModel& model, const Structure& structure, 
   check(VecScale(force, model.omega * model.omega));
   check(MatMultAdd(structure.K, du, force, force));
   check(MatMult(structure.M, v, momentum));
-  Block both = empty_block(structure.M);
-  append(both, force);
-  append(both, momentum);
-  const MatrixXd seen = gram(model.shapes, both);
+  const MatrixXd seen = inner_products(model.shapes, columns_of(std::array{force.get(), momentum.get()}));
   return {model.E_factor.solve(seen.col(0)), model.M_factor.solve(seen.col(1))};
 }
 
 void add_motion(const ReducedModel& model, double factor, const VectorXd& q, Vec target)
 {
-  Block sum{model.shapes.comm, model.shapes.rows, 0, {}};
-  append(sum, target);
-  add_combination(sum, factor, model.shapes, {q.data(), q.data() + q.size()});
-  copy_column(sum, 0, target);
+  PetscScalar* entries = nullptr;
+  check(VecGetArray(target, &entries));
+  VectorXd::Map(entries, model.shapes.entries.rows()).noalias() += factor * model.shapes.entries * q;
+  check(VecRestoreArray(target, &entries));
 }
 
 } // namespace squeal

@@ -1,45 +1,13 @@
 /// The modified theta-method on the reduced model: the scheme of transient/transient.hpp, in few dense products.
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/contact/pair_law.hpp"
 #include "squeal/reduction/reduced_model.hpp"
-
-#include <petscblaslapack.h>
 
 namespace squeal
 {
 
-namespace
-{
-
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-} // namespace
-
-MatrixXd product(const MatrixXd& A, const MatrixXd& B)
-{
-  MatrixXd result(A.rows(), B.cols());
-  const auto rows = static_cast<PetscBLASInt>(A.rows()), columns = static_cast<PetscBLASInt>(B.cols()),
-             inside = static_cast<PetscBLASInt>(A.cols());
-  const PetscBLASInt once = 1;
-  const double one = 1, zero = 0;
-  if (result.size() == 0 || inside == 0) return MatrixXd::Zero(A.rows(), B.cols());
-  if (columns == 1)
-    BLASgemv_("N", &rows, &inside, &one, A.data(), &rows, B.data(), &once, &zero, result.data(), &once);
-  else
-    BLASgemm_("N", "N", &rows, &columns, &inside, &one, A.data(), &rows, B.data(), &inside, &zero, result.data(),
-              &rows);
-  return result;
-}
-
-MatrixXd solve_dense(MatrixXd A, MatrixXd B)
-{
-  const auto n = static_cast<PetscBLASInt>(A.rows()), columns = static_cast<PetscBLASInt>(B.cols());
-  std::vector<PetscBLASInt> pivots(static_cast<std::size_t>(n));
-  PetscBLASInt info = 0;
-  LAPACKgesv_(&n, &columns, A.data(), &n, pivots.data(), B.data(), &n, &info);
-  if (info != 0) throw Error("reduced model: a motion has neither mass nor stiffness");
-  return B;
-}
 
 void prepare(ReducedMap& map, double period)
 {
@@ -50,11 +18,12 @@ void prepare(ReducedMap& map, double period)
   const Eigen::Index n = model.size(), rows = model.G.rows();
   MatrixXd right(n, 2 * n + rows);
   right << model.M - h * (1 - theta) * model.C - h * h * theta * (1 - theta) * model.K, -h * model.K, h * model.H;
-  right = solve_dense(model.M + h * theta * model.C + h * h * theta * theta * model.K, std::move(right));
+  right = solve_dense(model.M + h * theta * model.C + h * h * theta * theta * model.K, right,
+                      "reduced model: a motion has neither mass nor stiffness");
   map.from_state = right.leftCols(2 * n);
   map.from_reactions = right.rightCols(rows);
   map.from_equilibrium = -map.from_reactions * VectorXd::Map(model.reactions.data(), rows);
-  map.W = product(model.G, map.from_reactions);
+  map.W = model.G * map.from_reactions;
   map.G_n = model.G(Eigen::seq(0, Eigen::last, 1 + model.directions), Eigen::all);
   map.W_single = map.W.cast<float>();
   map.W_n = map.W_single(Eigen::seq(0, Eigen::last, 1 + model.directions), Eigen::all);
@@ -110,12 +79,12 @@ bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact
   const Eigen::Index n = model.size();
   VectorXd both(2 * n);
   both << state.v, state.q;
-  VectorXd next = product(map.from_state, both) + map.from_equilibrium;
+  VectorXd next = map.from_state * both + map.from_equilibrium;
 
   // b of w = W r + b: tangential rows are s+ + (1-theta)/theta s = s_theta/theta, normal ones gap rates
   // (g + G_n q~)/h + G_n v, q~ = q + h (1-theta) v
-  VectorXd b = product(model.G, next + earlier * state.v);
-  const VectorXd position = product(map.G_n, state.q + h * (1 - theta - earlier) * state.v);
+  VectorXd b = model.G * (next + earlier * state.v);
+  const VectorXd position = map.G_n * (state.q + h * (1 - theta - earlier) * state.v);
   const auto block = static_cast<std::size_t>(1 + model.directions), directions = block - 1;
   for (std::size_t i = 0; i < model.gap.size(); ++i)
   {
@@ -138,7 +107,7 @@ bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact
     contact.r_before.resize(0); // no step lies between
     converged = solve_contact(map, b, contact);
   }
-  next += product(map.from_reactions, contact.r);
+  next.noalias() += map.from_reactions * contact.r;
   state.q += h * (theta * next + (1 - theta) * state.v);
   state.v = std::move(next);
   return converged;

@@ -1,7 +1,6 @@
 /// The reduced period map's derivative.
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/reduction/reduced_model.hpp"
-
-#include <petscblaslapack.h>
 
 namespace squeal
 {
@@ -43,7 +42,7 @@ MatrixXd contact_response(const ReducedMap& map, const ReducedContact& contact, 
     A.block(i + 1, i, d, 1) += model.friction * e;
   }
   A.diagonal() *= 1 + 1e-10; // of pairs that stick there may be more rows than the shapes can tell apart
-  return solve_dense(std::move(A), std::move(right));
+  return solve_dense(std::move(A), right, "reduced model: the contact of a step determines no reactions");
 }
 
 } // namespace
@@ -54,7 +53,7 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, Eigen::In
   const ReducedModel& model = map.model;
   const double h = map.h, theta = map.theta;
   const Eigen::Index n = model.size(), block = 1 + model.directions;
-  MatrixXd b_from_state = product(model.G, map.from_state);
+  MatrixXd b_from_state = model.G * map.from_state;
   for (Eigen::Index row = 0; row < model.G.rows(); row += block)
   {
     b_from_state.row(row).head(n) += (1 - theta) * model.G.row(row);
@@ -70,14 +69,14 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, Eigen::In
   for (int i = 0; i < map.steps; ++i)
   {
     if (!advance(map, state, contact)) ++map.unconverged;
-    MatrixXd v = product(map.from_state, X);
+    MatrixXd v = map.from_state * X;
     if (const auto closed = closed_rows(contact, block); !closed.empty())
     {
       MatrixXd rows = b_from_state(closed, Eigen::all);
       for (std::size_t k = 0; k < closed.size(); ++k)
         if (closed[k] % block > 0 && !contact.opposes_end[static_cast<std::size_t>(closed[k] / block)])
           rows.row(static_cast<Eigen::Index>(k)).head(n) += (1 - theta) / theta * model.G.row(closed[k]);
-      v += product(map.from_reactions(Eigen::all, closed), contact_response(map, contact, closed, product(rows, X)));
+      v += map.from_reactions(Eigen::all, closed) * contact_response(map, contact, closed, rows * X);
     }
     X.bottomRows(n) += h * (theta * v + (1 - theta) * X.topRows(n));
     X.topRows(n) = v;

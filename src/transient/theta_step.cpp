@@ -233,10 +233,8 @@ void multiply(Mat A, std::span<const Vec> x, std::span<const Vec> y)
     check(MatMult(A, x[0], y[0]));
     return;
   }
-  Block X = empty_block(A);
-  for (const Vec column : x) append(X, column);
-  const Block Y = product(A, X);
-  for (std::size_t k = 0; k < y.size(); ++k) copy_column(Y, static_cast<PetscInt>(k), y[k]);
+  const MultiVector Y = product(A, columns_of(x));
+  for (std::size_t k = 0; k < y.size(); ++k) copy_column(Y, static_cast<Eigen::Index>(k), y[k]);
 }
 
 /// The start of a step: A v_free = [M v - (1-theta) A v]/theta - h K u + h F, into A v_next.

@@ -1,6 +1,8 @@
 // ranks: 1 2 3
 #include "squeal/modes/modes.hpp"
 #include "../support/sliding_oscillator.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/algebra/quadratic_residual.hpp"
 #include "squeal/equilibrium/closed_contact.hpp"
 #include "squeal/modes/quadratic.hpp"
 
@@ -79,15 +81,14 @@ TEST_CASE("B_n Z = 0 and (B_n + mu e.B_t) Y = 0, though every pair shares its de
   Owned<Mat> BZ, BY;
   check(MatMatMult(model.interface.B, closed.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
   check(MatMatMult(model.interface.B, closed.Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BY.put()));
-  const std::vector<double> Z = dense_copy(BZ), Y = dense_copy(BY);
+  const Eigen::MatrixXd Z = dense_copy(BZ), Y = dense_copy(BY);
   REQUIRE(Z.size() == 9 * 9); // three rows a pair, and three of twelve degrees of freedom are gone
   const double mu = model.interface.friction;
-  for (std::size_t column = 0; column < 9; ++column)
-    for (std::size_t pair = 0; pair < 3; ++pair)
+  for (Eigen::Index column = 0; column < 9; ++column)
+    for (Eigen::Index i = 0; i < 9; i += 3)
     {
-      const std::size_t i = 9 * column + 3 * pair;
-      CHECK(std::abs(Z[i]) < 1e-13);
-      CHECK(std::abs(Y[i] + mu * (.6 * Y[i + 1] + .8 * Y[i + 2])) < 1e-13);
+      CHECK(std::abs(Z(i, column)) < 1e-13);
+      CHECK(std::abs(Y(i, column) + mu * (.6 * Y(i + 1, column) + .8 * Y(i + 2, column))) < 1e-13);
     }
 }
 

@@ -1,8 +1,10 @@
 #pragma once
-/// Eigenproblems of dense matrices, n x n column-major, solved whole by LAPACK on one rank.
-#include "squeal/base/petsc.hpp"
+/// Eigenproblems of dense matrices, solved by Eigen with LAPACK underneath.
+#include "squeal/algebra/dense_matrix.hpp"
 
 #include <complex>
+#include <functional>
+#include <optional>
 #include <vector>
 
 namespace squeal
@@ -11,24 +13,45 @@ namespace squeal
 struct DenseEigenpair
 {
   std::complex<double> lambda;
-  std::vector<std::complex<double>> y;
+  Eigen::VectorXcd y; // 2-norm 1
 };
 
-/// All pairs with Im >= 0 and finite lambda; the collective form works on rank 0 and tells the others.
-std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, int n, const std::vector<double>& M,
-                                                         const std::vector<double>& C, const std::vector<double>& K);
-std::vector<DenseEigenpair> solve_dense_quadratic(int n, const std::vector<double>& M, const std::vector<double>& C,
-                                                  const std::vector<double>& K);
+/// The pairs (lambda^2 M + lambda C + K) y = 0 with Im(lambda) >= 0 and finite lambda. M, C and K are square, of one
+/// size and not symmetric in general.
+std::vector<DenseEigenpair> solve_dense_quadratic(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
+                                                  const Eigen::MatrixXd& K);
 
-/// Symmetric K y = lambda M y with M positive semidefinite and K - shift M positive definite, shift < 0: ascending
-/// finite lambda, and M-normalised y one after the other.
-void solve_dense_symmetric(int n, const std::vector<double>& M, const std::vector<double>& K, double shift,
-                           std::vector<double>& lambda, std::vector<double>& y);
+/// The same from the matrices of rank 0, with the pairs on every rank. Collective.
+std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Eigen::MatrixXd& M,
+                                                         const Eigen::MatrixXd& C, const Eigen::MatrixXd& K);
 
-/// The whole matrix, column-major, on every rank. Collective.
-std::vector<double> dense_copy(Mat A);
+/// Eigenvalues in ascending order and a vector for each, as the columns of y.
+struct SymmetricEigenpairs
+{
+  Eigen::VectorXd lambda;
+  Eigen::MatrixXd y;
+};
 
-/// real, imaginary = (lambda^2 M + lambda C + K) (y_r + i y_i)
-void quadratic_residual(Mat M, Mat C, Mat K, std::complex<double> lambda, Vec y_r, Vec y_i, Vec real, Vec imaginary);
+/// The finite eigenvalues of K y = lambda M y and M-normalised y. M is symmetric positive semidefinite,
+/// K - shift M symmetric positive definite, shift < 0.
+SymmetricEigenpairs solve_dense_symmetric(const Eigen::MatrixXd& M, const Eigen::MatrixXd& K, double shift);
+
+/// The same from the matrices of rank 0, with the pairs on every rank. Collective.
+SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& K,
+                                                 double shift);
+
+/// The real Schur form A = Q T Q', with 2 x 2 diagonal blocks in T for complex eigenvalues.
+struct SchurForm
+{
+  Eigen::MatrixXd T, Q;
+  std::vector<std::complex<double>> eigenvalues; // in the order of T's diagonal
+};
+
+/// Nothing if the QR algorithm does not converge.
+std::optional<SchurForm> schur_form(const Eigen::MatrixXd& A);
+
+/// Moves the chosen eigenvalues (of a conjugate pair both) to the front, by orthogonal similarities: the leading
+/// columns of Q then span their invariant subspace. Returns false if two eigenvalues are too close to change places.
+bool reorder(SchurForm& schur, const std::function<bool(std::complex<double>)>& chosen);
 
 } // namespace squeal

@@ -1,53 +1,55 @@
 #pragma once
-/// A few distributed vectors side by side: matrices are read once for all of them, and products are dense kernels.
-/// Every function is collective; small matrices are column-major and whole on every rank.
+/// Distributed vectors side by side: a sparse matrix is read once for all of them, and products among them are dense
+/// matrix products. Every function is collective; small matrices are whole on every rank.
 #include "squeal/base/petsc.hpp"
+
+#include <Eigen/Core>
 
 namespace squeal
 {
 
-struct Block
+struct MultiVector
 {
   MPI_Comm comm = MPI_COMM_NULL;
-  PetscInt rows = 0, columns = 0; // of this rank
-  std::vector<double> entries;    // column-major
+  Eigen::MatrixXd entries{}; // rows of this rank, one column for each vector
 
-  double* column(PetscInt j) { return entries.data() + static_cast<std::ptrdiff_t>(j) * rows; }
-  const double* column(PetscInt j) const { return entries.data() + static_cast<std::ptrdiff_t>(j) * rows; }
+  Eigen::Index columns() const { return entries.cols(); }
 };
 
-/// No columns yet, rows as the columns of A are distributed.
-Block empty_block(Mat A);
+/// No vectors yet, rows distributed as the columns of A.
+MultiVector empty_multivector(Mat A);
 
-/// `columns` vectors to start from, orthogonal to nothing in particular, the same for any number of ranks.
-Block uneven_block(Mat A, PetscInt columns);
+/// Pseudo-random entries in (-1, 1), the same for any number of ranks.
+MultiVector random_multivector(Mat A, PetscInt columns);
 
-void append(Block& X, Vec x);
-void append(Block& X, const Block& Y);
-void copy_column(const Block& X, PetscInt j, Vec x);
+/// Copies of at least one vector.
+MultiVector columns_of(std::span<const Vec> x);
+
+void append(MultiVector& X, Vec x);
+void append(MultiVector& X, const MultiVector& Y);
+void copy_column(const MultiVector& X, Eigen::Index j, Vec x);
 
 /// A X
-Block product(Mat A, const Block& X);
+MultiVector product(Mat A, const MultiVector& X);
 
-/// X'Y
-std::vector<double> inner(const Block& X, const Block& Y);
+/// X a
+MultiVector combination(const MultiVector& X, const Eigen::MatrixXd& a);
 
-/// X a, `columns` wide
-Block combination(const Block& X, const std::vector<double>& a, PetscInt columns);
+/// The columns of X from `first` on.
+MultiVector columns_from(const MultiVector& X, Eigen::Index first);
 
-/// Y += alpha X a
-void add_combination(Block& Y, double alpha, const Block& X, const std::vector<double>& a);
+/// X'Y, the same to the last bit on every rank.
+Eigen::MatrixXd inner_products(const MultiVector& X, const MultiVector& Y);
 
-Block columns_from(const Block& X, PetscInt first);
+/// 2-norms of the columns.
+Eigen::VectorXd column_norms(const MultiVector& X);
 
-/// 2-norms of the columns
-std::vector<double> column_norms(const Block& X);
+/// Replaces X by an orthonormal basis of its span, without the directions whose eigenvalue of X'X is below `least`
+/// times the largest.
+void orthonormalise(MultiVector& X, double least);
 
-/// X spans the same with X'X = I; directions below `least` of the largest eigenvalue of X'X are dropped.
-void orthonormalise(Block& X, double least);
-
-/// X appended to the orthonormal V as orthonormal columns; what V holds already (up to 1e-12 of a column) is dropped.
-/// Returns how many columns V gained.
-PetscInt extend_orthonormal(Block& V, Block X);
+/// Appends to the orthonormal V an orthonormal basis of what X adds to its span. A part of X below 1e-12 of its column
+/// counts as nothing. Returns the number of columns that V gains.
+Eigen::Index extend_orthonormal(MultiVector& V, MultiVector X);
 
 } // namespace squeal

@@ -1,7 +1,6 @@
 #pragma once
-/// The factor of K - shift M by MUMPS itself, in METIS's order, which PETSc cannot hand to it: by nested dissection L
-/// of an elastic block of 32 670 degrees of freedom has 14e6 entries, by the orderings that MUMPS brings along 17e6.
-/// Right-hand sides pass through rank 0.
+/// The factor of K - shift M by MUMPS, with METIS's nested dissection. It takes MUMPS's own interface, since PETSc's
+/// has no way to pass an order of elimination. Right-hand sides pass through rank 0.
 #include "squeal/algebra/multivector.hpp"
 
 #include <memory>
@@ -15,21 +14,22 @@ enum class Symmetry
   symmetric, // L D L', which counts eigenvalues
 };
 
-/// It moves from shift to shift; the order is found once. K and M are lent.
+/// The order of elimination is found once and serves every shift. Borrows K and M.
 class PencilFactor
 {
 public:
   PencilFactor(Mat K, Mat M, Symmetry symmetry);
   ~PencilFactor();
 
-  /// False if the shift is an eigenvalue. LibraryError: memory ran out.
-  /// Option: -modes_factor_room [%] beyond MUMPS's estimate of its memory; it grows by itself.
+  /// Returns false if the shift is an eigenvalue. Throws LibraryError if memory runs out.
+  /// Option -modes_factor_room: memory beyond MUMPS's estimate [%] to start with; it grows where that is too little.
   bool factorise(double shift);
 
-  /// As many eigenvalues lie below the shift (Sylvester). Symmetric only.
+  /// The number of eigenvalues below the shift (Sylvester's law of inertia). For Symmetry::symmetric only.
   int negative_pivots() const;
 
-  Block solved(const Block& X) const;
+  /// (K - shift M)^-1 X
+  MultiVector solve(const MultiVector& X) const;
 
 private:
   struct Parts;

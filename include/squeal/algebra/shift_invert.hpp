@@ -2,9 +2,9 @@
 /// The eigenvalues theta of K y = theta M y, symmetric or not, nearest a real shift, by a block Krylov space of
 /// (K - shift M)^-1 M.
 ///
-/// Blocks, because brakes have many nearly equal modes (doublets of a disc, one a pin), which a space grown from a
-/// single vector finds late or never, and because MUMPS reads its factor once for a block. No restarts: a shift is
-/// moved on instead.
+/// Blocks are used for two reasons. Brakes have many nearly equal modes (doublets of a disc, one mode for each pin),
+/// which a space grown from a single vector finds late or never; and MUMPS reads its factor once for a block. There
+/// are no restarts: the caller moves the shift instead.
 #include "squeal/algebra/pencil_factor.hpp"
 
 #include <complex>
@@ -14,30 +14,31 @@ namespace squeal
 
 struct ShiftInvert
 {
-  Mat K = nullptr, M = nullptr; // lent
+  Mat K = nullptr, M = nullptr; // borrowed
   double shift = 0;
-  std::unique_ptr<PencilFactor> factor; // of K - shift M
+  std::unique_ptr<PencilFactor> factor{}; // of K - shift M
 };
 
 ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry);
 
-/// To the shift, or a little below it where it is an eigenvalue. LibraryError: memory ran out.
+/// Factors K - shift M, or with a slightly lower shift where this one is an eigenvalue. Throws LibraryError if memory
+/// runs out.
 void move_to(ShiftInvert& pencil, double shift);
 
 /// Orthonormal basis of the invariant subspace of all theta with |theta - shift| <= reach.
 struct Nearest
 {
-  Block space;
+  MultiVector space;
   std::vector<std::complex<double>> theta;
   double reach = 0;
-  bool converged = false; // or the space grew to its limit, and nothing is given
+  bool converged = false; // if not, the space grew to its limit, and theta is empty
 };
 
-/// At least `count` of them, and at least those within `radius`; `tolerance`: by how much the space misses being
-/// invariant, relative to the eigenvalues of the inverse.
+/// The `count` nearest theta and all within `radius` of the shift. `tolerance`: the residual of the invariant
+/// subspace, relative to the smallest |1/(theta - shift)| in it.
 Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, double tolerance);
 
-/// MUMPS does the factorisations of a spectral transformation of SLEPc's.
+/// Sets a spectral transformation of SLEPc to shift-and-invert with MUMPS's LU.
 void use_mumps(ST transformation);
 
 } // namespace squeal

@@ -24,7 +24,7 @@ struct Correction
 
 /// `basis` spans the first V. Backward errors are those of `problem` itself; outcome.kind is the
 /// caller's.
-QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Block basis, const PencilFactor& P,
+QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector basis, const PencilFactor& P,
                                     const Correction& correction);
 
 struct ProjectionSettings

@@ -7,7 +7,6 @@
 ///
 /// Backward error of a pair (Tisseur 2000), in 1-norms of the matrices and 2-norms of the vectors:
 ///     eta = |(lambda^2 M + lambda C + K) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|)
-#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/equilibrium/state.hpp"
 
 #include <complex>

@@ -41,7 +41,7 @@ struct ReducedModel
   std::vector<double> gap;        // [m] at equilibrium, per active pair
   std::vector<double> drive;      // [m/s]
   std::vector<double> reactions;  // [N] r0
-  Block shapes;                   // Z V, dofs x size: u = u0 + shapes q
+  MultiVector shapes;             // Z V, dofs x size: u = u0 + shapes q
   double omega = 0;               // [rad/s] of the followed mode
   int modes = 0, attachments = 0; // columns that V came from
   Eigen::Index slow = 0;          // those that swing by less than four times omega, the first ones
@@ -109,10 +109,6 @@ struct ReducedMap
   ContactSettings contact{};
   long unconverged = 0;
 };
-
-/// A B and A^-1 B, by the library's kernels: several times faster than Eigen's own at these sizes.
-Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
-Eigen::MatrixXd solve_dense(Eigen::MatrixXd A, Eigen::MatrixXd B);
 
 /// The matrices of the period's step size, unless they are those already.
 void prepare(ReducedMap& map, double period);

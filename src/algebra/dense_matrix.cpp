@@ -1,0 +1,57 @@
+#include "squeal/algebra/dense_matrix.hpp"
+
+#include "squeal/base/integers.hpp"
+
+#include <Eigen/LU>
+
+namespace squeal
+{
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+MatrixXd dense_copy(Mat A)
+{
+  PetscInt rows = 0, columns = 0;
+  check(MatGetSize(A, &rows, &columns));
+  Owned<IS> all_rows, all_columns;
+  check(ISCreateStride(PETSC_COMM_SELF, rows, 0, 1, all_rows.put()));
+  check(ISCreateStride(PETSC_COMM_SELF, columns, 0, 1, all_columns.put()));
+  const IS row_set = all_rows, column_set = all_columns;
+  Mat* parts = nullptr;
+  check(MatCreateSubMatrices(A, 1, &row_set, &column_set, MAT_INITIAL_MATRIX, &parts));
+  MatrixXd result = MatrixXd::Zero(rows, columns);
+  for_each_row(parts[0],
+               [&](PetscInt i, std::span<const PetscInt> column, std::span<const PetscScalar> value)
+               {
+                 for (std::size_t k = 0; k < column.size(); ++k) result(i, column[k]) = value[k];
+               });
+  check(MatDestroySubMatrices(1, &parts));
+  return result;
+}
+
+void broadcast(MatrixXd& A, MPI_Comm comm)
+{
+  Eigen::Index size[2] = {A.rows(), A.cols()};
+  MPI_Bcast(size, sizeof size, MPI_BYTE, 0, comm);
+  A.resize(size[0], size[1]);
+  MPI_Bcast(A.data(), to_int(A.size()), MPI_DOUBLE, 0, comm);
+}
+
+void broadcast(VectorXd& x, MPI_Comm comm)
+{
+  Eigen::Index size = x.size();
+  MPI_Bcast(&size, sizeof size, MPI_BYTE, 0, comm);
+  x.resize(size);
+  MPI_Bcast(x.data(), to_int(size), MPI_DOUBLE, 0, comm);
+}
+
+MatrixXd solve_dense(MatrixXd A, const MatrixXd& B, const char* singular)
+{
+  if (A.size() == 0) return B;
+  const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> factor(A);
+  if ((factor.matrixLU().diagonal().array() == 0).any()) throw Error(singular);
+  return factor.solve(B);
+}
+
+} // namespace squeal
