@@ -173,6 +173,19 @@ def test_every_data_set_is_explained(written, name):
         assert units == {page[documented]}, documented
 
 
+def test_words_of_outcomes_and_choices_are_explained():
+    """Every word that the program may write or read, from the tables of its sources."""
+    pages = (ROOT / "README.md").read_text() + (INPUTS / "README.md").read_text()
+    found = 0
+    for file in [*(ROOT / "include").rglob("*.hpp"), *(ROOT / "src").rglob("*.[ch]pp")]:
+        for words in re.findall(r"std::array \w+_words\s*=\s*\{(.*?)\}", file.read_text(), re.S):
+            for word in re.findall(r'"([^"]+)"', words):
+                found += 1
+                # a start may be a file, which is named and not called "file"
+                assert f"`{word}`" in pages or f'`"{word}"`' in pages or word == "file", f"{file.name}: {word}"
+    assert found > 20
+
+
 def anchors_of(page):
     """Names by which headings are linked: small letters, digits, hyphens for spaces."""
     heads = re.findall(r"^#+ (.*)", page.read_text(), re.M)
