@@ -1,9 +1,9 @@
 #include "squeal/algebra/multivector.hpp"
 
+#include "splitmix.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <Eigen/Eigenvalues>
 
 namespace squeal
@@ -51,13 +51,10 @@ void normalise_columns(MultiVector& X)
   X.entries.array().rowwise() /= norms.transpose().array();
 }
 
-/// A number in (-1, 1) from a seed (splitmix64).
+/// A number in (-1, 1).
 double pseudo_random(std::uint64_t seed)
 {
-  std::uint64_t state = seed + 0x9e3779b97f4a7c15u;
-  state = (state ^ (state >> 30)) * 0xbf58476d1ce4e5b9u;
-  state = (state ^ (state >> 27)) * 0x94d049bb133111ebu;
-  return static_cast<double>((state ^ (state >> 31)) >> 11) * 0x1p-52 - 1;
+  return static_cast<double>(splitmix64(seed) >> 11) * 0x1p-52 - 1;
 }
 
 } // namespace

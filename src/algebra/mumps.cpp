@@ -9,25 +9,28 @@ namespace squeal
 namespace
 {
 
-constexpr int singular = -10, most_room = 2000; // INFOG(1); [%] beyond MUMPS's estimate
+constexpr int singular = -10;          // INFOG(1)
+constexpr int largest_increase = 2000; // [%] beyond MUMPS's estimate of its memory
 
-/// Pivots that are put off, and messages between ranks, need more than was estimated.
-bool short_of_room(int outcome)
+/// Whether INFOG(1) says that delayed pivots or messages between ranks need more memory than was estimated.
+bool exceeds_estimate(int outcome)
 {
   return outcome == -8 || outcome == -9 || outcome == -17 || outcome == -20;
 }
 
+/// INFOG(1) after the job.
 int outcome_of(DMUMPS_STRUC_C& mumps, MumpsJob job)
 {
   mumps.job = static_cast<MUMPS_INT>(job);
   dmumps_c(&mumps);
-  return mumps.infog[0];
+  return information(mumps, 1);
 }
 
-[[noreturn]] void give_up(const DMUMPS_STRUC_C& mumps)
+[[noreturn]] void throw_failure(const DMUMPS_STRUC_C& mumps)
 {
-  throw LibraryError("MUMPS, job " + std::to_string(mumps.job) + ": INFOG(1) = " + std::to_string(mumps.infog[0]) +
-                     ", INFOG(2) = " + std::to_string(mumps.infog[1]) + "; its manual lists them (-13: out of memory)");
+  throw LibraryError(
+      "MUMPS, job " + std::to_string(mumps.job) + ": INFOG(1) = " + std::to_string(information(mumps, 1)) +
+      ", INFOG(2) = " + std::to_string(information(mumps, 2)) + "; its manual lists them (-13: out of memory)");
 }
 
 } // namespace
@@ -38,42 +41,42 @@ void EndMumps::operator()(DMUMPS_STRUC_C* mumps) const
   delete mumps;
 }
 
-Mumps start_mumps(MPI_Comm comm, int symmetry)
+Mumps start_mumps(MPI_Comm comm, MumpsSymmetry symmetry)
 {
   Mumps mumps(new DMUMPS_STRUC_C{});
   mumps->par = 1;
-  mumps->sym = symmetry;
+  mumps->sym = static_cast<MUMPS_INT>(symmetry);
   mumps->comm_fortran = static_cast<MUMPS_INT>(MPI_Comm_c2f(comm));
   run(*mumps, MumpsJob::start);
   for (const int stream : {1, 2, 3}) control(*mumps, stream) = -1;
-  control(*mumps, 4) = 0;  // silent
-  control(*mumps, 7) = 1;  // the order that is given
-  control(*mumps, 13) = 1; // no ScaLAPACK: the negative pivots of a root that it factors are not counted
+  control(*mumps, 4) = 0;  // no output
+  control(*mumps, 7) = 1;  // the order of elimination is given
+  control(*mumps, 13) = 1; // no ScaLAPACK, since negative pivots of a root that it factors are not counted
   control(*mumps, 18) = 3; // every rank gives its share of the entries
   return mumps;
 }
 
 void run(DMUMPS_STRUC_C& mumps, MumpsJob job)
 {
-  if (outcome_of(mumps, job) < 0) give_up(mumps);
+  if (outcome_of(mumps, job) < 0) throw_failure(mumps);
 }
 
-void set_entries(DMUMPS_STRUC_C& mumps, Triplets& mine, int size)
+void set_entries(DMUMPS_STRUC_C& mumps, Triplets& entries, int size)
 {
   mumps.n = size;
-  mumps.nnz_loc = static_cast<MUMPS_INT8>(mine.value.size());
-  mumps.irn_loc = mine.row.data();
-  mumps.jcn_loc = mine.column.data();
-  mumps.a_loc = mine.value.data();
+  mumps.nnz_loc = static_cast<MUMPS_INT8>(entries.value.size());
+  mumps.irn_loc = entries.row.data();
+  mumps.jcn_loc = entries.column.data();
+  mumps.a_loc = entries.value.data();
 }
 
 bool factorise(DMUMPS_STRUC_C& mumps)
 {
   int outcome = outcome_of(mumps, MumpsJob::factorise);
-  for (MUMPS_INT& room = control(mumps, 14); short_of_room(outcome) && room < most_room;
+  for (MUMPS_INT& increase = control(mumps, 14); exceeds_estimate(outcome) && increase < largest_increase;
        outcome = outcome_of(mumps, MumpsJob::factorise))
-    room = 4 * std::max<MUMPS_INT>(room, 0) + 10;
-  if (outcome < 0 && outcome != singular) give_up(mumps);
+    increase = 4 * std::max<MUMPS_INT>(increase, 0) + 10;
+  if (outcome < 0 && outcome != singular) throw_failure(mumps);
   return outcome != singular;
 }
 

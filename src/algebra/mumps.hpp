@@ -1,7 +1,7 @@
 #pragma once
-/// What squeal says to MUMPS (Amestoy, Duff, L'Excellent, Koster 2001): one factor over all ranks, every rank giving
-/// its share of the entries, in an order of elimination that is given. Every call is collective, and MUMPS's INFOG is
-/// the same on all ranks: what it complains of is thrown on all together.
+/// The interface to MUMPS (Amestoy, Duff, L'Excellent, Koster 2001): one factor over all ranks, in a given order of
+/// elimination, from entries that are distributed. Every call is collective. MUMPS's INFOG is the same on all ranks, so
+/// that its errors are thrown on all ranks together.
 #include "triplets.hpp"
 
 #include <dmumps_c.h>
@@ -26,22 +26,42 @@ enum class MumpsJob
   solve = 3,
 };
 
-/// Silent; `symmetry` as MUMPS numbers it: 0 for L U, 2 for L D L', which counts its negative pivots.
-Mumps start_mumps(MPI_Comm comm, int symmetry);
+/// Parameter SYM of MUMPS. Its value 1, for positive definite matrices, is not used: negative pivots are not counted.
+enum class MumpsSymmetry
+{
+  none = 0,      // L U
+  symmetric = 2, // L D L', with the number of negative pivots
+};
 
-/// MUMPS's own numbering of its controls, which counts from one.
+/// An instance without output.
+Mumps start_mumps(MPI_Comm comm, MumpsSymmetry symmetry);
+
+/// ICNTL(number), counted from one as in MUMPS's manual.
 inline MUMPS_INT& control(DMUMPS_STRUC_C& mumps, int number)
 {
   return mumps.icntl[number - 1];
 }
 
-/// LibraryError if it fails.
+/// INFOG(number), counted from one as in MUMPS's manual.
+inline MUMPS_INT information(const DMUMPS_STRUC_C& mumps, int number)
+{
+  return mumps.infog[number - 1];
+}
+
+/// INFOG(12), of the last factorisation.
+inline int number_of_negative_pivots(const DMUMPS_STRUC_C& mumps)
+{
+  return information(mumps, 12);
+}
+
+/// Throws LibraryError if the job fails.
 void run(DMUMPS_STRUC_C& mumps, MumpsJob job);
 
-/// The matrix, `size` rows: lent until it is factored for the last time.
-void set_entries(DMUMPS_STRUC_C& mumps, Triplets& mine, int size);
+/// Sets the matrix of `size` rows. MUMPS borrows the entries until the last factorisation.
+void set_entries(DMUMPS_STRUC_C& mumps, Triplets& entries, int size);
 
-/// With as much room beyond its estimate, ICNTL(14), as it turns out to need. False if the matrix is singular.
+/// Factorises, and again with more memory beyond MUMPS's estimate, ICNTL(14), where that was too little. Returns false
+/// if the matrix is singular; throws LibraryError for any other failure.
 bool factorise(DMUMPS_STRUC_C& mumps);
 
 } // namespace squeal

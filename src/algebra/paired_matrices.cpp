@@ -15,13 +15,13 @@ using Two = double __attribute__((vector_size(16)));
 using Four = double __attribute__((vector_size(32)));
 using Eight = double __attribute__((vector_size(64)));
 
-/// y += A x for one matrix after the other, `parts` of them; with one part an entry is both matrices' and v and u lie
-/// side by side.
+/// y += A x for the upper triangles of symmetric matrices. With two parts an Entry belongs to one matrix, and a row of
+/// x holds v and then u of all trajectories. With one part an Entry holds those of both, and a row of x is (v, u).
 template <std::size_t parts, class Entry, class Vector>
 SQUEAL_INLINE void add_product(const PairedMatrices& matrices, const double* x, double* y)
 {
   constexpr std::size_t width = sizeof(Vector) / sizeof(double), stride = parts * width;
-  const int* const columns = matrices.columns.data();
+  const PetscInt* const columns = matrices.columns.data();
   const std::array<double, 2>* const values = matrices.values.data();
   Entry entry;
   Vector own[parts], sums[parts], other;
@@ -33,7 +33,7 @@ SQUEAL_INLINE void add_product(const PairedMatrices& matrices, const double* x, 
     {
       std::memcpy(&own[part], x + i * stride + part * width, sizeof other);
       std::memcpy(&sums[part], y + i * stride + part * width, sizeof other);
-      std::memcpy(&entry, &values[first][part], sizeof entry); // of the diagonal
+      std::memcpy(&entry, &values[first][part], sizeof entry); // on the diagonal
       sums[part] += entry * own[part];
     }
     for (std::size_t k = first + 1; k < end; ++k)
@@ -52,19 +52,19 @@ SQUEAL_INLINE void add_product(const PairedMatrices& matrices, const double* x, 
   }
 }
 
-/// One trajectory, without fused products: where a body moves as one, K u is then zero to the last bit.
+/// One trajectory. Without fused products K u of a body that moves without strain is zero to the last bit.
 void add_both(const PairedMatrices& matrices, const double* x, double* y)
 {
   add_product<1, Two, Two>(matrices, x, y);
 }
 
-/// Of 4 or 8 trajectories.
-SQUEAL_WIDE void add_products(const PairedMatrices& matrices, std::size_t count, const double* x, double* y)
+/// 4 or 8 trajectories.
+SQUEAL_SIMD void add_products(const PairedMatrices& matrices, std::size_t count, const double* x, double* y)
 {
   count == 4 ? add_product<2, double, Four>(matrices, x, y) : add_product<2, double, Eight>(matrices, x, y);
 }
 
-bool whole_here(Mat A)
+bool is_sequential_sparse(Mat A)
 {
   PetscBool sparse = PETSC_FALSE;
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(A), MATSEQAIJ, &sparse));
@@ -73,11 +73,13 @@ bool whole_here(Mat A)
 
 } // namespace
 
-std::optional<PairedMatrices> paired(Mat M, Mat K)
+std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
 {
-  if (!whole_here(M) || !whole_here(K)) return std::nullopt;
+  if (!is_sequential_sparse(M) || !is_sequential_sparse(K)) return std::nullopt;
+  PetscInt rows = 0;
+  check(MatGetSize(M, &rows, nullptr));
   PairedMatrices matrices{{0}, {}, {}};
-  std::vector<int> place; // of each column of the row at hand, one further on
+  std::vector<PetscInt> place(static_cast<std::size_t>(rows), 0); // one more than where a column's last entry is
   const auto enter = [&](Mat A, PetscInt i, std::size_t which)
   {
     PetscInt count = 0;
@@ -87,28 +89,26 @@ std::optional<PairedMatrices> paired(Mat M, Mat K)
     for (PetscInt k = 0; k < count; ++k)
     {
       if (columns[k] < i) continue;
-      int& here = place[static_cast<std::size_t>(columns[k])];
+      PetscInt& here = place[static_cast<std::size_t>(columns[k])];
       if (here <= matrices.starts.back())
       {
         matrices.columns.push_back(columns[k]);
         matrices.values.push_back({});
-        here = static_cast<int>(matrices.columns.size());
+        here = static_cast<PetscInt>(matrices.columns.size());
       }
       matrices.values[static_cast<std::size_t>(here) - 1][which] = values[k];
     }
     check(MatRestoreRow(A, i, &count, &columns, &values));
   };
-  PetscInt rows = 0;
-  check(MatGetSize(M, &rows, nullptr));
-  place.resize(static_cast<std::size_t>(rows), 0);
   for (PetscInt i = 0; i < rows; ++i)
   {
-    place[static_cast<std::size_t>(i)] = static_cast<int>(matrices.columns.size()) + 1; // whether it is there or not
+    // a row begins with its diagonal entry, be it zero
+    place[static_cast<std::size_t>(i)] = static_cast<PetscInt>(matrices.columns.size()) + 1;
     matrices.columns.push_back(i);
     matrices.values.push_back({});
     enter(M, i, 0);
     enter(K, i, 1);
-    matrices.starts.push_back(static_cast<int>(matrices.columns.size()));
+    matrices.starts.push_back(static_cast<PetscInt>(matrices.columns.size()));
   }
   return matrices;
 }

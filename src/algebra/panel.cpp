@@ -26,27 +26,28 @@ template <class Vector> SQUEAL_INLINE void put(const Vector& value, double* to)
   std::memcpy(to, &value, sizeof value);
 }
 
-/// How far ahead the lines of a strip are called for: a page [numbers], which the processor does not look beyond.
-constexpr std::size_t ahead = 512;
+/// The distance of software prefetches in a strip [numbers]: a page, beyond which the processor itself does not
+/// prefetch.
+constexpr std::size_t prefetch_distance = 512;
 
 constexpr std::size_t padded(std::size_t rows)
 {
   return (rows + tile - 1) / tile * tile;
 }
 
-/// Of the strip that begins at column j.
+/// The width of the strip that begins at column j.
 constexpr std::size_t width_from(std::size_t j, std::size_t columns)
 {
   return std::min(tile, std::bit_floor(columns - j));
 }
 
-/// Of the strip that ends before column j.
+/// The width of the strip that ends before column j.
 constexpr std::size_t width_before(std::size_t j)
 {
   return std::min(tile, j & -j);
 }
 
-/// Calls work(width), the width known to the compiler.
+/// Calls work(width) with a width that the compiler knows.
 template <class Work> SQUEAL_INLINE void with_width(std::size_t width, const Work& work)
 {
   switch (width)
@@ -62,7 +63,7 @@ template <class Work> SQUEAL_INLINE void with_width(std::size_t width, const Wor
   }
 }
 
-/// y -= L x of a strip and one right-hand side.
+/// y -= L x for a strip and one right-hand side.
 template <std::size_t width>
 SQUEAL_INLINE void subtract_strip(const double* L, std::size_t rows, const double* x, double* y)
 {
@@ -72,7 +73,7 @@ SQUEAL_INLINE void subtract_strip(const double* L, std::size_t rows, const doubl
     get(y + i, some_y);
     for (std::size_t k = 0; k < width; ++k)
     {
-      __builtin_prefetch(L + tile * k + ahead);
+      __builtin_prefetch(L + tile * k + prefetch_distance);
       get(L + tile * k, some_L);
       some_y -= some_L * x[k];
     }
@@ -80,7 +81,7 @@ SQUEAL_INLINE void subtract_strip(const double* L, std::size_t rows, const doubl
   }
 }
 
-/// y -= L' x
+/// y -= L' x for a strip and one right-hand side.
 template <std::size_t width>
 SQUEAL_INLINE void subtract_transposed_strip(const double* L, std::size_t rows, const double* x, double* y)
 {
@@ -90,7 +91,7 @@ SQUEAL_INLINE void subtract_transposed_strip(const double* L, std::size_t rows, 
     get(x + i, some_x);
     for (std::size_t k = 0; k < width; ++k)
     {
-      __builtin_prefetch(L + tile * k + ahead);
+      __builtin_prefetch(L + tile * k + prefetch_distance);
       get(L + tile * k, some_L);
       sums[k] += some_L * some_x;
     }
@@ -99,13 +100,13 @@ SQUEAL_INLINE void subtract_transposed_strip(const double* L, std::size_t rows, 
     for (std::size_t row = 0; row < tile; ++row) y[k] -= sums[k][row];
 }
 
-/// Where row i of a strip begins.
+/// The place of row i in a strip.
 constexpr std::size_t row_of(std::size_t i, std::size_t width)
 {
   return i / tile * tile * width + i % tile;
 }
 
-/// y -= L x of a strip and as many right-hand sides as a vector is wide; those of a row are `lanes` apart.
+/// y -= L x for a strip and as many right-hand sides as a Vector holds; rows are `lanes` apart.
 template <class Vector, std::size_t width>
 SQUEAL_INLINE void subtract_strip(const double* L, std::size_t rows, std::size_t lanes, const double* x, double* y)
 {
@@ -120,6 +121,7 @@ SQUEAL_INLINE void subtract_strip(const double* L, std::size_t rows, std::size_t
   }
 }
 
+/// y -= L' x for a strip and as many right-hand sides as a Vector holds.
 template <class Vector, std::size_t width> SQUEAL_INLINE void
 subtract_transposed_strip(const double* L, std::size_t rows, std::size_t lanes, const double* x, double* y)
 {
@@ -137,9 +139,10 @@ subtract_transposed_strip(const double* L, std::size_t rows, std::size_t lanes, 
   }
 }
 
-/// Right-hand sides that are taken at once; of a single one, rows are.
+/// The right-hand sides in a Vector; of a single right-hand side, the vector registers hold rows.
 template <class Vector> constexpr std::size_t taken = sizeof(Vector) / sizeof(double);
 
+/// y -= L x for a panel.
 template <class Vector> SQUEAL_INLINE void product(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
   const double* strip = L.values;
@@ -178,7 +181,7 @@ template <class Vector> SQUEAL_INLINE void transposed(const Panel& L, std::size_
   }
 }
 
-/// The tile on the diagonal of a strip `width` wide, and what it leaves to its own rows.
+/// Solves with the tile on the diagonal of a strip `width` wide, and subtracts its product from the tile's own rows.
 template <class Vector> SQUEAL_INLINE void solve_tile(const double* L, std::size_t width, std::size_t lanes, double* x)
 {
   for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
@@ -214,7 +217,7 @@ SQUEAL_INLINE void solve_transposed_tile(const double* L, std::size_t width, std
     }
 }
 
-/// What is below the tile on the diagonal of the strip of a triangle that begins at column j.
+/// The panel below the diagonal tile of the strip of a triangle that begins at column j.
 Panel below_tile(const double* strip, std::size_t j, std::size_t width, std::size_t columns)
 {
   return {strip + tile * width, columns - std::min(columns, j + tile), width};
@@ -245,7 +248,7 @@ SQUEAL_INLINE void solve_transposed(const double* L, std::size_t columns, std::s
   }
 }
 
-/// Eight columns of W: the part of them below their diagonal block acts as it stands and transposed.
+/// Adds the products with eight columns of W and, transposed, with their part below the diagonal block.
 SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j, const double* __restrict x,
                                double* __restrict y)
 {
@@ -278,7 +281,7 @@ SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j,
   }
 }
 
-/// y = W x of eight rows, or one, of a row-major matrix.
+/// y = W x for a few rows of a row-major matrix.
 template <class Vector, std::size_t rows>
 SQUEAL_INLINE void multiply_rows(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y)
 {
@@ -304,12 +307,12 @@ SQUEAL_INLINE void multiply(const double* W, std::size_t size, std::size_t lanes
 
 } // namespace
 
-SQUEAL_WIDE void dense_product(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y)
+SQUEAL_SIMD void dense_product(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y)
 {
   lanes == 4 ? multiply<Four>(W, size, lanes, x, y) : multiply<Eight>(W, size, lanes, x, y);
 }
 
-SQUEAL_WIDE void symmetric_product(const double* W, std::size_t size, const double* x, double* y)
+SQUEAL_SIMD void symmetric_product(const double* W, std::size_t size, const double* x, double* y)
 {
   std::fill_n(y, size, 0.);
   std::size_t j = 0;
@@ -351,28 +354,28 @@ double* pack_triangle(const double* from, std::size_t height, std::size_t column
   return to;
 }
 
-SQUEAL_WIDE void subtract_product(const Panel& L, std::size_t lanes, const double* x, double* y)
+SQUEAL_SIMD void subtract_product(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
   lanes == 1   ? product<double>(L, lanes, x, y)
   : lanes == 4 ? product<Four>(L, lanes, x, y)
                : product<Eight>(L, lanes, x, y);
 }
 
-SQUEAL_WIDE void subtract_transposed(const Panel& L, std::size_t lanes, const double* x, double* y)
+SQUEAL_SIMD void subtract_transposed(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
   lanes == 1   ? transposed<double>(L, lanes, x, y)
   : lanes == 4 ? transposed<Four>(L, lanes, x, y)
                : transposed<Eight>(L, lanes, x, y);
 }
 
-SQUEAL_WIDE void solve_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x)
+SQUEAL_SIMD void solve_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x)
 {
   lanes == 1   ? solve<double>(L, columns, lanes, x)
   : lanes == 4 ? solve<Four>(L, columns, lanes, x)
                : solve<Eight>(L, columns, lanes, x);
 }
 
-SQUEAL_WIDE void solve_transposed_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x)
+SQUEAL_SIMD void solve_transposed_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x)
 {
   lanes == 1   ? solve_transposed<double>(L, columns, lanes, x)
   : lanes == 4 ? solve_transposed<Four>(L, columns, lanes, x)

@@ -1,36 +1,40 @@
 #include "squeal/algebra/pencil_factor.hpp"
 
-#include "elimination.hpp"
 #include "mumps.hpp"
 #include "squeal/base/integers.hpp"
+#include "symbolic_factor.hpp"
 
 namespace squeal
 {
-
-namespace
-{
-
-using Index = std::size_t;
-
-int room_option()
-{
-  PetscInt room = 30;
-  check(PetscOptionsGetInt(nullptr, "modes_", "-factor_room", &room, nullptr));
-  return static_cast<int>(room);
-}
-
-} // namespace
 
 struct PencilFactor::Parts
 {
   MPI_Comm comm = MPI_COMM_NULL;
   Shares shares;
-  Triplets entries; // those of K, then those of M: MUMPS sums what is of one place
-  Index first_of_M = 0;
+  Triplets entries; // those of K, then those of M; MUMPS adds up entries of the same place
+  std::size_t first_of_M = 0;
   std::vector<double> values; // K - shift M
   Eigen::MatrixXd right;      // on rank 0
   Mumps mumps;
 };
+
+namespace
+{
+
+/// The position of each degree of freedom in nested dissection, counted from one as MUMPS does; on rank 0.
+std::vector<MUMPS_INT> elimination_order(Mat K, int dofs)
+{
+  const Triplets pattern = gather(lower_triangle(K), TripletContent::pattern, comm_of(K));
+  std::vector<MUMPS_INT> order;
+  on_rank_zero(comm_of(K),
+               [&]
+               {
+                 for (const int position : analyse(pattern, dofs, 0).position) order.push_back(position + 1);
+               });
+  return order;
+}
+
+} // namespace
 
 PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry) : parts_(std::make_unique<Parts>())
 {
@@ -43,17 +47,12 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry) : parts_(std::make_u
   parts.first_of_M = parts.entries.value.size();
   append(M);
   parts.values.resize(parts.entries.value.size());
-  Triplets pattern = gathered(lower_triangle(K), Triplets::Part::pattern, parts.comm);
-  std::vector<MUMPS_INT> order;
-  on_rank_zero(parts.comm,
-               [&]
-               {
-                 for (const int position : eliminate(pattern, parts.shares.total(), 0).position)
-                   order.push_back(position + 1);
-               });
-  parts.mumps = start_mumps(parts.comm, symmetry == Symmetry::none ? 0 : 2);
+  std::vector<MUMPS_INT> order = elimination_order(K, parts.shares.total());
+  PencilOptions options;
+  read_options(options_of(options));
+  parts.mumps = start_mumps(parts.comm, symmetry == Symmetry::none ? MumpsSymmetry::none : MumpsSymmetry::symmetric);
   DMUMPS_STRUC_C& mumps = *parts.mumps;
-  control(mumps, 14) = room_option();
+  control(mumps, 14) = to_int(options.room);
   set_entries(mumps, parts.entries, parts.shares.total());
   mumps.a_loc = parts.values.data();
   mumps.perm_in = order.data();
@@ -66,14 +65,14 @@ PencilFactor::~PencilFactor() = default;
 bool PencilFactor::factorise(double shift)
 {
   Parts& parts = *parts_;
-  for (Index k = 0; k < parts.values.size(); ++k)
+  for (std::size_t k = 0; k < parts.values.size(); ++k)
     parts.values[k] = (k < parts.first_of_M ? 1 : -shift) * parts.entries.value[k];
   return squeal::factorise(*parts.mumps);
 }
 
 int PencilFactor::negative_pivots() const
 {
-  return parts_->mumps->infog[11];
+  return number_of_negative_pivots(*parts_->mumps);
 }
 
 MultiVector PencilFactor::solve(const MultiVector& X) const
@@ -98,6 +97,14 @@ MultiVector PencilFactor::solve(const MultiVector& X) const
     MPI_Scatterv(whole(j), parts.shares.counts.data(), parts.shares.starts.data(), MPI_DOUBLE, Y.entries.col(j).data(),
                  rows, MPI_DOUBLE, 0, parts.comm);
   return Y;
+}
+
+OptionList options_of(PencilOptions& options)
+{
+  return {
+      {"-modes_factor_room", &options.room, Range::any,
+       "[%] of memory beyond what MUMPS estimates for a factor; it grows by itself"},
+  };
 }
 
 } // namespace squeal

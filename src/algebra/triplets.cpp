@@ -1,34 +1,41 @@
 #include "triplets.hpp"
 
+#include "squeal/base/integers.hpp"
+
 namespace squeal
 {
 
 namespace
 {
 
-template <class Keep> void append(Mat matrix, int offset, Keep keep, Triplets& mine)
+/// Appends the entries (i, j) of this rank for which `keep` holds, i below row `offset`.
+template <class Keep> void append(Mat matrix, PetscInt offset, Keep keep, Triplets& entries)
 {
+  PetscInt rows = 0, columns = 0;
+  check(MatGetSize(matrix, &rows, &columns));
+  (void)to_int(offset + rows);
+  (void)to_int(columns);
   for_each_row(matrix,
-               [&](PetscInt i, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
+               [&](PetscInt i, std::span<const PetscInt> column, std::span<const PetscScalar> value)
                {
-                 for (std::size_t k = 0; k < columns.size(); ++k)
+                 for (std::size_t k = 0; k < column.size(); ++k)
                  {
-                   if (!keep(i, columns[k])) continue;
-                   mine.row.push_back(static_cast<int>(offset + i) + 1);
-                   mine.column.push_back(static_cast<int>(columns[k]) + 1);
-                   mine.value.push_back(values[k]);
+                   if (!keep(i, column[k])) continue;
+                   entries.row.push_back(static_cast<int>(offset + i) + 1);
+                   entries.column.push_back(static_cast<int>(column[k]) + 1);
+                   entries.value.push_back(value[k]);
                  }
                });
 }
 
-template <class T> std::vector<T> gather(const std::vector<T>& mine, MPI_Datatype type, MPI_Comm comm)
+template <class T> std::vector<T> gather(const std::vector<T>& own, MPI_Datatype type, MPI_Comm comm)
 {
-  const int count = static_cast<int>(mine.size());
+  const int count = to_int(own.size());
   std::vector<int> counts(static_cast<std::size_t>(ranks_of(comm))), starts(counts.size(), 0);
   MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm);
   for (std::size_t p = 1; p < counts.size(); ++p) starts[p] = starts[p - 1] + counts[p - 1];
   std::vector<T> all(rank_of(comm) == 0 ? static_cast<std::size_t>(starts.back() + counts.back()) : 0);
-  MPI_Gatherv(mine.data(), count, type, all.data(), counts.data(), starts.data(), type, 0, comm);
+  MPI_Gatherv(own.data(), count, type, all.data(), counts.data(), starts.data(), type, 0, comm);
   return all;
 }
 
@@ -36,28 +43,31 @@ template <class T> std::vector<T> gather(const std::vector<T>& mine, MPI_Datatyp
 
 Triplets lower_triangle(Mat symmetric)
 {
-  Triplets mine;
-  append_lower_triangle(symmetric, mine);
-  return mine;
+  Triplets entries;
+  append_lower_triangle(symmetric, entries);
+  return entries;
 }
 
-void append_lower_triangle(Mat symmetric, Triplets& mine)
+void append_lower_triangle(Mat symmetric, Triplets& entries)
 {
   append(
-      symmetric, 0, [](PetscInt i, PetscInt j) { return j <= i; }, mine);
+      symmetric, 0, [](PetscInt i, PetscInt j) { return j <= i; }, entries);
 }
 
-void append_rows(Mat B, int offset, Triplets& mine)
+void append_rows(Mat B, PetscInt offset, Triplets& entries)
 {
   append(
-      B, offset, [](PetscInt, PetscInt) { return true; }, mine);
+      B, offset, [](PetscInt, PetscInt) { return true; }, entries);
 }
 
-Triplets gathered(Triplets mine, Triplets::Part part, MPI_Comm comm)
+Triplets gather(Triplets entries, TripletContent content, MPI_Comm comm)
 {
-  if (ranks_of(comm) == 1) return mine;
-  Triplets all{gather(mine.row, MPI_INT, comm), gather(mine.column, MPI_INT, comm), {}};
-  if (part == Triplets::Part::everything) all.value = gather(mine.value, MPI_DOUBLE, comm);
+  if (ranks_of(comm) == 1) return entries;
+  auto total = static_cast<long long>(entries.row.size());
+  MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPI_LONG_LONG, MPI_SUM, comm);
+  (void)to_int(total);
+  Triplets all{gather(entries.row, MPI_INT, comm), gather(entries.column, MPI_INT, comm), {}};
+  if (content == TripletContent::values) all.value = gather(entries.value, MPI_DOUBLE, comm);
   return all;
 }
 

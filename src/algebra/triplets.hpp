@@ -1,5 +1,6 @@
 #pragma once
-/// Entries of a distributed matrix as (row, column, value), numbered from one.
+/// Entries of a distributed matrix as (row, column, value), in MUMPS's format: indices are of type int and count from
+/// one, and entries of the same place are added up.
 #include "squeal/base/petsc.hpp"
 
 #include <vector>
@@ -9,26 +10,28 @@ namespace squeal
 
 struct Triplets
 {
-  enum class Part
-  {
-    pattern, // no values
-    everything,
-  };
-
   std::vector<int> row, column;
   std::vector<double> value;
+};
+
+/// What a gather communicates.
+enum class TripletContent
+{
+  pattern, // rows and columns only
+  values,  // all three
 };
 
 /// This rank's share of the lower triangle, diagonal included.
 Triplets lower_triangle(Mat symmetric);
 
-/// The same, appended.
-void append_lower_triangle(Mat symmetric, Triplets& mine);
+/// Appends this rank's share of the lower triangle, diagonal included.
+void append_lower_triangle(Mat symmetric, Triplets& entries);
 
-/// This rank's rows of B, below row `offset`.
-void append_rows(Mat B, int offset, Triplets& mine);
+/// Appends this rank's rows of B; its first row becomes row `offset` + 1.
+void append_rows(Mat B, PetscInt offset, Triplets& entries);
 
-/// The entries of all ranks on rank 0; nothing elsewhere. Collective.
-Triplets gathered(Triplets mine, Triplets::Part part, MPI_Comm comm);
+/// The entries of all ranks on rank 0, none elsewhere. Collective. Throws Error on all ranks if there are more than
+/// MPI can gather.
+Triplets gather(Triplets entries, TripletContent content, MPI_Comm comm);
 
 } // namespace squeal

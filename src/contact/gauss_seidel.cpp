@@ -35,7 +35,7 @@ template <class Entry, class Sum> SQUEAL_INLINE void add_block(const Entry* __re
 
 } // namespace
 
-SQUEAL_WIDE void add_rows(const float* rows, std::size_t count, std::size_t block, const PairVector& change,
+SQUEAL_SIMD void add_rows(const float* rows, std::size_t count, std::size_t block, const PairVector& change,
                           float* target)
 {
   add_block(rows, count, block, change, target);
@@ -57,13 +57,13 @@ template <class Entry> struct Sweep
   int in_vain = 0; // products with W that told otherwise than the sweeps
 };
 
-SQUEAL_WIDE void add_whole_rows(const double* rows, std::size_t count, std::size_t block, const PairVector& change,
+SQUEAL_SIMD void add_whole_rows(const double* rows, std::size_t count, std::size_t block, const PairVector& change,
                                 double* target)
 {
   add_block(rows, count, block, change, target);
 }
 
-SQUEAL_WIDE void add_runs(const NearField& near, std::size_t pair, std::size_t block, const PairVector& change,
+SQUEAL_SIMD void add_runs(const NearField& near, std::size_t pair, std::size_t block, const PairVector& change,
                           float* target)
 {
   const float* values = &near.values[near.values_of[pair]];

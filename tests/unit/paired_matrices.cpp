@@ -54,7 +54,7 @@ double difference(Mat A, Vec x, Vec y)
 TEST_CASE("matrices of different patterns side by side give the products of each, of one trajectory and of many")
 {
   const auto M = striped(41, 3), K = striped(41, 2);
-  const std::optional<PairedMatrices> matrices = paired(M, K);
+  const std::optional<PairedMatrices> matrices = pair_matrices(M, K);
   CHECK(matrices.has_value() == (ranks_of(PETSC_COMM_WORLD) == 1));
   if (!matrices) return;
   for (const int count : {1, 3, 11})

@@ -1,16 +1,14 @@
 #pragma once
 /// Direct factor of A (symmetric, meant to be positive definite) bordered by rows B that are never eliminated:
 ///     [A  B'] [x     ]   [b]
-///     [B  0 ] [lambda] = [*]     leaves  -B A^-1 B'  in the corner (Schur complement),
-/// and splits a solve in two halves: `forward` turns b into B A^-1 b, `backward` then gives x = A^-1 (b - B' lambda)
-/// for a lambda chosen in between. Both together cost less than two solves with A alone.
-///
-/// supernodal: L L' by supernodes in METIS's ordering, on rank 0, the quickest. mumps: MUMPS in the same ordering,
-/// spread over all ranks. dense: by LAPACK on rank 0. Right-hand sides, several at once at will, pass through rank 0.
-/// automatic: dense if A is small or full; else supernodal, but mumps on several ranks if rank 0 would hold more than
-/// -factor_limit for it. The option -factor names another.
+///     [B  0 ] [lambda] = [*]     leaves the Schur complement -B A^-1 B' of the border.
+/// A solve has two halves: `forward` turns b into B A^-1 b, `backward` then gives x = A^-1 (b - B' lambda) for a lambda
+/// that the caller chooses in between. Both together cost less than two solves with A alone. Right-hand sides, several
+/// at once where there are several, pass through rank 0.
+#include "squeal/base/options.hpp"
 #include "squeal/base/petsc.hpp"
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -23,10 +21,10 @@ class Factor
 public:
   enum class Kind
   {
-    automatic, // as -factor says
-    supernodal,
-    mumps,
-    dense,
+    automatic,  // dense if A is small or full; else supernodal, or mumps where FactorOptions::limit says so
+    supernodal, // L L' by supernodes in METIS's ordering, on rank 0; the fastest
+    mumps,      // MUMPS in the same ordering, spread over all ranks
+    dense,      // on rank 0
   };
 
   Factor();
@@ -34,30 +32,48 @@ public:
   Factor& operator=(Factor&&) noexcept;
   ~Factor();
 
-  /// Collective. `B` may be null: no border.
+  /// Collective. `B` may be null, for no border. The kind `automatic` is the one that FactorOptions name.
   Factor(Mat A, Mat B, Kind kind);
 
-  /// A pivot was zero or negative: A is not positive definite and the factor is of no use.
+  /// Whether a pivot was zero or negative: A is not positive definite, and the factor is not to be used.
   bool failed() const;
 
-  /// scale B A^-1 B', row-major, symmetric to the bit; on rank 0 only, empty elsewhere. Once: it gives its storage
-  /// away.
+  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere. Moves its storage out:
+  /// call it once.
   std::vector<double> condensed(double scale);
 
   /// B A^-1 b for each b, one after the other; on rank 0 only. `backward` must follow before the next `forward`.
   std::vector<double> forward(std::span<const Vec> b) const;
 
-  /// x = A^-1 (b - B' lambda) for the b of the last `forward`; lambda as `forward` returns, read on rank 0.
+  /// x = A^-1 (b - B' lambda) for the b of the last `forward`. lambda has the layout that `forward` returns, and is
+  /// read on rank 0.
   void backward(const std::vector<double>& lambda, std::span<const Vec> x) const;
 
-  double entries() const; // of the triangular factor, the border's rows included
+  /// Entries of the triangular factor, with the border's rows but for a dense one. Collective.
+  double entries() const;
 
 private:
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };
 
-/// What a Factor of A bordered by B (may be null) holds at its largest; its condensed corner apart [bytes]. Collective.
+inline constexpr std::array factor_kind_words = {"automatic", "supernodal", "mumps", "dense"};
+
+inline Words words_of(Factor::Kind)
+{
+  return factor_kind_words;
+}
+
+struct FactorOptions
+{
+  Factor::Kind kind = Factor::Kind::automatic;
+  double limit = 0.3; // [GB] of a supernodal factor; beyond it several ranks share MUMPS's
+};
+
+OptionList options_of(FactorOptions& options);
+
+/// The largest memory that an automatic Factor of A and B takes, without its Schur complement [bytes]. B may be null.
+/// Collective.
 double factor_memory(Mat A, Mat B);
 
 /// x = A^-1 b.

@@ -1,6 +1,6 @@
 #pragma once
-/// M and K, symmetric and whole on one process, side by side: what a step multiplies by them goes through their common
-/// pattern once, one triangle of it, and once for several trajectories.
+/// M and K, symmetric and whole on one process, stored together: one pass through the upper triangle of their common
+/// pattern gives the products of both, for several trajectories at once.
 #include "squeal/base/petsc.hpp"
 
 #include <array>
@@ -13,12 +13,12 @@ namespace squeal
 
 struct PairedMatrices
 {
-  std::vector<int> starts, columns;          // by rows, from the diagonal on
+  std::vector<PetscInt> starts, columns;     // of each row, from the diagonal on
   std::vector<std::array<double, 2>> values; // M_ij, K_ij
 };
 
 /// Nothing unless M and K are sparse and whole on this process.
-std::optional<PairedMatrices> paired(Mat M, Mat K);
+std::optional<PairedMatrices> pair_matrices(Mat M, Mat K);
 
 /// Mv = M v and Ku = K u of each.
 void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> u,

@@ -1,9 +1,11 @@
 #pragma once
-/// Products with the panels of a factor and solves with their triangles, packed so that each is read as one stream:
-/// strips of eight columns (four, two, one where fewer are left), each from its first row on in tiles of eight rows,
-/// the last one filled up with zeros; the columns of a tile one after the other. A strip of a triangle begins at its
-/// own diagonal. Vectors are `lanes` numbers wide, as `lanes_for` gives them: those of several right-hand sides side by
-/// side; as many rows as fill the last tile must be there to be read and, with their values kept, written.
+/// Products with the panels of a factor and solves with its triangles. Both are packed so that each is read as one
+/// stream.
+///
+/// A panel is cut into strips of eight columns, the last ones of four, two and one. A strip is cut into tiles of eight
+/// rows, the last one filled up with zeros; a tile is stored column by column. A triangle is packed in the same way,
+/// each strip from its own diagonal on. A vector holds `lanes` numbers in each row, one for each right-hand side
+/// (lanes_for says how many); it must have as many rows as fill the last tile, which are read and written unchanged.
 #include <cstddef>
 
 namespace squeal
@@ -11,23 +13,24 @@ namespace squeal
 
 constexpr std::size_t tile = 8; // rows
 
-/// For so many right-hand sides: 1, 4 or a multiple of 8.
+/// The lanes for that many right-hand sides: 1, 4 or a multiple of 8.
 constexpr std::size_t lanes_for(std::size_t columns)
 {
   return columns == 1 ? 1 : columns <= 4 ? 4 : (columns + 7) / 8 * 8;
 }
 
-/// Packed, of rows x columns.
+/// A packed matrix of rows x columns.
 struct Panel
 {
   const double* values;
   std::size_t rows, columns;
 };
 
+/// The numbers that a packed panel and a packed triangle take.
 std::size_t packed_panel(std::size_t rows, std::size_t columns);
 std::size_t packed_triangle(std::size_t columns);
 
-/// From a matrix stored by columns `height` apart; each returns where the next one goes.
+/// Pack part of a column-major matrix with `height` rows; each returns the end of what it wrote.
 double* pack_panel(const double* from, std::size_t height, std::size_t rows, std::size_t columns, double* to);
 double* pack_triangle(const double* from, std::size_t height, std::size_t columns, double* to);
 
@@ -37,16 +40,16 @@ void subtract_product(const Panel& L, std::size_t lanes, const double* x, double
 /// y -= L' x
 void subtract_transposed(const Panel& L, std::size_t lanes, const double* x, double* y);
 
-/// x = L^-1 x for a packed triangle of `columns`.
+/// x = L^-1 x for a packed triangle with `columns` columns.
 void solve_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x);
 
 /// x = L^-T x
 void solve_transposed_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x);
 
-/// y = W x for the lower triangle of a symmetric W, by columns, read once.
+/// y = W x for a symmetric W stored by columns, of which the lower triangle is read once.
 void symmetric_product(const double* W, std::size_t size, const double* x, double* y);
 
-/// y = W x for a W stored by rows, of several `lanes`.
+/// y = W x for a W stored by rows and at least four lanes.
 void dense_product(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y);
 
 } // namespace squeal

@@ -2,6 +2,7 @@
 /// The factor of K - shift M by MUMPS, with METIS's nested dissection. It takes MUMPS's own interface, since PETSc's
 /// has no way to pass an order of elimination. Right-hand sides pass through rank 0.
 #include "squeal/algebra/multivector.hpp"
+#include "squeal/base/options.hpp"
 
 #include <memory>
 
@@ -22,7 +23,6 @@ public:
   ~PencilFactor();
 
   /// Returns false if the shift is an eigenvalue. Throws LibraryError if memory runs out.
-  /// Option -modes_factor_room: memory beyond MUMPS's estimate [%] to start with; it grows where that is too little.
   bool factorise(double shift);
 
   /// The number of eigenvalues below the shift (Sylvester's law of inertia). For Symmetry::symmetric only.
@@ -35,5 +35,12 @@ private:
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };
+
+struct PencilOptions
+{
+  PetscInt room = 30; // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
+};
+
+OptionList options_of(PencilOptions& options);
 
 } // namespace squeal

@@ -1,10 +1,10 @@
-#include "elimination.hpp"
+#include "symbolic_factor.hpp"
 
+#include "splitmix.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <metis.h>
 #include <numeric>
 #include <span>
@@ -22,7 +22,7 @@ std::size_t at(int number)
   return static_cast<std::size_t>(number);
 }
 
-/// Neighbours of every node, one list after the other.
+/// A graph in compressed form: the neighbours of each node, one list after the other.
 struct Graph
 {
   std::vector<idx_t> offsets, neighbours;
@@ -34,7 +34,7 @@ struct Graph
   }
 };
 
-/// Of (node, neighbour) pairs, each neighbour once; neighbours are below `range`.
+/// The graph of (node, neighbour) pairs, each neighbour once and ascending; neighbours are less than `range`.
 Graph graph_of(int nodes, int range, const std::vector<std::pair<int, int>>& edges)
 {
   std::vector<std::size_t> starts(at(nodes) + 1, 0);
@@ -52,43 +52,37 @@ Graph graph_of(int nodes, int range, const std::vector<std::pair<int, int>>& edg
     std::sort(graph.neighbours.begin() + graph.offsets.back(), graph.neighbours.end());
     graph.offsets.push_back(static_cast<idx_t>(graph.neighbours.size()));
   }
-  graph.neighbours.reserve(1); // never without an address
+  graph.neighbours.reserve(1); // METIS takes no null pointer
   return graph;
 }
 
-/// A number for every degree of freedom, the same where they and their neighbours are the same set.
-std::vector<int> group(const Triplets& lower, int dofs, int& groups)
+/// The node of each degree of freedom. Degrees of freedom share a node if they and their neighbours are the same set,
+/// which a hash of the set decides.
+std::vector<int> nodes_of(const Triplets& lower, int dofs)
 {
-  const auto mixed = [](int number)
-  {
-    std::uint64_t x = static_cast<std::uint64_t>(number) + 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
-  };
+  const auto hash = [](int dof) { return splitmix64(static_cast<std::uint64_t>(dof)); };
   std::vector<std::uint64_t> sum(at(dofs));
-  for (int i = 0; i < dofs; ++i) sum[at(i)] = mixed(i);
+  for (int i = 0; i < dofs; ++i) sum[at(i)] = hash(i);
   for (std::size_t k = 0; k < lower.row.size(); ++k)
   {
     const int i = lower.row[k] - 1, j = lower.column[k] - 1;
     if (i == j || i >= dofs) continue;
-    sum[at(i)] += mixed(j);
-    sum[at(j)] += mixed(i);
+    sum[at(i)] += hash(j);
+    sum[at(j)] += hash(i);
   }
   std::unordered_map<std::uint64_t, int> seen;
   std::vector<int> number(at(dofs));
   for (int i = 0; i < dofs; ++i)
     number[at(i)] = seen.try_emplace(sum[at(i)], static_cast<int>(seen.size())).first->second;
-  groups = static_cast<int>(seen.size());
   return number;
 }
 
-/// Position of each node by nested dissection.
-std::vector<idx_t> dissect(Graph& graph, std::vector<idx_t>& weights)
+/// The position of each node in METIS's nested dissection.
+std::vector<idx_t> nested_dissection(Graph& graph, std::vector<idx_t>& weights)
 {
   std::vector<idx_t> order(weights.size()), position(weights.size()), options(METIS_NOPTIONS);
   METIS_SetDefaultOptions(options.data());
-  options[METIS_OPTION_COMPRESS] = 0; // done
+  options[METIS_OPTION_COMPRESS] = 0; // nodes_of has compressed the graph
   idx_t size = graph.nodes();
   if (METIS_NodeND(&size, graph.offsets.data(), graph.neighbours.data(), weights.data(), options.data(), order.data(),
                    position.data()) != METIS_OK)
@@ -96,7 +90,7 @@ std::vector<idx_t> dissect(Graph& graph, std::vector<idx_t>& weights)
   return position;
 }
 
-/// The graph with its nodes renumbered.
+/// The graph with node i renamed position[i].
 Graph renumbered(const Graph& graph, const std::vector<idx_t>& position)
 {
   std::vector<std::pair<int, int>> edges;
@@ -106,7 +100,7 @@ Graph renumbered(const Graph& graph, const std::vector<idx_t>& position)
   return graph_of(graph.nodes(), graph.nodes(), edges);
 }
 
-/// Elimination tree (Liu 1990): the node whose column takes each node's update; -1 for none.
+/// Parents in the elimination tree (Liu 1990), -1 for a root: the first row below the pivot in each node's column.
 std::vector<int> elimination_tree(const Graph& graph)
 {
   std::vector<int> parent(at(graph.nodes()), -1), ancestor(at(graph.nodes()), -1);
@@ -122,14 +116,14 @@ std::vector<int> elimination_tree(const Graph& graph)
   return parent;
 }
 
-/// Position of each node when every subtree is numbered in one run, children before parents.
+/// The position of each node in a postorder of the tree: each subtree is one run of numbers, children before parents.
 std::vector<idx_t> postorder(const std::vector<int>& parent)
 {
   const int nodes = static_cast<int>(parent.size());
   std::vector<std::vector<int>> children(at(nodes) + 1);
   for (int i = 0; i < nodes; ++i) children[at(parent[at(i)] < 0 ? nodes : parent[at(i)])].push_back(i);
   std::vector<idx_t> position(at(nodes));
-  std::vector<std::pair<int, std::size_t>> path{{nodes, 0}}; // a node, and how many of its children are done
+  std::vector<std::pair<int, std::size_t>> path{{nodes, 0}}; // a node and the number of its children that are numbered
   idx_t next = 0;
   while (!path.empty())
   {
@@ -145,20 +139,22 @@ std::vector<idx_t> postorder(const std::vector<int>& parent)
   return position;
 }
 
-/// A run of nodes with one set of rows below, as nodes; border row i is node `nodes` + i.
-struct Run
+/// A supernode in terms of nodes; row i of the border is node `nodes` + i.
+struct NodeRun
 {
-  int first = 0, last = 0, columns = 0;
-  std::vector<int> below;
-  double zeros = 0; // entries of its panel that elimination does not fill
+  int first = 0, last = 0; // nodes
+  int columns = 0;         // degrees of freedom
+  std::vector<int> below;  // nodes
+  double zeros = 0;        // entries of its panel that elimination does not fill
 };
 
-/// Whether longer columns are worth the zeros they read: much of a small panel, little of a large one.
-bool worthwhile(double columns, double zeros, double size)
+/// Whether a supernode may hold that many zeros among its `size` entries: a larger share if it has few columns.
+bool is_acceptable(double columns, double zeros, double size)
 {
-  return zeros <= size * (columns <= 16 ? .3 : columns <= 48 ? .1 : .04);
+  return zeros <= size * (columns <= 16 ? 0.3 : columns <= 48 ? 0.1 : 0.04);
 }
 
+/// Degrees of freedom of nodes; a border row counts as one.
 struct Weights
 {
   const std::vector<idx_t>& of_nodes;
@@ -172,7 +168,7 @@ struct Weights
   }
 };
 
-std::vector<int> united(const std::vector<int>& a, const std::vector<int>& b)
+std::vector<int> union_of(const std::vector<int>& a, const std::vector<int>& b)
 {
   std::vector<int> both;
   both.reserve(a.size() + b.size());
@@ -180,25 +176,25 @@ std::vector<int> united(const std::vector<int>& a, const std::vector<int>& b)
   return both;
 }
 
-/// Runs of a graph in postorder whose columns have one structure; that of a column is its own and its children's.
-std::vector<Run> find_runs(const Graph& graph, const Graph& border, const std::vector<int>& parent,
-                           const Weights& weight)
+/// The fundamental supernodes of a graph in postorder. The rows of a column are its own and those of its children.
+std::vector<NodeRun> fundamental_supernodes(const Graph& graph, const Graph& border, const std::vector<int>& parent,
+                                            const Weights& weight)
 {
   std::vector<std::vector<int>> from_children(at(graph.nodes()));
-  std::vector<Run> runs;
+  std::vector<NodeRun> runs;
   for (int j = 0; j < graph.nodes(); ++j)
   {
     std::vector<int> own;
     for (const int i : graph.of(j))
       if (i > j) own.push_back(i);
     for (const int i : border.of(j)) own.push_back(graph.nodes() + i);
-    std::vector<int> below = united(from_children[at(j)], own);
+    std::vector<int> below = union_of(from_children[at(j)], own);
     from_children[at(j)] = {};
     if (!below.empty() && below.front() == j) below.erase(below.begin());
     if (parent[at(j)] >= 0)
     {
       std::vector<int>& above = from_children[at(parent[at(j)])];
-      above = above.empty() ? below : united(above, below);
+      above = above.empty() ? below : union_of(above, below);
     }
     const bool continues = j > 0 && parent[at(j - 1)] == j && runs.back().below.size() == below.size() + 1;
     if (!continues) runs.push_back({j, j, 0, {}, 0});
@@ -209,18 +205,18 @@ std::vector<Run> find_runs(const Graph& graph, const Graph& border, const std::v
   return runs;
 }
 
-/// Runs joined with their last children, where that is worthwhile.
-std::vector<Run> joined(std::vector<Run> runs, const std::vector<int>& parent, const Weights& weight)
+/// Joins supernodes with their last children where that brings few zeros.
+std::vector<NodeRun> amalgamate(std::vector<NodeRun> runs, const std::vector<int>& parent, const Weights& weight)
 {
-  std::vector<Run> kept;
-  for (Run& run : runs)
+  std::vector<NodeRun> kept;
+  for (NodeRun& run : runs)
   {
     while (!kept.empty() && parent[at(kept.back().last)] >= run.first && parent[at(kept.back().last)] <= run.last)
     {
-      const Run& child = kept.back();
+      const NodeRun& child = kept.back();
       const double below = weight.of(run.below), columns = child.columns + run.columns;
       const double zeros = child.zeros + run.zeros + child.columns * (run.columns + below - weight.of(child.below));
-      if (!worthwhile(columns, zeros, columns * (columns + below))) break;
+      if (!is_acceptable(columns, zeros, columns * (columns + below))) break;
       run.first = child.first;
       run.columns += child.columns;
       run.zeros = zeros;
@@ -231,8 +227,8 @@ std::vector<Run> joined(std::vector<Run> runs, const std::vector<int>& parent, c
   return kept;
 }
 
-/// The supernodes in degrees of freedom; `starts`: the first position of each node.
-void expand(const std::vector<Run>& runs, const std::vector<int>& starts, Elimination& result)
+/// Sets the supernodes of `result` in degrees of freedom; `starts`: the first position of each node.
+void expand(const std::vector<NodeRun>& runs, const std::vector<int>& starts, SymbolicFactor& result)
 {
   const int nodes = static_cast<int>(starts.size()) - 1;
   std::vector<int> run_of(at(nodes));
@@ -244,63 +240,76 @@ void expand(const std::vector<Run>& runs, const std::vector<int>& starts, Elimin
     Supernode& supernode = result.supernodes[k];
     supernode.first = starts[at(runs[k].first)];
     supernode.columns = runs[k].columns;
-    supernode.rows = result.rows.size();
-    supernode.values = result.values;
+    supernode.rows_begin = result.rows.size();
+    supernode.values_begin = result.values;
     for (const int node : runs[k].below)
       if (node >= nodes)
       {
         result.rows.push_back(result.dofs + node - nodes);
-        ++supernode.bordering;
+        ++supernode.border;
       }
       else
         for (int row = starts[at(node)]; row < starts[at(node) + 1]; ++row) result.rows.push_back(row);
-    supernode.below = static_cast<int>(result.rows.size() - supernode.rows);
+    supernode.below = static_cast<int>(result.rows.size() - supernode.rows_begin);
     result.values += packed_triangle(at(supernode.columns)) + packed_panel(at(supernode.below), at(supernode.columns));
-    result.entries += .5 * supernode.columns * (supernode.columns + 1) + 1. * supernode.below * supernode.columns;
+    result.entries += supernode.columns * (0.5 * (supernode.columns + 1) + supernode.below);
     if (supernode.inner() > 0)
       result.supernodes[at(run_of[at(runs[k].below.front())])].children.push_back(static_cast<int>(k));
   }
 }
 
-} // namespace
-
-Elimination eliminate(const Triplets& lower, int dofs, int border)
+/// Adjacency of the nodes among each other, and to the rows of the border, as (node, neighbour) pairs.
+struct Edges
 {
-  Elimination result;
-  result.dofs = dofs;
-  result.border = border;
-  int nodes = 0;
-  const std::vector<int> node_of = group(lower, dofs, nodes);
-  std::vector<idx_t> weights(at(nodes), 0);
-  for (const int node : node_of) ++weights[at(node)];
-  std::vector<std::pair<int, int>> edges, rows;
+  std::vector<std::pair<int, int>> inner, border;
+};
+
+Edges edges_of(const Triplets& lower, int dofs, const std::vector<int>& node_of)
+{
+  Edges edges;
   for (std::size_t k = 0; k < lower.row.size(); ++k)
   {
     const int i = lower.row[k] - 1, j = node_of[at(lower.column[k] - 1)];
     if (i >= dofs)
-      rows.emplace_back(j, i - dofs);
+      edges.border.emplace_back(j, i - dofs);
     else if (node_of[at(i)] != j)
     {
-      edges.emplace_back(node_of[at(i)], j);
-      edges.emplace_back(j, node_of[at(i)]);
+      edges.inner.emplace_back(node_of[at(i)], j);
+      edges.inner.emplace_back(j, node_of[at(i)]);
     }
   }
-  Graph graph = graph_of(nodes, nodes, edges);
-  edges = {};
-  std::vector<idx_t> position = dissect(graph, weights);
+  return edges;
+}
+
+} // namespace
+
+SymbolicFactor analyse(const Triplets& lower, int dofs, int border)
+{
+  SymbolicFactor result;
+  result.dofs = dofs;
+  result.border = border;
+  const std::vector<int> node_of = nodes_of(lower, dofs);
+  const int nodes = node_of.empty() ? 0 : 1 + *std::max_element(node_of.begin(), node_of.end());
+  std::vector<idx_t> sizes(at(nodes), 0), ordered_sizes(sizes.size());
+  for (const int node : node_of) ++sizes[at(node)];
+  Edges edges = edges_of(lower, dofs, node_of);
+  Graph graph = graph_of(nodes, nodes, edges.inner);
+  edges.inner = {};
+
+  std::vector<idx_t> position = nested_dissection(graph, sizes);
   const std::vector<idx_t> moved = postorder(elimination_tree(renumbered(graph, position)));
   for (idx_t& place : position) place = moved[at(place)];
   graph = renumbered(graph, position);
-  std::vector<idx_t> moved_weights(weights.size());
-  for (std::size_t i = 0; i < weights.size(); ++i) moved_weights[at(position[i])] = weights[i];
-  for (auto& [node, row] : rows) node = position[at(node)];
+  for (std::size_t i = 0; i < sizes.size(); ++i) ordered_sizes[at(position[i])] = sizes[i];
+  for (auto& [node, row] : edges.border) node = position[at(node)];
+
   const std::vector<int> parent = elimination_tree(graph);
-  const Weights weight{moved_weights};
-  const std::vector<Run> runs = joined(find_runs(graph, graph_of(nodes, border, rows), parent, weight), parent, weight);
-  std::vector<int> starts(at(nodes) + 1, 0), next;
-  std::partial_sum(moved_weights.begin(), moved_weights.end(), starts.begin() + 1);
-  expand(runs, starts, result);
-  next = starts;
+  const Weights weight{ordered_sizes};
+  const Graph to_border = graph_of(nodes, border, edges.border);
+  std::vector<int> starts(at(nodes) + 1, 0);
+  std::partial_sum(ordered_sizes.begin(), ordered_sizes.end(), starts.begin() + 1);
+  expand(amalgamate(fundamental_supernodes(graph, to_border, parent, weight), parent, weight), starts, result);
+  std::vector<int> next = starts;
   for (const int node : node_of) result.position.push_back(next[at(position[at(node)])]++);
   return result;
 }

@@ -1,0 +1,40 @@
+#pragma once
+/// Ordering and symbolic factorisation of a bordered symmetric matrix.
+///
+/// Degrees of freedom with equal neighbours are taken as one node, METIS orders the nodes by nested dissection, and
+/// the border follows last. Supernodes are runs of neighbouring columns of the factor with the same rows below. Small
+/// ones are joined with their parent, at the price of some zeros (relaxed amalgamation; Ashcraft and Grimes 1989).
+#include "triplets.hpp"
+
+#include <cstddef>
+#include <vector>
+
+namespace squeal
+{
+
+struct Supernode
+{
+  int first = 0, columns = 0;   // its pivots, as positions in the order of elimination
+  int below = 0, border = 0;    // rows below its pivots; the last `border` of these belong to the border
+  std::size_t rows_begin = 0;   // of the rows below, in SymbolicFactor::rows
+  std::size_t values_begin = 0; // of its packed triangle in the factor; the panel below follows it
+  std::vector<int> children{};  // supernodes that update it
+
+  int height() const { return columns + below; }
+  int inner() const { return below - border; } // rows below that are no border rows
+};
+
+struct SymbolicFactor
+{
+  int dofs = 0, border = 0;
+  std::vector<int> position;         // of each degree of freedom in the order of elimination, from zero
+  std::vector<Supernode> supernodes; // children before parents, the last child right before its parent
+  std::vector<int> rows;             // positions, ascending in a supernode; dofs + i for row i of the border
+  std::size_t values = 0;            // numbers in the packed factor
+  double entries = 0;                // of the factor, without the zeros of packing
+};
+
+/// `lower`: the lower triangle of A and, from row dofs + 1 on, the border.
+SymbolicFactor analyse(const Triplets& lower, int dofs, int border);
+
+} // namespace squeal
