@@ -105,9 +105,9 @@ void expand(const Subspace& space, const QuadraticNorms& norms, Pairs pairs, con
     copy_column(y, k, pair.real);
     copy_column(y, count + k, pair.imaginary);
     solution.push_back(std::move(pair));
-    const double enough = lambda.real() > critical * w ? correction.sharp : correction.enough;
+    const double tolerance = lambda.real() > critical * w ? correction.sharp : correction.tolerance;
     for (const Index column : {k, count + k})
-      if (left(column) > enough * scale) kept.push_back(column);
+      if (left(column) > tolerance * scale) kept.push_back(column);
   }
   append(residuals, {residual.comm, residual.entries(Eigen::all, kept)});
 }
@@ -155,7 +155,7 @@ QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector
     result.outcome.iterations = pass + better;
     if (better) continue;
     expand_until(found.size());
-    settle(result);
+    sort_and_measure(result);
     return result;
   }
 }

@@ -14,6 +14,7 @@ namespace squeal
 namespace
 {
 
+/// Scales y to 2-norm 1.
 void normalise(Eigenpair& pair)
 {
   double a = 0, b = 0;
@@ -41,6 +42,7 @@ Owned<Vec> distributed(const Eigen::VectorXd& whole, Mat layout)
   return result;
 }
 
+/// Of a small problem.
 QuadraticSolution solve_whole(const QuadraticProblem& problem, const Window& window)
 {
   QuadraticSolution result;
@@ -73,7 +75,7 @@ Owned<PEP> make_solver(Mat M, Mat C, Mat K, PetscInt count, double shift)
   return pep;
 }
 
-// Pairs of a solved PEP; returns the farthest |nu - shift| found.
+/// Appends the pairs of a solved PEP that lie in the window. Returns the largest |nu - shift| of all.
 double collect(PEP pep, double omega, double shift, const Window& window, std::vector<Eigenpair>& pairs)
 {
   PetscInt converged = 0;
@@ -94,6 +96,7 @@ double collect(PEP pep, double omega, double shift, const Window& window, std::v
   return farthest;
 }
 
+/// By TOAR, with twice as many eigenvalues in each attempt until they reach the end of the band.
 QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSettings& settings, const Window& window)
 {
   PetscInt n = 0;
@@ -146,11 +149,11 @@ QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const Quadrat
     normalise(pair);
     pair.backward_error = backward_error(problem, norms, pair);
   }
-  settle(result);
+  sort_and_measure(result);
   return result;
 }
 
-void settle(QuadraticSolution& solution)
+void sort_and_measure(QuadraticSolution& solution)
 {
   for (const Eigenpair& pair : solution.pairs)
     solution.outcome.residual = std::max(solution.outcome.residual, pair.backward_error);

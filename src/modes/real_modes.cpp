@@ -2,6 +2,7 @@
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/multivector.hpp"
+#include "squeal/base/integers.hpp"
 #include "squeal/equilibrium/closed_contact.hpp"
 #include "squeal/modes/quadratic.hpp"
 
@@ -24,11 +25,13 @@ double trace(Mat A)
   return result;
 }
 
+/// All pairs of a small problem, on every rank.
 SymmetricEigenpairs solve_whole(Mat M, Mat K)
 {
   return solve_dense_symmetric_shared(comm_of(K), dense_copy(M), dense_copy(K), shift_below_zero(M, K));
 }
 
+/// The first `count` of them.
 RealModes first_of(const SymmetricEigenpairs& all, Mat K, Index count)
 {
   RealModes modes;
@@ -44,19 +47,20 @@ RealModes first_of(const SymmetricEigenpairs& all, Mat K, Index count)
   return modes;
 }
 
-// What a sweep looks for: all theta = omega^2 below a limit, or the first few.
-struct Sought
+/// What a sweep must find: all theta = omega^2 below `limit`, or the first `count`.
+struct Goal
 {
   double limit = 0; // [1/s2]
   int count = 0;
 };
 
+/// What a sweep has found: ascending theta, and M-normalised shapes.
 struct Found
 {
-  std::vector<double> theta;
+  std::vector<double> theta{};
   MultiVector shapes;
-  double covered = -INFINITY; // every theta below is here
-  bool complete = false;      // by count
+  double covered = -HUGE_VAL; // every theta below is in the list
+  bool complete = false;      // the goal is met, as the count of negative pivots says
   int iterations = 0;
 
   int count() const { return static_cast<int>(theta.size()); }
@@ -66,7 +70,7 @@ struct Found
   }
 };
 
-// Between the last third of the ascending values, the middle of the widest gap: a cluster is not cut there.
+/// The middle of the widest gap between the values of the last third of an ascending list. A cluster is not cut there.
 double widest_gap(const std::vector<double>& values)
 {
   std::size_t best = values.size() - 1;
@@ -85,14 +89,14 @@ SymmetricEigenpairs ritz_modes(const Nearest& nearest, Mat M, Mat K)
                                       inner_products(space, product(K, space)), -largest);
 }
 
-/// Appends to `found` the values between found.covered and a gap before `end`.
-void take(Found& found, const SymmetricEigenpairs& ritz, const MultiVector& space, double end, const Sought& sought)
+/// Appends the Ritz values between found.covered and a gap before `end`.
+void append(Found& found, const SymmetricEigenpairs& ritz, const MultiVector& space, double end, double limit)
 {
   std::vector<double> values = {found.covered};
   for (const double theta : ritz.lambda)
     if (theta > found.covered && theta < end) values.push_back(theta);
   values.push_back(end);
-  found.covered = end >= sought.limit ? sought.limit : widest_gap(values);
+  found.covered = end >= limit ? limit : widest_gap(values);
   std::vector<Index> chosen;
   for (Index k = 0; k < ritz.lambda.size(); ++k)
     if (ritz.lambda(k) > values.front() && ritz.lambda(k) < found.covered)
@@ -115,10 +119,11 @@ double largest_residual(const Found& found, Mat M, Mat K)
   return ratio.size() > 0 ? ratio.maxCoeff() : 0;
 }
 
-constexpr int ahead = 20, above = 40; // values from what is found to the next shift, and beyond it
+// Numbers of values between what is covered and the next shift, and at most beyond that shift.
+constexpr int below_shift = 20, above_shift = 40;
 
-// Moves up until about `ahead` values lie between what is found and the shift; returns how many do.
-int climb(ShiftInvert& pencil, const Found& found, double step, double limit)
+/// Raises the shift until about `below_shift` values lie between what is covered and the shift. Returns their number.
+int raise_shift(ShiftInvert& pencil, const Found& found, double step, double limit)
 {
   int between = 0;
   for (int attempt = 0; attempt < 6; ++attempt)
@@ -126,14 +131,14 @@ int climb(ShiftInvert& pencil, const Found& found, double step, double limit)
     const double shift = std::min(found.covered + step, limit);
     move_to(pencil, shift);
     between = pencil.factor->negative_pivots() - found.count();
-    if (between <= ahead + ahead / 4 && (2 * between >= ahead || shift == limit)) break;
-    step = (shift - found.covered) * std::min(3.0, ahead / std::max(1.0, static_cast<double>(between)));
+    if (between <= below_shift + below_shift / 4 && (2 * between >= below_shift || shift == limit)) break;
+    step = (shift - found.covered) * std::min(3.0, below_shift / std::max(1.0, static_cast<double>(between)));
   }
   return between;
 }
 
-// Forgets what no count has confirmed.
-void fall_back(Found& found, double verified)
+/// Drops the values above `verified`, which no count has confirmed.
+void drop_unverified(Found& found, double verified)
 {
   const int kept = found.below(verified);
   found.theta.resize(static_cast<std::size_t>(kept));
@@ -141,8 +146,9 @@ void fall_back(Found& found, double verified)
   found.covered = verified;
 }
 
-// What lies around the shift joins `found` if it is all there, by the shift's count of what lies below it.
-bool advance(Found& found, const ShiftInvert& pencil, PetscInt count, int between, const Sought& sought)
+/// Solves for `count` values about the shift, and appends them if `between` of them lie below the shift, as the inertia
+/// demands. Returns whether it did.
+bool extend(Found& found, const ShiftInvert& pencil, PetscInt count, int between, double limit)
 {
   const Nearest nearest = solve_nearest(pencil, count, pencil.shift - found.covered, 1e-9);
   ++found.iterations;
@@ -151,50 +157,48 @@ bool advance(Found& found, const ShiftInvert& pencil, PetscInt count, int betwee
   const auto below = std::count_if(ritz.lambda.begin(), ritz.lambda.end(),
                                    [&](double theta) { return theta > found.covered && theta < pencil.shift; });
   if (below != between) return false;
-  take(found, ritz, nearest.space, pencil.shift + nearest.reach, sought);
+  append(found, ritz, nearest.space, pencil.shift + nearest.reach, limit);
   return true;
 }
 
-// Shifts climb through the spectrum; the factor at each says how many values lie below it, and all must be there.
-Found sweep(Mat M, Mat K, const Sought& sought)
+/// Raises shifts through the spectrum. The factor at each counts the values below it, and all of them must be found.
+Found sweep(Mat M, Mat K, const Goal& goal)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
   ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric);
-  Found found;
-  found.shapes = empty_multivector(K);
-  double verified = shift_below_zero(M, K); // all below is found for sure
-  found.covered = verified;
+  double verified = shift_below_zero(M, K); // the list is complete below
+  Found found{.shapes = empty_multivector(K), .covered = verified};
   move_to(pencil, verified);
-  for (int failures = 0, between = 0; failures < 4 && !found.complete;)
+  for (int failures = 0, between = 0; failures < 4;)
   {
-    const int missing = std::clamp(sought.count - found.count() - between + 2, 5, above);
+    const int missing = std::clamp(goal.count - found.count() - between + 2, 5, above_shift);
     const double start = std::max(0.0, found.covered);
     const int before = found.count();
     const bool good =
-        advance(found, pencil, std::min<PetscInt>(n, between + missing * (1 + failures)), between, sought);
-    if (good && std::isinf(found.covered)) found.complete = true; // the whole spectrum
+        extend(found, pencil, std::min<PetscInt>(n, between + missing * (1 + failures)), between, goal.limit);
+    found.complete = good && std::isinf(found.covered); // the whole spectrum
     if (found.complete) break;
     failures = good ? 0 : failures + 1;
     if (good) verified = pencil.shift;
-    if (good && found.covered < sought.limit && found.count() < sought.count)
+    if (good && found.covered < goal.limit && found.count() < goal.count)
     {
       const double spacing = (found.covered - start) / std::max(1, found.count() - before);
-      between = climb(pencil, found, ahead * spacing, sought.limit);
+      between = raise_shift(pencil, found, below_shift * spacing, goal.limit);
       continue;
     }
-    // Done if the count says so; or what is missing lies below, and nearer shifts find it.
+    // The goal is met if the count agrees. If not, values are missing below, and a lower shift is nearer to them.
     if (good) move_to(pencil, found.covered);
     found.complete = good && pencil.factor->negative_pivots() == found.below(pencil.shift);
     if (found.complete) break;
-    fall_back(found, verified);
+    drop_unverified(found, verified);
     if (!good) move_to(pencil, (verified + pencil.shift) / 2);
     between = pencil.factor->negative_pivots() - found.count();
   }
   return found;
 }
 
-RealModes to_modes(const Found& found, Mat M, Mat K, const Sought& sought)
+RealModes to_modes(const Found& found, Mat M, Mat K, int count)
 {
   RealModes modes;
   modes.outcome = {OutcomeKind::converged, "", found.iterations, largest_residual(found, M, K)};
@@ -203,7 +207,7 @@ RealModes to_modes(const Found& found, Mat M, Mat K, const Sought& sought)
     modes.outcome.kind = OutcomeKind::not_converged;
     modes.outcome.reason = std::to_string(found.count()) + " real modes found, and more are missing";
   }
-  for (int k = 0; k < std::min(found.count(), sought.count); ++k)
+  for (int k = 0; k < std::min(found.count(), count); ++k)
   {
     Owned<Vec> shape;
     check(MatCreateVecs(K, shape.put(), nullptr));
@@ -294,8 +298,8 @@ RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit)
   check(MatGetSize(K, &n, nullptr));
   if (count <= 0) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (n <= dense_limit) return first_of(solve_whole(M, K), K, count);
-  const Sought sought{INFINITY, std::min(count, static_cast<int>(n))};
-  return to_modes(sweep(M, K, sought), M, K, sought);
+  const Goal goal{HUGE_VAL, static_cast<int>(std::min<PetscInt>(count, n))};
+  return to_modes(sweep(M, K, goal), M, K, goal.count);
 }
 
 RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit)
@@ -309,8 +313,8 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit)
     const auto below = std::lower_bound(all.lambda.begin(), all.lambda.end(), omega * omega);
     return first_of(all, K, below - all.lambda.begin());
   }
-  const Sought sought{omega * omega, static_cast<int>(n)};
-  return to_modes(sweep(M, K, sought), M, K, sought);
+  const Goal goal{omega * omega, to_int(n)};
+  return to_modes(sweep(M, K, goal), M, K, goal.count);
 }
 
 int dense_limit_option()

@@ -14,28 +14,30 @@ namespace squeal
 namespace
 {
 
-constexpr int per_slice = 100;           // pairs, at most
-constexpr double beyond = 1.05;          // of the band, for the count
-constexpr double usual = .06, wide = .2; // [rad] by which friction may turn theta: twice the change of damping ratio
-constexpr int passes = 12;               // of residual correction, if not all pairs are exact before
-constexpr double invariant = 1e-9;       // V, to be exact
-constexpr double enough = 1e-12, sharp = 1e-14; // backward errors,
-constexpr double spurious = 1e-8;               // and that of what is no pair
-constexpr double suspect = 1e-6;                // theta so small, in parts of the largest, may be a free body's
-constexpr double share = 1e-2;                  // a pass divides residuals by ten or so: a fourth of all directions
+constexpr int most_in_slice = 100;      // pairs
+constexpr double reach_of_count = 1.05; // over the band
+// The angle by which friction turns theta [rad], twice the change of the damping ratio: of most pairs, and of those
+// that a second search includes.
+constexpr double usual_angle = 0.06, wide_angle = 0.2;
+constexpr int passes = 12;                         // of residual correction, at most
+constexpr double subspace_tolerance = 1e-9;        // for V to be invariant
+constexpr double tolerance = 1e-12, sharp = 1e-14; // backward errors of pairs, and of nearly critical ones
+constexpr double spurious = 1e-8;                  // backward error of what is no pair
+constexpr double rigid_share = 1e-6;               // theta below this part of the largest may be a free body's
+constexpr double residual_share = 1e-2;            // a pass divides residuals by about ten: a quarter of them stay
 constexpr double two_pi = 2 * std::numbers::pi;
 
-// lower <= |lambda| < upper [rad/s]
+/// The pairs with lower <= |lambda| < upper [rad/s].
 struct Slice
 {
   double lower = 0, upper = 0;
-  int expected = 0;
-  double slowest = INFINITY; // |theta|
-  std::vector<Eigenpair> pairs;
+  int expected = 0;           // real modes in it
+  double smallest = HUGE_VAL; // |theta|
+  std::vector<Eigenpair> pairs{};
 };
 
-// Halves [0, reach] until a slice holds few enough of the real modes.
-std::vector<Slice> plan(RealCount& real, double floor, double reach)
+/// Halves [0, reach] until each slice holds few enough real modes.
+std::vector<Slice> make_slices(RealCount& real, double floor, double reach)
 {
   std::vector<double> edges = {reach, 0}; // those still to come, descending
   std::vector<Slice> slices;
@@ -43,39 +45,41 @@ std::vector<Slice> plan(RealCount& real, double floor, double reach)
   {
     const double lower = edges.back(), upper = edges[edges.size() - 2];
     const int expected = count_below(real, upper) - count_below(real, lower);
-    if (expected > per_slice)
+    if (expected > most_in_slice)
     {
       edges.insert(edges.end() - 1, (lower + upper) / 2);
       continue;
     }
-    slices.push_back({std::max(lower, floor), upper, expected, INFINITY, {}});
+    slices.push_back({.lower = std::max(lower, floor), .upper = upper, .expected = expected});
     edges.pop_back();
   }
   return slices;
 }
 
-// If the Krylov space grows too large the slice stays as it is, and the count tells.
-void find_pairs(Slice& slice, const QuadraticProblem& problem, ShiftInvert& pencil, double turned)
+/// Finds the pairs of a slice among those that friction turns by at most `angle`. Leaves the slice as it is if the
+/// Krylov space grows too large; the count then shows that pairs are missing.
+void find_pairs(Slice& slice, const QuadraticProblem& problem, ShiftInvert& pencil, double angle)
 {
   const double least = slice.lower * slice.lower, limit = slice.upper * slice.upper, middle = (least + limit) / 2;
   move_to(pencil, middle);
-  const double radius = std::abs(std::polar(limit, turned) - pencil.shift);
-  const Nearest nearest = solve_nearest(pencil, slice.expected, radius, invariant);
+  const double radius = std::abs(std::polar(limit, angle) - pencil.shift);
+  const Nearest nearest = solve_nearest(pencil, slice.expected, radius, subspace_tolerance);
   if (!nearest.converged) return;
-  for (const std::complex<double> theta : nearest.theta) slice.slowest = std::min(slice.slowest, std::abs(theta));
-  const Correction correction{{least, limit}, passes, std::numeric_limits<int>::max(), enough, sharp, share};
+  for (const std::complex<double> theta : nearest.theta) slice.smallest = std::min(slice.smallest, std::abs(theta));
+  const Correction correction{{least, limit}, passes, std::numeric_limits<int>::max(),
+                              tolerance,      sharp,  residual_share};
   slice.pairs = solve_on_subspace(problem, nearest.space, *pencil.factor, correction).pairs;
   std::erase_if(slice.pairs, [](const Eigenpair& pair) { return pair.backward_error > spurious; });
 }
 
-QuadraticSolution joined(std::vector<Slice>& slices)
+QuadraticSolution join(const std::vector<Slice>& slices)
 {
   QuadraticSolution solution;
   solution.outcome = {OutcomeKind::converged, "", static_cast<int>(slices.size()), 0};
-  for (Slice& slice : slices)
+  for (const Slice& slice : slices)
     for (const Eigenpair& pair : slice.pairs)
       solution.pairs.push_back({pair.lambda, copy_of(pair.real), copy_of(pair.imaginary), pair.backward_error});
-  settle(solution);
+  sort_and_measure(solution);
   return solution;
 }
 
@@ -86,18 +90,18 @@ PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, int fr
   std::vector<double> sizes;
   for (const Eigenpair& pair : solution.pairs) sizes.push_back(std::abs(pair.lambda));
   std::sort(sizes.rbegin(), sizes.rend());
-  const auto from = [](double edge, const std::vector<double>& values) {
+  const auto number_from = [](double edge, const std::vector<double>& values) {
     return static_cast<int>(std::count_if(values.begin(), values.end(), [&](double value) { return value >= edge; }));
   };
   const int all = static_cast<int>(sizes.size());
-  const PairCount whole{top / two_pi, count_below(real, top) - free, all - from(top, sizes)};
+  const PairCount whole{top / two_pi, count_below(real, top) - free, all - number_from(top, sizes)};
   if (whole.expected == whole.found) return whole;
   const std::vector<double> omega = omegas_between(real, least, top);
   for (std::size_t k = 1; k < sizes.size() && sizes[k - 1] > least; ++k)
   {
     const double edge = std::max(least, (sizes[k - 1] + sizes[k]) / 2);
     if (edge >= top) continue;
-    const PairCount count{edge / two_pi, whole.expected - from(edge, omega), all - from(edge, sizes)};
+    const PairCount count{edge / two_pi, whole.expected - number_from(edge, omega), all - number_from(edge, sizes)};
     if (count.expected == count.found) return count;
   }
   return whole;
@@ -105,25 +109,25 @@ PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, int fr
 
 CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real, double band)
 {
-  const double floor = std::sqrt(vibration_floor(norms_of(problem))), end = two_pi * band, reach = beyond * end;
-  std::vector<Slice> slices = plan(real, floor, reach);
+  const double floor = std::sqrt(vibration_floor(norms_of(problem))), end = two_pi * band, reach = reach_of_count * end;
+  std::vector<Slice> slices = make_slices(real, floor, reach);
   ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none);
   CountedSolution result;
-  const auto search = [&](double turned)
+  const auto search = [&](double angle)
   {
-    bool slow = false;
+    bool rigid = false; // a body may be free
     for (Slice& slice : slices)
     {
-      if (turned == usual || static_cast<int>(slice.pairs.size()) < slice.expected)
-        find_pairs(slice, problem, pencil, turned);
-      slow = slow || slice.slowest < suspect * reach * reach;
+      if (angle == usual_angle || static_cast<int>(slice.pairs.size()) < slice.expected)
+        find_pairs(slice, problem, pencil, angle);
+      rigid = rigid || slice.smallest < rigid_share * reach * reach;
     }
-    result.solution = joined(slices);
-    result.count = count_pairs(result.solution, real, slow ? count_below(real, floor) : 0, end, reach);
+    result.solution = join(slices);
+    result.count = count_pairs(result.solution, real, rigid ? count_below(real, floor) : 0, end, reach);
   };
-  search(usual);
-  // Friction moved some far. Between neighbours pairs may have changed places: only the sum is sure.
-  if (result.count.found < result.count.expected) search(wide);
+  search(usual_angle);
+  // Pairs may have moved from one slice to its neighbour, so that only the count of all slices is certain.
+  if (result.count.found < result.count.expected) search(wide_angle);
   return result;
 }
 

@@ -1,8 +1,8 @@
 #pragma once
-/// The quadratic eigenproblem on a small subspace, corrected by its own residuals.
+/// The quadratic eigenproblem on a small subspace that is corrected by residuals (src/README.md, section 3).
 ///
-/// On an orthonormal V, V'(lambda^2 M + lambda C + K) V a = 0 is small and dense. What V lacks shows in the residual r
-/// of each y = V a; an answer P^-1 r joins V, P a factor at hand, and so on for some passes.
+/// On an orthonormal V, V'(lambda^2 M + lambda C + K) V a = 0 is small and dense. The residual r of a pair y = V a
+/// shows what V lacks: P^-1 r is appended to V, where P is a factor that is at hand, for some passes.
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/modes/quadratic.hpp"
 #include "squeal/modes/real_modes.hpp"
@@ -10,20 +10,20 @@
 namespace squeal
 {
 
-/// Only the pairs of largest growth ratio, Re/|lambda|, are corrected, and of these only what is not below `enough`
-/// yet, or, from a ratio of -1e-3 on, `sharp`: an eigenvalue's own error may be 1e4 times its backward error, and
-/// growth is a small part of it.
+/// Each pass corrects the pairs of largest growth ratio, Re/|lambda|, whose backward error exceeds a tolerance. From a
+/// growth ratio of -1e-3 on the tolerance is `sharp`: the error of an eigenvalue may be 1e4 times its backward error,
+/// and growth is a small part of the eigenvalue.
 struct Correction
 {
-  Window window;                // the pairs sought
-  int passes = 0;               // at most
-  int pairs = 0;                // corrected in each pass
-  double enough = 0, sharp = 0; // backward errors
-  double share = 0;             // of the residuals' largest direction: what is smaller waits for a later pass
+  Window window;        // the pairs sought
+  int passes = 0;       // at most
+  int pairs = 0;        // corrected in each pass, at most
+  double tolerance = 0; // backward error
+  double sharp = 0;     // the same of nearly critical pairs
+  double share = 0;     // directions of the residuals below this part of the largest are left to later passes
 };
 
-/// `basis` spans the first V. Backward errors are those of `problem` itself; outcome.kind is the
-/// caller's.
+/// `basis` spans the first V. Backward errors are those of `problem` itself. The caller sets outcome.kind.
 QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector basis, const PencilFactor& P,
                                     const Correction& correction);
 
@@ -34,10 +34,10 @@ struct ProjectionSettings
   int candidates = 0; // pairs corrected in each pass
 };
 
-/// On the first real modes, corrected by the static answer of the symmetric stiffness without friction (Brizard,
-/// Chiello, Sinou, Lorang 2011). Caveat: an unstable pair that the first basis shows as well damped may be left out;
-/// judge by the full problem.
-/// `M`, `K`: the symmetric problem of the real modes `basis`, in the unknowns y of `problem`.
+/// Solves on the first real modes, corrected by static responses of the symmetric stiffness without friction (Brizard,
+/// Chiello, Sinou, Lorang 2011). Caveat: an unstable pair that appears well damped on the first basis may be missed;
+/// only the full problem is certain. `M`, `K`: the symmetric problem of the real modes `basis`, in the unknowns y of
+/// `problem`.
 QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K, const RealModes& basis,
                                   const ProjectionSettings& settings);
 

@@ -1,9 +1,9 @@
 #pragma once
 /// The quadratic eigenproblem of real unsymmetric sparse matrices, (lambda^2 M + lambda C + K) y = 0.
 ///
-/// Small problems are solved whole: on the companion matrix of mu = 1/(lambda - shift), which bears a singular M or K,
-/// by LAPACK's QR. Large ones by SLEPc's two-level Arnoldi (TOAR; Lu, Su, Bai 2016), shift-inverted near zero; time is
-/// scaled by the band, lambda = 2 pi band nu, without which growth rates lose their third digit.
+/// Small problems are solved whole, by LAPACK's QR on the companion matrix of mu = 1/(lambda - shift), which allows a
+/// singular M or K. Large ones are solved by SLEPc's two-level Arnoldi method (TOAR; Lu, Su, Bai 2016), shift-inverted
+/// near zero. Time is scaled by the band, lambda = 2 pi band nu; without that, growth rates lose their third digit.
 ///
 /// Backward error of a pair (Tisseur 2000), in 1-norms of the matrices and 2-norms of the vectors:
 ///     eta = |(lambda^2 M + lambda C + K) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|)
@@ -53,8 +53,8 @@ struct QuadraticSolution
 /// lambda.
 QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings);
 
-/// Largest real part first; outcome.residual becomes the largest backward error.
-void settle(QuadraticSolution& solution);
+/// Sorts the pairs by falling real part, and sets outcome.residual to the largest backward error.
+void sort_and_measure(QuadraticSolution& solution);
 
 /// Real part large enough to call unstable: rounding shows up to 1e-8 |lambda| on a mode without damping.
 bool is_unstable(std::complex<double> lambda);

@@ -1,7 +1,7 @@
 #pragma once
-/// The symmetric eigenproblem K y = omega^2 M y under the real modes: SLEPc's Krylov-Schur around shifts that climb
-/// from just below zero, complete by Sylvester's law, the factor at each shift counting what lies below it (after
-/// Grimes, Lewis, Simon 1994); LAPACK when small.
+/// The symmetric eigenproblem K y = omega^2 M y of the real modes. Small problems are solved by LAPACK. Large ones are
+/// solved by block Krylov spaces about shifts that rise from just below zero (after Grimes, Lewis, Simon 1994). By
+/// Sylvester's law the factor at each shift counts the eigenvalues below it, so that none is missed.
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/modes/modes.hpp"
 
@@ -10,31 +10,32 @@
 namespace squeal
 {
 
-/// Just below zero for any finite element model: -1e-8 trace(K)/trace(M) [1/s2]. A free body leaves K singular, and
-/// K - shift M is positive definite still.
+/// -1e-8 trace(K)/trace(M) [1/s2], just below zero for any finite element model. K - shift M is positive definite also
+/// where a free body leaves K singular.
 double shift_below_zero(Mat M, Mat K);
 
-/// How many omega lie below others, by a factor each or, when small, all of them once; what was asked is kept.
+/// Counts the omega below a limit: of a small problem from all eigenvalues, of a large one by the inertia of a factor,
+/// whose result is kept.
 struct RealCount
 {
-  ShiftInvert pencil;
-  std::vector<double> all; // eigenvalues, when small
-  std::map<double, int> below;
+  ShiftInvert pencil;          // of a large problem
+  std::vector<double> all;     // eigenvalues omega^2 of a small problem
+  std::map<double, int> below; // the counts so far
 };
 
 RealCount make_real_count(Mat M, Mat K, int dense_limit);
 
-/// Below omega [rad/s].
+/// The number of eigenvalues below omega [rad/s].
 int count_below(RealCount& count, double omega);
 
-/// All omega from `least` to `top` [rad/s], nearest `top` first. None if the search does not end. One that it misses
-/// makes the count below others too large, not too small.
+/// All omega from `least` to `top` [rad/s], in descending order. None if the search does not converge. An omega that is
+/// missed makes a count below some limit too large, not too small.
 std::vector<double> omegas_between(RealCount& count, double least, double top);
 
-/// The lowest `count`, or as many as there are; shapes are y.
+/// The lowest `count` modes, or all if there are fewer; shapes are y.
 RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit);
 
-/// All with omega below `band` [Hz].
+/// All modes with frequency below `band` [Hz]; shapes are y.
 RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit);
 
 /// -modes_dense_limit

@@ -1,23 +1,24 @@
 #pragma once
-/// Every pair of a band of the full quadratic problem, slice by slice of frequency.
+/// All pairs of a band of the full quadratic problem, by slices of frequency (src/README.md, section 3).
 ///
-/// A slice starts from the undamped problem with friction, K x = theta M x, real and unsymmetric: the invariant
-/// subspace V of all theta about the slice's middle sigma, by one real factor of K - sigma M (shift_invert.hpp). Under
+/// A slice starts from the undamped problem with friction, K x = theta M x, real and unsymmetric. One real factor of
+/// K - sigma M gives the invariant subspace V of all theta about the slice's middle sigma (shift_invert.hpp). Under
 /// Rayleigh damping, C = alpha M + beta K, the pairs of the quadratic problem lie in V: theta (1 + beta lambda) =
-/// -lambda (lambda + alpha). What other damping adds is what residuals r of the pairs on V show; (K - sigma M)^-1 r
-/// joins V until all are exact (projection.hpp).
+/// -lambda (lambda + alpha). Under other damping the pairs on V leave residuals r, and (K - sigma M)^-1 r is appended
+/// to V until all pairs are exact (projection.hpp).
 ///
-/// Friction turns theta about zero: a slice holds all turned by .06, and where pairs are missing in the end, by .2.
-/// Caveat: a pair that turns further, or whose oscillation stops, shows in the count; TOAR (quadratic.hpp) knows no
-/// slices.
+/// Friction turns theta about zero. A slice holds all theta that are turned by up to 0.06 rad and, where pairs are
+/// missing in the end, by 0.2 rad. Caveat: a pair that is turned further, or that no longer oscillates, is missing in
+/// the count; TOAR (quadratic.hpp) does not use slices.
 #include "squeal/modes/quadratic.hpp"
 #include "squeal/modes/real_modes.hpp"
 
 namespace squeal
 {
 
-/// Pairs that friction and damping move are still pairs: as mu grows from zero their number in a disc |lambda| < omega
-/// changes only where one crosses its edge, and frictionless undamped modes are counted by inertia (Sylvester).
+/// Pairs remain pairs when friction and damping move them. As mu grows from zero, their number in a disc
+/// |lambda| < omega changes only where one crosses its edge, and the modes at mu = 0 without damping are counted by
+/// inertia (Sylvester).
 struct PairCount
 {
   double frequency = 0; // [Hz] up to which both were counted
@@ -25,8 +26,8 @@ struct PairCount
   int found = 0;        // pairs with |lambda| below
 };
 
-/// Both below `top`, or, where one more or less lies there, below the highest gap between pairs from `least` on where
-/// they agree [rad/s]. `free`: motions of a free body, which are no vibrations.
+/// Counts both below `top` [rad/s]. Where they disagree, an edge between neighbouring pairs from `least` on serves: the
+/// highest below which they agree. `free`: motions of a free body, which are no vibrations.
 PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, int free, double least, double top);
 
 /// solution.pairs reach up to count.frequency.
@@ -36,7 +37,7 @@ struct CountedSolution
   PairCount count;
 };
 
-/// All pairs below the band [Hz], and a little further for the count, which `real` plans and checks.
+/// All pairs below the band [Hz] and, for the count, a little beyond. `real` gives the slices and the expected count.
 CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real, double band);
 
 } // namespace squeal
