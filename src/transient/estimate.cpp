@@ -3,7 +3,11 @@
 #include "squeal/equilibrium/closed_contact.hpp"
 
 #include <algorithm>
+#include <boost/math/quadrature/gauss_kronrod.hpp>
+#include <boost/math/tools/minima.hpp>
+#include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 
@@ -57,37 +61,18 @@ double power_at(const ShakenPair& pair, double q, double angle)
   return power;
 }
 
-// 7-15 points of Gauss and Kronrod (Piessens et al. 1983).
-constexpr std::array<double, 8> kronrod_nodes = {0,
-                                                 .207784955007898467600689403773245,
-                                                 .405845151377397166906606412076961,
-                                                 .586087235467691130294144428697265,
-                                                 .741531185599394439863864773280788,
-                                                 .864864423359769072789712788640926,
-                                                 .949107912342758524526189684047851,
-                                                 .991455371120812639206854697526329};
-constexpr std::array<double, 8> kronrod_weights = {
-    .209482141084727828012999174891714, .204432940075298892414161999234649, .190350578064785409913256402421014,
-    .169004726639267902826583426598550, .140653259715525918745189590510238, .104790010322250183839876322541518,
-    .063092092629978553290700663189204, .022935322010529224963732008058970};
-constexpr std::array<double, 4> gauss_weights = {.417959183673469387755102040816327, .381830050505118944950369775488975,
-                                                 .279705391489276667901467771423780,
-                                                 .129484966168869693270611432679082};
-
-double integrate_between(const ShakenPair& pair, double q, double from, double to, double tolerance, int depth)
+// Integral to an absolute tolerance, by 7-15 points of Gauss and Kronrod; Boost's tolerance is relative to the value of
+// the plain rule.
+double integrate_between(const ShakenPair& pair, double q, double from, double to, double tolerance)
 {
-  const double middle = (from + to) / 2, half = (to - from) / 2;
-  double fine = 0, coarse = 0;
-  for (std::size_t i = 0; i < kronrod_nodes.size(); ++i)
-  {
-    double value = power_at(pair, q, middle + half * kronrod_nodes[i]);
-    if (i > 0) value += power_at(pair, q, middle - half * kronrod_nodes[i]);
-    fine += kronrod_weights[i] * value;
-    if (i % 2 == 0) coarse += gauss_weights[i / 2] * value;
-  }
-  if (half * std::abs(fine - coarse) <= tolerance || depth == 0) return half * fine;
-  return integrate_between(pair, q, from, middle, tolerance / 2, depth - 1) +
-         integrate_between(pair, q, middle, to, tolerance / 2, depth - 1);
+  using Rule = boost::math::quadrature::gauss_kronrod<double, 15>;
+  constexpr unsigned bisections = 20;
+  const auto power = [&](double angle) { return power_at(pair, q, angle); };
+  double error = 0;
+  const double plain = Rule::integrate(power, from, to, 0, 0, &error);
+  if (error <= tolerance) return plain;
+  const double size = std::max(std::abs(plain), std::numeric_limits<double>::min());
+  return Rule::integrate(power, from, to, bisections, tolerance / size);
 }
 
 // Angles in (0, 2 pi) where level + q Re(amplitude e^{i angle}) changes sign.
@@ -114,7 +99,7 @@ double mean_power(const ShakenPair& pair, double q, double tolerance)
   std::sort(angles.begin(), angles.end());
   double sum = 0;
   for (std::size_t i = 0; i + 1 < angles.size(); ++i)
-    if (angles[i + 1] > angles[i]) sum += integrate_between(pair, q, angles[i], angles[i + 1], tolerance, 20);
+    if (angles[i + 1] > angles[i]) sum += integrate_between(pair, q, angles[i], angles[i + 1], tolerance);
   return sum / (2 * std::numbers::pi);
 }
 
@@ -194,42 +179,9 @@ double best_phase(const std::vector<ShakenPair>& pairs, double q)
     best = phase;
     highest = height;
   }
-  double from = best - 2 * std::numbers::pi / count, to = best + 2 * std::numbers::pi / count;
-  while (to - from > 1e-10)
-  {
-    const double low = from + (to - from) / 3, high = to - (to - from) / 3;
-    (smallest(low) < smallest(high) ? from : to) = smallest(low) < smallest(high) ? low : high;
-  }
-  return (from + to) / 2;
-}
-
-// Root of a continuous f, positive at `low` and not at `high`: false position that halves the value of an end kept
-// twice (Illinois; Dowell and Jarratt 1971), to |f| <= small.
-template <class Function> double find_root(const Function& f, double low, double high, double small, Outcome& outcome)
-{
-  double at = low, value = infinity, at_low = f(low), at_high = f(high);
-  int kept = 0;
-  for (outcome.iterations = 0; std::abs(value) > small && outcome.iterations < 100; ++outcome.iterations)
-  {
-    at = (low * at_high - high * at_low) / (at_high - at_low);
-    value = f(at);
-    if (value > 0)
-    {
-      low = at;
-      at_low = value;
-      if (kept == 1) at_high /= 2;
-      kept = 1;
-    }
-    else
-    {
-      high = at;
-      at_high = value;
-      if (kept == -1) at_low /= 2;
-      kept = -1;
-    }
-  }
-  outcome.residual = std::abs(value);
-  return at;
+  const double from = best - 2 * std::numbers::pi / count, to = best + 2 * std::numbers::pi / count;
+  constexpr int bits = std::numeric_limits<double>::digits;
+  return boost::math::tools::brent_find_minima([&](double phase) { return -smallest(phase); }, from, to, bits).first;
 }
 
 // The least q of six decades at which the interface stops giving more than the damping takes.
@@ -255,9 +207,22 @@ template <class Rate> void find_balance(Estimate& result, const Rate& rate, doub
   }
   const double larger = std::max(damping, std::abs(result.friction_rate_linear));
   result.outcome.kind = OutcomeKind::balance;
-  result.amplitude = std::exp(find_root([&](double log_q) { return (rate(std::exp(log_q)) - damping) / larger; },
-                                        std::log(result.curve_amplitude[above - 1]),
-                                        std::log(result.curve_amplitude[above]), 1e-13, result.outcome));
+  constexpr double small = 1e-13; // of `excess`, whose own rounding is near
+  const auto excess = [&](double log_q)
+  {
+    const double value = (rate(std::exp(log_q)) - damping) / larger;
+    result.outcome.residual = std::abs(value);
+    return result.outcome.residual <= small ? 0 : value;
+  };
+  std::uintmax_t evaluations = 100;
+  const auto bracket = boost::math::tools::toms748_solve(
+      excess, std::log(result.curve_amplitude[above - 1]), std::log(result.curve_amplitude[above]),
+      (result.curve_rate[above - 1] - damping) / larger, (result.curve_rate[above] - damping) / larger,
+      boost::math::tools::eps_tolerance<double>(), evaluations);
+  const double log_q = (bracket.first + bracket.second) / 2;
+  excess(log_q);
+  result.outcome.iterations = static_cast<int>(evaluations);
+  result.amplitude = std::exp(log_q);
 }
 
 double first_amplitude(double level, double size)
