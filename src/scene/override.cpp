@@ -30,11 +30,9 @@ toml::table parse_override(const std::string& text)
   catch (const toml::parse_error&)
   {
   }
-  std::string quoted;
-  for (const char c : value) quoted += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
   try
   {
-    return toml::parse(key + '"' + quoted + '"', source);
+    return toml::parse(key + toml_string(value), source);
   }
   catch (const toml::parse_error& error)
   {
@@ -90,6 +88,13 @@ std::string place_of(const toml::node& node)
   const std::string path = source.path ? *source.path : "scene";
   if (path.rfind(override_mark, 0) == 0) return path;
   return path + ", line " + std::to_string(source.begin.line);
+}
+
+std::string toml_string(const std::string& text)
+{
+  std::ostringstream result;
+  result << toml::toml_formatter(toml::value(text), toml::format_flags::allow_unicode_strings);
+  return result.str();
 }
 
 std::string kind_of(const toml::node& node)

@@ -1,5 +1,5 @@
 /// A scene back to text, and the reference of all keys, both from the fields.
-#include "squeal/scene/fields.hpp"
+#include "squeal/scene/toml.hpp"
 
 #include <charconv>
 #include <sstream>
@@ -14,16 +14,7 @@ namespace
 
 std::string print(const std::string& text)
 {
-  std::string quoted = "\"";
-  for (const char c : text)
-  {
-    if (c == '"' || c == '\\') quoted += '\\';
-    if (c == '\n')
-      quoted += "\\n";
-    else
-      quoted += c;
-  }
-  return quoted + '"';
+  return toml_string(text);
 }
 
 /// Shortest text that reads back as the same number.

@@ -225,6 +225,15 @@ TEST_CASE("the resolved text of a scene reads back as the same scene")
   }
 }
 
+TEST_CASE("a title of any characters comes through --set and the resolved text")
+{
+  const Folder folder;
+  const std::string title = "C:\\tmp \"squeal\",\ta second\nline at 20 °C";
+  const Scene scene = read_scene(folder.write("a.toml", points), {"title=" + title});
+  CHECK(scene.title == title);
+  CHECK(read_scene(folder.write("b.toml", resolved_scene(scene)), {}).title == title);
+}
+
 TEST_CASE("stages after the estimate run when their table is there, unless it says otherwise")
 {
   const Folder folder;

@@ -16,6 +16,9 @@ std::string kind_of(const toml::node& node);
 /// The value as written; lists and tables only by their kind.
 std::string text_of(const toml::node& node);
 
+/// The text as a TOML string in double quotes.
+std::string toml_string(const std::string& text);
+
 /// "; did you mean 'x'?", or all that is known when nothing is near.
 std::string suggestion_or_list(const std::string& word, const std::vector<std::string>& known);
 
