@@ -10,7 +10,8 @@ from pathlib import Path
 
 TOOL = Path(sys.argv[0]).name
 ROOT = Path(__file__).resolve().parent.parent
-PROGRAM = Path(os.environ.get("SQUEAL", ROOT / "build" / "squeal")).resolve()
+BUILT, INSTALLED = ROOT / "build" / "squeal", ROOT.parent.parent / "bin" / "squeal"
+PROGRAM = Path(os.environ.get("SQUEAL", BUILT if (ROOT / "CMakeLists.txt").exists() else INSTALLED)).resolve()
 DEBIAN = "/usr/bin/python3"
 MATRIX_ID, VECTOR_ID = 1211216, 1211214  # PETSc's class numbers, MAT_FILE_CLASSID and VEC_FILE_CLASSID
 BLUE, RED, ORANGE, GREEN, GREY = "#1b6ca8", "#c0272d", "#d95f02", "#2e8b57", "#8a8a8a"

@@ -1,0 +1,27 @@
+"""An installed squeal runs and draws without the source tree."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+
+def test_an_installation_runs_and_plots_from_another_folder(tmp_path):
+    build = Path(os.environ["SQUEAL"]).resolve().parent
+    if not (build / "cmake_install.cmake").exists():
+        pytest.skip("squeal does not lie in its build folder")
+    prefix, work = tmp_path / "prefix", tmp_path / "work"
+    subprocess.run(["cmake", "--install", build, "--prefix", prefix], check=True, capture_output=True)
+    shared = prefix / "share" / "squeal"
+    shutil.copytree(shared / "inputs" / "oscillator", work / "scene")
+    environment = {key: value for key, value in os.environ.items() if key != "SQUEAL"}
+    done = subprocess.run([shared / "tools" / "run", "scene"], cwd=work, env=environment | {"RANKS": "1"},
+                          capture_output=True, text=True, timeout=500)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    results = work / "results" / "scene"
+    assert (results / "report.json").exists()
+    assert {"modes.png", "cycle.png"} <= {file.name for file in results.iterdir()}
+    help_text = subprocess.run([shared / "tools" / "chart", "--help"], cwd=work, env=environment, capture_output=True)
+    assert help_text.returncode == 0
