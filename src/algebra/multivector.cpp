@@ -120,6 +120,17 @@ MultiVector product(Mat A, const MultiVector& X)
   return Y;
 }
 
+void product(Mat A, std::span<const Vec> x, std::span<const Vec> y)
+{
+  if (x.size() == 1)
+  {
+    check(MatMult(A, x[0], y[0]));
+    return;
+  }
+  const MultiVector Y = product(A, columns_of(x));
+  for (std::size_t k = 0; k < y.size(); ++k) copy_column(Y, static_cast<Index>(k), y[k]);
+}
+
 MultiVector combination(const MultiVector& X, const MatrixXd& a)
 {
   return {X.comm, X.entries * a};

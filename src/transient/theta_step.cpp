@@ -115,7 +115,7 @@ bool forget_where_turned(const Interface& interface, const std::vector<double>& 
 /// Solves contact on rank 0, where W is, and hands each r to every rank. `b`, `earlier`: one problem's after the
 /// other's.
 void find_reactions(const ThetaStep& step, const Interface& interface, const std::vector<double>& b,
-                    std::vector<double> earlier, std::span<StepWork> works, std::span<State> states,
+                    std::vector<double>& earlier, std::span<StepWork> works, std::span<State> states,
                     std::span<StepReport> reports, MPI_Comm comm)
 {
   // One message: iterations, residual, converged, r of each. Latency counts on small models.
@@ -148,6 +148,7 @@ void find_reactions(const ThetaStep& step, const Interface& interface, const std
         entries[2] = results[j].converged ? 1 : 0;
         const std::vector<double>& Wr = works[k].memory.Wr.front();
         std::transform(Wr.begin(), Wr.end(), mine[j].begin(), mine[j].begin(), std::plus<>());
+        if (works[k].record) works[k].record->contact_velocity = mine[j];
         if (forget_where_turned(interface, states[k].reactions, mine[j], &earlier[k * size])) again.push_back(k);
       }
       open = std::move(again);
@@ -225,24 +226,40 @@ void account(const ThetaStep& step, const Structure& structure, std::span<const 
   }
 }
 
-/// y_k = A x_k for all k at one reading of A.
-void multiply(Mat A, std::span<const Vec> x, std::span<const Vec> y)
-{
-  if (x.size() == 1)
-  {
-    check(MatMult(A, x[0], y[0]));
-    return;
-  }
-  const MultiVector Y = product(A, columns_of(x));
-  for (std::size_t k = 0; k < y.size(); ++k) copy_column(Y, static_cast<Eigen::Index>(k), y[k]);
-}
-
 /// The start of a step: A v_free = [M v - (1-theta) A v]/theta - h K u + h F, into A v_next.
 void load_free_step(const ThetaStep& step, const Structure& structure, StepWork& work)
 {
   check(VecCopy(work.Mv, work.Av_next));
   check(VecAXPBYPCZ(work.Av_next, (step.theta - 1) / step.theta, -step.h, 1 / step.theta, work.Av, work.Ku));
   check(VecAXPY(work.Av_next, step.h, structure.load));
+}
+
+/// What the tangent needs of the contact just solved, on every rank. `earlier`: the problem's entries, on rank 0.
+void record_contact(const Interface& interface, const State& state, const double* earlier, StepRecord& record,
+                    MPI_Comm comm)
+{
+  const auto block = static_cast<std::size_t>(interface.block()), pairs = static_cast<std::size_t>(interface.pairs);
+  record.reactions = state.reactions;
+  record.contact_velocity.resize(interface.size());
+  record.opposes_theta.assign(pairs, 0);
+  for (std::size_t i = 0; earlier && i < interface.size(); ++i)
+    if (earlier[i] != 0) record.opposes_theta[i / block] = 1;
+  MPI_Bcast(record.contact_velocity.data(), static_cast<int>(interface.size()), MPI_DOUBLE, 0, comm);
+  MPI_Bcast(record.opposes_theta.data(), interface.pairs, MPI_CHAR, 0, comm);
+  if (record.wanted == Recorded::contact) return;
+  record.gap = interface.gap;
+  const std::vector<double> position = relative(interface, state.u);
+  for (std::size_t i = 0; i < pairs; ++i) record.gap[i] += position[i * block];
+}
+
+/// The rates of h, from a step that is complete: `account` left M dv and K du in Mv and Ku.
+void record_rates(const ThetaStep& step, const StepWork& work)
+{
+  StepRecord& record = *work.record;
+  if (record.wanted == Recorded::contact) return;
+  record.v_theta = copy_of(work.v_theta.get());
+  record.force = copy_of(work.Mv.get());
+  check(VecAXPBY(record.force, -step.theta, 1 / step.h, work.Ku));
 }
 
 /// The contact of all of them: reactions into the states and reports, h B'r into f and A v_next; returns -h r.
@@ -262,9 +279,11 @@ std::vector<double> push_apart(const ThetaStep& step, const Interface& interface
     const std::vector<double> s = earlier_sliding(step, interface, states[k]);
     earlier.insert(earlier.end(), s.begin(), s.end());
   }
-  find_reactions(step, interface, b, std::move(earlier), works, states, reports, comm);
+  find_reactions(step, interface, b, earlier, works, states, reports, comm);
   for (std::size_t k = 0; k < states.size(); ++k)
   {
+    if (works[k].record)
+      record_contact(interface, states[k], rank_of(comm) == 0 ? &earlier[k * size] : nullptr, *works[k].record, comm);
     check(VecSet(works[k].f, 0));
     add_reactions(interface, states[k].reactions, works[k].f);
     check(VecScale(works[k].f, step.h));
@@ -303,6 +322,15 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.matrices = pair_matrices(structure.M, structure.K);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
   return step;
+}
+
+void multiply_mass_and_stiffness(const ThetaStep& step, const Structure& structure,
+                                 const std::array<std::span<const Vec>, 2>& of,
+                                 const std::array<std::span<const Vec>, 2>& to)
+{
+  if (step.matrices) return multiply_both(*step.matrices, of[0], of[1], to[0], to[1]);
+  product(structure.M, of[0], to[0]);
+  product(structure.K, of[1], to[1]);
 }
 
 StepWork begin_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state)
@@ -352,13 +380,7 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
     Mv.push_back(work.Mv_next);
     Ku.push_back(work.Ku_next);
   }
-  if (step.matrices)
-    multiply_both(*step.matrices, next, u, Mv, Ku);
-  else
-  {
-    multiply(structure.M, next, Mv);
-    multiply(structure.K, u, Ku);
-  }
+  multiply_mass_and_stiffness(step, structure, {next, u}, {Mv, Ku});
   account(step, structure, states, works, reports);
   for (std::size_t k = 0; k < states.size(); ++k)
   {
@@ -367,6 +389,7 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
       ++(status == ContactStatus::open    ? reports[k].open
          : status == ContactStatus::stick ? reports[k].stick
                                           : reports[k].slip);
+    if (work.record) record_rates(step, work);
     check(VecCopy(work.v_next, states[k].v));
     std::swap(work.Mv, work.Mv_next);
     std::swap(work.Av, work.Av_next);

@@ -4,6 +4,7 @@
 #include "squeal/base/petsc.hpp"
 
 #include <Eigen/Core>
+#include <span>
 
 namespace squeal
 {
@@ -31,6 +32,9 @@ void copy_column(const MultiVector& X, Eigen::Index j, Vec x);
 
 /// A X
 MultiVector product(Mat A, const MultiVector& X);
+
+/// y_k = A x_k for all k at one reading of A.
+void product(Mat A, std::span<const Vec> x, std::span<const Vec> y);
 
 /// X a
 MultiVector combination(const MultiVector& X, const Eigen::MatrixXd& a);

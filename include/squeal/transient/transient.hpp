@@ -13,6 +13,7 @@
 #include "squeal/contact/solver.hpp"
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/step_guards.hpp"
+#include "squeal/transient/step_record.hpp"
 
 #include <functional>
 #include <span>
@@ -57,6 +58,11 @@ Owned<Mat> step_matrix(const Structure& structure, double h, double theta);
 /// contact_tolerance, contact_max_it, contact_rho, contact_extrapolation. Error: h not above 0, theta not in (0, 1].
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta);
 
+/// M v_k and K u_k of (v, u) into a pair of spans, each matrix read once.
+void multiply_mass_and_stiffness(const ThetaStep& step, const Structure& structure,
+                                 const std::array<std::span<const Vec>, 2>& of,
+                                 const std::array<std::span<const Vec>, 2>& to);
+
 /// The products of a state that a step starts from and leaves behind for the next one (two multiplications and one
 /// solve a step), and its work vectors. Belongs to one state and one ThetaStep.
 struct StepWork
@@ -66,6 +72,7 @@ struct StepWork
   Owned<Vec> v_next, v_theta, dv, f;    // f: h B'r
   ContactMemory memory;                 // of the reactions, on rank 0
   double energy = 0;                    // [J]
+  StepRecord* record = nullptr;         // of the next step, borrowed; null: none is wanted
 };
 
 /// Must be called again after the state was changed by anything but `advance`.

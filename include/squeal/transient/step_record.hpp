@@ -1,0 +1,31 @@
+#pragma once
+/// What the tangent of a step needs to know of it (src/README.md, section 4.13). `advance` fills it where one is given.
+#include "squeal/base/petsc.hpp"
+
+#include <vector>
+
+namespace squeal
+{
+
+enum class Recorded
+{
+  contact,
+  contact_and_rates, // the column of h needs the rates
+};
+
+struct StepRecord
+{
+  Recorded wanted = Recorded::contact;
+
+  // the same on every rank
+  std::vector<double> reactions;        // [N] r+
+  std::vector<double> contact_velocity; // [m/s] w = W r+ + b
+  std::vector<char> opposes_theta;      // chi of each pair: 1 where friction opposes s_theta (section 4.3)
+
+  // rates
+  Owned<Vec> force;        // [N] M (v+ - v)/h - theta K (u+ - u)
+  Owned<Vec> v_theta;      // [m/s]
+  std::vector<double> gap; // [m] g0 + B_n u of each pair, on every rank
+};
+
+} // namespace squeal

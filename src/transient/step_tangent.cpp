@@ -1,0 +1,165 @@
+/// A column is a motion without load and drive whose contact is linear: with M dv, A dv and K du at hand a step solves
+///     A dv_f = [M dv - (1-theta) A dv]/theta - h K du + force dh,      A dv+ = A dv_f + h B' dr,
+/// and A dv+ is the right-hand side just solved for, as in the step itself.
+#include "squeal/transient/step_tangent.hpp"
+
+#include "linear_contact.hpp"
+#include "squeal/algebra/multivector.hpp"
+
+#include <algorithm>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr std::size_t at_once = 64; // columns: their work vectors take ten times a column's memory
+
+/// The products of the columns at a step's start, and its work vectors.
+struct TangentWork
+{
+  std::vector<Owned<Vec>> Mv, Av, Ku, v_next, scratch;
+};
+
+std::vector<Vec> handles(const std::vector<Owned<Vec>>& vectors)
+{
+  return {vectors.begin(), vectors.end()};
+}
+
+TangentWork begin_tangents(const ThetaStep& step, const Structure& structure, std::span<const TangentColumn> columns)
+{
+  TangentWork work;
+  std::vector<Vec> u, v;
+  for (const TangentColumn& column : columns)
+  {
+    u.push_back(column.u);
+    v.push_back(column.v);
+    for (auto* vectors : {&work.Mv, &work.Av, &work.Ku, &work.v_next, &work.scratch})
+      vectors->push_back(zeros_like(structure.load));
+  }
+  const double theta_h = step.theta * step.h;
+  const std::vector<Vec> Mv = handles(work.Mv), Av = handles(work.Av), Ku = handles(work.Ku),
+                         Kv = handles(work.scratch);
+  multiply_mass_and_stiffness(step, structure, {v, u}, {Mv, Ku});
+  product(structure.C, v, Av);
+  product(structure.K, v, Kv);
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    check(VecAXPBYPCZ(Av[k], 1, theta_h * theta_h, theta_h, Mv[k], Kv[k]));
+  return work;
+}
+
+/// db of every column but B dv_f, on every rank.
+MatrixXd contact_of_start(const ThetaStep& step, const Interface& interface, const StepRecord& record,
+                          std::span<const TangentColumn> columns, const TangentWork& work)
+{
+  const auto rows = static_cast<Index>(interface.size()), block = static_cast<Index>(interface.block());
+  const double earlier = (1 - step.theta) / step.theta;
+  MatrixXd db = MatrixXd::Zero(rows, static_cast<Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k)
+  {
+    const auto column = static_cast<Index>(k);
+    check(VecWAXPY(work.scratch[k], step.h * (1 - step.theta), columns[k].v, columns[k].u)); // of ut
+    const std::vector<double> position = relative(interface, work.scratch[k]), s = relative(interface, columns[k].v);
+    for (Index row = 0; row < rows; ++row)
+    {
+      const auto i = static_cast<std::size_t>(row), pair = static_cast<std::size_t>(row / block);
+      if (row % block > 0)
+        db(row, column) = record.opposes_theta[pair] ? earlier * s[i] : 0;
+      else if (step.law == ContactLaw::displacement)
+        db(row, column) = position[i] / step.h;
+      if (row % block == 0 && columns[k].step_size != 0 && step.law == ContactLaw::displacement)
+        db(row, column) -= columns[k].step_size * record.gap[pair] / (step.h * step.h);
+    }
+  }
+  return db;
+}
+
+/// dr of every column, on every rank. `Bv_free`: B dv_f of each, on rank 0.
+MatrixXd reactions(const ThetaStep& step, const Interface& interface, const StepRecord& record,
+                   std::span<const TangentColumn> columns, MatrixXd db, const std::vector<double>& Bv_free)
+{
+  MatrixXd dr = MatrixXd::Zero(db.rows(), db.cols());
+  on_rank_zero(comm_of(interface.B),
+               [&]
+               {
+                 db += MatrixXd::Map(Bv_free.data(), db.rows(), db.cols());
+                 VectorXd dmu(db.cols());
+                 for (Index k = 0; k < dmu.size(); ++k) dmu(k) = columns[static_cast<std::size_t>(k)].friction;
+                 LinearContact contact(step.W, interface.friction, record, contact_status(interface, record.reactions));
+                 dr = contact.response(db, dmu);
+               });
+  MPI_Bcast(dr.data(), static_cast<int>(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));
+  return dr;
+}
+
+void one_step(const ThetaStep& step, const Structure& structure, const Interface& interface, const StepRecord& record,
+              std::span<TangentColumn> columns, TangentWork& work)
+{
+  const double h = step.h, theta = step.theta;
+  const std::vector<Vec> Av = handles(work.Av), v_next = handles(work.v_next);
+  MatrixXd db, dr = MatrixXd::Zero(0, 0);
+  if (interface.pairs > 0) db = contact_of_start(step, interface, record, columns, work);
+  for (std::size_t k = 0; k < columns.size(); ++k)
+  {
+    check(VecAXPBYPCZ(Av[k], 1 / theta, -h, (theta - 1) / theta, work.Mv[k], work.Ku[k]));
+    if (columns[k].step_size != 0) check(VecAXPY(Av[k], columns[k].step_size, record.force));
+  }
+  const std::vector<double> Bv_free = step.factor.forward(Av);
+  std::vector<double> lambda;
+  if (interface.pairs > 0)
+  {
+    dr = h * reactions(step, interface, record, columns, std::move(db), Bv_free);
+    for (std::size_t k = 0; k < columns.size(); ++k)
+    {
+      const double* const impulse = dr.col(static_cast<Index>(k)).data();
+      add_reactions(interface, {impulse, impulse + dr.rows()}, Av[k]);
+    }
+    dr = -dr;
+    lambda.assign(dr.data(), dr.data() + dr.size());
+  }
+  step.factor.backward(lambda, v_next);
+  std::vector<Vec> u;
+  for (std::size_t k = 0; k < columns.size(); ++k)
+  {
+    TangentColumn& column = columns[k];
+    check(VecAXPBYPCZ(column.u, h * theta, h * (1 - theta), 1, v_next[k], column.v));
+    if (column.step_size != 0) check(VecAXPY(column.u, column.step_size, record.v_theta));
+    check(VecCopy(v_next[k], column.v));
+    u.push_back(column.u);
+  }
+  multiply_mass_and_stiffness(step, structure, {v_next, u}, {handles(work.Mv), handles(work.Ku)});
+}
+
+} // namespace
+
+std::vector<StepRecord> record_steps(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                                     State& state, int steps, Recorded wanted)
+{
+  std::vector<StepRecord> records(static_cast<std::size_t>(steps));
+  StepWork work = begin_steps(step, structure, interface, state);
+  for (StepRecord& record : records)
+  {
+    record.wanted = wanted;
+    work.record = &record;
+    (void)advance(step, structure, interface, work, state);
+  }
+  return records;
+}
+
+void advance_tangents(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                      std::span<const StepRecord> records, std::span<TangentColumn> columns)
+{
+  for (std::size_t first = 0; first < columns.size(); first += at_once)
+  {
+    const auto batch = columns.subspan(first, std::min(at_once, columns.size() - first));
+    TangentWork work = begin_tangents(step, structure, batch);
+    for (const StepRecord& record : records) one_step(step, structure, interface, record, batch, work);
+  }
+}
+
+} // namespace squeal
