@@ -1,4 +1,4 @@
-#include "squeal/options.hpp"
+#include "squeal/report/report.hpp"
 #include "squeal/run.hpp"
 
 #include <cstdio>
@@ -14,9 +14,14 @@ struct Arguments
 {
   std::filesystem::path scene, output;
   std::vector<std::string> overrides;
-  bool dry_run = false, help = false;
+  bool dry_run = false, help = false, version = false;
   std::string problem; // said after MPI is up, once
 };
+
+bool is_scene_folder(const std::string& word)
+{
+  return std::filesystem::is_regular_file(std::filesystem::path(word) / "scene.toml");
+}
 
 /// Takes squeal's own arguments out of argv; what stays is PETSc's.
 Arguments take_arguments(int& argc, char** argv)
@@ -29,6 +34,8 @@ Arguments take_arguments(int& argc, char** argv)
     const bool has_value = i + 1 < argc;
     if (word == "-help" || word == "--help" || word == "-h")
       arguments.help = true;
+    else if (word == "--version")
+      arguments.version = true;
     else if (word == "--dry-run")
       arguments.dry_run = true;
     else if (word == "--set" || word == "--output")
@@ -41,11 +48,12 @@ Arguments take_arguments(int& argc, char** argv)
         arguments.output = argv[++i];
     }
     else if (word.rfind("--", 0) == 0)
-      arguments.problem = "unknown argument " + word + "; did you mean " +
-                          nearest_word(word, std::vector<std::string>{"--set", "--output", "--dry-run", "--help"}) +
-                          "?";
-    else if (arguments.scene.empty() && word.size() > 5 && word.ends_with(".toml"))
-      arguments.scene = word;
+      arguments.problem =
+          "unknown argument " + word + "; did you mean " +
+          nearest_word(word, std::vector<std::string>{"--set", "--output", "--dry-run", "--help", "--version"}) + "?";
+    else if (arguments.scene.empty() && word[0] != '-' && (word.ends_with(".toml") || is_scene_folder(word)))
+      arguments.scene =
+          word.ends_with(".toml") ? std::filesystem::path(word) : std::filesystem::path(word) / "scene.toml";
     else
       argv[kept++] = argv[i];
   }
@@ -58,9 +66,11 @@ void print_help()
 {
   std::printf(
       "squeal %s: friction-induced vibration of a finite-element structure\n\n"
-      "  mpirun -n 2 squeal scene.toml [--set key=value]… [--output DIR] [--dry-run] [options]\n\n"
+      "  mpirun -n 2 squeal SCENE [--set key=value]… [--output DIR] [--dry-run] [options]\n\n"
+      "  SCENE             a scene file (.toml), or a folder that holds a scene.toml\n"
       "  --set key=value   overrides a key of the scene, e.g. --set friction.coefficient=0.25\n"
       "  --output DIR      where results go (results/<scene>)\n"
+      "  --version         versions of squeal and of the libraries it runs on\n"
       "  --dry-run         checks scene and mesh, prints the resolved scene and the model's size, and stops\n"
       "  exit code: 0 all converged, 2 a stage did not (the report says which), 1 an error\n\n"
       "%s\n"
@@ -78,10 +88,16 @@ std::filesystem::path default_output(const std::filesystem::path& scene)
   return std::filesystem::path("results") / name;
 }
 
+void print_versions()
+{
+  for (const auto& [name, version] : versions()) std::printf("%-7s %s\n", name.c_str(), version.c_str());
+}
+
 void check_leftover_words(int argc, char** argv)
 {
   if (argc > 1 && argv[1][0] != '-')
-    throw Error(std::string("unexpected argument '") + argv[1] + "': a scene is one file that ends in .toml");
+    throw Error(std::string("unexpected argument '") + argv[1] +
+                "': a scene is one file that ends in .toml, or a folder that holds a scene.toml");
 }
 
 void make_writable(const std::filesystem::path& folder, MPI_Comm comm)
@@ -107,9 +123,8 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   const MPI_Comm comm = PETSC_COMM_WORLD;
   if (!arguments.problem.empty()) throw Error(arguments.problem);
   check_leftover_words(argc, argv);
-  if (arguments.scene.empty())
-    throw Error("no scene given; usage: squeal scene.toml [options], squeal -help explains them");
-  check_option_names(comm);
+  if (arguments.scene.empty()) throw Error("no scene given; usage: squeal SCENE [options], squeal -help explains them");
+  const ProgramOptions options = read_program_options(comm);
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
   if (arguments.dry_run)
@@ -119,7 +134,7 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   }
   const auto output = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;
   make_writable(output, comm);
-  return static_cast<int>(run(scene, output, comm));
+  return static_cast<int>(run(scene, options, output, comm));
 }
 
 } // namespace
@@ -129,9 +144,9 @@ int main(int argc, char** argv)
   const Arguments arguments = take_arguments(argc, argv);
   Session session(argc, argv, nullptr);
   const int rank = rank_of(PETSC_COMM_WORLD);
-  if (arguments.help)
+  if (arguments.help || arguments.version)
   {
-    if (rank == 0) print_help();
+    if (rank == 0) arguments.help ? print_help() : print_versions();
     return 0;
   }
   try

@@ -2,6 +2,9 @@
 
 #include "squeal/algebra/bordered_factor.hpp"
 
+#include <cmath>
+#include <numbers>
+
 namespace squeal
 {
 
@@ -35,6 +38,28 @@ Model model_of_mesh(const Scene& scene, MPI_Comm comm)
 Model build_model(const Scene& scene, MPI_Comm comm)
 {
   return scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, comm);
+}
+
+ModelSummary summary_of(const Model& model, MPI_Comm comm)
+{
+  ModelSummary summary;
+  check(MatGetSize(model.structure.K, &summary.dofs, nullptr));
+  summary.elements = model.structure.elements;
+  summary.pairs = model.interface.pairs;
+  summary.ranks = ranks_of(comm);
+  double stiffness = 0, mass = 0;
+  check(MatNorm(model.structure.K, NORM_1, &stiffness));
+  check(MatNorm(model.structure.M, NORM_1, &mass));
+  if (mass > 0) summary.rounding_hz = 1e-6 * std::sqrt(stiffness / mass) / (2 * std::numbers::pi);
+  return summary;
+}
+
+std::vector<double> probe_values(Mat probes, Vec u)
+{
+  Owned<Vec> values;
+  check(MatCreateVecs(probes, nullptr, values.put()));
+  check(MatMult(probes, u, values));
+  return whole(values);
 }
 
 MemoryForecast forecast_memory(const Model& model)

@@ -56,6 +56,19 @@ def arguments_and_options():
     return words[:cut], words[cut + 1 :]
 
 
+FORMAT_VERSION = 1  # of report.json and the HDF5 files, the latest these tools read
+
+
+def read_report(folder):
+    """report.json of a results folder; stops with a sentence where its keys are of a later version."""
+    file = Path(folder) / "report.json"
+    report = json.loads(file.read_text())
+    if report.get("format_version", 0) > FORMAT_VERSION:
+        sys.exit(f"{TOOL}: {file} has format_version {report['format_version']}, these tools read up to {FORMAT_VERSION}: "
+                 "take the tools of the squeal that wrote it")
+    return report
+
+
 def run_squeal(scene, output, values, words=(), ranks=1, limit=None):
     """Exit code and report of a run; values: of the scene's keys. None: it took more than `limit` seconds.
 
@@ -73,7 +86,7 @@ def run_squeal(scene, output, values, words=(), ranks=1, limit=None):
         return None
     if done.returncode not in (0, 2):
         sys.exit(f"{TOOL}: {' '.join(command)}\n{done.stderr.strip()}")
-    return done.returncode, json.loads((Path(output) / "report.json").read_text())
+    return done.returncode, read_report(output)
 
 
 def petsc_bytes(array):

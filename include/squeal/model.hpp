@@ -1,6 +1,7 @@
 #pragma once
 /// The model of a scene: from a mesh, from points and springs, or from matrices; everything after it is the same.
 #include "squeal/contact/interface.hpp"
+#include "squeal/report/report.hpp"
 
 namespace squeal
 {
@@ -16,6 +17,12 @@ struct Model
 
 /// Collective.
 Model build_model(const Scene& scene, MPI_Comm comm);
+
+/// What the model is, as far as it is known before anything is solved. Collective.
+ModelSummary summary_of(const Model& model, MPI_Comm comm);
+
+/// What the probes read of a displacement [m], whole on every rank.
+std::vector<double> probe_values(Mat probes, Vec u);
 
 /// What the run would hold in memory, from the analysis of K bordered by B and the size of W. [bytes], all ranks.
 struct MemoryForecast

@@ -1,21 +1,32 @@
 #pragma once
-/// The algorithm options squeal documents, and the checks that no other one is given.
-#include <mpi.h>
-#include <string>
-#include <vector>
+/// All algorithm options of squeal: one struct a stage, each described in its own room; read and refused together.
+#include "squeal/cycle/options.hpp"
+#include "squeal/transient/estimate.hpp"
+#include "squeal/transient/transient.hpp"
 
 namespace squeal
 {
 
-/// One line an option: name, default, meaning.
+struct ProgramOptions
+{
+  EquilibriumOptions equilibrium;
+  ModesOptions modes;
+  EstimateOptions estimate;
+  StepOptions step; // of the transient and of the cycle
+  CycleOptions cycle;
+};
+
+OptionList options_of(ProgramOptions& options);
+
+/// A line for each option: name, meaning, default.
 std::string option_reference();
 
-/// Before the run, collective. Error for an option that neither squeal nor a solver of its stages could know, with the
-/// nearest that is known.
-void check_option_names(MPI_Comm comm);
+/// The options of PETSc's database. Collective. Error: an option that neither squeal nor a solver of its stages knows
+/// (with the nearest name that is known), or a value that an option does not take.
+ProgramOptions read_program_options(MPI_Comm comm);
 
 /// After the run, collective. Error for options that nobody asked for, with the nearest known ones. Options of a stage
-/// that did not run are let pass: whether it runs is found out on the way. `stages`: those that ran ("modes", …).
+/// that did not run are let pass, since whether it runs is found out on the way. `stages`: those that ran ("modes", …).
 void check_options_used(const std::vector<std::string>& stages, MPI_Comm comm);
 
 } // namespace squeal

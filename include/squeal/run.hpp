@@ -1,22 +1,21 @@
 #pragma once
 /// The whole method, once: mesh -> structure -> equilibrium -> modes -> estimate -> transient -> cycle -> report.
-#include "squeal/base/petsc.hpp"
-#include "squeal/scene/scene.hpp"
+#include "squeal/options.hpp"
 
 #include <filesystem>
 
 namespace squeal
 {
 
-/// Every stage that ran reached what it promised (0), or one did not and the report says which (2). Errors are thrown.
-enum class Verdict : int
+/// How the program ends where nothing is thrown. An error ends it with 1.
+enum class ExitCode : int
 {
-  converged = 0,
-  not_converged = 2,
+  converged = 0,     // every stage that ran gave what it promises
+  not_converged = 2, // one did not, and the report says which
 };
 
 /// Runs the chain and writes the results into `output`, which exists.
-Verdict run(const Scene& scene, const std::filesystem::path& output, MPI_Comm comm);
+ExitCode run(const Scene& scene, const ProgramOptions& options, const std::filesystem::path& output, MPI_Comm comm);
 
 /// Checks scene and mesh and prints what the model would be; computes and writes nothing.
 void dry_run(const Scene& scene, MPI_Comm comm);

@@ -153,6 +153,22 @@ void remember(const ContactWork& work, ContactMemory& memory)
 
 } // namespace
 
+OptionList options_of(ContactSettings& settings)
+{
+  return {
+      {"-transient_contact_solver", choice_of(settings.solver), Range::any,
+       "block Gauss-Seidel, or the projection fixed point (fixed_point)"},
+      {"-transient_contact_tolerance", &settings.tolerance, Range::positive,
+       "largest natural map of a pair over the largest reaction"},
+      {"-transient_contact_max_it", &settings.max_iterations, Range::natural,
+       "contact iterations (sweeps) allowed a step"},
+      {"-transient_contact_rho", &settings.rho, Range::below_two,
+       "of the fixed point, over 1/lambda_max(W); 0: chosen; it contracts below 2 only"},
+      {"-transient_contact_extrapolation", &settings.extrapolation, Range::up_to_two,
+       "highest order in time of the warm start; the best one is taken"},
+  };
+}
+
 void refresh(std::span<ContactWork* const> works)
 {
   if (works.empty()) return;
@@ -179,7 +195,7 @@ std::vector<ContactResult> solve_contacts(const ContactOperator& W, double frict
   std::vector<ContactWork> works;
   for (const ContactProblem& problem : problems) works.push_back(start(W, friction, problem));
   if (W.pairs == 0) return std::vector<ContactResult>(problems.size(), {0, 0, true});
-  if (settings.solver == "gauss_seidel")
+  if (settings.solver == ContactSolver::gauss_seidel)
   {
     std::vector<ContactWork*> all, cold;
     for (std::size_t k = 0; k < works.size(); ++k)
@@ -190,10 +206,8 @@ std::vector<ContactResult> solve_contacts(const ContactOperator& W, double frict
     refresh(cold);
     gauss_seidel(all, settings);
   }
-  else if (settings.solver == "fixed_point")
-    for (ContactWork& work : works) fixed_point(work, settings);
   else
-    throw Error("contact solver \"" + settings.solver + "\" is not known: gauss_seidel or fixed_point");
+    for (ContactWork& work : works) fixed_point(work, settings);
   std::vector<ContactResult> results;
   for (std::size_t k = 0; k < works.size(); ++k)
   {

@@ -15,17 +15,27 @@ namespace
 std::string find_by_reduced_model(ReducedSearch& search, LimitCycle& cycle)
 {
   const CycleProblem& problem = search.problem;
-  if (problem.unstable.size() > 1) return "several modes are unstable: only the full model's shooting excites them all";
+  if (problem.unstable.modes.size() > 1)
+    return "several modes are unstable: only the full model's shooting excites them all";
   ReducedCycle reduced;
   if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
-  const Preconditioner preconditioner = preconditioner_of(search.correction, search.model, problem.structure);
+  const Preconditioner preconditioner = preconditioner_of(search.correction, search.model, problem.sliding.structure);
   const Owned<Vec> state = full_motion(search, reduced.state);
-  check(VecAXPY(displacement(state), 1, problem.equilibrium.u));
-  const ShootingStart start{problem.equilibrium.u, displacement(state), velocity(state), reduced.period};
+  check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
+  const ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
   if (search.fidelity.asked != CycleModel::full)
     return correct_on_full_model(search, start, preconditioner, reduced, cycle);
   cycle = find_cycle_from(problem, search.options, start, preconditioner, 0);
   return {};
+}
+
+/// Why the cycle's own theta and steps a period would give misleading growth; empty if they would not.
+std::string step_refusal_of(const CycleProblem& problem)
+{
+  const ComplexMode& mode = problem.unstable.modes.front();
+  const double period = 1 / mode.frequency_hz();
+  return step_refusal(problem.sliding.structure, &mode, problem.settings.theta,
+                      period / problem.settings.steps_per_period, problem.step);
 }
 
 /// The cycle of the full model, from the estimate, with at least `steps` steps a period.
@@ -38,9 +48,8 @@ void find_by_full_model(const CycleProblem& problem, const CycleOptions& options
   fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
   CycleSettings refined = problem.settings;
   refined.steps_per_period = std::max(refined.steps_per_period, steps);
-  const CycleProblem at_steps{problem.structure, problem.interface, problem.equilibrium,
-                              problem.modes,     problem.unstable,  problem.estimate,
-                              refined,           problem.probes};
+  const CycleProblem at_steps{problem.sliding, problem.linearised, problem.modes,         problem.unstable,
+                              refined,         problem.step,       problem.modes_options, problem.probes};
   result.cycle = find_cycle_from_estimate(at_steps, options);
   fidelity.steps_per_period = refined.steps_per_period;
   fidelity.full_seconds += MPI_Wtime() - clock;
@@ -53,6 +62,11 @@ FittedCycle find_fitted_cycle(const CycleProblem& problem, const FidelityRequest
 {
   declare_solver_options();
   FittedCycle result;
+  if (const std::string refusal = step_refusal_of(problem); !refusal.empty())
+  {
+    result.cycle.outcome = {OutcomeKind::refused, refusal, 0, 0};
+    return result;
+  }
   Fidelity& fidelity = result.fidelity;
   fidelity.asked = request.model;
   fidelity.accuracy = request.accuracy;
@@ -70,13 +84,13 @@ FittedCycle find_fitted_cycle(const CycleProblem& problem, const FidelityRequest
     if (fidelity.reason.empty())
     {
       if (!settings.save_state.empty())
-        write_state(result.cycle.measured.start, problem.structure, settings.save_state);
+        write_state(result.cycle.measured.start, problem.sliding.structure, settings.save_state);
       return result;
     }
   }
   if (request.model == CycleModel::reduced)
   {
-    result.cycle.outcome.kind = problem.unstable.size() > 1 ? OutcomeKind::refused : OutcomeKind::not_converged;
+    result.cycle.outcome.kind = problem.unstable.modes.size() > 1 ? OutcomeKind::refused : OutcomeKind::not_converged;
     result.cycle.outcome.reason = fidelity.reason;
     return result;
   }

@@ -147,18 +147,18 @@ std::string correct_on_full_model(ReducedSearch& search, const ShootingStart& st
   const CycleProblem& given = search.problem;
   Fidelity& fidelity = search.fidelity;
   if (fidelity.asked == CycleModel::reduced) estimate_reduced_step_errors(search, reduced);
-  PeriodMap map{given.structure, given.interface, search.steps, given.settings.theta};
-  map.reactions = given.equilibrium.reactions;
-  map.contact_tolerance = fidelity.contact_tolerance;
+  PeriodMap map{given.sliding, given.step, search.steps, given.settings.theta};
+  map.reactions = given.sliding.equilibrium.reactions;
+  map.options.contact.tolerance = fidelity.contact_tolerance;
   MeasuredPeriod measured;
   const Recording recording{given.probes, static_cast<int>(search.options.samples)};
   const auto integrate = [&](double period, Vec from, Vec end, Vec rate)
   {
-    measured = measure_period(map, given.equilibrium, recording, period, from, rate);
+    measured = measure_period(map, recording, period, from, rate);
     check(VecCopy(measured.end.u, displacement(end)));
     check(VecCopy(measured.end.v, velocity(end)));
   };
-  const Flow flow{integrate, given.structure.M, given.structure.K};
+  const Flow flow{integrate, given.sliding.structure.M, given.sliding.structure.K};
   Progress progress(comm_of(start.u), "cycle", 20);
   ConvergenceLog log{progress};
   const OrbitProblem problem = problem_of(flow, preconditioner, start, 0);

@@ -16,8 +16,9 @@ namespace
 double fluctuation_norm(const CycleProblem& problem, const State& state)
 {
   const Owned<Vec> moved = copy_of(state.u.get());
-  check(VecAXPY(moved, -1, problem.equilibrium.u));
-  return std::sqrt(2 * (potential_energy(problem.structure, moved) + kinetic_energy(problem.structure, state.v)));
+  check(VecAXPY(moved, -1, problem.sliding.equilibrium.u));
+  return std::sqrt(
+      2 * (potential_energy(problem.sliding.structure, moved) + kinetic_energy(problem.sliding.structure, state.v)));
 }
 
 /// Adds to the reason of an outcome what the brake's options can do about it.
@@ -36,9 +37,8 @@ void add_remedies(const PeriodMap& map, Outcome& outcome)
 Preconditioner estimated_preconditioner(const CycleProblem& problem, double band_factor)
 {
   if (!(band_factor > 0)) return {};
-  const double band = band_factor * problem.unstable.front().frequency_hz();
-  return sliding_preconditioner(problem,
-                                find_real_modes_below(problem.structure, problem.interface, problem.equilibrium, band));
+  const double band = band_factor * problem.unstable.modes.front().frequency_hz();
+  return sliding_preconditioner(problem, find_real_modes_below(problem.linearised, band, problem.modes_options));
 }
 
 } // namespace
@@ -47,8 +47,8 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
                            const Preconditioner& preconditioner, int free_periods)
 {
   const CycleSettings& settings = problem.settings;
-  PeriodMap map{problem.structure, problem.interface, settings.steps_per_period, settings.theta};
-  map.reactions = problem.equilibrium.reactions;
+  PeriodMap map{problem.sliding, problem.step, settings.steps_per_period, settings.theta};
+  map.reactions = problem.sliding.equilibrium.reactions;
   ShootingResult found =
       shoot(flow_of(map), preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
@@ -59,21 +59,21 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
                    std::move(found.multipliers),
                    {},
                    {}};
-  cycle.measured = measure_period(map, problem.equilibrium, {problem.probes, static_cast<int>(options.samples)},
-                                  cycle.orbit.period, cycle.orbit.state, nullptr);
+  cycle.measured = measure_period(map, {problem.probes, static_cast<int>(options.samples)}, cycle.orbit.period,
+                                  cycle.orbit.state, nullptr);
   ++cycle.convergence.periods;
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
   add_remedies(map, cycle.outcome);
-  if (!settings.save_state.empty()) write_state(cycle.measured.start, problem.structure, settings.save_state);
+  if (!settings.save_state.empty()) write_state(cycle.measured.start, problem.sliding.structure, settings.save_state);
   return cycle;
 }
 
 LimitCycle find_cycle_from_estimate(const CycleProblem& problem, const CycleOptions& options)
 {
-  const ComplexMode& mode = problem.unstable.front();
-  const Estimate& estimate = problem.estimate;
-  const Equilibrium& equilibrium = problem.equilibrium;
-  const double amplitude = options.start_amplitude * start_amplitude(estimate);
+  const ComplexMode& mode = problem.unstable.modes.front();
+  const Estimate& estimate = problem.unstable.estimates.front();
+  const Equilibrium& equilibrium = problem.sliding.equilibrium;
+  const double amplitude = options.start_amplitude * estimate.start_amplitude;
   if (!(amplitude > 0) || !std::isfinite(amplitude) || mode.lambda.imag() == 0)
   {
     LimitCycle skipped;
@@ -92,11 +92,12 @@ LimitCycle find_cycle_from_estimate(const CycleProblem& problem, const CycleOpti
                       {mode.real, mode.imaginary, equilibrium.u},
                       {},
                       first_event};
-  for (const State& motion :
-       estimated_motions(problem.structure, problem.interface, equilibrium, problem.unstable.subspan(1)))
+  for (std::size_t i = 1; i < problem.unstable.modes.size(); ++i)
   {
-    add_motion(motion, options.start_amplitude, first);
-    start.other_unstable.push_back(state_of(motion.u, motion.v));
+    const auto motion = estimated_motion(equilibrium, problem.unstable.modes[i], problem.unstable.estimates[i]);
+    if (!motion) continue;
+    add_motion(*motion, options.start_amplitude, first);
+    start.other_unstable.push_back(state_of(motion->u, motion->v));
   }
   return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),
                          problem.settings.free_periods);

@@ -33,8 +33,7 @@ void summarise(MeasuredPeriod& measured)
 
 } // namespace
 
-MeasuredPeriod measure_period(PeriodMap& map, const Equilibrium& equilibrium, const Recording& recording, double period,
-                              Vec start, Vec rate)
+MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double period, Vec start, Vec rate)
 {
   MeasuredPeriod measured;
   measured.start = {copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
@@ -50,18 +49,18 @@ MeasuredPeriod measure_period(PeriodMap& map, const Equilibrium& equilibrium, co
   int done = 0;
   const auto watch = [&](const State& now, const StepReport&, const StepWork&)
   {
-    measured.statuses.push_back(contact_status(map.interface, now.reactions));
+    measured.statuses.push_back(contact_status(map.sliding.interface, now.reactions));
     // evenly spread over the period whatever the two numbers
     if ((done + 1) * samples / map.steps > done * samples / map.steps) measured.displacements.push_back(copy_of(now.u));
     if (++done + 1 == map.steps && rate) keep_for_rate(now);
   };
-  const MarchSummary summary = march(map.step, map.structure, map.interface, equilibrium, recording.probes, map.steps,
-                                     measured.end, measured.history, watch);
+  const MarchSummary summary =
+      march(map.step, map.sliding, map.steps, measured.end, {recording.probes, measured.history, watch});
   map.unconverged += summary.unconverged;
   if (rate)
   {
     State after = copy_of(measured.end);
-    StepWork work = begin_steps(map.step, map.structure, map.interface, after);
+    StepWork work = begin_steps(map.step, map.sliding.structure, map.sliding.interface, after);
     complete_rate(map, work, after, rate);
   }
   summarise(measured);

@@ -9,15 +9,14 @@ void set_period(PeriodMap& map, double period)
 {
   const double h = period / map.steps;
   if (h == map.step.h) return;
-  map.step = make_theta_step(map.structure, map.interface, h, map.theta);
-  if (map.contact_tolerance > 0) map.step.contact.tolerance = map.contact_tolerance;
+  map.step = make_theta_step(map.sliding.structure, map.sliding.interface, h, map.theta, map.options);
 }
 
 void complete_rate(PeriodMap& map, StepWork& work, State& end, Vec rate)
 {
   const double half = 0.5 / map.step.h;
   map.reactions = end.reactions;
-  (void)advance(map.step, map.structure, map.interface, work, end);
+  (void)advance(map.step, map.sliding.structure, map.sliding.interface, work, end);
   check(VecAXPBY(displacement(rate), half, -half, end.u));
   check(VecAXPBY(velocity(rate), half, -half, end.v));
 }
@@ -29,7 +28,7 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
 {
   set_period(map, period);
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
-  StepWork work = begin_steps(map.step, map.structure, map.interface, state);
+  StepWork work = begin_steps(map.step, map.sliding.structure, map.sliding.interface, state);
   for (int i = 0; i < map.steps; ++i)
   {
     if (rate && i + 1 == map.steps)
@@ -37,7 +36,8 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
       check(VecCopy(state.u, displacement(rate)));
       check(VecCopy(state.v, velocity(rate)));
     }
-    if (!advance(map.step, map.structure, map.interface, work, state).contact_converged) ++map.unconverged;
+    if (!advance(map.step, map.sliding.structure, map.sliding.interface, work, state).contact_converged)
+      ++map.unconverged;
   }
   check(VecCopy(state.u, displacement(end)));
   check(VecCopy(state.v, velocity(end)));
@@ -57,10 +57,10 @@ void integrate_periods(PeriodMap& map, double period, std::span<const Vec> start
     for (const Vec start : starts.subspan(first, count))
     {
       states.push_back({copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions});
-      works.push_back(begin_steps(map.step, map.structure, map.interface, states.back()));
+      works.push_back(begin_steps(map.step, map.sliding.structure, map.sliding.interface, states.back()));
     }
     for (int i = 0; i < map.steps; ++i)
-      for (const StepReport& report : advance(map.step, map.structure, map.interface, works, states))
+      for (const StepReport& report : advance(map.step, map.sliding.structure, map.sliding.interface, works, states))
         if (!report.contact_converged) ++map.unconverged;
     for (std::size_t k = 0; k < count; ++k)
     {
@@ -78,7 +78,7 @@ Flow flow_of(PeriodMap& map)
   { integrate_period(map, period, start, end, rate); };
   const auto integrate_many = [&map](double period, std::span<const Vec> starts, std::span<const Vec> ends)
   { integrate_periods(map, period, starts, ends); };
-  return {integrate, map.structure.M, map.structure.K, integrate_many};
+  return {integrate, map.sliding.structure.M, map.sliding.structure.K, integrate_many};
 }
 
 } // namespace squeal

@@ -2,7 +2,7 @@
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/multivector.hpp"
-#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <array>
@@ -150,13 +150,11 @@ void apply_inverse(const SlidingModes& modes, Mat M, double period, Vec x, Vec y
 Preconditioner sliding_preconditioner(const CycleProblem& problem, const RealModes& modes)
 {
   if (modes.shapes.empty()) return {};
-  const Structure& structure = problem.structure;
-  const ClosedContact contact = eliminate_closed_pairs(structure, problem.interface, problem.equilibrium);
-  const MatrixXd friction = friction_of(problem.interface, modes.shapes);
-  const Owned<Mat> C = sliding_damping(structure, problem.interface, problem.equilibrium);
-  const auto on_shapes = [&](Mat X) { return on_modes(modes.shapes, friction, contact, X); };
+  const Structure& structure = problem.sliding.structure;
+  const MatrixXd friction = friction_of(problem.sliding.interface, modes.shapes);
+  const auto on_shapes = [&](Mat X) { return on_modes(modes.shapes, friction, problem.linearised.contact, X); };
   const std::vector<DenseEigenpair> sliding = solve_dense_quadratic_shared(
-      comm_of(structure.load), on_shapes(structure.M), on_shapes(C), on_shapes(structure.K));
+      comm_of(structure.load), on_shapes(structure.M), on_shapes(problem.linearised.C), on_shapes(structure.K));
   SlidingModes inside = make_sliding_modes(sliding, modes.shapes, problem.settings);
   return [inside = std::move(inside), M = structure.M.get()](double period, Vec x, Vec y)
   { apply_inverse(inside, M, period, x, y); };

@@ -44,8 +44,8 @@ void describe_model(const ReducedSearch& search)
   fidelity.attachment_shapes = search.model.attachments;
   fidelity.active_pairs = static_cast<int>(search.active.size());
   fidelity.sliding_pairs = 0;
-  for (int pair = 0; pair < search.problem.interface.pairs; ++pair)
-    fidelity.sliding_pairs += search.problem.equilibrium.closed[static_cast<std::size_t>(pair)] &&
+  for (int pair = 0; pair < search.problem.sliding.interface.pairs; ++pair)
+    fidelity.sliding_pairs += search.problem.sliding.equilibrium.closed[static_cast<std::size_t>(pair)] &&
                               !std::binary_search(search.active.begin(), search.active.end(), pair);
 }
 
@@ -57,8 +57,8 @@ void build_model(ReducedSearch& search, double amplitude)
   const ReducedOptions& options = search.options.reduced;
   // where its cycle is the answer, friction is left free
   const bool sliding = search.fidelity.asked != CycleModel::reduced &&
-                       slide_throughout(problem.interface, problem.unstable.front(), amplitude);
-  search.model = reduce(problem.structure, problem.interface, problem.equilibrium, problem.modes, search.active,
+                       slide_throughout(problem.sliding.interface, problem.unstable.modes.front(), amplitude);
+  search.model = reduce(problem.sliding, problem.modes, search.active,
                         {static_cast<int>(options.modes), options.threshold, sliding});
   search.energy = energy_matrices(search.model);
   describe_model(search);
@@ -96,7 +96,7 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
   Fidelity& fidelity = search.fidelity;
   const PetscInt periods = search.options.reduced.free_periods;
   ReducedMap map = period_map_of(search, search.steps);
-  Progress progress(comm_of(search.problem.structure.load), "settling", static_cast<double>(periods));
+  Progress progress(comm_of(search.problem.sliding.structure.load), "settling", static_cast<double>(periods));
   double correction = 0;
   // compared every tenth period: whatever the rounding, it stops at the same
   for (double missed = 1; (missed > 5e-3 || fidelity.reduced_periods % 10 != 0) && fidelity.reduced_periods < periods;)
@@ -142,7 +142,8 @@ void update_correction(ReducedSearch& search, const FreeMotion& motion)
 {
   const double clock = MPI_Wtime();
   ReducedMap map = period_map_of(search, search.steps);
-  search.correction = monodromy_correction(map, motion.period, motion.state, comm_of(search.problem.structure.load));
+  search.correction =
+      monodromy_correction(map, motion.period, motion.state, comm_of(search.problem.sliding.structure.load));
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
 
@@ -166,19 +167,20 @@ std::string size_refusal(const ReducedSearch& search)
 {
   const CycleProblem& problem = search.problem;
   PetscInt dofs = 0;
-  check(VecGetSize(problem.structure.load, &dofs));
+  check(VecGetSize(problem.sliding.structure.load, &dofs));
   const std::size_t shapes = std::min(problem.modes.size(), static_cast<std::size_t>(search.options.reduced.modes)) +
-                             search.active.size() * static_cast<std::size_t>(problem.interface.block());
+                             search.active.size() * static_cast<std::size_t>(problem.sliding.interface.block());
   if (2 * shapes <= static_cast<std::size_t>(dofs)) return {};
   return "a reduced model of " + std::to_string(shapes) + " shapes is not small next to " + std::to_string(dofs) +
          " degrees of freedom";
 }
 
 /// The estimated motion (du, v) of the followed mode.
-Owned<Vec> estimated_motion(const CycleProblem& problem, double amplitude)
+Owned<Vec> estimated_fluctuation(const CycleProblem& problem, double amplitude)
 {
-  const State first = mode_state(problem.equilibrium, problem.unstable.front(), amplitude, problem.estimate.phase);
-  check(VecAXPY(first.u, -1, problem.equilibrium.u));
+  const State first = mode_state(problem.sliding.equilibrium, problem.unstable.modes.front(), amplitude,
+                                 problem.unstable.estimates.front().phase);
+  check(VecAXPY(first.u, -1, problem.sliding.equilibrium.u));
   return state_of(first.u, first.v);
 }
 
@@ -186,7 +188,7 @@ Owned<Vec> estimated_motion(const CycleProblem& problem, double amplitude)
 
 Owned<Vec> full_motion(const ReducedSearch& search, const ReducedState& state)
 {
-  const Owned<Vec> zero = zeros_like(search.problem.structure.load);
+  const Owned<Vec> zero = zeros_like(search.problem.sliding.structure.load);
   Owned<Vec> motion = state_of(zero, zero);
   add_motion(search.model, 1, state.q, displacement(motion));
   add_motion(search.model, 1, state.v, velocity(motion));
@@ -210,25 +212,26 @@ ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start
   cycle.energy = mean_energy(map, cycle.period, cycle.state);
   search.fidelity.reduced_periods += log.convergence.periods + 1;
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
-  share_from_first_rank(cycle, comm_of(search.problem.structure.load));
+  share_from_first_rank(cycle, comm_of(search.problem.sliding.structure.load));
   return cycle;
 }
 
 std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
 {
   const CycleProblem& problem = search.problem;
-  const ComplexMode& mode = problem.unstable.front();
+  const ComplexMode& mode = problem.unstable.modes.front();
   const double margin = search.options.reduced.margin;
-  double amplitude = search.options.start_amplitude * start_amplitude(problem.estimate);
-  const Owned<Vec> estimated = estimated_motion(problem, amplitude);
+  double amplitude = search.options.start_amplitude * problem.unstable.estimates.front().start_amplitude;
+  const Owned<Vec> estimated = estimated_fluctuation(problem, amplitude);
   Owned<Vec> motion = copy_of(estimated.get());
   FreeMotion free{{}, 1 / mode.frequency_hz(), 0};
   double unit = 0; // [J] energy at amplitude 1
   const auto on_model = [&](Vec x)
-  { return coordinates(search.model, problem.structure, displacement(x), velocity(x)); };
+  { return coordinates(search.model, problem.sliding.structure, displacement(x), velocity(x)); };
   for (;;)
   {
-    search.active = pairs_that_may_change(problem.interface, problem.equilibrium, mode, margin * amplitude);
+    search.active =
+        pairs_that_may_change(problem.sliding.interface, problem.sliding.equilibrium, mode, margin * amplitude);
     if (const std::string refusal = size_refusal(search); !refusal.empty()) return refusal;
     build_model(search, margin * amplitude);
     free.state = on_model(motion);

@@ -14,25 +14,11 @@ namespace squeal
 namespace
 {
 
-struct Options
+/// Iterations of the fixed point that checks the reactions.
+int check_iterations(const EquilibriumOptions& options, int pairs)
 {
-  int max_iterations = 100, check_iterations = 0;
-  double check_rho = 1.5; // over 1/lambda_max
-};
-
-/// What the options mean is said in the program's option table.
-Options read_options(int pairs)
-{
-  PetscInt max_it = 100, check_max_it = -1;
-  check(PetscOptionsGetInt(nullptr, "equilibrium_", "-max_it", &max_it, nullptr));
-  check(PetscOptionsGetInt(nullptr, "equilibrium_", "-check_max_it", &check_max_it, nullptr));
-  PetscReal check_rho = 1.5;
-  check(PetscOptionsGetReal(nullptr, "equilibrium_", "-check_rho", &check_rho, nullptr));
-  if (max_it < 1) throw Error("-equilibrium_max_it must be at least 1");
-  if (!(check_rho > 0 && check_rho < 2))
-    throw Error("-equilibrium_check_rho must be between 0 and 2: the fixed point contracts nowhere else");
-  if (check_max_it < 0) check_max_it = pairs <= 600 ? 20000 : 0;
-  return {static_cast<int>(max_it), static_cast<int>(check_max_it), check_rho};
+  if (options.check_max_iterations >= 0) return static_cast<int>(options.check_max_iterations);
+  return pairs <= 600 ? 20000 : 0;
 }
 
 /// K, or K + kappa B_n' B_n where contact alone holds a body, factored.
@@ -290,8 +276,8 @@ void settle(const Held& held, const Structure& structure, const Interface& inter
   }
 }
 
-void judge(const Structure& structure, const Interface& interface, const Search& search, const Options& options,
-           Equilibrium& equilibrium, MPI_Comm comm)
+void judge(const Structure& structure, const Interface& interface, const Search& search,
+           const EquilibriumOptions& options, Equilibrium& equilibrium, MPI_Comm comm)
 {
   const bool balanced = balances(structure, interface, equilibrium);
   const auto gap = gaps_of(interface, equilibrium.u);
@@ -307,9 +293,9 @@ void judge(const Structure& structure, const Interface& interface, const Search&
                    if (search.D_nn[i * pairs + i] > 0) rho[i] = 1 / search.D_nn[i * pairs + i];
                  told[0] = natural_map(reaction, gap, rho);
                  if (search.problem.N.empty()) told[4] = has_one_solution(search.problem) ? 1 : 2;
-                 if (options.check_iterations == 0 || pairs == 0 || !search.problem.N.empty()) return;
-                 const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12,
-                                                      options.check_iterations);
+                 const int limit = check_iterations(options, interface.pairs);
+                 if (limit == 0 || pairs == 0 || !search.problem.N.empty()) return;
+                 const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12, limit);
                  told[2] = run.iterations;
                  const double largest = *std::max_element(reaction.begin(), reaction.end());
                  for (std::size_t i = 0; i < pairs && largest > 0; ++i)
@@ -367,10 +353,20 @@ bool stays_at_rest(const Structure& structure, const Interface& interface)
 
 } // namespace
 
-Equilibrium find_equilibrium(const Structure& structure, const Interface& interface)
+OptionList options_of(EquilibriumOptions& options)
+{
+  return {
+      {"-equilibrium_max_it", &options.max_iterations, Range::natural, "status iterations before giving up"},
+      {"-equilibrium_check_max_it", &options.check_max_iterations, Range::any,
+       "iterations of the fixed point that checks the reactions; -1: 20000 up to 600 pairs, else none"},
+      {"-equilibrium_check_rho", &options.check_rho, Range::inside_two,
+       "of that fixed point, over 1/lambda_max(D_nn); it contracts below 2 only"},
+  };
+}
+
+Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
 {
   const MPI_Comm comm = comm_of(structure.load);
-  const Options options = read_options(interface.pairs);
   const auto pairs = static_cast<std::size_t>(interface.pairs);
 
   Equilibrium equilibrium;
@@ -397,7 +393,8 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
                    search.D_nn = normal_block(D, interface);
                    search.problem = problem_of(D, search.D_nn, interface, held.kappa, q);
                    search.rho = 1 / largest_eigenvalue(search.D_nn, pairs, 30);
-                   search.solution = find_split(search.problem, interface, options.max_iterations, 1.5 * search.rho);
+                   search.solution = find_split(search.problem, interface, static_cast<int>(options.max_iterations),
+                                                1.5 * search.rho);
                  });
     share(search.solution, pairs, comm);
   }

@@ -1,6 +1,6 @@
 #include "squeal/modes/modes.hpp"
 
-#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/projection.hpp"
 #include "squeal/modes/quadratic.hpp"
 #include "squeal/modes/real_modes.hpp"
@@ -16,26 +16,6 @@ namespace squeal
 
 namespace
 {
-
-struct SlidingProblem
-{
-  ClosedContact contact;
-  Owned<Mat> C;             // with the friction direction's, in the structure's dofs
-  QuadraticProblem reduced; // Y'.Z
-  Owned<Mat> M, K;          // Z'.Z, symmetric
-};
-
-SlidingProblem make_problem(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium)
-{
-  SlidingProblem problem;
-  problem.contact = eliminate_closed_pairs(structure, interface, equilibrium);
-  const Mat Y = problem.contact.Y, Z = problem.contact.Z;
-  problem.C = sliding_damping(structure, interface, equilibrium);
-  problem.reduced = {project(structure.M, Y, Z), project(problem.C, Y, Z), project(structure.K, Y, Z)};
-  problem.M = project_symmetric(structure.M, Z);
-  problem.K = project_symmetric(structure.K, Z);
-  return problem;
-}
 
 // The entry of phi of largest modulus; of nearly equal ones the first, so that every rank count turns phi alike.
 std::complex<double> largest_entry(Vec real, Vec imaginary)
@@ -78,41 +58,29 @@ void set_shape(ComplexMode& mode, const ClosedContact& contact, const Eigenpair&
   check(VecAXPBY(mode.imaginary, turn.imag(), turn.real(), real));
 }
 
-std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const Structure& structure,
-                                  const SlidingProblem& problem)
+std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const LinearisedSliding& linearised)
 {
   std::vector<ComplexMode> modes;
-  const ReactionOperator reaction = reaction_operator(problem.contact, structure, problem.C);
   for (const Eigenpair& pair : solution.pairs)
   {
     ComplexMode mode;
     mode.lambda = pair.lambda;
     mode.backward_error = pair.backward_error;
-    set_shape(mode, problem.contact, pair);
-    mode.reactions = normal_reactions(reaction, mode.lambda, mode.real, mode.imaginary);
+    set_shape(mode, linearised.contact, pair);
+    mode.reactions = normal_reactions(linearised.reaction, mode.lambda, mode.real, mode.imaginary);
     modes.push_back(std::move(mode));
   }
   return modes;
 }
 
-struct ModesOptions
+/// The sliding problem as the routes see it.
+struct ModesProblem
 {
-  PetscInt dense_limit = 200, candidates = 20;
-  std::string solver = "slices";
+  const LinearisedSliding& linearised;
+  QuadraticProblem reduced; // Y'.Z
+  const ModesSettings& settings;
+  const ModesOptions& options;
 };
-
-ModesOptions read_options()
-{
-  ModesOptions options;
-  char solver[16] = "slices";
-  options.dense_limit = dense_limit_option();
-  check(PetscOptionsGetInt(nullptr, "modes_", "-candidates", &options.candidates, nullptr));
-  check(PetscOptionsGetString(nullptr, "modes_", "-solver", solver, sizeof solver, nullptr));
-  options.solver = solver;
-  if (options.solver != "slices" && options.solver != "toar")
-    throw Error("option -modes_solver is \"" + options.solver + "\": it takes slices or toar");
-  return options;
-}
 
 // Friction may move a pair across the band's edge: a little below it both counts agree, then.
 PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution& solution, RealCount& real,
@@ -123,15 +91,14 @@ PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution
   return count_pairs(solution, real, free, .8 * end, end);
 }
 
-CountedSolution solve_full(const SlidingProblem& problem, RealCount& real, const ModesSettings& settings,
-                           const ModesOptions& options)
+CountedSolution solve_full(const ModesProblem& problem, RealCount& real)
 {
-  const int limit = static_cast<int>(options.dense_limit);
-  const double band = settings.band, end = 2 * std::numbers::pi * band;
+  const int limit = static_cast<int>(problem.options.dense_limit);
+  const double band = problem.settings.band, end = 2 * std::numbers::pi * band;
   PetscInt n = 0;
-  check(MatGetSize(problem.K, &n, nullptr));
+  check(MatGetSize(problem.linearised.K_z, &n, nullptr));
   CountedSolution result;
-  if (n > limit && options.solver == "slices")
+  if (n > limit && problem.options.solver == ModesSolver::slices)
   {
     result = solve_by_slices(problem.reduced, real, band);
     if (result.count.expected == result.count.found) return result;
@@ -143,18 +110,19 @@ CountedSolution solve_full(const SlidingProblem& problem, RealCount& real, const
     return result;
   }
   QuadraticSettings quadratic{band, 0, n > limit ? count_below(real, end) : 0, limit};
-  if (n > limit) quadratic.shift = std::sqrt(-shift_below_zero(problem.M, problem.K)) / end;
+  if (n > limit) quadratic.shift = std::sqrt(-shift_below_zero(problem.linearised.M_z, problem.linearised.K_z)) / end;
   result.solution = solve_quadratic(problem.reduced, quadratic);
   result.count = count_in_band(problem.reduced, result.solution, real, band);
   return result;
 }
 
 // As many real modes as the scene says, or those up to a little beyond the band, at least twenty.
-QuadraticSolution solve_by_projection(const SlidingProblem& problem, const ModesSettings& settings,
-                                      const ModesOptions& options)
+QuadraticSolution solve_by_projection(const ModesProblem& problem)
 {
   constexpr int fewest = 20;
-  const Mat M = problem.M, K = problem.K;
+  const ModesSettings& settings = problem.settings;
+  const ModesOptions& options = problem.options;
+  const Mat M = problem.linearised.M_z, K = problem.linearised.K_z;
   const int limit = static_cast<int>(options.dense_limit);
   RealModes basis;
   if (settings.real_modes == 0) basis = solve_real_modes_below(M, K, 1.05 * settings.band, limit);
@@ -193,6 +161,8 @@ void judge(Modes& modes)
 {
   for (const ComplexMode& mode : modes.modes)
     modes.outcome.residual = std::max(modes.outcome.residual, mode.backward_error);
+  std::stable_partition(modes.modes.begin(), modes.modes.end(),
+                        [](const ComplexMode& mode) { return is_unstable(mode.lambda); });
   modes.unstable_count = unstable_in(modes.modes);
   modes.routes_disagree = modes.method == ModesMethod::both && unstable_in(modes.projected) != modes.unstable_count;
   modes.count_check = count_check(modes);
@@ -228,28 +198,49 @@ double ComplexMode::damping_ratio() const
   return -lambda.real() / std::abs(lambda);
 }
 
-Modes find_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                 const ModesSettings& settings)
+OptionList options_of(ModesOptions& options)
 {
-  const ModesOptions options = read_options();
-  const SlidingProblem problem = make_problem(structure, interface, equilibrium);
+  return {
+      {"-modes_dense_limit", &options.dense_limit, Range::not_negative,
+       "eigenproblems up to this size are solved whole by LAPACK"},
+      {"-modes_solver", choice_of(options.solver), Range::any,
+       "of larger problems: slices of frequency, or TOAR around zero (toar)"},
+      {"-modes_candidates", &options.candidates, Range::not_negative,
+       "pairs that each residual pass of the projection corrects"},
+  };
+}
+
+bool is_unstable(std::complex<double> lambda)
+{
+  return lambda.real() > 1e-8 * std::abs(lambda);
+}
+
+Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised, const ModesSettings& settings,
+                 const ModesOptions& options)
+{
   Modes modes;
   modes.method = settings.method;
   modes.band = settings.band;
   PetscInt free = 0;
-  check(MatGetSize(problem.K, &free, nullptr));
+  check(MatGetSize(linearised.K_z, &free, nullptr));
   if (free == 0)
   {
     modes.outcome = {OutcomeKind::converged, "closed contact leaves nothing free to vibrate", 0, 0};
     modes.count_check = "confirmed: there is no mode to count";
     return modes;
   }
-  RealCount real = make_real_count(problem.M, problem.K, static_cast<int>(options.dense_limit));
+  const Mat Y = linearised.contact.Y, Z = linearised.contact.Z;
+  const ModesProblem problem{
+      linearised,
+      {project(sliding.structure.M, Y, Z), project(linearised.C, Y, Z), project(sliding.structure.K, Y, Z)},
+      settings,
+      options};
+  RealCount real = make_real_count(linearised.M_z, linearised.K_z, static_cast<int>(options.dense_limit));
   CountedSolution found;
   if (settings.method != ModesMethod::full)
   {
-    found.solution = solve_by_projection(problem, settings, options);
-    modes.projected = modes_of(found.solution, structure, problem);
+    found.solution = solve_by_projection(problem);
+    modes.projected = modes_of(found.solution, linearised);
   }
   if (settings.method == ModesMethod::projection)
   {
@@ -258,8 +249,8 @@ Modes find_modes(const Structure& structure, const Interface& interface, const E
   }
   else
   {
-    found = solve_full(problem, real, settings, options);
-    modes.modes = modes_of(found.solution, structure, problem);
+    found = solve_full(problem, real);
+    modes.modes = modes_of(found.solution, linearised);
   }
   modes.outcome = found.solution.outcome;
   modes.count = certificate(found.count);

@@ -161,11 +161,6 @@ void sort_and_measure(QuadraticSolution& solution)
                    [](const Eigenpair& a, const Eigenpair& b) { return a.lambda.real() > b.lambda.real(); });
 }
 
-bool is_unstable(std::complex<double> lambda)
-{
-  return lambda.real() > 1e-8 * std::abs(lambda);
-}
-
 QuadraticNorms norms_of(const QuadraticProblem& problem)
 {
   QuadraticNorms norms;

@@ -3,7 +3,7 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/integers.hpp"
-#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>
@@ -218,28 +218,13 @@ RealModes to_modes(const Found& found, Mat M, Mat K, int count)
   return modes;
 }
 
-struct BilateralProblem
-{
-  ClosedContact contact;
-  Owned<Mat> M, K;
-};
-
-BilateralProblem make_bilateral(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium)
-{
-  BilateralProblem result;
-  result.contact = eliminate_closed_pairs(structure, interface, equilibrium);
-  result.M = project_symmetric(structure.M, result.contact.Z);
-  result.K = project_symmetric(structure.K, result.contact.Z);
-  return result;
-}
-
-void to_structure(RealModes& modes, const BilateralProblem& problem)
+void to_structure(RealModes& modes, Mat Z)
 {
   for (Owned<Vec>& shape : modes.shapes)
   {
     Owned<Vec> whole;
-    check(MatCreateVecs(problem.contact.Z, nullptr, whole.put()));
-    check(MatMult(problem.contact.Z, shape, whole));
+    check(MatCreateVecs(Z, nullptr, whole.put()));
+    check(MatMult(Z, shape, whole));
     shape = std::move(whole);
   }
 }
@@ -317,19 +302,10 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit)
   return to_modes(sweep(M, K, goal), M, K, goal.count);
 }
 
-int dense_limit_option()
+RealModes find_real_modes_below(const LinearisedSliding& linearised, double band, const ModesOptions& options)
 {
-  PetscInt limit = 400;
-  check(PetscOptionsGetInt(nullptr, "modes_", "-dense_limit", &limit, nullptr));
-  return static_cast<int>(limit);
-}
-
-RealModes find_real_modes_below(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                                double band)
-{
-  const BilateralProblem problem = make_bilateral(structure, interface, equilibrium);
-  RealModes modes = solve_real_modes_below(problem.M, problem.K, band, dense_limit_option());
-  to_structure(modes, problem);
+  RealModes modes = solve_real_modes_below(linearised.M_z, linearised.K_z, band, static_cast<int>(options.dense_limit));
+  to_structure(modes, linearised.contact.Z);
   return modes;
 }
 

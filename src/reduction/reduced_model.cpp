@@ -1,7 +1,7 @@
 #include "squeal/reduction/reduced_model.hpp"
 
 #include "squeal/algebra/bordered_factor.hpp"
-#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include <algorithm>
 #include <array>
@@ -286,15 +286,14 @@ bool slide_throughout(const Interface& interface, const ComplexMode& mode, doubl
   return true;
 }
 
-ReducedModel reduce(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                    const std::vector<ComplexMode>& modes, std::vector<int> active, const Reduction& reduction)
+ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
+                    const Reduction& reduction)
 {
+  const auto& [structure, interface, equilibrium] = sliding;
   ReducedModel model;
-  Equilibrium sliding; // the pairs that stay closed
-  sliding.closed = equilibrium.closed;
-  sliding.reactions = equilibrium.reactions;
-  for (const int pair : active) sliding.closed[static_cast<std::size_t>(pair)] = 0;
-  const ClosedContact contact = eliminate_closed_pairs(structure, interface, sliding);
+  std::vector<char> stays_closed = equilibrium.closed;
+  for (const int pair : active) stays_closed[static_cast<std::size_t>(pair)] = 0;
+  const ClosedContact contact = eliminate_closed_pairs(structure, interface, stays_closed);
   const double omega = modes.front().lambda.imag();
 
   // the modes and the shapes of the pairs' forces, as they come
@@ -313,7 +312,9 @@ ReducedModel reduce(const Structure& structure, const Interface& interface, cons
 
   project(model, structure, contact, columns, X);
   const MultiVector left = product(contact.Y, columns), rows = transposed(B);
-  if (const Owned<Mat> turning = direction_damping(interface, reduction.sliding ? equilibrium : sliding); turning.get())
+  if (const Owned<Mat> turning =
+          direction_damping(interface, reduction.sliding ? equilibrium.closed : stays_closed, equilibrium.reactions);
+      turning.get())
   {
     const std::vector<PetscInt> turns = own_rows(turning);
     model.C += inner_products(rows_of(left, turns), rows_of(product(turning, X), turns));

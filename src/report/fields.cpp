@@ -2,8 +2,9 @@
 ///
 /// One temporal collection, a grid per sample of the cycle; the equilibrium and the modes are the same data in each.
 /// Without a cycle it has one grid. XDMF lists an element as its code and then its nodes, in VTK's order.
+#include "squeal/report/fields.hpp"
+
 #include "squeal/report/files.hpp"
-#include "squeal/report/parts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -88,9 +89,9 @@ void write_mesh(Hdf5File& file, const Mesh& mesh, Layout& layout)
 class Gather
 {
 public:
-  Gather(const Model& model) : model_(model)
+  Gather(const FieldNodes& nodes) : nodes_(nodes)
   {
-    check(VecScatterCreateToZero(model.structure.load, scatter_.put(), whole_.put()));
+    check(VecScatterCreateToZero(nodes.structure.load, scatter_.put(), whole_.put()));
   }
 
   /// Collective. x y z of every node [m] on rank 0, empty elsewhere.
@@ -104,12 +105,12 @@ public:
     const PetscScalar* values = nullptr;
     check(VecGetArrayRead(whole_, &values));
     std::vector<double> displacement;
-    displacement.reserve(3 * model_.mesh.nodes.size());
-    for (std::size_t node = 0; node < model_.mesh.nodes.size(); ++node)
+    displacement.reserve(3 * nodes_.mesh.nodes.size());
+    for (std::size_t node = 0; node < nodes_.mesh.nodes.size(); ++node)
       for (int component = 0; component < 3; ++component)
       {
         double sum = 0;
-        for (const DofTerm& term : model_.dofs.of(static_cast<int>(node), component))
+        for (const DofTerm& term : nodes_.dofs.of(static_cast<int>(node), component))
           sum += term.factor * values[term.dof];
         displacement.push_back(sum);
       }
@@ -118,7 +119,7 @@ public:
   }
 
 private:
-  const Model& model_;
+  const FieldNodes nodes_;
   Owned<VecScatter> scatter_;
   Owned<Vec> whole_;
 };
@@ -206,7 +207,7 @@ void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Mode
   int number = 0;
   for (const ComplexMode& mode : modes.modes)
   {
-    if (mode.growth_rate() <= 0) continue;
+    if (!is_unstable(mode.lambda)) continue;
     const std::string data = "modes/" + std::to_string(++number) + "/";
     std::ostringstream name;
     name << "unstable mode " << number << ", " << std::lround(mode.frequency_hz()) << " Hz, ";
@@ -226,8 +227,8 @@ double sample_time(const LimitCycle& cycle, std::size_t sample)
 
 } // namespace
 
-void write_fields(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
-                  MPI_Comm comm)
+void write_fields(const Report& report, const Scene& scene, const FieldNodes& nodes,
+                  const std::filesystem::path& output, MPI_Comm comm)
 {
   const auto place = output / "fields.h5", xdmf = output / "fields.xdmf";
   if (scene.matrices)
@@ -242,13 +243,13 @@ void write_fields(const Report& report, const Scene& scene, const Model& model, 
   }
   Layout layout;
   std::optional<Hdf5File> file; // on rank 0
-  on_rank_zero(comm, [&] { write_mesh(file.emplace(place), model.mesh, layout); });
-  const Gather gather(model);
+  on_rank_zero(comm, [&] { write_mesh(file.emplace(place), nodes.mesh, layout); });
+  const Gather gather(nodes);
   if (report.equilibrium.u.get())
   {
     write_displacement(file, gather, report.equilibrium.u, "equilibrium/displacement", comm);
     layout.still.push_back({"displacement at equilibrium [m]", "equilibrium/displacement", "Node", 3});
-    on_rank_zero(comm, [&] { write_contact(*file, report, scene, model.mesh, layout); });
+    on_rank_zero(comm, [&] { write_contact(*file, report, scene, nodes.mesh, layout); });
   }
   write_modes(file, gather, report.modes, layout, comm);
   const auto& samples = report.cycle.measured.displacements;

@@ -77,6 +77,7 @@ Hdf5File::Hdf5File(fs::path place) : file_(std::move(place))
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); // failures become our errors instead of a printed stack
   id_ = H5Fcreate(file_.path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   if (id_ < 0) throw Error("cannot write " + file_.path().string() + ": is the folder writable?");
+  write_attribute(id_, "format_version", std::to_string(format_version));
 }
 
 Hdf5File::~Hdf5File()

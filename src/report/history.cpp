@@ -1,6 +1,6 @@
-/// history.h5: what happened in time. Groups "transient" and "cycle" (one period) of data sets against "time".
+#include "squeal/report/history.hpp"
+
 #include "squeal/report/files.hpp"
-#include "squeal/report/parts.hpp"
 
 #include <algorithm>
 

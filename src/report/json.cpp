@@ -1,5 +1,8 @@
-/// report.json: the run in numbers, SI units. NaN and infinity become null.
-#include "squeal/report/parts.hpp"
+#include "squeal/report/json.hpp"
+
+#include "derived.hpp"
+#include "squeal/report/files.hpp"
+#include "warnings.hpp"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -38,12 +41,12 @@ Json equilibrium_entry(const Report& report, const Scene& scene)
   entry["check_difference"] = equilibrium.check_difference;
   entry["auxiliary_stiffness"] = equilibrium.auxiliary_stiffness;
   entry["uniqueness"] = equilibrium.uniqueness;
-  for (std::size_t i = 0; i < report.contact_forces.size(); ++i)
+  for (std::size_t i = 0; i < report.contacts.size(); ++i)
   {
     entry["contacts"].push_back({{"rotor", scene.contacts[i].rotor},
                                  {"stator", scene.contacts[i].stator},
-                                 {"normal_force_sum", report.contact_forces[i]}});
-    if (scene.contacts[i].rotation) entry["contacts"].back()["torque"] = report.contact_torques[i];
+                                 {"normal_force_sum", report.contacts[i].normal_force}});
+    if (scene.contacts[i].rotation) entry["contacts"].back()["torque"] = report.contacts[i].torque;
   }
   for (std::size_t i = 0; i < report.equilibrium_probes.size(); ++i)
     entry["probes"][scene.probes[i].name] = report.equilibrium_probes[i];
@@ -57,7 +60,8 @@ Json mode_list(const std::vector<ComplexMode>& modes)
     list.push_back({{"frequency_hz", mode.frequency_hz()},
                     {"growth_rate", mode.growth_rate()},
                     {"damping_ratio", mode.damping_ratio()},
-                    {"backward_error", mode.backward_error}});
+                    {"backward_error", mode.backward_error},
+                    {"unstable", is_unstable(mode.lambda)}});
   return list;
 }
 
@@ -112,7 +116,7 @@ Json transient_entry(const Report& report)
   entry["growth_rate_bias"] = transient_bias(report).growth;
   entry["frequency_bias"] = transient_bias(report).frequency;
   entry["normal_force_chatter"] = chatter(transient.history);
-  entry["contact_law"] = transient.law == ContactLaw::velocity ? "velocity" : "displacement";
+  entry["contact_law"] = word(transient.law);
   entry["energy_defect_max"] = transient.energy_defect_max;
   entry["residual"] = transient.outcome.residual;
   entry["contact_iterations_mean"] = transient.contact_iterations_mean;
@@ -201,34 +205,18 @@ Json fidelity_entry(const Fidelity& fidelity)
 
 } // namespace
 
-NormalForces normal_forces(const Equilibrium& equilibrium)
-{
-  NormalForces forces;
-  const std::size_t pairs = equilibrium.closed.size();
-  const std::size_t block = pairs > 0 ? equilibrium.reactions.size() / pairs : 0;
-  for (std::size_t i = 0; i < pairs; ++i)
-  {
-    if (!equilibrium.closed[i] || block == 0) continue;
-    const double force = equilibrium.reactions[i * block];
-    forces.least = forces.closed > 0 ? std::min(forces.least, force) : force;
-    forces.greatest = forces.closed > 0 ? std::max(forces.greatest, force) : force;
-    forces.sum += force;
-    ++forces.closed;
-  }
-  return forces;
-}
-
 std::string report_json(const Report& report, const Scene& scene)
 {
   Json json;
+  json["format_version"] = format_version;
   json["title"] = scene.title;
   json["scene"] = scene.file.string();
-  json["model"] = {{"dofs", report.dofs},
-                   {"pairs", report.pairs},
-                   {"elements", report.elements},
-                   {"ranks", report.ranks},
-                   {"memory_bytes", report.memory_bytes},
-                   {"rounding_hz", report.rounding_hz}};
+  json["model"] = {{"dofs", report.model.dofs},
+                   {"pairs", report.model.pairs},
+                   {"elements", report.model.elements},
+                   {"ranks", report.model.ranks},
+                   {"memory_bytes", report.model.memory_bytes},
+                   {"rounding_hz", report.model.rounding_hz}};
   const double factor = std::max(report.transient.factor_seconds, report.cycle.costs.factor_seconds);
   if (factor > 0) // A was factored: what one step size costs before the first step
   {
@@ -238,20 +226,20 @@ std::string report_json(const Report& report, const Scene& scene)
   }
   json["equilibrium"] = equilibrium_entry(report, scene);
   json["modes"] = modes_entry(report.modes);
-  json["estimate"] = estimate_entry(report.estimate);
+  json["estimate"] = estimate_entry(followed_estimate(report));
   json["transient"] = transient_entry(report);
   json["cycle"] = cycle_entry(report, scene);
   json["fidelity"] = fidelity_entry(report.fidelity);
-  const Verdicts verdicts = verdicts_of(report);
+  const Warnings warnings = warnings_of(report);
   const auto warn = [&json](const char* stage, const std::vector<std::string>& sentences)
   {
     if (!sentences.empty()) json[stage]["warnings"] = sentences;
   };
-  warn("equilibrium", verdicts.equilibrium);
-  warn("modes", verdicts.modes);
-  warn("estimate", verdicts.estimate);
-  warn("transient", verdicts.transient);
-  warn("cycle", verdicts.cycle);
+  warn("equilibrium", warnings.equilibrium);
+  warn("modes", warnings.modes);
+  warn("estimate", warnings.estimate);
+  warn("transient", warnings.transient);
+  warn("cycle", warnings.cycle);
   for (const auto& [stage, seconds, processor_seconds] : report.timings)
   {
     json["timings"][stage] = seconds;

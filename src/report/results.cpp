@@ -1,6 +1,7 @@
-/// Everything a run leaves in its folder.
+#include "squeal/report/fields.hpp"
 #include "squeal/report/files.hpp"
-#include "squeal/report/parts.hpp"
+#include "squeal/report/history.hpp"
+#include "squeal/report/json.hpp"
 
 #include <cctype>
 #include <dmumps_c.h>
@@ -39,13 +40,28 @@ std::string provenance()
 
 } // namespace
 
+const Estimate& followed_estimate(const Report& report)
+{
+  static const Estimate none;
+  return report.estimates.empty() ? none : report.estimates.front();
+}
+
+std::array<std::pair<const char*, Outcome>, 5> outcomes_of(const Report& report)
+{
+  return {{{"equilibrium", report.equilibrium.outcome},
+           {"modes", report.modes.outcome},
+           {"estimate", followed_estimate(report).outcome},
+           {"transient", report.transient.outcome},
+           {"cycle", report.cycle.outcome}}};
+}
+
 std::vector<std::pair<std::string, std::string>> versions()
 {
   const auto number = [](auto major, auto minor, auto release)
   { return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(release); };
   PetscInt major = 0, minor = 0, release = 0;
   unsigned hdf5_major = 0, hdf5_minor = 0, hdf5_release = 0;
-  std::vector<std::pair<std::string, std::string>> list = {{"squeal", SQUEAL_VERSION}};
+  std::vector<std::pair<std::string, std::string>> list = {{"squeal", SQUEAL_VERSION}, {"commit", SQUEAL_COMMIT}};
   check(PetscGetVersionNumber(&major, &minor, &release, nullptr));
   list.emplace_back("petsc", number(major, minor, release));
   check(SlepcGetVersionNumber(&major, &minor, &release, nullptr));
@@ -59,8 +75,8 @@ std::vector<std::pair<std::string, std::string>> versions()
   return list;
 }
 
-void write_results(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
-                   MPI_Comm comm)
+void write_results(const Report& report, const Scene& scene, const FieldNodes& nodes,
+                   const std::filesystem::path& output, MPI_Comm comm)
 {
   on_rank_zero(comm,
                [&]
@@ -70,7 +86,7 @@ void write_results(const Report& report, const Scene& scene, const Model& model,
                  write_text(output / "options.txt", provenance() + option_text());
                  write_history(report, scene, output / "history.h5");
                });
-  write_fields(report, scene, model, output, comm);
+  write_fields(report, scene, nodes, output, comm);
   // Last: where there is a report, the rest is there too.
   on_rank_zero(comm, [&] { write_text(output / "report.json", report_json(report, scene)); });
 }

@@ -1,6 +1,6 @@
 #include "squeal/transient/estimate.hpp"
 
-#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include <algorithm>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
@@ -111,14 +111,13 @@ double linear_power(const ShakenPair& pair)
   return pair.friction / 2 * (std::real(std::conj(along) * pair.reaction) - pair.reaction0 / speed * std::norm(across));
 }
 
-std::vector<ShakenPair> shaken_pairs(const Structure& structure, const Interface& interface,
-                                     const Equilibrium& equilibrium, const ComplexMode& mode)
+std::vector<ShakenPair> shaken_pairs(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
+                                     const ComplexMode& mode)
 {
+  const Interface& interface = sliding.interface;
+  const Equilibrium& equilibrium = sliding.equilibrium;
   const Complex s(0, mode.lambda.imag()); // the motion assumed neither grows nor decays, and its reactions are those
-  const std::vector<Complex> reactions =
-      normal_reactions(reaction_operator(eliminate_closed_pairs(structure, interface, equilibrium), structure,
-                                         sliding_damping(structure, interface, equilibrium)),
-                       s, mode.real, mode.imaginary);
+  const std::vector<Complex> reactions = normal_reactions(linearised.reaction, s, mode.real, mode.imaginary);
   const std::vector<double> e = drive_directions(interface), real = relative(interface, mode.real),
                             imaginary = relative(interface, mode.imaginary);
   const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
@@ -232,9 +231,16 @@ double first_amplitude(double level, double size)
 
 } // namespace
 
-Estimate estimate_amplitude(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                            const ComplexMode& mode)
+OptionList options_of(EstimateOptions& options)
 {
+  return {{"-estimate_lift_off_multiple", &options.lift_off_multiple, Range::positive,
+           "of first lift-off: where vibrations start without an energy balance"}};
+}
+
+Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
+                            const ComplexMode& mode, const EstimateOptions& options)
+{
+  const Structure& structure = sliding.structure;
   Estimate result;
   const double omega = mode.lambda.imag();
   if (omega == 0)
@@ -242,7 +248,7 @@ Estimate estimate_amplitude(const Structure& structure, const Interface& interfa
     result.outcome = {OutcomeKind::skipped, "the mode grows without vibrating", 0, 0};
     return result;
   }
-  const std::vector<ShakenPair> pairs = shaken_pairs(structure, interface, equilibrium, mode);
+  const std::vector<ShakenPair> pairs = shaken_pairs(sliding, linearised, mode);
   const double energy = omega * omega * quadratic_form(structure.M, mode) / 2; // E/q^2
   result.damping_rate = omega * omega * quadratic_form(structure.C, mode) / 2 / energy;
   double linear = 0, scale = 0;
@@ -262,6 +268,7 @@ Estimate estimate_amplitude(const Structure& structure, const Interface& interfa
   if (first_event == infinity || first_event <= 0)
   {
     result.outcome = {OutcomeKind::no_balance, "nothing saturates the interface force", 0, 0};
+    result.start_amplitude = options.lift_off_multiple * result.lift_off_amplitude;
     return result;
   }
   // Each pair's share of an absolute tolerance; the rule's finer half is far better than the difference it is held to.
@@ -279,29 +286,19 @@ Estimate estimate_amplitude(const Structure& structure, const Interface& interfa
   result.mean_energy = energy * result.amplitude * result.amplitude;
   const double q = result.outcome.kind == OutcomeKind::balance ? result.amplitude : result.lift_off_amplitude;
   if (q < infinity) result.phase = best_phase(pairs, q);
+  result.start_amplitude = result.outcome.kind == OutcomeKind::balance
+                               ? result.amplitude
+                               : options.lift_off_multiple * result.lift_off_amplitude;
   return result;
 }
 
-double start_amplitude(const Estimate& estimate)
+std::optional<State> estimated_motion(const Equilibrium& equilibrium, const ComplexMode& mode, const Estimate& estimate)
 {
-  double multiple = 2;
-  check(PetscOptionsGetReal(nullptr, "estimate_", "-lift_off_multiple", &multiple, nullptr));
-  return estimate.outcome.kind == OutcomeKind::balance ? estimate.amplitude : multiple * estimate.lift_off_amplitude;
-}
-
-std::vector<State> estimated_motions(const Structure& structure, const Interface& interface,
-                                     const Equilibrium& equilibrium, std::span<const ComplexMode> modes)
-{
-  std::vector<State> motions;
-  for (const ComplexMode& mode : modes)
-  {
-    const Estimate estimate = estimate_amplitude(structure, interface, equilibrium, mode);
-    const double amplitude = start_amplitude(estimate);
-    if (!(amplitude > 0) || !std::isfinite(amplitude) || mode.lambda.imag() == 0) continue;
-    motions.push_back(mode_state(equilibrium, mode, amplitude, estimate.phase));
-    check(VecAXPY(motions.back().u, -1, equilibrium.u));
-  }
-  return motions;
+  const double amplitude = estimate.start_amplitude;
+  if (!(amplitude > 0) || !std::isfinite(amplitude) || mode.lambda.imag() == 0) return std::nullopt;
+  State motion = mode_state(equilibrium, mode, amplitude, estimate.phase);
+  check(VecAXPY(motion.u, -1, equilibrium.u));
+  return motion;
 }
 
 void add_motion(const State& motion, double factor, State& state)

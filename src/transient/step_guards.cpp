@@ -92,11 +92,10 @@ double free_growth(const Structure& structure, double theta, double h)
   return slope / (observed * (observed * observed - 1.) / 12) / 2;
 }
 
-std::string step_refusal(const Structure& structure, const ComplexMode* mode, double theta, double h)
+std::string step_refusal(const Structure& structure, const ComplexMode* mode, double theta, double h,
+                         const StepOptions& options)
 {
-  PetscBool refuse = PETSC_TRUE;
-  check(PetscOptionsGetBool(nullptr, "transient_", "-refuse", &refuse, nullptr));
-  if (!refuse) return {};
+  if (!options.refuse) return {};
   if (mode)
     if (const std::string reason = mode_refusal(*mode, theta, h); !reason.empty()) return reason;
   if (theta >= 0.5) return {};

@@ -21,34 +21,6 @@ namespace squeal
 namespace
 {
 
-/// What the options mean is said in the program's option table.
-void read_options(ThetaStep& step)
-{
-  const std::array<const char*, 2> laws = {"displacement", "velocity"};
-  const std::array<const char*, 2> solvers = {"gauss_seidel", "fixed_point"};
-  const std::array<const char*, 2> slidings = {"theta", "end"};
-  PetscInt law = 0, solver = 0, sliding = 0, max_it = step.contact.max_iterations;
-  PetscInt order = step.contact.extrapolation;
-  const char* prefix = "transient_";
-  check(PetscOptionsGetEList(nullptr, prefix, "-contact_law", laws.data(), 2, &law, nullptr));
-  check(PetscOptionsGetEList(nullptr, prefix, "-friction", slidings.data(), 2, &sliding, nullptr));
-  check(PetscOptionsGetEList(nullptr, prefix, "-contact_solver", solvers.data(), 2, &solver, nullptr));
-  check(PetscOptionsGetReal(nullptr, prefix, "-contact_tolerance", &step.contact.tolerance, nullptr));
-  check(PetscOptionsGetInt(nullptr, prefix, "-contact_max_it", &max_it, nullptr));
-  check(PetscOptionsGetReal(nullptr, prefix, "-contact_rho", &step.contact.rho, nullptr));
-  check(PetscOptionsGetInt(nullptr, prefix, "-contact_extrapolation", &order, nullptr));
-  if (!(step.contact.tolerance > 0)) throw Error("-transient_contact_tolerance must be above 0");
-  if (order < 0 || order > 2) throw Error("-transient_contact_extrapolation must be 0, 1 or 2");
-  if (max_it < 1) throw Error("-transient_contact_max_it must be at least 1");
-  if (!(step.contact.rho >= 0 && step.contact.rho < 2))
-    throw Error("-transient_contact_rho must be at least 0 and below 2: the fixed point contracts nowhere else");
-  step.opposed = sliding == 0 ? Opposed::theta : Opposed::end;
-  step.law = law == 0 ? ContactLaw::displacement : ContactLaw::velocity;
-  step.contact.solver = solvers[static_cast<std::size_t>(solver)];
-  step.contact.max_iterations = static_cast<int>(max_it);
-  step.contact.extrapolation = static_cast<int>(order);
-}
-
 /// b of w = W r + b, from the free velocity's B v: normal rows are gap rates (g + B_n ut)/h + B_n v, tangential ones s.
 /// Collective; the result is on rank 0.
 std::vector<double> free_contact_velocity(const ThetaStep& step, const Interface& interface, const State& state,
@@ -295,6 +267,20 @@ std::vector<double> push_apart(const ThetaStep& step, const Interface& interface
 
 } // namespace
 
+OptionList options_of(StepOptions& options)
+{
+  OptionList list = {
+      {"-transient_friction", choice_of(options.opposed), Range::any,
+       "opposes the sliding velocity at theta, or at the end of the step (end)"},
+      {"-transient_contact_law", choice_of(options.law), Range::any,
+       "contact on displacements, or on velocities (velocity)"},
+      {"-transient_refuse", &options.refuse, Range::any,
+       "false: march even where theta and the step give misleading growth rates"},
+  };
+  for (Option& option : options_of(options.contact)) list.push_back(std::move(option));
+  return list;
+}
+
 Owned<Mat> step_matrix(const Structure& structure, double h, double theta)
 {
   Owned<Mat> A;
@@ -305,7 +291,8 @@ Owned<Mat> step_matrix(const Structure& structure, double h, double theta)
   return A;
 }
 
-ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta)
+ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta,
+                          const StepOptions& options)
 {
   if (!(h > 0) || !std::isfinite(h)) throw Error("the time step must be above 0, not " + std::to_string(h) + " s");
   if (!(theta > 0 && theta <= 1)) throw Error("theta must be in (0, 1], not " + std::to_string(theta));
@@ -313,7 +300,9 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   ThetaStep step;
   step.h = h;
   step.theta = theta;
-  read_options(step);
+  step.law = options.law;
+  step.opposed = options.opposed;
+  step.contact = options.contact;
   CondensedOperator condensed = condense(step_matrix(structure, h, theta), interface, h, structure.names);
   step.factor = std::move(condensed.factor);
   step.factor_seconds = MPI_Wtime() - start;

@@ -91,8 +91,8 @@ bool counts_steps(const TransientSettings& settings)
   return settings.steps > 0 && settings.step_size > 0;
 }
 
-/// Step size and number of steps; refuses where the rule does.
-long plan(Trajectory& trajectory, const Structure& structure, const ComplexMode* mode, TransientSettings settings)
+/// Step size and number of steps.
+long plan(Trajectory& trajectory, const ComplexMode* mode, TransientSettings settings)
 {
   if (mode) settings = planned(settings, *mode);
   if (!counts_steps(settings))
@@ -103,8 +103,6 @@ long plan(Trajectory& trajectory, const Structure& structure, const ComplexMode*
   trajectory.growth_rate_fit = std::numeric_limits<double>::quiet_NaN();
   trajectory.predicted = mode ? discrete_eigenvalue(mode->lambda, settings.theta, settings.step_size)
                               : std::complex<double>(std::numeric_limits<double>::quiet_NaN(), 0);
-  trajectory.outcome.reason = step_refusal(structure, mode, settings.theta, trajectory.step_size);
-  if (!trajectory.outcome.reason.empty()) trajectory.outcome.kind = OutcomeKind::refused;
   return settings.steps;
 }
 
@@ -132,10 +130,11 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
 
 } // namespace
 
-MarchSummary march(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                   const Equilibrium& equilibrium, Mat probes, long steps, State& state, History& history,
-                   const Monitor& monitor)
+MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, long steps, State& state,
+                   const Recorder& recorder)
 {
+  const auto& [structure, interface, equilibrium] = sliding;
+  const auto& [probes, history, monitor] = recorder;
   MarchSummary summary;
   Fluctuation fluctuation = about(structure, equilibrium);
   Owned<Vec> probe_values;
@@ -176,30 +175,48 @@ TransientSettings planned(TransientSettings settings, const ComplexMode& mode)
   return settings;
 }
 
-Trajectory integrate(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                     const ComplexMode* mode, const TransientSettings& settings, State start, Mat probes)
+State transient_start(const SlidingEquilibrium& sliding, const UnstableModes& unstable,
+                      const TransientSettings& settings)
 {
+  if (settings.start.kind == StartKind::file) return read_state(settings.start.file, sliding.structure);
+  const ComplexMode& followed = unstable.modes.front();
+  const Estimate& estimate = unstable.estimates.front();
+  if (settings.start.kind == StartKind::mode)
+    return mode_state(sliding.equilibrium, followed,
+                      settings.amplitude > 0 ? settings.amplitude : 0.1 * estimate.lift_off_amplitude, estimate.phase);
+  State start = mode_state(sliding.equilibrium, followed, estimate.start_amplitude, estimate.phase);
+  for (std::size_t i = 1; i < unstable.modes.size(); ++i)
+    if (const auto motion = estimated_motion(sliding.equilibrium, unstable.modes[i], unstable.estimates[i]))
+      add_motion(*motion, 1, start);
+  return start;
+}
+
+Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode, const TransientSettings& settings,
+                     const StepOptions& options, State start, Mat probes)
+{
+  const auto& [structure, interface, equilibrium] = sliding;
   Trajectory trajectory;
-  const long steps = plan(trajectory, structure, mode, settings);
+  const long steps = plan(trajectory, mode, settings);
+  trajectory.outcome.reason = step_refusal(structure, mode, trajectory.theta, trajectory.step_size, options);
+  if (!trajectory.outcome.reason.empty()) trajectory.outcome.kind = OutcomeKind::refused;
   trajectory.end = std::move(start);
   if (trajectory.outcome.kind == OutcomeKind::refused) return trajectory;
 
-  const ThetaStep step = make_theta_step(structure, interface, trajectory.step_size, settings.theta);
+  const ThetaStep step = make_theta_step(structure, interface, trajectory.step_size, settings.theta, options);
   const std::vector<double> drive = drive_directions(interface);
   ModeAmplitude amplitude;
   if (mode) amplitude = follow(structure, equilibrium, *mode);
-  bool sliding = mode != nullptr; // so far
+  bool slides = mode != nullptr; // so far
   Progress progress(comm_of(structure.load), "transient", static_cast<double>(steps));
   const Monitor watch = [&](const State& state, const StepReport& report, const StepWork& work)
   {
-    sliding = sliding && slides_as_at_equilibrium(interface, equilibrium, drive, state.reactions);
-    if (sliding) observe(amplitude, state.time, work.Ku, work.Mv);
+    slides = slides && slides_as_at_equilibrium(interface, equilibrium, drive, state.reactions);
+    if (slides) observe(amplitude, state.time, work.Ku, work.Mv);
     progress.update(static_cast<double>(trajectory.history.time.size()),
                     format("energy %.4g J, open %d, stick %d", report.energy, report.open, report.stick));
   };
   const double wall = MPI_Wtime();
-  const MarchSummary summary =
-      march(step, structure, interface, equilibrium, probes, steps, trajectory.end, trajectory.history, watch);
+  const MarchSummary summary = march(step, sliding, steps, trajectory.end, {probes, trajectory.history, watch});
   trajectory.seconds_per_step = (MPI_Wtime() - wall) / static_cast<double>(std::max(summary.steps, 1L));
   trajectory.factor_seconds = step.factor_seconds;
   trajectory.condensed_seconds = step.condensed_seconds;

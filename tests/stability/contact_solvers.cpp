@@ -146,7 +146,7 @@ int fixed_point_iterations(double condition, double rho)
   std::mt19937 random(4);
   const Vector W = random_compliance(8, 2, condition, 0, random);
   ContactSettings settings;
-  settings.solver = "fixed_point";
+  settings.solver = ContactSolver::fixed_point;
   settings.max_iterations = 20000;
   settings.rho = rho;
   Vector r, b(16, 0.);

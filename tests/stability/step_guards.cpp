@@ -29,14 +29,15 @@ double boundary(const ComplexMode& mode, double theta)
 /// Growth rate fitted to a march of four periods.
 double marched(const test::SmallModel& model, const test::Sliding& sliding, double theta, double h)
 {
-  const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta);
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, {});
   State state = test::mode_start(sliding, .05);
   History history;
   ModeAmplitude amplitude = follow(model.structure, sliding.equilibrium, sliding.mode);
   const long steps = std::lround(std::ceil(4.2 * period_of(sliding.mode) / h));
-  march(step, model.structure, model.interface, sliding.equilibrium, nullptr, steps, state, history,
-        [&](const State& now, const StepReport&, const StepWork& work)
-        { observe(amplitude, now.time, work.Ku, work.Mv); });
+  march(step, test::view_of(model, sliding), steps, state,
+        {nullptr, history, [&](const State& now, const StepReport&, const StepWork& work) {
+           observe(amplitude, now.time, work.Ku, work.Mv);
+         }});
   return growth_rate(amplitude, period_of(sliding.mode));
 }
 
@@ -75,10 +76,10 @@ TEST_CASE("theta > 1/2: an unstable mode looks stable below the stated number of
     const double steps = boundary(sliding.mode, theta);
     // the boundary is sharp: 2 % on either side; the discrete rate there is 2 % of sigma
     const double fine = period_of(sliding.mode) / (1.02 * steps), coarse = period_of(sliding.mode) / (.98 * steps);
-    CHECK(step_refusal(model.structure, &sliding.mode, theta, fine).empty());
+    CHECK(step_refusal(model.structure, &sliding.mode, theta, fine, {}).empty());
     CHECK(marched(model, sliding, theta, fine) > .01 * sigma);
     CHECK(growth_bias(sliding.mode.lambda, theta, fine) > -1);
-    const std::string reason = step_refusal(model.structure, &sliding.mode, theta, coarse);
+    const std::string reason = step_refusal(model.structure, &sliding.mode, theta, coarse, {});
     CHECK(reason.find("would look stable") != std::string::npos);
     CHECK(reason.find("or theta = 1/2") != std::string::npos);
     CHECK(marched(model, sliding, theta, coarse) < -.01 * sigma);
@@ -88,7 +89,7 @@ TEST_CASE("theta > 1/2: an unstable mode looks stable below the stated number of
   for (const double steps : {7., 25., 400.})
   {
     const double h = period_of(sliding.mode) / steps;
-    CHECK(step_refusal(model.structure, &sliding.mode, .5, h).empty());
+    CHECK(step_refusal(model.structure, &sliding.mode, .5, h, {}).empty());
     CHECK(growth_bias(sliding.mode.lambda, .5, h) < 0);
     CHECK(growth_bias(sliding.mode.lambda, .5, h) > -.25 * std::norm(sliding.mode.lambda) * h * h);
   }
@@ -100,10 +101,10 @@ TEST_CASE("theta < 1/2: growth that is mostly the step's own is refused")
   const auto sliding = test::persistent_sliding(model, test::Complex(.0007, 1.06));
   const double h = period_of(sliding.mode) / (.98 * boundary(sliding.mode, .49));
   CHECK(growth_bias(sliding.mode.lambda, .49, h) > 1);
-  CHECK(step_refusal(model.structure, &sliding.mode, .49, h).find("owe most of its growth") != std::string::npos);
+  CHECK(step_refusal(model.structure, &sliding.mode, .49, h, {}).find("owe most of its growth") != std::string::npos);
   const double fine = period_of(sliding.mode) / (1.02 * boundary(sliding.mode, .49));
   CHECK(growth_bias(sliding.mode.lambda, .49, fine) < 1);
-  CHECK(step_refusal(model.structure, &sliding.mode, .49, fine).empty());
+  CHECK(step_refusal(model.structure, &sliding.mode, .49, fine, {}).empty());
 }
 
 TEST_CASE("theta < 1/2 with C = beta K blows up beyond beta/(1 - 2 theta), or 2/((1 - 2 theta)|lambda|) if overdamped")
@@ -119,21 +120,19 @@ TEST_CASE("theta < 1/2 with C = beta K blows up beyond beta/(1 - 2 theta), or 2/
       const double fastest = overdamped ? beta * w2 / 2 + std::sqrt(beta * beta * w2 * w2 / 4 - w2) : 0;
       const double limit = overdamped ? 2 / ((1 - 2 * theta) * fastest) : beta / (1 - 2 * theta);
       CHECK(free_growth(structure, theta, .97 * limit) < 2e-6); // the slowest decays by 5e-6 a step
-      CHECK(step_refusal(structure, nullptr, theta, .97 * limit).empty());
+      CHECK(step_refusal(structure, nullptr, theta, .97 * limit, {}).empty());
       CHECK(free_growth(structure, theta, 1.03 * limit) > 1e-4);
-      const std::string reason = step_refusal(structure, nullptr, theta, 1.03 * limit);
+      const std::string reason = step_refusal(structure, nullptr, theta, 1.03 * limit, {});
       CHECK(reason.find("theta = 1/2 needs no damping") != std::string::npos);
     }
   // without damping there is no such step; at theta = 1/2 there is no such limit
-  CHECK_FALSE(step_refusal(chain(0), nullptr, .49, .1).empty());
-  CHECK(step_refusal(chain(0), nullptr, .5, 1e3).empty());
+  CHECK_FALSE(step_refusal(chain(0), nullptr, .49, .1, {}).empty());
+  CHECK(step_refusal(chain(0), nullptr, .5, 1e3, {}).empty());
 }
 
 TEST_CASE("the refusal is lifted by its option only")
 {
   const Structure structure = chain(0);
-  check(PetscOptionsSetValue(nullptr, "-transient_refuse", "false"));
-  CHECK(step_refusal(structure, nullptr, .4, 1).empty());
-  check(PetscOptionsClearValue(nullptr, "-transient_refuse"));
-  CHECK_FALSE(step_refusal(structure, nullptr, .4, 1).empty());
+  CHECK(step_refusal(structure, nullptr, .4, 1, {.refuse = false}).empty());
+  CHECK_FALSE(step_refusal(structure, nullptr, .4, 1, {.refuse = false}).empty());
 }

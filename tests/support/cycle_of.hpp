@@ -10,20 +10,24 @@ namespace squeal::test
 
 inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance, const CycleOptions& options)
 {
-  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface);
+  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
   REQUIRE(equilibrium.outcome.kind == OutcomeKind::converged);
+  const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
+  const LinearisedSliding linearised = linearise(sliding);
   ModesSettings modes_settings;
   modes_settings.method = ModesMethod::full;
-  const Modes modes = find_modes(model.structure, model.interface, equilibrium, modes_settings);
+  const Modes modes = find_modes(sliding, linearised, modes_settings, {});
   REQUIRE(!modes.modes.empty());
   const ComplexMode& mode = modes.modes.front();
-  const Estimate estimate = estimate_amplitude(model.structure, model.interface, equilibrium, mode);
+  const Estimate estimate = estimate_amplitude(sliding, linearised, mode, {});
   CycleSettings settings;
   settings.steps_per_period = steps;
   settings.free_periods = free;
   settings.tolerance = tolerance;
-  const CycleProblem problem{model.structure, model.interface, equilibrium, modes.modes,
-                             {&mode, 1},      estimate,        settings};
+  const StepOptions step;
+  const ModesOptions modes_options;
+  const CycleProblem problem{sliding,  linearised, modes.modes,   {{&mode, 1}, {&estimate, 1}},
+                             settings, step,       modes_options, nullptr};
   return find_cycle_from_estimate(problem, options);
 }
 

@@ -2,6 +2,7 @@
 /// A chain of cells of two modes each that friction couples (M = I, C = .02 I): 100 pairs of 50 cells lie within 1 % to
 /// 30 % of each other, many close to coalescence.
 #include "small_models.hpp"
+#include "squeal/modes/modes.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <cmath>

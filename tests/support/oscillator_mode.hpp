@@ -58,6 +58,11 @@ inline Sliding persistent_sliding(const SmallModel& model, Complex guess)
   return sliding;
 }
 
+inline SlidingEquilibrium view_of(const SmallModel& model, const Sliding& sliding)
+{
+  return {model.structure, model.interface, sliding.equilibrium};
+}
+
 inline State mode_start(const Sliding& sliding, double q)
 {
   State state{copy_of(sliding.equilibrium.u.get()), copy_of(sliding.equilibrium.u.get()), 0,

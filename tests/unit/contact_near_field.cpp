@@ -67,7 +67,7 @@ TEST_CASE("sweeps over the near field in single precision end at the answer of W
   const auto result = solve_contact(W, b, pairs, 2, .4, {}, swept);
   CHECK(result.converged);
   CHECK(true_residual(W, b, swept) < 1.01e-10); // another order of summation
-  CHECK(solve_contact(W, b, pairs, 2, .4, {"fixed_point", 1e-12, 20000, 0}, projected).converged);
+  CHECK(solve_contact(W, b, pairs, 2, .4, {ContactSolver::fixed_point, 1e-12, 20000, 0}, projected).converged);
   CHECK(difference(swept, projected) < 1e-8 * *std::max_element(projected.begin(), projected.end())); // cond(W) < 100
   CHECK(std::count_if(swept.begin(), swept.end(), [](double r) { return r == 0; }) > 30); // some pairs are open
 
@@ -116,6 +116,6 @@ TEST_CASE("a pair of infinite free velocity takes no part")
   CHECK(r[out] == 0);
   CHECK(r[out + 1] == 0);
   b[out] = 1e3; // so far open that nothing closes it
-  CHECK(solve_contact(W, b, pairs, 2, .4, {"gauss_seidel", 1e-13, 1000, 0}, elsewhere).converged);
+  CHECK(solve_contact(W, b, pairs, 2, .4, {ContactSolver::gauss_seidel, 1e-13, 1000, 0}, elsewhere).converged);
   CHECK(difference(r, elsewhere) < 1e-8);
 }

@@ -130,8 +130,10 @@ TEST_CASE("Gauss-Seidel and the projection fixed point find the same reactions")
       const std::size_t n = static_cast<std::size_t>(pairs * (1 + directions));
       const Vector W = random_spd(n, .3, random), b = random_velocity(n, random);
       Vector swept, projected;
-      const auto first = solve_contact(W, b, pairs, directions, mu, {"gauss_seidel", 1e-12, 1000, 0}, swept);
-      const auto second = solve_contact(W, b, pairs, directions, mu, {"fixed_point", 1e-12, 20000, 0}, projected);
+      const auto first =
+          solve_contact(W, b, pairs, directions, mu, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, swept);
+      const auto second =
+          solve_contact(W, b, pairs, directions, mu, {ContactSolver::fixed_point, 1e-12, 20000, 0}, projected);
       CHECK(first.converged);
       CHECK(second.converged);
       CHECK(first.residual <= 1e-12);
@@ -152,7 +154,7 @@ TEST_CASE("a converged answer satisfies the residual when w is formed afresh, or
     const double mu = trial % 3 == 0 ? 5 : 1; // coupling far beyond what either solver is sure of
     const Vector W = random_spd(n, 1e-6, random), b = random_velocity(n, random);
     Vector r;
-    const auto result = solve_contact(W, b, pairs, directions, mu, {"gauss_seidel", 1e-10, 2000, 0}, r);
+    const auto result = solve_contact(W, b, pairs, directions, mu, {ContactSolver::gauss_seidel, 1e-10, 2000, 0}, r);
     const double truth = contact_residual(W, relative_velocity(W, b, r), pairs, directions, mu, r);
     CHECK(result.converged == (result.residual <= 1e-10));
     if (result.converged) CHECK(truth < 2e-10); // another order of summation
@@ -167,12 +169,12 @@ TEST_CASE("forces a million times larger or smaller give the same relative answe
   const int pairs = 8;
   const Vector W = random_spd(24, .2, random), b = random_velocity(24, random);
   Vector reference;
-  CHECK(solve_contact(W, b, pairs, 2, .3, {"gauss_seidel", 1e-12, 1000, 0}, reference).converged);
+  CHECK(solve_contact(W, b, pairs, 2, .3, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, reference).converged);
   for (const double factor : {1e6, 1e-6, 1e-20})
   {
     Vector scaled = b, r;
     for (double& value : scaled) value *= factor;
-    CHECK(solve_contact(W, scaled, pairs, 2, .3, {"gauss_seidel", 1e-12, 1000, 0}, r).converged);
+    CHECK(solve_contact(W, scaled, pairs, 2, .3, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, r).converged);
     for (double& value : r) value /= factor;
     CHECK(difference(r, reference) < 1e-10);
   }
@@ -183,7 +185,7 @@ TEST_CASE("a warm start at the solution takes no sweep, and an inadmissible one 
   std::mt19937 random(17);
   const Vector W = random_spd(24, .2, random), b = random_velocity(24, random);
   Vector r;
-  const ContactSettings settings{"gauss_seidel", 1e-12, 1000, 0};
+  const ContactSettings settings{ContactSolver::gauss_seidel, 1e-12, 1000, 0};
   CHECK(solve_contact(W, b, 8, 2, .3, settings, r).converged);
   Vector again = r;
   const auto result = solve_contact(W, b, 8, 2, .3, settings, again);

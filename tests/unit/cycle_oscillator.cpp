@@ -21,7 +21,8 @@ TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
   const Owned<Vec> start = copy_of(a.orbit.state.get()), end = zeros_like(start);
   check(VecScale(displacement(start), 2));
   check(VecScale(velocity(start), 2));
-  PeriodMap map{twice.structure, twice.interface, 100, 0.5};
+  const Equilibrium equilibrium = find_equilibrium(twice.structure, twice.interface, {});
+  PeriodMap map{{twice.structure, twice.interface, equilibrium}, {}, 100, 0.5};
   const Flow flow = flow_of(map);
   flow.integrate(a.orbit.period, start, end, nullptr);
   check(VecAXPY(end, -1, start));

@@ -72,7 +72,7 @@ TEST_CASE("an overturning block: the feet share the weight as statics says, and 
     for (const double friction : {0., .2, .4, .6})
     {
       const auto model = overturning_block(friction, weight);
-      const auto result = find_equilibrium(model.structure, model.interface);
+      const auto result = find_equilibrium(model.structure, model.interface, {});
       CHECK(result.outcome.kind == OutcomeKind::converged);
       const double small = (.5 - friction * .75) * weight, large = weight - small;
       const std::vector<double>& r = result.reactions;
@@ -87,7 +87,7 @@ TEST_CASE("an overturning block: the feet share the weight as statics says, and 
   for (const double friction : {.68, .7, 1., 5.})
   {
     const auto model = overturning_block(friction, 100);
-    const auto result = find_equilibrium(model.structure, model.interface);
+    const auto result = find_equilibrium(model.structure, model.interface, {});
     CHECK(result.outcome.kind == OutcomeKind::no_equilibrium);
     CHECK_FALSE(result.outcome.reason.empty());
   }
@@ -99,7 +99,7 @@ TEST_CASE("pads that partly lift off: every law of the equilibrium, the fixed po
   for (const double load : {1., 1e6, 1e-6})
   {
     const auto model = random_pads(40, .3, load);
-    const auto result = find_equilibrium(model.structure, model.interface);
+    const auto result = find_equilibrium(model.structure, model.interface, {});
     CHECK(result.outcome.kind == OutcomeKind::converged);
     CHECK(result.outcome.residual < 1e-12); // rounding, after settling
     CHECK(result.check_residual < 1e-12);
@@ -134,7 +134,7 @@ TEST_CASE("the oscillator at rest: closed, with the reaction of both springs")
   // y: 1.7 y - 0.1 x = -1 and x: 1.1 x - 0.1 y = mu r, r = -1.2 y
   const double mu = .3, y = -1 / (1.7 - .1 * (.1 - 1.2 * mu) / 1.1), r = -1.2 * y;
   const auto model = test::unilateral_oscillator(mu, .6);
-  const auto result = find_equilibrium(model.structure, model.interface);
+  const auto result = find_equilibrium(model.structure, model.interface, {});
   CHECK(result.outcome.kind == OutcomeKind::converged);
   CHECK(std::abs(result.reactions[0] - r) < 1e-14);
   CHECK(std::abs(result.reactions[1] - mu * r) < 1e-14);
@@ -144,12 +144,12 @@ TEST_CASE("the oscillator at rest: closed, with the reaction of both springs")
 TEST_CASE("a chain that stands on the ground alone carries its weight; lifted, it has no equilibrium")
 {
   const auto standing = test::mass_spring_chain(9, 2, 1e9, 1e-3, -9.81);
-  const auto result = find_equilibrium(standing.structure, standing.interface);
+  const auto result = find_equilibrium(standing.structure, standing.interface, {});
   CHECK(result.outcome.kind == OutcomeKind::converged);
   CHECK(std::abs(result.reactions[0] - 16 * 9.81) < 1e-9); // 8 masses in all; mass times 1e-12
   CHECK(std::abs(whole(result.u)[0] + 1e-3) < 1e-15);
   const auto lifted = test::mass_spring_chain(9, 2, 1e9, 1e-3, 9.81);
-  CHECK(find_equilibrium(lifted.structure, lifted.interface).outcome.kind == OutcomeKind::no_equilibrium);
+  CHECK(find_equilibrium(lifted.structure, lifted.interface, {}).outcome.kind == OutcomeKind::no_equilibrium);
 }
 
 TEST_CASE("far from contact nothing is closed, and a body that nothing can hold is named")
@@ -157,11 +157,11 @@ TEST_CASE("far from contact nothing is closed, and a body that nothing can hold 
   const test::Rows K = {{3, -1, 0}, {-1, 2, 0}, {0, 0, 0}}, held = {{3, -1, 0}, {-1, 2, 0}, {0, 0, 1}};
   const test::Rows B = {{1, 0, 0}, {0, 1, 0}};
   const auto open = test::make_structure(held, held, held, {-1, -2, 0});
-  const auto result = find_equilibrium(open, test::make_interface(B, 1, {5}, {1}, .3, open.K));
+  const auto result = find_equilibrium(open, test::make_interface(B, 1, {5}, {1}, .3, open.K), {});
   CHECK(result.outcome.kind == OutcomeKind::converged);
   CHECK(result.closed == std::vector<char>{0});
   CHECK(result.outcome.residual == 0);
   const auto loose = test::make_structure(held, held, K, {-1, -2, 0});
   const auto interface = test::make_interface(B, 1, {0}, {1}, .3, loose.K);
-  CHECK_THROWS_WITH_AS(find_equilibrium(loose, interface), doctest::Contains("dof 2"), Error);
+  CHECK_THROWS_WITH_AS(find_equilibrium(loose, interface, {}), doctest::Contains("dof 2"), Error);
 }

@@ -1,6 +1,7 @@
 // ranks: 1 2 3
 #include "squeal/transient/estimate.hpp"
 #include "../support/about.hpp"
+#include "../support/linearised.hpp"
 #include "../support/sliding_oscillator.hpp"
 
 #include <cmath>
@@ -27,10 +28,10 @@ Found estimate_of(double mu, double belt_speed)
   found.equilibrium = sliding_equilibrium(oscillator);
   ModesSettings settings;
   settings.band = 1;
-  Modes modes = find_modes(oscillator.structure, oscillator.interface, found.equilibrium, settings);
+  Modes modes = test::modes_of(oscillator, found.equilibrium, settings, {});
   found.mode = std::move(modes.modes.at(0));
   found.per_y = std::hypot(whole(found.mode.real)[1], whole(found.mode.imaginary)[1]);
-  found.estimate = estimate_amplitude(oscillator.structure, oscillator.interface, found.equilibrium, found.mode);
+  found.estimate = test::estimate_of(oscillator, found.equilibrium, found.mode);
   return found;
 }
 

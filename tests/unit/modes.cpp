@@ -1,9 +1,10 @@
 // ranks: 1 2 3
 #include "squeal/modes/modes.hpp"
+#include "../support/linearised.hpp"
 #include "../support/sliding_oscillator.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/algebra/quadratic_residual.hpp"
-#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <cmath>
@@ -77,7 +78,7 @@ ModesSettings settings_of(ModesMethod method)
 TEST_CASE("B_n Z = 0 and (B_n + mu e.B_t) Y = 0, though every pair shares its degrees of freedom with the others")
 {
   const SmallModel model = crowded_model(12, 3);
-  const ClosedContact closed = eliminate_closed_pairs(model.structure, model.interface, all_closed(model));
+  const ClosedContact closed = eliminate_closed_pairs(model.structure, model.interface, all_closed(model).closed);
   Owned<Mat> BZ, BY;
   check(MatMatMult(model.interface.B, closed.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
   check(MatMatMult(model.interface.B, closed.Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BY.put()));
@@ -96,10 +97,11 @@ TEST_CASE("the equations of the structure hold with the reactions of each mode, 
 {
   const SmallModel model = crowded_model(12, 3);
   const Equilibrium equilibrium = all_closed(model);
-  const Modes modes = find_modes(model.structure, model.interface, equilibrium, settings_of(ModesMethod::full));
+  const Modes modes = test::modes_of(model, equilibrium, settings_of(ModesMethod::full), {});
   Owned<Mat> C;
   check(MatDuplicate(model.structure.C, MAT_COPY_VALUES, C.put()));
-  check(MatAXPY(C, 1, direction_damping(model.interface, equilibrium), UNKNOWN_NONZERO_PATTERN));
+  check(MatAXPY(C, 1, direction_damping(model.interface, equilibrium.closed, equilibrium.reactions),
+                UNKNOWN_NONZERO_PATTERN));
   REQUIRE(modes.modes.size() == 9);
   for (const ComplexMode& mode : modes.modes)
   {
@@ -126,7 +128,8 @@ TEST_CASE("the equations of the structure hold with the reactions of each mode, 
 TEST_CASE("C_f resists turning of the friction force and nothing else")
 {
   const SmallModel model = crowded_model(12, 1);
-  const Owned<Mat> Cf = direction_damping(model.interface, all_closed(model));
+  const Equilibrium equilibrium = all_closed(model);
+  const Owned<Mat> Cf = direction_damping(model.interface, equilibrium.closed, equilibrium.reactions);
   const Owned<Vec> v = vector_like(model.structure.K, {1, -2, .5, 3, 1, 0, 0, 0, 0, 0, 0, 0}), force = zeros_like(v);
   check(MatMult(Cf, v, force));
   double power = 0;
@@ -144,14 +147,14 @@ TEST_CASE("a pair that the others already hold is an error that names it")
   Rows twice = one;
   twice.insert(twice.end(), one.begin(), one.end());
   model.interface = make_interface(twice, 2, {0, 0}, {1, 0, 1, 0}, .3, model.structure.K);
-  CHECK_THROWS_WITH_AS(eliminate_closed_pairs(model.structure, model.interface, all_closed(model)),
+  CHECK_THROWS_WITH_AS(eliminate_closed_pairs(model.structure, model.interface, all_closed(model).closed),
                        doctest::Contains("contact pair 1"), Error);
 }
 
 TEST_CASE("projection on all real modes is the full problem")
 {
   const SmallModel model = crowded_model(30, 3);
-  const Modes modes = find_modes(model.structure, model.interface, all_closed(model), settings_of(ModesMethod::both));
+  const Modes modes = test::modes_of(model, all_closed(model), settings_of(ModesMethod::both), {});
   REQUIRE(modes.modes.size() == 27);
   REQUIRE(modes.projected.size() == 27);
   for (std::size_t i = 0; i < modes.modes.size(); ++i)
@@ -172,7 +175,7 @@ TEST_CASE("residual passes bring the growth rate of a truncated basis to that of
   for (const int passes : {0, 1, 2, 3})
   {
     settings.residual_passes = passes;
-    const Modes modes = find_modes(model.structure, model.interface, all_closed(model), settings);
+    const Modes modes = test::modes_of(model, all_closed(model), settings, {});
     REQUIRE(modes.projected.size() == modes.modes.size());
     double error = 0;
     for (const ComplexMode& mode : modes.projected) error = std::max(error, mode.backward_error);
@@ -185,13 +188,11 @@ TEST_CASE("residual passes bring the growth rate of a truncated basis to that of
 TEST_CASE("Krylov and LAPACK find the same real modes, M-normalised and closed")
 {
   const SmallModel model = crowded_model(60, 3);
-  const auto below = [&](double band)
-  { return find_real_modes_below(model.structure, model.interface, all_closed(model), band); };
-  const RealModes all = below(10);
+  const auto below = [&](double band, const ModesOptions& options)
+  { return test::real_modes_of(model, all_closed(model), band, options); };
+  const RealModes all = below(10, {});
   REQUIRE(all.omega.size() >= 10);
-  check(PetscOptionsSetValue(nullptr, "-modes_dense_limit", "0"));
-  const RealModes krylov = below((all.omega[9] + 1e-6) / (2 * M_PI));
-  check(PetscOptionsClearValue(nullptr, "-modes_dense_limit"));
+  const RealModes krylov = below((all.omega[9] + 1e-6) / (2 * M_PI), {.dense_limit = 0});
   CHECK(krylov.outcome.kind == OutcomeKind::converged);
   REQUIRE(krylov.omega.size() == 10);
   for (std::size_t k = 0; k < 10; ++k)
@@ -212,16 +213,15 @@ TEST_CASE("a free body moves at no cost: its real mode is 0, and no complex mode
   apart.u = zeros_like(bar.structure.load);
   apart.reactions = {0, 0};
   apart.closed = {0};
-  for (const char* limit : {"200", "0"})
+  for (const PetscInt limit : {200, 0})
   {
-    check(PetscOptionsSetValue(nullptr, "-modes_dense_limit", limit));
+    const ModesOptions options{.dense_limit = limit};
     // 20 sin(4 pi/58) = 4.3, 20 sin(5 pi/58) = 5.4
-    const RealModes real = find_real_modes_below(bar.structure, bar.interface, apart, 5 / (2 * M_PI));
+    const RealModes real = test::real_modes_of(bar, apart, 5 / (2 * M_PI), options);
     ModesSettings settings = settings_of(ModesMethod::both);
     settings.band = 3;
     settings.real_modes = 10;
-    const Modes modes = find_modes(bar.structure, bar.interface, apart, settings);
-    check(PetscOptionsClearValue(nullptr, "-modes_dense_limit"));
+    const Modes modes = test::modes_of(bar, apart, settings, options);
     REQUIRE(real.omega.size() == 5);
     CHECK(real.omega[0] < 1e-5); // square root of rounding
     for (std::size_t k = 1; k < 5; ++k)

@@ -1,6 +1,10 @@
 // ranks: 1 2 3
+#include "squeal/model.hpp"
+#include "squeal/report/fields.hpp"
 #include "squeal/report/files.hpp"
-#include "squeal/report/parts.hpp"
+#include "squeal/report/history.hpp"
+#include "squeal/report/json.hpp"
+#include "squeal/report/table.hpp"
 
 #include <cmath>
 #include <cstdlib>
@@ -122,12 +126,17 @@ History history_of(std::size_t steps)
 }
 
 /// Every stage ran.
+FieldNodes nodes_of(const Model& model)
+{
+  return {model.mesh, model.dofs, model.structure};
+}
+
 Report full_report(const Model& model)
 {
   Report report;
-  report.dofs = model.dofs.size;
-  report.pairs = 2;
-  report.elements = static_cast<long>(model.mesh.elements.size());
+  report.model.dofs = model.dofs.size;
+  report.model.pairs = 2;
+  report.model.elements = static_cast<long>(model.mesh.elements.size());
   report.equilibrium.outcome = {OutcomeKind::converged, "", 3, 1e-12};
   report.equilibrium.u = ramp(model, 1);
   report.equilibrium.reactions = {3, 0.6, 0, 0, 0, 0, 7, 1.4, 0};
@@ -140,7 +149,7 @@ Report full_report(const Model& model)
   mode.imaginary = ramp(model, 3);
   report.modes.modes.push_back(std::move(mode));
   report.modes.unstable_count = 1;
-  report.estimate.outcome = {OutcomeKind::no_balance, "the curve has no root", 0, 0};
+  report.estimates.emplace_back().outcome = {OutcomeKind::no_balance, "the curve has no root", 0, 0};
   report.transient.outcome = {OutcomeKind::completed, "", 10, 1e-11};
   report.transient.growth_rate_fit = std::numeric_limits<double>::quiet_NaN();
   report.transient.history = history_of(11);
@@ -198,7 +207,7 @@ TEST_CASE("fields: every set the XDMF names is in the file with that shape, and 
 {
   const Folder folder;
   const Model model = one_of_each();
-  write_results(full_report(model), scene_of_test(), model, folder.path, PETSC_COMM_WORLD);
+  write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path, PETSC_COMM_WORLD);
   if (rank_of(PETSC_COMM_WORLD) != 0) return;
 
   const std::string xdmf = text_of(folder.path / "fields.xdmf");
@@ -231,7 +240,7 @@ TEST_CASE("history: one entry a step, statuses as step by pair")
 {
   const Folder folder;
   const Model model = one_of_each();
-  write_results(full_report(model), scene_of_test(), model, folder.path, PETSC_COMM_WORLD);
+  write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path, PETSC_COMM_WORLD);
   if (rank_of(PETSC_COMM_WORLD) != 0) return;
   const hid_t file = H5Fopen((folder.path / "history.h5").c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   std::vector<hsize_t> shape;
@@ -284,9 +293,9 @@ TEST_CASE("the table never shows figures of a cycle that did not converge")
 {
   const Model model = one_of_each();
   Report report = full_report(model);
-  CHECK(summary(report, scene_of_test()).find("mean energy") != std::string::npos);
+  CHECK(table(report, scene_of_test()).find("mean energy") != std::string::npos);
   report.cycle.outcome = {OutcomeKind::not_converged, "the residual stalled", 9, 0.1};
-  const std::string text = summary(report, scene_of_test());
+  const std::string text = table(report, scene_of_test());
   CHECK(text.find("mean energy") == std::string::npos);
   CHECK(text.find("NOT CONVERGED: the residual stalled") != std::string::npos);
 }
@@ -296,12 +305,14 @@ TEST_CASE("a folder that cannot be written is an error on every rank, and nothin
   const Folder folder;
   const Model model = one_of_each();
   on_rank_zero(PETSC_COMM_WORLD, [&] { write_text(folder.path / "taken", "a file where the folder should be"); });
-  CHECK_THROWS_AS(write_results(full_report(model), scene_of_test(), model, folder.path / "taken", PETSC_COMM_WORLD),
-                  Error);
+  CHECK_THROWS_AS(
+      write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path / "taken", PETSC_COMM_WORLD),
+      Error);
   // A folder in the place of a result file: the file's move fails, its draft must go.
   on_rank_zero(PETSC_COMM_WORLD, [&] { fs::create_directories(folder.path / "out" / "history.h5" / "full"); });
-  CHECK_THROWS_AS(write_results(full_report(model), scene_of_test(), model, folder.path / "out", PETSC_COMM_WORLD),
-                  Error);
+  CHECK_THROWS_AS(
+      write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path / "out", PETSC_COMM_WORLD),
+      Error);
   if (rank_of(PETSC_COMM_WORLD) != 0) return;
   CHECK_FALSE(fs::exists(folder.path / "out" / "history.h5.part"));
   CHECK_FALSE(fs::exists(folder.path / "out" / "report.json"));
@@ -312,9 +323,9 @@ TEST_CASE("a matrix scene has no mesh to draw: fields of an earlier run are remo
   const Folder folder;
   const Model model = one_of_each();
   Scene scene = scene_of_test();
-  write_results(full_report(model), scene, model, folder.path, PETSC_COMM_WORLD);
+  write_results(full_report(model), scene, nodes_of(model), folder.path, PETSC_COMM_WORLD);
   scene.matrices = folder.path;
-  write_results(full_report(model), scene, model, folder.path, PETSC_COMM_WORLD);
+  write_results(full_report(model), scene, nodes_of(model), folder.path, PETSC_COMM_WORLD);
   CHECK_FALSE(fs::exists(folder.path / "fields.h5"));
   CHECK(fs::exists(folder.path / "report.json"));
 }

@@ -99,10 +99,10 @@ TEST_CASE("a state file that cannot be used says why on every rank")
 TEST_CASE("a step size or theta without meaning is an error")
 {
   const auto model = test::unilateral_oscillator(.3, .6);
-  check_error([&] { (void)make_theta_step(model.structure, model.interface, 0, .5); }, "time step");
-  check_error([&] { (void)make_theta_step(model.structure, model.interface, std::nan(""), .5); }, "time step");
-  check_error([&] { (void)make_theta_step(model.structure, model.interface, .1, 0); }, "theta");
-  check_error([&] { (void)make_theta_step(model.structure, model.interface, .1, 1.5); }, "theta");
+  check_error([&] { (void)make_theta_step(model.structure, model.interface, 0, .5, {}); }, "time step");
+  check_error([&] { (void)make_theta_step(model.structure, model.interface, std::nan(""), .5, {}); }, "time step");
+  check_error([&] { (void)make_theta_step(model.structure, model.interface, .1, 0, {}); }, "theta");
+  check_error([&] { (void)make_theta_step(model.structure, model.interface, .1, 1.5, {}); }, "theta");
 }
 
 TEST_CASE(
@@ -128,7 +128,7 @@ TEST_CASE("in free flight every theta follows its discrete eigenvalue exactly")
     const std::complex<double> lambda(-.1, std::sqrt(4 - .01)); // lambda^2 + .05 * 4 lambda + 4 = 0
     const std::complex<double> end = std::exp(discrete_eigenvalue(lambda, theta, h) * 7. * h);
     State state = state_of(model.structure, {1, -1}, {lambda.real(), -lambda.real()});
-    const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta);
+    const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, {});
     CHECK(test::run_steps(model, step, 7, state) == 0);
     CHECK(whole(state.u)[0] == about(end.real(), 1e-13));
     CHECK(whole(state.v)[1] == about(-(lambda * end).real(), 1e-13));
@@ -138,7 +138,7 @@ TEST_CASE("in free flight every theta follows its discrete eigenvalue exactly")
 TEST_CASE("trajectories stepped together follow those stepped alone, through contact and free flight")
 {
   const auto model = test::unilateral_oscillator(.3, .6);
-  const ThetaStep step = make_theta_step(model.structure, model.interface, .015, .5);
+  const ThetaStep step = make_theta_step(model.structure, model.interface, .015, .5, {});
   std::vector<State> together, alone;
   std::vector<StepWork> works;
   for (const double scale : {.1, 1., 3.})
@@ -169,7 +169,7 @@ TEST_CASE("a trajectory is the same by every kind of factor, through contact and
   const auto end = [&](const char* kind)
   {
     const test::Option factor("-factor", kind);
-    const ThetaStep step = make_theta_step(model.structure, model.interface, .015, .5);
+    const ThetaStep step = make_theta_step(model.structure, model.interface, .015, .5, {});
     State state = state_of(model.structure, {3, -.5, -.5}, {0, 3, 0});
     CHECK(test::run_steps(model, step, 500, state) == 0);
     return std::pair(whole(state.u), whole(state.v));

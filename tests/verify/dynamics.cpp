@@ -15,17 +15,6 @@ using test::at_three_tenths, test::Complex, test::mode_start, test::persistent_s
 namespace
 {
 
-/// PETSc options for as long as it lives.
-struct WithOption
-{
-  std::string name;
-  WithOption(const std::string& option, const std::string& value) : name(option)
-  {
-    check(PetscOptionsSetValue(nullptr, name.c_str(), value.c_str()));
-  }
-  ~WithOption() { (void)PetscOptionsClearValue(nullptr, name.c_str()); }
-};
-
 /// The gap of pair 0 of a state.
 double gap_of(const Interface& interface, Vec u)
 {
@@ -46,7 +35,7 @@ TEST_CASE("a falling mass meets the ground in the step of its impact, and stays"
 {
   const auto model = test::mass_spring_chain(1, 2, 0, 1, -9.81);
   const double h = 4e-3, impact = std::sqrt(2 / 9.81);
-  const ThetaStep step = make_theta_step(model.structure, model.interface, h, .5);
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, .5, {});
   State state = state_of(model.structure, {0}, {0});
   StepWork work = begin_steps(step, model.structure, model.interface, state);
   double first = 0;
@@ -69,14 +58,13 @@ TEST_CASE("a falling mass meets the ground in the step of its impact, and stays"
 
 TEST_CASE("a pressed mass stays pressed, whatever the rounding of its gap")
 {
-  for (const char* law : {"displacement", "velocity"})
+  for (const ContactLaw law : {ContactLaw::displacement, ContactLaw::velocity})
     for (const double gap : {0., 1e-20, -1e-20})
     {
-      CAPTURE(law);
+      CAPTURE(word(law));
       CAPTURE(gap);
-      const WithOption option("-transient_contact_law", law);
       const auto model = test::mass_spring_chain(1, 2, 0, gap, -9.81);
-      const ThetaStep step = make_theta_step(model.structure, model.interface, 1e-3, .5);
+      const ThetaStep step = make_theta_step(model.structure, model.interface, 1e-3, .5, {.law = law});
       State state = state_of(model.structure, {0}, {0});
       StepWork work = begin_steps(step, model.structure, model.interface, state);
       for (int i = 0; i < 8; ++i)
@@ -105,7 +93,7 @@ Bounce bouncing_bar(int elements)
   const auto model = test::mass_spring_chain(elements + 1, length, 900 / length, 5, -10);
   const std::vector<double> zero(static_cast<std::size_t>(elements) + 1, 0);
   const int steps_per_second = 10 * elements; // h = .3 of an element's length over the wave speed
-  const ThetaStep step = make_theta_step(model.structure, model.interface, 1. / steps_per_second, .5);
+  const ThetaStep step = make_theta_step(model.structure, model.interface, 1. / steps_per_second, .5, {});
   State state = state_of(model.structure, zero, zero);
   StepWork work = begin_steps(step, model.structure, model.interface, state);
   Bounce bounce;
@@ -149,21 +137,20 @@ TEST_CASE("a bouncing bar takes off when its wave comes back, and loses an energ
 
 TEST_CASE("the velocity law penetrates by what an impact covers in a step, the displacement law not at all")
 {
-  const auto penetration = [](const char* law, double h)
+  const auto penetration = [](ContactLaw law, double h)
   {
-    const WithOption option("-transient_contact_law", law);
     const auto model = test::mass_spring_chain(1, 2, 0, 1, -9.81);
-    const ThetaStep step = make_theta_step(model.structure, model.interface, h, .5);
+    const ThetaStep step = make_theta_step(model.structure, model.interface, h, .5, {.law = law});
     State state = state_of(model.structure, {0}, {0});
     test::run_steps(model, step, static_cast<int>(.6 / h), state);
     return -gap_of(model.interface, state.u);
   };
   const double speed = std::sqrt(2 * 9.81);
-  CHECK(std::abs(penetration("displacement", 8e-3)) < 1e-13);
+  CHECK(std::abs(penetration(ContactLaw::displacement, 8e-3)) < 1e-13);
   for (const double h : {8e-3, 2e-3})
   {
-    CHECK(std::abs(penetration("velocity", h)) > .01 * speed * h);
-    CHECK(std::abs(penetration("velocity", h)) < speed * h);
+    CHECK(std::abs(penetration(ContactLaw::velocity, h)) > .01 * speed * h);
+    CHECK(std::abs(penetration(ContactLaw::velocity, h)) < speed * h);
   }
 }
 
@@ -173,7 +160,7 @@ TEST_CASE("a sliding brick stops where and when Coulomb says")
   test::SmallModel model;
   model.structure = test::make_structure(test::diagonal({3, 3}), test::zeros(2, 2), test::zeros(2, 2), {-3 * g, 0});
   model.interface = test::make_interface({{1, 0}, {0, 1}}, 1, {0}, {0}, mu, model.structure.K);
-  const ThetaStep step = make_theta_step(model.structure, model.interface, h, .5);
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, .5, {});
   State state = state_of(model.structure, {0, 0}, {0, v0});
   StepWork work = begin_steps(step, model.structure, model.interface, state);
   double stopped = 0;
@@ -195,7 +182,7 @@ namespace
 /// A mass on a belt, pressed with 2 N and held by springs along and across it: sliding, friction turns with its swing
 /// across. Ends after a second, and what friction took beside what it brought; the work it should have taken is
 /// h mu r_n |s_theta|.
-std::vector<double> swung_across(int steps, double& worst)
+std::vector<double> swung_across(int steps, Opposed opposed, double& worst)
 {
   const double mu = .5, h = 1. / steps, theta = .5;
   const std::vector<double> belt = {1, 0};
@@ -203,7 +190,7 @@ std::vector<double> swung_across(int steps, double& worst)
   model.structure =
       test::make_structure(test::diagonal({1, 1, 1}), test::zeros(3, 3), test::diagonal({1, 30, 50}), {-2, 0, 0});
   model.interface = test::make_interface({{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, 2, {0}, belt, mu, model.structure.K);
-  const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta);
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, {.opposed = opposed});
   State state = state_of(model.structure, {0, 0, .05}, {0, 0, .3});
   StepWork work = begin_steps(step, model.structure, model.interface, state);
   worst = 0;
@@ -225,10 +212,10 @@ std::vector<double> swung_across(int steps, double& worst)
 }
 
 /// The error across the belt at n steps over that at twice as many, from the change on halving.
-double error_ratio(int steps, double& worst)
+double error_ratio(int steps, Opposed opposed, double& worst)
 {
-  const double coarse = swung_across(steps, worst)[2], middle = swung_across(2 * steps, worst)[2],
-               fine = swung_across(4 * steps, worst)[2];
+  const double coarse = swung_across(steps, opposed, worst)[2], middle = swung_across(2 * steps, opposed, worst)[2],
+               fine = swung_across(4 * steps, opposed, worst)[2];
   return std::abs((coarse - middle) / (middle - fine));
 }
 
@@ -237,23 +224,23 @@ double error_ratio(int steps, double& worst)
 TEST_CASE("sliding is of second order where friction turns, and friction takes mu r_n |s_theta|; by s+ of first")
 {
   double worst = 0;
-  CHECK(error_ratio(50, worst) == doctest::Approx(4).epsilon(.05)); // the next order is h^2 of it, and the least phase
+  CHECK(error_ratio(50, Opposed::theta, worst) ==
+        doctest::Approx(4).epsilon(.05)); // the next order is h^2 of it, and the least phase
   CHECK(worst < 1e-14);
-  const WithOption end("-transient_friction", "end");
-  CHECK(error_ratio(50, worst) == doctest::Approx(2).epsilon(.1)); // mixed with the second order of the rest
+  CHECK(error_ratio(50, Opposed::end, worst) ==
+        doctest::Approx(2).epsilon(.1)); // mixed with the second order of the rest
   CHECK(worst > 1e-8);
 }
 
 TEST_CASE("the energy identity holds in every step: lift-off, touch, stick and slip, any theta, both laws")
 {
-  for (const char* law : {"displacement", "velocity"})
+  for (const ContactLaw law : {ContactLaw::displacement, ContactLaw::velocity})
     for (const double theta : {.5, .55, 1.})
     {
-      const WithOption option("-transient_contact_law", law);
       const auto model = test::unilateral_oscillator(.3, .6);
       const Structure& structure = model.structure;
       const double h = .05;
-      const ThetaStep step = make_theta_step(structure, model.interface, h, theta);
+      const ThetaStep step = make_theta_step(structure, model.interface, h, theta, {.law = law});
       State state = state_of(structure, {-.5, 1, -.3}, {.3, -.2, .6});
       StepWork work = begin_steps(step, structure, model.interface, state);
       int open = 0, stick = 0, slip = 0;
@@ -281,7 +268,7 @@ TEST_CASE("the energy identity holds in every step: lift-off, touch, stick and s
         worst_reported = std::max(worst_reported, std::abs(report.energy_defect) / report.energy);
       }
       CAPTURE(theta);
-      CAPTURE(law);
+      CAPTURE(word(law));
       CHECK(open * slip > 0);
       if (theta == .5) CHECK(stick > 0);
       CHECK(worst < 1e-12);
@@ -298,8 +285,8 @@ TEST_CASE("a mode grows in persistent sliding at its discrete rate, fitted over 
   TransientSettings settings;
   settings.periods = 5.2;
   settings.steps_per_period = 50;
-  const Trajectory run = integrate(model.structure, model.interface, sliding.equilibrium, &sliding.mode, settings,
-                                   mode_start(sliding, .05), nullptr);
+  const Trajectory run =
+      integrate(test::view_of(model, sliding), &sliding.mode, settings, {}, mode_start(sliding, .05), nullptr);
   CHECK(run.outcome.kind == OutcomeKind::completed);
   CHECK(run.steps == 260);
   CHECK(run.history.open.back() + run.history.stick.back() == 0);
@@ -320,21 +307,22 @@ TEST_CASE("theta = .51 with 50 steps a period hides a weak instability, as predi
   settings.periods = 5;
   settings.steps_per_period = 50;
   settings.theta = .51;
-  const Trajectory run = integrate(model.structure, model.interface, sliding.equilibrium, &sliding.mode, settings,
-                                   mode_start(sliding, .05), nullptr);
+  const Trajectory run =
+      integrate(test::view_of(model, sliding), &sliding.mode, settings, {}, mode_start(sliding, .05), nullptr);
   CHECK(run.outcome.kind == OutcomeKind::refused);
   CHECK(run.outcome.reason.find("2 pi (theta - 1/2) omega/sigma") != std::string::npos);
   CHECK(run.steps == 0);
 
   // marched all the same, it decays at the discrete rate
   const ThetaStep step =
-      make_theta_step(model.structure, model.interface, 2 * std::numbers::pi / (50 * omega), settings.theta);
+      make_theta_step(model.structure, model.interface, 2 * std::numbers::pi / (50 * omega), settings.theta, {});
   State state = mode_start(sliding, .05);
   History history;
   ModeAmplitude amplitude = follow(model.structure, sliding.equilibrium, sliding.mode);
-  march(step, model.structure, model.interface, sliding.equilibrium, nullptr, 260, state, history,
-        [&](const State& now, const StepReport&, const StepWork& work)
-        { observe(amplitude, now.time, work.Ku, work.Mv); });
+  march(step, test::view_of(model, sliding), 260, state,
+        {nullptr, history, [&](const State& now, const StepReport&, const StepWork& work) {
+           observe(amplitude, now.time, work.Ku, work.Mv);
+         }});
   const double predicted = discrete_eigenvalue(sliding.mode.lambda, .51, step.h).real();
   CHECK(predicted < 0);
   CHECK(growth_rate(amplitude, 2 * std::numbers::pi / omega) == about(predicted, 1e-6));
@@ -348,7 +336,7 @@ TEST_CASE("between events the trajectory converges with the square of the step")
   const Complex end = q * std::exp(sliding.mode.lambda * time);
   const auto error = [&](int steps)
   {
-    const ThetaStep step = make_theta_step(model.structure, model.interface, time / steps, .5);
+    const ThetaStep step = make_theta_step(model.structure, model.interface, time / steps, .5, {});
     State state = mode_start(sliding, q);
     test::run_steps(model, step, steps, state);
     Owned<Vec> difference = copy_of(state.u.get());
@@ -365,29 +353,30 @@ TEST_CASE("between events the trajectory converges with the square of the step")
 TEST_CASE("the two contact solvers give one trajectory")
 {
   const auto model = test::unilateral_oscillator(.3, .6);
-  const auto end = [&](const char* solver)
+  const auto end = [&](ContactSolver solver)
   {
-    const WithOption option("-transient_contact_solver", solver);
-    const ThetaStep step = make_theta_step(model.structure, model.interface, .03, .5);
+    StepOptions options;
+    options.contact.solver = solver;
+    const ThetaStep step = make_theta_step(model.structure, model.interface, .03, .5, options);
     State state = state_of(model.structure, {-.5, 1, -.3}, {.3, -.2, .6});
     CHECK(test::run_steps(model, step, 200, state) == 0);
     return whole(state.u);
   };
-  const auto a = end("gauss_seidel"), b = end("fixed_point");
+  const auto a = end(ContactSolver::gauss_seidel), b = end(ContactSolver::fixed_point);
   for (std::size_t i = 0; i < 3; ++i) CHECK(std::abs(a[i] - b[i]) < 1e-8); // contact tolerance, piled up
 }
 
 TEST_CASE("contact that does not converge is an outcome, not a crash")
 {
-  const WithOption solver("-transient_contact_solver", "fixed_point");
-  const WithOption limit("-transient_contact_max_it", "1"), tolerance("-transient_contact_tolerance", "1e-300");
+  StepOptions options;
+  options.contact = {ContactSolver::fixed_point, 1e-300, 1, 0, 2};
   const auto model = test::unilateral_oscillator(.3, .6);
   const Sliding sliding = persistent_sliding(model, at_three_tenths);
   TransientSettings settings;
   settings.steps = 20;
   settings.step_size = .05;
-  const Trajectory run = integrate(model.structure, model.interface, sliding.equilibrium, nullptr, settings,
-                                   mode_start(sliding, .05), nullptr);
+  const Trajectory run =
+      integrate(test::view_of(model, sliding), nullptr, settings, options, mode_start(sliding, .05), nullptr);
   CHECK(run.outcome.kind == OutcomeKind::not_converged);
   CHECK(run.outcome.reason.find("first at t = ") != std::string::npos);
   CHECK(run.steps == 20);

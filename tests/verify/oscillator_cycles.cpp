@@ -25,12 +25,11 @@ TEST_CASE("long integration of the unilateral oscillator falls on its exact limi
   {
     const auto model = test::unilateral_oscillator(exact.mu, exact.speed);
     const test::Sliding sliding = test::persistent_sliding(model, test::at_three_tenths);
-    const ThetaStep step = make_theta_step(model.structure, model.interface, exact.period / 400, .5);
+    const ThetaStep step = make_theta_step(model.structure, model.interface, exact.period / 400, .5, {});
     State state = test::mode_start(sliding, 2 * exact.speed);
     const Owned<Mat> probe = test::sparse({{1, 0, 0}}, {{1, 0, 0}});
     History history;
-    march(step, model.structure, model.interface, sliding.equilibrium, probe, 400 * (exact.free_periods + 10), state,
-          history, nullptr);
+    march(step, test::view_of(model, sliding), 400 * (exact.free_periods + 10), state, {probe, history, nullptr});
     const std::vector<double>&x = history.probes[0], &energy = history.energy;
     const auto settled = static_cast<std::size_t>(400 * exact.free_periods);
     double mean_x = 0, mean_energy = 0;

@@ -1,6 +1,7 @@
 // ranks: 1 2 3
 // Published and exact eigenvalues of sliding systems.
 #include "../support/flutter_chain.hpp"
+#include "../support/linearised.hpp"
 #include "../support/sliding_oscillator.hpp"
 #include "squeal/modes/modes.hpp"
 #include "squeal/modes/quadratic.hpp"
@@ -110,7 +111,7 @@ TEST_CASE("the unilateral oscillator slides into flutter at the exact friction c
   const auto modes_at = [&](double mu)
   {
     const SmallModel oscillator = unilateral_oscillator(mu, 1);
-    return find_modes(oscillator.structure, oscillator.interface, sliding_equilibrium(oscillator), settings);
+    return test::modes_of(oscillator, sliding_equilibrium(oscillator), settings, {});
   };
   const Modes modes = modes_at(.3);
   REQUIRE(modes.modes.size() == 2);

@@ -14,6 +14,7 @@
 /// Problems with the same W are solved together: each row of W that is read serves all of them.
 ///
 /// Caveat: neither is sure to converge where mu couples sliding and pressure strongly; the result says so.
+#include "squeal/base/options.hpp"
 #include "squeal/contact/pair_law.hpp"
 
 #include <cstddef>
@@ -24,14 +25,29 @@
 namespace squeal
 {
 
+enum class ContactSolver
+{
+  gauss_seidel,
+  fixed_point,
+};
+
+inline constexpr std::array contact_solver_words = {"gauss_seidel", "fixed_point"};
+
+inline Words words_of(ContactSolver)
+{
+  return contact_solver_words;
+}
+
 struct ContactSettings
 {
-  std::string solver = "gauss_seidel"; // block Gauss-Seidel, or the paper's "fixed_point"
-  double tolerance = 1e-10;            // on the residual
-  int max_iterations = 1000;
-  double rho = 0;        // of the fixed point, over 1/lambda_max(W); 0: chosen, and halved when the residual grows
-  int extrapolation = 2; // highest order of the warm start's extrapolation in time
+  ContactSolver solver = ContactSolver::gauss_seidel;
+  double tolerance = 1e-10; // on the residual
+  PetscInt max_iterations = 1000;
+  double rho = 0;             // of the fixed point, over 1/lambda_max(W); 0: chosen, and halved when the residual grows
+  PetscInt extrapolation = 2; // highest order of the warm start's extrapolation in time
 };
+
+OptionList options_of(ContactSettings& settings);
 
 struct ContactResult
 {

@@ -30,13 +30,13 @@ struct LimitCycle
 /// The brake about its sliding equilibrium, and what is asked of its cycle.
 struct CycleProblem
 {
-  const Structure& structure;
-  const Interface& interface;
-  const Equilibrium& equilibrium;
+  SlidingEquilibrium sliding;
+  const LinearisedSliding& linearised;
   const std::vector<ComplexMode>& modes;
-  std::span<const ComplexMode> unstable; // the first of the modes; the cycle follows the very first
-  const Estimate& estimate;              // of the followed mode
+  UnstableModes unstable; // the first of the modes; the cycle follows the very first
   const CycleSettings& settings;
+  const StepOptions& step;
+  const ModesOptions& modes_options; // of the preconditioner's real modes
   Mat probes = nullptr;
 };
 

@@ -25,7 +25,6 @@ struct Recording
 };
 
 /// Integrates a period from the state `start`. `rate`: dPhi/dperiod at its end, or null.
-MeasuredPeriod measure_period(PeriodMap& map, const Equilibrium& equilibrium, const Recording& recording, double period,
-                              Vec start, Vec rate);
+MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double period, Vec start, Vec rate);
 
 } // namespace squeal

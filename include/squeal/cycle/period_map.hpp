@@ -12,14 +12,13 @@ namespace squeal
 /// Keeps A and W of the last period length: one factorisation for each, none for difference quotients.
 struct PeriodMap
 {
-  const Structure& structure;
-  const Interface& interface;
+  SlidingEquilibrium sliding; // the start of its warm start, and what measurements refer to
+  StepOptions options;
   int steps = 0;
   double theta = 0.5;
   ThetaStep step{};
   std::vector<double> reactions{}; // warm start: at the end of the last period integrated with its rate
   long unconverged = 0;            // steps whose contact did not converge
-  double contact_tolerance = 0;    // 0: the option's
 };
 
 /// Makes A and W those of this period, unless they are already.

@@ -13,6 +13,7 @@
 /// Caveat: at large mu an equilibrium may not exist, or not be the only one. It is the only one if the symmetric part
 /// of D_nn + mu D_nt e is positive definite, which is checked where K alone is regular; whether it is stable, modes
 /// say.
+#include "squeal/base/options.hpp"
 #include "squeal/equilibrium/state.hpp"
 
 namespace squeal
@@ -35,8 +36,24 @@ struct Equilibrium
   std::string uniqueness;         // "assured", "not assured", "not checked"
 };
 
-/// Options, prefix -equilibrium_: max_it (100), check_max_it (of the fixed point; -1: 20000 up to 600 pairs, else 0).
-/// Errors: K singular on a body that contact does not hold either (which body).
-Equilibrium find_equilibrium(const Structure& structure, const Interface& interface);
+struct EquilibriumOptions
+{
+  PetscInt max_iterations = 100;
+  PetscInt check_max_iterations = -1; // of the fixed point; -1: 20000 up to 600 pairs, else none
+  double check_rho = 1.5;             // of the fixed point, over 1/lambda_max(D_nn)
+};
+
+OptionList options_of(EquilibriumOptions& options);
+
+/// Error: K is singular on a body that contact does not hold either (which body).
+Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options);
+
+/// A model at its sliding equilibrium, as every stage after it sees it. Borrows all three.
+struct SlidingEquilibrium
+{
+  const Structure& structure;
+  const Interface& interface;
+  const Equilibrium& equilibrium;
+};
 
 } // namespace squeal

@@ -3,9 +3,10 @@
 ///     (lambda^2 Y'M Z + lambda Y'(C + C_f) Z + Y'K Z) phi = 0,   u(t) ~ phi exp(lambda t),   Re(lambda) > 0:
 ///     squeal-prone.
 /// Z keeps closed pairs closed, Y removes their normal reactions; all three matrices are unsymmetric.
-#include "squeal/equilibrium/equilibrium.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include <complex>
+#include <span>
 
 namespace squeal
 {
@@ -49,22 +50,51 @@ struct Modes
   Outcome outcome;
   ModesMethod method = ModesMethod::both;
   double band = 0;                    // [Hz] covered: every mode below is here
-  std::vector<ComplexMode> modes;     // Im(lambda) >= 0, largest growth first
+  std::vector<ComplexMode> modes;     // Im(lambda) >= 0, unstable ones first, then by growth
   std::vector<ComplexMode> projected; // the other route's, when both ran
   std::vector<double> beyond_band;    // [Hz] pairs between the band and count.frequency
-  int unstable_count = 0;
-  bool routes_disagree = false; // on unstable_count, when both ran
+  int unstable_count = 0;             // of is_unstable, the first ones
+  bool routes_disagree = false;       // on unstable_count, when both ran
   ModeCount count;
   std::string count_check; // in words: unstable modes by either route, all modes by inertia
+
+  std::span<const ComplexMode> unstable() const
+  {
+    return std::span(modes).first(static_cast<std::size_t>(unstable_count));
+  }
 };
 
-/// Real modes with frequency below `band` [Hz], as many as there are. Option: -modes_dense_limit, as below.
-RealModes find_real_modes_below(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                                double band);
+/// How problems too large to be solved whole are solved.
+enum class ModesSolver
+{
+  slices, // of frequency (modes/slices.hpp)
+  toar,   // SLEPc's two-level Arnoldi around zero, with the options of -modes_pep_ and -modes_st_
+};
 
-/// Options, prefix -modes_: dense_limit (200, problems up to this size are solved whole by LAPACK), candidates (20,
-/// pairs a residual pass of the projection corrects), solver (slices, or toar with the options of pep_ and st_).
-Modes find_modes(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                 const ModesSettings& settings);
+inline constexpr std::array modes_solver_words = {"slices", "toar"};
+
+inline Words words_of(ModesSolver)
+{
+  return modes_solver_words;
+}
+
+struct ModesOptions
+{
+  PetscInt dense_limit = 400; // up to this size eigenproblems are solved whole by LAPACK
+  ModesSolver solver = ModesSolver::slices;
+  PetscInt candidates = 20; // pairs that each residual pass of the projection corrects
+};
+
+OptionList options_of(ModesOptions& options);
+
+/// Real part large enough to call a mode unstable, here and everywhere: rounding shows up to 1e-8 |lambda| on a mode
+/// without damping.
+bool is_unstable(std::complex<double> lambda);
+
+/// Frictionless undamped modes in the structure's dofs with frequency below `band` [Hz], as many as there are.
+RealModes find_real_modes_below(const LinearisedSliding& linearised, double band, const ModesOptions& options);
+
+Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised, const ModesSettings& settings,
+                 const ModesOptions& options);
 
 } // namespace squeal

@@ -56,9 +56,6 @@ QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const Quadrat
 /// Sorts the pairs by falling real part, and sets outcome.residual to the largest backward error.
 void sort_and_measure(QuadraticSolution& solution);
 
-/// Real part large enough to call unstable: rounding shows up to 1e-8 |lambda| on a mode without damping.
-bool is_unstable(std::complex<double> lambda);
-
 struct QuadraticNorms
 {
   double M = 0, C = 0, K = 0; // 1-norms

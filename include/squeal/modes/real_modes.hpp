@@ -38,7 +38,4 @@ RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit);
 /// All modes with frequency below `band` [Hz]; shapes are y.
 RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit);
 
-/// -modes_dense_limit
-int dense_limit_option();
-
 } // namespace squeal

@@ -63,8 +63,8 @@ struct Reduction
   bool sliding = false;    // the active pairs slide along the drive throughout
 };
 
-ReducedModel reduce(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                    const std::vector<ComplexMode>& modes, std::vector<int> active, const Reduction& reduction);
+ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
+                    const Reduction& reduction);
 
 /// Position and velocity about the equilibrium.
 struct ReducedState

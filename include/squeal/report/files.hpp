@@ -8,6 +8,9 @@
 namespace squeal
 {
 
+/// The version of the keys of report.json and of the data sets of the HDF5 files. Readers refuse a later one.
+inline constexpr int format_version = 1;
+
 /// A file in the making; it takes its place by keep(), and vanishes without.
 class NewFile
 {
@@ -27,7 +30,7 @@ private:
 /// Writes a whole text file.
 void write_text(const std::filesystem::path& place, const std::string& text);
 
-/// An HDF5 file written by one rank. Data sets carry their unit and meaning as attributes.
+/// An HDF5 file written by one rank. Data sets carry their unit as an attribute, the file its format_version.
 class Hdf5File
 {
 public:

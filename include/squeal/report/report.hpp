@@ -1,9 +1,11 @@
 #pragma once
-/// What a run leaves behind: report.json, fields.h5 + fields.xdmf, history.h5, scene.toml (resolved), options.txt, and
-/// the printed table. Every number comes with its unit and with what it is worth (residual, backward error, defect).
+/// All results of a run, and what it leaves behind: report.json, fields.h5 + fields.xdmf, history.h5, scene.toml
+/// (resolved), options.txt, and the printed table. Every number comes with its unit and with what it is worth
+/// (residual, backward error, defect).
+#include "squeal/contact/resultants.hpp"
 #include "squeal/cycle/fidelity.hpp"
-#include "squeal/model.hpp"
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -12,6 +14,15 @@
 namespace squeal
 {
 
+struct ModelSummary
+{
+  PetscInt dofs = 0;
+  long elements = 0;
+  int pairs = 0, ranks = 1;
+  double memory_bytes = 0; // largest resident size so far, all ranks together
+  double rounding_hz = 0;  // 1e-6 sqrt(|K|/|M|) / 2 pi: slower modes are lost in rounding
+};
+
 struct Timing
 {
   std::string stage;
@@ -19,31 +30,43 @@ struct Timing
   double processor_seconds = 0; // of rank 0, its waiting for others included: a busy machine does not stretch it
 };
 
-/// All results of a run. A stage that did not run has outcome "off" (by the scene) or "skipped", with the reason.
+/// A stage that did not run has the outcome "off" (by the scene) or "skipped", with the reason.
 struct Report
 {
-  PetscInt dofs = 0;
-  long elements = 0;
-  int pairs = 0, ranks = 1;
-  double memory_bytes = 0; // largest resident size so far, all ranks together
-  double rounding_hz = 0;  // 1e-6 sqrt(|K|/|M|) / 2 pi: slower modes are taken for rigid motions
+  ModelSummary model;
   Equilibrium equilibrium;
-  std::vector<double> contact_forces;     // [N] sum of r_n of each contact of the scene; empty on a matrix scene
-  std::vector<double> contact_torques;    // [N m] with which each brakes its rotation: sum of r_t.v_d over the rate
+  std::vector<ContactResultant> contacts; // of the equilibrium, one a contact of the scene; empty on a matrix scene
   std::vector<double> equilibrium_probes; // [m] at the equilibrium, one a probe
   Modes modes;
-  Estimate estimate;
+  std::vector<Estimate> estimates; // of the unstable modes, the followed one first; else one that says why not
   Trajectory transient;
   LimitCycle cycle;
   Fidelity fidelity;           // of the cycle
   std::vector<Timing> timings; // in order
 };
 
+/// The estimate of the followed mode.
+const Estimate& followed_estimate(const Report& report);
+
+/// The outcome of every stage, in the order they run in, by the stage's name.
+std::array<std::pair<const char*, Outcome>, 5> outcomes_of(const Report& report);
+
+/// Where the nodes of the fields are.
+struct FieldNodes
+{
+  const Mesh& mesh;
+  const DofMap& dofs;
+  const Structure& structure;
+};
+
 /// Rank 0 prints the table a person reads.
-void print_summary(const Report& report, const Scene& scene, MPI_Comm comm);
+void print_table(const Report& report, const Scene& scene, MPI_Comm comm);
 
 /// Collective. Writes everything into `output`, each file whole or not at all. Error: what could not be written.
-void write_results(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
-                   MPI_Comm comm);
+void write_results(const Report& report, const Scene& scene, const FieldNodes& nodes,
+                   const std::filesystem::path& output, MPI_Comm comm);
+
+/// Name and version of squeal, its commit, and of the libraries it runs on.
+std::vector<std::pair<std::string, std::string>> versions();
 
 } // namespace squeal

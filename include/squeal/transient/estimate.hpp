@@ -15,6 +15,7 @@
 /// where pairs stick, 1.1 to 4 of it otherwise, and 300 where slip reversal alone holds it far above first lift-off.
 #include "squeal/modes/modes.hpp"
 
+#include <optional>
 #include <span>
 
 namespace squeal
@@ -31,25 +32,36 @@ struct Estimate
   double reversal_amplitude = 0;   // [m] first q at which some pair's sliding along the drive stops; or infinite
   double damping_rate = 0;         // P_C/E [1/s], independent of q
   double friction_rate_linear = 0; // P_R/E as q -> 0 [1/s]; friction - damping = 2 Re(lambda)
-  double phase = 0;                // [rad] turn of phi for which the smallest normal reaction at t = 0 is largest
+  double start_amplitude = 0; // [m] where vibrations start: the balance, or a multiple of first lift-off without one
+  double phase = 0;           // [rad] turn of phi for which the smallest normal reaction at t = 0 is largest
   std::vector<double> curve_amplitude, curve_rate; // q [m] and P_R/E [1/s]
 };
 
-/// No options. The phase is that of the amplitude found, or of first lift-off without balance.
-Estimate estimate_amplitude(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                            const ComplexMode& mode);
+struct EstimateOptions
+{
+  double lift_off_multiple = 2; // of first lift-off: where vibrations start without an energy balance
+};
 
-/// Where vibrations start from: the balance, or -estimate_lift_off_multiple (2) times first lift-off without one [m].
-/// A start well above the cycle falls onto it; one below may fall onto the equilibrium.
-double start_amplitude(const Estimate& estimate);
+OptionList options_of(EstimateOptions& options);
+
+/// The phase is that of the amplitude found, or of first lift-off without balance.
+Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
+                            const ComplexMode& mode, const EstimateOptions& options);
 
 /// State u0 + q Re(phi e^{i phase}), v = q Re(lambda phi e^{i phase}) (paper, eqs. 18-19).
 State mode_state(const Equilibrium& equilibrium, const ComplexMode& mode, double amplitude, double phase);
 
-/// What each mode that oscillates adds to a start, from its own estimate: q Re(phi e^{i phase}) and its velocity,
-/// without u0.
-std::vector<State> estimated_motions(const Structure& structure, const Interface& interface,
-                                     const Equilibrium& equilibrium, std::span<const ComplexMode> modes);
+/// The modes that grow, the followed one first, with an estimate each.
+struct UnstableModes
+{
+  std::span<const ComplexMode> modes;
+  std::span<const Estimate> estimates;
+};
+
+/// What a mode adds to a start, from its own estimate: q Re(phi e^{i phase}) and its velocity, without u0. Nothing
+/// where the estimate gives no amplitude to start from.
+std::optional<State> estimated_motion(const Equilibrium& equilibrium, const ComplexMode& mode,
+                                      const Estimate& estimate);
 
 /// state += factor motion
 void add_motion(const State& motion, double factor, State& state);

@@ -8,8 +8,9 @@
 /// - theta < 1/2 also amplifies every stable mode with -Re(lambda) < (1/2 - theta) h |lambda|^2, up to the highest one
 ///   of the mesh. With C = beta K that is h > beta/(1 - 2 theta), or h > 2/((1 - 2 theta) |lambda|) where the mode is
 ///   overdamped, lambda its faster root.
-/// All refusals are lifted by -transient_refuse false.
+/// All refusals are lifted by StepOptions::refuse.
 #include "squeal/modes/modes.hpp"
+#include "squeal/transient/step_options.hpp"
 
 namespace squeal
 {
@@ -23,6 +24,7 @@ double free_growth(const Structure& structure, double theta, double h);
 
 /// Why a run with this theta and h is refused, in a sentence with the remedy; empty if it is not. `mode`: the followed
 /// one, or null.
-std::string step_refusal(const Structure& structure, const ComplexMode* mode, double theta, double h);
+std::string step_refusal(const Structure& structure, const ComplexMode* mode, double theta, double h,
+                         const StepOptions& options);
 
 } // namespace squeal

@@ -13,6 +13,7 @@
 #include "squeal/contact/solver.hpp"
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/step_guards.hpp"
+#include "squeal/transient/step_options.hpp"
 #include "squeal/transient/step_record.hpp"
 
 #include <functional>
@@ -20,21 +21,6 @@
 
 namespace squeal
 {
-
-/// displacement: the law above. velocity (Moreau-Jean): where gap + B_n ut <= 0, 0 <= B_n v+ _|_ r_n >= 0, elsewhere
-/// r = 0; the gap then drifts by O(h).
-enum class ContactLaw
-{
-  displacement,
-  velocity,
-};
-
-/// What friction opposes: s_theta, or s+.
-enum class Opposed
-{
-  theta,
-  end,
-};
 
 /// Everything that depends on h: factored A and W = h B A^-1 B', so that contact solves w = W r + b for r in N.
 /// Built once per h.
@@ -53,10 +39,9 @@ struct ThetaStep
 /// A
 Owned<Mat> step_matrix(const Structure& structure, double h, double theta);
 
-/// Options, prefix -transient_: contact_law (displacement | velocity), friction (theta |
-/// end), contact_solver (gauss_seidel | fixed_point),
-/// contact_tolerance, contact_max_it, contact_rho, contact_extrapolation. Error: h not above 0, theta not in (0, 1].
-ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta);
+/// Error: h not above 0, theta not in (0, 1].
+ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta,
+                          const StepOptions& options);
 
 /// M v_k and K u_k of (v, u) into a pair of spans, each matrix read once.
 void multiply_mass_and_stiffness(const ThetaStep& step, const Structure& structure,
@@ -130,10 +115,18 @@ struct MarchSummary
   double contact_iterations_mean = 0;
 };
 
-/// `steps` steps in place, recorded: appends to `history` (energies, powers, counts, rows of `probes`: may be null).
-MarchSummary march(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                   const Equilibrium& equilibrium, Mat probes, long steps, State& state, History& history,
-                   const Monitor& monitor);
+/// What is kept of a march: `history` gains energies, powers, counts and the rows of `probes` (null: none) of each
+/// step.
+struct Recorder
+{
+  Mat probes = nullptr;
+  History& history;
+  Monitor monitor; // may be empty
+};
+
+/// `steps` steps in place, recorded.
+MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, long steps, State& state,
+                   const Recorder& recorder);
 
 /// outcome: "completed", "refused" (step_guards.hpp: theta and h would tell a lie), "not converged" (contact, or an
 /// energy that is no longer finite). residual: the largest contact residual; iterations: contact iterations in all.
@@ -155,9 +148,14 @@ struct Trajectory
 /// With the steps and the step size that the periods of the mode mean, if they are not given.
 TransientSettings planned(TransientSettings settings, const ComplexMode& mode);
 
+/// The state that the scene starts from: a file, the followed mode at an amplitude (0: a tenth of first lift-off), or
+/// all unstable modes at their estimates.
+State transient_start(const SlidingEquilibrium& sliding, const UnstableModes& unstable,
+                      const TransientSettings& settings);
+
 /// Integrates from `start`; `mode` is the followed mode (null: no growth is fitted, and the settings must give steps
 /// and step_size).
-Trajectory integrate(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium,
-                     const ComplexMode* mode, const TransientSettings& settings, State start, Mat probes);
+Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode, const TransientSettings& settings,
+                     const StepOptions& options, State start, Mat probes);
 
 } // namespace squeal

@@ -1,4 +1,4 @@
-#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include "squeal/algebra/quadratic_residual.hpp"
 
@@ -221,11 +221,11 @@ Owned<Mat> assemble_reaction(const std::vector<Row>& rows, const std::vector<Pet
 } // namespace
 
 ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface& interface,
-                                     const Equilibrium& equilibrium)
+                                     const std::vector<char>& closed)
 {
   ClosedContact result;
   for (int pair = 0; pair < interface.pairs; ++pair)
-    if (equilibrium.closed[static_cast<std::size_t>(pair)]) result.pairs.push_back(pair);
+    if (closed[static_cast<std::size_t>(pair)]) result.pairs.push_back(pair);
   std::vector<Row> rows = read_rows(interface, result.pairs);
   PetscInt dofs = 0;
   check(MatGetSize(structure.K, &dofs, nullptr));
@@ -254,16 +254,17 @@ Owned<Mat> project(Mat A, Mat Y, Mat Z)
   return result;
 }
 
-Owned<Mat> direction_damping(const Interface& interface, const Equilibrium& equilibrium)
+Owned<Mat> direction_damping(const Interface& interface, const std::vector<char>& closed,
+                             const std::vector<double>& reactions)
 {
   if (interface.directions < 2 || interface.friction == 0) return {};
   const std::vector<double> e = drive_directions(interface);
   std::vector<double> weight(static_cast<std::size_t>(interface.pairs));
   for (std::size_t i = 0; i < weight.size(); ++i)
   {
-    const double reaction = equilibrium.reactions[3 * i];
+    const double reaction = reactions[3 * i];
     const double speed = std::hypot(interface.drive[2 * i], interface.drive[2 * i + 1]);
-    if (equilibrium.closed[i] && reaction > 0) weight[i] = std::sqrt(interface.friction * reaction / speed);
+    if (closed[i] && reaction > 0) weight[i] = std::sqrt(interface.friction * reaction / speed);
   }
   if (std::all_of(weight.begin(), weight.end(), [](double w) { return w == 0; })) return {};
   // Across the drive: S = sqrt(mu r_n0/|v_d|) (-e_2 B_t1 + e_1 B_t2), C_f = S'S.
@@ -288,25 +289,6 @@ Owned<Mat> direction_damping(const Interface& interface, const Equilibrium& equi
   return Cf;
 }
 
-Owned<Mat> sliding_damping(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium)
-{
-  Owned<Mat> C;
-  check(MatDuplicate(structure.C, MAT_COPY_VALUES, C.put()));
-  if (!interface.direction_damping) return C;
-  const Owned<Mat> Cf = direction_damping(interface, equilibrium);
-  if (Cf.get()) check(MatAXPY(C, 1, Cf, UNKNOWN_NONZERO_PATTERN));
-  return C;
-}
-
-ReactionOperator reaction_operator(const ClosedContact& contact, const Structure& structure, Mat C)
-{
-  ReactionOperator result;
-  for (const auto& [A, rows] :
-       {std::pair{structure.M.get(), &result.M}, {C, &result.C}, {structure.K.get(), &result.K}})
-    check(MatMatMult(contact.reaction, A, MAT_INITIAL_MATRIX, PETSC_DEFAULT, rows->put()));
-  return result;
-}
-
 std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
                                                    Vec imaginary)
 {
@@ -317,6 +299,24 @@ std::vector<std::complex<double>> normal_reactions(const ReactionOperator& react
   const std::vector<double> first = whole(re), second = whole(im);
   std::vector<std::complex<double>> result;
   for (std::size_t i = 0; i < first.size(); ++i) result.emplace_back(first[i], second[i]);
+  return result;
+}
+
+LinearisedSliding linearise(const SlidingEquilibrium& sliding)
+{
+  const auto& [structure, interface, equilibrium] = sliding;
+  LinearisedSliding result;
+  result.contact = eliminate_closed_pairs(structure, interface, equilibrium.closed);
+  check(MatDuplicate(structure.C, MAT_COPY_VALUES, result.C.put()));
+  if (interface.direction_damping)
+    if (const Owned<Mat> Cf = direction_damping(interface, equilibrium.closed, equilibrium.reactions); Cf.get())
+      check(MatAXPY(result.C, 1, Cf, UNKNOWN_NONZERO_PATTERN));
+  for (const auto& [A, rows] : {std::pair{structure.M.get(), &result.reaction.M},
+                                {result.C.get(), &result.reaction.C},
+                                {structure.K.get(), &result.reaction.K}})
+    check(MatMatMult(result.contact.reaction, A, MAT_INITIAL_MATRIX, PETSC_DEFAULT, rows->put()));
+  result.M_z = project_symmetric(structure.M, result.contact.Z);
+  result.K_z = project_symmetric(structure.K, result.contact.Z);
   return result;
 }
 

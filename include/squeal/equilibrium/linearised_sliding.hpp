@@ -20,23 +20,21 @@ struct ClosedContact
   std::vector<int> pairs; // the closed ones, ascending
 };
 
-/// Error: a closed pair whose normal motion the other closed pairs already fix, or that the friction coefficient jams
-/// (which pair).
+/// `closed`: by pairs. Error: a closed pair whose normal motion the other closed pairs already fix, or that the
+/// friction coefficient jams (which pair).
 ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface& interface,
-                                     const Equilibrium& equilibrium);
-
-/// Z'A Z, marked symmetric.
-Owned<Mat> project_symmetric(Mat A, Mat Z);
+                                     const std::vector<char>& closed);
 
 /// Y'A Z
 Owned<Mat> project(Mat A, Mat Y, Mat Z);
 
-/// The derivative of the friction direction, C_f = sum mu r_n0/|v_d| B_t'(I - e e')B_t [N s/m]; no matrix for pairs
-/// with one tangential row, which cannot turn, without friction, or when nothing is closed.
-Owned<Mat> direction_damping(const Interface& interface, const Equilibrium& equilibrium);
+/// Z'A Z, marked symmetric.
+Owned<Mat> project_symmetric(Mat A, Mat Z);
 
-/// C, and C_f with it where the interface has it on.
-Owned<Mat> sliding_damping(const Structure& structure, const Interface& interface, const Equilibrium& equilibrium);
+/// The derivative of the friction direction, C_f = sum mu r_n0/|v_d| B_t'(I - e e')B_t over the closed pairs [N s/m].
+/// Null for pairs with one tangential row, which cannot turn, without friction, or when nothing is closed.
+Owned<Mat> direction_damping(const Interface& interface, const std::vector<char>& closed,
+                             const std::vector<double>& reactions);
 
 /// Normal reactions lambda_n per pair that a motion phi e^{s t} takes are (s^2 M + s C + K) phi, from the pivots' rows
 /// of (s^2 M + s C + K) phi = R' lambda_n; 0 on open pairs. Every choice of rows agrees if s and phi are an eigenpair.
@@ -45,9 +43,18 @@ struct ReactionOperator
   Owned<Mat> M, C, K; // pairs x dofs
 };
 
-ReactionOperator reaction_operator(const ClosedContact& contact, const Structure& structure, Mat C);
-
 std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
                                                    Vec imaginary);
+
+/// The equations of small motions about sliding, made once for the modes, the estimate and the preconditioner.
+struct LinearisedSliding
+{
+  ClosedContact contact;
+  Owned<Mat> C; // with C_f where the interface has it on
+  ReactionOperator reaction;
+  Owned<Mat> M_z, K_z; // Z'M Z, Z'K Z, symmetric: the frictionless bilateral problem
+};
+
+LinearisedSliding linearise(const SlidingEquilibrium& sliding);
 
 } // namespace squeal

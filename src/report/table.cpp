@@ -1,5 +1,7 @@
-/// The table a person reads at the end of a run.
-#include "squeal/report/parts.hpp"
+#include "squeal/report/table.hpp"
+
+#include "derived.hpp"
+#include "warnings.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -19,7 +21,7 @@ std::string row(const std::string& head, const std::string& text)
   return format("  %-12s ", head.c_str()) + text + "\n";
 }
 
-std::string warnings(const std::vector<std::string>& sentences)
+std::string warning_rows(const std::vector<std::string>& sentences)
 {
   std::string text;
   for (const std::string& sentence : sentences) text += row("", "WARNING: " + sentence);
@@ -55,7 +57,7 @@ std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
 std::string mode_line(const ComplexMode& mode)
 {
   return row("", format("%12.7g %14.5g %12.5f %16.1e  %s", mode.frequency_hz(), mode.growth_rate(),
-                        100 * mode.damping_ratio(), mode.backward_error, mode.growth_rate() > 0 ? "unstable" : ""));
+                        100 * mode.damping_ratio(), mode.backward_error, is_unstable(mode.lambda) ? "unstable" : ""));
 }
 
 std::string modes_text(const Modes& modes)
@@ -171,26 +173,27 @@ std::string timings_text(const Report& report)
 
 } // namespace
 
-std::string summary(const Report& report, const Scene& scene)
+std::string table(const Report& report, const Scene& scene)
 {
+  const ModelSummary& model = report.model;
   std::string text = "\n" + (scene.title.empty() ? scene.file.filename().string() : scene.title) + "\n";
   text += row("model", format("%lld degrees of freedom, %ld elements, %d contact pairs, %d rank%s",
-                              static_cast<long long>(report.dofs), report.elements, report.pairs, report.ranks,
-                              report.ranks == 1 ? "" : "s"));
-  const Verdicts verdicts = verdicts_of(report);
-  text += equilibrium_text(report.equilibrium, report.pairs) + warnings(verdicts.equilibrium);
-  text += modes_text(report.modes) + warnings(verdicts.modes);
-  text += estimate_text(report.estimate) + warnings(verdicts.estimate);
-  text += transient_text(report) + warnings(verdicts.transient);
-  text += cycle_text(report, scene) + warnings(verdicts.cycle);
+                              static_cast<long long>(model.dofs), model.elements, model.pairs, model.ranks,
+                              model.ranks == 1 ? "" : "s"));
+  const Warnings warnings = warnings_of(report);
+  text += equilibrium_text(report.equilibrium, model.pairs) + warning_rows(warnings.equilibrium);
+  text += modes_text(report.modes) + warning_rows(warnings.modes);
+  text += estimate_text(followed_estimate(report)) + warning_rows(warnings.estimate);
+  text += transient_text(report) + warning_rows(warnings.transient);
+  text += cycle_text(report, scene) + warning_rows(warnings.cycle);
   text += fidelity_text(report.fidelity);
   return text + timings_text(report);
 }
 
-void print_summary(const Report& report, const Scene& scene, MPI_Comm comm)
+void print_table(const Report& report, const Scene& scene, MPI_Comm comm)
 {
   if (rank_of(comm) != 0) return;
-  std::fputs(summary(report, scene).c_str(), stdout);
+  std::fputs(table(report, scene).c_str(), stdout);
   std::fflush(stdout);
 }
 

@@ -1,0 +1,18 @@
+#pragma once
+/// What the reactions of a contact add up to.
+#include "squeal/contact/interface.hpp"
+
+namespace squeal
+{
+
+struct ContactResultant
+{
+  double normal_force = 0; // [N] sum of r_n
+  double torque = 0;       // [N m] with which it brakes its rotation: sum of r_t.v_d over the rate; 0 without rotation
+};
+
+/// One for each contact of the scene; none on a matrix scene.
+std::vector<ContactResultant> contact_resultants(const Interface& interface, const std::vector<double>& reactions,
+                                                 const std::vector<Contact>& contacts);
+
+} // namespace squeal

@@ -1,0 +1,12 @@
+#pragma once
+/// fields.h5 and fields.xdmf: mesh, equilibrium, unstable modes, one period of the cycle.
+#include "squeal/report/report.hpp"
+
+namespace squeal
+{
+
+/// Collective. A matrix scene has no nodes and leaves no such files, nor those of an earlier run.
+void write_fields(const Report& report, const Scene& scene, const FieldNodes& nodes,
+                  const std::filesystem::path& output, MPI_Comm comm);
+
+} // namespace squeal

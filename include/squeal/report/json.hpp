@@ -1,0 +1,11 @@
+#pragma once
+/// report.json: the run in numbers.
+#include "squeal/report/report.hpp"
+
+namespace squeal
+{
+
+/// The whole report as JSON text: SI units, null for what is not a number. inputs/README.md lists the keys.
+std::string report_json(const Report& report, const Scene& scene);
+
+} // namespace squeal

@@ -1,0 +1,10 @@
+#pragma once
+/// The table a person reads at the end of a run.
+#include "squeal/report/report.hpp"
+
+namespace squeal
+{
+
+std::string table(const Report& report, const Scene& scene);
+
+} // namespace squeal

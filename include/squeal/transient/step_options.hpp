@@ -1,0 +1,47 @@
+#pragma once
+/// Which variant of the theta step is marched (src/README.md, section 4), of the transient and of the cycle.
+#include "squeal/contact/solver.hpp"
+
+namespace squeal
+{
+
+/// displacement: contact on u + h (1-theta) v, as the step has it. velocity (Moreau-Jean): where gap + B_n ut <= 0, 0
+/// <= B_n v+ _|_ r_n >= 0, elsewhere r = 0; the gap then drifts by O(h).
+enum class ContactLaw
+{
+  displacement,
+  velocity,
+};
+
+inline constexpr std::array contact_law_words = {"displacement", "velocity"};
+
+inline Words words_of(ContactLaw)
+{
+  return contact_law_words;
+}
+
+/// What friction opposes: s_theta, or s+.
+enum class Opposed
+{
+  theta,
+  end,
+};
+
+inline constexpr std::array opposed_words = {"theta", "end"};
+
+inline Words words_of(Opposed)
+{
+  return opposed_words;
+}
+
+struct StepOptions
+{
+  ContactLaw law = ContactLaw::displacement;
+  Opposed opposed = Opposed::theta;
+  ContactSettings contact{};
+  bool refuse = true; // what step_guards.hpp refuses
+};
+
+OptionList options_of(StepOptions& options);
+
+} // namespace squeal

@@ -1,0 +1,63 @@
+#include "derived.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+StepBias bias_of(const Report& report, std::complex<double> discrete)
+{
+  if (report.modes.modes.empty()) return {};
+  const std::complex<double> lambda = report.modes.modes.front().lambda;
+  return {discrete.real() / lambda.real() - 1, discrete.imag() / lambda.imag() - 1};
+}
+
+} // namespace
+
+NormalForces normal_forces(const Equilibrium& equilibrium)
+{
+  NormalForces forces;
+  const std::size_t pairs = equilibrium.closed.size();
+  const std::size_t block = pairs > 0 ? equilibrium.reactions.size() / pairs : 0;
+  for (std::size_t i = 0; i < pairs; ++i)
+  {
+    if (!equilibrium.closed[i] || block == 0) continue;
+    const double force = equilibrium.reactions[i * block];
+    forces.least = forces.closed > 0 ? std::min(forces.least, force) : force;
+    forces.greatest = forces.closed > 0 ? std::max(forces.greatest, force) : force;
+    forces.sum += force;
+    ++forces.closed;
+  }
+  return forces;
+}
+
+StepBias transient_bias(const Report& report)
+{
+  return bias_of(report, report.transient.predicted);
+}
+
+StepBias cycle_bias(const Report& report)
+{
+  if (report.modes.modes.empty() || !(report.cycle.orbit.period > 0)) return {};
+  const double h = report.cycle.orbit.period / report.cycle.steps_per_period;
+  return bias_of(report, discrete_eigenvalue(report.modes.modes.front().lambda, report.cycle.theta, h));
+}
+
+double chatter(const History& history)
+{
+  const std::vector<double>& force = history.normal_force;
+  double squares = 0, sum = 0;
+  for (std::size_t i = 1; i + 1 < force.size(); ++i)
+  {
+    const double bend = force[i - 1] - 2 * force[i] + force[i + 1];
+    squares += bend * bend;
+    sum += force[i];
+  }
+  return sum > 0 ? std::sqrt(squares * static_cast<double>(force.size() - 2)) / 4 / sum : 0;
+}
+
+} // namespace squeal

@@ -1,0 +1,135 @@
+#include "warnings.hpp"
+
+#include "derived.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Sentences = std::vector<std::string>;
+
+Sentences of_equilibrium(const Report& report)
+{
+  Sentences sentences;
+  if (report.equilibrium.uniqueness == "not assured")
+    sentences.push_back("with this much friction other equilibria may exist beside this one");
+  return sentences;
+}
+
+Sentences of_modes(const Report& report)
+{
+  Sentences sentences;
+  const Modes& modes = report.modes;
+  if (report.model.rounding_hz > .001 * modes.band)
+    sentences.push_back(
+        format("modes below %.3g Hz are lost in rounding beside the stiffest entry of K: make what is rigid "
+               "a rigid body, not a stiff spring",
+               report.model.rounding_hz));
+  constexpr double narrow = 1e-4; // of |lambda|: less than a mesh or a damping value is known to
+  const auto on_the_edge = std::count_if(modes.modes.begin(), modes.modes.end(),
+                                         [](const ComplexMode& mode)
+                                         { return std::abs(mode.growth_rate()) < narrow * std::abs(mode.lambda); });
+  if (on_the_edge > 0)
+    sentences.push_back(
+        format("%ld of the modes are within 0.01 %% of the threshold: mesh and damping decide their sign",
+               static_cast<long>(on_the_edge)));
+  if (modes.routes_disagree)
+    sentences.push_back("the two routes disagree on the number of unstable modes: raise modes.real_modes or "
+                        "modes.residual_passes");
+  if (modes.count.certified_by.empty() && modes.count.expected != modes.count.found)
+    sentences.push_back(format("%d pairs were found where %d are expected, so an unstable one may be missing: %s",
+                               modes.count.found, modes.count.expected,
+                               modes.method == ModesMethod::projection
+                                   ? "raise modes.real_modes, or take modes.method = \"full\""
+                                   : "-modes_solver toar seeks them otherwise"));
+  return sentences;
+}
+
+Sentences of_estimate(const Report& report)
+{
+  const Estimate& estimate = followed_estimate(report);
+  const double lift_off = estimate.lift_off_amplitude;
+  if (estimate.outcome.kind == OutcomeKind::no_balance && std::isfinite(lift_off))
+    return {format("no amplitude is predicted; shooting starts from first lift-off times -estimate_lift_off_multiple, "
+                   "%.5g m by default",
+                   2 * lift_off)};
+  Sentences sentences;
+  if (estimate.outcome.kind != OutcomeKind::balance) return sentences;
+  if (estimate.amplitude > 3 * lift_off)
+    sentences.push_back(format("%.2g times first lift-off: the cycle itself may be far smaller, down to that",
+                               estimate.amplitude / lift_off));
+  if (estimate.reversal_amplitude < lift_off)
+    sentences.push_back(
+        "slip reverses before anything lifts off: pairs will stick, and the cycle may be twice as large");
+  return sentences;
+}
+
+void add_chatter(const History& history, Sentences& sentences)
+{
+  const double share = chatter(history);
+  if (share > .1)
+    sentences.push_back(
+        format("the normal force jumps between steps by %.0f %% of its mean: impacts of the contact nodes' own "
+               "mass; average it over steps, or refine the contact surface",
+               100 * share));
+}
+
+Sentences of_transient(const Report& report)
+{
+  Sentences sentences;
+  const Trajectory& transient = report.transient;
+  const double bias = transient_bias(report).growth;
+  if (std::abs(bias) > .1)
+    sentences.push_back(format(
+        "theta and the step change the growth rate by %+.0f %%: more steps a period, or theta = 1/2", 100 * bias));
+  const double fit = transient.growth_rate_fit, predicted = transient.predicted.real();
+  if (std::abs(fit - predicted) > .01 * std::abs(predicted))
+    sentences.push_back("the fitted growth rate is not the predicted one: other motion than the mode is in the start");
+  if (transient.law == ContactLaw::velocity)
+    sentences.push_back("by the velocity law the gap drifts, by up to what an impact covers in a step");
+  if (transient.energy_defect_max > 1e-8)
+    sentences.push_back("the energy identity of the scheme is missed: tighten -transient_contact_tolerance");
+  add_chatter(transient.history, sentences);
+  return sentences;
+}
+
+Sentences of_cycle(const Report& report)
+{
+  Sentences sentences;
+  const LimitCycle& cycle = report.cycle;
+  if (cycle.outcome.kind != OutcomeKind::converged) return sentences;
+  const StepBias bias = cycle_bias(report);
+  if (std::abs(bias.growth) > .1)
+    sentences.push_back(format("theta and the step change the growth rate by %+.0f %%: the cycle's amplitude suffers",
+                               100 * bias.growth));
+  if (cycle.orbit.residual > 1e-3 && report.fidelity.used == CycleModel::full)
+    sentences.push_back("a residual this large is no proof of a periodic motion");
+  add_chatter(cycle.measured.history, sentences);
+  if (cycle.multipliers.stability == Stability::undecided)
+    sentences.push_back(
+        "whether a vibration settles on this cycle is undecided: its largest multiplier is 1 to within its error");
+  if (cycle.multipliers.values.empty())
+    sentences.push_back("whether this cycle attracts was not examined: -cycle_multipliers 20 does");
+  return sentences;
+}
+
+} // namespace
+
+Warnings warnings_of(const Report& report)
+{
+  Warnings warnings;
+  if (has_run(report.equilibrium.outcome)) warnings.equilibrium = of_equilibrium(report);
+  if (has_run(report.modes.outcome)) warnings.modes = of_modes(report);
+  if (has_run(followed_estimate(report).outcome)) warnings.estimate = of_estimate(report);
+  if (has_run(report.transient.outcome) && report.transient.outcome.kind != OutcomeKind::refused)
+    warnings.transient = of_transient(report);
+  if (has_run(report.cycle.outcome)) warnings.cycle = of_cycle(report);
+  return warnings;
+}
+
+} // namespace squeal
