@@ -2,7 +2,7 @@
 
 #include "squeal/mesh/vector.hpp"
 #include "squeal/solid/binary.hpp"
-#include "squeal/solid/rows.hpp"
+#include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -98,8 +98,8 @@ Interface make_interface(const Mesh& mesh, const std::vector<NodePair>& pairs, c
   interface.directions = 1;
   for (const Contact& contact : scene.contacts)
     if (contact.tangents.size() != 1) interface.directions = 2;
-  std::vector<Row> rows;
-  const auto [first, last] = share_of(interface.pairs, comm);
+  std::vector<SparseRow> rows;
+  const auto [first, last] = local_range(interface.pairs, comm);
   for (PetscInt i = 0; i < interface.pairs; ++i)
   {
     const NodePair& pair = pairs[static_cast<std::size_t>(i)];
@@ -117,8 +117,8 @@ Interface make_interface(const Mesh& mesh, const std::vector<NodePair>& pairs, c
     for (const Vec3& axis : axes)
     {
       rows.emplace_back();
-      add_motion(dofs, pair.b, axis, rows.back());
-      add_motion(dofs, pair.a, -1 * axis, rows.back());
+      add_displacement(dofs, pair.b, axis, rows.back());
+      add_displacement(dofs, pair.a, -1 * axis, rows.back());
     }
   }
   interface.B = matrix_of_rows(rows, dofs.last - dofs.first, comm);
@@ -150,7 +150,7 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
     throw Error((folder / "drive.petsc").string() + ": length " + std::to_string(interface.drive.size()) + " for " +
                 std::to_string(interface.pairs) + " pairs with " + std::to_string(interface.directions) +
                 " tangential row(s) each in B.petsc");
-  const auto [first, last] = share_of(interface.pairs, comm);
+  const auto [first, last] = local_range(interface.pairs, comm);
   interface.B = load_matrix(B, size, {interface.block() * (last - first), local_dofs}, comm);
   check_interface(interface, folder.string(), comm);
   return interface;

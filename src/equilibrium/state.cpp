@@ -67,11 +67,9 @@ Owned<VecScatter> to_file_order(const Structure& structure, Vec x, Vec in_file)
   check(VecGetSize(x, &size));
   std::vector<PetscInt> order(static_cast<std::size_t>(size));
   std::iota(order.begin(), order.end(), 0);
-  const std::vector<int>& motion = structure.names.motion;
-  if (!motion.empty())
-    std::sort(order.begin(), order.end(),
-              [&](PetscInt a, PetscInt b)
-              { return motion[static_cast<std::size_t>(a)] < motion[static_cast<std::size_t>(b)]; });
+  const std::vector<PetscInt>& nodal_dof = structure.names.nodal_dof;
+  if (!nodal_dof.empty())
+    std::sort(order.begin(), order.end(), [&](PetscInt a, PetscInt b) { return nodal_dof[a] < nodal_dof[b]; });
   Owned<IS> from, to;
   const MPI_Comm comm = comm_of(x);
   check(ISCreateGeneral(comm, last - first, order.data() + first, PETSC_COPY_VALUES, from.put()));

@@ -110,7 +110,7 @@ public:
       for (int component = 0; component < 3; ++component)
       {
         double sum = 0;
-        for (const DofTerm& term : nodes_.dofs.of(static_cast<int>(node), component))
+        for (const DofTerm& term : nodes_.dofs.terms_of(static_cast<PetscInt>(6 * node) + component))
           sum += term.factor * values[term.dof];
         displacement.push_back(sum);
       }

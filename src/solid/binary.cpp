@@ -1,4 +1,7 @@
+/// Checks of PETSc binary files on rank 0, and their collective reading.
 #include "squeal/solid/binary.hpp"
+
+#include "squeal/base/broadcast.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -13,7 +16,7 @@ namespace squeal
 namespace
 {
 
-// PETSc writes indices in its own width: a file of a 64-bit-index build differs from one of a 32-bit-index build.
+/// Index in a file: PETSc writes PetscInt, so that builds with 32- and 64-bit indices have different files.
 using Index = std::conditional_t<sizeof(PetscInt) == 8, std::int64_t, std::int32_t>;
 
 template <class Number> std::vector<Number> read_big_endian(std::istream& stream, std::int64_t count)
@@ -27,7 +30,8 @@ template <class Number> std::vector<Number> read_big_endian(std::istream& stream
   return values;
 }
 
-std::ifstream open(const std::filesystem::path& file)
+/// Opens a file. Throws Error if it is missing or unreadable.
+std::ifstream open_file(const std::filesystem::path& file)
 {
   if (!std::filesystem::is_regular_file(file)) throw Error(file.string() + ": no such file");
   std::ifstream stream(file, std::ios::binary);
@@ -35,7 +39,7 @@ std::ifstream open(const std::filesystem::path& file)
   return stream;
 }
 
-/// The header's first `count` indices after the class id.
+/// Returns the first `count` indices after the class id. Throws Error if the file is of another kind or truncated.
 std::vector<Index> read_header(std::istream& stream, const std::filesystem::path& file, Index class_id,
                                const std::string& kind, std::int64_t count)
 {
@@ -48,6 +52,7 @@ std::vector<Index> read_header(std::istream& stream, const std::filesystem::path
   return header;
 }
 
+/// Throws Error if the file's length [bytes] is not what its header announces.
 void check_length(const std::filesystem::path& file, std::int64_t expected)
 {
   const auto found = static_cast<std::int64_t>(std::filesystem::file_size(file));
@@ -56,6 +61,7 @@ void check_length(const std::filesystem::path& file, std::int64_t expected)
               " bytes where its header announces " + std::to_string(expected) + " (real double precision)");
 }
 
+/// Throws Error if the columns of a row do not ascend or are out of range.
 void check_columns(std::istream& stream, const std::filesystem::path& file, const std::vector<Index>& counts,
                    Index columns)
 {
@@ -74,9 +80,10 @@ void check_columns(std::istream& stream, const std::filesystem::path& file, cons
   }
 }
 
+/// Returns the size of a matrix after all checks of its file.
 MatrixSize checked_size(const std::filesystem::path& file)
 {
-  auto stream = open(file);
+  auto stream = open_file(file);
   const auto header = read_header(stream, file, MAT_FILE_CLASSID, "matrix", 3);
   const std::int64_t rows = header[0], columns = header[1], entries = header[2];
   if (entries < 0) throw Error(file.string() + ": a dense matrix; write it as a sparse one (AIJ)");
@@ -98,7 +105,21 @@ MatrixSize checked_size(const std::filesystem::path& file)
   return {static_cast<PetscInt>(rows), static_cast<PetscInt>(columns)};
 }
 
-/// Text for the first entry of this rank's rows that is not finite.
+/// Returns the entries of a vector after all checks of its file.
+std::vector<double> checked_vector(const std::filesystem::path& file)
+{
+  auto stream = open_file(file);
+  const std::int64_t length = read_header(stream, file, VEC_FILE_CLASSID, "vector", 1)[0];
+  if (length < 0) throw Error(file.string() + ": a vector of " + std::to_string(length));
+  check_length(file, 2 * static_cast<std::int64_t>(sizeof(Index)) + length * 8);
+  std::vector<double> values = read_big_endian<double>(stream, length);
+  const auto bad = std::find_if_not(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  if (bad != values.end())
+    throw Error(file.string() + ": entry " + std::to_string(bad - values.begin()) + " is " + std::to_string(*bad));
+  return values;
+}
+
+/// Returns the message on the first entry of this rank's rows that is not finite; empty if there is none.
 std::string not_finite(Mat A, const std::filesystem::path& file)
 {
   std::string problem;
@@ -140,24 +161,8 @@ Owned<Mat> load_matrix(const std::filesystem::path& file, MatrixSize size, Matri
 std::vector<double> read_vector(const std::filesystem::path& file, MPI_Comm comm)
 {
   std::vector<double> values;
-  on_rank_zero(comm,
-               [&]
-               {
-                 auto stream = open(file);
-                 const std::int64_t length = read_header(stream, file, VEC_FILE_CLASSID, "vector", 1)[0];
-                 if (length < 0) throw Error(file.string() + ": a vector of " + std::to_string(length));
-                 check_length(file, 2 * static_cast<std::int64_t>(sizeof(Index)) + length * 8);
-                 values = read_big_endian<double>(stream, length);
-                 const auto bad =
-                     std::find_if_not(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-                 if (bad != values.end())
-                   throw Error(file.string() + ": entry " + std::to_string(bad - values.begin()) + " is " +
-                               std::to_string(*bad));
-               });
-  auto length = static_cast<int>(values.size());
-  MPI_Bcast(&length, 1, MPI_INT, 0, comm);
-  values.resize(static_cast<std::size_t>(length));
-  MPI_Bcast(values.data(), length, MPI_DOUBLE, 0, comm);
+  on_rank_zero(comm, [&] { values = checked_vector(file); });
+  broadcast(values, comm);
   return values;
 }
 

@@ -1,52 +1,56 @@
 #pragma once
-/// Static condensation of an element's internal parameters a, which no neighbour shares and no load drives:
+/// Static condensation of the internal parameters a of an element, which no neighbour shares and no load acts on:
 ///     strain = B u + Ba a,   a = -H^-1 G u,   H = int Ba' D Ba,   G = int Ba' D B,   hence   B <- B - Ba H^-1 G.
-/// With the condensed B at the integration points, stiffness and stress need nothing else.
+/// Stiffness and stress then follow from the condensed B at the integration points alone.
 #include <Eigen/Dense>
 #include <vector>
 
 namespace squeal
 {
 
-/// Strain operator at one integration point and the volume [m3] or area [m2] that it stands for.
-template <class Operator> struct StrainPoint
+/// Strain operator at one integration point.
+template <class Strains> struct StrainPoint
 {
-  Operator B;
-  double measure = 0;
+  Strains B;          // strains of unit displacements, one displacement a column
+  double measure = 0; // [m3 or m2] volume or area that the point stands for
 };
 
-/// Returns -H^-1 G: the internal parameters of unit displacements, one displacement a column.
-template <class Operator, class Elasticity> Eigen::MatrixXd
-condense(std::vector<StrainPoint<Operator>>& points, const std::vector<Operator>& Ba, const Elasticity& D)
+/// Condenses the parameters with strain operators Ba out of the points. Returns -H^-1 G, the parameters of unit
+/// displacements, one displacement a column.
+template <class Strains, class ParameterStrains, class Elasticity>
+auto condense_parameters(std::vector<StrainPoint<Strains>>& points, const std::vector<ParameterStrains>& Ba,
+                         const Elasticity& D)
 {
-  const auto parameters = Ba.front().cols(), dofs = points.front().B.cols();
-  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 12, 12>;
-  using Rectangle = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 12, 60>;
-  Square H = Square::Zero(parameters, parameters);
-  Rectangle G = Rectangle::Zero(parameters, dofs);
+  constexpr int parameters = ParameterStrains::ColsAtCompileTime, dofs = Strains::ColsAtCompileTime;
+  using Coupling = Eigen::Matrix<double, parameters, dofs>;
+  Eigen::Matrix<double, parameters, parameters> H;
+  Coupling G;
+  H.setZero();
+  G.setZero();
   for (std::size_t p = 0; p < points.size(); ++p)
   {
-    const Operator stress = points[p].measure * D * Ba[p];
+    const ParameterStrains stress = points[p].measure * D * Ba[p];
     H += stress.transpose() * Ba[p];
     G += stress.transpose() * points[p].B;
   }
-  const Rectangle a = -H.ldlt().solve(G);
+  const Coupling a = -H.ldlt().solve(G);
   for (std::size_t p = 0; p < points.size(); ++p) points[p].B += Ba[p] * a;
   return a;
 }
 
-/// K = int B' D B, exactly symmetric whatever the order of the sums.
-template <class Operator, class Elasticity>
-Eigen::MatrixXd stiffness_of(const std::vector<StrainPoint<Operator>>& points, const Elasticity& D)
+/// Returns K = int B' D B, symmetric to the last bit whatever the order of the sums.
+template <class Strains, class Elasticity>
+auto stiffness_matrix(const std::vector<StrainPoint<Strains>>& points, const Elasticity& D)
 {
-  const auto dofs = points.front().B.cols();
-  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(dofs, dofs);
+  constexpr int dofs = Strains::ColsAtCompileTime;
+  using Square = Eigen::Matrix<double, dofs, dofs>;
+  Square K = Square::Zero();
   for (const auto& [B, measure] : points)
   {
-    const Operator stress = measure * D * B;
+    const Strains stress = measure * D * B;
     K.noalias() += B.transpose() * stress;
   }
-  return .5 * (K + K.transpose());
+  return Square(0.5 * (K + K.transpose()));
 }
 
 } // namespace squeal

@@ -9,13 +9,7 @@ namespace squeal
 ElementMatrices solid_matrices(Shape shape, const NodePositions& X, const Material& material);
 ElementMatrices shell_matrices(Shape shape, const NodePositions& X, const Material& material, double thickness);
 
-/// Determinant of a Jacobian, or std::runtime_error naming it when it is not positive.
-double positive(double determinant, std::size_t point);
-
-/// Dense symmetric matrix as the array that ElementMatrices holds.
-template <class Matrix> std::vector<double> entries(const Matrix& A)
-{
-  return {A.data(), A.data() + A.size()};
-}
+/// Returns the determinant of a Jacobian. Throws std::runtime_error with its value if it is not positive.
+double positive_jacobian(double determinant, std::size_t point);
 
 } // namespace squeal

@@ -1,12 +1,11 @@
-/// Load T^T f: a force is shared equally by the nodes it acts on; a pressure p acts as -p times the integral of N_i n
-/// dA, n outward. What acts on a held motion goes into the support.
+/// Load T' f: a force is shared equally by its nodes; a pressure p is -p times the integral of N_i n dA, n outward.
+/// The share of a fixed degree of freedom is carried by its support.
 #include "loads.hpp"
 
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/vector.hpp"
-#include "squeal/solid/element.hpp"
 
 namespace squeal
 {
@@ -17,17 +16,16 @@ namespace
 void add_force(Vec load, const DofMap& dofs, int node, const Vec3& force)
 {
   for (int c = 0; c < 3; ++c)
-    for (const DofTerm& term : dofs.of(node, c))
-      check(VecSetValue(load, term.dof, force[static_cast<std::size_t>(c)] * term.factor, ADD_VALUES));
+    for (const DofTerm& term : dofs.terms_of(6 * PetscInt{node} + c))
+      check(VecSetValue(load, term.dof, force[c] * term.factor, ADD_VALUES));
 }
 
 void add_pressure(Vec load, const DofMap& dofs, const Mesh& mesh, const Face& face, double pressure)
 {
-  const auto count = static_cast<std::size_t>(node_count(face.shape));
   std::vector<Vec3> x;
-  for (std::size_t k = 0; k < count; ++k) x.push_back(mesh.nodes[static_cast<std::size_t>(face.nodes[k])]);
+  for (const int node : nodes_of(face)) x.push_back(mesh.nodes[node]);
   const auto weights = face_weights(face.shape, x);
-  for (std::size_t k = 0; k < count; ++k) add_force(load, dofs, face.nodes[k], -pressure * weights[k]);
+  for (std::size_t i = 0; i < weights.size(); ++i) add_force(load, dofs, face.nodes[i], -pressure * weights[i]);
 }
 
 } // namespace
@@ -48,8 +46,7 @@ Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const Partition& 
   }
   for (const Pressure& pressure : scene.pressures)
     for (const Face& face : named_faces(mesh, pressure.on, "pressure"))
-      if (partition.node_rank[static_cast<std::size_t>(face.nodes[0])] == rank)
-        add_pressure(load, dofs, mesh, face, pressure.value);
+      if (partition.node_rank[face.nodes[0]] == rank) add_pressure(load, dofs, mesh, face, pressure.value);
   check(VecAssemblyBegin(load));
   check(VecAssemblyEnd(load));
   return load;

@@ -1,7 +1,6 @@
-/// Structures that come as matrices: M C K F of a folder, PETSc binary.
+/// Structures given as matrices: M C K F of a folder, in PETSc's binary format.
 #include "matrices.hpp"
 
-#include "squeal/mesh/names.hpp"
 #include "squeal/solid/binary.hpp"
 
 #include <cmath>
@@ -12,15 +11,17 @@ namespace squeal
 namespace
 {
 
-// Exported matrices carry the round-off of the program that wrote them; a genuine error is orders above this.
+/// Largest |A_ij - A_ji| over the largest entry. Exported matrices have the round-off of the program that wrote them; a
+/// genuine error is orders of magnitude larger.
 constexpr double symmetry_tolerance = 1e-9;
 
 struct Entry
 {
-  double size = -1;
+  double magnitude = -1;
   PetscInt row = 0, column = 0;
 };
 
+/// Returns the largest entry of this rank's rows.
 Entry largest_entry(Mat A)
 {
   Entry largest;
@@ -28,37 +29,38 @@ Entry largest_entry(Mat A)
                [&](PetscInt row, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
                {
                  for (std::size_t k = 0; k < columns.size(); ++k)
-                   if (std::abs(values[k]) > largest.size) largest = {std::abs(values[k]), row, columns[k]};
+                   if (std::abs(values[k]) > largest.magnitude) largest = {std::abs(values[k]), row, columns[k]};
                });
   return largest;
 }
 
-double largest_of_all(double mine, MPI_Comm comm)
+double maximum(double local, MPI_Comm comm)
 {
   double largest = 0;
-  MPI_Allreduce(&mine, &largest, 1, MPI_DOUBLE, MPI_MAX, comm);
+  MPI_Allreduce(&local, &largest, 1, MPI_DOUBLE, MPI_MAX, comm);
   return largest;
 }
 
+/// Throws Error if A is not symmetric.
 void check_symmetric(Mat A, const std::filesystem::path& file, MPI_Comm comm)
 {
   Owned<Mat> difference;
   check(MatTranspose(A, MAT_INITIAL_MATRIX, difference.put()));
   check(MatAXPY(difference, -1, A, DIFFERENT_NONZERO_PATTERN));
   const Entry worst = largest_entry(difference);
-  const double scale = largest_of_all(largest_entry(A).size, comm);
-  const double overall = largest_of_all(worst.size, comm);
+  const double scale = maximum(largest_entry(A).magnitude, comm);
+  const double overall = maximum(worst.magnitude, comm);
   std::string problem;
-  if (overall > symmetry_tolerance * scale && worst.size == overall)
+  if (overall > symmetry_tolerance * scale && worst.magnitude == overall)
   {
-    problem =
-        file.string() + format(": not symmetric: entries (%d, %d) and (%d, %d) differ by %g, the largest entry is %g",
-                               static_cast<int>(worst.row), static_cast<int>(worst.column),
-                               static_cast<int>(worst.column), static_cast<int>(worst.row), worst.size, scale);
+    const std::string i = std::to_string(worst.row), j = std::to_string(worst.column);
+    problem = file.string() + ": not symmetric: entries (" + i + ", " + j + ") and (" + j + ", " + i + ") differ by " +
+              format("%g, the largest entry is %g", worst.magnitude, scale);
   }
   agree(comm, problem);
 }
 
+/// Returns A with the pattern of `pattern`, whose entries are zero.
 Owned<Mat> with_pattern(Mat pattern, Mat A)
 {
   Owned<Mat> result;
@@ -68,6 +70,7 @@ Owned<Mat> with_pattern(Mat pattern, Mat A)
   return result;
 }
 
+/// Loads a square matrix. `size` is the expected size, or receives it if negative.
 Owned<Mat> load_square(const std::filesystem::path& file, PetscInt& size, MPI_Comm comm)
 {
   const auto found = check_matrix_file(file, comm);
@@ -84,6 +87,7 @@ Owned<Mat> load_square(const std::filesystem::path& file, PetscInt& size, MPI_Co
   return A;
 }
 
+/// Throws Error if M has a negative diagonal entry.
 void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
 {
   Owned<Vec> diagonal;
@@ -98,16 +102,6 @@ void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
 }
 
 } // namespace
-
-std::string describe(const DofNames& names, PetscInt dof)
-{
-  if (names.motion.empty()) return "dof " + std::to_string(dof);
-  static const char* const directions[] = {"x", "y", "z", "rx", "ry", "rz"};
-  const int motion = names.motion.at(static_cast<std::size_t>(dof));
-  const auto node = static_cast<std::size_t>(motion / 6);
-  return names.bodies[static_cast<std::size_t>(names.body[node])] + ", " + node_text(motion / 6, names.at[node]) +
-         ", direction " + directions[motion % 6];
-}
 
 void mark_symmetric(Mat A)
 {

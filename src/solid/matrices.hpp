@@ -1,15 +1,15 @@
 #pragma once
-/// M, C and K in the form that every later stage relies on.
+/// Properties of M, C and K that every later stage relies on.
 #include "squeal/solid/structure.hpp"
 
 namespace squeal
 {
 
-/// Gives M, C and K the union of their patterns (with the whole diagonal), so that A = M + a C + b K is a plain sum of
-/// values, and marks them symmetric.
+/// Gives M, C and K the union of their patterns with the whole diagonal, and marks them as symmetric.
+/// A sum M + a C + b K then needs additions of values only.
 void share_pattern(Structure& structure);
 
-/// Tells the library that A is symmetric for good, and that its pattern is complete.
+/// Declares to PETSc that A stays symmetric and that its pattern is complete.
 void mark_symmetric(Mat A);
 
 } // namespace squeal

@@ -1,11 +1,13 @@
-/// Flat shells: membrane with drilling (shell_membrane.cpp) and plate (shell_plate.cpp), side by side in the element's
-/// plane, D = diag(h C, G h, h^3/12 C, kappa G h I), kappa = 5/6, C plane stress.
+/// Flat shells: membrane with drilling rotation (shell_membrane.cpp) and plate (shell_plate.cpp) in the element's
+/// plane,
+///     D = diag(h C, G h, h^3/12 C, kappa G h I),
+/// with C of plane stress, h the thickness, G the shear modulus and kappa = 5/6 the shear correction.
 ///
-/// Frame: z along the product of the diagonals (of two sides of a triangle). The nodes of a warped quadrilateral stand
-/// off its plane by +-d and carry it on rigid arms: u_plane = u + r x (-d z); rigid motions stay exact.
-/// Mass: rho h of the displacements, sides bowed by the rotations of their ends, and rho h^3/12 N_i N_j on all three
-/// rotations, the drilling one too, so that M is positive definite and the same in every frame.
-/// Caveat: facets carry no coupling of membrane and bending within an element: curved shells converge with the mesh.
+/// Axes: z is normal to both diagonals (to two sides of a triangle). The nodes of a warped quadrilateral are at +-d
+/// from its plane and connected to it by rigid links: u_plane = u + r x (-d z). Rigid motions stay exact. Mass: rho h
+/// of the displacements, with sides curved by the rotations of their ends, and rho h^3/12 N_i N_j on all three
+/// rotations. The drilling rotation is included, so that M is positive definite and the same in all axes. Caveat: flat
+/// elements do not couple membrane and bending, so that curved shells converge with the mesh only.
 #include "condensation.hpp"
 #include "kernels.hpp"
 #include "shell_strains.hpp"
@@ -20,45 +22,44 @@ namespace
 {
 
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
+template <int n> using Square = Eigen::Matrix<double, 6 * n, 6 * n>; // on u v w rx ry rz of each node
 constexpr double shear_correction = 5. / 6;
 
-/// Where the element lies: rows of `axes` are its x, y, z; nodes at `plane` + `offset` z about their centre.
-struct Facet
+/// The plane of an element with n nodes.
+template <int n> struct Facet
 {
-  Eigen::Matrix3d axes;
-  PlanePositions plane;   // [m]
-  Eigen::Vector4d offset; // [m]
+  Eigen::Matrix3d axes;            // [-] rows: unit vectors x, y, z
+  PlanePositions<n> plane;         // [m] nodes in x and y about their centre
+  Eigen::Vector<double, n> offset; // [m] nodes along z from the plane
 };
 
-/// `along` [any length], projected on the element, gives its x.
-Facet facet(const NodePositions& X, const Eigen::Vector3d& along)
+/// Returns the plane of an element; its x is the projection of `direction` (of any length) on the plane.
+template <int n> Facet<n> make_facet(const NodePositions& X, const Eigen::Vector3d& direction)
 {
-  const auto nodes = X.cols();
-  const Eigen::Vector3d one = nodes == 3 ? X.col(1) - X.col(0) : X.col(2) - X.col(0);
-  const Eigen::Vector3d other = nodes == 3 ? X.col(2) - X.col(0) : X.col(3) - X.col(1);
-  const Eigen::Vector3d area = one.cross(other), z = area / positive(area.norm(), 0);
-  const Eigen::Vector3d x = along - along.dot(z) * z;
-  if (!(x.norm() > 1e-6 * along.norm()))
+  const Eigen::Vector3d a = n == 3 ? X.col(1) - X.col(0) : X.col(2) - X.col(0);
+  const Eigen::Vector3d b = n == 3 ? X.col(2) - X.col(0) : X.col(3) - X.col(1);
+  const Eigen::Vector3d area = a.cross(b), z = area / positive_jacobian(area.norm(), 0);
+  const Eigen::Vector3d x = direction - direction.dot(z) * z;
+  if (!(x.norm() > 1e-6 * direction.norm()))
     throw std::runtime_error("the axis of the shell's resultants is normal to the element; give one along the surface");
-  Facet f;
-  f.axes << x.normalized().transpose(), z.cross(x).normalized().transpose(), z.transpose();
-  const NodePositions local = f.axes * (X.colwise() - X.rowwise().mean().eval());
-  f.plane = local.topRows<2>();
-  f.offset.head(nodes) = local.row(2).transpose();
-  return f;
+  Facet<n> facet;
+  facet.axes << x.normalized().transpose(), z.cross(x).normalized().transpose(), z.transpose();
+  const Eigen::Matrix<double, 3, n> local = facet.axes * (X.colwise() - X.rowwise().mean().eval());
+  facet.plane = local.template topRows<2>();
+  facet.offset = local.row(2).transpose();
+  return facet;
 }
 
-/// Local displacements (six a node, at the plane) of global ones (at the nodes).
-Eigen::MatrixXd to_plane(const Facet& f)
+/// Returns T of u_local = T u: displacements at the plane in local axes, from those of the nodes in global axes.
+template <int n> Square<n> local_transformation(const Facet<n>& facet)
 {
-  const auto nodes = f.plane.cols();
-  Eigen::MatrixXd T = Eigen::MatrixXd::Zero(6 * nodes, 6 * nodes);
-  for (Eigen::Index i = 0; i < nodes; ++i)
+  Square<n> T = Square<n>::Zero();
+  for (Eigen::Index i = 0; i < n; ++i)
   {
-    T.block<3, 3>(6 * i, 6 * i) = f.axes;
-    T.block<3, 3>(6 * i + 3, 6 * i + 3) = f.axes;
-    T.block<1, 3>(6 * i, 6 * i + 3) = -f.offset(i) * f.axes.row(1);
-    T.block<1, 3>(6 * i + 1, 6 * i + 3) = f.offset(i) * f.axes.row(0);
+    T.template block<3, 3>(6 * i, 6 * i) = facet.axes;
+    T.template block<3, 3>(6 * i + 3, 6 * i + 3) = facet.axes;
+    T.template block<1, 3>(6 * i, 6 * i + 3) = -facet.offset(i) * facet.axes.row(1);
+    T.template block<1, 3>(6 * i + 1, 6 * i + 3) = facet.offset(i) * facet.axes.row(0);
   }
   return T;
 }
@@ -67,7 +68,7 @@ Matrix9 elasticity(const Material& material, double h)
 {
   const double nu = material.poisson, G = material.young / (2 * (1 + nu));
   Eigen::Matrix3d C;
-  C << 1, nu, 0, nu, 1, 0, 0, 0, .5 * (1 - nu);
+  C << 1, nu, 0, nu, 1, 0, 0, 0, 0.5 * (1 - nu);
   C *= material.young / (1 - nu * nu);
   Matrix9 D = Matrix9::Zero();
   D.topLeftCorner<3, 3>() = h * C;
@@ -77,102 +78,119 @@ Matrix9 elasticity(const Material& material, double h)
   return D;
 }
 
-std::vector<StrainPoint<ShellStrains>> strain_points(Shape shape, const PlanePositions& X, const Material& material,
-                                                     double h)
+template <int n> constexpr Shape shell_shape = n == 3 ? Shape::shell3 : Shape::shell4;
+
+template <int n> Eigen::Matrix2d jacobian(const ShapeFunctions& at, const PlanePositions<n>& X)
 {
-  const Quadrature& rule = stiffness_rule(shape);
-  const bool quad = shape == Shape::shell4;
+  return at.dN.topRows<2>() * X.transpose();
+}
+
+/// Returns the strain operators at the points of the stiffness rule.
+template <int n>
+std::vector<StrainPoint<ShellStrains<n>>> strain_points(const PlanePositions<n>& X, const Material& material, double h)
+{
   const double slenderness = 2 * h * h / (shear_correction * (1 - material.poisson));
-  const auto jacobian = [&](const ShapeFunctions& at) { return Eigen::Matrix2d(at.dN.topRows<2>() * X.transpose()); };
-  const Eigen::Matrix2d J0 = jacobian(shape_functions(shape, Eigen::Vector3d::Zero()));
-  std::vector<StrainPoint<ShellStrains>> points(rule.size());
-  std::vector<ShellStrains> modes(quad ? rule.size() : 0);
-  for (std::size_t p = 0; p < rule.size(); ++p)
+  const Eigen::Matrix2d J0 = jacobian<n>(shape_functions(shell_shape<n>, Eigen::Vector3d::Zero()), X);
+  std::vector<StrainPoint<ShellStrains<n>>> points;
+  std::vector<ShellModeStrains> modes;
+  for (const auto& [xi, weight, at] : stiffness_rule(shell_shape<n>))
   {
-    const ShapeFunctions& at = rule[p].at;
-    const Eigen::Matrix2d J = jacobian(at);
-    const double determinant = positive(J.determinant(), p);
-    points[p] = {ShellStrains::Zero(9, 6 * X.cols()), determinant * rule[p].weight};
-    add_plate(points[p].B, X, rule[p].xi, slenderness);
-    if (quad)
-    {
-      add_quad_membrane(points[p].B, at.N, J.inverse() * at.dN.topRows<2>());
-      modes[p] = quad_membrane_modes(rule[p].xi, J0.determinant() / determinant * J0.inverse());
-    }
+    const int p = static_cast<int>(points.size());
+    const Eigen::Matrix2d J = jacobian<n>(at, X);
+    const double determinant = positive_jacobian(J.determinant(), p);
+    ShellStrains<n>& B =
+        points.emplace_back(StrainPoint<ShellStrains<n>>{ShellStrains<n>::Zero(), determinant * weight}).B;
+    add_plate<n>(B, X, xi, slenderness);
+    if constexpr (n == 3)
+      add_triangle_membrane(B, X, material.poisson, p);
     else
-      add_triangle_membrane(points[p].B, X, material.poisson, p);
+    {
+      add_quad_membrane(B, at.N, J.inverse() * at.dN.template topRows<2>());
+      modes.push_back(quad_membrane_modes(xi, J0.determinant() / determinant * J0.inverse()));
+    }
   }
-  if (quad) condense(points, modes, elasticity(material, h));
+  if constexpr (n == 4) condense_parameters(points, modes, elasticity(material, h));
   return points;
 }
 
-/// Displacement of the plane's points: sides bow as the rotations of their ends ask, u' = r x t, so that a curved
-/// element's mass is as accurate as its stiffness (the linear field alone is out by (k L)^2 / 12 in frequency).
-BoundedMatrix<3, 24> displacement(Shape shape, const PlanePositions& X, const Eigen::Vector3d& xi)
+/// Returns the displacements of the plane's points of unit nodal displacements. The rotations r of its ends curve a
+/// side along t by u' = r x t. With the linear field alone the frequency of a bent element is wrong by (k L)^2 / 12.
+template <int n>
+Eigen::Matrix<double, 3, 6 * n> plane_displacements(const PlanePositions<n>& X, const Eigen::Vector3d& xi)
 {
-  const auto nodes = X.cols();
-  const NodeValues N = shape_functions(shape, xi).N;
-  const NodeValues bow = shape_functions(nodes == 3 ? FaceShape::triangle6 : FaceShape::quad8, xi).N.tail(nodes) / 8;
-  BoundedMatrix<3, 24> U = BoundedMatrix<3, 24>::Zero(3, 6 * nodes);
-  for (Eigen::Index i = 0; i < nodes; ++i)
+  const NodeValues N = shape_functions(shell_shape<n>, xi).N;
+  const NodeValues bubble = shape_functions(n == 3 ? FaceShape::triangle6 : FaceShape::quad8, xi).N.tail(n) / 8;
+  Eigen::Matrix<double, 3, 6 * n> U = Eigen::Matrix<double, 3, 6 * n>::Zero();
+  for (Eigen::Index i = 0; i < n; ++i)
   {
-    const auto j = (i + 1) % nodes;
+    const auto j = (i + 1) % n;
     const double x = X(0, j) - X(0, i), y = X(1, j) - X(1, i);
-    Eigen::Matrix3d side; // side x rotation
+    Eigen::Matrix3d side; // cross product of the side with a rotation
     side << 0, 0, y, /**/ 0, 0, -x, /**/ -y, x, 0;
-    U.block<3, 3>(0, 6 * i).diagonal().array() += N(i);
-    U.block<3, 3>(0, 6 * i + 3) -= bow(i) * side;
-    U.block<3, 3>(0, 6 * j + 3) += bow(i) * side;
+    U.template block<3, 3>(0, 6 * i).diagonal().array() += N(i);
+    U.template block<3, 3>(0, 6 * i + 3) -= bubble(i) * side;
+    U.template block<3, 3>(0, 6 * j + 3) += bubble(i) * side;
   }
   return U;
 }
 
-Eigen::MatrixXd plane_mass(Shape shape, const PlanePositions& X, double density, double h)
+template <int n> Square<n> plane_mass(const PlanePositions<n>& X, double density, double h)
 {
-  const auto nodes = X.cols();
-  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(6 * nodes, 6 * nodes);
-  for (const auto& [xi, weight, at] : mass_rule(shape))
+  Square<n> M = Square<n>::Zero();
+  for (const auto& [xi, weight, at] : mass_rule(shell_shape<n>))
   {
-    const double mass = density * h * weight * Eigen::Matrix2d(at.dN.topRows<2>() * X.transpose()).determinant();
-    const BoundedMatrix<3, 24> U = displacement(shape, X, xi);
+    const double mass = density * h * weight * jacobian<n>(at, X).determinant();
+    const auto U = plane_displacements<n>(X, xi);
     M += mass * U.transpose() * U;
-    for (Eigen::Index i = 0; i < nodes; ++i)
-      for (Eigen::Index j = 0; j < nodes; ++j)
-        M.block<3, 3>(6 * i + 3, 6 * j + 3).diagonal().array() += mass * h * h / 12 * at.N(i) * at.N(j);
+    for (Eigen::Index i = 0; i < n; ++i)
+      for (Eigen::Index j = 0; j < n; ++j)
+        M.template block<3, 3>(6 * i + 3, 6 * j + 3).diagonal().array() += mass * h * h / 12 * at.N(i) * at.N(j);
   }
   return M;
+}
+
+template <int n> ElementMatrices matrices(const NodePositions& X, const Material& material, double h)
+{
+  const Facet<n> facet = make_facet<n>(X, X.col(1) - X.col(0));
+  const Square<n> T = local_transformation(facet);
+  const auto in_global_axes = [&](const Square<n>& A) -> Eigen::MatrixXd
+  {
+    const Square<n> B = T.transpose() * A * T;
+    return 0.5 * (B + B.transpose());
+  };
+  const auto points = strain_points<n>(facet.plane, material, h);
+  return {in_global_axes(stiffness_matrix(points, elasticity(material, h))),
+          in_global_axes(plane_mass<n>(facet.plane, material.density, h))};
+}
+
+template <int n> std::vector<std::array<double, 6>> resultants(const Facet<n>& facet, const Material& material,
+                                                               double h, std::span<const double> u)
+{
+  const Eigen::Map<const Eigen::Vector<double, 6 * n>> displacement(u.data());
+  const Eigen::Vector<double, 6 * n> local = local_transformation(facet) * displacement;
+  std::vector<std::array<double, 6>> result;
+  for (const auto& [B, area] : strain_points<n>(facet.plane, material, h))
+  {
+    const Eigen::Vector<double, 9> r = elasticity(material, h) * (B * local);
+    result.push_back({r(0), r(1), r(2), r(4), r(5), r(6)});
+  }
+  return result;
 }
 
 } // namespace
 
 ElementMatrices shell_matrices(Shape shape, const NodePositions& X, const Material& material, double thickness)
 {
-  const Facet f = facet(X, X.col(1) - X.col(0));
-  const Eigen::MatrixXd T = to_plane(f);
-  const auto in_space = [&](const Eigen::MatrixXd& A) -> Eigen::MatrixXd
-  {
-    const Eigen::MatrixXd B = T.transpose() * A * T;
-    return .5 * (B + B.transpose());
-  };
-  const auto points = strain_points(shape, f.plane, material, thickness);
-  return {entries(in_space(stiffness_of(points, elasticity(material, thickness)))),
-          entries(in_space(plane_mass(shape, f.plane, material.density, thickness)))};
+  return shape == Shape::shell3 ? matrices<3>(X, material, thickness) : matrices<4>(X, material, thickness);
 }
 
 std::vector<std::array<double, 6>> shell_resultants(Shape shape, std::span<const Vec3> x, const Material& material,
                                                     double thickness, const Vec3& axis1, std::span<const double> u)
 {
-  const Facet f = facet(position_matrix(x), Eigen::Vector3d(axis1[0], axis1[1], axis1[2]));
-  const Matrix9 D = elasticity(material, thickness);
-  const Eigen::Map<const Eigen::VectorXd> displacement(u.data(), static_cast<Eigen::Index>(u.size()));
-  const Eigen::VectorXd local = to_plane(f) * displacement;
-  std::vector<std::array<double, 6>> resultants;
-  for (const auto& point : strain_points(shape, f.plane, material, thickness))
-  {
-    const Eigen::Matrix<double, 9, 1> r = D * (point.B * local);
-    resultants.push_back({r(0), r(1), r(2), r(4), r(5), r(6)});
-  }
-  return resultants;
+  const NodePositions X = position_matrix(x);
+  const Eigen::Vector3d direction(axis1.data());
+  return shape == Shape::shell3 ? resultants<3>(make_facet<3>(X, direction), material, thickness, u)
+                                : resultants<4>(make_facet<4>(X, direction), material, thickness, u);
 }
 
 } // namespace squeal

@@ -1,15 +1,18 @@
-/// Solids:   K = int B' D B dV,   M = int rho N' N dV,   B: strains (xx yy zz xy yz zx) of nodal displacements.
+/// Solids:   K = int B' D B dV,   M = int rho U' U dV,
+/// with B the strains (xx yy zz xy yz zx) and U the displacements of unit nodal displacements.
 ///
-/// hex8 and wedge6 carry incompatible modes, or they would lock in bending (Wilson, Taylor, Doherty, Ghaboussi 1973):
-///     u = sum N_i u_i + sum m_k(xi) a_k,   m = 1 - xi_k^2 for hex8,   xi^2 - xi, eta^2 - eta, xi eta, 1 - zeta^2 for
-/// wedge6, with Taylor's correction (Taylor, Beresford, Wilson 1976): their gradient is  det(J0)/det(J) J0^-1 dm, J0 at
-/// the centre and dm less its mean, so that it integrates to zero over any shape and the patch test holds. The
-/// parameters follow the nodes statically, in the stiffness and in the mass: without the modes' share of the motion
-/// the mass of a bent element is too small, and its frequency out by (k L)^2 / 12.
+/// hex8 and wedge6 have incompatible modes, without which they lock in bending (Wilson, Taylor, Doherty, Ghaboussi
+/// 1973):
+///     u = sum N_i u_i + sum m_k(xi) a_k,
+///     m = 1 - xi_k^2 for hex8,   m = xi^2 - xi, eta^2 - eta, xi eta, 1 - zeta^2 for wedge6.
+/// Their gradients are corrected (Taylor, Beresford, Wilson 1976) to  det(J0)/det(J) J0^-1 dm,  with J0 the Jacobian at
+/// the centre and dm less its mean. They then integrate to zero over any shape, so that the patch test holds. The
+/// parameters a_k are condensed statically, in the stiffness and in the mass: without the share of the modes in the
+/// motion the frequency of a bent element is wrong by (k L)^2 / 12.
 ///
-/// Caveats: wedge6 stays stiff in bending, in the plane of its triangles as the constant-strain triangle is: for
-/// filling, not for beams. hex8 is exact in bending as a parallelepiped and stiffens when tapered (MacNeal 1987), as
-/// all 8-node bricks.
+/// Caveats: wedge6 is stiff in bending within the plane of its triangles, as the constant-strain triangle is; it is for
+/// filling, not for beams. hex8 is exact in bending as a parallelepiped and stiffer when tapered (MacNeal 1987), as all
+/// 8-node bricks are.
 #include "condensation.hpp"
 #include "kernels.hpp"
 #include "squeal/mesh/quadrature.hpp"
@@ -21,7 +24,6 @@ namespace
 {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Strains = BoundedMatrix<6, 60>;
 
 Matrix6 elasticity(const Material& material)
 {
@@ -32,86 +34,125 @@ Matrix6 elasticity(const Material& material)
   return D;
 }
 
-/// Strains of displacements whose gradients in x, y, z are the columns of `g`.
-Strains strains_of(const BoundedMatrix<3, 20>& g)
+template <int columns> using Gradients = Eigen::Matrix<double, 3, columns>;
+template <int columns> using Strains = Eigen::Matrix<double, 6, 3 * columns>;
+
+/// Returns the strains of displacements whose gradients in x, y, z are the columns of g.
+template <int columns> Strains<columns> strains_of(const Gradients<columns>& g)
 {
-  Strains B = Strains::Zero(6, 3 * g.cols());
-  for (Eigen::Index i = 0; i < g.cols(); ++i)
+  Strains<columns> B;
+  for (Eigen::Index i = 0; i < columns; ++i)
   {
     const double x = g(0, i), y = g(1, i), z = g(2, i);
-    B.middleCols<3>(3 * i) << x, 0, 0, /**/ 0, y, 0, /**/ 0, 0, z, /**/ y, x, 0, /**/ 0, z, y, /**/ z, 0, x;
+    B.template middleCols<3>(3 * i) << x, 0, 0, /**/ 0, y, 0, /**/ 0, 0, z, /**/ y, x, 0, /**/ 0, z, y, /**/ z, 0, x;
   }
   return B;
 }
 
-/// Natural gradients of the incompatible modes, one a column, less their mean over the parent element.
-BoundedMatrix<3, 20> incompatible_gradients(Shape shape, const Eigen::Vector3d& xi)
+/// Returns the natural gradients of the incompatible modes, one a column, less their mean over the reference element.
+template <int modes> Gradients<modes> mode_gradients(const Eigen::Vector3d& xi)
 {
-  if (shape == Shape::hex8) return Eigen::Matrix3d((-2 * xi).asDiagonal());
+  Gradients<modes> g;
   const double r = xi(0) - 1. / 3, s = xi(1) - 1. / 3;
-  BoundedMatrix<3, 20> g(3, 4);
-  g << 2 * r, 0, s, 0, /**/ 0, 2 * s, r, 0, /**/ 0, 0, 0, -2 * xi(2);
+  if constexpr (modes == 3)
+    g = (-2 * xi).asDiagonal();
+  else
+    g << 2 * r, 0, s, 0, /**/ 0, 2 * s, r, 0, /**/ 0, 0, 0, -2 * xi(2);
   return g;
 }
 
-/// Values of the same modes, which vanish at the nodes.
-Eigen::VectorXd incompatible_values(Shape shape, const Eigen::Vector3d& xi)
+/// Returns the values of the same modes, which vanish at the nodes.
+template <int modes> Eigen::Vector<double, modes> mode_values(const Eigen::Vector3d& xi)
 {
-  if (shape == Shape::hex8) return 1 - xi.array().square();
-  return Eigen::Vector4d(xi(0) * xi(0) - xi(0), xi(1) * xi(1) - xi(1), xi(0) * xi(1), 1 - xi(2) * xi(2));
+  if constexpr (modes == 3)
+    return 1 - xi.array().square();
+  else
+    return {xi(0) * xi(0) - xi(0), xi(1) * xi(1) - xi(1), xi(0) * xi(1), 1 - xi(2) * xi(2)};
 }
 
-bool is_enriched(Shape shape)
+/// Strain operators of an element with n nodes and its number of incompatible modes: 3 for hex8, 4 for wedge6, else 0.
+template <int n, int modes> struct Kinematics
 {
-  return shape == Shape::hex8 || shape == Shape::wedge6;
-}
-
-struct Kinematics
-{
-  std::vector<StrainPoint<Strains>> points;
-  Eigen::MatrixXd modes; // amplitudes of unit nodal displacements: row 3 k + component of mode k
+  std::vector<StrainPoint<Strains<n>>> points;        // of the stiffness rule
+  Eigen::Matrix<double, 3 * modes, 3 * n> amplitudes; // of unit nodal displacements: row 3 k + component of mode k
 };
 
-Kinematics kinematics(Shape shape, const NodePositions& X, const Matrix6& D)
+template <int n, int modes> Kinematics<n, modes> kinematics(Shape shape, const NodePositions& X, const Matrix6& D)
 {
   const Quadrature& rule = stiffness_rule(shape);
-  const Eigen::Vector3d centre = shape == Shape::wedge6 ? Eigen::Vector3d(1. / 3, 1. / 3, 0) : Eigen::Vector3d(0, 0, 0);
-  const Eigen::Matrix3d J0 = shape_functions(shape, centre).dN * X.transpose();
-  std::vector<StrainPoint<Strains>> points(rule.size());
-  std::vector<Strains> incompatible(is_enriched(shape) ? rule.size() : 0);
-  for (std::size_t p = 0; p < rule.size(); ++p)
+  Kinematics<n, modes> result;
+  std::vector<Strains<modes>> mode_strains;
+  Eigen::Matrix3d J0;
+  if constexpr (modes > 0)
   {
-    const ShapeFunctions& at = rule[p].at;
-    const Eigen::Matrix3d J = at.dN * X.transpose(); // J(k, l) = dx_l / dxi_k
-    const double determinant = positive(J.determinant(), p);
-    points[p] = {strains_of(J.inverse() * at.dN), determinant * rule[p].weight};
-    if (!is_enriched(shape)) continue;
-    const Eigen::Matrix3d mean = J0.determinant() / determinant * J0.inverse();
-    incompatible[p] = strains_of(mean * incompatible_gradients(shape, rule[p].xi));
+    const Eigen::Vector3d centre = modes == 4 ? Eigen::Vector3d(1. / 3, 1. / 3, 0) : Eigen::Vector3d(0, 0, 0);
+    J0 = shape_functions(shape, centre).dN * X.transpose();
   }
-  Eigen::MatrixXd modes;
-  if (is_enriched(shape)) modes = condense(points, incompatible, D);
-  return {std::move(points), std::move(modes)};
+  for (const auto& [xi, weight, at] : rule)
+  {
+    const Eigen::Matrix3d J = at.dN * X.transpose(); // J(k, l) = dx_l / dxi_k
+    const double determinant = positive_jacobian(J.determinant(), result.points.size());
+    result.points.push_back({strains_of<n>(J.inverse() * at.dN), determinant * weight});
+    if constexpr (modes > 0)
+      mode_strains.push_back(
+          strains_of<modes>(J0.determinant() / determinant * J0.inverse() * mode_gradients<modes>(xi)));
+  }
+  if constexpr (modes > 0) result.amplitudes = condense_parameters(result.points, mode_strains, D);
+  return result;
 }
 
-Eigen::MatrixXd solid_mass(Shape shape, const NodePositions& X, const Eigen::MatrixXd& modes, double density)
+/// Returns the matrix with S_ij times the 3 x 3 identity as its blocks.
+template <int rows, int columns>
+Eigen::Matrix<double, 3 * rows, 3 * columns> in_three_directions(const Eigen::Matrix<double, rows, columns>& S)
 {
-  const Quadrature& rule = mass_rule(shape);
-  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(3 * X.cols(), 3 * X.cols());
-  for (std::size_t p = 0; p < rule.size(); ++p)
+  Eigen::Matrix<double, 3 * rows, 3 * columns> result = Eigen::Matrix<double, 3 * rows, 3 * columns>::Zero();
+  for (Eigen::Index i = 0; i < rows; ++i)
+    for (Eigen::Index j = 0; j < columns; ++j)
+      result.template block<3, 3>(3 * i, 3 * j).diagonal().setConstant(S(i, j));
+  return result;
+}
+
+/// Returns M from the scalar mass S = int rho f f' dV of the shape functions and modes, f = (N, m), and the amplitudes
+/// A of the modes: with S partitioned like f, M = S_NN + A' S_mN + S_Nm A + A' S_mm A in three directions.
+template <int n, int modes> Eigen::Matrix<double, 3 * n, 3 * n>
+mass_matrix(Shape shape, const NodePositions& X, const Kinematics<n, modes>& kinematics, double density)
+{
+  Eigen::Matrix<double, n + modes, n + modes> S = Eigen::Matrix<double, n + modes, n + modes>::Zero();
+  std::size_t point = 0;
+  for (const auto& [xi, weight, at] : mass_rule(shape))
   {
-    const ShapeFunctions& at = rule[p].at;
-    const double volume = rule[p].weight * positive((at.dN * X.transpose()).determinant(), p);
-    BoundedMatrix<3, 60> U = BoundedMatrix<3, 60>::Zero(3, 3 * X.cols()); // displacement at the point
-    for (Eigen::Index i = 0; i < X.cols(); ++i) U.middleCols<3>(3 * i).diagonal().setConstant(at.N(i));
-    if (is_enriched(shape))
-    {
-      const Eigen::VectorXd m = incompatible_values(shape, rule[p].xi);
-      for (Eigen::Index k = 0; k < m.size(); ++k) U += m(k) * modes.middleRows<3>(3 * k);
-    }
-    M += density * volume * U.transpose() * U;
+    const double volume = weight * positive_jacobian((at.dN * X.transpose()).determinant(), point++);
+    Eigen::Vector<double, n + modes> f;
+    f.template head<n>() = at.N;
+    if constexpr (modes > 0) f.template tail<modes>() = mode_values<modes>(xi);
+    S += density * volume * f * f.transpose();
   }
-  return .5 * (M + M.transpose());
+  Eigen::Matrix<double, 3 * n, 3 * n> M = in_three_directions<n, n>(S.template topLeftCorner<n, n>());
+  if constexpr (modes > 0)
+  {
+    const auto& A = kinematics.amplitudes;
+    const Eigen::Matrix<double, 3 * n, 3 * n> half =
+        A.transpose() * (in_three_directions<modes, n>(S.template bottomLeftCorner<modes, n>()) +
+                         0.5 * in_three_directions<modes, modes>(S.template bottomRightCorner<modes, modes>()) * A);
+    M += half + half.transpose();
+  }
+  return M;
+}
+
+/// Calls visit.operator()<n, modes>() with the number of nodes and of incompatible modes of a solid.
+template <class Visit> auto visit_solid(Shape shape, Visit visit)
+{
+  switch (shape)
+  {
+  case Shape::hex8:
+    return visit.template operator()<8, 3>();
+  case Shape::wedge6:
+    return visit.template operator()<6, 4>();
+  case Shape::hex20:
+    return visit.template operator()<20, 0>();
+  default:
+    return visit.template operator()<10, 0>();
+  }
 }
 
 } // namespace
@@ -119,22 +160,30 @@ Eigen::MatrixXd solid_mass(Shape shape, const NodePositions& X, const Eigen::Mat
 ElementMatrices solid_matrices(Shape shape, const NodePositions& X, const Material& material)
 {
   const Matrix6 D = elasticity(material);
-  const auto [points, modes] = kinematics(shape, X, D);
-  return {entries(stiffness_of(points, D)), entries(solid_mass(shape, X, modes, material.density))};
+  return visit_solid(shape,
+                     [&]<int n, int modes>() -> ElementMatrices
+                     {
+                       const auto k = kinematics<n, modes>(shape, X, D);
+                       return {stiffness_matrix(k.points, D), mass_matrix(shape, X, k, material.density)};
+                     });
 }
 
 std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec3> x, const Material& material,
                                                 std::span<const double> u)
 {
   const Matrix6 D = elasticity(material);
-  const Eigen::Map<const Eigen::VectorXd> displacement(u.data(), static_cast<Eigen::Index>(u.size()));
-  std::vector<std::array<double, 6>> stress;
-  for (const auto& point : kinematics(shape, position_matrix(x), D).points)
-  {
-    std::array<double, 6>& s = stress.emplace_back();
-    Eigen::Map<Eigen::Matrix<double, 6, 1>>(s.data()) = D * (point.B * displacement);
-  }
-  return stress;
+  return visit_solid(shape,
+                     [&]<int n, int modes>()
+                     {
+                       const Eigen::Map<const Eigen::Vector<double, 3 * n>> displacement(u.data());
+                       std::vector<std::array<double, 6>> stress;
+                       for (const auto& [B, measure] : kinematics<n, modes>(shape, position_matrix(x), D).points)
+                       {
+                         std::array<double, 6>& s = stress.emplace_back();
+                         Eigen::Map<Eigen::Vector<double, 6>>(s.data()) = D * (B * displacement);
+                       }
+                       return stress;
+                     });
 }
 
 } // namespace squeal

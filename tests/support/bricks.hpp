@@ -128,8 +128,8 @@ inline Owned<Vec> sample(const Structure& structure, const Field& field)
   check(VecGetOwnershipRange(u, &first, &last));
   for (PetscInt dof = first; dof < last; ++dof)
   {
-    const auto motion = static_cast<std::size_t>(structure.names.motion[static_cast<std::size_t>(dof)]);
-    check(VecSetValue(u, dof, field(structure.names.at[motion / 6])[motion % 6], INSERT_VALUES));
+    const PetscInt nodal_dof = structure.names.nodal_dof[dof];
+    check(VecSetValue(u, dof, field(structure.names.at[nodal_dof / 6])[nodal_dof % 6], INSERT_VALUES));
   }
   check(VecAssemblyBegin(u));
   check(VecAssemblyEnd(u));

@@ -51,7 +51,7 @@ double motion_at(const Mesh& mesh, const Built& built, Vec u, const Vec3& at, in
   Mesh copy = mesh;
   const int node = node_at(copy, at);
   double value = 0;
-  for (const DofTerm& term : built.dofs.of(node, component))
+  for (const DofTerm& term : built.dofs.terms_of(6 * node + component))
     if (term.dof >= built.dofs.first && term.dof < built.dofs.last)
     {
       double entry = 0;
@@ -97,10 +97,10 @@ TEST_CASE("the rotation of a shared node is the solid's: exact where the solid t
   for (int c = 0; c < 3; ++c)
     CHECK(motion_at(mesh, built, u, {.1, .05, 0}, 3 + c) ==
           doctest::Approx(turn[static_cast<std::size_t>(c)]).epsilon(1e-12));
-  const auto& motions = built.structure.names.motion;
+  const auto& nodal_dofs = built.structure.names.nodal_dof;
   Mesh copy = mesh;
   const int shared = node_at(copy, {.1, .05, 0});
-  CHECK(std::count_if(motions.begin(), motions.end(), [&](int motion) { return motion / 6 == shared; }) == 3);
+  CHECK(std::count_if(nodal_dofs.begin(), nodal_dofs.end(), [&](PetscInt i) { return i / 6 == shared; }) == 3);
 }
 
 TEST_CASE("a cantilever strip on a cube bends like a clamped beam")
@@ -134,7 +134,7 @@ TEST_CASE("a shared node of a rigid body turns with the body")
   add_points(mesh, scene);
   const auto built = build(mesh, scene, world);
   Mesh copy = mesh;
-  const auto terms = built.dofs.of(node_at(copy, {.1, .1, 0}), 4);
+  const auto terms = built.dofs.terms_of(6 * node_at(copy, {.1, .1, 0}) + 4);
   REQUIRE(terms.size() == 1);
   CHECK(terms[0].factor == 1);
   CHECK(describe(built.dofs.names, terms[0].dof).find("rigid body clamp") == 0);

@@ -62,9 +62,9 @@ TEST_CASE("a state file is in the order of the mesh, whichever the partition num
 {
   auto model = test::unilateral_oscillator(.3, .6);
   const auto file = scratch() / "ordered.petsc";
-  model.structure.names.motion = {7, 0, 3};
+  model.structure.names.nodal_dof = {7, 0, 3};
   write_state(state_of(model.structure, {7, 0, 3}, {70, 0, 30}), model.structure, file);
-  model.structure.names.motion = {0, 3, 7}; // as another number of ranks would number them
+  model.structure.names.nodal_dof = {0, 3, 7}; // as another number of ranks would number them
   const State back = read_state(file, model.structure);
   CHECK(whole(back.u) == std::vector<double>{0, 3, 7});
   CHECK(whole(back.v) == std::vector<double>{0, 30, 70});

@@ -171,8 +171,8 @@ inline System assemble(const Body& body)
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j)
       {
-        K.emplace_back(global(i), global(j), matrices.stiffness[i * n + j]);
-        M.emplace_back(global(i), global(j), matrices.mass[i * n + j]);
+        K.emplace_back(global(i), global(j), matrices.stiffness(i, j));
+        M.emplace_back(global(i), global(j), matrices.mass(i, j));
       }
   }
   System system{Sparse(size, size), Sparse(size, size)};

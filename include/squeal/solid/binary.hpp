@@ -1,7 +1,8 @@
 #pragma once
-/// PETSc binary files (big-endian): a matrix is {1211216, rows, columns, entries, entries of each row, columns,
-/// values}, a vector {1211214, length, values}. A damaged file would leave PETSc's readers with one message a rank, or
-/// none, so rank 0 checks the whole of it first. All collective; an Error names the file and is thrown by every rank.
+/// PETSc binary files, big-endian. A matrix is {1211216, rows, columns, entries, entries of each row, columns, values},
+/// a vector {1211214, length, values}.
+/// PETSc's readers fail on a damaged file with one message a rank, or none. Rank 0 therefore checks the whole file
+/// first. All functions are collective; an Error names the file and is thrown by every rank.
 #include "squeal/base/petsc.hpp"
 
 #include <filesystem>
@@ -15,13 +16,14 @@ struct MatrixSize
   PetscInt rows = 0, columns = 0;
 };
 
-/// Checks length, kind, row counts and columns (ascending and in range) of a matrix file.
+/// Returns the size of the matrix in a file. Throws Error if its length, kind, row counts or columns are wrong.
 MatrixSize check_matrix_file(const std::filesystem::path& file, MPI_Comm comm);
 
-/// AIJ matrix of a file that was checked; local sizes may be PETSC_DECIDE. Error: entries that are not finite.
+/// Returns the AIJ matrix in a file that was checked; local sizes may be PETSC_DECIDE.
+/// Throws Error if an entry is not finite.
 Owned<Mat> load_matrix(const std::filesystem::path& file, MatrixSize size, MatrixSize local, MPI_Comm comm);
 
-/// A vector file, whole on every rank.
+/// Returns all entries of a vector file on every rank. Throws Error as above.
 std::vector<double> read_vector(const std::filesystem::path& file, MPI_Comm comm);
 
 } // namespace squeal

@@ -1,9 +1,12 @@
 #pragma once
-/// From mesh to matrices: degrees of freedom and constraints u_nodes = T u, and M, C, K, load on the free ones.
-///     M u'' + C u' + K u = load + contact,   C = sum of alpha M + beta K by part, plus dashpots.
+/// From the mesh to the equations of motion of the free degrees of freedom q:
+///     M q'' + C q' + K q = load + contact forces,   C = sum of alpha M + beta K of each part, and dashpots.
+/// Supports and rigid bodies are exact constraints u = T q on the nodal degrees of freedom u.
+/// Nodal degree of freedom 6 * node + c is component c of a node, c = 0..5 for x y z rx ry rz.
 #include "squeal/base/petsc.hpp"
 #include "squeal/mesh/mesh.hpp"
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,61 +14,68 @@
 namespace squeal
 {
 
-struct DofTerm
-{
-  PetscInt dof = 0;
-  double factor = 0;
-};
-
-/// What each free degree of freedom is, for messages: told when asked, since a model has a quarter million of them.
+/// What each free degree of freedom is. Texts are made on demand only, since a model has many degrees of freedom.
 struct DofNames
 {
   std::vector<std::string> bodies; // "part disc", "point tip", "rigid body carrier"
-  std::vector<int> body;           // of each node
-  std::vector<Vec3> at;            // [m] of each node
-  std::vector<int> motion;         // of each free dof: 6 * node + component; empty on a matrix scene
+  std::vector<int> body;           // index in `bodies` of each node
+  std::vector<Vec3> at;            // [m] position of each node
+  std::vector<PetscInt> nodal_dof; // of each free degree of freedom; empty on a matrix scene
 };
 
-/// "part disc, node 12 at (x, y, z), direction ry", or "dof 12" on a matrix scene.
+/// Returns "part disc, node 12 at (x, y, z), direction ry", or "dof 12" on a matrix scene.
 std::string describe(const DofNames& names, PetscInt dof);
 
-/// u of node k, component c (0..2 translations, 3..5 rotations) = sum of factor * u[dof]; no terms: held still, or the
-/// node has no such motion. The same on every rank; a pair of contact nodes and its degrees of freedom share a rank.
+struct DofTerm
+{
+  PetscInt dof = 0;  // free degree of freedom
+  double factor = 0; // [-, m]
+};
+
+/// The rows of T, the same on every rank. Both nodes of a contact pair have their degrees of freedom on one rank.
 struct DofMap
 {
-  PetscInt size = 0;             // free degrees of freedom of all ranks
-  PetscInt first = 0, last = 0;  // this rank owns [first, last)
-  std::vector<PetscInt> offsets; // 6 * nodes + 1, into terms
-  std::vector<DofTerm> terms;
+  PetscInt size = 0;                // number of free degrees of freedom on all ranks
+  PetscInt first = 0;               // this rank owns first to last - 1
+  PetscInt last = 0;                // end of this rank's range
+  std::vector<std::size_t> offsets; // of each nodal degree of freedom in `terms`, and the end
+  std::vector<DofTerm> terms;       // all rows
   DofNames names;
 
-  std::span<const DofTerm> of(int node, int component) const;
+  /// Row of a nodal degree of freedom. It is empty where the motion is fixed or the node does not have it.
+  std::span<const DofTerm> terms_of(PetscInt nodal_dof) const;
 };
 
-/// Supports and rigid bodies are eliminated exactly. A node shared by shells and solids: its rotation follows the
-/// least-squares rotation of the solid nodes around it, so that the shell's moments enter the solid as couples.
-/// Errors: a support or rigid body that contradicts another (which node, which two), nothing free.
+/// Numbers the free degrees of freedom and eliminates supports and rigid bodies. Collective.
+/// The rotation of a node that shells and solids share follows the least-squares rotation of the solid nodes around it,
+/// so that the moments of the shell act on the solid as couples.
+/// Throws Error for a support or rigid body that contradicts another, and if nothing is free.
 DofMap number_dofs(const Mesh& mesh, const Scene& scene, const Partition& partition, MPI_Comm comm);
 
-/// AIJ matrices of one common non-zero pattern, symmetric flags set.
+/// The matrices have one common non-zero pattern and are marked as symmetric.
 struct Structure
 {
-  Owned<Mat> M, C, K; // [kg, N s/m, N/m]
-  Owned<Vec> load;    // [N]
-  long elements = 0;
+  Owned<Mat> M;              // [kg, kg m, kg m2]
+  Owned<Mat> C;              // [N s/m, N s, N m s]
+  Owned<Mat> K;              // [N/m, N, N m]
+  Owned<Vec> load;           // [N, N m]
+  std::int64_t elements = 0; // number of elements; 0 on a matrix scene
   DofNames names;
 };
 
+/// Returns the structure of a mesh or point scene. Collective.
+/// Throws Error for an element whose Jacobian is not positive, with its part and place.
 Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partition, const DofMap& dofs, MPI_Comm comm);
 
-/// M.petsc C.petsc K.petsc F.petsc of a folder. Errors: a file missing, truncated or not PETSc binary, sizes that
-/// disagree (both named), entries that are not finite, M or K not symmetric.
+/// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder. Collective.
+/// Throws Error for a file that is missing, truncated or not PETSc binary, sizes that disagree, entries that are not
+/// finite, and an M, C or K that is not symmetric.
 Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm);
 
-/// A row of the probe matrix per probe: probe value = row . u.
+/// Returns the matrix P with a row for each probe: the values of the probes are P q.
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const DofMap& dofs, MPI_Comm comm);
 
-/// Probes of a matrix scene: "dof:N".
+/// The same for a matrix scene, where a probe is "dof:N".
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Structure& structure, MPI_Comm comm);
 
 } // namespace squeal

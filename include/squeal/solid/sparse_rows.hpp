@@ -1,0 +1,20 @@
+#pragma once
+/// Sparse rows on the free degrees of freedom, for matrices that read displacements of nodes: gaps, sliding velocities,
+/// probes.
+#include "squeal/solid/structure.hpp"
+
+namespace squeal
+{
+
+using SparseRow = std::map<PetscInt, double>; // coefficient of each free degree of freedom
+
+/// Adds direction . u(node) to a row.
+void add_displacement(const DofMap& dofs, int node, const Vec3& direction, SparseRow& row);
+
+/// Returns the AIJ matrix with this rank's rows. Collective.
+Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm);
+
+/// Returns this rank's range [first, last) of `count` items that are shared equally among the ranks in order.
+std::pair<PetscInt, PetscInt> local_range(PetscInt count, MPI_Comm comm);
+
+} // namespace squeal

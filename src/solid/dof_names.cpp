@@ -1,0 +1,34 @@
+#include "dof_names.hpp"
+
+#include "squeal/mesh/names.hpp"
+#include "squeal/mesh/shapes.hpp"
+
+namespace squeal
+{
+
+void name_nodes(const Mesh& mesh, const Scene& scene, DofNames& names)
+{
+  names.at = mesh.nodes;
+  names.body.assign(mesh.nodes.size(), 0);
+  for (const Part& part : scene.parts) names.bodies.push_back("part " + part.name);
+  for (const Element& element : mesh.elements)
+    for (const int node : nodes_of(element)) names.body[node] = element.part;
+  const auto name_point = [&](const std::string& kind, const std::string& name)
+  {
+    names.body[mesh.points.at(name)] = static_cast<int>(names.bodies.size());
+    names.bodies.push_back(kind + " " + name);
+  };
+  for (const Point& point : scene.points) name_point("point", point.name);
+  for (const RigidBody& body : scene.rigid_bodies) name_point("rigid body", body.name);
+}
+
+std::string describe(const DofNames& names, PetscInt dof)
+{
+  if (names.nodal_dof.empty()) return "dof " + std::to_string(dof);
+  const PetscInt nodal_dof = names.nodal_dof.at(dof);
+  const int node = static_cast<int>(nodal_dof / 6);
+  return names.bodies[names.body[node]] + ", " + node_text(node, names.at[node]) + ", direction " +
+         direction_names[nodal_dof % 6];
+}
+
+} // namespace squeal
