@@ -83,8 +83,9 @@ void check_option_names(MPI_Comm comm)
 OptionList options_of(ProgramOptions& options)
 {
   OptionList all;
-  for (OptionList list : {options_of(options.equilibrium), options_of(options.modes), options_of(options.estimate),
-                          options_of(options.step), options_of(options.cycle)})
+  for (OptionList list :
+       {options_of(options.factor), options_of(options.equilibrium), options_of(options.modes),
+        options_of(options.pencil), options_of(options.estimate), options_of(options.step), options_of(options.cycle)})
     all.insert(all.end(), list.begin(), list.end());
   return all;
 }

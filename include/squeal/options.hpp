@@ -1,5 +1,7 @@
 #pragma once
 /// All algorithm options of squeal: one struct a stage, each described in its own room; read and refused together.
+#include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/cycle/options.hpp"
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/transient.hpp"
@@ -9,6 +11,8 @@ namespace squeal
 
 struct ProgramOptions
 {
+  FactorOptions factor; // the classes that factor a matrix read their options where they do so
+  PencilOptions pencil;
   EquilibriumOptions equilibrium;
   ModesOptions modes;
   EstimateOptions estimate;

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 namespace squeal
@@ -17,7 +16,7 @@ namespace squeal
 namespace
 {
 
-// The entry of phi of largest modulus; of nearly equal ones the first, so that every rank count turns phi alike.
+/// The entry of phi with the largest modulus. Of nearly equal ones it is the first, for any number of ranks.
 std::complex<double> largest_entry(Vec real, Vec imaginary)
 {
   PetscInt first = 0, last = 0;
@@ -33,19 +32,19 @@ std::complex<double> largest_entry(Vec real, Vec imaginary)
   {
     double entry[2] = {0, 0};
     int rank = 0;
-  } mine;
-  mine.rank = ranks_of(comm);
+  } own;
+  own.rank = ranks_of(comm);
   for (PetscInt i = last - first - 1; i >= 0; --i)
-    if (std::hypot(re[i], im[i]) >= largest * (1 - 1e-6)) mine = {{re[i], im[i]}, rank_of(comm)};
+    if (std::hypot(re[i], im[i]) >= largest * (1 - 1e-6)) own = {{re[i], im[i]}, rank_of(comm)};
   check(VecRestoreArrayRead(real, &re));
   check(VecRestoreArrayRead(imaginary, &im));
   int holder = 0;
-  MPI_Allreduce(&mine.rank, &holder, 1, MPI_INT, MPI_MIN, comm);
-  MPI_Bcast(mine.entry, 2, MPI_DOUBLE, holder, comm);
-  return {mine.entry[0], mine.entry[1]};
+  MPI_Allreduce(&own.rank, &holder, 1, MPI_INT, MPI_MIN, comm);
+  MPI_Bcast(own.entry, 2, MPI_DOUBLE, holder, comm);
+  return {own.entry[0], own.entry[1]};
 }
 
-// phi = Z y turned and scaled so that its largest entry is 1
+/// Sets phi = Z y, turned and scaled so that its largest entry is 1.
 void set_shape(ComplexMode& mode, const ClosedContact& contact, const Eigenpair& pair)
 {
   check(MatCreateVecs(contact.Z, nullptr, mode.real.put()));
@@ -73,7 +72,7 @@ std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const Linea
   return modes;
 }
 
-/// The sliding problem as the routes see it.
+/// What both routes, the full problem and the projection, solve.
 struct ModesProblem
 {
   const LinearisedSliding& linearised;
@@ -82,13 +81,13 @@ struct ModesProblem
   const ModesOptions& options;
 };
 
-// Friction may move a pair across the band's edge: a little below it both counts agree, then.
+/// Counts in the band, or up to an edge a little below if friction moves a pair across the end of the band.
 PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution& solution, RealCount& real,
                         double band)
 {
   const double end = 2 * std::numbers::pi * band;
   const int free = count_below(real, std::sqrt(vibration_floor(norms_of(problem))));
-  return count_pairs(solution, real, free, .8 * end, end);
+  return count_pairs(solution, real, free, 0.8 * end, end);
 }
 
 CountedSolution solve_full(const ModesProblem& problem, RealCount& real)
@@ -105,8 +104,7 @@ CountedSolution solve_full(const ModesProblem& problem, RealCount& real)
     result.count = count_in_band(problem.reduced, result.solution, real, band);
     if (result.count.found >= result.count.expected) return result;
     result.solution.outcome.kind = OutcomeKind::not_converged;
-    result.solution.outcome.reason =
-        "fewer pairs were found than are expected; -modes_solver toar seeks them otherwise";
+    result.solution.outcome.reason = "fewer pairs were found than are expected; -modes_solver toar uses another method";
     return result;
   }
   QuadraticSettings quadratic{band, 0, n > limit ? count_below(real, end) : 0, limit};
@@ -116,7 +114,8 @@ CountedSolution solve_full(const ModesProblem& problem, RealCount& real)
   return result;
 }
 
-// As many real modes as the scene says, or those up to a little beyond the band, at least twenty.
+/// Projects on the number of real modes that the scene asks for, or on those up to a little beyond the band, at least
+/// twenty.
 QuadraticSolution solve_by_projection(const ModesProblem& problem)
 {
   constexpr int fewest = 20;
@@ -138,26 +137,20 @@ int unstable_in(const std::vector<ComplexMode>& modes)
       std::count_if(modes.begin(), modes.end(), [](const ComplexMode& mode) { return is_unstable(mode.lambda); }));
 }
 
-std::string text_of(const ModeCount& count)
-{
-  char text[200];
-  std::snprintf(text, sizeof text, "%d pairs below %.6g Hz, %d expected by the inertia of the frictionless structure",
-                count.found, count.frequency, count.expected);
-  return text;
-}
-
-// Unstable modes by either route; all modes by inertia.
-std::string count_check(const Modes& modes)
+/// The sentence that Modes::count_check holds.
+std::string describe_count(const Modes& modes)
 {
   const bool confirmed = !modes.count.certified_by.empty() && !modes.routes_disagree;
   std::string text = confirmed ? "confirmed: " : "NOT confirmed: ";
   if (modes.method == ModesMethod::both)
     text += std::to_string(modes.unstable_count) + " unstable by the full problem, " +
             std::to_string(unstable_in(modes.projected)) + " by projection on real modes; ";
-  return text + text_of(modes.count);
+  return text + format("%d pairs below %.6g Hz, %d expected by the inertia of the frictionless structure",
+                       modes.count.found, modes.count.frequency, modes.count.expected);
 }
 
-void judge(Modes& modes)
+/// Sets what follows from the modes: their order, the numbers of unstable ones, the residual and whether it converged.
+void assess(Modes& modes)
 {
   for (const ComplexMode& mode : modes.modes)
     modes.outcome.residual = std::max(modes.outcome.residual, mode.backward_error);
@@ -165,19 +158,19 @@ void judge(Modes& modes)
                         [](const ComplexMode& mode) { return is_unstable(mode.lambda); });
   modes.unstable_count = unstable_in(modes.modes);
   modes.routes_disagree = modes.method == ModesMethod::both && unstable_in(modes.projected) != modes.unstable_count;
-  modes.count_check = count_check(modes);
+  modes.count_check = describe_count(modes);
   if (modes.outcome.residual <= 1e-8 || modes.outcome.kind != OutcomeKind::converged) return;
   modes.outcome.kind = OutcomeKind::not_converged;
   modes.outcome.reason = "a backward error exceeds 1e-8";
 }
 
-ModeCount certificate(const PairCount& count)
+ModeCount certified(const PairCount& count)
 {
   return {count.expected == count.found ? "inertia" : "", count.frequency, count.expected, count.found};
 }
 
-// Pairs that were found beyond the band, for the count, are told by their frequency only.
-void keep_band(Modes& modes)
+/// Keeps of the modes beyond the band, which were found for the count, the frequencies only.
+void drop_beyond_band(Modes& modes)
 {
   const auto beyond = std::stable_partition(modes.modes.begin(), modes.modes.end(),
                                             [&](const ComplexMode& mode)
@@ -253,9 +246,9 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
     modes.modes = modes_of(found.solution, linearised);
   }
   modes.outcome = found.solution.outcome;
-  modes.count = certificate(found.count);
-  keep_band(modes);
-  judge(modes);
+  modes.count = certified(found.count);
+  drop_beyond_band(modes);
+  assess(modes);
   return modes;
 }
 

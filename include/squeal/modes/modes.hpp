@@ -1,7 +1,7 @@
 #pragma once
 /// Complex modes of the structure linearised about steady sliding (src/README.md, section 3):
 ///     (lambda^2 Y'M Z + lambda Y'(C + C_f) Z + Y'K Z) phi = 0,   u(t) ~ phi exp(lambda t),   Re(lambda) > 0:
-///     squeal-prone.
+///     squeal may start.
 /// Z keeps closed pairs closed, Y removes their normal reactions; all three matrices are unsymmetric.
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
@@ -35,11 +35,11 @@ struct RealModes
   std::vector<Owned<Vec>> shapes; // in the structure's dofs
 };
 
-/// How it is known that no mode is missing.
+/// The count that shows whether a mode is missing.
 struct ModeCount
 {
   std::string certified_by;    // "inertia" of the frictionless structure; empty: not certified
-  double frequency = 0;        // [Hz], the band or just above, where no pair crossed the edge for friction
+  double frequency = 0;        // [Hz] the end of the band or near it, where friction moved no pair across
   int expected = 0, found = 0; // pairs below it
 };
 
@@ -56,7 +56,7 @@ struct Modes
   int unstable_count = 0;             // of is_unstable, the first ones
   bool routes_disagree = false;       // on unstable_count, when both ran
   ModeCount count;
-  std::string count_check; // in words: unstable modes by either route, all modes by inertia
+  std::string count_check; // one sentence: unstable modes by either route, all modes by inertia
 
   std::span<const ComplexMode> unstable() const
   {
