@@ -59,7 +59,7 @@ std::vector<double> probe_values(Mat probes, Vec u)
   Owned<Vec> values;
   check(MatCreateVecs(probes, nullptr, values.put()));
   check(MatMult(probes, u, values));
-  return whole(values);
+  return all_entries(values);
 }
 
 MemoryForecast forecast_memory(const Model& model)

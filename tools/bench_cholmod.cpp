@@ -272,14 +272,14 @@ struct RightSides
 
 RightSides right_sides(const std::vector<State>& states, Common& common)
 {
-  const std::vector<double> first = whole(states[0].v);
+  const std::vector<double> first = all_entries(states[0].v);
   RightSides sides{{}, {}, hold(cholmod_zeros(first.size(), states.size(), CHOLMOD_REAL, &common), common)};
   auto* column = static_cast<double*>(sides.dense->x);
   for (const State& state : states)
   {
     sides.b.push_back(copy_of(state.v));
     sides.x.push_back(zeros_like(state.v));
-    const std::vector<double> entries = whole(state.v);
+    const std::vector<double> entries = all_entries(state.v);
     column = std::copy(entries.begin(), entries.end(), column);
   }
   return sides;
@@ -326,7 +326,7 @@ void compare_solves(const ThetaStep& step, const Structure& structure, const Int
         [&] { cholmod_solve2(CHOLMOD_A, L.get(), sides.dense.get(), nullptr, &solution, nullptr, &Y, &E, &common); }));
   }
   comparison.difference_x =
-      std::max(comparison.difference_x, difference(whole(x[0]), static_cast<const double*>(solution->x)));
+      std::max(comparison.difference_x, difference(all_entries(x[0]), static_cast<const double*>(solution->x)));
   for (cholmod_dense* block : {solution, Y, E}) cholmod_free_dense(&block, &common);
 }
 

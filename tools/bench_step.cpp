@@ -133,7 +133,7 @@ void run(const std::vector<std::string>& words)
     if (words.size() > 6)
       for (const Vec x : {states[0].u.get(), states[0].v.get()})
       {
-        const std::vector<double> all = whole(x);
+        const std::vector<double> all = all_entries(x);
         dump.write(reinterpret_cast<const char*>(all.data()), static_cast<std::streamsize>(8 * all.size()));
       }
   }
@@ -144,7 +144,7 @@ void run(const std::vector<std::string>& words)
   const auto [cold, cold_sweeps] = cold_contact(step, mu, b, "gauss_seidel");
   const auto [fixed, fixed_sweeps] = cold_contact(step, mu, b, "fixed_point");
   const double entries = plain_factor_entries(structure, h);
-  const std::size_t dofs = whole(structure.load).size();
+  const std::size_t dofs = all_entries(structure.load).size();
   if (!speaks) return;
   taken.erase(taken.begin());
   std::printf("{\"dofs\": %d, \"pairs\": %d, \"ranks\": %d, \"trajectories\": %d, \"step\": %.4g, "

@@ -16,14 +16,14 @@ struct Factor::Parts
 {
   MPI_Comm comm = MPI_COMM_NULL;
   int dofs = 0, border = 0;
-  Shares shares;                                                             // of the degrees of freedom
+  RowLayout layout;                                                          // of the degrees of freedom
   std::variant<std::monostate, Cholesky, MumpsFactor, DenseFactor> factor{}; // MumpsFactor on all ranks, others on 0
   bool failed = false;
   std::vector<double> right{}; // on rank 0: right-hand sides and then solutions, `dofs` long each
   int columns = 0;             // of the last forward
 
   bool on_rank_zero() const { return rank_of(comm) == 0; }
-  int own_rows() const { return shares.counts[static_cast<std::size_t>(rank_of(comm))]; }
+  int own_rows() const { return layout.counts[static_cast<std::size_t>(rank_of(comm))]; }
   double* column(std::size_t k) { return on_rank_zero() ? &right[k * static_cast<std::size_t>(dofs)] : nullptr; }
 };
 
@@ -128,8 +128,8 @@ Factor::Factor(Mat A, Mat B, Kind kind) : parts_(std::make_unique<Parts>())
 {
   Parts& parts = *parts_;
   parts.comm = comm_of(A);
-  parts.shares = shares_of(A);
-  parts.dofs = parts.shares.total();
+  parts.layout = row_layout(A);
+  parts.dofs = parts.layout.total();
   parts.border = rows_of(B);
   Plan plan = make_plan(kind, A, B);
   if (plan.kind == Kind::mumps)
@@ -174,8 +174,8 @@ std::vector<double> Factor::forward(std::span<const Vec> b) const
   {
     const double* own = nullptr;
     check(VecGetArrayRead(b[k], &own));
-    MPI_Gatherv(own, parts.own_rows(), MPI_DOUBLE, parts.column(k), parts.shares.counts.data(),
-                parts.shares.starts.data(), MPI_DOUBLE, 0, parts.comm);
+    MPI_Gatherv(own, parts.own_rows(), MPI_DOUBLE, parts.column(k), parts.layout.counts.data(),
+                parts.layout.starts.data(), MPI_DOUBLE, 0, parts.comm);
     check(VecRestoreArrayRead(b[k], &own));
   }
   return with_factor<std::vector<double>>(parts.factor,
@@ -190,7 +190,7 @@ void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x)
   {
     double* own = nullptr;
     check(VecGetArrayWrite(x[k], &own));
-    MPI_Scatterv(parts.column(k), parts.shares.counts.data(), parts.shares.starts.data(), MPI_DOUBLE, own,
+    MPI_Scatterv(parts.column(k), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, own,
                  parts.own_rows(), MPI_DOUBLE, 0, parts.comm);
     check(VecRestoreArrayWrite(x[k], &own));
   }

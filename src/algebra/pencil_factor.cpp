@@ -10,7 +10,7 @@ namespace squeal
 struct PencilFactor::Parts
 {
   MPI_Comm comm = MPI_COMM_NULL;
-  Shares shares;
+  RowLayout layout;
   Triplets entries; // those of K, then those of M; MUMPS adds up entries of the same place
   std::size_t first_of_M = 0;
   std::vector<double> values; // K - shift M
@@ -40,20 +40,20 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry) : parts_(std::make_u
 {
   Parts& parts = *parts_;
   parts.comm = comm_of(K);
-  parts.shares = shares_of(K);
+  parts.layout = row_layout(K);
   const auto append = [&](Mat A)
   { symmetry == Symmetry::none ? append_rows(A, 0, parts.entries) : append_lower_triangle(A, parts.entries); };
   append(K);
   parts.first_of_M = parts.entries.value.size();
   append(M);
   parts.values.resize(parts.entries.value.size());
-  std::vector<MUMPS_INT> order = elimination_order(K, parts.shares.total());
+  std::vector<MUMPS_INT> order = elimination_order(K, parts.layout.total());
   PencilOptions options;
   read_options(options_of(options));
   parts.mumps = start_mumps(parts.comm, symmetry == Symmetry::none ? MumpsSymmetry::none : MumpsSymmetry::symmetric);
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 14) = to_int(options.room);
-  set_entries(mumps, parts.entries, parts.shares.total());
+  set_entries(mumps, parts.entries, parts.layout.total());
   mumps.a_loc = parts.values.data();
   mumps.perm_in = order.data();
   run(mumps, MumpsJob::analyse);
@@ -82,19 +82,19 @@ MultiVector PencilFactor::solve(const MultiVector& X) const
   const bool here = rank_of(parts.comm) == 0;
   const int rows = to_int(X.entries.rows()), columns = to_int(X.columns());
   if (columns == 0) return Y;
-  if (here) parts.right.resize(parts.shares.total(), columns);
+  if (here) parts.right.resize(parts.layout.total(), columns);
   const auto whole = [&](int j) { return here ? parts.right.col(j).data() : nullptr; };
   for (int j = 0; j < columns; ++j)
-    MPI_Gatherv(X.entries.col(j).data(), rows, MPI_DOUBLE, whole(j), parts.shares.counts.data(),
-                parts.shares.starts.data(), MPI_DOUBLE, 0, parts.comm);
+    MPI_Gatherv(X.entries.col(j).data(), rows, MPI_DOUBLE, whole(j), parts.layout.counts.data(),
+                parts.layout.starts.data(), MPI_DOUBLE, 0, parts.comm);
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 27) = columns; // all of them at each reading of the factor
   mumps.rhs = parts.right.data();
   mumps.nrhs = columns;
-  mumps.lrhs = parts.shares.total();
+  mumps.lrhs = parts.layout.total();
   run(mumps, MumpsJob::solve);
   for (int j = 0; j < columns; ++j)
-    MPI_Scatterv(whole(j), parts.shares.counts.data(), parts.shares.starts.data(), MPI_DOUBLE, Y.entries.col(j).data(),
+    MPI_Scatterv(whole(j), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, Y.entries.col(j).data(),
                  rows, MPI_DOUBLE, 0, parts.comm);
   return Y;
 }

@@ -12,13 +12,15 @@ namespace squeal
 namespace
 {
 
-// The text of the innermost failure; PETSc calls the handler from the inside out.
+/// The text of the innermost failure. PETSc calls the handler from the innermost function outwards, and its handler
+/// cannot hand the text to check in any other way.
 std::string& last_failure()
 {
   static std::string text;
   return text;
 }
 
+/// PETSc's error handler: keeps the text of the innermost failure.
 PetscErrorCode keep_failure(MPI_Comm, int line, const char* function, const char* file, PetscErrorCode code,
                             PetscErrorType type, const char* message, void*)
 {
@@ -28,22 +30,23 @@ PetscErrorCode keep_failure(MPI_Comm, int line, const char* function, const char
   return code;
 }
 
-Shares shares_of(const PetscInt* ranges, MPI_Comm comm)
+RowLayout row_layout(const PetscInt* ranges, MPI_Comm comm)
 {
-  Shares shares;
-  for (int rank = 0; rank < ranks_of(comm); ++rank)
+  const auto ranks = static_cast<std::size_t>(ranks_of(comm));
+  RowLayout layout{std::vector<int>(ranks), std::vector<int>(ranks)};
+  for (std::size_t rank = 0; rank < ranks; ++rank)
   {
-    shares.starts.push_back(static_cast<int>(ranges[rank]));
-    shares.counts.push_back(static_cast<int>(ranges[rank + 1] - ranges[rank]));
+    check(PetscMPIIntCast(ranges[rank], &layout.starts[rank]));
+    check(PetscMPIIntCast(ranges[rank + 1] - ranges[rank], &layout.counts[rank]));
   }
-  return shares;
+  return layout;
 }
 
 } // namespace
 
 Session::Session(int& argc, char**& argv, const char* help)
 {
-  if (SlepcInitialize(&argc, &argv, nullptr, help)) throw Error("PETSc and SLEPc did not start");
+  if (SlepcInitialize(&argc, &argv, nullptr, help)) throw Error("PETSc and SLEPc could not be initialised");
   check(PetscPushErrorHandler(keep_failure, nullptr));
 }
 
@@ -81,40 +84,40 @@ Owned<Vec> copy_of(Vec source)
   return result;
 }
 
-std::vector<double> whole(Vec x)
+std::vector<double> all_entries(Vec x)
 {
-  const Shares shares = shares_of(x);
-  std::vector<double> result(static_cast<std::size_t>(shares.total()));
-  const PetscScalar* mine = nullptr;
-  check(VecGetArrayRead(x, &mine));
-  MPI_Allgatherv(mine, shares.counts[static_cast<std::size_t>(rank_of(comm_of(x)))], MPI_DOUBLE, result.data(),
-                 shares.counts.data(), shares.starts.data(), MPI_DOUBLE, comm_of(x));
-  check(VecRestoreArrayRead(x, &mine));
+  const RowLayout layout = row_layout(x);
+  std::vector<double> result(static_cast<std::size_t>(layout.total()));
+  const PetscScalar* own = nullptr;
+  check(VecGetArrayRead(x, &own));
+  MPI_Allgatherv(own, layout.counts[rank_of(comm_of(x))], MPI_DOUBLE, result.data(), layout.counts.data(),
+                 layout.starts.data(), MPI_DOUBLE, comm_of(x));
+  check(VecRestoreArrayRead(x, &own));
   return result;
 }
 
-void set_whole(Vec x, std::span<const double> entries)
+void set_all_entries(Vec x, std::span<const double> entries)
 {
   PetscInt first = 0, last = 0;
   check(VecGetOwnershipRange(x, &first, &last));
-  PetscScalar* mine = nullptr;
-  check(VecGetArrayWrite(x, &mine));
-  std::copy(entries.begin() + first, entries.begin() + last, mine);
-  check(VecRestoreArrayWrite(x, &mine));
+  PetscScalar* own = nullptr;
+  check(VecGetArrayWrite(x, &own));
+  std::copy(entries.begin() + first, entries.begin() + last, own);
+  check(VecRestoreArrayWrite(x, &own));
 }
 
-Shares shares_of(Vec x)
+RowLayout row_layout(Vec x)
 {
   const PetscInt* ranges = nullptr;
   check(VecGetOwnershipRanges(x, &ranges));
-  return shares_of(ranges, comm_of(x));
+  return row_layout(ranges, comm_of(x));
 }
 
-Shares shares_of(Mat A)
+RowLayout row_layout(Mat A)
 {
   const PetscInt* ranges = nullptr;
   check(MatGetOwnershipRanges(A, &ranges));
-  return shares_of(ranges, comm_of(A));
+  return row_layout(ranges, comm_of(A));
 }
 
 double processor_time()
@@ -127,14 +130,14 @@ double processor_time()
 double peak_memory(MPI_Comm comm)
 {
   double bytes = 0;
-  std::ifstream status("/proc/self/status"); // getrusage inherits the size of whoever started the process
+  std::ifstream status("/proc/self/status"); // getrusage counts the size of the parent process too
   for (std::string word; status >> word;)
     if (word == "VmHWM:" && status >> bytes) bytes *= 1024;
   if (bytes == 0)
   {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
-    bytes = 1024. * static_cast<double>(usage.ru_maxrss);
+    bytes = 1024.0 * static_cast<double>(usage.ru_maxrss);
   }
   MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_DOUBLE, MPI_SUM, comm);
   return bytes;

@@ -11,7 +11,8 @@ namespace squeal
 namespace
 {
 
-/// mpirun hands every rank a terminal of its own whatever it does with their output, so mpirun's output counts too.
+/// Whether the output is read on a terminal. mpirun gives every rank a pseudo-terminal whatever becomes of the output,
+/// so the output of the parent process must be a terminal too.
 bool writes_to_terminal()
 {
   if (!isatty(STDOUT_FILENO)) return false;
@@ -25,34 +26,34 @@ bool writes_to_terminal()
 Progress::Progress(MPI_Comm comm, std::string stage, double total)
     : stage_(std::move(stage)), total_(std::max(total, 1e-300)), start_(std::chrono::steady_clock::now()), last_(start_)
 {
-  int rank = 0, in_all = 0;
+  int rank = 0, world_rank = 0;
   MPI_Comm_rank(comm, &rank);
-  MPI_Comm_rank(MPI_COMM_WORLD, &in_all); // of work that every rank does for itself, one tells
-  speaks_ = rank == 0 && in_all == 0;
-  terminal_ = speaks_ && writes_to_terminal();
+  MPI_Comm_rank(MPI_COMM_WORLD, &world_rank); // work on a communicator of each rank is printed by one of them
+  prints_ = rank == 0 && world_rank == 0;
+  terminal_ = prints_ && writes_to_terminal();
 }
 
 Progress::~Progress()
 {
-  if (open_line_) std::fputs("\n", stdout);
-  if (speaks_) std::fflush(stdout);
+  if (line_is_open_) std::fputs("\n", stdout);
+  if (prints_) std::fflush(stdout);
 }
 
 void Progress::update(double done, const std::string& note)
 {
-  if (!speaks_) return;
+  if (!prints_) return;
   const auto now = std::chrono::steady_clock::now();
-  const double fraction = std::clamp(done / total_, 0., 1.);
+  const double fraction = std::clamp(done / total_, 0.0, 1.0);
   const double elapsed = std::chrono::duration<double>(now - start_).count();
-  const double left = fraction > 0 ? elapsed * (1 - fraction) / fraction : 0;
+  const double remaining = fraction > 0 ? elapsed * (1 - fraction) / fraction : 0;
   const int tenth = static_cast<int>(10 * fraction + 1e-9);
   if (terminal_)
   {
     if (now - last_ < std::chrono::milliseconds(100) && fraction < 1) return;
     const int filled = static_cast<int>(24 * fraction);
     std::printf("\r  %-11s [%.*s%*s] %3.0f %%  %4.0f s left  %s\033[K", stage_.c_str(), filled,
-                "========================", 24 - filled, "", 100 * fraction, left, note.c_str());
-    open_line_ = true;
+                "========================", 24 - filled, "", 100 * fraction, remaining, note.c_str());
+    line_is_open_ = true;
   }
   else
   {

@@ -1,6 +1,5 @@
 #include "squeal/contact/interface.hpp"
 
-#include "squeal/mesh/vector.hpp"
 #include "squeal/solid/binary.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 
@@ -161,14 +160,14 @@ std::vector<double> relative(const Interface& interface, Vec x)
   Owned<Vec> rows;
   check(MatCreateVecs(interface.B, nullptr, rows.put()));
   check(MatMult(interface.B, x, rows));
-  return whole(rows);
+  return all_entries(rows);
 }
 
 void add_reactions(const Interface& interface, const std::vector<double>& r, Vec y)
 {
   Owned<Vec> rows;
   check(MatCreateVecs(interface.B, nullptr, rows.put()));
-  set_whole(rows, r);
+  set_all_entries(rows, r);
   check(MatMultTransposeAdd(interface.B, rows, y, y));
 }
 

@@ -61,7 +61,7 @@ MatrixXd on_modes(const std::vector<Owned<Vec>>& shapes, const MatrixXd& frictio
     check(MatMult(X, shapes[static_cast<std::size_t>(j)], force));
     check(VecMDot(force, static_cast<PetscInt>(n), all.data(), result.col(j).data()));
     check(MatMult(contact.reaction, force, reactions));
-    const std::vector<double> lambda = whole(reactions);
+    const std::vector<double> lambda = all_entries(reactions);
     result.col(j) -= friction.transpose() * VectorXd::Map(lambda.data(), static_cast<Eigen::Index>(lambda.size()));
   }
   return result;

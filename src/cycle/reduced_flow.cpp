@@ -47,7 +47,7 @@ Owned<Vec> vector_of(const VectorXd& values)
 
 VectorXd entries_of(Vec x)
 {
-  const std::vector<double> values = whole(x);
+  const std::vector<double> values = all_entries(x);
   return VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 

@@ -7,7 +7,6 @@
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/shapes.hpp"
-#include "squeal/mesh/vector.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -113,7 +112,7 @@ void check_parts(const FileMesh& file, const Mesh& mesh, const Scene& scene)
     if (shell && names[3].count(name))
       throw Error("part '" + name + "' is a volume in the mesh but has a thickness: remove the thickness");
     throw Error("part '" + name + "': the mesh has no elements in a physical " + (shell ? "surface" : "volume") +
-                " of that name" + suggestion(name, names[shell ? 2 : 3]));
+                " of that name" + spelling_hint(name, names[shell ? 2 : 3]));
   }
 }
 

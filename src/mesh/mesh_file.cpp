@@ -87,7 +87,7 @@ void check_parameters(const MeshSource& source)
   for (const auto& [name, value] : source.parameters)
     if (std::find(known.begin(), known.end(), name) == known.end())
       throw Error(source.file.string() + ": no parameter '" + name + "' in its DefineConstant lists" +
-                  suggestion(name, known));
+                  spelling_hint(name, known));
 }
 
 /// Initialises libgmsh without output, and finalises it at the end of the read.

@@ -20,7 +20,7 @@ int point_node(const Mesh& mesh, const std::string& name, const std::string& use
   if (const auto point = mesh.points.find(name); point != mesh.points.end()) return point->second;
   std::vector<std::string> known;
   add_keys(mesh.points, known);
-  throw Error(user + ": there is no point or rigid body \"" + name + "\"" + suggestion(name, known));
+  throw Error(user + ": there is no point or rigid body \"" + name + "\"" + spelling_hint(name, known));
 }
 
 std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const std::string& user)
@@ -30,7 +30,7 @@ std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const st
   std::vector<std::string> known;
   add_keys(mesh.points, known);
   add_keys(mesh.node_groups, known);
-  throw Error(user + ": there is no point, rigid body or mesh group \"" + name + "\"" + suggestion(name, known));
+  throw Error(user + ": there is no point, rigid body or mesh group \"" + name + "\"" + spelling_hint(name, known));
 }
 
 const std::vector<Face>& named_faces(const Mesh& mesh, const std::string& name, const std::string& user)
@@ -38,7 +38,7 @@ const std::vector<Face>& named_faces(const Mesh& mesh, const std::string& name, 
   if (const auto surface = mesh.surfaces.find(name); surface != mesh.surfaces.end()) return surface->second;
   std::vector<std::string> known;
   add_keys(mesh.surfaces, known);
-  throw Error(user + " on \"" + name + "\": the mesh has no such surface" + suggestion(name, known));
+  throw Error(user + " on \"" + name + "\": the mesh has no such surface" + spelling_hint(name, known));
 }
 
 std::string node_text(int node, const Vec3& position)

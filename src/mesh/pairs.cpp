@@ -8,7 +8,6 @@
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 #include "squeal/mesh/shapes.hpp"
-#include "squeal/mesh/vector.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -38,7 +38,7 @@ Owned<Vec> distributed(const Eigen::VectorXd& whole, Mat layout)
 {
   Owned<Vec> result;
   check(MatCreateVecs(layout, nullptr, result.put()));
-  set_whole(result, {whole.data(), static_cast<std::size_t>(whole.size())});
+  set_all_entries(result, {whole.data(), static_cast<std::size_t>(whole.size())});
   return result;
 }
 

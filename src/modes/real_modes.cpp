@@ -40,7 +40,7 @@ RealModes first_of(const SymmetricEigenpairs& all, Mat K, Index count)
   {
     Owned<Vec> shape;
     check(MatCreateVecs(K, shape.put(), nullptr));
-    set_whole(shape, {all.y.col(k).data(), static_cast<std::size_t>(all.y.rows())});
+    set_all_entries(shape, {all.y.col(k).data(), static_cast<std::size_t>(all.y.rows())});
     modes.omega.push_back(std::sqrt(std::max(0.0, all.lambda(k))));
     modes.shapes.push_back(std::move(shape));
   }

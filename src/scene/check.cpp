@@ -1,7 +1,7 @@
-/// What no single key can tell: tables that exclude each other, names that are not defined or doubled, numbers that
-/// contradict each other.
+/// Checks of a scene that involve several keys: tables that exclude each other, undefined or repeated names, numbers
+/// that contradict each other.
 #include "squeal/base/error.hpp"
-#include "squeal/scene/toml.hpp"
+#include "toml_values.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,11 +13,7 @@ namespace squeal
 namespace
 {
 
-double dot(const Vec3& a, const Vec3& b)
-{
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
+/// Checks of one scene; each throws Error with the place of the wrong value.
 class Checker
 {
 public:
@@ -50,6 +46,7 @@ private:
     throw Error(places_.at(member) + ": " + text);
   }
 
+  /// Throws Error if a list that excludes another is not empty.
   template <class T> void refuse(const std::vector<T>& list, const std::string& key, const std::string& why) const
   {
     if (!list.empty()) fail(&list.front(), "[[" + key + "]] " + why);
@@ -85,6 +82,7 @@ private:
     if (places_.given.count(&s.damping)) fail(&s.damping, "[damping] " + why);
   }
 
+  /// Throws Error if a name was seen before.
   template <class T>
   void need_different(const std::vector<T>& list, const std::string& key, std::set<std::string>& seen) const
   {
@@ -95,18 +93,19 @@ private:
 
   void check_names() const
   {
-    std::set<std::string> parts, nodes = {"ground"}, probes; // "ground" is what springs hang on
+    std::set<std::string> parts, nodes = {"ground"}, probes; // springs refer to "ground"
     need_different(scene_.parts, "part", parts);
     need_different(scene_.points, "point", nodes);
     need_different(scene_.rigid_bodies, "rigid_body", nodes);
     need_different(scene_.probes, "probe", probes);
   }
 
+  /// Throws Error if a name is not known.
   void need_known(const std::string& name, const std::vector<std::string>& known, const void* member,
                   const std::string& key) const
   {
     if (std::find(known.begin(), known.end(), name) == known.end())
-      fail(member, key + " = \"" + name + "\" is not defined" + suggestion_or_list(name, known));
+      fail(member, key + " = \"" + name + "\" is not defined" + hint_or_list(name, known));
   }
 
   void check_motions() const
@@ -154,13 +153,13 @@ private:
 
   void check_frame(const Contact& contact) const
   {
-    constexpr double square = 1e-6; // cosine; hand-written unit vectors carry a few digits
+    constexpr double largest_cosine = 1e-6; // unit vectors written by hand have a few digits
     const auto& tangents = contact.tangents;
     if (contact.normal)
       for (const Vec3& tangent : tangents)
-        if (std::abs(dot(tangent, *contact.normal)) > square)
+        if (std::abs(dot(tangent, *contact.normal)) > largest_cosine)
           fail(&contact.tangents, "[[contact]] tangents must be square to the normal");
-    if (tangents.size() == 2 && std::abs(dot(tangents[0], tangents[1])) > square)
+    if (tangents.size() == 2 && std::abs(dot(tangents[0], tangents[1])) > largest_cosine)
       fail(&contact.tangents, "[[contact]] the two tangents must be square to each other");
   }
 
@@ -187,7 +186,8 @@ private:
 
   const Scene& scene_;
   const Places& places_;
-  std::vector<std::string> points_, nodes_;
+  std::vector<std::string> points_; // names of points
+  std::vector<std::string> nodes_;  // names of points and rigid bodies
 };
 
 } // namespace

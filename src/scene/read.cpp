@@ -1,6 +1,6 @@
-/// Scene files: TOML tables into the members that fields.cpp binds to their keys.
+/// Reading of TOML tables into the members that scene_keys.cpp binds to their keys.
 #include "squeal/base/error.hpp"
-#include "squeal/scene/toml.hpp"
+#include "toml_values.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +13,7 @@ namespace squeal
 namespace
 {
 
+/// The numbers that a rule allows.
 struct Bounds
 {
   double least, greatest;
@@ -38,6 +39,7 @@ Bounds bounds_of(Rule rule)
   }
 }
 
+/// Reads the tables of one scene and records the places of its values.
 class Reader
 {
 public:
@@ -45,15 +47,11 @@ public:
 
   void read_scene(const toml::table& root, Scene& scene)
   {
-    std::vector<std::string> known;
-    for (const Field& field : fields(scene)) known.push_back(field.key);
+    std::vector<std::string> known = names_of(keys_of(scene));
     for_each_table(scene, [&](const std::string& key, auto&, const char*) { known.push_back(key); });
-    for (const auto& [key, node] : root)
-      if (std::find(known.begin(), known.end(), key.str()) == known.end())
-        throw Error(place_of(node) + ": unknown key '" + std::string(key.str()) + "'" +
-                    suggestion_or_list(std::string(key.str()), known));
-    for (const Field& field : fields(scene))
-      if (const toml::node* node = root.get(field.key)) read_field(field, *node, "");
+    check_known(root, known, "");
+    for (const SceneKey& key : keys_of(scene))
+      if (const toml::node* node = root.get(key.name)) read_value(key, *node, "");
     for_each_table(scene,
                    [&](const std::string& key, auto& member, const char*)
                    {
@@ -62,11 +60,27 @@ public:
   }
 
 private:
+  static std::vector<std::string> names_of(const SceneKeys& keys)
+  {
+    std::vector<std::string> names;
+    for (const SceneKey& key : keys) names.push_back(key.name);
+    return names;
+  }
+
+  /// Throws Error if a table has a key that is not known.
+  static void check_known(const toml::table& table, const std::vector<std::string>& known, const std::string& label)
+  {
+    for (const auto& [key, value] : table)
+      if (std::find(known.begin(), known.end(), key.str()) == known.end())
+        throw Error(place_of(value) + ": " + label + "unknown key '" + std::string(key.str()) + "'" +
+                    hint_or_list(std::string(key.str()), known));
+  }
+
   template <class T> void read_member(const std::string& key, const toml::node& node, std::vector<T>& list)
   {
     const toml::array* array = node.as_array();
     if (!array) throw Error(place_of(node) + ": '" + key + "' is a list; write [[" + key + "]]");
-    list.resize(array->size()); // whole, so that the addresses in places_ stay
+    list.resize(array->size()); // at once, so that the addresses in places_ stay valid
     for (std::size_t i = 0; i < array->size(); ++i)
     {
       const toml::node& entry = *array->get(i);
@@ -93,26 +107,22 @@ private:
     const toml::table* table = node.as_table();
     if (!table) throw Error(place_of(node) + ": " + label + "is a table, not " + kind_of(node));
     places_.given[&target] = place_of(node);
-    const Fields list = fields(target);
-    std::vector<std::string> known;
-    for (const Field& field : list) known.push_back(field.key);
-    for (const auto& [key, value] : *table)
-      if (std::find(known.begin(), known.end(), key.str()) == known.end())
-        throw Error(place_of(value) + ": " + label + "unknown key '" + std::string(key.str()) + "'" +
-                    suggestion_or_list(std::string(key.str()), known));
-    for (const Field& field : list)
+    const SceneKeys keys = keys_of(target);
+    check_known(*table, names_of(keys), label);
+    for (const SceneKey& key : keys)
     {
-      if (const toml::node* value = table->get(field.key))
-        read_field(field, *value, label);
-      else if (field.need == Need::required)
-        throw Error(place_of(node) + ": " + label + "needs the key '" + field.key + "' [" + field.unit +
-                    "]: " + field.meaning);
+      if (const toml::node* value = table->get(key.name))
+        read_value(key, *value, label);
+      else if (key.need == Need::required)
+        throw Error(place_of(node) + ": " + label + "needs the key '" + key.name + "' [" + key.unit +
+                    "]: " + key.meaning);
     }
   }
 
-  void read_field(const Field& field, const toml::node& node, const std::string& label)
+  /// Reads the value of a key into its member.
+  void read_value(const SceneKey& key, const toml::node& node, const std::string& label)
   {
-    field_ = &field;
+    key_ = &key;
     label_ = label;
     std::visit(
         [&](auto target)
@@ -126,18 +136,19 @@ private:
             read(node, target);
           if constexpr (std::is_same_v<decltype(target), Choice>) places_.given[target.member] = place_of(node);
         },
-        field.target);
+        key.target);
   }
 
+  /// Throws Error for a value of the current key that is not as expected.
   [[noreturn]] void fail(const toml::node& node, const std::string& expected) const
   {
-    const std::string unit = has_unit(field_->unit) ? " [" + field_->unit + "]" : "";
-    throw Error(place_of(node) + ": " + label_ + field_->key + " = " + text_of(node) + ": expected " + expected + unit);
+    const std::string unit = has_unit(key_->unit) ? " [" + key_->unit + "]" : "";
+    throw Error(place_of(node) + ": " + label_ + key_->name + " = " + text_of(node) + ": expected " + expected + unit);
   }
 
   double number(const toml::node& node) const
   {
-    const Bounds bounds = bounds_of(field_->rule);
+    const Bounds bounds = bounds_of(key_->rule);
     if (!node.is_number()) fail(node, std::string(bounds.text) + ", not " + kind_of(node));
     const double value = *node.value<double>();
     const bool inside = bounds.open ? value > bounds.least && value < bounds.greatest
@@ -174,26 +185,26 @@ private:
     return values;
   }
 
-  /// "x", "-y", … or a list of three numbers; a direction is made a unit vector.
+  /// Returns a list of three numbers, or of a direction its unit vector, which may be given as "x", "-y" and so on.
   Vec3 vector(const toml::node& node) const
   {
     Vec3 v{};
-    if (field_->rule == Rule::direction && node.is_string())
+    if (key_->rule == Rule::direction && node.is_string())
     {
       std::string axis = text(node);
       const double sign = axis.rfind('-', 0) == 0 ? -1 : 1;
       if (sign < 0) axis.erase(0, 1);
       if (axis != "x" && axis != "y" && axis != "z") fail(node, "x, y, z, -x, -y, -z or a list of three numbers");
-      v[static_cast<std::size_t>(axis[0] - 'x')] = sign;
+      v[axis[0] - 'x'] = sign;
       return v;
     }
     const auto values = numbers(node, "a list of three numbers");
     if (values.size() != 3) fail(node, "a list of three numbers, not of " + std::to_string(values.size()));
     std::copy(values.begin(), values.end(), v.begin());
-    if (field_->rule != Rule::direction) return v;
+    if (key_->rule != Rule::direction) return v;
     const double length = std::hypot(v[0], v[1], v[2]);
     if (length == 0) fail(node, "a direction, not the zero vector");
-    if (std::abs(length - 1) > 1e-15) // a unit vector stays as it was written
+    if (std::abs(length - 1) > 1e-15) // a unit vector keeps its digits
       for (double& x : v) x /= length;
     return v;
   }
@@ -218,7 +229,7 @@ private:
   void read(const toml::node& node, std::string& target) const
   {
     target = text(node);
-    if (field_->need == Need::required && target.empty()) fail(node, "a name that is not empty");
+    if (key_->need == Need::required && target.empty()) fail(node, "a name that is not empty");
   }
 
   void read(const toml::node& node, const Choice& target) const
@@ -227,8 +238,8 @@ private:
     const std::vector<std::string> words(target.words.begin(), target.words.end());
     const auto found = std::find(words.begin(), words.end(), given);
     if (found == words.end())
-      throw Error(place_of(node) + ": " + label_ + field_->key + " = '" + given + "' is none of " + joined(words) +
-                  suggestion_or_list(given, words));
+      throw Error(place_of(node) + ": " + label_ + key_->name + " = '" + given + "' is none of " + joined(words) +
+                  hint_or_list(given, words));
     target.set(target.member, static_cast<std::size_t>(found - words.begin()));
   }
 
@@ -247,19 +258,19 @@ private:
     }
     target = {StartKind::file, absolute(given)};
     if (!std::filesystem::is_regular_file(target.file))
-      throw Error(place_of(node) + ": " + label_ + field_->key + " = '" + given + "' is none of " + joined(words) +
+      throw Error(place_of(node) + ": " + label_ + key_->name + " = '" + given + "' is none of " + joined(words) +
                   ", and there is no file " + target.file.string());
   }
 
   void read(const toml::node& node, std::filesystem::path& target) const
   {
     target = absolute(text(node));
-    const std::string what = field_->rule == Rule::folder ? "folder" : "file";
-    const bool exists = field_->rule == Rule::folder ? std::filesystem::is_directory(target)
-                        : field_->rule == Rule::file ? std::filesystem::is_regular_file(target)
-                                                     : true;
+    const std::string what = key_->rule == Rule::folder ? "folder" : "file";
+    const bool exists = key_->rule == Rule::folder ? std::filesystem::is_directory(target)
+                        : key_->rule == Rule::file ? std::filesystem::is_regular_file(target)
+                                                   : true;
     if (!exists)
-      throw Error(place_of(node) + ": " + label_ + field_->key + " = " + text_of(node) + ": there is no " + what + " " +
+      throw Error(place_of(node) + ": " + label_ + key_->name + " = " + text_of(node) + ": there is no " + what + " " +
                   target.string() + " (paths are relative to the scene file)");
   }
 
@@ -296,16 +307,15 @@ private:
 
   void read(const toml::node& node, Motions& target) const
   {
-    static const std::vector<std::string> names = {"x", "y", "z", "rx", "ry", "rz"};
     target.fill(false);
     std::istringstream words(text(node));
     for (std::string word; words >> word;)
     {
-      const auto found = std::find(names.begin(), names.end(), word);
+      const auto found = std::find(motion_words.begin(), motion_words.end(), word);
       if (word == "all")
         target.fill(true);
-      else if (found != names.end())
-        target[static_cast<std::size_t>(found - names.begin())] = true;
+      else if (found != motion_words.end())
+        target[found - motion_words.begin()] = true;
       else if (word != "none")
         fail(node, "some of x y z rx ry rz with blanks between, all, or none");
     }
@@ -325,7 +335,7 @@ private:
   void read(const toml::node& node, std::optional<Rotation>& target)
   {
     const std::string label = label_;
-    read_table(node, target.emplace(), label + field_->key + " ");
+    read_table(node, target.emplace(), label + key_->name + " ");
   }
 
   void read(const toml::node& node, const DampingTarget& target) const
@@ -336,8 +346,8 @@ private:
 
   Places& places_;
   std::filesystem::path folder_;
-  const Field* field_ = nullptr; // being read, for messages
-  std::string label_;            // of its table
+  const SceneKey* key_ = nullptr; // the key that is being read, for messages
+  std::string label_;             // of the key's table, for messages
 };
 
 } // namespace

@@ -1,6 +1,6 @@
 /// From a scene file and overrides to a checked Scene.
 #include "squeal/base/error.hpp"
-#include "squeal/scene/toml.hpp"
+#include "toml_values.hpp"
 
 namespace squeal
 {

@@ -1,5 +1,5 @@
-/// A scene back to text, and the reference of all keys, both from the fields.
-#include "squeal/scene/toml.hpp"
+/// The resolved scene as text, and the reference of all keys.
+#include "toml_values.hpp"
 
 #include <charconv>
 #include <sstream>
@@ -10,20 +10,20 @@ namespace squeal
 namespace
 {
 
-// An empty text means: leave the key out, its default says the same.
+// print returns the TOML text of a value. It is empty where the key is left out, since its default means the same.
 
 std::string print(const std::string& text)
 {
   return toml_string(text);
 }
 
-/// Shortest text that reads back as the same number.
+/// The text is the shortest that reads back as the same number.
 std::string print(double value)
 {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, value).ptr;
   std::string result(text, end);
-  if (result.find_first_of(".e") == std::string::npos && result.size() > 15) result += ".0"; // not a 64-bit integer
+  if (result.find_first_of(".e") == std::string::npos && result.size() > 15) result += ".0"; // no TOML integer
   return result;
 }
 
@@ -83,10 +83,9 @@ std::string print(const std::array<double, 6>& list)
 
 std::string print(const Motions& motions)
 {
-  const char* names[] = {"x", "y", "z", "rx", "ry", "rz"};
   std::string text;
   for (std::size_t i = 0; i < 6; ++i)
-    if (motions[i]) text += std::string(text.empty() ? "" : " ") + names[i];
+    if (motions[i]) text += std::string(text.empty() ? "" : " ") + motion_words[i];
   return print(text.empty() ? std::string("none") : text);
 }
 
@@ -119,16 +118,16 @@ std::string print(const Start& start)
   return print(start.kind == StartKind::file ? start.file.string() : std::string(word(start.kind)));
 }
 
-/// Directions and drives that were not given are zero, which is no value of theirs.
-bool says_nothing(const Field& field)
+/// Whether a vector was not given. Optional vectors are directions and velocities, for which zero is no valid value.
+bool is_absent(const SceneKey& key)
 {
-  const Vec3* const* vector = std::get_if<Vec3*>(&field.target);
-  return vector && field.need == Need::optional && **vector == Vec3{};
+  const Vec3* const* vector = std::get_if<Vec3*>(&key.target);
+  return vector && key.need == Need::optional && **vector == Vec3{};
 }
 
-std::string value_text(const Field& field)
+std::string value_text(const SceneKey& key)
 {
-  if (says_nothing(field)) return "";
+  if (is_absent(key)) return "";
   return std::visit(
       [](const auto& target)
       {
@@ -137,49 +136,53 @@ std::string value_text(const Field& field)
         else
           return print(target);
       },
-      field.target);
+      key.target);
 }
 
-std::string lines_of(const Fields& list)
+/// The lines "key = value # unit" of a table.
+std::string table_text(const SceneKeys& keys)
 {
   std::string text;
-  for (const Field& field : list)
-    if (const std::string value = value_text(field); !value.empty())
-      text += field.key + " = " + value + (has_unit(field.unit) ? "  # " + field.unit : "") + "\n";
+  for (const SceneKey& key : keys)
+    if (const std::string value = value_text(key); !value.empty())
+      text += key.name + " = " + value + (has_unit(key.unit) ? "  # " + key.unit : "") + "\n";
   return text;
 }
 
+/// Appends a table of the resolved scene.
 struct TextWriter
 {
   std::string& text;
 
   template <class T> void operator()(const std::string& key, std::vector<T>& list, const char*) const
   {
-    for (T& entry : list) text += "\n[[" + key + "]]\n" + lines_of(fields(entry));
+    for (T& entry : list) text += "\n[[" + key + "]]\n" + table_text(keys_of(entry));
   }
   template <class T> void operator()(const std::string& key, std::optional<T>& table, const char*) const
   {
-    if (table) text += "\n[" + key + "]\n" + lines_of(fields(*table));
+    if (table) text += "\n[" + key + "]\n" + table_text(keys_of(*table));
   }
   template <class T> void operator()(const std::string& key, T& table, const char*) const
   {
-    text += "\n[" + key + "]\n" + lines_of(fields(table));
+    text += "\n[" + key + "]\n" + table_text(keys_of(table));
   }
 };
 
-std::string reference_lines(const Fields& list)
+/// The lines "key meaning [unit, default]" of a table.
+std::string reference_text(const SceneKeys& keys)
 {
   std::ostringstream text;
-  for (const Field& field : list)
+  for (const SceneKey& key : keys)
   {
-    std::string note = field.need == Need::required ? "required" : value_text(field);
-    note = field.unit + (note.empty() ? "" : ", " + note);
-    text << "  " << field.key << std::string(field.key.size() < 18 ? 18 - field.key.size() : 1, ' ') << field.meaning
-         << " [" << note << "]\n";
+    std::string note = key.need == Need::required ? "required" : value_text(key);
+    note = key.unit + (note.empty() ? "" : ", " + note);
+    text << "  " << key.name << std::string(key.name.size() < 18 ? 18 - key.name.size() : 1, ' ') << key.meaning << " ["
+         << note << "]\n";
   }
   return text.str();
 }
 
+/// Appends a table of the reference.
 struct ReferenceWriter
 {
   std::string& text;
@@ -187,16 +190,16 @@ struct ReferenceWriter
   template <class T> void operator()(const std::string& key, std::vector<T>&, const char* meaning) const
   {
     T entry{};
-    text += "[[" + key + "]]  " + meaning + "\n" + reference_lines(fields(entry));
+    text += "[[" + key + "]]  " + meaning + "\n" + reference_text(keys_of(entry));
   }
   template <class T> void operator()(const std::string& key, std::optional<T>&, const char* meaning) const
   {
     T entry{};
-    text += "[" + key + "]  " + meaning + "\n" + reference_lines(fields(entry));
+    text += "[" + key + "]  " + meaning + "\n" + reference_text(keys_of(entry));
   }
   template <class T> void operator()(const std::string& key, T& table, const char* meaning) const
   {
-    text += "[" + key + "]  " + meaning + "\n" + reference_lines(fields(table));
+    text += "[" + key + "]  " + meaning + "\n" + reference_text(keys_of(table));
   }
 };
 
@@ -204,9 +207,9 @@ struct ReferenceWriter
 
 std::string resolved_scene(const Scene& scene)
 {
-  Scene copy = scene; // the fields bind members to write to
-  std::string text = lines_of(fields(copy));
-  // A matrix scene brings its damping in C; the table would be refused there.
+  Scene copy = scene; // keys_of binds members that can be written
+  std::string text = table_text(keys_of(copy));
+  // The damping of a matrix scene is in C; the table would be refused there.
   for_each_table(copy,
                  [&](const std::string& key, auto& table, const char* meaning)
                  {
@@ -220,9 +223,9 @@ std::string scene_reference()
 {
   Scene scene;
   Rotation rotation;
-  std::string text = "Keys of a scene file (TOML, SI units) [unit, default]:\n" + reference_lines(fields(scene));
+  std::string text = "Keys of a scene file (TOML, SI units) [unit, default]:\n" + reference_text(keys_of(scene));
   for_each_table(scene, ReferenceWriter{text});
-  return text + "rotation = { ... } of a contact\n" + reference_lines(fields(rotation));
+  return text + "rotation = { ... } of a contact\n" + reference_text(keys_of(rotation));
 }
 
 } // namespace squeal

@@ -8,7 +8,6 @@
 #include "matrices.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
-#include "squeal/mesh/vector.hpp"
 #include "squeal/solid/element.hpp"
 
 #include <algorithm>

@@ -28,7 +28,7 @@ std::string describe(const DofNames& names, PetscInt dof)
   const PetscInt nodal_dof = names.nodal_dof.at(dof);
   const int node = static_cast<int>(nodal_dof / 6);
   return names.bodies[names.body[node]] + ", " + node_text(node, names.at[node]) + ", direction " +
-         direction_names[nodal_dof % 6];
+         motion_words[nodal_dof % 6];
 }
 
 } // namespace squeal

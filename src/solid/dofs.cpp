@@ -10,7 +10,6 @@
 #include "dof_names.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
-#include "squeal/mesh/vector.hpp"
 #include "squeal/solid/element.hpp"
 
 #include <algorithm>
@@ -125,9 +124,9 @@ void check_supported_dependent(const Constraints& constraints, const Mesh& mesh,
   for (const ConstraintTerm& term : dependent->second)
     if (term.factor != 0 && constraints.kind[term.nodal_dof] == DofKind::free)
       throw Error(node_text(node, mesh.nodes[node]) + ": the support on " + support + " holds its " +
-                  direction_names[nodal_dof % 6] + ", which rigid body " +
+                  motion_words[nodal_dof % 6] + ", which rigid body " +
                   scene.rigid_bodies[constraints.body_of.at(node)].name + " moves by its " +
-                  direction_names[term.nodal_dof % 6] +
+                  motion_words[term.nodal_dof % 6] +
                   "; take the node out of the support, or put the support on the body");
 }
 

@@ -5,7 +5,6 @@
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 #include "squeal/mesh/shapes.hpp"
-#include "squeal/mesh/vector.hpp"
 
 namespace squeal
 {

@@ -137,7 +137,7 @@ Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
     throw Error((folder / "F.petsc").string() + ": length " + std::to_string(force.size()) + ", but M.petsc is " +
                 std::to_string(size) + " x " + std::to_string(size));
   check(MatCreateVecs(structure.K, nullptr, structure.load.put()));
-  set_whole(structure.load, force);
+  set_all_entries(structure.load, force);
   return structure;
 }
 

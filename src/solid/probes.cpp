@@ -1,6 +1,5 @@
 /// Probe matrices: a row for each probe, which reads one displacement.
 #include "squeal/mesh/names.hpp"
-#include "squeal/mesh/vector.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>

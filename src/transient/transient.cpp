@@ -65,7 +65,7 @@ void record(const StepReport& report, double h, const State& state, std::size_t 
   history.slip.push_back(report.slip);
   if (!probes) return;
   check(MatMult(probes, state.u, probe_values));
-  const std::vector<double> values = whole(probe_values);
+  const std::vector<double> values = all_entries(probe_values);
   for (std::size_t i = 0; i < values.size(); ++i) history.probes[i].push_back(values[i]);
 }
 

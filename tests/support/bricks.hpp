@@ -1,6 +1,5 @@
 #pragma once
 /// Meshes of boxes and strips for tests, and fields on their degrees of freedom.
-#include "squeal/mesh/vector.hpp"
 #include "squeal/solid/structure.hpp"
 
 #include <array>

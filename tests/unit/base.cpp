@@ -57,10 +57,10 @@ TEST_CASE("what is set whole comes back whole, and the rows visited are those th
   check(MatCreateVecs(A, x.put(), nullptr));
   std::vector<double> entries;
   for (int i = 0; i < size; ++i) entries.push_back(i * i - 3);
-  set_whole(x, entries);
-  CHECK(whole(x) == entries);
-  CHECK(shares_of(x).total() == size);
-  CHECK(shares_of(A).counts == shares_of(x).counts);
+  set_all_entries(x, entries);
+  CHECK(all_entries(x) == entries);
+  CHECK(row_layout(x).total() == size);
+  CHECK(row_layout(A).counts == row_layout(x).counts);
 
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(A, &first, &last));

@@ -1,5 +1,5 @@
 // What shooting must do on the three-degree unilateral oscillator, on any number of ranks.
-#include "../support/about.hpp"
+#include "../support/approx.hpp"
 #include "../support/cycle_of.hpp"
 #include "../support/small_models.hpp"
 
@@ -29,8 +29,8 @@ TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
   CHECK(energy_norm(flow, end) < 1e-10 * energy_norm(flow, start));
   const LimitCycle b = cycle_of(twice, 100, 5, 1e-11);
   REQUIRE(b.outcome.kind == OutcomeKind::converged);
-  CHECK(b.orbit.period == about(a.orbit.period, 1e-6));
-  CHECK(b.measured.mean_energy == about(4 * a.measured.mean_energy, 1e-6));
+  CHECK(b.orbit.period == approx(a.orbit.period, 1e-6));
+  CHECK(b.measured.mean_energy == approx(4 * a.measured.mean_energy, 1e-6));
 }
 
 TEST_CASE("without instability the oscillator falls back to rest: collapsed, not converged")

@@ -106,7 +106,7 @@ TEST_CASE("pads that partly lift off: every law of the equilibrium, the fixed po
     CHECK(result.force_residual < 1e-13);
     CHECK(result.check_iterations > 0);
     CHECK(result.check_difference < 1e-9); // residual 1e-12 times the condition of the compliance
-    const auto motion = whole(result.u);
+    const auto motion = all_entries(result.u);
     const auto e = drive_directions(model.interface);
     int open = 0;
     for (std::size_t p = 0; p < 40; ++p)
@@ -138,7 +138,7 @@ TEST_CASE("the oscillator at rest: closed, with the reaction of both springs")
   CHECK(result.outcome.kind == OutcomeKind::converged);
   CHECK(std::abs(result.reactions[0] - r) < 1e-14);
   CHECK(std::abs(result.reactions[1] - mu * r) < 1e-14);
-  CHECK(std::abs(whole(result.u)[1] - y) < 1e-14);
+  CHECK(std::abs(all_entries(result.u)[1] - y) < 1e-14);
 }
 
 TEST_CASE("a chain that stands on the ground alone carries its weight; lifted, it has no equilibrium")
@@ -147,7 +147,7 @@ TEST_CASE("a chain that stands on the ground alone carries its weight; lifted, i
   const auto result = find_equilibrium(standing.structure, standing.interface, {});
   CHECK(result.outcome.kind == OutcomeKind::converged);
   CHECK(std::abs(result.reactions[0] - 16 * 9.81) < 1e-9); // 8 masses in all; mass times 1e-12
-  CHECK(std::abs(whole(result.u)[0] + 1e-3) < 1e-15);
+  CHECK(std::abs(all_entries(result.u)[0] + 1e-3) < 1e-15);
   const auto lifted = test::mass_spring_chain(9, 2, 1e9, 1e-3, 9.81);
   CHECK(find_equilibrium(lifted.structure, lifted.interface, {}).outcome.kind == OutcomeKind::no_equilibrium);
 }

@@ -1,6 +1,6 @@
 // ranks: 1 2 3
 #include "squeal/transient/estimate.hpp"
-#include "../support/about.hpp"
+#include "../support/approx.hpp"
 #include "../support/linearised.hpp"
 #include "../support/sliding_oscillator.hpp"
 
@@ -30,7 +30,7 @@ Found estimate_of(double mu, double belt_speed)
   settings.band = 1;
   Modes modes = test::modes_of(oscillator, found.equilibrium, settings, {});
   found.mode = std::move(modes.modes.at(0));
-  found.per_y = std::hypot(whole(found.mode.real)[1], whole(found.mode.imaginary)[1]);
+  found.per_y = std::hypot(all_entries(found.mode.real)[1], all_entries(found.mode.imaginary)[1]);
   found.estimate = test::estimate_of(oscillator, found.equilibrium, found.mode);
   return found;
 }
@@ -72,9 +72,9 @@ TEST_CASE("at small amplitude the interface and the damping make the mode's grow
     const Estimate& estimate = found.estimate;
     const double growth = 2 * found.mode.growth_rate();
     // The reaction is taken at i w instead of lambda, which leaves the inertia of one row times the growth: 1 % here.
-    CHECK(estimate.friction_rate_linear - estimate.damping_rate == about(growth, .015));
+    CHECK(estimate.friction_rate_linear - estimate.damping_rate == approx(growth, .015));
     // Two decades below the first event, where the curve starts, the force is linear: quadrature and rounding only.
-    CHECK(estimate.curve_rate[0] == about(estimate.friction_rate_linear, 1e-10));
+    CHECK(estimate.curve_rate[0] == approx(estimate.friction_rate_linear, 1e-10));
   }
 }
 
@@ -88,7 +88,8 @@ TEST_CASE("the start has its reaction at the largest, and is the mode's own moti
   const std::complex<double> later = std::exp(found.mode.lambda * h);
   const State next =
       mode_state(found.equilibrium, found.mode, q * std::abs(later), found.estimate.phase + std::arg(later));
-  const std::vector<double> u = whole(start.u), v = whole(start.v), u_next = whole(next.u), v_next = whole(next.v);
+  const std::vector<double> u = all_entries(start.u), v = all_entries(start.v), u_next = all_entries(next.u),
+                            v_next = all_entries(next.v);
   for (std::size_t i = 0; i < 3; ++i) // trapezoidal rule, error h^3/12 of a motion of size q
     CHECK(std::abs(u_next[i] - u[i] - h * (v[i] + v_next[i]) / 2) < 1e-12 * q);
 }

@@ -2,7 +2,6 @@
 #include "squeal/base/petsc.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/shapes.hpp"
-#include "squeal/mesh/vector.hpp"
 
 #include <doctest/doctest.h>
 #include <fstream>

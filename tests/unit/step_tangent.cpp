@@ -106,8 +106,8 @@ void count(const Run& run, Met& met)
 
 std::vector<double> entries_of(Vec u, Vec v)
 {
-  std::vector<double> all = whole(u);
-  const std::vector<double> rest = whole(v);
+  std::vector<double> all = all_entries(u);
+  const std::vector<double> rest = all_entries(v);
   all.insert(all.end(), rest.begin(), rest.end());
   return all;
 }

@@ -1,7 +1,7 @@
 // ranks: 1 2 3
 // Assembly and constraints by their exact invariants: rigid motions, masses and inertias, point models, resultants.
 // Tolerances are round-off of sums of some thousand terms unless said otherwise.
-#include "../support/about.hpp"
+#include "../support/approx.hpp"
 #include "../support/bricks.hpp"
 
 #include <algorithm>
@@ -80,10 +80,10 @@ TEST_CASE("a free body feels no force in a rigid motion, and has its mass and in
     CHECK(relative_force(built.structure.K, sample(built.structure, motion)) < round_off);
   const double mass = 7850 * size[0] * size[1] * size[2];
   const auto x = sample(built.structure, rigid_motion({1, 0, 0}, {}));
-  CHECK(form(built.structure.M, x, x) == about(mass, round_off));
+  CHECK(form(built.structure.M, x, x) == approx(mass, round_off));
   // A rotation is linear in space: the elements hold it, and their mass integrates its square exactly.
   const auto rz = sample(built.structure, rigid_motion({}, {0, 0, 1}));
-  CHECK(form(built.structure.M, rz, rz) == about(mass * (size[0] * size[0] + size[1] * size[1]) / 3, round_off));
+  CHECK(form(built.structure.M, rz, rz) == approx(mass * (size[0] * size[0] + size[1] * size[1]) / 3, round_off));
 }
 
 TEST_CASE("the matrices do not depend on the number of ranks")
@@ -101,10 +101,10 @@ TEST_CASE("the matrices do not depend on the number of ranks")
   const auto alone = build(mesh, scene, PETSC_COMM_SELF);
   CHECK(together.dofs.size == alone.dofs.size);
   const auto u = sample(together.structure, wavy), v = sample(alone.structure, wavy);
-  CHECK(form(together.structure.M, u, u) == about(form(alone.structure.M, v, v), round_off));
-  CHECK(form(together.structure.C, u, u) == about(form(alone.structure.C, v, v), round_off));
-  CHECK(form(together.structure.K, u, u) == about(form(alone.structure.K, v, v), round_off));
-  CHECK(work(together.structure, wavy) == about(work(alone.structure, wavy), round_off));
+  CHECK(form(together.structure.M, u, u) == approx(form(alone.structure.M, v, v), round_off));
+  CHECK(form(together.structure.C, u, u) == approx(form(alone.structure.C, v, v), round_off));
+  CHECK(form(together.structure.K, u, u) == approx(form(alone.structure.K, v, v), round_off));
+  CHECK(work(together.structure, wavy) == approx(work(alone.structure, wavy), round_off));
 }
 
 TEST_CASE("M, C and K have one pattern, counted exactly before they are filled")
@@ -141,7 +141,7 @@ TEST_CASE("damping is alpha M + beta K, of the part where it has its own")
     const auto built = build(mesh, scene, world);
     const auto u = sample(built.structure, wavy);
     CHECK(form(built.structure.C, u, u) ==
-          about(alpha * form(built.structure.M, u, u) + beta * form(built.structure.K, u, u), round_off));
+          approx(alpha * form(built.structure.M, u, u) + beta * form(built.structure.K, u, u), round_off));
   };
   of_form(3, 1e-6);
   scene.parts[0].damping = RayleighDamping{7, 2e-6};
@@ -206,15 +206,15 @@ TEST_CASE("a rigid body is the exact constraint u = u_ref + theta x r")
     return {u[0], u[1], u[2], turn[0], turn[1], turn[2]};
   };
   const auto u = sample(structure, cap), nodal = sample(unconstrained.structure, cap);
-  CHECK(form(structure.K, u, u) == about(form(unconstrained.structure.K, nodal, nodal), round_off));
+  CHECK(form(structure.K, u, u) == approx(form(unconstrained.structure.K, nodal, nodal), round_off));
   const double rotary = Ixx * turn[0] * turn[0] + Iyy * turn[1] * turn[1] + Izz * turn[2] * turn[2] +
                         2 * (Ixy * turn[0] * turn[1] + Iyz * turn[1] * turn[2] + Izx * turn[2] * turn[0]);
   CHECK(form(structure.M, u, u) ==
-        about(form(unconstrained.structure.M, nodal, nodal) + m * dot(shift, shift) + rotary, round_off));
+        approx(form(unconstrained.structure.M, nodal, nodal) + m * dot(shift, shift) + rotary, round_off));
   CHECK(relative_force(structure.K, sample(structure, rigid_motion({1, 2, 3}, {.4, .5, .6}))) < round_off);
   // Its face's force arrives at the reference point with its moment: work = F . u(face centre).
   const auto rigid = rigid_motion({1, 2, 3}, {.4, .5, .6});
-  CHECK(work(structure, rigid) == about(700 * rigid({.3, .1, .05})[1], round_off));
+  CHECK(work(structure, rigid) == approx(700 * rigid({.3, .1, .05})[1], round_off));
 }
 
 TEST_CASE("a rigid body that may only move along its normal carries one degree of freedom")
@@ -235,9 +235,9 @@ TEST_CASE("a pressure presses with p A against the outward normal, a force is sh
   scene.pressures = {{"block:z+", 3e5}};
   scene.forces = {{"block:x-", {10, 20, 30}}};
   const auto built = build(box({.3, .2, .1}, {3, 2, 2}), scene, world);
-  CHECK(work(built.structure, rigid_motion({1, 0, 0}, {})) == about(10, round_off));
-  CHECK(work(built.structure, rigid_motion({0, 1, 0}, {})) == about(20, round_off));
-  CHECK(work(built.structure, rigid_motion({0, 0, 1}, {})) == about(30 - 3e5 * .06, round_off));
+  CHECK(work(built.structure, rigid_motion({1, 0, 0}, {})) == approx(10, round_off));
+  CHECK(work(built.structure, rigid_motion({0, 1, 0}, {})) == approx(20, round_off));
+  CHECK(work(built.structure, rigid_motion({0, 0, 1}, {})) == approx(30 - 3e5 * .06, round_off));
 }
 
 TEST_CASE("a probe reads the node it names")
@@ -254,7 +254,7 @@ TEST_CASE("a probe reads the node it names")
   double read = 0;
   check(VecSum(values, &read));
   const auto expected = wavy({.3, .2, .1});
-  CHECK(read == about(.6 * expected[1] + .8 * expected[2], round_off));
+  CHECK(read == approx(.6 * expected[1] + .8 * expected[2], round_off));
   const auto D = probe_rows({{"d", "dof:7", {}, {}}}, built.structure, world);
   PetscInt rows = 0;
   check(MatGetSize(D, &rows, nullptr));

@@ -1,6 +1,6 @@
 // ranks: 1 2 3
 #include "squeal/transient/transient.hpp"
-#include "../support/about.hpp"
+#include "../support/approx.hpp"
 #include "../support/option.hpp"
 #include "../support/oscillator_mode.hpp"
 
@@ -52,8 +52,8 @@ TEST_CASE("a state read back is the state that was written, to the bit")
   const auto file = scratch() / "state.petsc";
   write_state(state, model.structure, file);
   const State back = read_state(file, model.structure);
-  CHECK(whole(back.u) == whole(state.u));
-  CHECK(whole(back.v) == whole(state.v));
+  CHECK(all_entries(back.u) == all_entries(state.u));
+  CHECK(all_entries(back.v) == all_entries(state.v));
   CHECK(!std::filesystem::exists(file.string() + ".part"));
   CHECK(!std::filesystem::exists(file.string() + ".info"));
 }
@@ -66,8 +66,8 @@ TEST_CASE("a state file is in the order of the mesh, whichever the partition num
   write_state(state_of(model.structure, {7, 0, 3}, {70, 0, 30}), model.structure, file);
   model.structure.names.nodal_dof = {0, 3, 7}; // as another number of ranks would number them
   const State back = read_state(file, model.structure);
-  CHECK(whole(back.u) == std::vector<double>{0, 3, 7});
-  CHECK(whole(back.v) == std::vector<double>{0, 30, 70});
+  CHECK(all_entries(back.u) == std::vector<double>{0, 3, 7});
+  CHECK(all_entries(back.v) == std::vector<double>{0, 30, 70});
 }
 
 TEST_CASE("a state file that cannot be used says why on every rank")
@@ -112,9 +112,9 @@ TEST_CASE(
   const double h = .01;
   const auto discrete = discrete_eigenvalue(lambda, .5, h);
   // next terms: (omega h)^4 = 1e-8 of the value
-  CHECK(discrete.real() / lambda.real() - 1 == about(-h * h / 4, 1e-3));
-  CHECK(discrete.imag() / lambda.imag() - 1 == about(-h * h / 12, 1e-3));
-  CHECK(discrete_eigenvalue(lambda, .51, h).real() == about(1e-3 - .01 * h, 1e-3));
+  CHECK(discrete.real() / lambda.real() - 1 == approx(-h * h / 4, 1e-3));
+  CHECK(discrete.imag() / lambda.imag() - 1 == approx(-h * h / 12, 1e-3));
+  CHECK(discrete_eigenvalue(lambda, .51, h).real() == approx(1e-3 - .01 * h, 1e-3));
 }
 
 TEST_CASE("in free flight every theta follows its discrete eigenvalue exactly")
@@ -130,8 +130,8 @@ TEST_CASE("in free flight every theta follows its discrete eigenvalue exactly")
     State state = state_of(model.structure, {1, -1}, {lambda.real(), -lambda.real()});
     const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, {});
     CHECK(test::run_steps(model, step, 7, state) == 0);
-    CHECK(whole(state.u)[0] == about(end.real(), 1e-13));
-    CHECK(whole(state.v)[1] == about(-(lambda * end).real(), 1e-13));
+    CHECK(all_entries(state.u)[0] == approx(end.real(), 1e-13));
+    CHECK(all_entries(state.v)[1] == approx(-(lambda * end).real(), 1e-13));
   }
 }
 
@@ -172,7 +172,7 @@ TEST_CASE("a trajectory is the same by every kind of factor, through contact and
     const ThetaStep step = make_theta_step(model.structure, model.interface, .015, .5, {});
     State state = state_of(model.structure, {3, -.5, -.5}, {0, 3, 0});
     CHECK(test::run_steps(model, step, 500, state) == 0);
-    return std::pair(whole(state.u), whole(state.v));
+    return std::pair(all_entries(state.u), all_entries(state.v));
   };
   const auto [u, v] = end("automatic");
   for (const char* kind : {"dense", "supernodal", "mumps"})

@@ -1,6 +1,6 @@
 // ranks: 1
 // Limit cycles of the three-degree unilateral oscillator against exact ones (matrix exponentials between events).
-#include "../support/about.hpp"
+#include "../support/approx.hpp"
 #include "../support/cycle_of.hpp"
 #include "../support/small_models.hpp"
 
@@ -42,8 +42,8 @@ TEST_CASE("exact limit cycles: stick, lift-off, touch, backward slip")
     CHECK(cycle.outcome.kind == OutcomeKind::converged);
     CHECK(cycle.orbit.residual < 1e-8);
     // the theta step is of second order in the period: 400 steps a period leave 1e-5 to 1e-4, whatever the events
-    CHECK(cycle.orbit.period == about(row.period, 1e-4));
-    CHECK(cycle.measured.mean_energy == about(row.mean_energy, .01));
+    CHECK(cycle.orbit.period == approx(row.period, 1e-4));
+    CHECK(cycle.measured.mean_energy == approx(row.mean_energy, .01));
     CHECK(cycle.multipliers.stability == Stability::stable);
     // the trivial multiplier comes out between .990 and 1.001 here: so good are the others
     CHECK(cycle.multipliers.trivial_error < 0.01);
@@ -60,5 +60,5 @@ TEST_CASE("the paper's base is rank-deficient here, and the reduced system is so
   const LimitCycle cycle = cycle_of(unilateral_oscillator(.3, 1), 400, 0, 1e-8, options);
   CHECK(cycle.outcome.kind == OutcomeKind::converged); // the contact space has two dimensions, and the base spans it
   CHECK(cycle.convergence.records.front().unknowns == 5);
-  CHECK(cycle.orbit.period == about(5.984555109780, 1e-4));
+  CHECK(cycle.orbit.period == approx(5.984555109780, 1e-4));
 }

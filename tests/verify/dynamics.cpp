@@ -1,6 +1,6 @@
 // ranks: 1 2 3
 // Exact-contact dynamics against exact answers, on models small enough to have them.
-#include "../support/about.hpp"
+#include "../support/approx.hpp"
 #include "../support/oscillator_mode.hpp"
 #include "squeal/transient/growth.hpp"
 #include "squeal/transient/transient.hpp"
@@ -49,7 +49,7 @@ TEST_CASE("a falling mass meets the ground in the step of its impact, and stays"
     if (first > 0 && state.time > first + 2.5 * h) // an inelastic shock takes two steps
     {
       CHECK(std::abs(height) < 1e-10 * 9.81 * h * h);                // the contact tolerance, over a step
-      CHECK(std::abs(whole(state.v)[0]) < 1e-10 * 9.81 * h);         // the same, of W r = 9.81 h
+      CHECK(std::abs(all_entries(state.v)[0]) < 1e-10 * 9.81 * h);   // the same, of W r = 9.81 h
       CHECK(std::abs(state.reactions[0] - 2 * 9.81) < 1e-9 * 19.62); // contact tolerance
     }
   }
@@ -105,7 +105,7 @@ Bounce bouncing_bar(int elements)
     if (state.time > 1.2 && state.time <= 1.4) impulse += step.h * state.reactions[0];
     bounce.gain = std::max(bounce.gain, report.contact_work / report.energy);
     // what the law keeps open is u + h v/2
-    const auto u = whole(state.u), v = whole(state.v);
+    const auto u = all_entries(state.u), v = all_entries(state.v);
     bounce.gap_min = std::min(bounce.gap_min, 5 + u[0] + step.h * v[0] / 2);
     if (i == 2 * steps_per_second)
     {
@@ -171,9 +171,9 @@ TEST_CASE("a sliding brick stops where and when Coulomb says")
     if (stopped > 0) CHECK(report.stick == 1);
   }
   CHECK(std::abs(stopped - stop) <= h);
-  CHECK(std::abs(whole(state.v)[1]) < 1e-12);
+  CHECK(std::abs(all_entries(state.v)[1]) < 1e-12);
   // exact up to the step of the stop, which is travelled at half speed: at most (mu g h) h/8
-  CHECK(std::abs(whole(state.u)[1] - v0 * stop / 2) < mu * g * h * h / 8 + 1e-10);
+  CHECK(std::abs(all_entries(state.u)[1] - v0 * stop / 2) < mu * g * h * h / 8 + 1e-10);
 }
 
 namespace
@@ -196,9 +196,9 @@ std::vector<double> swung_across(int steps, Opposed opposed, double& worst)
   worst = 0;
   for (int i = 0; i < steps; ++i)
   {
-    const std::vector<double> before = whole(state.v);
+    const std::vector<double> before = all_entries(state.v);
     const StepReport report = advance(step, model.structure, model.interface, work, state);
-    const std::vector<double> after = whole(state.v), &r = state.reactions;
+    const std::vector<double> after = all_entries(state.v), &r = state.reactions;
     CHECK(report.slip == 1);
     double speed = 0, work_of_belt = 0;
     for (std::size_t k = 0; k < 2; ++k)
@@ -208,7 +208,7 @@ std::vector<double> swung_across(int steps, Opposed opposed, double& worst)
     }
     worst = std::max(worst, std::abs(report.contact_work - work_of_belt + h * mu * r[0] * speed));
   }
-  return whole(state.u);
+  return all_entries(state.u);
 }
 
 /// The error across the belt at n steps over that at twice as many, from the change on halving.
@@ -280,8 +280,8 @@ TEST_CASE("a mode grows in persistent sliding at its discrete rate, fitted over 
 {
   const auto model = test::unilateral_oscillator(.3, 1);
   const Sliding sliding = persistent_sliding(model, at_three_tenths);
-  CHECK(sliding.mode.lambda.real() == about(.024503265987, 1e-10));
-  CHECK(sliding.mode.lambda.imag() == about(1.059820289428, 1e-11));
+  CHECK(sliding.mode.lambda.real() == approx(.024503265987, 1e-10));
+  CHECK(sliding.mode.lambda.imag() == approx(1.059820289428, 1e-11));
   TransientSettings settings;
   settings.periods = 5.2;
   settings.steps_per_period = 50;
@@ -290,7 +290,7 @@ TEST_CASE("a mode grows in persistent sliding at its discrete rate, fitted over 
   CHECK(run.outcome.kind == OutcomeKind::completed);
   CHECK(run.steps == 260);
   CHECK(run.history.open.back() + run.history.stick.back() == 0);
-  CHECK(run.growth_rate_fit == about(run.predicted.real(), 1e-6));
+  CHECK(run.growth_rate_fit == approx(run.predicted.real(), 1e-6));
   CHECK(run.predicted.real() < sliding.mode.lambda.real() * .998); // what 50 steps a period lose is seen
   CHECK(run.energy_defect_max < 1e-12);
 }
@@ -325,7 +325,7 @@ TEST_CASE("theta = .51 with 50 steps a period hides a weak instability, as predi
          }});
   const double predicted = discrete_eigenvalue(sliding.mode.lambda, .51, step.h).real();
   CHECK(predicted < 0);
-  CHECK(growth_rate(amplitude, 2 * std::numbers::pi / omega) == about(predicted, 1e-6));
+  CHECK(growth_rate(amplitude, 2 * std::numbers::pi / omega) == approx(predicted, 1e-6));
 }
 
 TEST_CASE("between events the trajectory converges with the square of the step")
@@ -360,7 +360,7 @@ TEST_CASE("the two contact solvers give one trajectory")
     const ThetaStep step = make_theta_step(model.structure, model.interface, .03, .5, options);
     State state = state_of(model.structure, {-.5, 1, -.3}, {.3, -.2, .6});
     CHECK(test::run_steps(model, step, 200, state) == 0);
-    return whole(state.u);
+    return all_entries(state.u);
   };
   const auto a = end(ContactSolver::gauss_seidel), b = end(ContactSolver::fixed_point);
   for (std::size_t i = 0; i < 3; ++i) CHECK(std::abs(a[i] - b[i]) < 1e-8); // contact tolerance, piled up

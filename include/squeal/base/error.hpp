@@ -85,7 +85,7 @@ template <class Words> std::string nearest_word(const std::string& word, const W
 }
 
 /// "; did you mean 'best'?", or nothing.
-template <class Words> std::string suggestion(const std::string& word, const Words& known)
+template <class Words> std::string spelling_hint(const std::string& word, const Words& known)
 {
   const std::string best = nearest_word(word, known);
   return best.empty() ? "" : "; did you mean '" + best + "'?";

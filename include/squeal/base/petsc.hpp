@@ -1,7 +1,7 @@
 #pragma once
-/// PETSc and SLEPc: the session, the error check, and the one handle that owns a library object.
+/// PETSc and SLEPc: the session, the error check, the one handle that owns a library object, and small helpers.
 ///
-/// The libraries' own API stays visible: functions borrow raw handles (Vec, Mat, …), results own them (Owned<Vec>).
+/// The API of the libraries stays visible: functions borrow raw handles (Vec, Mat, ...), results own them (Owned<Vec>).
 #include "squeal/base/error.hpp"
 
 #include <slepc.h>
@@ -17,7 +17,8 @@
 namespace squeal
 {
 
-/// Starts MPI, PETSc and SLEPc, and ends them. Library errors become a squeal::LibraryError with PETSc's own text.
+/// Initialises MPI, PETSc and SLEPc, and finalises them at the end. Between, a failed call leaves PETSc's text for
+/// check.
 class Session
 {
 public:
@@ -27,43 +28,10 @@ public:
   Session& operator=(const Session&) = delete;
 };
 
-/// Throws LibraryError with PETSc's text, the file and the line if a library call failed.
+/// Throws LibraryError if a library call failed, with PETSc's text and the file and line of the caller.
 void check(PetscErrorCode code, std::source_location where = std::source_location::current());
 
-inline PetscErrorCode destroy(Vec* object)
-{
-  return VecDestroy(object);
-}
-inline PetscErrorCode destroy(Mat* object)
-{
-  return MatDestroy(object);
-}
-inline PetscErrorCode destroy(KSP* object)
-{
-  return KSPDestroy(object);
-}
-inline PetscErrorCode destroy(SNES* object)
-{
-  return SNESDestroy(object);
-}
-inline PetscErrorCode destroy(PEP* object)
-{
-  return PEPDestroy(object);
-}
-inline PetscErrorCode destroy(IS* object)
-{
-  return ISDestroy(object);
-}
-inline PetscErrorCode destroy(VecScatter* object)
-{
-  return VecScatterDestroy(object);
-}
-inline PetscErrorCode destroy(PetscViewer* object)
-{
-  return PetscViewerDestroy(object);
-}
-
-/// Sole owner of a library object; moves, never copies. The only place that destroys one.
+/// Sole owner of a PETSc or SLEPc object. It can be moved but not copied, and is the only place that destroys one.
 template <class Handle> class Owned
 {
 public:
@@ -77,49 +45,53 @@ public:
   }
   Owned(const Owned&) = delete;
   Owned& operator=(const Owned&) = delete;
-  ~Owned()
-  {
-    if (handle_) (void)destroy(&handle_);
-  }
+  ~Owned() { (void)destroy(); }
 
   operator Handle() const { return handle_; } // lends the handle to a library call
   Handle get() const { return handle_; }
 
-  /// The address for a library call that creates the object; drops what was owned before.
+  /// Destroys what is owned and returns the address for a library call that creates a new object.
   Handle* put()
   {
-    if (handle_) check(destroy(&handle_));
-    handle_ = nullptr;
+    check(destroy());
     return &handle_;
   }
 
 private:
+  PetscErrorCode destroy()
+  {
+    auto object = reinterpret_cast<PetscObject>(std::exchange(handle_, nullptr));
+    return object ? PetscObjectDestroy(&object) : PetscErrorCode(PETSC_SUCCESS);
+  }
+
   Handle handle_ = nullptr;
 };
 
-/// A vector of the same layout; its entries are zero.
+/// Returns a vector of the same layout with zero entries.
 Owned<Vec> zeros_like(Vec pattern);
 
-/// A vector of the same layout and entries.
+/// Returns a vector of the same layout and entries.
 Owned<Vec> copy_of(Vec source);
 
-/// The entries of a small distributed vector, whole on every rank. Collective.
-std::vector<double> whole(Vec x);
+/// Returns all entries of a small distributed vector on every rank. Collective.
+std::vector<double> all_entries(Vec x);
 
-/// The inverse: this rank's share of `entries` into x.
-void set_whole(Vec x, std::span<const double> entries);
+/// Sets this rank's entries of x from a list of all entries.
+void set_all_entries(Vec x, std::span<const double> entries);
 
-/// How many rows each rank has of an object's, and where they start, as MPI's gathers take them.
-struct Shares
+/// Numbers of rows of an object on each rank, as MPI's collective calls take them.
+struct RowLayout
 {
-  std::vector<int> counts, starts;
+  std::vector<int> counts; // number of rows on each rank
+  std::vector<int> starts; // first row of each rank
   int total() const { return starts.back() + counts.back(); }
 };
 
-Shares shares_of(Vec x);
-Shares shares_of(Mat A); // of its rows
+/// Return the layout of a vector, and of a matrix's rows. Throw LibraryError if a number exceeds int.
+RowLayout row_layout(Vec x);
+RowLayout row_layout(Mat A);
 
-/// visit(row, columns, values) for every row of this rank; the spans end with the call.
+/// Calls visit(row, columns, values) for every row of this rank. The spans are valid during the call only.
 template <class Visit> void for_each_row(Mat A, Visit visit)
 {
   PetscInt first = 0, last = 0;
@@ -136,13 +108,13 @@ template <class Visit> void for_each_row(Mat A, Visit visit)
   }
 }
 
-/// Of this process so far [s].
+/// Returns the processor time that this process has used so far [s].
 double processor_time();
 
-/// Largest resident size so far, the ranks' added up [bytes]. Collective.
+/// Returns the largest resident size of each process so far, summed over the ranks [bytes]. Collective.
 double peak_memory(MPI_Comm comm);
 
-/// Registers (once) and enters a -log_view stage for as long as it lives.
+/// Enters a stage of -log_view for as long as the object lives. A new name is registered.
 class LogStage
 {
 public:

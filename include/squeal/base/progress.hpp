@@ -1,6 +1,6 @@
 #pragma once
-/// Progress of a long stage on rank 0: a bar with the time left on a terminal, a plain line every tenth or
-/// half minute in a batch log.
+/// Progress of a long stage, printed by rank 0: a bar with the remaining time on a terminal, otherwise a line at every
+/// tenth of the work or every half minute.
 #include <chrono>
 #include <mpi.h>
 #include <string>
@@ -11,20 +11,24 @@ namespace squeal
 class Progress
 {
 public:
-  /// `total`: units of work expected (steps, periods); silent on every rank but 0.
+  /// `total` is the expected amount of work, in steps or periods. Only rank 0 of MPI_COMM_WORLD prints.
   Progress(MPI_Comm comm, std::string stage, double total);
-  ~Progress(); // ends the bar's line
+
+  /// Ends the line of the bar.
+  ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `done` units so far; `note`: what a reader wants to see now, such as a residual.
+  /// Prints that `done` of the work is done, with a note such as the residual.
   void update(double done, const std::string& note);
 
 private:
-  bool speaks_ = false, terminal_ = false, open_line_ = false;
+  bool prints_ = false;
+  bool terminal_ = false;
+  bool line_is_open_ = false;
   std::string stage_;
-  double total_ = 0;
-  int tenth_ = -1;
+  double total_ = 0; // steps or periods
+  int tenth_ = -1;   // of the last line printed
   std::chrono::steady_clock::time_point start_, last_;
 };
 

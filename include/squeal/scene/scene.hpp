@@ -1,6 +1,7 @@
 #pragma once
-/// A scene: everything physical that a run needs, as plain data in SI units. No PETSc, no MPI.
-/// Algorithms are not here: they are PETSc options, one prefix per stage.
+/// A scene: everything physical that a run needs, as plain data in SI units. This room includes neither PETSc nor MPI.
+/// Algorithms are chosen by PETSc options, with one prefix for each stage.
+#include "squeal/base/vec3.hpp"
 #include "squeal/base/words.hpp"
 
 #include <array>
@@ -13,102 +14,107 @@
 namespace squeal
 {
 
-using Vec3 = std::array<double, 3>;
-/// x y z rx ry rz: which motions of a node or body are meant.
+/// A choice among the motions x y z rx ry rz of a node or body.
 using Motions = std::array<bool, 6>;
 
+inline constexpr std::array motion_words = {"x", "y", "z", "rx", "ry", "rz"};
+
+/// Isotropic linear elasticity.
 struct Material
 {
-  double young = 0;   // [Pa]
-  double poisson = 0; // [-]
-  double density = 0; // [kg/m3]
+  double young = 0;   // [Pa] Young's modulus
+  double poisson = 0; // [-] Poisson's ratio
+  double density = 0; // [kg/m3] mass density
 };
 
-/// C = alpha M + beta K
+/// Rayleigh damping C = alpha M + beta K.
 struct RayleighDamping
 {
   double alpha = 0; // [1/s]
   double beta = 0;  // [s]
 };
 
-/// A named volume of the mesh, or a named surface when it has a thickness (a shell).
+/// A named volume of the mesh, or a named surface if it has a thickness (shell).
 struct Part
 {
   std::string name;
   Material material;
-  double thickness = 0;                   // [m]; 0: a solid
-  std::optional<RayleighDamping> damping; // the scene's own when absent
+  double thickness = 0;                   // [m] of a shell; 0 for a solid
+  std::optional<RayleighDamping> damping; // if absent, the scene's
 };
 
-/// A node of its own: a point mass, or where springs meet.
+/// A node of its own: a point mass, or an end of springs.
 struct Point
 {
   std::string name;
-  Vec3 at{};       // [m]
+  Vec3 at{};       // [m] position
   double mass = 0; // [kg]
-  Motions free{};
+  Motions free{};  // the other motions are fixed
 };
 
-/// A named surface (or several) that moves as one rigid body: u(x) = u_ref + theta x (x - at). An exact constraint.
+/// Named surfaces that move as one rigid body: u(x) = u_ref + theta x (x - at), an exact constraint.
 struct RigidBody
 {
   std::string name;
   std::vector<std::string> surfaces;
   Vec3 at{};                       // [m] reference point
-  double mass = 0;                 // [kg], at the reference point
+  double mass = 0;                 // [kg] at the reference point
   std::array<double, 6> inertia{}; // [kg m2] xx yy zz xy yz zx about the reference point
-  Motions free{};
+  Motions free{};                  // of the reference point; the other motions are fixed
 };
 
-/// Spring and dashpot in parallel along one direction, between two points or rigid bodies, or from one to "ground".
+/// A spring and a dashpot in parallel, between two points or rigid bodies, or from one of them to "ground".
 struct Spring
 {
-  std::string from, to = "ground";
-  Vec3 direction{};     // unit
-  double stiffness = 0; // [N/m]
-  double damping = 0;   // [N s/m]
+  std::string from;          // point or rigid body
+  std::string to = "ground"; // point, rigid body or "ground"
+  Vec3 direction{};          // [-] unit vector of the line of action
+  double stiffness = 0;      // [N/m]
+  double damping = 0;        // [N s/m]
 };
 
-/// Nodes of a named group held still in the given motions.
+/// Fixed motions of the nodes of a group.
 struct Support
 {
-  std::string on;
+  std::string on; // named group or point
   Motions fixed{};
 };
 
 struct Force
 {
-  std::string on; // point or rigid body, or a named node group (the whole force shared equally by its nodes)
-  Vec3 vector{};  // [N]
+  std::string on; // point, rigid body, or node group whose nodes share the force equally
+  Vec3 vector{};  // [N] total force
 };
 
 struct Pressure
 {
   std::string on;   // named surface
-  double value = 0; // [Pa], positive presses onto the solid
+  double value = 0; // [Pa] positive towards the solid
 };
 
 struct Rotation
 {
-  Vec3 axis{};     // unit
-  Vec3 centre{};   // [m]
+  Vec3 axis{};     // [-] unit vector
+  Vec3 centre{};   // [m] a point of the axis
   double rate = 0; // [rad/s]
 };
 
-/// Pairs of coincident nodes of two named surfaces of matching meshes, or one pair of two named points. With a reach,
-/// partners may stand apart along the normal, as on a curved face: their distance adds to the gap.
-/// Normal: out of the rotor into the stator. Sliding velocity: s = B_t v - v_d.
+/// Contact of two named surfaces with matching meshes, whose coincident nodes are pairs, or of two named points.
+/// With a reach, the nodes of a pair may be at a distance along the normal, which is added to the gap.
+/// The sliding velocity of a pair is s = B_t v - v_d (src/README.md, section 1).
 struct Contact
 {
-  std::string rotor, stator;
-  double gap = 0;                   // [m] initial, positive open
-  std::optional<Vec3> normal;       // unit; needed for points and a reach, else from the rotor's surface
-  std::vector<Vec3> tangents;       // one: plane friction along it; two; empty: two, chosen from the normal
-  std::optional<Rotation> rotation; // of the rotor: v_d = rate axis x (x - centre), its tangential part
-  Vec3 velocity{};                  // [m/s] of the rotor's surface when there is no rotation
-  double reach = 0;                 // [m] how far apart along the normal partners may stand
+  std::string rotor;                // surface or point that the drive moves
+  std::string stator;               // surface or point that slides on it
+  double gap = 0;                   // [m] initial gap, positive if open
+  std::optional<Vec3> normal;       // [-] unit, out of the rotor; required for points and a reach, else the surface's
+  std::vector<Vec3> tangents;       // [-] one: plane friction along it; two; empty: two chosen from the normal
+  std::optional<Rotation> rotation; // of the rotor: v_d is the tangential part of rate axis x (x - centre)
+  Vec3 velocity{};                  // [m/s] of the rotor's surface if there is no rotation
+  double reach = 0;                 // [m] largest distance of the nodes of a pair along the normal
 };
 
+/// Coulomb's law.
 struct FrictionLaw
 {
   double coefficient = 0;        // [-]
@@ -117,16 +123,16 @@ struct FrictionLaw
 
 struct MeshSource
 {
-  std::filesystem::path file;               // .geo .msh .unv … ; absolute once read
-  std::map<std::string, double> parameters; // DefineConstant overrides of a .geo
-  double scale = 1;                         // [m] per length unit of the file
+  std::filesystem::path file;               // mesh or geometry that libgmsh reads; absolute
+  std::map<std::string, double> parameters; // values for the DefineConstant of a .geo, in its own units
+  double scale = 1;                         // [m] length unit of the file
 };
 
-/// By which route the complex modes are found.
+/// Route by which the complex modes are computed.
 enum class ModesMethod
 {
-  projection, // on real modes (the paper's)
-  full,       // the full sparse quadratic problem
+  projection, // projection on real modes
+  full,       // full sparse quadratic problem
   both,       // the full problem, and the projection beside it
 };
 
@@ -137,12 +143,12 @@ inline Words words_of(ModesMethod)
   return modes_method_words;
 }
 
-/// The model that the limit cycle is computed on.
+/// The model on which the limit cycle is computed.
 enum class CycleModel
 {
   full,
   reduced,
-  automatic, // reduced as far as the accuracy asked for allows
+  automatic, // reduced as far as the required accuracy allows
 };
 
 inline constexpr std::array cycle_model_words = {"full", "reduced", "auto"};
@@ -152,7 +158,7 @@ inline Words words_of(CycleModel)
   return cycle_model_words;
 }
 
-/// What a motion starts from.
+/// Origin of the initial state of a motion.
 enum class StartKind
 {
   mode,     // the unstable mode at a given amplitude
@@ -170,17 +176,17 @@ inline Words words_of(StartKind)
 struct Start
 {
   StartKind kind = StartKind::estimate;
-  std::filesystem::path file; // of kind file; absolute
+  std::filesystem::path file; // of StartKind::file; absolute
 };
 
-/// What one stage needs to know. A stage runs when enabled, or when a later enabled stage needs it.
+/// Settings of a stage. A stage runs if it is enabled, or if a later enabled stage needs it.
 struct ModesSettings
 {
   bool enabled = true;
   ModesMethod method = ModesMethod::both;
-  int real_modes = 0;      // of the projection; 0: those below the band
-  int residual_passes = 3; // of the projection
-  double band = 20000;     // [Hz] report every mode below
+  int real_modes = 0;      // [-] number of real modes of the projection; 0: those below the band
+  int residual_passes = 3; // [-] number of corrections of the projection
+  double band = 20000;     // [Hz] modes below this frequency are reported
 };
 
 struct EstimateSettings
@@ -192,42 +198,42 @@ struct TransientSettings
 {
   bool enabled = false;
   Start start;
-  double amplitude = 0; // largest displacement of the mode at "mode" [m]; 0: a tenth of first lift-off
-  double periods = 20;  // of the followed mode, with steps_per_period; or:
-  double steps_per_period = 100;
-  long steps = 0;       // with step_size, when > 0 overrides periods
-  double step_size = 0; // [s]
-  double theta = 0.5;
-  std::filesystem::path save_state; // written at the end when not empty
+  double amplitude = 0;             // [m] largest displacement of the mode at StartKind::mode; 0: a tenth of lift-off
+  double periods = 20;              // [-] length, in periods of the followed mode
+  double steps_per_period = 100;    // [-]
+  long steps = 0;                   // [-] number of steps; if > 0, with step_size instead of the two above
+  double step_size = 0;             // [s]
+  double theta = 0.5;               // [-] of the theta method
+  std::filesystem::path save_state; // state file written at the end; none if empty
 };
 
 struct CycleSettings
 {
   bool enabled = false;
-  int steps_per_period = 100;
-  double tolerance = 1e-5; // on the full-space residual
-  int free_periods = 10;
-  double theta = 0.5;
-  std::filesystem::path save_state;
+  int steps_per_period = 100;       // [-]
+  double tolerance = 1e-5;          // [-] on the residual of the full state
+  int free_periods = 10;            // [-] number of periods integrated before the first Newton step
+  double theta = 0.5;               // [-] of the theta method
+  std::filesystem::path save_state; // state file of the start of the cycle; none if empty
 };
 
-/// What is watched in time: a node of a named point, rigid body or group nearest to `at`, and a direction; or "dof:N".
+/// A displacement that is recorded in time: of the node of a point, body or group, along a direction.
 struct Probe
 {
   std::string name;
-  std::string on; // "dof:N" on a matrix scene
-  std::optional<Vec3> at;
-  Vec3 direction{}; // unit
+  std::string on;         // point, rigid body or group; "dof:N" on a matrix scene
+  std::optional<Vec3> at; // [m] the group's node nearest to this position is meant
+  Vec3 direction{};       // [-] unit vector
 };
 
 struct Scene
 {
   std::string title;
   CycleModel fidelity = CycleModel::full;
-  double accuracy = 1e-3;     // [-] wished, of the cycle's frequency and energy
-  std::filesystem::path file; // absolute
-  std::optional<MeshSource> mesh;
-  std::optional<std::filesystem::path> matrices; // folder; absolute
+  double accuracy = 1e-3;                        // [-] required relative accuracy of the cycle's frequency and energy
+  std::filesystem::path file;                    // scene file; absolute
+  std::optional<MeshSource> mesh;                // either a mesh
+  std::optional<std::filesystem::path> matrices; // or a folder of matrices, absolute; or points alone
   std::vector<Part> parts;
   std::vector<Point> points;
   std::vector<RigidBody> rigid_bodies;
@@ -237,7 +243,7 @@ struct Scene
   std::vector<Pressure> pressures;
   std::vector<Contact> contacts;
   FrictionLaw friction;
-  RayleighDamping damping;
+  RayleighDamping damping; // of parts without their own
   ModesSettings modes;
   EstimateSettings estimate;
   TransientSettings transient;
@@ -245,16 +251,17 @@ struct Scene
   std::vector<Probe> probes;
 };
 
-/// Reads a scene file (TOML) and applies `overrides` ("table.key=value", TOML values; a bare word is a string;
-/// "part.NAME.key" and the like reach the entry of that name in a list, "contact.0.key" the entry of that index).
-/// Checks every key, type, sign and range: Error names file, line, key, value, remedy, and the nearest known key.
-/// Paths become absolute, relative to the scene file.
+/// Returns the scene in a TOML file after the overrides "table.key=value", whose values are TOML or bare words.
+/// "part.NAME.key" reaches the entry with that name in a list, "contact.0.key" the entry with that index. Paths become
+/// absolute; they are relative to the scene file.
+/// Throws Error for every wrong key, type, sign and range, with file, line, key, value, remedy and the nearest known
+/// key.
 Scene read_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides);
 
-/// The scene as TOML with every default written out; read_scene of it gives the same scene.
+/// Returns the scene as TOML with all defaults; read_scene of it gives the same scene.
 std::string resolved_scene(const Scene& scene);
 
-/// Every key of a scene file with its unit, default and meaning.
+/// Returns a list of all keys of a scene file with their meanings, units and defaults.
 std::string scene_reference();
 
 } // namespace squeal

@@ -1,11 +1,12 @@
 #pragma once
-/// Arithmetic of vectors in space.
-#include "squeal/scene/scene.hpp"
-
+/// Vectors in space.
+#include <array>
 #include <cmath>
 
 namespace squeal
 {
+
+using Vec3 = std::array<double, 3>; // components x, y, z
 
 inline Vec3 operator+(const Vec3& a, const Vec3& b)
 {

@@ -1,6 +1,7 @@
-/// Overrides from the command line: --set table.key=value.
+/// Values of TOML documents, and overrides from the command line: --set table.key=value.
+#include "toml_values.hpp"
+
 #include "squeal/base/error.hpp"
-#include "squeal/scene/toml.hpp"
 
 #include <charconv>
 #include <cmath>
@@ -12,13 +13,14 @@ namespace squeal
 namespace
 {
 
-constexpr const char* override_mark = "--set ";
+/// The source name of an override; it tells overrides from values of the file.
+constexpr const char* override_prefix = "--set ";
 
-/// "a.b=v" as the table { a = { b = v } }; what is not a TOML value is a string.
+/// Returns "a.b=v" as the table { a = { b = v } }. A value that is not TOML is taken as a string.
 toml::table parse_override(const std::string& text)
 {
   const auto equals = text.find('=');
-  const std::string source = override_mark + text;
+  const std::string source = override_prefix + text;
   if (equals == std::string::npos || equals == 0)
     throw Error(source + ": expected KEY=VALUE, such as friction.coefficient=0.3");
   const std::string key = text.substr(0, equals) + " = ";
@@ -42,7 +44,7 @@ toml::table parse_override(const std::string& text)
 
 void merge(toml::table& into, toml::table& from);
 
-/// Entries of a list are reached by name, else by index.
+/// Moves the values of `from` into the entries of a list, which it selects by name or by index.
 void merge_list(const std::string& key, toml::array& list, toml::table& from)
 {
   for (auto&& [selector, value] : from)
@@ -59,13 +61,13 @@ void merge_list(const std::string& key, toml::array& list, toml::table& from)
       if (wanted == name || (!entry && wanted == index)) entry = candidate;
     }
     if (!entry)
-      throw Error(place_of(value) + ": no [[" + key + "]] is called '" + wanted + "'" +
-                  suggestion_or_list(wanted, known));
+      throw Error(place_of(value) + ": no [[" + key + "]] is called '" + wanted + "'" + hint_or_list(wanted, known));
     if (!value.is_table()) throw Error(place_of(value) + ": expected " + key + "." + wanted + ".KEY=VALUE");
     merge(*entry, *value.as_table());
   }
 }
 
+/// Moves the values of `from` into the same keys of `into`.
 void merge(toml::table& into, toml::table& from)
 {
   for (auto&& [key, value] : from)
@@ -86,7 +88,7 @@ std::string place_of(const toml::node& node)
 {
   const auto& source = node.source();
   const std::string path = source.path ? *source.path : "scene";
-  if (path.rfind(override_mark, 0) == 0) return path;
+  if (path.rfind(override_prefix, 0) == 0) return path;
   return path + ", line " + std::to_string(source.begin.line);
 }
 
@@ -111,7 +113,7 @@ std::string text_of(const toml::node& node)
   if (node.is_array() || node.is_table()) return kind_of(node);
   if (const auto number = node.value_exact<double>(); number && std::isfinite(*number))
   {
-    char digits[32]; // shortest text that reads back as the same number: -0.3, not -0.29999999999999999
+    char digits[32]; // the shortest text of the number: -0.3, not -0.29999999999999999
     return {digits, std::to_chars(digits, digits + sizeof digits, *number).ptr};
   }
   std::ostringstream text;
@@ -126,9 +128,9 @@ std::string joined(const std::vector<std::string>& words)
   return text;
 }
 
-std::string suggestion_or_list(const std::string& word, const std::vector<std::string>& known)
+std::string hint_or_list(const std::string& word, const std::vector<std::string>& known)
 {
-  const std::string near = suggestion(word, known);
+  const std::string near = spelling_hint(word, known);
   return near.empty() ? "; known: " + joined(known) : near;
 }
 

@@ -1,4 +1,5 @@
-#include "squeal/scene/fields.hpp"
+/// The keys of every table.
+#include "scene_keys.hpp"
 
 #include <algorithm>
 
@@ -16,17 +17,18 @@ bool has_unit(const std::string& unit)
   return std::find(none.begin(), none.end(), unit) == none.end();
 }
 
-Fields fields(Scene& scene)
+SceneKeys keys_of(Scene& scene)
 {
   return {
       {"title", &scene.title, optional, Rule::any, "text", "what the scene shows"},
       {"fidelity", choice_of(scene.fidelity), optional, Rule::any, "word",
        "of the cycle's model: full, reduced, or auto (reduced as far as the accuracy allows)"},
-      {"accuracy", &scene.accuracy, optional, Rule::positive, "-", "wished, of the cycle's frequency and energy"},
+      {"accuracy", &scene.accuracy, optional, Rule::positive, "-",
+       "required relative accuracy of the cycle's frequency and energy"},
   };
 }
 
-Fields fields(MeshSource& m)
+SceneKeys keys_of(MeshSource& m)
 {
   return {
       {"file", &m.file, required, Rule::file, "path", "a .geo to mesh, or a mesh gmsh reads, with named groups"},
@@ -35,12 +37,12 @@ Fields fields(MeshSource& m)
   };
 }
 
-Fields fields(std::filesystem::path& matrices)
+SceneKeys keys_of(std::filesystem::path& matrices)
 {
   return {{"folder", &matrices, required, Rule::folder, "path", "folder of M C K B F gap drive .petsc"}};
 }
 
-Fields fields(Part& p)
+SceneKeys keys_of(Part& p)
 {
   return {
       {"name", &p.name, required, Rule::any, "text", "named group of the mesh"},
@@ -55,7 +57,7 @@ Fields fields(Part& p)
   };
 }
 
-Fields fields(Point& p)
+SceneKeys keys_of(Point& p)
 {
   return {
       {"name", &p.name, required, Rule::any, "text", "name for springs, forces, contacts, probes"},
@@ -65,7 +67,7 @@ Fields fields(Point& p)
   };
 }
 
-Fields fields(RigidBody& b)
+SceneKeys keys_of(RigidBody& b)
 {
   return {
       {"name", &b.name, required, Rule::any, "text", "name for springs, forces, probes"},
@@ -77,7 +79,7 @@ Fields fields(RigidBody& b)
   };
 }
 
-Fields fields(Spring& s)
+SceneKeys keys_of(Spring& s)
 {
   return {
       {"from", &s.from, required, Rule::any, "text", "point or rigid body"},
@@ -88,23 +90,23 @@ Fields fields(Spring& s)
   };
 }
 
-Fields fields(Support& s)
+SceneKeys keys_of(Support& s)
 {
   return {
       {"on", &s.on, required, Rule::any, "text", "named group or point"},
-      {"fixed", &s.fixed, required, Rule::any, "motions", "motions held still: any of x y z rx ry rz, all"},
+      {"fixed", &s.fixed, required, Rule::any, "motions", "fixed motions: any of x y z rx ry rz, all"},
   };
 }
 
-Fields fields(Force& f)
+SceneKeys keys_of(Force& f)
 {
   return {
       {"on", &f.on, required, Rule::any, "text", "point, rigid body, or named group (force shared by its nodes)"},
-      {"vector", &f.vector, required, Rule::any, "N", "the whole force"},
+      {"vector", &f.vector, required, Rule::any, "N", "total force"},
   };
 }
 
-Fields fields(Pressure& p)
+SceneKeys keys_of(Pressure& p)
 {
   return {
       {"on", &p.on, required, Rule::any, "text", "named surface"},
@@ -112,7 +114,7 @@ Fields fields(Pressure& p)
   };
 }
 
-Fields fields(Rotation& r)
+SceneKeys keys_of(Rotation& r)
 {
   return {
       {"axis", &r.axis, required, Rule::direction, "-", "of rotation: x, y, z or a vector"},
@@ -121,21 +123,23 @@ Fields fields(Rotation& r)
   };
 }
 
-Fields fields(Contact& c)
+SceneKeys keys_of(Contact& c)
 {
   return {
       {"rotor", &c.rotor, required, Rule::any, "text", "named surface or point that the drive moves"},
-      {"stator", &c.stator, required, Rule::any, "text", "named surface or point that rubs on it"},
+      {"stator", &c.stator, required, Rule::any, "text", "named surface or point that slides on it"},
       {"gap", &c.gap, optional, Rule::any, "m", "initial gap, positive when open"},
-      {"reach", &c.reach, optional, Rule::not_negative, "m", "partners may be so far apart, which adds to the gap"},
-      {"normal", &c.normal, optional, Rule::direction, "-", "out of the rotor; points need it, surfaces have it"},
+      {"reach", &c.reach, optional, Rule::not_negative, "m",
+       "largest distance of partners along the normal, which adds to the gap"},
+      {"normal", &c.normal, optional, Rule::direction, "-",
+       "out of the rotor; required for points, else that of the surface"},
       {"tangents", &c.tangents, optional, Rule::direction, "-", "one direction: plane friction along it; or two"},
       {"rotation", &c.rotation, optional, Rule::any, "table", "of the rotor: {axis, centre, rate}"},
       {"velocity", &c.velocity, optional, Rule::any, "m/s", "of the rotor's surface, instead of a rotation"},
   };
 }
 
-Fields fields(FrictionLaw& f)
+SceneKeys keys_of(FrictionLaw& f)
 {
   return {
       {"coefficient", &f.coefficient, optional, Rule::not_negative, "-", "Coulomb's mu"},
@@ -144,7 +148,7 @@ Fields fields(FrictionLaw& f)
   };
 }
 
-Fields fields(RayleighDamping& d)
+SceneKeys keys_of(RayleighDamping& d)
 {
   return {
       {"alpha", &d.alpha, optional, Rule::not_negative, "1/s", "mass part"},
@@ -152,7 +156,7 @@ Fields fields(RayleighDamping& d)
   };
 }
 
-Fields fields(ModesSettings& m)
+SceneKeys keys_of(ModesSettings& m)
 {
   return {
       {"enabled", &m.enabled, optional, Rule::any, "switch", "run this stage"},
@@ -165,12 +169,12 @@ Fields fields(ModesSettings& m)
   };
 }
 
-Fields fields(EstimateSettings& e)
+SceneKeys keys_of(EstimateSettings& e)
 {
   return {{"enabled", &e.enabled, optional, Rule::any, "switch", "run this stage"}};
 }
 
-Fields fields(TransientSettings& t)
+SceneKeys keys_of(TransientSettings& t)
 {
   return {
       {"enabled", &t.enabled, optional, Rule::any, "switch", "run this stage"},
@@ -186,7 +190,7 @@ Fields fields(TransientSettings& t)
   };
 }
 
-Fields fields(CycleSettings& c)
+SceneKeys keys_of(CycleSettings& c)
 {
   return {
       {"enabled", &c.enabled, optional, Rule::any, "switch", "run this stage"},
@@ -198,7 +202,7 @@ Fields fields(CycleSettings& c)
   };
 }
 
-Fields fields(Probe& p)
+SceneKeys keys_of(Probe& p)
 {
   return {
       {"name", &p.name, required, Rule::any, "text", "name in the results"},

@@ -1,0 +1,34 @@
+#pragma once
+/// Values of TOML documents: where they are given, their text, and how overrides change them.
+#include "scene_keys.hpp"
+
+#include <toml++/toml.h>
+
+namespace squeal
+{
+
+/// Returns "scene.toml, line 12", or the override "--set key=value" that gave the value.
+std::string place_of(const toml::node& node);
+
+/// Returns "text", "a number", "a list", and so on.
+std::string kind_of(const toml::node& node);
+
+/// Returns the value as it is written; of a list or table its kind only.
+std::string text_of(const toml::node& node);
+
+/// Returns the text as a TOML string.
+std::string toml_string(const std::string& text);
+
+/// Returns the words with commas between them.
+std::string joined(const std::vector<std::string>& words);
+
+/// Returns "; did you mean 'x'?", or the list of known words if none is near.
+std::string hint_or_list(const std::string& word, const std::vector<std::string>& known);
+
+/// Applies "table.key=value" to the tables of a scene.
+void apply_override(toml::table& root, const std::string& text);
+
+/// Fills the scene from its tables and records where each value was given.
+void read_tables(const toml::table& root, Scene& scene, Places& places);
+
+} // namespace squeal
