@@ -56,6 +56,31 @@ void find_by_full_model(const CycleProblem& problem, const CycleOptions& options
   fidelity.full_periods += result.cycle.convergence.periods;
 }
 
+/// The cycle on the model asked for, or on the full one where "auto" cannot do without it.
+void find_on_model(const CycleProblem& problem, const CycleOptions& options, FittedCycle& result)
+{
+  Fidelity& fidelity = result.fidelity;
+  const bool by_full_model = fidelity.asked == CycleModel::full;
+  ReducedSearch search{problem, options, fidelity, problem.settings.steps_per_period};
+  if (fidelity.asked == CycleModel::automatic) search.steps = std::min(64, search.steps);
+  // a start need not be better; slow motions multiply its error
+  search.tolerance = by_full_model ? 1e-3 : 3e-4 * fidelity.accuracy;
+  if (!by_full_model || options.start == CycleStart::reduced_model)
+  {
+    fidelity.used = by_full_model ? CycleModel::full : CycleModel::reduced;
+    fidelity.contact_tolerance = 1e-3 * fidelity.accuracy;
+    fidelity.reason = find_by_reduced_model(search, result.cycle);
+    if (fidelity.reason.empty()) return;
+  }
+  if (fidelity.asked == CycleModel::reduced)
+  {
+    result.cycle.outcome.kind = problem.unstable.modes.size() > 1 ? OutcomeKind::refused : OutcomeKind::not_converged;
+    result.cycle.outcome.reason = fidelity.reason;
+    return;
+  }
+  find_by_full_model(problem, options, search.steps, result);
+}
+
 } // namespace
 
 FittedCycle find_fitted_cycle(const CycleProblem& problem, const FidelityRequest& request, const CycleOptions& options)
@@ -67,34 +92,12 @@ FittedCycle find_fitted_cycle(const CycleProblem& problem, const FidelityRequest
     result.cycle.outcome = {OutcomeKind::refused, refusal, 0, 0};
     return result;
   }
-  Fidelity& fidelity = result.fidelity;
-  fidelity.asked = request.model;
-  fidelity.accuracy = request.accuracy;
-  const CycleSettings& settings = problem.settings;
-  const bool by_full_model = request.model == CycleModel::full;
-  ReducedSearch search{problem, options, fidelity, settings.steps_per_period};
-  if (request.model == CycleModel::automatic) search.steps = std::min(64, settings.steps_per_period);
-  // a start need not be better; slow motions multiply its error
-  search.tolerance = by_full_model ? 1e-3 : 3e-4 * request.accuracy;
-  if (!by_full_model || options.start == CycleStart::reduced_model)
-  {
-    fidelity.used = by_full_model ? CycleModel::full : CycleModel::reduced;
-    fidelity.contact_tolerance = 1e-3 * request.accuracy;
-    fidelity.reason = find_by_reduced_model(search, result.cycle);
-    if (fidelity.reason.empty())
-    {
-      if (!settings.save_state.empty())
-        write_state(result.cycle.measured.start, problem.sliding.structure, settings.save_state);
-      return result;
-    }
-  }
-  if (request.model == CycleModel::reduced)
-  {
-    result.cycle.outcome.kind = problem.unstable.modes.size() > 1 ? OutcomeKind::refused : OutcomeKind::not_converged;
-    result.cycle.outcome.reason = fidelity.reason;
-    return result;
-  }
-  find_by_full_model(problem, options, search.steps, result);
+  result.fidelity.asked = request.model;
+  result.fidelity.accuracy = request.accuracy;
+  find_on_model(problem, options, result);
+  const State& start = result.cycle.measured.start;
+  const std::filesystem::path& file = problem.settings.save_state;
+  if (!file.empty() && start.u.get()) write_state(start, problem.sliding.structure, file);
   return result;
 }
 

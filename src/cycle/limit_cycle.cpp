@@ -64,7 +64,6 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   ++cycle.convergence.periods;
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
   add_remedies(map, cycle.outcome);
-  if (!settings.save_state.empty()) write_state(cycle.measured.start, problem.sliding.structure, settings.save_state);
   return cycle;
 }
 

@@ -26,9 +26,10 @@ namespace
 
 void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
 {
+  const auto& [structure, interface, equilibrium] = map.sliding;
   set_period(map, period);
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
-  StepWork work = begin_steps(map.step, map.sliding.structure, map.sliding.interface, state);
+  StepWork work = begin_steps(map.step, structure, interface, state);
   for (int i = 0; i < map.steps; ++i)
   {
     if (rate && i + 1 == map.steps)
@@ -36,8 +37,7 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
       check(VecCopy(state.u, displacement(rate)));
       check(VecCopy(state.v, velocity(rate)));
     }
-    if (!advance(map.step, map.sliding.structure, map.sliding.interface, work, state).contact_converged)
-      ++map.unconverged;
+    if (!advance(map.step, structure, interface, work, state).contact_converged) ++map.unconverged;
   }
   check(VecCopy(state.u, displacement(end)));
   check(VecCopy(state.v, velocity(end)));
@@ -48,6 +48,7 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
 void integrate_periods(PeriodMap& map, double period, std::span<const Vec> starts, std::span<const Vec> ends)
 {
   constexpr std::size_t at_once = 16; // more gains nothing
+  const auto& [structure, interface, equilibrium] = map.sliding;
   set_period(map, period);
   for (std::size_t first = 0; first < starts.size(); first += at_once)
   {
@@ -57,10 +58,10 @@ void integrate_periods(PeriodMap& map, double period, std::span<const Vec> start
     for (const Vec start : starts.subspan(first, count))
     {
       states.push_back({copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions});
-      works.push_back(begin_steps(map.step, map.sliding.structure, map.sliding.interface, states.back()));
+      works.push_back(begin_steps(map.step, structure, interface, states.back()));
     }
     for (int i = 0; i < map.steps; ++i)
-      for (const StepReport& report : advance(map.step, map.sliding.structure, map.sliding.interface, works, states))
+      for (const StepReport& report : advance(map.step, structure, interface, works, states))
         if (!report.contact_converged) ++map.unconverged;
     for (std::size_t k = 0; k < count; ++k)
     {

@@ -96,10 +96,12 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
   Fidelity& fidelity = search.fidelity;
   const PetscInt periods = search.options.reduced.free_periods;
   ReducedMap map = period_map_of(search, search.steps);
-  Progress progress(comm_of(search.problem.sliding.structure.load), "settling", static_cast<double>(periods));
-  double correction = 0;
+  Progress progress(comm_of(search.problem.sliding.structure.load), "reduced model, free",
+                    static_cast<double>(periods));
+  double missed = 1, correction = 0;
   // compared every tenth period: whatever the rounding, it stops at the same
-  for (double missed = 1; (missed > 5e-3 || fidelity.reduced_periods % 10 != 0) && fidelity.reduced_periods < periods;)
+  const auto periodic = [&] { return missed <= 5e-3 && fidelity.reduced_periods % 10 == 0; };
+  while (!periodic() && fidelity.reduced_periods < periods)
   {
     missed = run_one_period(map, motion, correction);
     ++fidelity.reduced_periods;
@@ -175,7 +177,7 @@ std::string size_refusal(const ReducedSearch& search)
          " degrees of freedom";
 }
 
-/// The estimated motion (du, v) of the followed mode.
+/// The estimated fluctuation (du, v) of the followed mode.
 Owned<Vec> estimated_fluctuation(const CycleProblem& problem, double amplitude)
 {
   const State first = mode_state(problem.sliding.equilibrium, problem.unstable.modes.front(), amplitude,

@@ -32,8 +32,8 @@ struct CycleProblem
 {
   SlidingEquilibrium sliding;
   const LinearisedSliding& linearised;
-  const std::vector<ComplexMode>& modes;
-  UnstableModes unstable; // the first of the modes; the cycle follows the very first
+  const std::vector<ComplexMode>& modes; // all in the band
+  UnstableModes unstable;                // the first of the modes; the cycle follows the very first
   const CycleSettings& settings;
   const StepOptions& step;
   const ModesOptions& modes_options; // of the preconditioner's real modes
@@ -44,7 +44,7 @@ struct CycleProblem
 /// start unexcited.
 LimitCycle find_cycle_from_estimate(const CycleProblem& problem, const CycleOptions& options);
 
-/// The cycle from any start, without or with free periods.
+/// The cycle from any start, after a number of free periods.
 LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
                            const Preconditioner& preconditioner, int free_periods);
 

@@ -12,7 +12,7 @@ namespace squeal
 /// Keeps A and W of the last period length: one factorisation for each, none for difference quotients.
 struct PeriodMap
 {
-  SlidingEquilibrium sliding; // the start of its warm start, and what measurements refer to
+  SlidingEquilibrium sliding; // what measurements refer to
   StepOptions options;
   int steps = 0;
   double theta = 0.5;
