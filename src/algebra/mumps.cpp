@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <string>
+#include <type_traits>
+#include <utility>
 
 namespace squeal
 {
@@ -16,6 +18,15 @@ constexpr int largest_increase = 2000; // [%] beyond MUMPS's estimate of its mem
 bool exceeds_estimate(int outcome)
 {
   return outcome == -8 || outcome == -9 || outcome == -17 || outcome == -20;
+}
+
+/// The same numbers as MUMPS's integers, which may have 64 bits.
+template <class Integer> std::vector<MUMPS_INT> converted(std::vector<Integer> numbers)
+{
+  if constexpr (std::is_same_v<MUMPS_INT, Integer>)
+    return numbers;
+  else
+    return {numbers.begin(), numbers.end()};
 }
 
 /// INFOG(1) after the job.
@@ -61,13 +72,16 @@ void run(DMUMPS_STRUC_C& mumps, MumpsJob job)
   if (outcome_of(mumps, job) < 0) throw_failure(mumps);
 }
 
-void set_entries(DMUMPS_STRUC_C& mumps, Triplets& entries, int size)
+void set_entries(Mumps& mumps, Triplets& entries, int size)
 {
-  mumps.n = size;
-  mumps.nnz_loc = static_cast<MUMPS_INT8>(entries.value.size());
-  mumps.irn_loc = entries.row.data();
-  mumps.jcn_loc = entries.column.data();
-  mumps.a_loc = entries.value.data();
+  EndMumps& places = mumps.get_deleter();
+  places.row = converted(std::move(entries.row));
+  places.column = converted(std::move(entries.column));
+  mumps->n = size;
+  mumps->nnz_loc = static_cast<MUMPS_INT8>(entries.value.size());
+  mumps->irn_loc = places.row.data();
+  mumps->jcn_loc = places.column.data();
+  mumps->a_loc = entries.value.data();
 }
 
 bool factorise(DMUMPS_STRUC_C& mumps)

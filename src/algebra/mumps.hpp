@@ -10,8 +10,11 @@
 namespace squeal
 {
 
+/// Ends an instance, and holds the places of its entries in MUMPS's own integers.
 struct EndMumps
 {
+  std::vector<MUMPS_INT> row, column;
+
   void operator()(DMUMPS_STRUC_C* mumps) const;
 };
 
@@ -57,8 +60,9 @@ inline int number_of_negative_pivots(const DMUMPS_STRUC_C& mumps)
 /// Throws LibraryError if the job fails.
 void run(DMUMPS_STRUC_C& mumps, MumpsJob job);
 
-/// Sets the matrix of `size` rows. MUMPS borrows the entries until the last factorisation.
-void set_entries(DMUMPS_STRUC_C& mumps, Triplets& entries, int size);
+/// Sets the matrix of `size` rows. Moves rows and columns of the entries out; MUMPS borrows their values until the last
+/// factorisation.
+void set_entries(Mumps& mumps, Triplets& entries, int size);
 
 /// Factorises, and again with more memory beyond MUMPS's estimate, ICNTL(14), where that was too little. Returns false
 /// if the matrix is singular; throws LibraryError for any other failure.

@@ -24,7 +24,7 @@ Mumps analysed(BorderedEntries& entries)
   for (const int position : entries.elimination) order.push_back(position + 1);
   for (int i = 0; i < entries.border; ++i) kept.push_back(entries.dofs + i + 1);
   order.insert(order.end(), kept.begin(), kept.end());
-  set_entries(*mumps, entries.lower, entries.dofs + entries.border);
+  set_entries(mumps, entries.lower, entries.dofs + entries.border);
   control(*mumps, 14) = 1; // [%] increase of the estimated memory: without pivoting the estimate is close
   mumps->cntl[0] = 0;      // no pivoting, since A is positive definite
   mumps->perm_in = order.data();

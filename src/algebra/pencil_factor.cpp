@@ -51,9 +51,9 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry) : parts_(std::make_u
   PencilOptions options;
   read_options(options_of(options));
   parts.mumps = start_mumps(parts.comm, symmetry == Symmetry::none ? MumpsSymmetry::none : MumpsSymmetry::symmetric);
+  set_entries(parts.mumps, parts.entries, parts.layout.total());
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 14) = to_int(options.room);
-  set_entries(mumps, parts.entries, parts.layout.total());
   mumps.a_loc = parts.values.data();
   mumps.perm_in = order.data();
   run(mumps, MumpsJob::analyse);
