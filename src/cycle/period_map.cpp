@@ -71,7 +71,48 @@ void integrate_periods(PeriodMap& map, double period, std::span<const Vec> start
   }
 }
 
+/// Moves a state on by part of a step: Hermite's interpolation between the ends of the step.
+void move_by_part(const PeriodMap& map, double part, State& state)
+{
+  State next = copy_of(state);
+  const Owned<Vec> v = copy_of(state.v.get());
+  StepWork work = begin_steps(map.step, map.sliding.structure, map.sliding.interface, next);
+  (void)advance(map.step, map.sliding.structure, map.sliding.interface, work, next);
+  const double s = part, h = map.step.h, from_end = s * s * (3 - 2 * s);
+  check(VecAXPBYPCZ(state.u, from_end, h * s * (1 - s) * (1 - s), 1 - from_end, next.u, v));
+  check(VecAXPY(state.u, -h * s * s * (1 - s), next.v));
+  check(VecAXPBY(state.v, s, 1 - s, next.v));
+  state.reactions = next.reactions;
+}
+
+void record_period(PeriodMap& map, double period, Vec start, double shift)
+{
+  set_period(map, period);
+  State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
+  if (shift > 0) move_by_part(map, shift, state);
+  map.records =
+      record_steps(map.step, map.sliding.structure, map.sliding.interface, state, map.steps, Recorded::contact);
+}
+
+void apply_tangent(const PeriodMap& map, std::span<const Vec> states)
+{
+  std::vector<TangentColumn> columns;
+  for (const Vec state : states) columns.push_back({copy_of(displacement(state)), copy_of(velocity(state)), 0, 0});
+  advance_tangents(map.step, map.sliding.structure, map.sliding.interface, map.records, columns);
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    check(VecCopy(columns[k].u, displacement(states[k])));
+    check(VecCopy(columns[k].v, velocity(states[k])));
+  }
+}
+
 } // namespace
+
+void add_tangent(PeriodMap& map, Flow& flow)
+{
+  flow.record_period = [&map](double period, Vec start, double shift) { record_period(map, period, start, shift); };
+  flow.apply_tangent = [&map](std::span<const Vec> states) { apply_tangent(map, states); };
+}
 
 Flow flow_of(PeriodMap& map)
 {
@@ -79,7 +120,9 @@ Flow flow_of(PeriodMap& map)
   { integrate_period(map, period, start, end, rate); };
   const auto integrate_many = [&map](double period, std::span<const Vec> starts, std::span<const Vec> ends)
   { integrate_periods(map, period, starts, ends); };
-  return {integrate, map.sliding.structure.M, map.sliding.structure.K, integrate_many};
+  Flow flow{integrate, map.sliding.structure.M, map.sliding.structure.K, integrate_many};
+  add_tangent(map, flow);
+  return flow;
 }
 
 } // namespace squeal

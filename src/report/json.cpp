@@ -140,12 +140,17 @@ Json newton_list(const std::vector<NewtonRecord>& records)
 Json multiplier_entry(const Multipliers& multipliers)
 {
   Json list = Json::array();
-  for (const std::complex<double>& multiplier : multipliers.values)
-    list.push_back({{"real", multiplier.real()}, {"imaginary", multiplier.imag()}});
-  return {{"stability", word(multipliers.stability)},
-          {"trivial_error", multipliers.trivial_error},
-          {"periods_integrated", multipliers.periods},
-          {"values", list}};
+  for (std::size_t i = 0; i < multipliers.values.size(); ++i)
+    list.push_back({{"real", multipliers.values[i].real()},
+                    {"imaginary", multipliers.values[i].imag()},
+                    {"error", multipliers.errors[i]}});
+  Json entry = {{"stability", word(multipliers.stability)},
+                {"trivial_error", multipliers.trivial_error},
+                {"periods_integrated", multipliers.periods},
+                {"values", list}};
+  if (multipliers.crossing != Crossing::none) entry["crossing"] = word(multipliers.crossing);
+  if (!multipliers.would_decide.empty()) entry["would_decide"] = multipliers.would_decide;
+  return entry;
 }
 
 Json cycle_entry(const Report& report, const Scene& scene)

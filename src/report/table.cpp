@@ -133,7 +133,7 @@ std::string cycle_text(const Report& report, const Scene& scene)
   if (!cycle.multipliers.values.empty())
     text += row("", format("%s by %zu multipliers: the largest is %.6f, error bar %.1e",
                            word(cycle.multipliers.stability), cycle.multipliers.values.size(),
-                           std::abs(cycle.multipliers.values.front()), cycle.multipliers.trivial_error));
+                           std::abs(cycle.multipliers.values.front()), cycle.multipliers.errors.front()));
   const std::size_t probes = std::min(scene.probes.size(), cycle.measured.peak_to_peak.size());
   for (std::size_t i = 0; i < probes; ++i)
     text +=

@@ -111,8 +111,7 @@ Sentences of_cycle(const Report& report)
     sentences.push_back("a residual this large is no proof of a periodic motion");
   add_chatter(cycle.measured.history, sentences);
   if (cycle.multipliers.stability == Stability::undecided)
-    sentences.push_back(
-        "whether a vibration settles on this cycle is undecided: its largest multiplier is 1 to within its error");
+    sentences.push_back("whether a vibration settles on this cycle is undecided: " + cycle.multipliers.would_decide);
   if (cycle.multipliers.values.empty())
     sentences.push_back("whether this cycle attracts was not examined: -cycle_multipliers 20 does");
   return sentences;

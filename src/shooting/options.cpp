@@ -23,8 +23,8 @@ OptionList options_of(ShootingOptions& options)
        "iterations without progress before the finish starts again, or falls back"},
       {"-cycle_max_periods", &options.max_periods, Range::not_negative, "periods that may be integrated in all"},
       {"-cycle_multipliers", &options.multipliers, Range::any,
-       "Floquet multipliers' Krylov dimension, 0: none; below 0: all up to 25 dofs, else 8 and 2 a further unstable "
-       "mode"},
+       "Arnoldi steps of the Floquet multipliers, 0: none; below 0: all of a small system, else until the largest is "
+       "found"},
   };
 }
 

@@ -127,8 +127,8 @@ void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable
 {
   if (outcome.kind != OutcomeKind::converged || multipliers.stability != Stability::unstable) return;
   outcome.kind = other_unstable == 0 ? OutcomeKind::unstable_cycle : OutcomeKind::not_periodic;
-  outcome.reason = format("the cycle found repels: a small motion beside it grows %.4g times a period",
-                          std::abs(multipliers.values.front()));
+  outcome.reason = format("the cycle found repels: a small motion beside it grows %.4g times a period (%s)",
+                          std::abs(multipliers.values.front()), word(multipliers.crossing));
   outcome.reason += other_unstable == 0 ? "; try another start or more free periods"
                                         : "; " + std::to_string(other_unstable + 1) +
                                               " modes are unstable and the motion may be quasi-periodic: integrate it";

@@ -4,7 +4,7 @@
 /// The derivative in the period is (x_(N+1) - x_(N-1))/2h. That is exact for theta = 1/2 and a linear structure, stiff
 /// modes included.
 #include "squeal/shooting/flow.hpp"
-#include "squeal/transient/transient.hpp"
+#include "squeal/transient/step_tangent.hpp"
 
 namespace squeal
 {
@@ -17,12 +17,16 @@ struct PeriodMap
   int steps = 0;
   double theta = 0.5;
   ThetaStep step{};
-  std::vector<double> reactions{}; // warm start: at the end of the last period integrated with its rate
-  long unconverged = 0;            // steps whose contact did not converge
+  std::vector<double> reactions{};   // warm start: at the end of the last period integrated with its rate
+  long unconverged = 0;              // steps whose contact did not converge
+  std::vector<StepRecord> records{}; // of the period recorded last, with the step at hand
 };
 
 /// Makes A and W those of this period, unless they are already.
 void set_period(PeriodMap& map, double period);
+
+/// Gives the flow the exact tangent of the map. Borrows the map.
+void add_tangent(PeriodMap& map, Flow& flow);
 
 /// The map as a flow for shooting. Borrows the map.
 Flow flow_of(PeriodMap& map);

@@ -18,6 +18,11 @@ struct Flow
   Mat M = nullptr, K = nullptr; // of the energy product
   /// end_k = Phi_period(start_k), all at once. Empty: starts are integrated one after the other.
   std::function<void(double period, std::span<const Vec> starts, std::span<const Vec> ends)> integrate_many{};
+  /// Integrates a period and keeps what its tangent needs. `shift`: the part of a step by which the grid of time is
+  /// moved. Empty: difference quotients take the tangent's place.
+  std::function<void(double period, Vec start, double shift)> record_period{};
+  /// x_k = dPhi_period/dx x_k along the period recorded last, all at once, in place.
+  std::function<void(std::span<const Vec> states)> apply_tangent{};
 };
 
 /// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; x and y are states. Empty: P = -I.

@@ -1,16 +1,22 @@
 #pragma once
-/// Floquet multipliers (src/README.md, section 6.9): eigenvalues of the monodromy matrix dPhi_T/dx at a periodic orbit,
-/// by Arnoldi in the energy product on difference quotients of the flow.
+/// Floquet multipliers: eigenvalues of the monodromy matrix dPhi_T/dx at a periodic orbit (src/README.md, section 6.9).
 ///
-/// With as many steps as the state has entries it is the whole matrix. With fewer it starts from the motions that may
-/// grow: a change of amplitude and the other unstable modes, which the orbit may leave unexcited. The flow's own
-/// direction d is then taken out along itself, so that the shift in time, whose multiplier is 1, is not found.
+/// A small system's matrix is formed whole, a large one's projected on an Arnoldi space in the energy product. Both use
+/// the flow's exact tangent; a flow without one is left to difference quotients. The Arnoldi space starts from the
+/// motions that may grow: a change of amplitude and the other unstable modes, which the orbit may leave unexcited. The
+/// flow's own direction d is taken out of it along itself, so that the shift in time, whose multiplier is 1, is not
+/// found.
 ///
-/// Caveat: how far from 1 the shift in time itself comes out is the error bar of the verdict.
+/// Each multiplier has an error bar of its own. Of a whole matrix it is what the multiplier changes by when the grid of
+/// time moves by half a step. Of a Ritz value it is twice its residual. The distance of the shift's own multiplier from
+/// 1 says nothing about the others.
+///
+/// Caveat: an Arnoldi space may lack a motion that grows. That its leading value has converged makes it unlikely.
 #include "squeal/shooting/options.hpp"
 #include "squeal/shooting/orbit.hpp"
 
 #include <complex>
+#include <string>
 
 namespace squeal
 {
@@ -21,7 +27,7 @@ enum class Stability
   not_examined,
   stable,
   unstable,
-  undecided, // the largest multiplier is 1 to within its error
+  undecided, // a bar reaches across 1, or the Arnoldi space has not converged
 };
 
 inline constexpr std::array stability_words = {"", "stable", "unstable", "undecided"};
@@ -31,12 +37,31 @@ inline Words words_of(Stability)
   return stability_words;
 }
 
+/// How the largest multiplier of an unstable orbit crossed the circle |m| = 1.
+enum class Crossing
+{
+  none,
+  fold,            // at 1
+  period_doubling, // at -1
+  neimark_sacker,  // as a complex pair
+};
+
+inline constexpr std::array crossing_words = {"", "fold", "period doubling", "Neimark-Sacker"};
+
+inline Words words_of(Crossing)
+{
+  return crossing_words;
+}
+
 struct Multipliers
 {
   std::vector<std::complex<double>> values; // without that of a shift in time, largest first; empty: not examined
+  std::vector<double> errors;               // error bar of each
   Stability stability = Stability::not_examined;
-  double trivial_error = 0; // distance of the shift's own multiplier from 1
-  long periods = 0;         // integrated for them
+  Crossing crossing = Crossing::none; // of an unstable orbit
+  std::string would_decide;           // of an undecided one, in a sentence
+  double trivial_error = 0;           // distance of the shift's own multiplier from 1
+  long periods = 0;                   // columns of the tangent, or difference quotients, over one period each
 };
 
 struct FloquetAnalysis
@@ -45,8 +70,9 @@ struct FloquetAnalysis
   Owned<Vec> fastest; // the motion of the largest multiplier, of energy norm 1; null if none was examined
 };
 
-/// All multipliers of a system of up to 25 degrees of freedom, else 8 and 2 for each of the `other_unstable` motions,
-/// unless -cycle_multipliers says how many.
+/// All multipliers of a system of up to 100 degrees of freedom, or 25 without an exact tangent. Of a larger one as many
+/// Arnoldi steps as its leading value needs: its residual must be below a tenth of its distance from the unit circle.
+/// At most 64 steps are made, or 24 beyond 10 000 degrees of freedom. -cycle_multipliers gives another number.
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable);
 

@@ -34,7 +34,7 @@ struct ShootingOptions
   double clamp = 0.3;             // longest multisecant step over the fluctuation
   PetscInt stall = 30;            // iterations without progress before the multisecant stage gives up
   PetscInt max_periods = 400;     // integrated in all
-  PetscInt multipliers = -1;      // Krylov dimension; 0: none; below 0: as many as find_multipliers says
+  PetscInt multipliers = -1;      // Arnoldi steps; 0: none; below 0: as many as find_multipliers says
 };
 
 OptionList options_of(ShootingOptions& options);
