@@ -105,7 +105,7 @@ double residual_of(const Krylov& krylov, const Eigenpair& pair)
   return krylov.remainder * std::abs(pair.vector(pair.vector.size() - 1));
 }
 
-/// Whether the leading Ritz value's residual is below a tenth of its distance from the unit circle.
+/// Whether the residual of the largest Ritz value is below a tenth of its distance from the unit circle.
 bool leading_converged(const Krylov& krylov)
 {
   const Eigenpair leading = eigenpairs(krylov.H).front();
@@ -133,7 +133,7 @@ Owned<Vec> extend(const Monodromy& monodromy, Krylov& krylov)
   return image;
 }
 
-/// `steps` Arnoldi steps, or at most -`steps` until the leading value has converged where `steps` is negative.
+/// `steps` Arnoldi steps; where `steps` is negative, at most -`steps` until the largest value has converged.
 Krylov arnoldi(const Monodromy& monodromy, Owned<Vec> start, PetscInt steps)
 {
   constexpr std::size_t looked_at = 8;                     // steps between two looks at the leading value
@@ -222,8 +222,9 @@ std::size_t find_shift(const std::vector<Eigenpair>& pairs, const Eigen::VectorX
   return place;
 }
 
-/// Says what the bars allow. `complete`: no larger multiplier is to be expected.
-void decide(Multipliers& multipliers, bool complete)
+/// Says what the bars allow. `complete`: no larger multiplier is to be expected. The `converged` largest values alone
+/// can leave it undecided: an Arnoldi space always holds smaller ones that have not converged.
+void decide(Multipliers& multipliers, bool complete, std::size_t converged)
 {
   multipliers.stability = complete ? Stability::stable : Stability::undecided;
   if (!complete)
@@ -241,7 +242,7 @@ void decide(Multipliers& multipliers, bool complete)
       multipliers.would_decide.clear();
       return;
     }
-    if (size + error < 1 || multipliers.stability == Stability::undecided) continue;
+    if (i >= converged || size + error < 1 || multipliers.stability == Stability::undecided) continue;
     multipliers.stability = Stability::undecided;
     multipliers.would_decide =
         format("a multiplier of %.6f with an error of %.1e reaches across 1: a smaller tolerance "
@@ -284,7 +285,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
     multipliers.errors.push_back(std::max(error, 1e-9));
   }
   if (pairs.empty()) return result;
-  decide(multipliers, true);
+  decide(multipliers, true, multipliers.values.size());
   result.fastest = state_at(real_part(pairs.front().vector), orbit);
   normalise(monodromy.flow, result.fastest);
   return result;
@@ -310,7 +311,7 @@ FloquetAnalysis from_arnoldi(Monodromy& monodromy, Owned<Vec> start, PetscInt st
     multipliers.values.push_back(pair.value);
     multipliers.errors.push_back(2 * residual_of(krylov, pair));
   }
-  decide(multipliers, leading_converged(krylov));
+  decide(multipliers, leading_converged(krylov), 1);
   result.fastest = zeros_like(orbit.state);
   const Eigen::VectorXd fastest = real_part(pairs.front().vector);
   for (std::size_t i = 0; i < krylov.base.size(); ++i)
@@ -330,7 +331,7 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
   Monodromy monodromy{problem.flow, orbit, options.difference * orbit.fluctuation};
   const bool whole = options.multipliers > 0 ? options.multipliers >= 2 * dofs : dofs <= (monodromy.exact() ? 100 : 25);
   if (whole) return from_whole_matrix(monodromy, dofs);
-  const PetscInt steps = options.multipliers > 0 ? options.multipliers : dofs <= 10000 ? -64 : -24;
+  const PetscInt steps = options.multipliers > 0 ? options.multipliers : dofs <= 10000 ? -96 : -24;
   return from_arnoldi(monodromy, motions_that_may_grow(problem, orbit, other_unstable), steps);
 }
 

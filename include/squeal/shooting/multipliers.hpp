@@ -72,7 +72,7 @@ struct FloquetAnalysis
 
 /// All multipliers of a system of up to 100 degrees of freedom, or 25 without an exact tangent. Of a larger one as many
 /// Arnoldi steps as its leading value needs: its residual must be below a tenth of its distance from the unit circle.
-/// At most 64 steps are made, or 24 beyond 10 000 degrees of freedom. -cycle_multipliers gives another number.
+/// At most 96 steps are made, or 24 beyond 10 000 degrees of freedom. -cycle_multipliers gives another number.
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable);
 
