@@ -1,5 +1,7 @@
 #include "squeal/shooting/multipliers.hpp"
 
+#include ""
+
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Eigenvalues>

@@ -69,8 +69,9 @@ State random_state(const SmallModel& model, std::mt19937& random, double size)
 
 Run run(const SmallModel& model, const State& start, double h, double theta, int steps)
 {
-  ThetaStep step = make_theta_step(model.structure, model.interface, h, theta);
-  step.contact.tolerance = 1e-13;
+  StepOptions options;
+  options.contact.tolerance = 1e-13;
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, options);
   Run result{copy_of(start), {}, {}};
   result.records = record_steps(step, model.structure, model.interface, result.end, steps, Recorded::contact_and_rates);
   for (const StepRecord& record : result.records)
@@ -149,7 +150,7 @@ void compare(SmallModel& model, std::mt19937& random, double theta, int steps, M
   for (const Run& other : moved)
     if (!same_branch(middle, other)) return;
   count(middle, met);
-  const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta);
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, {});
   std::array<TangentColumn, 3> columns;
   for (TangentColumn& column : columns) column = {zeros_like(start.u), zeros_like(start.v), 0, 0};
   columns[0].u = copy_of(direction.u.get());
