@@ -1,7 +1,5 @@
 #include "squeal/shooting/multipliers.hpp"
 
-#include ""
-
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Eigenvalues>
@@ -168,7 +166,7 @@ double shift_multiplier(const Monodromy& monodromy)
 /// Entries of a state, velocities over 2 pi/T: of the displacements' size in a vibration.
 Eigen::VectorXd coordinates_of(Vec state, double period)
 {
-  const std::vector<double> u = whole(displacement(state)), v = whole(velocity(state));
+  const std::vector<double> u = all_entries(displacement(state)), v = all_entries(velocity(state));
   Eigen::VectorXd all(static_cast<Eigen::Index>(u.size() + v.size()));
   all << Eigen::VectorXd::Map(u.data(), static_cast<Eigen::Index>(u.size())),
       Eigen::VectorXd::Map(v.data(), static_cast<Eigen::Index>(v.size())) * (period / (2 * std::numbers::pi));
