@@ -168,7 +168,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, const std::files
   report.fidelity = std::move(fitted.fidelity);
 
   report.model.memory_bytes = peak_memory(comm);
-  write_results(report, scene, {model.mesh, model.dofs, model.structure}, output, comm);
+  write_results(report, scene, {model.mesh, model.dofs, model.structure, model.interface.nodes}, output, comm);
   print_table(report, scene, comm);
   if (rank_of(comm) == 0) std::printf("results are in %s\n", output.c_str());
   check_options_used(stages_run(report), comm);

@@ -27,18 +27,22 @@ std::vector<double> first_problem(const ThetaStep& step, const Structure& struct
   std::vector<double> b = step.factor.forward(std::array<Vec, 1>{rhs});
   step.factor.backward(std::vector<double>(b.size(), 0.), std::array<Vec, 1>{v});
   check(VecWAXPY(position, step.h * (1 - step.theta), state.v, state.u));
-  const std::vector<double> moved = relative(interface, position);
-  const auto block = static_cast<std::size_t>(interface.block());
-  for (std::size_t i = 0; i < b.size(); ++i)
-    if (i % block == 0)
-      b[i] += (interface.gap[i / block] + moved[i]) / step.h;
-    else
-      b[i] -= interface.drive[i / block * (block - 1) + i % block - 1];
+  const std::vector<double> displaced = relative(interface, position);
+  if (b.empty()) return b;
+  const PairView<const double> moved(displaced, interface.directions);
+  const PairView<double> velocity(b, interface.directions);
+  const TangentView drive(interface.drive, interface.directions);
+  for (std::size_t i = 0; i < velocity.pairs(); ++i)
+  {
+    velocity.normal(i) += (interface.gap[i] + moved.normal(i)) / step.h;
+    for (std::size_t k = 0; k < drive.of(i).size(); ++k) velocity.tangential(i)[k] -= drive.of(i)[k];
+  }
   return b;
 }
 
 /// Seconds of contact alone from r = 0, and the sweeps.
-std::pair<double, int> cold_contact(const ThetaStep& step, double mu, const std::vector<double>& b, const char* solver)
+std::pair<double, int> cold_contact(const ThetaStep& step, const FrictionLaw& friction, const std::vector<double>& b,
+                                    ContactSolver solver)
 {
   if (b.empty()) return {0, 0};
   ContactSettings settings = step.contact;
@@ -51,7 +55,8 @@ std::pair<double, int> cold_contact(const ThetaStep& step, double mu, const std:
                                  std::vector<double> r;
                                  ContactMemory memory;
                                  const ContactProblem problem{b, r, memory};
-                                 sweeps = solve_contacts(step.W, mu, settings, std::span(&problem, 1))[0].iterations;
+                                 sweeps =
+                                     solve_contacts(step.W, friction, settings, std::span(&problem, 1))[0].iterations;
                                });
   return {taken, sweeps};
 }
@@ -141,8 +146,8 @@ void run(const std::vector<std::string>& words)
   const double solve_time = seconds(5, [&] { solve(step.factor, structure.load, x); });
   const double product_time = seconds(5, [&] { check(MatMult(structure.K, structure.load, x)); });
   const double resident = peak_memory(comm) / 1024 / 1024;
-  const auto [cold, cold_sweeps] = cold_contact(step, mu, b, "gauss_seidel");
-  const auto [fixed, fixed_sweeps] = cold_contact(step, mu, b, "fixed_point");
+  const auto [cold, cold_sweeps] = cold_contact(step, interface.friction, b, ContactSolver::gauss_seidel);
+  const auto [fixed, fixed_sweeps] = cold_contact(step, interface.friction, b, ContactSolver::fixed_point);
   const double entries = plain_factor_entries(structure, h);
   const std::size_t dofs = all_entries(structure.load).size();
   if (!speaks) return;
@@ -154,9 +159,7 @@ void run(const std::vector<std::string>& words)
               "\"contact_cold\": %.4g, \"cold_sweeps\": %d, \"fixed_point_cold\": %.4g, \"fixed_point_sweeps\": %d, "
               "\"factor_entries\": %.6g}\n",
               static_cast<int>(dofs), interface.pairs, ranks_of(comm), count, median(taken), median(taken) / count,
-              prepared, solve_time, product_time, iterations / steps / count, residual, defect,
-              static_cast<double>(step.W.near.values.size()) /
-                  static_cast<double>(std::max<std::size_t>(1, step.W.W.size())),
+              prepared, solve_time, product_time, iterations / steps / count, residual, defect, step.W.near_share(),
               resident, cold, cold_sweeps, fixed, fixed_sweeps, entries);
 }
 

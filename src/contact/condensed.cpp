@@ -8,7 +8,7 @@ namespace squeal
 namespace
 {
 
-/// The same start for any number of ranks, orthogonal to nothing in particular.
+/// Entries that are all different, the same for any number of ranks: a start for inverse iteration.
 Owned<Vec> uneven_vector(Mat A)
 {
   Owned<Vec> x;
@@ -16,7 +16,7 @@ Owned<Vec> uneven_vector(Mat A)
   PetscInt first = 0, last = 0;
   check(VecGetOwnershipRange(x, &first, &last));
   for (PetscInt i = first; i < last; ++i)
-    check(VecSetValue(x, i, 1 + .5 * std::sin(7. * static_cast<double>(i) + 1), INSERT_VALUES));
+    check(VecSetValue(x, i, 1 + 0.5 * std::sin(7. * static_cast<double>(i) + 1), INSERT_VALUES));
   check(VecAssemblyBegin(x));
   check(VecAssemblyEnd(x));
   return x;
@@ -54,8 +54,8 @@ PetscInt largest_entry(Vec x)
   return where;
 }
 
-/// After a failed factorisation: the motion that A with a little added to its diagonal resists least. If that does not
-/// factor either, A does not resist that motion but drives it on.
+/// After a failed factorisation: finds the motion that A resists least, with a little added to A's diagonal. If that
+/// matrix does not factor either, A is indefinite.
 void find_loose(Mat A, Vec D, Factored& result)
 {
   double largest = 0, part = 1e-8;

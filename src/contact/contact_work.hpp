@@ -2,13 +2,15 @@
 /// What the contact solvers share: one problem while it is being solved.
 #include "squeal/contact/solver.hpp"
 
+#include <limits>
+
 namespace squeal
 {
 
 struct ContactWork
 {
   const ContactOperator& W;
-  double friction;
+  const FrictionLaw& friction;
   const std::vector<double>& b;
   std::vector<double>& r;
   std::vector<double> Wr; // at the last product with W
@@ -20,19 +22,29 @@ struct ContactWork
   /// pair the largest free velocity, so that a light pair beside heavy ones is not passed over.
   double force_scale(std::size_t pair, double largest) const;
 
-  PairVector velocity(std::size_t i) const; // W r + b of the pair whose rows begin at i
+  PairVector reaction(std::size_t pair) const { return PairView(r, W.directions()).vector(pair); }
 
-  bool takes_part(std::size_t pair) const; // b_n is not infinite
+  /// W r + b
+  PairVector velocity(std::size_t pair) const
+  {
+    const PairVector free = PairView(b, W.directions()).vector(pair),
+                     change = PairView(Wr, W.directions()).vector(pair);
+    return {free[0] + change[0], free[1] + change[1], free[2] + change[2]};
+  }
+
+  /// Whether b_n is not infinite.
+  bool takes_part(std::size_t pair) const
+  {
+    return PairView(b, W.directions()).normal(pair) != std::numeric_limits<double>::infinity();
+  }
 };
-
-PairVector pair_of(const std::vector<double>& values, std::size_t i, std::size_t block);
 
 double largest_reaction(const std::vector<double>& r);
 
 double residual_of(const ContactWork& work);
 
 /// W r of each, reading W once.
-void refresh(std::span<ContactWork* const> works);
+void form_products(std::span<ContactWork* const> works);
 
 /// Block Gauss-Seidel on all of them at once; W r must be fresh, and is in the end.
 void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& settings);

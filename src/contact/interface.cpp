@@ -65,24 +65,25 @@ void check_interface(const Interface& interface, const std::string& source, MPI_
 {
   std::string problem;
   const auto is_zero = [](double value) { return value == 0; };
+  const PairRows<PetscInt> rows(interface.directions);
   for_each_row(interface.B,
                [&](PetscInt row, std::span<const PetscInt>, std::span<const PetscScalar> values)
                {
-                 if (row % interface.block() != 0 || !problem.empty()) return;
+                 if (!rows.is_normal(row) || !problem.empty()) return;
                  if (std::all_of(values.begin(), values.end(), is_zero))
-                   problem = source + ": " + where(interface, static_cast<int>(row / interface.block())) +
+                   problem = source + ": " + where(interface, static_cast<int>(rows.pair_of(row))) +
                              " cannot move along its normal: both sides are held still there, remove it from the "
                              "contact";
                });
   agree(comm, problem);
-  if (interface.friction == 0) return;
-  const auto directions = drive_directions(interface);
-  const auto width = static_cast<std::size_t>(interface.directions);
-  for (std::size_t i = 0; i < directions.size(); i += width)
-    if (std::all_of(&directions[i], &directions[i] + width, is_zero))
-      throw Error(source + ": " + where(interface, static_cast<int>(i / width)) +
+  for (int pair = 0; pair < interface.pairs; ++pair)
+  {
+    const double speed = drive_speed(interface, static_cast<std::size_t>(pair));
+    if (speed == 0 && friction_coefficient(interface.friction, speed).value != 0)
+      throw Error(source + ": " + where(interface, pair) +
                   " has no tangential drive velocity: friction has no direction there; give a velocity or move the " +
                   "axis of rotation, or set friction.coefficient = 0");
+  }
 }
 
 } // namespace
@@ -92,8 +93,7 @@ Interface make_interface(const Mesh& mesh, const std::vector<NodePair>& pairs, c
 {
   Interface interface;
   interface.pairs = static_cast<int>(pairs.size());
-  interface.friction = scene.friction.coefficient;
-  interface.direction_damping = scene.friction.direction_damping;
+  interface.friction = scene.friction;
   interface.directions = 1;
   for (const Contact& contact : scene.contacts)
     if (contact.tangents.size() != 1) interface.directions = 2;
@@ -110,14 +110,15 @@ Interface make_interface(const Mesh& mesh, const std::vector<NodePair>& pairs, c
     for (const Vec3& axis : axes) interface.drive.push_back(dot(velocity, axis));
     interface.position.push_back(at);
     interface.contact.push_back(pair.contact);
+    interface.nodes.push_back({{pair.b, 1}, {pair.a, -1}});
     interface.gap.push_back(contact.gap + pair.gap);
     if (i < first || i >= last) continue;
     axes.insert(axes.begin(), pair.normal);
     for (const Vec3& axis : axes)
     {
       rows.emplace_back();
-      add_displacement(dofs, pair.b, axis, rows.back());
-      add_displacement(dofs, pair.a, -1 * axis, rows.back());
+      for (const auto& [node, weight] : interface.nodes.back())
+        add_displacement(dofs, node, weight * axis, rows.back());
     }
   }
   interface.B = matrix_of_rows(rows, dofs.last - dofs.first, comm);
@@ -129,8 +130,7 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
                          MPI_Comm comm)
 {
   Interface interface;
-  interface.friction = friction.coefficient;
-  interface.direction_damping = friction.direction_damping;
+  interface.friction = friction;
   interface.gap = read_vector(folder / "gap.petsc", comm);
   interface.drive = read_vector(folder / "drive.petsc", comm);
   interface.pairs = static_cast<int>(interface.gap.size());
@@ -150,7 +150,8 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
                 std::to_string(interface.pairs) + " pairs with " + std::to_string(interface.directions) +
                 " tangential row(s) each in B.petsc");
   const auto [first, last] = local_range(interface.pairs, comm);
-  interface.B = load_matrix(B, size, {interface.block() * (last - first), local_dofs}, comm);
+  interface.B =
+      load_matrix(B, size, {PairRows<PetscInt>(interface.directions).per_pair() * (last - first), local_dofs}, comm);
   check_interface(interface, folder.string(), comm);
   return interface;
 }
@@ -171,17 +172,49 @@ void add_reactions(const Interface& interface, const std::vector<double>& r, Vec
   check(MatMultTransposeAdd(interface.B, rows, y, y));
 }
 
+double drive_speed(const Interface& interface, std::size_t pair)
+{
+  return length(TangentView(interface.drive, interface.directions).of(pair));
+}
+
 std::vector<double> drive_directions(const Interface& interface)
 {
-  std::vector<double> directions = interface.drive;
-  const auto width = static_cast<std::size_t>(interface.directions);
-  for (std::size_t i = 0; i < directions.size(); i += width)
+  std::vector<double> result = interface.drive;
+  const TangentView e(result, interface.directions);
+  for (std::size_t pair = 0; pair < static_cast<std::size_t>(interface.pairs); ++pair)
   {
-    double speed = 0;
-    for (std::size_t k = i; k < i + width; ++k) speed = std::hypot(speed, directions[k]);
-    for (std::size_t k = i; k < i + width; ++k) directions[k] = speed > 0 ? directions[k] / speed : 0;
+    const double speed = drive_speed(interface, pair);
+    for (double& component : e.of(pair)) component = speed > 0 ? component / speed : 0;
   }
-  return directions;
+  return result;
+}
+
+std::vector<double> drive_friction(const Interface& interface)
+{
+  std::vector<double> mu;
+  for (std::size_t pair = 0; pair < static_cast<std::size_t>(interface.pairs); ++pair)
+    mu.push_back(friction_coefficient(interface.friction, drive_speed(interface, pair)).value);
+  return mu;
+}
+
+Owned<Mat> rows_of(const Interface& interface, const std::vector<int>& pairs, RowsTaken taken)
+{
+  const PairRows<PetscInt> rows_of_pairs(interface.directions);
+  PetscInt first = 0, last = 0, first_dof = 0, last_dof = 0;
+  check(MatGetOwnershipRange(interface.B, &first, &last));
+  check(MatGetOwnershipRangeColumn(interface.B, &first_dof, &last_dof));
+  const PetscInt count = taken == RowsTaken::all ? rows_of_pairs.per_pair() : 1;
+  std::vector<PetscInt> mine;
+  for (const int pair : pairs)
+    for (PetscInt k = 0; k < count; ++k)
+      if (const PetscInt row = rows_of_pairs.normal(pair) + k; row >= first && row < last) mine.push_back(row);
+  const MPI_Comm comm = comm_of(interface.B);
+  Owned<IS> rows, columns;
+  check(ISCreateGeneral(comm, static_cast<PetscInt>(mine.size()), mine.data(), PETSC_COPY_VALUES, rows.put()));
+  check(ISCreateStride(comm, last_dof - first_dof, first_dof, 1, columns.put()));
+  Owned<Mat> result;
+  check(MatCreateSubMatrix(interface.B, rows, columns, MAT_INITIAL_MATRIX, result.put()));
+  return result;
 }
 
 } // namespace squeal

@@ -12,20 +12,6 @@ namespace
 
 constexpr double round_off = 1e-13; // a few hundred units in the last place of the terms summed
 
-/// std::hypot guards against squares out of range, which reactions and velocities never have, at ten times the cost.
-double length(double x, double y)
-{
-  return std::sqrt(x * x + y * y);
-}
-
-PairVector apply(const PairBlock& A, const PairVector& r, const PairVector& q)
-{
-  PairVector w = q;
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 3; ++j) w[i] += A[i][j] * r[j];
-  return w;
-}
-
 /// A r = -q by elimination of r_n; a tangential direction that cannot move gets no reaction, and no stick if it slides.
 std::optional<PairVector> stick(const PairBlock& A, const PairVector& q)
 {
@@ -48,7 +34,7 @@ std::optional<PairVector> stick(const PairBlock& A, const PairVector& q)
     r[2] = factor * v2;
   }
   r[0] = -(q[0] + A[0][1] * r[1] + A[0][2] * r[2]) / a;
-  const PairVector w = apply(A, r, q);
+  const PairVector w = pair_velocity(A, r, q);
   const double scale = std::abs(q[0]) + std::abs(q[1]) + std::abs(q[2]);
   if (length(w[1], w[2]) > 10 * round_off * scale) return std::nullopt;
   return r;
@@ -124,7 +110,7 @@ struct SlipAngle
       double derivative = 0;
       const double value = cross(angle, derivative);
       const double change = derivative != 0 ? -value / derivative : 0;
-      angle += std::clamp(change, -.5, .5);
+      angle += std::clamp(change, -0.5, 0.5);
       if (std::abs(change) < 1e-9)
       {
         // quadratic convergence: the last step was below the root of round-off
@@ -170,7 +156,7 @@ PairVector slip_in_space(const PairBlock& A, const PairVector& q, double mu, con
   double start = std::atan2(last[2], last[1]);
   if (last[1] == 0 && last[2] == 0)
   {
-    const PairVector sliding = apply(A, {-q[0] / A[0][0], 0, 0}, q); // without friction
+    const PairVector sliding = pair_velocity(A, {-q[0] / A[0][0], 0, 0}, q); // without friction
     start = std::atan2(-sliding[2], -sliding[1]);
   }
   if (const auto found = slip.newton(start)) return *found;
@@ -180,29 +166,66 @@ PairVector slip_in_space(const PairBlock& A, const PairVector& q, double mu, con
 
 } // namespace
 
-void project_on_disc(PairVector& r, double friction)
+SlidingFriction sliding_friction(const FrictionLaw& law, double r_n, std::span<const double> s)
 {
-  const double radius = friction * std::max(0., r[0]), size = length(r[1], r[2]);
-  if (size <= radius) return;
-  r[1] *= radius / size;
-  r[2] *= radius / size;
+  SlidingFriction result{};
+  const double speed = length(s);
+  if (speed == 0) return result;
+  const FrictionCoefficient mu = friction_coefficient(law, speed);
+  for (std::size_t k = 0; k < s.size(); ++k)
+  {
+    result.along[k] = mu.value * s[k] / speed;
+    for (std::size_t l = 0; l < s.size(); ++l)
+    {
+      const double parallel = s[k] * s[l] / (speed * speed);
+      result.damping[k][l] = r_n * (mu.value / speed * ((k == l ? 1 : 0) - parallel) + mu.derivative * parallel);
+    }
+  }
+  return result;
 }
 
-PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, double friction, const PairVector& last)
+PairVector admissible(PairVector r, const PairVector& w, const FrictionLaw& law)
+{
+  r[0] = std::max(0., r[0]);
+  const double shrink = disc_factor(r[1], r[2], coefficient_at(law, w) * r[0]);
+  r[1] *= shrink;
+  r[2] *= shrink;
+  return r;
+}
+
+NaturalScale natural_scale(const PairBlock& A, double otherwise)
+{
+  // a pair that cannot move takes the scale of the others, so that a gap it cannot close is not passed over
+  const double normal = A[0][0] > 0 ? A[0][0] : otherwise, tangential = std::max(A[1][1], A[2][2]);
+  const double rho_n = normal > 0 ? 1 / normal : 1;
+  return {rho_n, tangential > 0 ? 1 / tangential : rho_n};
+}
+
+PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, const FrictionLaw& law,
+                      const PairVector& last)
 {
   if (q[0] >= 0 || A[0][0] <= 0) return {};
-  if (friction == 0) return {-q[0] / A[0][0], 0, 0};
-  if (const auto r = stick(A, q); r && (*r)[0] >= 0 && length((*r)[1], (*r)[2]) <= friction * (*r)[0]) return *r;
-  return directions == 1 ? slip_in_plane(A, q, friction, last) : slip_in_space(A, q, friction, last);
+  const double mu = coefficient_at(law, pair_velocity(A, last, q));
+  if (mu == 0) return {-q[0] / A[0][0], 0, 0};
+  if (const auto r = stick(A, q); r && (*r)[0] >= 0 && length((*r)[1], (*r)[2]) <= mu * (*r)[0]) return *r;
+  return directions == 1 ? slip_in_plane(A, q, mu, last) : slip_in_space(A, q, mu, last);
 }
 
-double natural_map(const PairVector& r, const PairVector& w, double friction, double rho_n, double rho_t)
+ContactStatus contact_status(const PairVector& r, const FrictionLaw& law, double largest)
 {
-  // the disc's radius is that of the reaction itself: r_n is judged by its own row
-  PairVector moved = {std::max(0., r[0]), r[1] - rho_t * w[1], r[2] - rho_t * w[2]};
-  project_on_disc(moved, friction);
-  moved[0] = std::max(0., r[0] - rho_n * w[0]);
-  return length(r[0] - moved[0], length(r[1] - moved[1], r[2] - moved[2]));
+  if (r[0] <= 0) return ContactStatus::open;
+  const double limit = friction_coefficient(law, 0).value * r[0];
+  return limit - length(r[1], r[2]) > 1e-8 * largest ? ContactStatus::stick : ContactStatus::slip;
+}
+
+std::vector<ContactStatus> contact_status(PairView<const double> reactions, const FrictionLaw& law)
+{
+  double largest = 0;
+  for (std::size_t pair = 0; pair < reactions.pairs(); ++pair) largest = std::max(largest, reactions.normal(pair));
+  std::vector<ContactStatus> status;
+  for (std::size_t pair = 0; pair < reactions.pairs(); ++pair)
+    status.push_back(contact_status(reactions.vector(pair), law, largest));
+  return status;
 }
 
 } // namespace squeal

@@ -7,16 +7,15 @@ std::vector<ContactResultant> contact_resultants(const Interface& interface, con
                                                  const std::vector<Contact>& contacts)
 {
   std::vector<ContactResultant> resultants(contacts.size());
-  const auto directions = static_cast<std::size_t>(interface.directions);
+  const PairView view(reactions, interface.directions);
+  const TangentView drive(interface.drive, interface.directions);
   for (std::size_t i = 0; i < interface.contact.size(); ++i)
   {
     const auto contact = static_cast<std::size_t>(interface.contact[i]);
-    const double* r = &reactions[i * (1 + directions)];
-    resultants[contact].normal_force += r[0];
+    resultants[contact].normal_force += view.normal(i);
     const auto& rotation = contacts[contact].rotation;
-    if (!rotation || rotation->rate == 0) continue;
-    for (std::size_t k = 0; k < directions; ++k)
-      resultants[contact].torque += r[1 + k] * interface.drive[i * directions + k] / rotation->rate;
+    if (rotation && rotation->rate != 0)
+      resultants[contact].torque += dot(view.tangential(i), drive.of(i)) / rotation->rate;
   }
   return resultants;
 }

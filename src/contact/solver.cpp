@@ -1,9 +1,7 @@
 #include "squeal/contact/solver.hpp"
 
 #include "contact_work.hpp"
-#include "squeal/algebra/panel.hpp"
-#include "squeal/base/petsc.hpp"
-#include "squeal/contact/complementarity.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,25 +12,9 @@ namespace squeal
 
 double ContactWork::force_scale(std::size_t pair, double largest) const
 {
-  const double own = speed * std::min(W.rho_n[pair], W.rho_t[pair]);
+  const NaturalScale& rho = W.scale(pair);
+  const double own = speed * std::min(rho.normal, rho.tangential);
   return own == 0 ? largest : largest == 0 ? own : std::min(own, largest);
-}
-
-bool ContactWork::takes_part(std::size_t pair) const
-{
-  return b[pair * W.block()] != std::numeric_limits<double>::infinity();
-}
-
-PairVector ContactWork::velocity(std::size_t i) const
-{
-  PairVector w{};
-  for (std::size_t k = 0; k < W.block(); ++k) w[k] = b[i + k] + Wr[i + k];
-  return w;
-}
-
-PairVector pair_of(const std::vector<double>& values, std::size_t i, std::size_t block)
-{
-  return {values[i], values[i + 1], block == 3 ? values[i + 2] : 0.};
 }
 
 double largest_reaction(const std::vector<double>& r)
@@ -44,15 +26,13 @@ double largest_reaction(const std::vector<double>& r)
 
 double residual_of(const ContactWork& work)
 {
-  const ContactOperator& W = work.W;
   const double largest = largest_reaction(work.r);
   double residual = 0;
-  for (std::size_t pair = 0; pair < W.diagonal.size(); ++pair)
+  for (std::size_t pair = 0; pair < work.W.pairs(); ++pair)
   {
     if (!work.takes_part(pair)) continue;
-    const std::size_t i = pair * W.block();
-    const PairVector r = pair_of(work.r, i, W.block()), w = work.velocity(i);
-    const double defect = natural_map(r, w, work.friction, W.rho_n[pair], W.rho_t[pair]);
+    const PairVector w = work.velocity(pair);
+    const double defect = natural_map(work.reaction(pair), w, work.friction, work.W.scale(pair));
     if (!std::isfinite(defect + w[0] + w[1] + w[2])) return std::numeric_limits<double>::infinity();
     if (defect > 0) residual = std::max(residual, defect / work.force_scale(pair, largest));
   }
@@ -62,33 +42,37 @@ double residual_of(const ContactWork& work)
 namespace
 {
 
+/// One iteration r <- proj(r - rho w) of every pair; W r is then no longer that of r.
+void project(ContactWork& work, double rho)
+{
+  const PairView<double> r(work.r, work.W.directions());
+  for (std::size_t pair = 0; pair < work.W.pairs(); ++pair)
+  {
+    if (!work.takes_part(pair)) continue;
+    const PairVector w = work.velocity(pair);
+    PairVector next = r.vector(pair);
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] -= rho * w[k];
+    r.set(pair, admissible(next, w, work.friction));
+  }
+}
+
 void fixed_point(ContactWork& work, const ContactSettings& settings)
 {
-  const std::size_t block = work.W.block();
   ContactResult& result = work.result;
-  for (std::size_t pair = 0; pair < work.W.diagonal.size(); ++pair)
-    if (!work.takes_part(pair)) std::fill_n(work.r.begin() + static_cast<std::ptrdiff_t>(pair * block), block, 0.);
+  for (std::size_t pair = 0; pair < work.W.pairs(); ++pair)
+    if (!work.takes_part(pair)) PairView<double>(work.r, work.W.directions()).set(pair, {});
   ContactWork* const alone[] = {&work};
-  refresh(alone);
+  form_products(alone);
   result.residual = residual_of(work);
   // a lower bound, close enough for a step that adapts
-  const double lambda = result.residual > settings.tolerance ? largest_eigenvalue(work.W.W, work.W.size(), 12) : 0;
+  const double lambda = result.residual > settings.tolerance ? work.W.largest_eigenvalue(12) : 0;
   double rho = (settings.rho > 0 ? settings.rho : 1.5) / (lambda > 0 ? lambda : 1);
   double best = result.residual;
   while (result.residual > settings.tolerance && std::isfinite(result.residual) &&
          result.iterations < settings.max_iterations)
   {
-    for (std::size_t pair = 0; pair < work.W.diagonal.size(); ++pair)
-    {
-      if (!work.takes_part(pair)) continue;
-      const PairVector w = work.velocity(pair * block);
-      PairVector next = pair_of(work.r, pair * block, block);
-      next[0] = std::max(0., next[0] - rho * w[0]);
-      for (std::size_t k = 1; k < block; ++k) next[k] -= rho * w[k];
-      project_on_disc(next, work.friction);
-      std::copy_n(next.begin(), block, work.r.begin() + static_cast<std::ptrdiff_t>(pair * block));
-    }
-    refresh(alone);
+    project(work, rho);
+    form_products(alone);
     ++result.iterations;
     result.residual = residual_of(work);
     best = std::min(best, result.residual);
@@ -97,7 +81,7 @@ void fixed_point(ContactWork& work, const ContactSettings& settings)
   result.converged = result.residual <= settings.tolerance;
 }
 
-ContactWork start(const ContactOperator& W, double friction, const ContactProblem& problem)
+ContactWork start(const ContactOperator& W, const FrictionLaw& friction, const ContactProblem& problem)
 {
   if (problem.b.size() != W.size())
     throw Error("contact: " + std::to_string(problem.b.size()) + " velocities for " + std::to_string(W.size()) +
@@ -169,33 +153,30 @@ OptionList options_of(ContactSettings& settings)
   };
 }
 
-void refresh(std::span<ContactWork* const> works)
+void form_products(std::span<ContactWork* const> works)
 {
   if (works.empty()) return;
-  const ContactOperator& W = works.front()->W;
-  const std::size_t n = W.size(), lanes = lanes_for(works.size());
-  std::vector<double> r(n * lanes), Wr(n * lanes);
-  for (std::size_t k = 0; k < works.size(); ++k)
-    for (std::size_t i = 0; i < n; ++i) r[i * lanes + k] = works[k]->r[i];
-  if (lanes == 1)
-    symmetric_product(W.W.data(), n, r.data(), Wr.data());
-  else
-    dense_product(W.W.data(), n, lanes, r.data(), Wr.data());
-  for (std::size_t k = 0; k < works.size(); ++k)
+  std::vector<std::span<const double>> r;
+  std::vector<std::span<double>> Wr;
+  for (ContactWork* work : works)
   {
-    works[k]->Wr.resize(n);
-    for (std::size_t i = 0; i < n; ++i) works[k]->Wr[i] = Wr[i * lanes + k];
-    ++works[k]->reads;
+    work->Wr.resize(work->r.size());
+    r.emplace_back(work->r);
+    Wr.emplace_back(work->Wr);
+    ++work->reads;
   }
+  works.front()->W.multiply(r, Wr);
 }
 
-std::vector<ContactResult> solve_contacts(const ContactOperator& W, double friction, const ContactSettings& settings,
-                                          std::span<const ContactProblem> problems)
+std::vector<ContactResult> solve_contacts(const ContactOperator& W, const FrictionLaw& friction,
+                                          const ContactSettings& settings, std::span<const ContactProblem> problems)
 {
   std::vector<ContactWork> works;
   for (const ContactProblem& problem : problems) works.push_back(start(W, friction, problem));
-  if (W.pairs == 0) return std::vector<ContactResult>(problems.size(), {0, 0, true});
-  if (settings.solver == ContactSolver::gauss_seidel)
+  if (W.pairs() == 0) return std::vector<ContactResult>(problems.size(), {0, 0, true});
+  switch (settings.solver)
+  {
+  case ContactSolver::gauss_seidel:
   {
     std::vector<ContactWork*> all, cold;
     for (std::size_t k = 0; k < works.size(); ++k)
@@ -203,11 +184,13 @@ std::vector<ContactResult> solve_contacts(const ContactOperator& W, double frict
       all.push_back(&works[k]);
       if (!start_warm(works[k], problems[k].memory, settings.extrapolation)) cold.push_back(&works[k]);
     }
-    refresh(cold);
+    form_products(cold);
     gauss_seidel(all, settings);
+    break;
   }
-  else
+  case ContactSolver::fixed_point:
     for (ContactWork& work : works) fixed_point(work, settings);
+  }
   std::vector<ContactResult> results;
   for (std::size_t k = 0; k < works.size(); ++k)
   {
@@ -217,35 +200,14 @@ std::vector<ContactResult> solve_contacts(const ContactOperator& W, double frict
   return results;
 }
 
-ContactResult solve_contact(const std::vector<double>& W, const std::vector<double>& b, int pairs, int directions,
-                            double friction, const ContactSettings& settings, std::vector<double>& r)
+double contact_residual(const ContactOperator& W, const FrictionLaw& friction, const std::vector<double>& b,
+                        const std::vector<double>& r)
 {
+  std::vector<double> reactions = r;
   ContactMemory nothing;
-  const ContactProblem problem{b, r, nothing};
-  return solve_contacts(make_contact_operator(W, pairs, directions), friction, settings, std::span(&problem, 1))[0];
-}
-
-std::vector<double> relative_velocity(const std::vector<double>& W, const std::vector<double>& b,
-                                      const std::vector<double>& r)
-{
-  const std::size_t n = b.size();
-  std::vector<double> w = b;
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < n; ++j) w[i] += W[i * n + j] * r[j];
-  return w;
-}
-
-double contact_residual(const std::vector<double>& W, const std::vector<double>& w, int pairs, int directions,
-                        double friction, const std::vector<double>& r)
-{
-  const ContactOperator op = make_contact_operator(W, pairs, directions);
-  std::vector<double> opposite = r, reactions = r;
-  for (double& value : opposite) value = -value;
-  const std::vector<double> b = relative_velocity(W, w, opposite);
-  ContactMemory nothing;
-  ContactWork work = start(op, friction, {b, reactions, nothing});
+  ContactWork work = start(W, friction, {b, reactions, nothing});
   ContactWork* const alone[] = {&work};
-  refresh(alone);
+  form_products(alone);
   return residual_of(work);
 }
 

@@ -34,15 +34,15 @@ struct SlidingModes
 /// mu e.B_t Phi, a column for each mode.
 MatrixXd friction_of(const Interface& interface, const std::vector<Owned<Vec>>& shapes)
 {
-  const auto directions = static_cast<std::size_t>(interface.directions), block = directions + 1;
-  const std::vector<double> e = drive_directions(interface);
+  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
+  const TangentView e(directions, interface.directions);
   MatrixXd result = MatrixXd::Zero(interface.pairs, static_cast<Eigen::Index>(shapes.size()));
   for (Eigen::Index j = 0; j < result.cols(); ++j)
   {
     const std::vector<double> motion = relative(interface, shapes[static_cast<std::size_t>(j)]);
-    for (Eigen::Index pair = 0; pair < result.rows(); ++pair)
-      for (std::size_t i = static_cast<std::size_t>(pair), k = 0; k < directions; ++k)
-        result(pair, j) += interface.friction * e[i * directions + k] * motion[i * block + 1 + k];
+    for (std::size_t i = 0; i < mu.size(); ++i)
+      result(static_cast<Eigen::Index>(i), j) =
+          mu[i] * dot(e.of(i), PairView(motion, interface.directions).tangential(i));
   }
   return result;
 }

@@ -171,7 +171,7 @@ std::string size_refusal(const ReducedSearch& search)
   PetscInt dofs = 0;
   check(VecGetSize(problem.sliding.structure.load, &dofs));
   const std::size_t shapes = std::min(problem.modes.size(), static_cast<std::size_t>(search.options.reduced.modes)) +
-                             search.active.size() * static_cast<std::size_t>(problem.sliding.interface.block());
+                             search.active.size() * static_cast<std::size_t>(1 + problem.sliding.interface.directions);
   if (2 * shapes <= static_cast<std::size_t>(dofs)) return {};
   return "a reduced model of " + std::to_string(shapes) + " shapes is not small next to " + std::to_string(dofs) +
          " degrees of freedom";

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace squeal
 {
@@ -29,22 +30,13 @@ struct Held
   double kappa = 0; // [N/m]
 };
 
-/// B_n' B_n, from the normal rows of B.
+/// B_n' B_n
 Owned<Mat> normal_springs(const Interface& interface)
 {
-  const PetscInt block = interface.block();
-  PetscInt first = 0, last = 0, first_dof = 0, last_dof = 0;
-  check(MatGetOwnershipRange(interface.B, &first, &last));
-  check(MatGetOwnershipRangeColumn(interface.B, &first_dof, &last_dof));
-  std::vector<PetscInt> normals;
-  for (PetscInt row = first; row < last; ++row)
-    if (row % block == 0) normals.push_back(row);
-  const auto comm = comm_of(interface.B);
-  Owned<IS> rows, columns;
-  check(ISCreateGeneral(comm, static_cast<PetscInt>(normals.size()), normals.data(), PETSC_COPY_VALUES, rows.put()));
-  check(ISCreateStride(comm, last_dof - first_dof, first_dof, 1, columns.put()));
-  Owned<Mat> B_n, product;
-  check(MatCreateSubMatrix(interface.B, rows, columns, MAT_INITIAL_MATRIX, B_n.put()));
+  std::vector<int> all(static_cast<std::size_t>(interface.pairs));
+  std::iota(all.begin(), all.end(), 0);
+  const Owned<Mat> B_n = rows_of(interface, all, RowsTaken::normal);
+  Owned<Mat> product;
   check(MatTransposeMatMult(B_n, B_n, MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.put()));
   return product;
 }
@@ -103,18 +95,18 @@ Held hold(const Structure& structure, const Interface& interface)
   return held;
 }
 
-/// Block entries of every pair: normal r_n + kappa (g - g0), tangential mu r_n e.
+/// Of every pair: normal r_n + kappa (g - g0), tangential mu r_n e.
 std::vector<double> pair_forces(const Interface& interface, const std::vector<double>& reaction,
                                 const std::vector<double>& gap, double kappa)
 {
-  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
-  const auto e = drive_directions(interface);
+  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
+  const TangentView e(directions, interface.directions);
   std::vector<double> forces(interface.size());
+  const PairView view(forces, interface.directions);
   for (std::size_t i = 0; i < reaction.size(); ++i)
   {
-    forces[i * block] = reaction[i] + kappa * (gap[i] - interface.gap[i]);
-    for (std::size_t k = 0; k < directions; ++k)
-      forces[i * block + 1 + k] = interface.friction * reaction[i] * e[i * directions + k];
+    view.normal(i) = reaction[i] + kappa * (gap[i] - interface.gap[i]);
+    for (std::size_t k = 0; k < e.of(i).size(); ++k) view.tangential(i)[k] = mu[i] * reaction[i] * e.of(i)[k];
   }
   return forces;
 }
@@ -138,44 +130,41 @@ std::vector<double> gaps_of(const Interface& interface, Vec u)
 {
   std::vector<double> gap = interface.gap;
   if (gap.empty()) return gap;
-  const auto motion = relative(interface, u);
-  for (std::size_t i = 0; i < gap.size(); ++i) gap[i] += motion[i * static_cast<std::size_t>(interface.block())];
+  const std::vector<double> motion = relative(interface, u);
+  for (std::size_t i = 0; i < gap.size(); ++i) gap[i] += PairView(motion, interface.directions).normal(i);
   return gap;
 }
 
-/// D_nn of the block matrix D.
-std::vector<double> normal_block(const std::vector<double>& D, const Interface& interface)
+/// The gaps that normal reactions cause with the friction that each brings along, D_nn + D_nt mu e; on rank 0, where D
+/// is. `mu`: of every pair.
+Eigen::MatrixXd normal_compliance(const PairMatrixView& D, const Interface& interface, const std::vector<double>& mu)
 {
-  const auto block = static_cast<std::size_t>(interface.block()), pairs = interface.gap.size(), n = pairs * block;
-  std::vector<double> D_nn(pairs * pairs);
-  for (std::size_t i = 0; i < pairs; ++i)
-    for (std::size_t j = 0; j < pairs; ++j) D_nn[i * pairs + j] = D[i * block * n + j * block];
-  return D_nn;
+  const std::vector<double> directions = drive_directions(interface);
+  const TangentView e(directions, interface.directions);
+  const auto pairs = static_cast<Eigen::Index>(mu.size());
+  Eigen::MatrixXd result(pairs, pairs);
+  for (std::size_t i = 0; i < mu.size(); ++i)
+    for (std::size_t j = 0; j < mu.size(); ++j)
+    {
+      const PairVector row = D.block(i, j)[0];
+      const double friction = dot(std::span(row).subspan(1, e.of(j).size()), e.of(j));
+      result(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = row[0] + mu[j] * friction;
+    }
+  return result;
 }
 
-/// On rank 0, where D is.
-ComplementarityProblem problem_of(const std::vector<double>& D, const std::vector<double>& D_nn,
-                                  const Interface& interface, double kappa, const std::vector<double>& q)
+ComplementarityProblem problem_of(const Eigen::MatrixXd& D_nn, Eigen::MatrixXd with_friction, double kappa,
+                                  const std::vector<double>& q)
 {
-  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
-  const std::size_t pairs = q.size(), n = pairs * block;
-  const auto e = drive_directions(interface);
   ComplementarityProblem problem;
   problem.q = q;
-  problem.M = D_nn;
-  for (std::size_t i = 0; i < pairs; ++i)
-  {
-    problem.compliance = std::max(problem.compliance, D_nn[i * pairs + i]);
-    for (std::size_t j = 0; j < pairs; ++j)
-      for (std::size_t k = 0; k < directions; ++k)
-        problem.M[i * pairs + j] += interface.friction * D[i * block * n + j * block + 1 + k] * e[j * directions + k];
-  }
+  problem.M = std::move(with_friction);
+  problem.compliance = std::max(0., D_nn.diagonal().maxCoeff());
   if (kappa == 0) return problem;
-  problem.N.resize(pairs * pairs);
-  for (std::size_t i = 0; i < pairs * pairs; ++i) problem.N[i] = -kappa * D_nn[i];
-  for (std::size_t i = 0; i < pairs; ++i) problem.N[i * pairs + i] += 1;
-  for (double& value : problem.N)
-    if (std::abs(value) < 1e-12) value = 0; // rounding of 1 - 1: the pair alone holds its body
+  problem.N = -kappa * D_nn;
+  problem.N.diagonal().array() += 1;
+  // rounding of 1 - 1: the pair alone holds its body
+  problem.N = (problem.N.array().abs() < 1e-12).select(0, problem.N);
   return problem;
 }
 
@@ -184,7 +173,7 @@ std::vector<char> first_split(const ComplementarityProblem& problem, const Inter
 {
   std::vector<char> closed(problem.q.size());
   for (std::size_t i = 0; i < closed.size(); ++i)
-    closed[i] = !problem.N.empty() || interface.gap[i] <= 0 || problem.q[i] < 0;
+    closed[i] = problem.N.size() > 0 || interface.gap[i] <= 0 || problem.q[i] < 0;
   return closed;
 }
 
@@ -193,7 +182,7 @@ StatusSolution find_split(const ComplementarityProblem& problem, const Interface
                           double rho)
 {
   StatusSolution solution = solve_by_status(problem, first_split(problem, interface), max_iterations);
-  if (solution.outcome == "converged" || !problem.N.empty()) return solution;
+  if (solution.outcome == StatusOutcome::converged || problem.N.size() > 0) return solution;
   const auto projected = solve_by_projection(problem, rho, 1e-8, 5000);
   if (projected.residual > 1e-8) return solution;
   std::vector<char> closed(problem.q.size());
@@ -207,19 +196,6 @@ void broadcast(std::vector<double>& values, std::size_t size, MPI_Comm comm)
 {
   values.resize(size);
   MPI_Bcast(values.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm);
-}
-
-/// The residual with each pair's own 1/D_nn, and with the fixed point's rho.
-double natural_map(const std::vector<double>& reaction, const std::vector<double>& gap, const std::vector<double>& rho)
-{
-  double error = 0, scale = 0, pull = 0;
-  for (std::size_t i = 0; i < gap.size(); ++i)
-  {
-    error = std::max(error, std::abs(reaction[i] - std::max(0., reaction[i] - rho[i] * gap[i])));
-    scale = std::max(scale, reaction[i]);
-    pull = std::max(pull, rho[i] * std::abs(gap[i]));
-  }
-  return error == 0 ? 0 : error / (scale > 0 ? scale : pull);
 }
 
 /// Sets the force residual; returns whether it is small, or all that rounding of K u allows (a soft support lets u be
@@ -244,7 +220,7 @@ bool balances(const Structure& structure, const Interface& interface, Equilibriu
 /// What the search shares between ranks; D and the problem live on rank 0.
 struct Search
 {
-  std::vector<double> D_nn;
+  Eigen::MatrixXd D_nn;
   ComplementarityProblem problem;
   StatusSolution solution;
   double rho = 0; // 1/lambda_max(D_nn)
@@ -288,13 +264,14 @@ void judge(const Structure& structure, const Interface& interface, const Search&
                {
                  const std::size_t pairs = gap.size();
                  std::vector<double> rho(pairs, search.rho);
-                 told[1] = natural_map(reaction, gap, rho);
+                 told[1] = unilateral_residual(reaction, gap, rho, gap);
                  for (std::size_t i = 0; i < pairs; ++i)
-                   if (search.D_nn[i * pairs + i] > 0) rho[i] = 1 / search.D_nn[i * pairs + i];
-                 told[0] = natural_map(reaction, gap, rho);
-                 if (search.problem.N.empty()) told[4] = has_one_solution(search.problem) ? 1 : 2;
+                   if (const double own = search.D_nn.diagonal()[static_cast<Eigen::Index>(i)]; own > 0)
+                     rho[i] = 1 / own;
+                 told[0] = unilateral_residual(reaction, gap, rho, gap);
+                 if (search.problem.N.size() == 0) told[4] = has_one_solution(search.problem) ? 1 : 2;
                  const int limit = check_iterations(options, interface.pairs);
-                 if (limit == 0 || pairs == 0 || !search.problem.N.empty()) return;
+                 if (limit == 0 || pairs == 0 || search.problem.N.size() > 0) return;
                  const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12, limit);
                  told[2] = run.iterations;
                  const double largest = *std::max_element(reaction.begin(), reaction.end());
@@ -317,9 +294,9 @@ void judge(const Structure& structure, const Interface& interface, const Search&
 Outcome failure(const StatusSolution& solution, double friction)
 {
   Outcome outcome{OutcomeKind::no_equilibrium, "", solution.iterations, 1};
-  if (solution.outcome == "cycles")
+  if (solution.outcome == StatusOutcome::cycles)
     outcome.reason = format("the sets of closed pairs repeat without end at mu = %g: friction is too large", friction);
-  else if (solution.outcome == "singular")
+  else if (solution.outcome == StatusOutcome::singular)
     outcome.reason = format("no set of closed pairs balances the load at mu = %g: the structure tips, slides away or "
                             "lifts off",
                             friction);
@@ -331,11 +308,9 @@ Outcome failure(const StatusSolution& solution, double friction)
 
 void share(StatusSolution& solution, std::size_t pairs, MPI_Comm comm)
 {
-  const std::array<std::string, 4> words = {"converged", "cycles", "singular", "not converged"};
-  std::array<int, 2> told = {static_cast<int>(std::find(words.begin(), words.end(), solution.outcome) - words.begin()),
-                             solution.iterations};
+  std::array<int, 2> told = {static_cast<int>(solution.outcome), solution.iterations};
   MPI_Bcast(told.data(), 2, MPI_INT, 0, comm);
-  solution.outcome = words.at(static_cast<std::size_t>(told[0]));
+  solution.outcome = static_cast<StatusOutcome>(told[0]);
   solution.iterations = told[1];
   solution.closed.resize(pairs);
   MPI_Bcast(solution.closed.data(), static_cast<int>(pairs), MPI_CHAR, 0, comm);
@@ -371,6 +346,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
 
   Equilibrium equilibrium;
   equilibrium.u = zeros_like(structure.load);
+  equilibrium.directions = interface.directions;
   if (stays_at_rest(structure, interface))
   {
     equilibrium.outcome = {OutcomeKind::converged, "", 0, 0};
@@ -383,16 +359,18 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   const std::vector<double> q = gaps_of(interface, equilibrium.u);
 
   Search search;
-  search.solution.outcome = "converged";
+  search.solution.outcome = StatusOutcome::converged;
   if (pairs > 0)
   {
     const std::vector<double> D = held.factor.condensed(1);
     on_rank_zero(comm,
                  [&]
                  {
-                   search.D_nn = normal_block(D, interface);
-                   search.problem = problem_of(D, search.D_nn, interface, held.kappa, q);
-                   search.rho = 1 / largest_eigenvalue(search.D_nn, pairs, 30);
+                   const PairMatrixView view(D, pairs, interface.directions);
+                   search.D_nn = normal_compliance(view, interface, std::vector<double>(pairs, 0.));
+                   search.problem = problem_of(
+                       search.D_nn, normal_compliance(view, interface, drive_friction(interface)), held.kappa, q);
+                   search.rho = 1 / largest_eigenvalue(search.D_nn, 30);
                    search.solution = find_split(search.problem, interface, static_cast<int>(options.max_iterations),
                                                 1.5 * search.rho);
                  });
@@ -400,9 +378,9 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   }
 
   equilibrium.closed = search.solution.closed;
-  if (search.solution.outcome != "converged")
+  if (search.solution.outcome != StatusOutcome::converged)
   {
-    equilibrium.outcome = failure(search.solution, interface.friction);
+    equilibrium.outcome = failure(search.solution, interface.friction.coefficient);
     equilibrium.reactions.assign(interface.size(), 0.);
     check(VecSet(equilibrium.u, 0));
     return equilibrium;

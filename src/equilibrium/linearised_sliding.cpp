@@ -24,10 +24,10 @@ using Row = std::map<PetscInt, Coefficients>;
 // The rows of B of the closed pairs, whole on every rank: they are few, and the elimination is the same everywhere.
 std::vector<Row> read_rows(const Interface& interface, const std::vector<int>& pairs)
 {
-  const int block = interface.block();
+  const PairRows<PetscInt> rows(interface.directions);
   std::vector<PetscInt> indices;
   for (const int pair : pairs)
-    for (int k = 0; k < block; ++k) indices.push_back(static_cast<PetscInt>(pair) * block + k);
+    for (PetscInt k = 0; k < rows.per_pair(); ++k) indices.push_back(rows.normal(pair) + k);
   PetscInt dofs = 0;
   check(MatGetSize(interface.B, nullptr, &dofs));
   Owned<IS> row_set, column_set;
@@ -37,19 +37,21 @@ std::vector<Row> read_rows(const Interface& interface, const std::vector<int>& p
   const IS wanted_rows = row_set, wanted_columns = column_set;
   Mat* parts = nullptr;
   check(MatCreateSubMatrices(interface.B, 1, &wanted_rows, &wanted_columns, MAT_INITIAL_MATRIX, &parts));
-  const std::vector<double> e = drive_directions(interface);
+  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
+  const TangentView e(directions, interface.directions);
   std::vector<Row> result(pairs.size());
   for_each_row(parts[0],
                [&](PetscInt row, std::span<const PetscInt> column, std::span<const PetscScalar> value)
                {
-                 const auto i = static_cast<std::size_t>(row / block);
-                 const int k = static_cast<int>(row % block), direction = pairs[i] * interface.directions + k - 1;
-                 const double weight = k == 0 ? 1 : interface.friction * e[static_cast<std::size_t>(direction)];
+                 const auto i = static_cast<std::size_t>(rows.pair_of(row)), pair = static_cast<std::size_t>(pairs[i]);
+                 const bool normal = rows.is_normal(row);
+                 const auto k = static_cast<std::size_t>(rows.component_of(row));
+                 const double weight = normal ? 1 : mu[pair] * e.of(pair)[k - 1];
                  for (std::size_t j = 0; j < column.size(); ++j)
                  {
                    if (value[j] == 0) continue;
                    Coefficients& entry = result[i][column[j]];
-                   if (k == 0) entry.normal += value[j];
+                   if (normal) entry.normal += value[j];
                    entry.sliding += weight * value[j];
                  }
                });
@@ -254,39 +256,50 @@ Owned<Mat> project(Mat A, Mat Y, Mat Z)
   return result;
 }
 
+namespace
+{
+
+/// damping of sliding_friction at -v_d for the pairs that are closed, on the rows of B; null if it is zero.
+Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>& closed,
+                            const std::vector<double>& reactions)
+{
+  const PairRows<PetscInt> rows(interface.directions);
+  const TangentView drive(interface.drive, interface.directions);
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(interface.B, &first, &last));
+  Owned<Mat> result;
+  check(MatCreateAIJ(comm_of(interface.B), last - first, last - first, PETSC_DETERMINE, PETSC_DETERMINE,
+                     interface.directions, nullptr, 0, nullptr, result.put()));
+  bool any = false; // alike on every rank
+  for (std::size_t i = 0; i < closed.size(); ++i)
+  {
+    const double reaction = PairView(reactions, interface.directions).normal(i);
+    if (!closed[i] || reaction <= 0) continue;
+    const SlidingFriction friction = sliding_friction(interface.friction, reaction, drive.of(i)); // even in s
+    const PetscInt tangential = rows.tangential(static_cast<PetscInt>(i));
+    for (PetscInt k = 0; k < rows.directions; ++k)
+      for (PetscInt l = 0; l < rows.directions; ++l)
+      {
+        const double value = friction.damping[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)];
+        any = any || value != 0;
+        if (tangential >= first && tangential < last)
+          check(MatSetValue(result, tangential + k, tangential + l, value, INSERT_VALUES));
+      }
+  }
+  if (!any) return {};
+  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
+  return result;
+}
+
+} // namespace
+
 Owned<Mat> direction_damping(const Interface& interface, const std::vector<char>& closed,
                              const std::vector<double>& reactions)
 {
-  if (interface.directions < 2 || interface.friction == 0) return {};
-  const std::vector<double> e = drive_directions(interface);
-  std::vector<double> weight(static_cast<std::size_t>(interface.pairs));
-  for (std::size_t i = 0; i < weight.size(); ++i)
-  {
-    const double reaction = reactions[3 * i];
-    const double speed = std::hypot(interface.drive[2 * i], interface.drive[2 * i + 1]);
-    if (closed[i] && reaction > 0) weight[i] = std::sqrt(interface.friction * reaction / speed);
-  }
-  if (std::all_of(weight.begin(), weight.end(), [](double w) { return w == 0; })) return {};
-  // Across the drive: S = sqrt(mu r_n0/|v_d|) (-e_2 B_t1 + e_1 B_t2), C_f = S'S.
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(interface.B, &first, &last));
-  Owned<Mat> across, S, Cf;
-  check(MatCreateAIJ(comm_of(interface.B), PETSC_DECIDE, last - first, interface.pairs, PETSC_DETERMINE, 2, nullptr, 2,
-                     nullptr, across.put()));
-  PetscInt first_pair = 0, last_pair = 0;
-  check(MatGetOwnershipRange(across, &first_pair, &last_pair));
-  for (PetscInt pair = first_pair; pair < last_pair; ++pair)
-  {
-    const auto i = static_cast<std::size_t>(pair);
-    const PetscInt columns[2] = {3 * pair + 1, 3 * pair + 2};
-    const PetscScalar values[2] = {-e[2 * i + 1] * weight[i], e[2 * i] * weight[i]};
-    check(MatSetValues(across, 1, &pair, 2, columns, values, INSERT_VALUES));
-  }
-  check(MatAssemblyBegin(across, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(across, MAT_FINAL_ASSEMBLY));
-  check(MatMatMult(across, interface.B, MAT_INITIAL_MATRIX, PETSC_DEFAULT, S.put()));
-  check(MatTransposeMatMult(S, S, MAT_INITIAL_MATRIX, PETSC_DEFAULT, Cf.put()));
-  return Cf;
+  const Owned<Mat> damping = damping_of_pairs(interface, closed, reactions);
+  if (!damping.get()) return {};
+  return project(damping, interface.B, interface.B);
 }
 
 std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
@@ -308,7 +321,7 @@ LinearisedSliding linearise(const SlidingEquilibrium& sliding)
   LinearisedSliding result;
   result.contact = eliminate_closed_pairs(structure, interface, equilibrium.closed);
   check(MatDuplicate(structure.C, MAT_COPY_VALUES, result.C.put()));
-  if (interface.direction_damping)
+  if (interface.friction.direction_damping)
     if (const Owned<Mat> Cf = direction_damping(interface, equilibrium.closed, equilibrium.reactions); Cf.get())
       check(MatAXPY(result.C, 1, Cf, UNKNOWN_NONZERO_PATTERN));
   for (const auto& [A, rows] : {std::pair{structure.M.get(), &result.reaction.M},

@@ -5,6 +5,7 @@
 /// slides at the time: a row of W a pair, in single precision, since it acts on changes only. One product with W then
 /// gives the rates, and pairs that still miss the law - those that stick or turn - are solved one by one.
 #include "squeal/contact/solver.hpp"
+#include "squeal/mesh/vector.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
 #include <algorithm>
@@ -17,148 +18,142 @@ namespace squeal
 namespace
 {
 
+using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr int unread_at_most = 20; // products in single precision, and their extrapolation, gather rounding
 
-struct Pairs
+struct Iterate
 {
   const ReducedMap& map;
   VectorXd& r;
   VectorXd& w; // W r + b
-  Eigen::Index block = 1 + map.model.directions;
-  double friction = map.model.friction;
+  int directions = map.model.directions;
+  const FrictionLaw& friction = map.model.friction;
+  PairRows<Index> rows{directions};
 
-  PairVector of(const VectorXd& x, Eigen::Index i) const
-  {
-    PairVector own{};
-    for (Eigen::Index k = 0; k < block; ++k) own[static_cast<std::size_t>(k)] = x(i + k);
-    return own;
-  }
+  std::size_t pairs() const { return map.own.size(); }
+  PairVector reaction(std::size_t pair) const { return PairView<const double>(r, directions).vector(pair); }
+  PairVector velocity(std::size_t pair) const { return PairView<const double>(w, directions).vector(pair); }
 
-  double defect(Eigen::Index i) const
+  double defect(std::size_t pair) const
   {
-    const PairBlock& A = map.own[static_cast<std::size_t>(i / block)];
-    return natural_map(of(r, i), of(w, i), friction, 1 / A[0][0], block > 1 ? 1 / std::max(A[1][1], A[2][2]) : 0);
+    return natural_map(reaction(pair), velocity(pair), friction, natural_scale(map.own[pair], 0));
   }
 };
 
 /// The pair's reaction becomes `next`, and w follows.
-void react(Pairs& pairs, Eigen::Index i, const PairVector& next)
+void change_reaction(Iterate& iterate, std::size_t pair, const PairVector& next)
 {
-  for (Eigen::Index k = 0; k < pairs.block; ++k)
-    if (const double change = next[static_cast<std::size_t>(k)] - pairs.r(i + k); change != 0)
-    {
-      pairs.r(i + k) += change;
-      pairs.w += change * pairs.map.W.col(i + k);
-    }
+  const PairVector last = iterate.reaction(pair);
+  for (Index k = 0; k < iterate.rows.per_pair(); ++k)
+    if (const double change = next[static_cast<std::size_t>(k)] - last[static_cast<std::size_t>(k)]; change != 0)
+      iterate.w += change * iterate.map.W.col(iterate.rows.normal(static_cast<Index>(pair)) + k);
+  PairView<double>(iterate.r, iterate.directions).set(pair, next);
 }
 
 /// A warm start need not be admissible.
-void admit(Pairs& pairs)
+void admit(Iterate& iterate)
 {
-  for (Eigen::Index i = 0; i < pairs.r.size(); i += pairs.block)
-  {
-    PairVector first = pairs.of(pairs.r, i);
-    first[0] = std::max(first[0], 0.);
-    project_on_disc(first, pairs.friction);
-    react(pairs, i, first);
-  }
+  for (std::size_t pair = 0; pair < iterate.pairs(); ++pair)
+    change_reaction(iterate, pair, admissible(iterate.reaction(pair), iterate.velocity(pair), iterate.friction));
 }
 
-/// What a unit of a pair's normal reaction brings along: itself and, unless the pair sticks, friction against sliding.
-PairVector push_of(const Pairs& pairs, Eigen::Index i)
+/// What a unit of each pair's normal reaction brings along: itself and, unless the pair sticks, friction against
+/// sliding.
+std::vector<PairVector> pushes(const Iterate& iterate)
 {
-  PairVector push{1, 0, 0};
-  const PairVector r = pairs.of(pairs.r, i), w = pairs.of(pairs.w, i);
-  const double speed = std::hypot(w[1], w[2]), held = std::hypot(r[1], r[2]);
-  if (speed == 0 || (r[0] > 0 && held < (1 - 1e-8) * pairs.friction * r[0])) return push;
-  push[1] = -pairs.friction * w[1] / speed;
-  push[2] = -pairs.friction * w[2] / speed;
-  return push;
+  const std::vector<ContactStatus> status =
+      contact_status(PairView<const double>(iterate.r, iterate.directions), iterate.friction);
+  std::vector<PairVector> result;
+  for (std::size_t pair = 0; pair < iterate.pairs(); ++pair)
+  {
+    PairVector& push = result.emplace_back(PairVector{1, 0, 0});
+    const PairVector w = iterate.velocity(pair);
+    const double speed = length(w[1], w[2]);
+    if (speed == 0 || status[pair] == ContactStatus::stick) continue;
+    const double mu = friction_coefficient(iterate.friction, speed).value;
+    push[1] = -mu * w[1] / speed;
+    push[2] = -mu * w[2] / speed;
+  }
+  return result;
 }
 
 /// What a normal reaction does to the normal rates with the friction it brings along, by pairs.
-Eigen::MatrixXf along_pushes(const Pairs& pairs)
+Eigen::MatrixXf normal_responses(const Iterate& iterate)
 {
-  const Eigen::MatrixXf& W = pairs.map.W_n;
-  Eigen::MatrixXf along(W.rows(), W.rows());
-  for (Eigen::Index j = 0; j < W.rows(); ++j)
+  const Eigen::MatrixXf& W = iterate.map.W_n;
+  const std::vector<PairVector> push = pushes(iterate);
+  Eigen::MatrixXf responses(W.rows(), W.rows());
+  for (Index j = 0; j < W.rows(); ++j)
   {
-    const PairVector push = push_of(pairs, j * pairs.block);
-    along.col(j) = W.col(j * pairs.block);
-    for (Eigen::Index k = 1; k < pairs.block; ++k)
-      along.col(j) += static_cast<float>(push[static_cast<std::size_t>(k)]) * W.col(j * pairs.block + k);
+    responses.col(j) = W.col(iterate.rows.normal(j));
+    for (Index k = 1; k < iterate.rows.per_pair(); ++k)
+      responses.col(j) += static_cast<float>(push[static_cast<std::size_t>(j)][static_cast<std::size_t>(k)]) *
+                          W.col(iterate.rows.normal(j) + k);
   }
-  return along;
+  return responses;
 }
 
 /// Sweeps over the normal laws until no reaction changes by more than `enough`; r changes, w does not yet.
-void sweep_normals(Pairs& pairs, const Eigen::MatrixXf& along, double enough)
+void sweep_normals(Iterate& iterate, const Eigen::MatrixXf& responses, double enough)
 {
-  VectorXd& r = pairs.r;
-  const Eigen::Index count = along.rows(), block = pairs.block;
-  std::vector<PairVector> push;
-  Eigen::VectorXf dw = Eigen::VectorXf::Zero(count);
-  for (Eigen::Index i = 0; i < r.size(); i += block)
-  {
-    const PairVector p = push.emplace_back(push_of(pairs, i));
-    if (p[1] == 0 && p[2] == 0) continue; // sticks
-    for (Eigen::Index k = 1; k < block; ++k) r(i + k) = p[static_cast<std::size_t>(k)] * r(i);
-  }
+  const PairView<double> r(iterate.r, iterate.directions);
+  const PairView<const double> w(iterate.w, iterate.directions);
+  const std::vector<PairVector> push = pushes(iterate);
+  const std::size_t count = iterate.pairs();
+  Eigen::VectorXf dw = Eigen::VectorXf::Zero(responses.rows());
+  for (std::size_t i = 0; i < count; ++i)
+    if (push[i][1] != 0 || push[i][2] != 0) r.set(i, r.normal(i) * push[i]);
   constexpr double relaxation = 1.2;
   double largest = HUGE_VAL;
   for (int sweep = 0; largest > enough && sweep < 50; ++sweep)
   {
     largest = 0;
-    for (Eigen::Index j = 0; j < count; ++j)
+    for (std::size_t i = 0; i < count; ++i)
     {
-      const Eigen::Index i = j * block;
-      const double rate = pairs.w(i) + static_cast<double>(dw(j));
-      const double change = std::max(-r(i), -relaxation * rate / static_cast<double>(along(j, j)));
+      const auto row = static_cast<Index>(i);
+      const double rate = w.normal(i) + static_cast<double>(dw(row));
+      const double change = std::max(-r.normal(i), -relaxation * rate / static_cast<double>(responses(row, row)));
       if (std::abs(change) <= enough / 8) continue;
       largest = std::max(largest, std::abs(change));
-      for (Eigen::Index k = 0; k < block; ++k)
-        r(i + k) += change * push[static_cast<std::size_t>(j)][static_cast<std::size_t>(k)];
-      add_rows(along.col(j).data(), static_cast<std::size_t>(count), 1, {change, 0, 0}, dw.data());
+      r.set(i, r.vector(i) + change * push[i]);
+      add_rows(responses.col(row).data(), count, 1, {change, 0, 0}, dw.data());
     }
   }
 }
 
 /// One sweep over the pairs that miss their law by more than `limit`, each solved whole; the local solves see the
 /// symmetric part of W's own blocks, which leaves the fixed point what it is.
-void sweep_pairs(Pairs& pairs, double limit)
+void sweep_pairs(Iterate& iterate, double limit)
 {
-  const ReducedMap& map = pairs.map;
-  for (Eigen::Index i = 0; i < pairs.r.size(); i += pairs.block)
+  for (std::size_t pair = 0; pair < iterate.pairs(); ++pair)
   {
-    if (pairs.defect(i) <= limit) continue;
-    const PairBlock& A = map.own[static_cast<std::size_t>(i / pairs.block)];
-    const PairVector last = pairs.of(pairs.r, i);
-    PairVector q = pairs.of(pairs.w, i);
-    for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t l = 0; l < 3; ++l) q[k] -= A[k][l] * last[l];
-    react(pairs, i, solve_pair(A, q, map.model.directions, pairs.friction, last));
+    if (iterate.defect(pair) <= limit) continue;
+    const PairBlock& A = iterate.map.own[pair];
+    const PairVector last = iterate.reaction(pair), q = velocity_without(A, last, iterate.velocity(pair));
+    change_reaction(iterate, pair, solve_pair(A, q, iterate.directions, iterate.friction, last));
   }
 }
 
-double largest_defect(const Pairs& pairs)
+double largest_defect(const Iterate& iterate)
 {
   double worst = 0;
-  for (Eigen::Index i = 0; i < pairs.r.size(); i += pairs.block) worst = std::max(worst, pairs.defect(i));
+  for (std::size_t pair = 0; pair < iterate.pairs(); ++pair) worst = std::max(worst, iterate.defect(pair));
   return worst;
 }
 
 /// W x in single precision.
 VectorXd product_single(const ReducedMap& map, const VectorXd& x)
 {
-  const auto rows = static_cast<std::size_t>(x.size()), block = static_cast<std::size_t>(1 + map.model.directions);
-  std::vector<float> result(rows, 0);
-  for (std::size_t i = 0; i < rows; i += block)
+  const PairRows<Index> rows(map.model.directions);
+  const auto size = static_cast<std::size_t>(x.size()), per_pair = static_cast<std::size_t>(rows.per_pair());
+  std::vector<float> result(size, 0);
+  for (std::size_t pair = 0; pair < map.own.size(); ++pair)
   {
-    PairVector own{};
-    std::copy_n(&x(static_cast<Eigen::Index>(i)), block, own.begin());
-    if (own != PairVector{}) add_rows(&map.W_single(0, static_cast<Eigen::Index>(i)), rows, block, own, result.data());
+    const PairVector own = PairView(x, map.model.directions).vector(pair);
+    const float* columns = map.W_single.col(rows.normal(static_cast<Index>(pair))).data();
+    if (own != PairVector{}) add_rows(columns, size, per_pair, own, result.data());
   }
   return Eigen::VectorXf::Map(result.data(), x.size()).cast<double>();
 }
@@ -187,25 +182,25 @@ bool solve_contact(const ReducedMap& map, const VectorXd& b, ReducedContact& con
   extrapolate(map, contact);
   contact.w = b + contact.Wr;
   VectorXd& r = contact.r;
-  Pairs pairs{map, r, contact.w};
-  admit(pairs);
-  if (contact.unread++ == 0) contact.along = along_pushes(pairs);
+  Iterate iterate{map, r, contact.w};
+  admit(iterate);
+  if (contact.unread++ == 0) contact.normal_responses = normal_responses(iterate);
   double worst = HUGE_VAL;
   bool converged = false;
   for (int pass = 0; pass < map.contact.max_iterations; ++pass)
   {
     const double tolerance = map.contact.tolerance * r.cwiseAbs().maxCoeff(), last = worst;
-    worst = largest_defect(pairs);
+    worst = largest_defect(iterate);
     converged = worst <= tolerance;
     if (converged) break;
     if (worst < last / 2)
     {
       const VectorXd before = r;
-      sweep_normals(pairs, contact.along, std::max(tolerance / 4, 1e-6 * worst));
+      sweep_normals(iterate, contact.normal_responses, std::max(tolerance / 4, 1e-6 * worst));
       contact.w += product_single(map, r - before);
     }
     else // friction that the normal sweeps do not see
-      sweep_pairs(pairs, .01 * tolerance);
+      sweep_pairs(iterate, 0.01 * tolerance);
   }
   contact.Wr = contact.w - b;
   return converged;

@@ -18,25 +18,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The rows of the active pairs.
-Owned<Mat> rows_of(const Interface& interface, const std::vector<int>& active)
-{
-  PetscInt first = 0, last = 0, first_dof = 0, last_dof = 0;
-  check(MatGetOwnershipRange(interface.B, &first, &last));
-  check(MatGetOwnershipRangeColumn(interface.B, &first_dof, &last_dof));
-  std::vector<PetscInt> mine;
-  for (const int pair : active)
-    for (int k = 0; k < interface.block(); ++k)
-      if (const PetscInt row = pair * interface.block() + k; row >= first && row < last) mine.push_back(row);
-  Owned<IS> rows, columns;
-  check(ISCreateGeneral(comm_of(interface.B), static_cast<PetscInt>(mine.size()), mine.data(), PETSC_COPY_VALUES,
-                        rows.put()));
-  check(ISCreateStride(comm_of(interface.B), last_dof - first_dof, first_dof, 1, columns.put()));
-  Owned<Mat> result;
-  check(MatCreateSubMatrix(interface.B, rows, columns, MAT_INITIAL_MATRIX, result.put()));
-  return result;
-}
-
 /// y of du = Z y: Z is the identity on the kept degrees of freedom, found by a row of a single one. (A pivot's row may
 /// look the same; du is the same there.)
 Owned<VecScatter> to_kept(Mat Z, Vec u, Vec y)
@@ -107,23 +88,21 @@ MultiVector transposed(Mat B)
   return result;
 }
 
-/// Every `step`-th column from the first on.
-MultiVector every(const MultiVector& X, int step)
-{
-  return {X.comm, X.entries(Eigen::all, Eigen::seq(0, Eigen::last, step))};
-}
-
 /// What each active pair that slides pushes with, B_n' + mu B_t'e: its normal force and the friction that follows it.
+/// `rows`: those of B of the active pairs, as columns.
 MultiVector sliding_forces(const MultiVector& rows, const Interface& interface, const std::vector<int>& active)
 {
-  const std::vector<double> e = drive_directions(interface);
-  const Index directions = interface.directions, block = 1 + directions;
-  MultiVector result = every(rows, interface.block());
+  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
+  const TangentView e(directions, interface.directions);
+  const PairRows<Index> columns(interface.directions);
+  MultiVector result{rows.comm, MatrixXd(rows.entries.rows(), static_cast<Index>(active.size()))};
   for (Index i = 0; i < result.columns(); ++i)
   {
-    const double* direction = &e[static_cast<std::size_t>(active[static_cast<std::size_t>(i)] * directions)];
-    result.entries.col(i) += rows.entries.middleCols(i * block + 1, directions) *
-                             (interface.friction * VectorXd::Map(direction, directions));
+    const auto pair = static_cast<std::size_t>(active[static_cast<std::size_t>(i)]);
+    const Eigen::Map<const VectorXd> direction(e.of(pair).data(), interface.directions);
+    result.entries.col(i) =
+        rows.entries.col(columns.normal(i)) +
+        rows.entries.middleCols(columns.tangential(i), interface.directions) * (mu[pair] * direction);
   }
   return result;
 }
@@ -254,16 +233,17 @@ void choose_basis(ReducedModel& model, const MultiVector& X, Index of_modes, dou
 std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
                                        const ComplexMode& mode, double amplitude)
 {
-  const auto block = static_cast<std::size_t>(interface.block());
   const std::vector<double> real = relative(interface, mode.real), imaginary = relative(interface, mode.imaginary);
   const std::vector<double> still = relative(interface, equilibrium.u);
+  const auto normal = [&](const std::vector<double>& x, std::size_t pair)
+  { return PairView(x, interface.directions).normal(pair); };
   std::vector<int> pairs;
   for (std::size_t i = 0; i < interface.gap.size(); ++i)
   {
-    const double gap = interface.gap[i] + still[i * block];
+    const double gap = interface.gap[i] + normal(still, i);
     const bool changes = equilibrium.closed[i]
-                             ? equilibrium.reactions[i * block] < amplitude * std::abs(mode.reactions[i])
-                             : gap < amplitude * std::hypot(real[i * block], imaginary[i * block]);
+                             ? normal(equilibrium.reactions, i) < amplitude * std::abs(mode.reactions[i])
+                             : gap < amplitude * std::hypot(normal(real, i), normal(imaginary, i));
     if (changes) pairs.push_back(static_cast<int>(i));
   }
   return pairs;
@@ -271,20 +251,40 @@ std::vector<int> pairs_that_may_change(const Interface& interface, const Equilib
 
 bool slide_throughout(const Interface& interface, const ComplexMode& mode, double amplitude)
 {
-  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
   const std::vector<double> real = relative(interface, mode.real), imaginary = relative(interface, mode.imaginary);
   for (std::size_t i = 0; i < interface.gap.size(); ++i)
   {
-    double drive = 0, moves = 0;
-    for (std::size_t k = 0; k < directions; ++k)
-    {
-      drive = std::hypot(drive, interface.drive[i * directions + k]);
-      moves = std::hypot(moves, real[i * block + 1 + k], imaginary[i * block + 1 + k]);
-    }
-    if (amplitude * std::abs(mode.lambda) * moves >= drive) return false;
+    const double moves = std::hypot(length(PairView(real, interface.directions).tangential(i)),
+                                    length(PairView(imaginary, interface.directions).tangential(i)));
+    if (amplitude * std::abs(mode.lambda) * moves >= drive_speed(interface, i)) return false;
   }
   return true;
 }
+
+namespace
+{
+
+/// Law, gaps, reactions and drive of the active pairs; normal ones alone if they slide along the drive throughout.
+void set_active_pairs(ReducedModel& model, const Interface& interface, const Equilibrium& equilibrium,
+                      const Reduction& reduction)
+{
+  const std::vector<double> motion = relative(interface, equilibrium.u);
+  const PairView still(motion, interface.directions), reactions(equilibrium.reactions, interface.directions);
+  const TangentView drive(interface.drive, interface.directions);
+  model.directions = reduction.sliding ? 0 : interface.directions;
+  if (!reduction.sliding) model.friction = interface.friction;
+  for (const int pair : model.active)
+  {
+    const auto i = static_cast<std::size_t>(pair);
+    model.gap.push_back(equilibrium.closed[i] ? 0 : interface.gap[i] + still.normal(i));
+    model.reactions.push_back(reactions.normal(i));
+    if (reduction.sliding) continue;
+    for (const double friction : reactions.tangential(i)) model.reactions.push_back(friction);
+    for (const double velocity : drive.of(i)) model.drive.push_back(velocity);
+  }
+}
+
+} // namespace
 
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
                     const Reduction& reduction)
@@ -301,7 +301,7 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   const Owned<Mat> M_z = project_symmetric(structure.M, contact.Z);
   check(MatAXPY(E, omega * omega, M_z, UNKNOWN_NONZERO_PATTERN));
   check(MatSetOption(E, MAT_SYMMETRIC, PETSC_TRUE));
-  const Owned<Mat> B = rows_of(interface, active);
+  const Owned<Mat> B = rows_of(interface, active, RowsTaken::all);
   check(MatMatMult(B, contact.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
   const auto forces = [&](Mat rows)
   { return reduction.sliding ? sliding_forces(transposed(rows), interface, active) : transposed(rows); };
@@ -311,7 +311,7 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   const MultiVector X = product(contact.Z, columns);
 
   project(model, structure, contact, columns, X);
-  const MultiVector left = product(contact.Y, columns), rows = transposed(B);
+  const MultiVector left = product(contact.Y, columns);
   if (const Owned<Mat> turning =
           direction_damping(interface, reduction.sliding ? equilibrium.closed : stays_closed, equilibrium.reactions);
       turning.get())
@@ -320,24 +320,14 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
     model.C += inner_products(rows_of(left, turns), rows_of(product(turning, X), turns));
   }
   model.H = inner_products(left, forces(B));
-  model.G = inner_products(reduction.sliding ? every(rows, interface.block()) : rows, X);
+  const Owned<Mat> read = rows_of(interface, active, reduction.sliding ? RowsTaken::normal : RowsTaken::all);
+  model.G = inner_products(transposed(read), X);
 
   model.omega = omega;
   choose_basis(model, X, of_modes, reduction.threshold);
 
-  // the active pairs
-  const auto block = static_cast<std::size_t>(interface.block()), kept = reduction.sliding ? 1 : block;
-  const std::vector<double> still = relative(interface, equilibrium.u);
-  for (const int pair : active)
-  {
-    const auto i = static_cast<std::size_t>(pair);
-    model.gap.push_back(equilibrium.closed[i] ? 0 : interface.gap[i] + still[i * block]);
-    for (std::size_t k = 0; k < kept; ++k) model.reactions.push_back(equilibrium.reactions[i * block + k]);
-    for (std::size_t k = 0; k + 1 < kept; ++k) model.drive.push_back(interface.drive[i * (block - 1) + k]);
-  }
   model.active = std::move(active);
-  model.directions = reduction.sliding ? 0 : interface.directions;
-  model.friction = reduction.sliding ? 0 : interface.friction;
+  set_active_pairs(model, interface, equilibrium, reduction);
   return model;
 }
 

@@ -1,6 +1,6 @@
 /// The modified theta-method on the reduced model: the scheme of transient/transient.hpp, in few dense products.
 #include "squeal/algebra/dense_matrix.hpp"
-#include "squeal/contact/pair_law.hpp"
+#include "squeal/contact/sliding_direction.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
 namespace squeal
@@ -8,6 +8,36 @@ namespace squeal
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+namespace
+{
+
+std::vector<Eigen::Index> normal_rows(const ReducedModel& model)
+{
+  const PairRows<Eigen::Index> rows(model.directions);
+  std::vector<Eigen::Index> result;
+  for (std::size_t pair = 0; pair < model.active.size(); ++pair)
+    result.push_back(rows.normal(static_cast<Eigen::Index>(pair)));
+  return result;
+}
+
+/// The symmetric part of each pair's own block of W.
+std::vector<PairBlock> own_blocks(const MatrixXd& W, const ReducedModel& model)
+{
+  const PairRows<Eigen::Index> rows(model.directions);
+  std::vector<PairBlock> result(model.active.size(), PairBlock{});
+  for (std::size_t pair = 0; pair < result.size(); ++pair)
+  {
+    const Eigen::Index first = rows.normal(static_cast<Eigen::Index>(pair));
+    for (Eigen::Index k = 0; k < rows.per_pair(); ++k)
+      for (Eigen::Index l = 0; l < rows.per_pair(); ++l)
+        result[pair][static_cast<std::size_t>(k)][static_cast<std::size_t>(l)] =
+            (W(first + k, first + l) + W(first + l, first + k)) / 2;
+  }
+  return result;
+}
+
+} // namespace
 
 void prepare(ReducedMap& map, double period)
 {
@@ -24,91 +54,67 @@ void prepare(ReducedMap& map, double period)
   map.from_reactions = right.rightCols(rows);
   map.from_equilibrium = -map.from_reactions * VectorXd::Map(model.reactions.data(), rows);
   map.W = model.G * map.from_reactions;
-  map.G_n = model.G(Eigen::seq(0, Eigen::last, 1 + model.directions), Eigen::all);
+  const std::vector<Eigen::Index> normal = normal_rows(model);
+  map.G_n = model.G(normal, Eigen::all);
   map.W_single = map.W.cast<float>();
-  map.W_n = map.W_single(Eigen::seq(0, Eigen::last, 1 + model.directions), Eigen::all);
-  map.own.assign(model.active.size(), {});
-  const Eigen::Index block = 1 + model.directions;
-  for (Eigen::Index row = 0; row < rows; ++row)
-    for (Eigen::Index k = 0, first = row - row % block; k < block; ++k)
-      map.own[static_cast<std::size_t>(row / block)][static_cast<std::size_t>(row % block)]
-             [static_cast<std::size_t>(k)] = (map.W(row, first + k) + map.W(first + k, row)) / 2;
+  map.W_n = map.W_single(normal, Eigen::all);
+  map.own = own_blocks(map.W, model);
   map.h = h;
 }
 
 namespace
 {
 
-/// s of the pair whose rows begin at `row`.
-VectorXd sliding(const ReducedModel& model, const VectorXd& v, Eigen::Index row)
+/// b of w = W r + b without past sliding: normal rows are gap rates (g0 + G_n q~)/h + G_n v_free, q~ = q + h (1-theta)
+/// v, tangential ones sliding velocities. `rates`: G v_free and G v.
+VectorXd free_contact_velocity(const ReducedMap& map, const ReducedState& state, const MatrixXd& rates)
 {
-  const Eigen::Index d = model.directions;
-  return model.G.middleRows(row + 1, d) * v -
-         VectorXd::Map(&model.drive[static_cast<std::size_t>(row / (1 + d) * d)], d);
+  const ReducedModel& model = map.model;
+  const VectorXd position = map.G_n * state.q, before = rates.col(1);
+  VectorXd b = rates.col(0);
+  const PairView<double> velocity(b, model.directions);
+  const TangentView drive(model.drive, model.directions);
+  for (std::size_t i = 0; i < model.gap.size(); ++i)
+  {
+    velocity.normal(i) += (model.gap[i] + position(static_cast<Eigen::Index>(i))) / map.h +
+                          (1 - map.theta) * PairView(before, model.directions).normal(i);
+    for (std::size_t k = 0; k < drive.of(i).size(); ++k) velocity.tangential(i)[k] -= drive.of(i)[k];
+  }
+  return b;
 }
 
-/// Closed pairs that stick or turn back oppose s+ alone, as in the full step: b without what s had to say there.
-/// Returns whether there were any.
-bool forget_where_turned(const ReducedMap& map, const VectorXd& v, ReducedContact& contact, VectorXd& b)
+/// Solves contact, again as long as a pair is turned by its past sliding. Returns whether it converged.
+bool find_reactions(const ReducedMap& map, const ReducedState& state, const VectorXd& v_free, ReducedContact& contact)
 {
-  const Eigen::Index d = map.model.directions, block = 1 + d;
-  bool any = false;
-  for (std::size_t i = 0; d > 0 && i < contact.opposes_end.size(); ++i)
+  const ReducedModel& model = map.model;
+  MatrixXd both(model.size(), 2);
+  both << v_free, state.v;
+  const MatrixXd rates = model.G * both;
+  const VectorXd free = free_contact_velocity(map, state, rates), velocity = rates.col(1);
+  const auto reactions = [&] { return PairView<const double>(contact.r, model.directions); };
+  contact.past = past_sliding(PairView(velocity, model.directions), TangentView(model.drive, model.directions),
+                              contact_status(reactions(), model.friction), (1 - map.theta) / map.theta);
+  const auto b = [&] { return VectorXd(free + VectorXd::Map(contact.past.data(), free.size())); };
+  bool converged = solve_contact(map, b(), contact);
+  while (leave_out_where_turned(reactions(), PairView<const double>(contact.w, model.directions),
+                                PairView(contact.past, model.directions)))
   {
-    const Eigen::Index row = static_cast<Eigen::Index>(i) * block;
-    if (contact.opposes_end[i] || contact.r(row) <= 0) continue;
-    const VectorXd earlier = (1 - map.theta) / map.theta * sliding(map.model, v, row);
-    if ((contact.w.segment(row + 1, d) - earlier).dot(earlier) >= 0) continue;
-    contact.opposes_end[i] = any = true;
-    b.segment(row + 1, d) -= earlier;
+    contact.r_before.resize(0); // no step lies between
+    converged = solve_contact(map, b(), contact);
   }
-  return any;
+  return converged;
 }
 
 } // namespace
 
-bool sticks(const VectorXd& r, double friction)
-{
-  return r.tail(r.size() - 1).norm() < (1 - 1e-8) * friction * r(0);
-}
-
 bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact)
 {
-  const ReducedModel& model = map.model;
-  const double h = map.h, theta = map.theta, earlier = (1 - theta) / theta;
-  const Eigen::Index n = model.size();
-  VectorXd both(2 * n);
+  VectorXd both(2 * map.model.size());
   both << state.v, state.q;
   VectorXd next = map.from_state * both + map.from_equilibrium;
-
-  // b of w = W r + b: tangential rows are s+ + (1-theta)/theta s = s_theta/theta, normal ones gap rates
-  // (g + G_n q~)/h + G_n v, q~ = q + h (1-theta) v
-  VectorXd b = model.G * (next + earlier * state.v);
-  const VectorXd position = map.G_n * (state.q + h * (1 - theta - earlier) * state.v);
-  const auto block = static_cast<std::size_t>(1 + model.directions), directions = block - 1;
-  for (std::size_t i = 0; i < model.gap.size(); ++i)
-  {
-    const auto row = static_cast<Eigen::Index>(i * block);
-    b(row) += (model.gap[i] + position(static_cast<Eigen::Index>(i))) / h;
-    for (std::size_t k = 0; k < directions; ++k)
-      b(row + 1 + static_cast<Eigen::Index>(k)) -= (1 + earlier) * model.drive[i * directions + k];
-  }
-  contact.opposes_end.assign(model.gap.size(), false);
-  for (std::size_t i = 0; directions > 0 && i < model.gap.size(); ++i)
-  {
-    const auto row = static_cast<Eigen::Index>(i * block), d = static_cast<Eigen::Index>(directions);
-    if (contact.r(row) <= 0 || !sticks(contact.r.segment(row, 1 + d), model.friction)) continue;
-    contact.opposes_end[i] = true; // its s is rounding
-    b.segment(row + 1, d) -= earlier * sliding(model, state.v, row);
-  }
-  bool converged = solve_contact(map, b, contact);
-  while (forget_where_turned(map, state.v, contact, b))
-  {
-    contact.r_before.resize(0); // no step lies between
-    converged = solve_contact(map, b, contact);
-  }
+  const bool converged = find_reactions(map, state, next, contact);
   next.noalias() += map.from_reactions * contact.r;
-  state.q += h * (theta * next + (1 - theta) * state.v);
+  state.q += map.h * (map.theta * next + (1 - map.theta) * state.v);
   state.v = std::move(next);
   return converged;
 }

@@ -1,5 +1,6 @@
 /// The reduced period map's derivative.
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/contact/sliding_direction.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
 namespace squeal
@@ -11,38 +12,87 @@ namespace
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Rows of the pairs that touch at the end of a step.
-std::vector<Eigen::Index> closed_rows(const ReducedContact& contact, Eigen::Index block)
+using Eigen::Index;
+
+/// Pairs that touch at the end of a step.
+std::vector<std::size_t> closed_pairs(const ReducedContact& contact, int directions)
 {
-  std::vector<Eigen::Index> closed;
-  for (Eigen::Index i = 0; i < contact.r.size(); i += block)
-    for (Eigen::Index k = 0; k < block && contact.r(i) > 0; ++k) closed.push_back(i + k);
+  const PairView<const double> r(contact.r, directions);
+  std::vector<std::size_t> closed;
+  for (std::size_t pair = 0; pair < r.pairs(); ++pair)
+    if (r.normal(pair) > 0) closed.push_back(pair);
   return closed;
 }
 
-/// dr of w = W r + b in the closed rows for changes db of these, under the contact law where it is smooth: at w and r
-/// of the step just made. Open pairs have none; of the others
-///     dw_n = 0,   and dw_t = 0 (stick) or dr_t + mu e dr_n + mu r_n/|s| (I - e e') dw_t = 0, e = s/|s| (slip).
-MatrixXd contact_response(const ReducedMap& map, const ReducedContact& contact, const std::vector<Eigen::Index>& closed,
+std::vector<Index> rows_of(const std::vector<std::size_t>& pairs, int directions)
+{
+  const PairRows<Index> rows(directions);
+  std::vector<Index> result;
+  for (const std::size_t pair : pairs)
+    for (Index k = 0; k < rows.per_pair(); ++k) result.push_back(rows.normal(static_cast<Index>(pair)) + k);
+  return result;
+}
+
+/// dr of w = W r + b in the rows of the closed pairs for changes db of these, under the contact law where it is smooth:
+/// at w and r of the step just made (src/README.md, section 4.13).
+MatrixXd contact_response(const ReducedMap& map, const ReducedContact& contact, const std::vector<std::size_t>& closed,
                           const MatrixXd& db)
 {
   const ReducedModel& model = map.model;
-  const Eigen::Index d = model.directions, block = 1 + d;
-  MatrixXd A = map.W(closed, closed), right = -db;
-  for (Eigen::Index i = 0; i < A.rows(); i += block)
+  const Index d = model.directions;
+  const PairRows<Index> rows(model.directions);
+  const PairView<const double> r(contact.r, model.directions), w(contact.w, model.directions);
+  const std::vector<ContactStatus> status = contact_status(r, model.friction);
+  const std::vector<Index> all = rows_of(closed, model.directions);
+  MatrixXd A = map.W(all, all), right = -db;
+  for (std::size_t i = 0; i < closed.size(); ++i)
   {
-    const Eigen::Index pair = closed[static_cast<std::size_t>(i)];
-    const double limit = model.friction * contact.r(pair);
-    if (sticks(contact.r.segment(pair, block), model.friction)) continue;
-    const VectorXd s = contact.w.segment(pair + 1, d), e = s / std::max(s.norm(), 1e-300);
-    const MatrixXd turn = limit / std::max(s.norm(), 1e-300) * (MatrixXd::Identity(d, d) - e * e.transpose());
-    A.middleRows(i + 1, d) = (turn * A.middleRows(i + 1, d)).eval();
-    right.middleRows(i + 1, d) = (turn * right.middleRows(i + 1, d)).eval();
-    A.block(i + 1, i + 1, d, d) += MatrixXd::Identity(d, d);
-    A.block(i + 1, i, d, 1) += model.friction * e;
+    const std::span<const double> s = w.tangential(closed[i]);
+    if (status[closed[i]] == ContactStatus::stick || length(s) == 0) continue;
+    const SlidingFriction friction = sliding_friction(model.friction, r.normal(closed[i]), s);
+    const Index normal = rows.normal(static_cast<Index>(i)), tangential = rows.tangential(static_cast<Index>(i));
+    MatrixXd damping(d, d);
+    for (Index k = 0; k < d; ++k)
+      for (Index l = 0; l < d; ++l)
+        damping(k, l) = friction.damping[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)];
+    A.middleRows(tangential, d) = (damping * A.middleRows(tangential, d)).eval();
+    right.middleRows(tangential, d) = (damping * right.middleRows(tangential, d)).eval();
+    A.block(tangential, tangential, d, d) += MatrixXd::Identity(d, d);
+    A.block(tangential, normal, d, 1) += VectorXd::Map(friction.along.data(), d);
   }
   A.diagonal() *= 1 + 1e-10; // of pairs that stick there may be more rows than the shapes can tell apart
   return solve_dense(std::move(A), right, "reduced model: the contact of a step determines no reactions");
+}
+
+/// db of all rows for changes of the start (v, q), without past sliding.
+MatrixXd free_rates(const ReducedMap& map)
+{
+  const ReducedModel& model = map.model;
+  const Index n = model.size();
+  const PairRows<Index> rows(model.directions);
+  MatrixXd rates = model.G * map.from_state;
+  for (Index pair = 0; pair < static_cast<Index>(model.active.size()); ++pair)
+  {
+    const auto normal = model.G.row(rows.normal(pair));
+    rates.row(rows.normal(pair)).head(n) += (1 - map.theta) * normal;
+    rates.row(rows.normal(pair)).tail(n) += normal / map.h;
+  }
+  return rates;
+}
+
+/// db of the closed pairs' rows for changes of the start (v, q): of those of all rows, with past sliding.
+MatrixXd closed_rates(const ReducedMap& map, const MatrixXd& rates_of_all, const ReducedContact& contact,
+                      const std::vector<std::size_t>& closed)
+{
+  const ReducedModel& model = map.model;
+  const Index n = model.size(), d = model.directions;
+  const PairRows<Index> all(model.directions);
+  MatrixXd rates = rates_of_all(rows_of(closed, model.directions), Eigen::all);
+  for (std::size_t i = 0; i < closed.size(); ++i)
+    if (!opposes_end(PairView<const double>(contact.past, model.directions), closed[i]))
+      rates.middleRows(all.tangential(static_cast<Index>(i)), d).leftCols(n) +=
+          (1 - map.theta) / map.theta * model.G.middleRows(all.tangential(static_cast<Index>(closed[i])), d);
+  return rates;
 }
 
 } // namespace
@@ -52,31 +102,22 @@ MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, Eigen::In
   prepare(map, period);
   const ReducedModel& model = map.model;
   const double h = map.h, theta = map.theta;
-  const Eigen::Index n = model.size(), block = 1 + model.directions;
-  MatrixXd b_from_state = model.G * map.from_state;
-  for (Eigen::Index row = 0; row < model.G.rows(); row += block)
-  {
-    b_from_state.row(row).head(n) += (1 - theta) * model.G.row(row);
-    b_from_state.row(row).tail(n) += model.G.row(row) / h;
-  }
+  const Index n = model.size();
+  const MatrixXd rates = free_rates(map);
   // this rank's columns, of (q, v); the rows are (v, q), as in the step
-  const Eigen::Index first = 2 * slow * rank_of(comm) / ranks_of(comm),
-                     last = 2 * slow * (rank_of(comm) + 1) / ranks_of(comm);
+  const Index first = 2 * slow * rank_of(comm) / ranks_of(comm), last = 2 * slow * (rank_of(comm) + 1) / ranks_of(comm);
   MatrixXd X = MatrixXd::Zero(2 * n, last - first);
-  for (Eigen::Index column = first; column < last; ++column)
-    X(column < slow ? n + column : column - slow, column - first) = 1;
+  for (Index column = first; column < last; ++column) X(column < slow ? n + column : column - slow, column - first) = 1;
   ReducedContact contact{map.reactions};
   for (int i = 0; i < map.steps; ++i)
   {
     if (!advance(map, state, contact)) ++map.unconverged;
     MatrixXd v = map.from_state * X;
-    if (const auto closed = closed_rows(contact, block); !closed.empty())
+    if (const auto closed = closed_pairs(contact, model.directions); !closed.empty())
     {
-      MatrixXd rows = b_from_state(closed, Eigen::all);
-      for (std::size_t k = 0; k < closed.size(); ++k)
-        if (closed[k] % block > 0 && !contact.opposes_end[static_cast<std::size_t>(closed[k] / block)])
-          rows.row(static_cast<Eigen::Index>(k)).head(n) += (1 - theta) / theta * model.G.row(closed[k]);
-      v += map.from_reactions(Eigen::all, closed) * contact_response(map, contact, closed, rows * X);
+      const MatrixXd db = closed_rates(map, rates, contact, closed) * X;
+      const std::vector<Index> rows = rows_of(closed, model.directions);
+      v += map.from_reactions(Eigen::all, rows) * contact_response(map, contact, closed, db);
     }
     X.bottomRows(n) += h * (theta * v + (1 - theta) * X.topRows(n));
     X.topRows(n) = v;

@@ -21,12 +21,11 @@ StepBias bias_of(const Report& report, std::complex<double> discrete)
 NormalForces normal_forces(const Equilibrium& equilibrium)
 {
   NormalForces forces;
-  const std::size_t pairs = equilibrium.closed.size();
-  const std::size_t block = pairs > 0 ? equilibrium.reactions.size() / pairs : 0;
-  for (std::size_t i = 0; i < pairs; ++i)
+  const PairView reactions(equilibrium.reactions, equilibrium.directions);
+  for (std::size_t i = 0; i < reactions.pairs(); ++i)
   {
-    if (!equilibrium.closed[i] || block == 0) continue;
-    const double force = equilibrium.reactions[i * block];
+    if (!equilibrium.closed[i]) continue;
+    const double force = reactions.normal(i);
     forces.least = forces.closed > 0 ? std::min(forces.least, force) : force;
     forces.greatest = forces.closed > 0 ? std::max(forces.greatest, force) : force;
     forces.sum += force;

@@ -125,22 +125,17 @@ private:
 };
 
 /// Reactions of the equilibrium at the nodes of the pairs; a node of several pairs has their sum.
-void write_contact(Hdf5File& file, const Report& report, const Scene& scene, const Mesh& mesh, Layout& layout)
+void write_contact(Hdf5File& file, const Equilibrium& equilibrium, const FieldNodes& nodes, Layout& layout)
 {
-  const Equilibrium& equilibrium = report.equilibrium;
-  const auto pairs = match_pairs(mesh, scene.contacts);
-  if (pairs.empty() || equilibrium.closed.size() != pairs.size()) return;
-  const std::size_t block = equilibrium.reactions.size() / pairs.size();
-  std::vector<double> normal(mesh.nodes.size(), 0), friction(mesh.nodes.size(), 0);
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-  {
-    const double* r = &equilibrium.reactions[i * block];
-    for (const int node : {pairs[i].a, pairs[i].b})
+  const PairView reactions(equilibrium.reactions, equilibrium.directions);
+  if (nodes.pairs.empty() || reactions.pairs() != nodes.pairs.size()) return;
+  std::vector<double> normal(nodes.mesh.nodes.size(), 0), friction(nodes.mesh.nodes.size(), 0);
+  for (std::size_t i = 0; i < nodes.pairs.size(); ++i)
+    for (const auto& [node, weight] : nodes.pairs[i])
     {
-      normal[static_cast<std::size_t>(node)] += r[0];
-      friction[static_cast<std::size_t>(node)] += block > 2 ? std::hypot(r[1], r[2]) : std::abs(r[1]);
+      normal[static_cast<std::size_t>(node)] += std::abs(weight) * reactions.normal(i);
+      friction[static_cast<std::size_t>(node)] += std::abs(weight) * length(reactions.tangential(i));
     }
-  }
   file.write("equilibrium/normal_reaction", {normal.size()}, normal, "N");
   file.write("equilibrium/friction_reaction", {friction.size()}, friction, "N");
   layout.still.push_back({"normal reaction at equilibrium [N]", "equilibrium/normal_reaction", "Node", 1});
@@ -249,7 +244,7 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
   {
     write_displacement(file, gather, report.equilibrium.u, "equilibrium/displacement", comm);
     layout.still.push_back({"displacement at equilibrium [m]", "equilibrium/displacement", "Node", 3});
-    on_rank_zero(comm, [&] { write_contact(*file, report, scene, nodes.mesh, layout); });
+    on_rank_zero(comm, [&] { write_contact(*file, report.equilibrium, nodes, layout); });
   }
   write_modes(file, gather, report.modes, layout, comm);
   const auto& samples = report.cycle.measured.displacements;

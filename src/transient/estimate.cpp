@@ -20,11 +20,11 @@ namespace
 using Complex = std::complex<double>;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// A sliding pair as the mode shakes it, per metre of q and w t = 0 .. 2 pi; friction law with |r_t| = mu r_n.
+// A sliding pair as the mode shakes it, per metre of q and w t = 0 .. 2 pi.
 struct ShakenPair
 {
-  int directions = 1;
-  double friction = 0;                    // mu
+  std::size_t directions = 1;
+  FrictionLaw law;
   double reaction0 = 0;                   // [N] r_n0
   Complex reaction;                       // [N/m] rho at i w
   Complex mode_reaction;                  // [N/m] the mode's own, at lambda
@@ -43,20 +43,21 @@ double power_at(const ShakenPair& pair, double q, double angle)
   const Complex turn = std::polar(1.0, angle);
   const double change = std::max(real_part(pair.reaction, turn), -pair.reaction0 / q); // of r_n, over q
   double slide[2] = {0, 0}, shake[2] = {0, 0}, speed = 0;
-  for (int k = 0; k < pair.directions; ++k)
+  for (std::size_t i = 0; i < pair.directions; ++i)
   {
-    const auto i = static_cast<std::size_t>(k);
     shake[i] = real_part(pair.velocity[i], turn);
     slide[i] = q * shake[i] - pair.drive[i];
     speed = std::hypot(speed, slide[i]);
   }
   if (speed == 0) return 0; // an instant of no measure
+  const double mu = friction_coefficient(pair.law, speed).value,
+               mu0 = friction_coefficient(pair.law, length(pair.drive)).value;
   double power = 0;
-  for (int k = 0; k < pair.directions; ++k)
+  for (std::size_t i = 0; i < pair.directions; ++i)
   {
-    const auto i = static_cast<std::size_t>(k);
     const double heading = -slide[i] / speed;
-    power += shake[i] * pair.friction * (change * heading + pair.reaction0 * (heading - pair.along[i]) / q);
+    power += shake[i] * (mu * (change * heading + pair.reaction0 * (heading - pair.along[i]) / q) +
+                         (mu - mu0) * pair.reaction0 * pair.along[i] / q);
   }
   return power;
 }
@@ -103,12 +104,19 @@ double mean_power(const ShakenPair& pair, double q, double tolerance)
   return sum / (2 * std::numbers::pi);
 }
 
-// As q -> 0: mu rho along the drive, and mu r_n0/|v_d| against motion across it.
+// As q -> 0: mu e rho, and what sliding friction damps of the motion.
 double linear_power(const ShakenPair& pair)
 {
-  const Complex along = along_drive(pair), across = pair.along[0] * pair.velocity[1] - pair.along[1] * pair.velocity[0];
-  const double speed = std::hypot(pair.drive[0], pair.drive[1]);
-  return pair.friction / 2 * (std::real(std::conj(along) * pair.reaction) - pair.reaction0 / speed * std::norm(across));
+  const SlidingFriction friction =
+      sliding_friction(pair.law, pair.reaction0, std::span(pair.drive).first(pair.directions));
+  double power = 0;
+  for (std::size_t k = 0; k < pair.directions; ++k)
+  {
+    Complex force = friction.along[k] * pair.reaction;
+    for (std::size_t l = 0; l < pair.directions; ++l) force -= friction.damping[k][l] * pair.velocity[l];
+    power += std::real(std::conj(pair.velocity[k]) * force) / 2;
+  }
+  return power;
 }
 
 std::vector<ShakenPair> shaken_pairs(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
@@ -120,23 +128,23 @@ std::vector<ShakenPair> shaken_pairs(const SlidingEquilibrium& sliding, const Li
   const std::vector<Complex> reactions = normal_reactions(linearised.reaction, s, mode.real, mode.imaginary);
   const std::vector<double> e = drive_directions(interface), real = relative(interface, mode.real),
                             imaginary = relative(interface, mode.imaginary);
-  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
+  const int directions = interface.directions;
   std::vector<ShakenPair> pairs;
   for (std::size_t i = 0; i < static_cast<std::size_t>(interface.pairs); ++i)
   {
     if (!equilibrium.closed[i]) continue;
     ShakenPair pair;
-    pair.directions = interface.directions;
-    pair.friction = interface.friction;
-    pair.reaction0 = equilibrium.reactions[i * block];
+    pair.directions = static_cast<std::size_t>(directions);
+    pair.law = interface.friction;
+    pair.reaction0 = PairView(equilibrium.reactions, directions).normal(i);
     pair.reaction = reactions[i];
     pair.mode_reaction = mode.reactions[i];
-    for (std::size_t k = 0; k < directions; ++k)
+    for (std::size_t k = 0; k < pair.directions; ++k)
     {
       pair.velocity[k] =
-          Complex(0, mode.lambda.imag()) * Complex(real[i * block + 1 + k], imaginary[i * block + 1 + k]);
-      pair.drive[k] = interface.drive[i * directions + k];
-      pair.along[k] = e[i * directions + k];
+          s * Complex(PairView(real, directions).tangential(i)[k], PairView(imaginary, directions).tangential(i)[k]);
+      pair.drive[k] = TangentView(interface.drive, directions).of(i)[k];
+      pair.along[k] = TangentView(e, directions).of(i)[k];
     }
     pairs.push_back(pair);
   }

@@ -31,37 +31,33 @@ MatrixXd across(const VectorXd& e)
 
 } // namespace
 
-LinearContact::LinearContact(const ContactOperator& W, double friction, const StepRecord& record,
+LinearContact::LinearContact(const ContactOperator& W, const FrictionLaw& law, const StepRecord& record,
                              std::span<const ContactStatus> statuses)
-    : friction_(friction), size_(static_cast<Index>(W.size())), directions_(W.directions)
+    : size_(static_cast<Index>(W.size())), directions_(W.directions())
 {
-  const Index block = 1 + directions_;
+  const PairRows<Index> rows(W.directions());
+  const PairView reactions(record.reactions, W.directions()), velocity(record.contact_velocity, W.directions());
   std::vector<Index> following;
   for (std::size_t pair = 0; pair < statuses.size(); ++pair)
   {
     if (statuses[pair] == ContactStatus::open) continue;
-    const Index row = static_cast<Index>(pair) * block;
-    const auto tangential = VectorXd::Map(&record.contact_velocity[static_cast<std::size_t>(row + 1)], directions_);
-    if (statuses[pair] == ContactStatus::slip)
+    const bool slips = statuses[pair] == ContactStatus::slip;
+    if (slips)
     {
-      const double speed = std::max(tangential.norm(), 1e-300),
-                   reaction = record.reactions[static_cast<std::size_t>(row)];
-      slips_.push_back({static_cast<Index>(rows_.size()), static_cast<Index>(following.size()), tangential / speed,
-                        friction * reaction / speed, reaction});
+      const VectorXd s = VectorXd::Map(velocity.tangential(pair).data(), directions_);
+      const double speed = std::max(s.norm(), 1e-300), mu = friction_coefficient(law, speed).value;
+      const double reaction = reactions.normal(pair);
+      slips_.push_back({static_cast<Index>(rows_.size()), static_cast<Index>(following.size()), s / speed, mu,
+                        mu * reaction / speed, reaction});
     }
-    rows_.push_back(row);
-    for (Index k = 1; k < block; ++k) (statuses[pair] == ContactStatus::slip ? following : rows_).push_back(row + k);
+    const auto own = static_cast<Index>(pair);
+    rows_.push_back(rows.normal(own));
+    for (Index k = 0; k < directions_; ++k) (slips ? following : rows_).push_back(rows.tangential(own) + k);
   }
   leading_ = static_cast<Index>(rows_.size());
   for (Slip& slip : slips_) slip.first += leading_;
   rows_.insert(rows_.end(), following.begin(), following.end());
-  W_.resize(static_cast<Index>(rows_.size()), static_cast<Index>(rows_.size()));
-  for (Index j = 0; j < W_.cols(); ++j)
-  {
-    const double* const column =
-        &W.W[static_cast<std::size_t>(rows_[static_cast<std::size_t>(j)] * size_)]; // symmetric
-    for (Index i = 0; i < W_.rows(); ++i) W_(i, j) = column[rows_[static_cast<std::size_t>(i)]];
-  }
+  W_ = W.submatrix(rows_);
 }
 
 MatrixXd LinearContact::by_whole_system(const MatrixXd& db, const VectorXd& dmu)
@@ -74,7 +70,7 @@ MatrixXd LinearContact::by_whole_system(const MatrixXd& db, const VectorXd& dmu)
       const MatrixXd turn = slip.tau * across(slip.e);
       A.middleRows(slip.first, directions_) = (turn * W_.middleRows(slip.first, directions_)).eval();
       A.block(slip.first, slip.first, directions_, directions_).diagonal().array() += 1;
-      A.block(slip.first, slip.normal, directions_, 1) += friction_ * slip.e;
+      A.block(slip.first, slip.normal, directions_, 1) += slip.mu * slip.e;
     }
     regularise(A, leading_);
     whole_lu_.emplace(A);
@@ -94,7 +90,7 @@ bool LinearContact::by_fixed_point(const MatrixXd& db, const VectorXd& dmu, Matr
   {
     MatrixXd A = W_.topLeftCorner(leading_, leading_);
     for (const Slip& slip : slips_)
-      A.col(slip.normal) -= friction_ * W_.block(0, slip.first, leading_, directions_) * slip.e;
+      A.col(slip.normal) -= slip.mu * W_.block(0, slip.first, leading_, directions_) * slip.e;
     regularise(A, leading_);
     leading_lu_.emplace(A);
   }
@@ -108,7 +104,7 @@ bool LinearContact::by_fixed_point(const MatrixXd& db, const VectorXd& dmu, Matr
     MatrixXd right = -db.topRows(leading_);
     right.noalias() -= W_.topRightCorner(leading_, following) * dr.bottomRows(following);
     dr.topRows(leading_) = leading_lu_->solve(right);
-    for (const Slip& slip : slips_) dr.middleRows(slip.first, directions_) -= friction_ * slip.e * dr.row(slip.normal);
+    for (const Slip& slip : slips_) dr.middleRows(slip.first, directions_) -= slip.mu * slip.e * dr.row(slip.normal);
     if (directions_ == 1 || slips_.empty()) return true;
     MatrixXd dw = db.bottomRows(following);
     dw.noalias() += W_.bottomRows(following) * dr;

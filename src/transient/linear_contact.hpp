@@ -13,10 +13,7 @@
 #include "squeal/transient/step_record.hpp"
 
 #include <Eigen/LU>
-
 #include <optional>
-#include <span>
-
 #include <span>
 
 namespace squeal
@@ -26,7 +23,7 @@ namespace squeal
 class LinearContact
 {
 public:
-  LinearContact(const ContactOperator& W, double friction, const StepRecord& record,
+  LinearContact(const ContactOperator& W, const FrictionLaw& law, const StepRecord& record,
                 std::span<const ContactStatus> statuses);
 
   /// dr of each column of db, dmu of each; every row of W, zeros on open pairs.
@@ -37,13 +34,13 @@ private:
   {
     Eigen::Index normal = 0, first = 0; // places of its normal and of its first tangential row among the rows
     Eigen::VectorXd e;                  // [-]
-    double tau = 0, reaction = 0;       // [N s/m], [N]
+    double mu = 0, tau = 0;             // [-], [N s/m]
+    double reaction = 0;                // [N] r_n
   };
 
   Eigen::MatrixXd by_whole_system(const Eigen::MatrixXd& db, const Eigen::VectorXd& dmu);
   bool by_fixed_point(const Eigen::MatrixXd& db, const Eigen::VectorXd& dmu, Eigen::MatrixXd& dr);
 
-  double friction_ = 0;
   Eigen::Index size_ = 0, leading_ = 0, directions_ = 0; // all rows of W; the first unknowns; tangential rows of a pair
   std::vector<Eigen::Index> rows_;                       // of the closed pairs in W: first unknowns, then those of slip
   std::vector<Slip> slips_;

@@ -57,23 +57,24 @@ TangentWork begin_tangents(const ThetaStep& step, const Structure& structure, st
 MatrixXd contact_of_start(const ThetaStep& step, const Interface& interface, const StepRecord& record,
                           std::span<const TangentColumn> columns, const TangentWork& work)
 {
-  const auto rows = static_cast<Index>(interface.size()), block = static_cast<Index>(interface.block());
-  const double earlier = (1 - step.theta) / step.theta;
-  MatrixXd db = MatrixXd::Zero(rows, static_cast<Index>(columns.size()));
+  const double past = (1 - step.theta) / step.theta;
+  MatrixXd db = MatrixXd::Zero(static_cast<Index>(interface.size()), static_cast<Index>(columns.size()));
   for (std::size_t k = 0; k < columns.size(); ++k)
   {
-    const auto column = static_cast<Index>(k);
     check(VecWAXPY(work.scratch[k], step.h * (1 - step.theta), columns[k].v, columns[k].u)); // of ut
-    const std::vector<double> position = relative(interface, work.scratch[k]), s = relative(interface, columns[k].v);
-    for (Index row = 0; row < rows; ++row)
+    const std::vector<double> position = relative(interface, work.scratch[k]),
+                              velocity = relative(interface, columns[k].v);
+    const PairView moved(position, interface.directions), s(velocity, interface.directions);
+    auto column = db.col(static_cast<Index>(k));
+    const PairView<double> change(column, interface.directions);
+    for (std::size_t pair = 0; pair < change.pairs(); ++pair)
     {
-      const auto i = static_cast<std::size_t>(row), pair = static_cast<std::size_t>(row / block);
-      if (row % block > 0)
-        db(row, column) = record.opposes_theta[pair] ? earlier * s[i] : 0;
-      else if (step.law == ContactLaw::displacement)
-        db(row, column) = position[i] / step.h;
-      if (row % block == 0 && columns[k].step_size != 0 && step.law == ContactLaw::displacement)
-        db(row, column) -= columns[k].step_size * record.gap[pair] / (step.h * step.h);
+      if (step.law == ContactLaw::displacement) change.normal(pair) = moved.normal(pair) / step.h;
+      if (step.law == ContactLaw::displacement && columns[k].step_size != 0)
+        change.normal(pair) -= columns[k].step_size * record.gap[pair] / (step.h * step.h);
+      if (!record.opposes_theta[pair]) continue;
+      for (std::size_t d = 0; d < s.tangential(pair).size(); ++d)
+        change.tangential(pair)[d] = past * s.tangential(pair)[d];
     }
   }
   return db;

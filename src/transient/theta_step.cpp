@@ -5,7 +5,7 @@
 /// and A v+ is the right-hand side just solved for: a step multiplies by M and K once each. The same vectors give the
 /// energies and, from (A - M) v_theta = h theta C v_theta + theta^2 h (K u+ - K u), the damping work.
 #include "squeal/algebra/multivector.hpp"
-#include "squeal/transient/transient.hpp"
+#include "step_contact.hpp"
 
 #include <algorithm>
 #include <array>
@@ -20,136 +20,6 @@ namespace squeal
 
 namespace
 {
-
-/// b of w = W r + b, from the free velocity's B v: normal rows are gap rates (g + B_n ut)/h + B_n v, tangential ones s.
-/// Collective; the result is on rank 0.
-std::vector<double> free_contact_velocity(const ThetaStep& step, const Interface& interface, const State& state,
-                                          StepWork& work, std::vector<double> b)
-{
-  check(VecWAXPY(work.v_theta, step.h * (1 - step.theta), state.v, state.u)); // ut, for a moment
-  const std::vector<double> position = relative(interface, work.v_theta);
-  double rounding = 0;
-  if (step.law == ContactLaw::velocity) check(VecNorm(work.v_theta, NORM_INFINITY, &rounding));
-  if (b.empty()) return b;
-  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
-  // A gap at rounding is closed: against the displacements it was rounded from, or a free step's own motion.
-  for (std::size_t i = 0; i < b.size(); i += block) rounding = std::max(rounding, step.h * std::abs(b[i]));
-  rounding *= 1e-10;
-  for (std::size_t i = 0; i < interface.gap.size(); ++i)
-  {
-    const double gap = interface.gap[i] + position[i * block];
-    if (step.law == ContactLaw::displacement)
-      b[i * block] += gap / step.h;
-    else if (gap > rounding)
-      b[i * block] = std::numeric_limits<double>::infinity(); // takes no part: r = 0
-    for (std::size_t k = 0; k < directions; ++k) b[i * block + 1 + k] -= interface.drive[i * directions + k];
-  }
-  return b;
-}
-
-/// (1-theta)/theta s of the state's sliding velocity s, on tangential rows: friction opposes s+ and that. Nothing for
-/// pairs that stuck, whose s is rounding. Collective; the result is on rank 0.
-std::vector<double> earlier_sliding(const ThetaStep& step, const Interface& interface, const State& state)
-{
-  std::vector<double> s = relative(interface, state.v);
-  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
-  const double part = step.opposed == Opposed::theta ? (1 - step.theta) / step.theta : 0;
-  const std::vector<ContactStatus> status = contact_status(interface, state.reactions);
-  for (std::size_t i = 0; i < interface.gap.size(); ++i)
-  {
-    s[i * block] = 0;
-    for (std::size_t k = 0; k < directions; ++k)
-      s[i * block + 1 + k] =
-          status[i] == ContactStatus::stick ? 0 : part * (s[i * block + 1 + k] - interface.drive[i * directions + k]);
-  }
-  return s;
-}
-
-/// Takes the earlier sliding away from closed pairs that it would bring to rest or turn back: friction does neither by
-/// itself, and a pair at rest must not be one that swings about it. Returns whether there were any. w = W r + b, b with
-/// it.
-bool forget_where_turned(const Interface& interface, const std::vector<double>& r, const std::vector<double>& w,
-                         double* earlier)
-{
-  bool any = false;
-  const auto block = static_cast<std::size_t>(interface.block());
-  for (std::size_t i = 0; i < r.size(); i += block)
-  {
-    double along = 0;
-    for (std::size_t k = i + 1; k < i + block; ++k) along += (w[k] - earlier[k]) * earlier[k];
-    if (r[i] <= 0 || along >= 0) continue;
-    std::fill_n(earlier + i, block, 0.);
-    any = true;
-  }
-  return any;
-}
-
-/// Solves contact on rank 0, where W is, and hands each r to every rank. `b`, `earlier`: one problem's after the
-/// other's.
-void find_reactions(const ThetaStep& step, const Interface& interface, const std::vector<double>& b,
-                    std::vector<double>& earlier, std::span<StepWork> works, std::span<State> states,
-                    std::span<StepReport> reports, MPI_Comm comm)
-{
-  // One message: iterations, residual, converged, r of each. Latency counts on small models.
-  const std::size_t size = interface.size(), length = size + 3;
-  std::string problem;
-  std::vector<double> told(length * states.size(), -1);
-  const auto solve_all = [&]
-  {
-    std::vector<std::size_t> open(states.size()); // problems
-    std::iota(open.begin(), open.end(), 0);
-    while (!open.empty())
-    {
-      std::vector<std::vector<double>> mine;
-      std::vector<ContactProblem> problems;
-      for (const std::size_t k : open)
-      {
-        mine.emplace_back(size);
-        std::transform(&b[k * size], &b[k * size] + size, &earlier[k * size], mine.back().begin(), std::plus<>());
-      }
-      for (std::size_t j = 0; j < open.size(); ++j)
-        problems.push_back({mine[j], states[open[j]].reactions, works[open[j]].memory});
-      const auto results = solve_contacts(step.W, interface.friction, step.contact, problems);
-      std::vector<std::size_t> again;
-      for (std::size_t j = 0; j < open.size(); ++j)
-      {
-        const std::size_t k = open[j];
-        double* const entries = &told[k * length];
-        entries[0] = std::max(entries[0], 0.) + results[j].iterations;
-        entries[1] = results[j].residual;
-        entries[2] = results[j].converged ? 1 : 0;
-        const std::vector<double>& Wr = works[k].memory.Wr.front();
-        std::transform(Wr.begin(), Wr.end(), mine[j].begin(), mine[j].begin(), std::plus<>());
-        if (works[k].record) works[k].record->contact_velocity = mine[j];
-        if (forget_where_turned(interface, states[k].reactions, mine[j], &earlier[k * size])) again.push_back(k);
-      }
-      open = std::move(again);
-    }
-    for (std::size_t k = 0; k < states.size(); ++k)
-      std::copy(states[k].reactions.begin(), states[k].reactions.end(), &told[k * length] + 3);
-  };
-  if (rank_of(comm) == 0)
-  {
-    try
-    {
-      solve_all();
-    }
-    catch (const std::exception& error)
-    {
-      problem = error.what();
-    }
-  }
-  MPI_Bcast(told.data(), static_cast<int>(told.size()), MPI_DOUBLE, 0, comm);
-  if (told[0] < 0) agree(comm, problem);
-  for (std::size_t k = 0; k < states.size(); ++k)
-  {
-    const double* const entries = &told[k * length];
-    reports[k].contact_iterations = static_cast<int>(entries[0]);
-    reports[k].contact_residual = entries[1];
-    reports[k].contact_converged = entries[2] > 0;
-    std::copy(entries + 3, entries + length, states[k].reactions.begin());
-  }
-}
 
 /// The products whose sums over the ranks make up the works. Overwrites M v, A v and K u of the start.
 using Factors = std::array<std::pair<Vec, Vec>, 7>;
@@ -206,24 +76,6 @@ void load_free_step(const ThetaStep& step, const Structure& structure, StepWork&
   check(VecAXPY(work.Av_next, step.h, structure.load));
 }
 
-/// What the tangent needs of the contact just solved, on every rank. `earlier`: the problem's entries, on rank 0.
-void record_contact(const Interface& interface, const State& state, const double* earlier, StepRecord& record,
-                    MPI_Comm comm)
-{
-  const auto block = static_cast<std::size_t>(interface.block()), pairs = static_cast<std::size_t>(interface.pairs);
-  record.reactions = state.reactions;
-  record.contact_velocity.resize(interface.size());
-  record.opposes_theta.assign(pairs, 0);
-  for (std::size_t i = 0; earlier && i < interface.size(); ++i)
-    if (earlier[i] != 0) record.opposes_theta[i / block] = 1;
-  MPI_Bcast(record.contact_velocity.data(), static_cast<int>(interface.size()), MPI_DOUBLE, 0, comm);
-  MPI_Bcast(record.opposes_theta.data(), interface.pairs, MPI_CHAR, 0, comm);
-  if (record.wanted == Recorded::contact) return;
-  record.gap = interface.gap;
-  const std::vector<double> position = relative(interface, state.u);
-  for (std::size_t i = 0; i < pairs; ++i) record.gap[i] += position[i * block];
-}
-
 /// The rates of h, from a step that is complete: `account` left M dv and K du in Mv and Ku.
 void record_rates(const ThetaStep& step, const StepWork& work)
 {
@@ -234,33 +86,18 @@ void record_rates(const ThetaStep& step, const StepWork& work)
   check(VecAXPBY(record.force, -step.theta, 1 / step.h, work.Ku));
 }
 
-/// The contact of all of them: reactions into the states and reports, h B'r into f and A v_next; returns -h r.
-std::vector<double> push_apart(const ThetaStep& step, const Interface& interface, const std::vector<double>& Bv_free,
-                               std::span<StepWork> works, std::span<State> states, std::span<StepReport> reports,
-                               MPI_Comm comm)
+/// Adds h B'r of the reactions to A v+, and keeps it in f; returns -h r of one trajectory after the other.
+std::vector<double> apply_reactions(const StepBatch& batch)
 {
-  std::vector<double> b, earlier, lambda;
-  const std::size_t size = interface.size();
-  for (std::size_t k = 0; k < states.size(); ++k)
+  std::vector<double> lambda;
+  for (std::size_t k = 0; k < batch.states.size(); ++k)
   {
-    const auto first = Bv_free.begin() + static_cast<std::ptrdiff_t>(Bv_free.empty() ? 0 : k * size);
-    const auto mine =
-        free_contact_velocity(step, interface, states[k], works[k],
-                              {first, Bv_free.empty() ? first : first + static_cast<std::ptrdiff_t>(size)});
-    b.insert(b.end(), mine.begin(), mine.end());
-    const std::vector<double> s = earlier_sliding(step, interface, states[k]);
-    earlier.insert(earlier.end(), s.begin(), s.end());
-  }
-  find_reactions(step, interface, b, earlier, works, states, reports, comm);
-  for (std::size_t k = 0; k < states.size(); ++k)
-  {
-    if (works[k].record)
-      record_contact(interface, states[k], rank_of(comm) == 0 ? &earlier[k * size] : nullptr, *works[k].record, comm);
-    check(VecSet(works[k].f, 0));
-    add_reactions(interface, states[k].reactions, works[k].f);
-    check(VecScale(works[k].f, step.h));
-    check(VecAXPY(works[k].Av_next, 1, works[k].f));
-    for (const double reaction : states[k].reactions) lambda.push_back(-step.h * reaction);
+    StepWork& work = batch.works[k];
+    check(VecSet(work.f, 0));
+    add_reactions(batch.interface, batch.states[k].reactions, work.f);
+    check(VecScale(work.f, batch.step.h));
+    check(VecAXPY(work.Av_next, 1, work.f));
+    for (const double reaction : batch.states[k].reactions) lambda.push_back(-batch.step.h * reaction);
   }
   return lambda;
 }
@@ -356,8 +193,12 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
   }
   const std::vector<double> Bv_free = step.factor.forward(right);
   std::vector<double> lambda;
-  const MPI_Comm comm = comm_of(structure.load);
-  if (interface.pairs > 0) lambda = push_apart(step, interface, Bv_free, works, states, reports, comm);
+  if (interface.pairs > 0)
+  {
+    const StepBatch batch{step, interface, works, states, reports};
+    find_reactions(batch, Bv_free);
+    lambda = apply_reactions(batch);
+  }
   step.factor.backward(lambda, next);
   std::vector<Vec> u, Mv, Ku;
   for (std::size_t k = 0; k < states.size(); ++k)
@@ -393,22 +234,6 @@ StepReport advance(const ThetaStep& step, const Structure& structure, const Inte
                    State& state)
 {
   return advance(step, structure, interface, std::span(&work, 1), std::span(&state, 1))[0];
-}
-
-std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions)
-{
-  const auto block = static_cast<std::size_t>(interface.block());
-  double largest = 0;
-  for (std::size_t i = 0; i < reactions.size(); i += block) largest = std::max(largest, reactions[i]);
-  std::vector<ContactStatus> status(static_cast<std::size_t>(interface.pairs), ContactStatus::open);
-  for (std::size_t i = 0; i < status.size(); ++i)
-  {
-    const double* r = &reactions[i * block];
-    if (r[0] <= 0) continue;
-    const double friction = block == 2 ? std::abs(r[1]) : std::hypot(r[1], r[2]);
-    status[i] = interface.friction * r[0] - friction > 1e-8 * largest ? ContactStatus::stick : ContactStatus::slip;
-  }
-  return status;
 }
 
 } // namespace squeal

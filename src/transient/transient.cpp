@@ -49,7 +49,7 @@ double energy(const Fluctuation& fluctuation, const State& state, const StepWork
   return (kinetic + potential) / 2;
 }
 
-void record(const StepReport& report, double h, const State& state, std::size_t block, Mat probes, Vec probe_values,
+void record(const StepReport& report, double h, const State& state, int directions, Mat probes, Vec probe_values,
             History& history)
 {
   history.time.push_back(state.time);
@@ -57,8 +57,9 @@ void record(const StepReport& report, double h, const State& state, std::size_t 
   history.damping_power.push_back(report.damping_work / h);
   history.contact_power.push_back(report.contact_work / h);
   history.load_power.push_back(report.load_work / h);
+  const PairView reactions(state.reactions, directions);
   double normal_force = 0;
-  for (std::size_t i = 0; i < state.reactions.size(); i += block) normal_force += state.reactions[i];
+  for (std::size_t pair = 0; pair < reactions.pairs(); ++pair) normal_force += reactions.normal(pair);
   history.normal_force.push_back(normal_force);
   history.open.push_back(report.open);
   history.stick.push_back(report.stick);
@@ -73,15 +74,13 @@ void record(const StepReport& report, double h, const State& state, std::size_t 
 bool slides_as_at_equilibrium(const Interface& interface, const Equilibrium& equilibrium,
                               const std::vector<double>& drive, const std::vector<double>& reactions)
 {
-  const auto block = static_cast<std::size_t>(interface.block()), directions = block - 1;
   const std::vector<ContactStatus> status = contact_status(interface, reactions);
   for (std::size_t i = 0; i < status.size(); ++i)
   {
     if (equilibrium.closed[i] != (status[i] != ContactStatus::open)) return false;
     if (status[i] == ContactStatus::stick) return false;
-    double along = 0;
-    for (std::size_t k = 0; k < directions; ++k) along += drive[i * directions + k] * reactions[i * block + 1 + k];
-    if (along < 0) return false;
+    const std::span<const double> friction = PairView(reactions, interface.directions).tangential(i);
+    if (dot(TangentView(drive, interface.directions).of(i), friction) < 0) return false;
   }
   return true;
 }
@@ -158,7 +157,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     const double scale = std::max({report.energy, std::abs(report.contact_work), std::abs(report.load_work)});
     if (defect > 0) summary.energy_defect_max = std::max(summary.energy_defect_max, defect / scale);
     update(fluctuation, state, work);
-    record(report, step.h, state, static_cast<std::size_t>(interface.block()), probes, probe_values, history);
+    record(report, step.h, state, interface.directions, probes, probe_values, history);
     history.fluctuating_energy.push_back(energy(fluctuation, state, work));
     if (monitor) monitor(state, report, work);
     if (!std::isfinite(report.energy)) break;

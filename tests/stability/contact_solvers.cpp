@@ -1,8 +1,8 @@
 // ranks: 1
 // Where contact solvers fail: the fixed point beyond rho = 2/lambda_max(W), both at large friction and on
 // ill-conditioned W; what is not solved must say so.
+#include "../support/contact_problem.hpp"
 #include "squeal/contact/complementarity.hpp"
-#include "squeal/contact/solver.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +11,7 @@
 #include <random>
 
 using namespace squeal;
+using test::solve_contact;
 
 namespace
 {
@@ -87,11 +88,12 @@ Tally try_all(double condition, double spread, double mu, int directions)
   {
     const int pairs = 4 + trial % 9;
     const Vector W = random_compliance(pairs, block, condition, spread, random);
+    const ContactOperator op = make_contact_operator(W, pairs, directions);
     Vector b(static_cast<std::size_t>(pairs) * block), r;
     for (double& value : b) value = uniform(random);
-    (void)solve_contact(W, b, pairs, directions, mu, {}, r); // a warm start
+    (void)solve_contact(op, b, {mu}, {}, r); // a warm start
     for (double& value : b) value += .01 * uniform(random);
-    const ContactResult result = solve_contact(W, b, pairs, directions, mu, {}, r);
+    const ContactResult result = solve_contact(op, b, {mu}, {}, r);
     if (!result.converged)
     {
       ++tally.said;
@@ -130,9 +132,10 @@ TEST_CASE("no cone is left unsolved silently, however ill-conditioned W and howe
 TEST_CASE("a light pair beside a heavy one is solved from a warm start too")
 {
   const Vector W = {1e-6, 0, 0, 0, 0, 1e-6, 0, 0, 0, 0, 1e6, 0, 0, 0, 0, 1e6}; // reactions of 1e6 and 1e-6
+  const ContactOperator op = make_contact_operator(W, 2, 1);
   Vector r;
-  REQUIRE(solve_contact(W, {-1, 0, -1, 0}, 2, 1, .3, {}, r).converged);
-  REQUIRE(solve_contact(W, {-1, 0, -2, 0}, 2, 1, .3, {}, r).converged);
+  REQUIRE(solve_contact(op, {-1, 0, -1, 0}, {.3}, {}, r).converged);
+  REQUIRE(solve_contact(op, {-1, 0, -2, 0}, {.3}, {}, r).converged);
   CHECK(std::abs(r[0] - 1e6) < 1e-4);
   CHECK(std::abs(r[2] - 2e-6) < 1e-15);
 }
@@ -156,7 +159,8 @@ int fixed_point_iterations(double condition, double rho)
       b[i] -= W[i * 16 + j];
       b[i + 1] -= W[(i + 1) * 16 + j];
     }
-  const ContactResult result = solve_contact(W, b, 8, 1, 1e6, settings, r); // nothing slips: a linear problem
+  // nothing slips: a linear problem
+  const ContactResult result = solve_contact(make_contact_operator(W, 8, 1), b, {1e6}, settings, r);
   return result.converged ? result.iterations : -1;
 }
 
@@ -179,7 +183,7 @@ TEST_CASE("the fixed point contracts for 0 < rho lambda_max(W) < 2 at a rate set
 TEST_CASE("at rest the same bound holds, on one pair exactly")
 {
   ComplementarityProblem problem;
-  problem.M = {2};
+  problem.M.setConstant(1, 1, 2);
   problem.q = {-1};
   problem.compliance = 2;
   CHECK(solve_by_projection(problem, 1.95 / 2, 1e-10, 40).residual > 1e-10); // 0.95^n: slow beside the bound
@@ -195,8 +199,9 @@ TEST_CASE("one equilibrium is promised only where there is one")
   {
     const std::size_t n = 4;
     ComplementarityProblem problem;
-    problem.M = random_compliance(4, 1, 20, 0, random);
-    for (double& entry : problem.M) entry += (trial % 4) * .3 * uniform(random); // friction couples without symmetry
+    Vector M = random_compliance(4, 1, 20, 0, random);
+    for (double& entry : M) entry += (trial % 4) * .3 * uniform(random); // friction couples without symmetry
+    problem.M = Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(M.data());
     problem.compliance = 1;
     for (std::size_t i = 0; i < n; ++i) problem.q.push_back(uniform(random));
     int solutions = 0;
@@ -213,7 +218,7 @@ TEST_CASE("one equilibrium is promised only where there is one")
     {
       ++promised;
       CHECK(solutions == 1);
-      CHECK(solve_by_status(problem, std::vector<char>(n, 0), 100).outcome == "converged");
+      CHECK(solve_by_status(problem, std::vector<char>(n, 0), 100).outcome == StatusOutcome::converged);
     }
     several += solutions > 1 ? 1 : 0;
     none += solutions == 0 ? 1 : 0;

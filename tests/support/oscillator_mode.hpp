@@ -36,7 +36,7 @@ struct Sliding
 inline Sliding persistent_sliding(const SmallModel& model, Complex guess)
 {
   const Structure& structure = model.structure;
-  const double mu = model.interface.friction;
+  const double mu = model.interface.friction.coefficient;
   // y = y1 = y2 = 1: r = -(.5 l^2 + .02 l + 1.2), (l^2 + .02 l + 1.1) x = .1 + mu r, and the pad's own
   // -.1 x + l^2 + .02 l + .5 - r = 0
   const auto x_of = [&](Complex l) { return (.1 - mu * (.5 * l * l + .02 * l + 1.2)) / (l * l + .02 * l + 1.1); };

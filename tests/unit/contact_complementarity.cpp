@@ -22,18 +22,19 @@ ComplementarityProblem random_problem(std::size_t n, double mu, std::mt19937& ra
   std::vector<double> H(n * n);
   for (double& value : H) value = uniform(random);
   ComplementarityProblem problem;
-  problem.M.assign(n * n, 0.);
+  problem.M.setZero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
   problem.q.resize(n);
   for (std::size_t i = 0; i < n; ++i)
   {
     problem.q[i] = uniform(random);
     for (std::size_t j = 0; j < n; ++j)
     {
-      for (std::size_t k = 0; k < n; ++k) problem.M[i * n + j] += H[i * n + k] * H[j * n + k] / static_cast<double>(n);
-      problem.M[i * n + j] += (i == j ? .1 : 0.) + mu * uniform(random);
+      double& entry = problem.M(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      for (std::size_t k = 0; k < n; ++k) entry += H[i * n + k] * H[j * n + k] / static_cast<double>(n);
+      entry += (i == j ? .1 : 0.) + mu * uniform(random);
     }
-    problem.compliance = std::max(problem.compliance, std::abs(problem.M[i * n + i]));
   }
+  problem.compliance = problem.M.diagonal().cwiseAbs().maxCoeff();
   return problem;
 }
 
@@ -72,10 +73,9 @@ TEST_CASE("the status iteration finds what trying every split finds")
     const auto truth = all_solutions(problem);
     const auto found = solve_by_status(problem, std::vector<char>(problem.q.size(), trial % 3 == 0), 200);
     REQUIRE(truth.size() == 1); // little friction: one solution
-    CHECK(found.outcome == "converged");
+    CHECK(found.outcome == StatusOutcome::converged);
     CHECK(difference(found.reaction, truth[0]) < 1e-9); // condition below 1e5
-    const auto projected =
-        solve_by_projection(problem, .5 / largest_eigenvalue(problem.M, problem.q.size(), 30), 1e-12, 100000);
+    const auto projected = solve_by_projection(problem, .5 / largest_eigenvalue(problem.M, 30), 1e-12, 100000);
     CHECK(projected.residual <= 1e-12);
     CHECK(difference(projected.reaction, truth[0]) < 1e-8);
   }
@@ -90,14 +90,14 @@ TEST_CASE("much friction: a converged status iteration is one of the solutions, 
     const auto problem = random_problem(5, 2, random);
     const auto truth = all_solutions(problem);
     const auto found = solve_by_status(problem, std::vector<char>(5, 1), 200);
-    if (found.outcome == "converged")
+    if (found.outcome == StatusOutcome::converged)
     {
       double nearest = HUGE_VAL;
       for (const auto& solution : truth) nearest = std::min(nearest, difference(found.reaction, solution));
       CHECK(nearest < 1e-6);
     }
     else
-      CHECK(found.outcome == "cycles");
+      CHECK(found.outcome == StatusOutcome::cycles);
     none += truth.empty() ? 1 : 0;
     several += truth.size() > 1 ? 1 : 0;
   }
@@ -109,11 +109,11 @@ TEST_CASE("a gap at rounding counts as closed, whatever the unit of force")
   for (const double factor : {1., 1e-6, 1e6})
   {
     ComplementarityProblem problem;
-    problem.M = {2 / factor, 1 / factor, 1 / factor, 2 / factor};
+    problem.M = Eigen::Matrix2d{{2 / factor, 1 / factor}, {1 / factor, 2 / factor}};
     problem.q = {-3, -1.5 + 1e-16}; // the second pair just touches under the first one's reaction
     problem.compliance = 2 / factor;
     const auto found = solve_by_status(problem, {1, 1}, 10);
-    CHECK(found.outcome == "converged");
+    CHECK(found.outcome == StatusOutcome::converged);
     CHECK(found.iterations == 1);
     CHECK(std::abs(found.reaction[0] / factor - 1.5) < 1e-15);
     CHECK(std::abs(found.reaction[1] / factor) < 1e-15);
@@ -123,10 +123,10 @@ TEST_CASE("a gap at rounding counts as closed, whatever the unit of force")
 TEST_CASE("pairs that share a rigid face share its load evenly")
 {
   ComplementarityProblem problem;
-  problem.M = std::vector<double>(9, 1.);
+  problem.M.setOnes(3, 3);
   problem.q = {-6, -6, -6};
   problem.compliance = 1;
   const auto found = solve_by_status(problem, {1, 1, 1}, 10);
-  CHECK(found.outcome == "converged");
+  CHECK(found.outcome == StatusOutcome::converged);
   for (const double r : found.reaction) CHECK(std::abs(r - 2) < 1e-13);
 }

@@ -1,5 +1,5 @@
 // ranks: 1
-#include "squeal/contact/solver.hpp"
+#include "../support/contact_problem.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +8,7 @@
 #include <random>
 
 using namespace squeal;
+using test::solve_contact;
 
 namespace
 {
@@ -52,7 +53,7 @@ double difference(const Vector& a, const Vector& b)
 
 double true_residual(const Vector& W, const Vector& b, const Vector& r)
 {
-  return contact_residual(W, relative_velocity(W, b, r), pairs, 2, .4, r);
+  return contact_residual(make_contact_operator(W, pairs, 2), {.4}, b, r);
 }
 
 } // namespace
@@ -61,13 +62,13 @@ TEST_CASE("sweeps over the near field in single precision end at the answer of W
 {
   const Vector W = decaying_compliance(), b = velocity_at(0);
   const ContactOperator op = make_contact_operator(W, pairs, 2);
-  CHECK(op.near.values.size() < W.size() / 4); // 25 of 120 neighbours
-  CHECK(!op.near.runs.empty());
+  CHECK(op.near_share() < .25); // 25 of 120 neighbours
+  CHECK(op.has_near_field());
   Vector swept, projected;
-  const auto result = solve_contact(W, b, pairs, 2, .4, {}, swept);
+  const auto result = solve_contact(op, b, {.4}, {}, swept);
   CHECK(result.converged);
   CHECK(true_residual(W, b, swept) < 1.01e-10); // another order of summation
-  CHECK(solve_contact(W, b, pairs, 2, .4, {ContactSolver::fixed_point, 1e-12, 20000, 0}, projected).converged);
+  CHECK(solve_contact(op, b, {.4}, {ContactSolver::fixed_point, 1e-12, 20000, 0}, projected).converged);
   CHECK(difference(swept, projected) < 1e-8 * *std::max_element(projected.begin(), projected.end())); // cond(W) < 100
   CHECK(std::count_if(swept.begin(), swept.end(), [](double r) { return r == 0; }) > 30); // some pairs are open
 
@@ -75,7 +76,7 @@ TEST_CASE("sweeps over the near field in single precision end at the answer of W
   for (double& entry : without_tail)
     if (std::abs(entry) < 1e-8) entry = 0;
   Vector other;
-  CHECK(solve_contact(without_tail, b, pairs, 2, .4, {}, other).converged);
+  CHECK(solve_contact(make_contact_operator(without_tail, pairs, 2), b, {.4}, {}, other).converged);
   CHECK(true_residual(W, b, other) > 1e-8); // the tail counts
 }
 
@@ -93,13 +94,13 @@ TEST_CASE("problems solved together have the answers of each alone, and what is 
     for (int k = 0; k < together; ++k) b.push_back(velocity_at(.02 * step + .3 * k));
     std::vector<ContactProblem> problems;
     for (std::size_t k = 0; k < together; ++k) problems.push_back({b[k], r[k], memory[k]});
-    const auto results = solve_contacts(op, .4, {}, problems);
+    const auto results = solve_contacts(op, {.4}, {}, problems);
     for (std::size_t k = 0; k < together; ++k)
     {
       CHECK(results[k].converged);
       CHECK(true_residual(W, b[k], r[k]) < 1.01e-10);
       Vector alone;
-      CHECK(solve_contact(W, b[k], pairs, 2, .4, {}, alone).converged);
+      CHECK(solve_contact(op, b[k], {.4}, {}, alone).converged);
       CHECK(difference(r[k], alone) < 1e-8);
     }
     sweeps.push_back(results[0].iterations);
@@ -110,12 +111,13 @@ TEST_CASE("problems solved together have the answers of each alone, and what is 
 TEST_CASE("a pair of infinite free velocity takes no part")
 {
   Vector W = decaying_compliance(), b = velocity_at(0), r, elsewhere;
+  const ContactOperator op = make_contact_operator(W, pairs, 2);
   const std::size_t out = 51;
   b[out] = std::numeric_limits<double>::infinity();
-  CHECK(solve_contact(W, b, pairs, 2, .4, {}, r).converged);
+  CHECK(solve_contact(op, b, {.4}, {}, r).converged);
   CHECK(r[out] == 0);
   CHECK(r[out + 1] == 0);
   b[out] = 1e3; // so far open that nothing closes it
-  CHECK(solve_contact(W, b, pairs, 2, .4, {ContactSolver::gauss_seidel, 1e-13, 1000, 0}, elsewhere).converged);
+  CHECK(solve_contact(op, b, {.4}, {ContactSolver::gauss_seidel, 1e-13, 1000, 0}, elsewhere).converged);
   CHECK(difference(r, elsewhere) < 1e-8);
 }

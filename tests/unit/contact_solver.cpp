@@ -1,5 +1,4 @@
-#include "squeal/contact/pair_law.hpp"
-#include "squeal/contact/solver.hpp"
+#include "../support/contact_problem.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,6 +6,7 @@
 #include <random>
 
 using namespace squeal;
+using test::solve_contact;
 
 namespace
 {
@@ -75,7 +75,7 @@ TEST_CASE("one pair: the local solution obeys Signorini's and Coulomb's laws to 
       last[i] = trial % 4 == 0 ? 0 : uniform(random);
       for (std::size_t j = 0; j < block; ++j) A[i][j] = W[i * block + j];
     }
-    const PairVector r = solve_pair(A, q, directions, mu, last);
+    const PairVector r = solve_pair(A, q, directions, {mu}, last);
     PairVector w = q;
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t j = 0; j < 3; ++j) w[i] += A[i][j] * r[j];
@@ -91,33 +91,33 @@ TEST_CASE("one pair: the local solution obeys Signorini's and Coulomb's laws to 
 TEST_CASE("a pair sticks below the Coulomb limit and slips above it, against the sliding")
 {
   const PairBlock A = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  CHECK(solve_pair(A, {-2, .6, -.7}, 2, .5, {}) == PairVector{2, -.6, .7}); // .92 < 1: stick
-  const PairVector r = solve_pair(A, {-2, 3, -4}, 2, .5, {});               // 5 > 1: slip along (-.6, .8)
+  CHECK(solve_pair(A, {-2, .6, -.7}, 2, {.5}, {}) == PairVector{2, -.6, .7}); // .92 < 1: stick
+  const PairVector r = solve_pair(A, {-2, 3, -4}, 2, {.5}, {});               // 5 > 1: slip along (-.6, .8)
   CHECK(std::abs(r[0] - 2) + std::abs(r[1] + .6) + std::abs(r[2] - .8) < 1e-14);
-  CHECK(solve_pair(A, {1e-20, 3, 4}, 2, .5, {1, 0, 0}) == PairVector{0, 0, 0});
-  const PairVector plane = solve_pair(A, {-2, -3, 0}, 1, .5, {});
+  CHECK(solve_pair(A, {1e-20, 3, 4}, 2, {.5}, {1, 0, 0}) == PairVector{0, 0, 0});
+  const PairVector plane = solve_pair(A, {-2, -3, 0}, 1, {.5}, {});
   CHECK(plane == PairVector{2, 1, 0});
 }
 
 TEST_CASE("an immovable direction gets no reaction at rest and never a number that is not one")
 {
   const PairBlock A = {{{2, 0, 0}, {0, 0, 0}, {0, 0, 0}}};
-  CHECK(solve_pair(A, {-1, 0, 0}, 1, .3, {}) == PairVector{.5, 0, 0});
-  CHECK(solve_pair(A, {-1, 0, 0}, 2, .3, {}) == PairVector{.5, 0, 0});
+  CHECK(solve_pair(A, {-1, 0, 0}, 1, {.3}, {}) == PairVector{.5, 0, 0});
+  CHECK(solve_pair(A, {-1, 0, 0}, 2, {.3}, {}) == PairVector{.5, 0, 0});
   const PairBlock fixed{};
-  CHECK(solve_pair(fixed, {-1, 1, 1}, 2, .3, {}) == PairVector{0, 0, 0});
+  CHECK(solve_pair(fixed, {-1, 1, 1}, 2, {.3}, {}) == PairVector{0, 0, 0});
   const PairBlock one = {{{2, 0, 0}, {0, 1, 0}, {0, 0, 0}}}; // t2 immovable, pair at rest along it
-  CHECK(solve_pair(one, {-1, .1, 0}, 2, .3, {}) == PairVector{.5, -.1, 0});
-  CHECK(std::abs(solve_pair(one, {-1, 5, 0}, 2, .3, {})[1] + .15) < 1e-15);
+  CHECK(solve_pair(one, {-1, .1, 0}, 2, {.3}, {}) == PairVector{.5, -.1, 0});
+  CHECK(std::abs(solve_pair(one, {-1, 5, 0}, 2, {.3}, {})[1] + .15) < 1e-15);
 }
 
 TEST_CASE("the natural map is zero on a solution, and sees each law broken")
 {
-  CHECK(natural_map({1, -.5, 0}, {0, 2, 0}, .5, 1, 1) == 0);
-  CHECK(natural_map({0, 0, 0}, {1, 2, 3}, .5, 1, 1) == 0);
-  CHECK(natural_map({0, 0, 0}, {-1, 0, 0}, .5, 1, 1) == 1); // penetrates
-  CHECK(natural_map({1, 0, 0}, {2, 0, 0}, .5, 1, 1) == 1);  // pushes while open
-  CHECK(natural_map({1, .5, 0}, {0, 2, 0}, .5, 1, 1) == 1); // pushes along the sliding
+  CHECK(natural_map({1, -.5, 0}, {0, 2, 0}, {.5}, {1, 1}) == 0);
+  CHECK(natural_map({0, 0, 0}, {1, 2, 3}, {.5}, {1, 1}) == 0);
+  CHECK(natural_map({0, 0, 0}, {-1, 0, 0}, {.5}, {1, 1}) == 1); // penetrates
+  CHECK(natural_map({1, 0, 0}, {2, 0, 0}, {.5}, {1, 1}) == 1);  // pushes while open
+  CHECK(natural_map({1, .5, 0}, {0, 2, 0}, {.5}, {1, 1}) == 1); // pushes along the sliding
 }
 
 TEST_CASE("Gauss-Seidel and the projection fixed point find the same reactions")
@@ -129,17 +129,16 @@ TEST_CASE("Gauss-Seidel and the projection fixed point find the same reactions")
       const int pairs = 12;
       const std::size_t n = static_cast<std::size_t>(pairs * (1 + directions));
       const Vector W = random_spd(n, .3, random), b = random_velocity(n, random);
+      const ContactOperator op = make_contact_operator(W, pairs, directions);
       Vector swept, projected;
-      const auto first =
-          solve_contact(W, b, pairs, directions, mu, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, swept);
-      const auto second =
-          solve_contact(W, b, pairs, directions, mu, {ContactSolver::fixed_point, 1e-12, 20000, 0}, projected);
+      const auto first = solve_contact(op, b, {mu}, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, swept);
+      const auto second = solve_contact(op, b, {mu}, {ContactSolver::fixed_point, 1e-12, 20000, 0}, projected);
       CHECK(first.converged);
       CHECK(second.converged);
       CHECK(first.residual <= 1e-12);
       // the residual bounds the error up to the condition of W, which is below 100 here
       CHECK(difference(swept, projected) < 1e-9);
-      CHECK(contact_residual(W, relative_velocity(W, b, swept), pairs, directions, mu, swept) <= 1e-12);
+      CHECK(contact_residual(op, {mu}, b, swept) <= 1e-12);
     }
 }
 
@@ -153,9 +152,10 @@ TEST_CASE("a converged answer satisfies the residual when w is formed afresh, or
     const std::size_t n = static_cast<std::size_t>(pairs * (1 + directions));
     const double mu = trial % 3 == 0 ? 5 : 1; // coupling far beyond what either solver is sure of
     const Vector W = random_spd(n, 1e-6, random), b = random_velocity(n, random);
+    const ContactOperator op = make_contact_operator(W, pairs, directions);
     Vector r;
-    const auto result = solve_contact(W, b, pairs, directions, mu, {ContactSolver::gauss_seidel, 1e-10, 2000, 0}, r);
-    const double truth = contact_residual(W, relative_velocity(W, b, r), pairs, directions, mu, r);
+    const auto result = solve_contact(op, b, {mu}, {ContactSolver::gauss_seidel, 1e-10, 2000, 0}, r);
+    const double truth = contact_residual(op, {mu}, b, r);
     CHECK(result.converged == (result.residual <= 1e-10));
     if (result.converged) CHECK(truth < 2e-10); // another order of summation
     solved += result.converged ? 1 : 0;
@@ -168,13 +168,14 @@ TEST_CASE("forces a million times larger or smaller give the same relative answe
   std::mt19937 random(13);
   const int pairs = 8;
   const Vector W = random_spd(24, .2, random), b = random_velocity(24, random);
+  const ContactOperator op = make_contact_operator(W, pairs, 2);
   Vector reference;
-  CHECK(solve_contact(W, b, pairs, 2, .3, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, reference).converged);
+  CHECK(solve_contact(op, b, {.3}, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, reference).converged);
   for (const double factor : {1e6, 1e-6, 1e-20})
   {
     Vector scaled = b, r;
     for (double& value : scaled) value *= factor;
-    CHECK(solve_contact(W, scaled, pairs, 2, .3, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, r).converged);
+    CHECK(solve_contact(op, scaled, {.3}, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, r).converged);
     for (double& value : r) value /= factor;
     CHECK(difference(r, reference) < 1e-10);
   }
@@ -184,20 +185,21 @@ TEST_CASE("a warm start at the solution takes no sweep, and an inadmissible one 
 {
   std::mt19937 random(17);
   const Vector W = random_spd(24, .2, random), b = random_velocity(24, random);
+  const ContactOperator op = make_contact_operator(W, 8, 2);
   Vector r;
   const ContactSettings settings{ContactSolver::gauss_seidel, 1e-12, 1000, 0};
-  CHECK(solve_contact(W, b, 8, 2, .3, settings, r).converged);
+  CHECK(solve_contact(op, b, {.3}, settings, r).converged);
   Vector again = r;
-  const auto result = solve_contact(W, b, 8, 2, .3, settings, again);
+  const auto result = solve_contact(op, b, {.3}, settings, again);
   CHECK(result.iterations <= 1); // rounding of w alone
   Vector wild(24, std::nan(""));
   wild[0] = -5;
-  CHECK(solve_contact(W, b, 8, 2, .3, settings, wild).converged);
+  CHECK(solve_contact(op, b, {.3}, settings, wild).converged);
   CHECK(difference(wild, r) < 1e-10);
 }
 
 TEST_CASE("what is not a number ends as not converged")
 {
   Vector W = {1, 0, 0, 1}, r;
-  CHECK_FALSE(solve_contact(W, {std::nan(""), 0}, 1, 1, .3, {}, r).converged);
+  CHECK_FALSE(solve_contact(make_contact_operator(W, 1, 1), {std::nan(""), 0}, {.3}, {}, r).converged);
 }

@@ -183,7 +183,7 @@ TEST_CASE("relative and add_reactions are B x and B'r, whole on every rank")
   // Whole pairs on a rank: a pair's rows are never parted.
   PetscInt first = 0;
   check(MatGetOwnershipRange(interface.B, &first, nullptr));
-  CHECK(first % interface.block() == 0);
+  CHECK(first % (1 + interface.directions) == 0);
 }
 
 TEST_CASE("a damaged folder is one message on every rank")

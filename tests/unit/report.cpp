@@ -128,7 +128,7 @@ History history_of(std::size_t steps)
 /// Every stage ran.
 FieldNodes nodes_of(const Model& model)
 {
-  return {model.mesh, model.dofs, model.structure};
+  return {model.mesh, model.dofs, model.structure, model.interface.nodes};
 }
 
 Report full_report(const Model& model)

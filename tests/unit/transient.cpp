@@ -191,7 +191,7 @@ TEST_CASE("status of pairs: open without reaction, stick inside the Coulomb disc
   Interface interface;
   interface.pairs = 3;
   interface.directions = 2;
-  interface.friction = .5;
+  interface.friction.coefficient = .5;
   const auto status = contact_status(interface, {0, 0, 0, 10, 3, -4, 10, 3, 3.9});
   CHECK(status == std::vector<ContactStatus>{ContactStatus::open, ContactStatus::slip, ContactStatus::stick});
 }

@@ -7,7 +7,7 @@
 /// sign is wrong changes status. When that stops reducing their number, only the last one does: block principal
 /// pivoting (Judice and Pires 1994), finite when M is a P-matrix, that is as long as friction is not too large. Beyond,
 /// a split met twice ends it.
-#include <string>
+#include <Eigen/Core>
 #include <vector>
 
 namespace squeal
@@ -15,9 +15,9 @@ namespace squeal
 
 struct ComplementarityProblem
 {
-  std::vector<double> N, M; // row-major; N empty: identity
-  std::vector<double> q;    // [m] gaps without reactions
-  double compliance = 0;    // [m/N] typical of M: reactions times it are compared with gaps
+  Eigen::MatrixXd N, M;  // N empty: identity
+  std::vector<double> q; // [m] gaps without reactions
+  double compliance = 0; // [m/N] typical of M: reactions times it are compared with gaps
 };
 
 struct SplitSolution
@@ -27,16 +27,24 @@ struct SplitSolution
 };
 
 /// N g - M r = rhs with g = 0 on closed pairs and r = 0 on open ones; least squares where that is singular.
+/// Error: an entry is not finite.
 SplitSolution solve_split(const ComplementarityProblem& problem, const std::vector<char>& closed,
                           const std::vector<double>& rhs);
 
-/// outcome: "converged", "cycles", "singular" (a split whose signs fit does not balance), "not converged".
+enum class StatusOutcome
+{
+  converged,
+  cycles,        // a split was met twice
+  singular,      // a split whose signs fit does not balance
+  not_converged, // within the iterations allowed
+};
+
 struct StatusSolution
 {
-  std::string outcome;
+  StatusOutcome outcome = StatusOutcome::not_converged;
   int iterations = 0;
   std::vector<char> closed;
-  std::vector<double> gap, reaction; // [m, N]
+  std::vector<double> gap, reaction; // [m, N]; empty unless converged or singular
 };
 
 StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, int max_iterations);
@@ -44,18 +52,23 @@ StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vecto
 /// Whether the symmetric part of M is positive definite, N being the identity: then there is one solution and no other.
 bool has_one_solution(const ComplementarityProblem& problem);
 
+/// The largest natural map of a pair, |r - max(0, r - rho g)|, over the largest reaction; over the largest rho |pull|
+/// where no pair has a reaction.
+double unilateral_residual(const std::vector<double>& reaction, const std::vector<double>& gap,
+                           const std::vector<double>& rho, const std::vector<double>& pull);
+
 /// r <- max(0, r - rho g), g = q + M r; N must be the identity. `rho` is halved when the residual grows.
 struct ProjectionSolution
 {
   int iterations = 0;
-  double residual = 0; // |r - max(0, r - g/compliance)| over the largest reaction
+  double residual = 0; // the unilateral residual with rho = 1/compliance, its pull q
   std::vector<double> reaction;
 };
 
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
                                        int max_iterations);
 
-/// Largest eigenvalue of a positive semi-definite matrix, by power iteration: a lower bound.
-double largest_eigenvalue(const std::vector<double>& matrix, std::size_t n, int iterations);
+/// Largest eigenvalue of a symmetric positive semi-definite matrix, by power iteration: a lower bound.
+double largest_eigenvalue(const Eigen::Ref<const Eigen::MatrixXd>& A, int iterations);
 
 } // namespace squeal

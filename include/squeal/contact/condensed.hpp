@@ -13,22 +13,21 @@ struct CondensedOperator
 {
   Factor factor;         // of A bordered by B
   std::vector<double> W; // row-major, size x size; on rank 0 only, empty elsewhere
-  int size = 0;          // pairs * block
+  int size = 0;          // rows of B
 };
 
 /// Factors A (symmetric) and forms W. Collective.
 /// Error: A singular, naming (`describe`) the offending degree of freedom.
 CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names);
 
-/// A factor for A symmetric and meant to be positive definite, bordered by the interface's B; `loose`: the degree of
-/// freedom that moves most in a motion that A resists with less than rounding of its diagonal, if there is one (the
-/// factor is then of no use).
+/// A symmetric matrix A, bordered by the interface's B, and whether it is positive definite.
 struct Factored
 {
-  Factor factor;
+  Factor factor; // of no use where `loose` is set
+  /// The degree of freedom that moves most in a motion x whose resistance is below rounding; none: A is definite.
   std::optional<PetscInt> loose;
-  bool indefinite = false; // of `loose`: A drives that motion on
-  double resistance = 0;   // least x'A x / x' diag(A) x found by inverse iteration
+  bool indefinite = false; // in that motion x'A x < 0
+  double resistance = 0;   // x'A x / x' diag(A) x, the least that inverse iteration found
 };
 
 Factored factor_positive(Mat A, const Interface& interface);

@@ -2,34 +2,36 @@
 /// The contact interface: pairs, the gap and sliding operators, and the drive (src/README.md, section 1).
 ///     g = gap + B_n u >= 0,   s = B_t v - v_d,   r_n >= 0 pushes the pair apart,   |r_t| <= mu r_n.
 ///
-/// Contact vectors (reactions, gaps, velocities) live whole on every rank as std::vector<double>, `block` entries a
-/// pair: normal first, then one or two tangential ones. They are small; the structure is not.
+/// A pair is a block of rows of B, its normal row first, with any number of nodes. Contact vectors (reactions, gaps,
+/// velocities) live whole on every rank as std::vector<double>, read and written through PairView. They are small; the
+/// structure is not.
+#include "squeal/contact/pair_law.hpp"
 #include "squeal/solid/structure.hpp"
 
 namespace squeal
 {
 
-enum class ContactStatus : char
+/// A node that a pair reads.
+struct PairNode
 {
-  open,
-  stick,
-  slip,
+  int node;
+  double weight; // in the pair's gap; the rotor's nodes have negative ones
 };
 
 struct Interface
 {
   int pairs = 0;
-  int directions = 2;         // tangential rows a pair: 1 or 2
-  Owned<Mat> B;               // (pairs * block) x dofs, AIJ; row i * block + k
-  std::vector<double> gap;    // [m] per pair
-  std::vector<double> drive;  // [m/s] pairs * directions: v_d
-  std::vector<int> contact;   // per pair, index in Scene::contacts; empty on a matrix scene
-  std::vector<Vec3> position; // [m] per pair; empty on a matrix scene
-  double friction = 0;        // mu
-  bool direction_damping = true;
+  int directions = 2;                       // tangential rows a pair: 1 or 2
+  Owned<Mat> B;                             // a row for every entry of a contact vector, by columns of u; AIJ
+  std::vector<double> gap;                  // [m] per pair
+  std::vector<double> drive;                // [m/s] per pair and direction, as TangentView reads it: v_d
+  std::vector<int> contact;                 // per pair, index in Scene::contacts; empty on a matrix scene
+  std::vector<Vec3> position;               // [m] per pair; empty on a matrix scene
+  std::vector<std::vector<PairNode>> nodes; // per pair; empty on a matrix scene
+  FrictionLaw friction;
 
-  int block() const { return 1 + directions; }
-  std::size_t size() const { return static_cast<std::size_t>(pairs) * static_cast<std::size_t>(block()); }
+  /// Of a contact vector.
+  std::size_t size() const { return static_cast<std::size_t>(pairs) * static_cast<std::size_t>(1 + directions); }
 };
 
 /// Rows n, t1, t2 of every pair: n.(u_b - u_a), t.(u_b - u_a). Tangents: the scene's, else t1 along the drive.
@@ -47,8 +49,29 @@ std::vector<double> relative(const Interface& interface, Vec x);
 /// y += B^T r. Collective; r the same on every rank.
 void add_reactions(const Interface& interface, const std::vector<double>& r, Vec y);
 
-/// Unit drive direction e = v_d/|v_d| of every pair (pairs * directions): reactions of steady sliding are r_t = mu r_n
-/// e.
+/// |v_d| of a pair [m/s].
+double drive_speed(const Interface& interface, std::size_t pair);
+
+/// Unit drive direction e = v_d/|v_d| of every pair, as TangentView reads it: reactions of steady sliding are
+/// r_t = mu(|v_d|) r_n e.
 std::vector<double> drive_directions(const Interface& interface);
+
+/// mu(|v_d|) of every pair.
+std::vector<double> drive_friction(const Interface& interface);
+
+enum class RowsTaken
+{
+  all,
+  normal,
+};
+
+/// The rows of these pairs (ascending), all of each or the normal ones alone, in the same distribution. Collective.
+Owned<Mat> rows_of(const Interface& interface, const std::vector<int>& pairs, RowsTaken taken);
+
+/// Status of every pair at the end of a step, from its reactions.
+inline std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions)
+{
+  return contact_status(PairView(reactions, interface.directions), interface.friction);
+}
 
 } // namespace squeal

@@ -1,30 +1,134 @@
 #pragma once
-/// Signorini-Coulomb contact of one pair, all others held: find r with w = A r + q,
-///     0 <= w_n _|_ r_n >= 0,   |r_t| <= mu r_n,   w_t = -sigma r_t with sigma >= 0 (zero while |r_t| < mu r_n).
-/// A is the pair's own block of W, symmetric and positive semi-definite, 1 + directions square.
+/// Signorini-Coulomb contact of one pair (src/README.md, section 1):
+///     0 <= w_n _|_ r_n >= 0,   |r_t| <= mu r_n,   w_t = -sigma r_t with sigma >= 0 (zero while |r_t| < mu r_n),
+/// w_n the gap or its rate, w_t the velocity that friction opposes, mu = mu(|w_t|).
 ///
-/// Solved to round-off by cases. Open: q_n >= 0. Stick: A r = -q. Slip: r_t = mu r_n d with a unit d, so that w_n = 0
-/// gives r_n = -q_n / (A_nn + mu A_nt d), and d is a zero of the cross product of d and w_t, a trigonometric polynomial
-/// of degree two in the angle of d (the quartic of Bonnefon and Daviet, 2011, in angle form): Newton from the last
-/// direction, a scan of the circle when that fails.
+/// The local problem holds all other pairs: find r with w = A r + q, A the pair's own block of W, symmetric and
+/// positive semi-definite. It is solved to round-off by cases. Open: q_n >= 0. Stick: A r = -q. Slip: r_t = mu r_n d
+/// with a unit d, so that w_n = 0 gives r_n = -q_n / (A_nn + mu A_nt d), and d is a zero of the cross product of d and
+/// w_t, a trigonometric polynomial of degree two in the angle of d (the quartic of Bonnefon and Daviet, 2011, in angle
+/// form): Newton from the last direction, a scan of the circle when that fails.
 ///
-/// Caveat: a direction in which neither side can move (a zero row of W) keeps Coulomb's law: sliding there, r_t opposes
-/// the drive although it moves nothing; at rest there, r_t is zero along it.
-#include <array>
+/// Caveats: mu is constant today. The local problem takes mu at the speed that the last reaction leaves, so that sweeps
+/// would converge to a mu that depends on the speed, too; the natural map takes the speed at hand. The status of a pair
+/// is read off its reaction alone, which a mu that depends on the speed will not allow.
+///
+/// In a direction in which neither side can move (a zero row of W), r_t opposes the drive while the pair slides along
+/// it although it moves nothing; at rest there, r_t is zero along it.
+#include "squeal/contact/pairs.hpp"
+#include "squeal/scene/scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
 
 namespace squeal
 {
 
-using PairVector = std::array<double, 3>; // n, t1, t2; t2 stays 0 in plane friction
-using PairBlock = std::array<PairVector, 3>;
+/// mu and its derivative in the sliding speed.
+struct FrictionCoefficient
+{
+  double value;      // [-]
+  double derivative; // [s/m]
+};
 
-/// `last`: the pair's reaction so far, which decides between several slip directions.
-PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, double friction, const PairVector& last);
+/// Without the guard of std::hypot against squares out of range, which takes ten times as long: reactions and
+/// velocities never have such squares.
+inline double length(double x, double y)
+{
+  return std::sqrt(x * x + y * y);
+}
 
-/// |r - proj(r - rho w)|, the natural map of one pair: zero where the law holds; rho_n, rho_t in force per velocity.
-double natural_map(const PairVector& r, const PairVector& w, double friction, double rho_n, double rho_t);
+/// At a sliding speed [m/s].
+inline FrictionCoefficient friction_coefficient(const FrictionLaw& law, double /*speed*/)
+{
+  return {law.coefficient, 0};
+}
 
-/// Scales the tangential part of r back into the disc of radius mu max(0, r_n).
-void project_on_disc(PairVector& r, double friction);
+/// mu at the sliding speed of w.
+inline double coefficient_at(const FrictionLaw& law, const PairVector& w)
+{
+  return friction_coefficient(law, length(w[1], w[2])).value;
+}
+
+/// The friction r_t = -mu r_n e of a pair that slides with s, e = s/|s|: its derivatives are
+///     dr_t = -along dr_n - damping ds,   along = mu e,   damping = mu r_n/|s| (I - e e') + mu' r_n e e'.
+struct SlidingFriction
+{
+  std::array<double, 2> along;                  // [-]
+  std::array<std::array<double, 2>, 2> damping; // [N s/m]
+};
+
+/// Zero where s is.
+SlidingFriction sliding_friction(const FrictionLaw& law, double r_n, std::span<const double> s);
+
+/// What takes a tangential vector (t1, t2) back into a disc around zero; 1 inside it.
+inline double disc_factor(double t1, double t2, double radius)
+{
+  const double size = length(t1, t2);
+  return size <= radius ? 1 : radius / size;
+}
+
+/// The reaction with r_n >= 0 and |r_t| <= mu r_n that has r's normal and tangential parts as far as allowed.
+PairVector admissible(PairVector r, const PairVector& w, const FrictionLaw& law);
+
+/// rho of the natural map [force per velocity].
+struct NaturalScale
+{
+  double normal, tangential;
+};
+
+/// 1/A_nn and 1/max A_tt; `otherwise`: a compliance in place of a zero A_nn.
+NaturalScale natural_scale(const PairBlock& A, double otherwise);
+
+/// |r - max(0, r - rho w)|: the natural map of the unilateral law alone.
+inline double normal_map(double r, double w, double rho)
+{
+  return std::abs(r - std::max(0., r - rho * w));
+}
+
+/// |r - proj(r - rho w)|: zero where the law holds. The disc's radius is mu r_n, since r_n is judged by its own row.
+inline double natural_map(const PairVector& r, const PairVector& w, const FrictionLaw& law, const NaturalScale& rho)
+{
+  const double t1 = r[1] - rho.tangential * w[1], t2 = r[2] - rho.tangential * w[2];
+  const double shrink = disc_factor(t1, t2, coefficient_at(law, w) * std::max(0., r[0]));
+  const double normal = normal_map(r[0], w[0], rho.normal), d1 = r[1] - shrink * t1, d2 = r[2] - shrink * t2;
+  return std::sqrt(normal * normal + d1 * d1 + d2 * d2);
+}
+
+/// Of the local problem; `last`: the pair's reaction so far, which decides between several slip directions.
+PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, const FrictionLaw& law,
+                      const PairVector& last);
+
+/// A r + q
+inline PairVector pair_velocity(const PairBlock& A, const PairVector& r, const PairVector& q)
+{
+  PairVector w = q;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) w[i] += A[i][j] * r[j];
+  return w;
+}
+
+/// w - A r: q of the local problem, what the other pairs leave.
+inline PairVector velocity_without(const PairBlock& A, const PairVector& r, const PairVector& w)
+{
+  PairVector q = w;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) q[i] -= A[i][j] * r[j];
+  return q;
+}
+
+enum class ContactStatus : char
+{
+  open,
+  stick,
+  slip,
+};
+
+/// A closed pair sticks where its friction stays inside the Coulomb disc by more than 1e-8 of the largest normal
+/// reaction of all pairs.
+ContactStatus contact_status(const PairVector& r, const FrictionLaw& law, double largest);
+
+std::vector<ContactStatus> contact_status(PairView<const double> reactions, const FrictionLaw& law);
 
 } // namespace squeal

@@ -1,8 +1,8 @@
 #pragma once
-/// Contact with Coulomb friction on the condensed operator (src/README.md, section 4): find r with w = W r + b,
-///     0 <= w_n _|_ r_n >= 0,   |r_t| <= mu r_n,   r_t opposes w_t.
-/// Residual, one measure for every solver: the natural map per pair, |r - proj(r - rho w)| with rho = 1/W_ii, over the
-/// largest reaction, or over rho max|b| where that is smaller. It is always that of W itself, in double precision.
+/// Contact with Coulomb friction on the condensed operator (src/README.md, section 4): find r with w = W r + b and
+/// every pair's law of pair_law.hpp. Residual, one measure for every solver: the natural map per pair, |r - proj(r -
+/// rho w)| with rho = 1/W_ii, over the largest reaction, or over rho max|b| where that is smaller. It is always that of
+/// W itself, in double precision.
 ///
 /// gauss_seidel: one exact local solve a pair and sweep; w follows each change of a reaction, pairs that no longer move
 /// are passed over. A large W is swept over through its near field, in single precision, and one product with W
@@ -15,12 +15,7 @@
 ///
 /// Caveat: neither is sure to converge where mu couples sliding and pressure strongly; the result says so.
 #include "squeal/base/options.hpp"
-#include "squeal/contact/pair_law.hpp"
-
-#include <cstddef>
-#include <span>
-#include <string>
-#include <vector>
+#include "squeal/contact/contact_operator.hpp"
 
 namespace squeal
 {
@@ -56,33 +51,6 @@ struct ContactResult
   bool converged = false;
 };
 
-/// The entries of W that matter during sweeps, in single precision: row by row, runs of neighbouring pairs.
-struct NearField
-{
-  struct Run
-  {
-    std::size_t first, count; // of w's entries
-  };
-  std::vector<std::size_t> runs_of, values_of; // of each pair: where its runs and its values begin
-  std::vector<Run> runs;
-  std::vector<float> values; // run after run, the pair's rows of each run one after the other
-};
-
-/// W and what is known of it before any b. On one rank.
-struct ContactOperator
-{
-  int pairs = 0, directions = 0;
-  std::vector<double> W;            // row-major, symmetric, size x size, size = pairs * (1 + directions)
-  std::vector<PairBlock> diagonal;  // W_ii of each pair
-  std::vector<double> rho_n, rho_t; // of the natural map
-  NearField near;                   // empty: W is small
-
-  std::size_t block() const { return static_cast<std::size_t>(1 + directions); }
-  std::size_t size() const { return static_cast<std::size_t>(pairs) * block(); }
-};
-
-ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
-
 /// The last solutions of one trajectory, latest first, and W times them: a warm start then needs no product with W.
 struct ContactMemory
 {
@@ -98,22 +66,11 @@ struct ContactProblem
   ContactMemory& memory;
 };
 
-std::vector<ContactResult> solve_contacts(const ContactOperator& W, double friction, const ContactSettings& settings,
-                                          std::span<const ContactProblem> problems);
+std::vector<ContactResult> solve_contacts(const ContactOperator& W, const FrictionLaw& friction,
+                                          const ContactSettings& settings, std::span<const ContactProblem> problems);
 
-/// One problem without a past.
-ContactResult solve_contact(const std::vector<double>& W, const std::vector<double>& b, int pairs, int directions,
-                            double friction, const ContactSettings& settings, std::vector<double>& r);
-
-/// target += rows' change, of one pair: its `block` rows (1 to 3), `count` long, one after the other.
-void add_rows(const float* rows, std::size_t count, std::size_t block, const PairVector& change, float* target);
-
-/// w = W r + b.
-std::vector<double> relative_velocity(const std::vector<double>& W, const std::vector<double>& b,
-                                      const std::vector<double>& r);
-
-/// The residual above of reactions r with w = W r + b.
-double contact_residual(const std::vector<double>& W, const std::vector<double>& w, int pairs, int directions,
-                        double friction, const std::vector<double>& r);
+/// The residual above of reactions r to the free velocities b.
+double contact_residual(const ContactOperator& W, const FrictionLaw& friction, const std::vector<double>& b,
+                        const std::vector<double>& r);
 
 } // namespace squeal

@@ -26,7 +26,8 @@ struct Equilibrium
 {
   Outcome outcome;
   Owned<Vec> u;                   // [m]
-  std::vector<double> reactions;  // [N] block entries a pair
+  std::vector<double> reactions;  // [N] a contact vector
+  int directions = 2;             // tangential entries of a pair in it
   std::vector<char> closed;       // per pair
   double force_residual = 0;      // |K u - F - B'r| / |F|
   double check_residual = 0;      // the natural map with the fixed point's rho = 1/lambda_max(D_nn)

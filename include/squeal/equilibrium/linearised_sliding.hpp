@@ -31,8 +31,9 @@ Owned<Mat> project(Mat A, Mat Y, Mat Z);
 /// Z'A Z, marked symmetric.
 Owned<Mat> project_symmetric(Mat A, Mat Z);
 
-/// The derivative of the friction direction, C_f = sum mu r_n0/|v_d| B_t'(I - e e')B_t over the closed pairs [N s/m].
-/// Null for pairs with one tangential row, which cannot turn, without friction, or when nothing is closed.
+/// The derivative of steady friction in the sliding velocity over the closed pairs [N s/m],
+///     C_f = sum B_t'[mu r_n0/|v_d| (I - e e') + mu' r_n0 e e']B_t.
+/// Null where it is zero: pairs with one tangential row cannot turn, and mu' is 0 today.
 Owned<Mat> direction_damping(const Interface& interface, const std::vector<char>& closed,
                              const std::vector<double>& reactions);
 

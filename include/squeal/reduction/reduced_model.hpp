@@ -32,15 +32,15 @@ namespace squeal
 struct ReducedModel
 {
   Eigen::MatrixXd M, C, K;                        // size x size [of kg, N s/m, N/m]
-  Eigen::MatrixXd H, G;                           // size x rows, rows x size; of a pair: normal, tangential
+  Eigen::MatrixXd H, G;                           // size x rows, rows x size; rows by pairs as PairRows counts them
   Eigen::MatrixXd M_z, C_z, K_z;                  // symmetric: V'Z'M Z V ..., of the energies
   Eigen::LLT<Eigen::MatrixXd> E_factor, M_factor; // of K_z + omega^2 M_z, M_z
   std::vector<int> active;                        // pairs, ascending
   int directions = 2;                             // tangential ones of an active pair; 0: friction follows
-  double friction = 0;
+  FrictionLaw friction;
   std::vector<double> gap;        // [m] at equilibrium, per active pair
-  std::vector<double> drive;      // [m/s]
-  std::vector<double> reactions;  // [N] r0
+  std::vector<double> drive;      // [m/s] as TangentView reads it
+  std::vector<double> reactions;  // [N] r0, a contact vector
   MultiVector shapes;             // Z V, dofs x size: u = u0 + shapes q
   double omega = 0;               // [rad/s] of the followed mode
   int modes = 0, attachments = 0; // columns that V came from
@@ -81,13 +81,14 @@ void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd&
 /// The active pairs at the end of a step, and what the next one starts from.
 struct ReducedContact
 {
-  Eigen::VectorXd r;                       // [N]
+  Eigen::VectorXd r;                       // [N] a contact vector, as all vectors here
   Eigen::VectorXd Wr{};                    // W r; empty: not known
   Eigen::VectorXd w{};                     // [m/s] W r + b
   Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
   int unread = 0;                          // steps since W was read in double precision
-  std::vector<bool> opposes_end{};         // by pairs: friction opposes s+ there, elsewhere s_theta
-  Eigen::MatrixXf along{}; // W_nn + W_nt e of those directions e in which friction was then, mu included
+  std::vector<double> past{};              // [m/s] w_t - s+, as sliding_direction.hpp says
+  /// W_nn + mu W_nt d, d the direction of each pair's friction when W was read: normal rates by normal reactions.
+  Eigen::MatrixXf normal_responses{};
 };
 
 /// The period map of the reduced model by theta steps (src/README.md, section 4), whose matrices are formed
@@ -116,9 +117,6 @@ void prepare(ReducedMap& map, double period);
 /// The reactions after a step whose contact velocities are b without them; `contact` is of the step before. Residual:
 /// the natural map over the largest reaction. Returns whether it converged.
 bool solve_contact(const ReducedMap& map, const Eigen::VectorXd& b, ReducedContact& contact);
-
-/// Whether a pair's friction stays inside the Coulomb disc.
-bool sticks(const Eigen::VectorXd& r, double friction);
 
 /// One step. Returns whether contact converged.
 bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact);

@@ -57,6 +57,7 @@ struct FieldNodes
   const Mesh& mesh;
   const DofMap& dofs;
   const Structure& structure;
+  const std::vector<std::vector<PairNode>>& pairs; // Interface::nodes
 };
 
 /// Rank 0 prints the table a person reads.

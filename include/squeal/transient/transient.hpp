@@ -87,9 +87,6 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
                    State& state);
 
-/// A closed pair sticks where its friction stays inside the Coulomb disc by more than 1e-8 of the largest reaction.
-std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions);
-
 /// Called after every step.
 using Monitor = std::function<void(const State&, const StepReport&, const StepWork&)>;
 

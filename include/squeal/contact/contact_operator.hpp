@@ -1,0 +1,79 @@
+#pragma once
+/// The condensed operator W of the contact solvers, symmetric, over the rows of all pairs (src/README.md, section 4).
+/// How it is stored is known to this type alone: solvers use its products, the blocks of its diagonal, and its rows
+/// added up pair by pair.
+///
+/// The near field holds the entries that matter during sweeps, in single precision. In a step as short as an element's
+/// transit W decays with distance; a longer step, or a body that moves as one, does not let it, and the near field is
+/// all of W.
+#include "squeal/contact/pair_law.hpp"
+
+#include <cstddef>
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+namespace squeal
+{
+
+/// Row by row, runs of neighbouring pairs.
+struct NearField
+{
+  struct Run
+  {
+    std::size_t first, count; // of w's entries
+  };
+  std::vector<std::size_t> runs_of, values_of; // of each pair: where its runs and its values begin
+  std::vector<Run> runs;
+  std::vector<float> values; // run after run, the pair's rows of each run one after the other
+};
+
+/// On one rank.
+class ContactOperator
+{
+public:
+  ContactOperator() = default;
+
+  std::size_t pairs() const { return pairs_; }
+  int directions() const { return directions_; }
+  std::size_t size() const { return pairs_ * static_cast<std::size_t>(1 + directions_); } // rows
+
+  /// W_ii
+  const PairBlock& diagonal(std::size_t pair) const { return diagonal_[pair]; }
+  const NaturalScale& scale(std::size_t pair) const { return scale_[pair]; }
+
+  /// y_k = W x_k, reading W once.
+  void multiply(std::span<const std::span<const double>> x, std::span<const std::span<double>> y) const;
+
+  /// w += W dr of a change dr of one pair's reaction.
+  void add_product(std::size_t pair, const PairVector& change, std::span<double> w) const;
+
+  /// The same by the near field, which small operators do not have.
+  void add_near_product(std::size_t pair, const PairVector& change, std::span<float> w) const;
+  bool has_near_field() const { return !near_.runs.empty(); }
+  double near_share() const; // entries of the near field over those of W
+
+  /// W on these rows and columns.
+  Eigen::MatrixXd submatrix(std::span<const Eigen::Index> rows) const;
+
+  /// By power iteration: a lower bound.
+  double largest_eigenvalue(int iterations) const;
+
+private:
+  friend ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
+
+  std::size_t pairs_ = 0;
+  int directions_ = 0;
+  std::vector<double> values_; // by rows
+  std::vector<PairBlock> diagonal_;
+  std::vector<NaturalScale> scale_;
+  NearField near_; // empty: W is small
+};
+
+/// From a dense symmetric W, stored by rows. Error: the number of its entries does not fit.
+ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
+
+/// target += sum of factors[k] row_k over the rows of one pair (1 to 3), `length` long, one after the other.
+void add_rows(const float* rows, std::size_t length, std::size_t number, const PairVector& factors, float* target);
+
+} // namespace squeal

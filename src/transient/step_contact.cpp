@@ -1,0 +1,181 @@
+#include "step_contact.hpp"
+
+#include "squeal/contact/sliding_direction.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// From B v_free of a trajectory: normal rows become gap rates (g0 + B_n ut)/h + B_n v_free, tangential ones sliding
+/// velocities. Collective; both are on rank 0.
+std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t trajectory, std::vector<double> b)
+{
+  const auto& [step, interface, works, states, reports] = batch;
+  const State& state = states[trajectory];
+  const StepWork& work = works[trajectory];
+  check(VecWAXPY(work.v_theta, step.h * (1 - step.theta), state.v, state.u)); // ut, for a moment
+  const std::vector<double> position = relative(interface, work.v_theta);
+  double rounding = 0;
+  if (step.law == ContactLaw::velocity) check(VecNorm(work.v_theta, NORM_INFINITY, &rounding));
+  if (b.empty()) return b;
+  const PairView velocity(b, interface.directions);
+  const PairView moved(position, interface.directions);
+  const TangentView drive(interface.drive, interface.directions);
+  // A gap at rounding is closed: against the displacements it was rounded from, or a free step's own motion.
+  for (std::size_t i = 0; i < velocity.pairs(); ++i)
+    rounding = std::max(rounding, step.h * std::abs(velocity.normal(i)));
+  rounding *= 1e-10;
+  for (std::size_t i = 0; i < velocity.pairs(); ++i)
+  {
+    const double gap = interface.gap[i] + moved.normal(i);
+    if (step.law == ContactLaw::displacement)
+      velocity.normal(i) += gap / step.h;
+    else if (gap > rounding)
+      velocity.normal(i) = std::numeric_limits<double>::infinity(); // takes no part: r = 0
+    for (std::size_t k = 0; k < drive.of(i).size(); ++k) velocity.tangential(i)[k] -= drive.of(i)[k];
+  }
+  return b;
+}
+
+/// One trajectory's problem: w = W r + free + past.
+struct StepProblem
+{
+  std::vector<double> free; // on rank 0
+  std::vector<double> past; // as sliding_direction.hpp says
+};
+
+std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector<double>& Bv_free)
+{
+  const auto& [step, interface, works, states, reports] = batch;
+  const double weight = step.opposed == Opposed::theta ? (1 - step.theta) / step.theta : 0;
+  const auto size = static_cast<std::ptrdiff_t>(Bv_free.size() / states.size());
+  std::vector<StepProblem> problems(states.size());
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    const auto first = Bv_free.begin() + static_cast<std::ptrdiff_t>(k) * size;
+    problems[k].free = free_contact_velocity(batch, k, {first, first + size});
+    const std::vector<double> velocity = relative(interface, states[k].v);
+    problems[k].past =
+        past_sliding(PairView(velocity, interface.directions), TangentView(interface.drive, interface.directions),
+                     contact_status(interface, states[k].reactions), weight);
+  }
+  return problems;
+}
+
+std::vector<double> sum(const std::vector<double>& a, const std::vector<double>& b)
+{
+  std::vector<double> result = a;
+  for (std::size_t i = 0; i < result.size(); ++i) result[i] += b[i];
+  return result;
+}
+
+/// Solves the problems of these trajectories; returns those that are to be solved again, with less past sliding.
+std::vector<std::size_t> solve_once(const StepBatch& batch, std::vector<StepProblem>& problems,
+                                    const std::vector<std::size_t>& trajectories)
+{
+  const auto& [step, interface, works, states, reports] = batch;
+  std::vector<std::vector<double>> b;
+  for (const std::size_t k : trajectories) b.push_back(sum(problems[k].free, problems[k].past));
+  std::vector<ContactProblem> unsolved;
+  for (std::size_t j = 0; j < trajectories.size(); ++j)
+    unsolved.push_back({b[j], states[trajectories[j]].reactions, works[trajectories[j]].memory});
+  const std::vector<ContactResult> results = solve_contacts(step.W, interface.friction, step.contact, unsolved);
+  std::vector<std::size_t> again;
+  for (std::size_t j = 0; j < trajectories.size(); ++j)
+  {
+    const std::size_t k = trajectories[j];
+    StepReport& report = reports[k];
+    report.contact_iterations += results[j].iterations;
+    report.contact_residual = results[j].residual;
+    report.contact_converged = results[j].converged;
+    const std::vector<double> w = sum(works[k].memory.Wr.front(), b[j]);
+    if (works[k].record) works[k].record->contact_velocity = w;
+    if (leave_out_where_turned(PairView<const double>(states[k].reactions, interface.directions),
+                               PairView(w, interface.directions), PairView(problems[k].past, interface.directions)))
+      again.push_back(k);
+  }
+  return again;
+}
+
+/// Gives every rank what rank 0 found, in one message: latency counts on small models. Collective.
+/// Error on every rank: `problem`, unless it is empty.
+void share_from_rank_zero(const StepBatch& batch, const std::string& problem)
+{
+  const MPI_Comm comm = comm_of(batch.interface.B);
+  const std::size_t size = batch.interface.size(), length = size + 3;
+  std::vector<double> message(1 + length * batch.states.size());
+  message[0] = problem.empty() ? 0 : 1;
+  for (std::size_t k = 0; k < batch.states.size(); ++k)
+  {
+    const StepReport& report = batch.reports[k];
+    double* const entries = &message[1 + k * length];
+    entries[0] = report.contact_iterations;
+    entries[1] = report.contact_residual;
+    entries[2] = report.contact_converged ? 1 : 0;
+    std::copy(batch.states[k].reactions.begin(), batch.states[k].reactions.end(), entries + 3);
+  }
+  MPI_Bcast(message.data(), static_cast<int>(message.size()), MPI_DOUBLE, 0, comm);
+  if (message[0] != 0) agree(comm, problem);
+  for (std::size_t k = 0; k < batch.states.size(); ++k)
+  {
+    StepReport& report = batch.reports[k];
+    const double* const entries = &message[1 + k * length];
+    report.contact_iterations = static_cast<int>(entries[0]);
+    report.contact_residual = entries[1];
+    report.contact_converged = entries[2] != 0;
+    std::copy_n(entries + 3, size, batch.states[k].reactions.begin());
+  }
+}
+
+/// What the tangent needs of the contact just solved, on every rank; `past` is rank 0's. Collective.
+void record_contact(const Interface& interface, const State& state, const std::vector<double>& past, StepRecord& record)
+{
+  const MPI_Comm comm = comm_of(interface.B);
+  record.reactions = state.reactions;
+  record.contact_velocity.resize(interface.size());
+  record.opposes_theta.clear();
+  for (std::size_t i = 0; i < interface.gap.size(); ++i)
+    record.opposes_theta.push_back(opposes_end(PairView(past, interface.directions), i) ? 0 : 1);
+  MPI_Bcast(record.contact_velocity.data(), static_cast<int>(interface.size()), MPI_DOUBLE, 0, comm);
+  MPI_Bcast(record.opposes_theta.data(), interface.pairs, MPI_CHAR, 0, comm);
+  if (record.wanted == Recorded::contact) return;
+  record.gap = interface.gap;
+  const std::vector<double> position = relative(interface, state.u);
+  for (std::size_t i = 0; i < record.gap.size(); ++i)
+    record.gap[i] += PairView(position, interface.directions).normal(i);
+}
+
+} // namespace
+
+void find_reactions(const StepBatch& batch, const std::vector<double>& Bv_free)
+{
+  std::vector<StepProblem> problems = make_problems(batch, Bv_free);
+  std::string problem;
+  if (rank_of(comm_of(batch.interface.B)) == 0)
+  {
+    try
+    {
+      std::vector<std::size_t> unsolved(problems.size());
+      std::iota(unsolved.begin(), unsolved.end(), 0);
+      while (!unsolved.empty()) unsolved = solve_once(batch, problems, unsolved);
+    }
+    catch (const std::exception& error)
+    {
+      problem = error.what();
+    }
+  }
+  share_from_rank_zero(batch, problem);
+  for (std::size_t k = 0; k < problems.size(); ++k)
+    if (StepRecord* const record = batch.works[k].record)
+      record_contact(batch.interface, batch.states[k], problems[k].past, *record);
+}
+
+} // namespace squeal

@@ -1,0 +1,22 @@
+#pragma once
+/// Contact within a theta step (src/README.md, sections 4.3 to 4.7).
+#include "squeal/transient/transient.hpp"
+
+namespace squeal
+{
+
+/// Trajectories that one step advances together.
+struct StepBatch
+{
+  const ThetaStep& step;
+  const Interface& interface;
+  std::span<StepWork> works;
+  std::span<State> states;
+  std::span<StepReport> reports;
+};
+
+/// Reactions at the end of the step, into the states of every rank, and what the reports say of contact. `Bv_free`: B v
+/// of the steps without reactions, one trajectory after the other, on rank 0. Overwrites v_theta. Collective.
+void find_reactions(const StepBatch& batch, const std::vector<double>& Bv_free);
+
+} // namespace squeal

@@ -1,0 +1,108 @@
+// ranks: 1
+#include "squeal/contact/sliding_direction.hpp"
+
+#include <doctest/doctest.h>
+#include <Eigen/Core>
+
+using namespace squeal;
+
+namespace
+{
+
+using Vector = std::vector<double>;
+
+/// The friction of a sliding pair, r_t = -mu r_n s/|s|.
+std::array<double, 2> friction_force(const FrictionLaw& law, double r_n, const std::array<double, 2>& s)
+{
+  const double speed = std::hypot(s[0], s[1]), mu = friction_coefficient(law, speed).value;
+  return {-mu * r_n * s[0] / speed, -mu * r_n * s[1] / speed};
+}
+
+} // namespace
+
+TEST_CASE("a contact vector is read and written by pairs, in a std::vector and in an Eigen vector")
+{
+  for (const int directions : {0, 1, 2})
+  {
+    const int rows = 1 + directions;
+    Vector values(static_cast<std::size_t>(3 * rows));
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<double>(i);
+    const PairView view(values, directions);
+    REQUIRE(view.pairs() == 3);
+    CHECK(view.normal(2) == 2 * rows);
+    CHECK(view.tangential(2).size() == static_cast<std::size_t>(directions));
+    CHECK(view.vector(1) == PairVector{1. * rows, directions > 0 ? rows + 1. : 0, directions > 1 ? rows + 2. : 0});
+    view.set(1, {-1, -2, -3});
+    CHECK(view.vector(1) == PairVector{-1, directions > 0 ? -2. : 0, directions > 1 ? -3. : 0});
+    CHECK(values[static_cast<std::size_t>(rows) - 1] == rows - 1); // neighbours keep theirs
+    CHECK(values[static_cast<std::size_t>(2 * rows)] == 2 * rows);
+    Eigen::VectorXd copy = Eigen::VectorXd::Map(values.data(), 3 * rows);
+    CHECK(PairView<double>(copy, directions).vector(1) == view.vector(1));
+  }
+}
+
+TEST_CASE("row numbers, the blocks of a dense matrix and tangential vectors follow the order of contact vectors")
+{
+  const PairRows<long> rows(2);
+  CHECK(rows.normal(4) == 12);
+  CHECK(rows.tangential(4) == 13);
+  CHECK(rows.pair_of(14) == 4);
+  CHECK(rows.component_of(14) == 2);
+  CHECK(rows.is_normal(12));
+  CHECK_FALSE(rows.is_normal(13));
+  Vector W(36), e = {1, 2, 3, 4};
+  for (std::size_t i = 0; i < W.size(); ++i) W[i] = static_cast<double>(i);
+  const PairMatrixView view(W, 2, 2);
+  CHECK(view.size() == 6);
+  CHECK(view.block(1, 0) == PairBlock{{{18, 19, 20}, {24, 25, 26}, {30, 31, 32}}});
+  CHECK(view.row(1, 2)[0] == 30);
+  CHECK(PairMatrixView(W, 3, 1).block(2, 1) == PairBlock{{{26, 27, 0}, {32, 33, 0}, {0, 0, 0}}});
+  CHECK(TangentView(e, 2).of(1)[0] == 3);
+  CHECK(TangentView(e, 1).of(3)[0] == 4);
+}
+
+TEST_CASE("the derivatives of sliding friction are those of r_t = -mu r_n s/|s|")
+{
+  const FrictionLaw law{.4};
+  const double r_n = 7, d = 1e-6;
+  const std::array<double, 2> s = {.3, -.2};
+  const SlidingFriction friction = sliding_friction(law, r_n, s);
+  for (std::size_t k = 0; k < 2; ++k)
+  {
+    const double by_normal = (friction_force(law, r_n + d, s)[k] - friction_force(law, r_n - d, s)[k]) / (2 * d);
+    CHECK(std::abs(by_normal + friction.along[k]) < 1e-9); // differences of 1e-6: rounding 1e-10, curvature none
+    for (std::size_t l = 0; l < 2; ++l)
+    {
+      std::array<double, 2> more = s, less = s;
+      more[l] += d, less[l] -= d;
+      const double by_sliding = (friction_force(law, r_n, more)[k] - friction_force(law, r_n, less)[k]) / (2 * d);
+      CHECK(std::abs(by_sliding + friction.damping[k][l]) < 1e-8); // of 10 N s/m: rounding 1e-9, curvature 1e-10
+    }
+  }
+  const std::array<double, 2> rest = {0, 0};
+  CHECK(sliding_friction(law, r_n, rest).damping[0][0] == 0);
+}
+
+TEST_CASE("friction opposes s_theta, but s+ where the pair stuck or where its solution turns back")
+{
+  const Vector velocity = {9, 3, 9, 3, 9, 3, 9, 3}, drive = {1, 1, 1, 1}; // s = 2
+  const std::vector<ContactStatus> status = {ContactStatus::slip, ContactStatus::stick, ContactStatus::open,
+                                             ContactStatus::slip};
+  Vector past = past_sliding(PairView(velocity, 1), TangentView(drive, 1), status, .5);
+  CHECK(past == Vector{0, 1, 0, 0, 0, 1, 0, 1});                                // nothing on normal rows
+  const Vector r = {1, 0, 1, 0, 0, 0, 1, 0}, w = {0, .5, 0, -5, 0, -5, 0, 1.5}; // s+: -.5, -5, -6, .5
+  CHECK(leave_out_where_turned(PairView(r, 1), PairView(w, 1), PairView(past, 1)));
+  CHECK(past == Vector{0, 0, 0, 0, 0, 1, 0, 1}); // the third pair is open, the fourth slides on
+  CHECK(opposes_end(PairView<const double>(past, 1), 0));
+  CHECK_FALSE(opposes_end(PairView<const double>(past, 1), 3));
+  CHECK_FALSE(leave_out_where_turned(PairView(r, 1), PairView(w, 1), PairView(past, 1)));
+  CHECK(past_sliding(PairView(velocity, 1), TangentView(drive, 1), status, 0) == Vector(8, 0.)); // s+ everywhere
+}
+
+TEST_CASE("what is admissible stays, what is not goes to the cone along its normal and its tangential part")
+{
+  CHECK(admissible({2, .5, -.5}, {}, {.5}) == PairVector{2, .5, -.5});
+  CHECK(admissible({2, 3, 4}, {}, {.5}) == PairVector{2, .6, .8});
+  CHECK(admissible({-2, 3, 4}, {}, {.5})[0] == 0);
+  CHECK(length(admissible({-2, 3, 4}, {}, {.5})[1], admissible({-2, 3, 4}, {}, {.5})[2]) == 0);
+}
