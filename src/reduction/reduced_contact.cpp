@@ -5,7 +5,6 @@
 /// slides at the time: a row of W a pair, in single precision, since it acts on changes only. One product with W then
 /// gives the rates, and pairs that still miss the law - those that stick or turn - are solved one by one.
 #include "squeal/contact/solver.hpp"
-#include "squeal/mesh/vector.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
 #include <algorithm>
