@@ -145,6 +145,10 @@ def data_sets_of(file):
     return found
 
 
+# Written with a verdict that is unstable or undecided, which no run here ends in.
+UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide"}
+
+
 def compare(documented, written):
     """Both ways; documented names may hold <placeholders>."""
     patterns = {name: re.compile(re.sub(r"<\w+>", r"[^./]+", re.escape(name).replace(r"\<", "<").replace(r"\>", ">")))
@@ -153,6 +157,7 @@ def compare(documented, written):
     unknown = {name for name in written if not any(pattern.fullmatch(name) for pattern in patterns.values())}
     assert not unknown, f"written and not explained: {sorted(unknown)}"
     missing = {name for name, pattern in patterns.items() if not any(pattern.fullmatch(path) for path in written)}
+    missing -= UNLESS_STABLE
     assert not missing, f"explained and never written: {sorted(missing)}"
     return patterns
 

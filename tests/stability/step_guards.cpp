@@ -134,5 +134,5 @@ TEST_CASE("the refusal is lifted by its option only")
 {
   const Structure structure = chain(0);
   CHECK(step_refusal(structure, nullptr, .4, 1, {.refuse = false}).empty());
-  CHECK_FALSE(step_refusal(structure, nullptr, .4, 1, {.refuse = false}).empty());
+  CHECK_FALSE(step_refusal(structure, nullptr, .4, 1, {}).empty());
 }

@@ -1,6 +1,7 @@
 // ranks: 1
 #include "squeal/contact/sliding_direction.hpp"
 
+#include <cmath>
 #include <doctest/doctest.h>
 #include <Eigen/Core>
 
@@ -102,7 +103,10 @@ TEST_CASE("friction opposes s_theta, but s+ where the pair stuck or where its so
 TEST_CASE("what is admissible stays, what is not goes to the cone along its normal and its tangential part")
 {
   CHECK(admissible({2, .5, -.5}, {}, {.5}) == PairVector{2, .5, -.5});
-  CHECK(admissible({2, 3, 4}, {}, {.5}) == PairVector{2, .6, .8});
+  const PairVector onto_cone = admissible({2, 3, 4}, {}, {.5});
+  CHECK(onto_cone[0] == 2);
+  CHECK(std::abs(onto_cone[1] - .6) < 1e-15); // rounding of one division
+  CHECK(std::abs(onto_cone[2] - .8) < 1e-15);
   CHECK(admissible({-2, 3, 4}, {}, {.5})[0] == 0);
   CHECK(length(admissible({-2, 3, 4}, {}, {.5})[1], admissible({-2, 3, 4}, {}, {.5})[2]) == 0);
 }
