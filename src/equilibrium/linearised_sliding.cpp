@@ -269,8 +269,9 @@ Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>&
   check(MatGetOwnershipRange(interface.B, &first, &last));
   Owned<Mat> result;
   check(MatCreateAIJ(comm_of(interface.B), last - first, last - first, PETSC_DETERMINE, PETSC_DETERMINE,
-                     interface.directions, nullptr, 0, nullptr, result.put()));
-  bool any = false; // alike on every rank
+                     interface.directions, nullptr, interface.directions, nullptr,
+                     result.put())); // a pair may straddle ranks
+  bool any = false;                  // alike on every rank
   for (std::size_t i = 0; i < closed.size(); ++i)
   {
     const double reaction = PairView(reactions, interface.directions).normal(i);
@@ -282,7 +283,7 @@ Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>&
       {
         const double value = friction.damping[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)];
         any = any || value != 0;
-        if (tangential >= first && tangential < last)
+        if (tangential + k >= first && tangential + k < last)
           check(MatSetValue(result, tangential + k, tangential + l, value, INSERT_VALUES));
       }
   }
