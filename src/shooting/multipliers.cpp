@@ -105,11 +105,40 @@ double residual_of(const Krylov& krylov, const Eigenpair& pair)
   return krylov.remainder * std::abs(pair.vector(pair.vector.size() - 1));
 }
 
-/// Whether the residual of the largest Ritz value is below a tenth of its distance from the unit circle.
-bool leading_converged(const Krylov& krylov)
+/// The place of the shift in time among the pairs: near 1, with the vector that is closest to the flow.
+std::size_t find_shift(const std::vector<Eigenpair>& pairs, const Eigen::VectorXd& flow)
 {
-  const Eigenpair leading = eigenpairs(krylov.H).front();
-  return residual_of(krylov, leading) < 0.1 * std::abs(std::abs(leading.value) - 1);
+  std::size_t place = 0;
+  double best = -1;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+  {
+    const double likeness = std::abs(pairs[i].vector.dot(flow.normalized())) - 10 * std::abs(pairs[i].value - 1.);
+    if (i > 0 && likeness <= best) continue;
+    best = likeness;
+    place = i;
+  }
+  return place;
+}
+
+/// The Ritz pairs without that of the shift in time, which is in the space unless it was taken out. `distance`: of the
+/// shift's own multiplier from 1.
+std::vector<Eigenpair> without_shift(const Monodromy& monodromy, const Krylov& krylov, double& distance)
+{
+  std::vector<Eigenpair> pairs = eigenpairs(krylov.H);
+  if (monodromy.phase.get()) return pairs;
+  Eigen::VectorXd flow(krylov.H.rows());
+  for (Eigen::Index i = 0; i < flow.size(); ++i)
+    flow(i) = energy_product(monodromy.flow, krylov.base[static_cast<std::size_t>(i)], monodromy.orbit.rate);
+  const std::size_t shift = find_shift(pairs, flow);
+  distance = std::abs(pairs[shift].value - 1.);
+  pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
+  return pairs;
+}
+
+/// Whether the residual of the largest Ritz value is below a tenth of its distance from the unit circle.
+bool leading_converged(const Krylov& krylov, const std::vector<Eigenpair>& pairs)
+{
+  return !pairs.empty() && residual_of(krylov, pairs.front()) < 0.1 * std::abs(std::abs(pairs.front().value) - 1);
 }
 
 /// Appends the image of the base's last member to the space. Returns the part of it that is new.
@@ -147,7 +176,9 @@ Krylov arnoldi(const Monodromy& monodromy, Owned<Vec> start, PetscInt steps)
     Owned<Vec> next = extend(monodromy, krylov);
     const std::size_t size = krylov.base.size();
     if (size == static_cast<std::size_t>(std::abs(steps)) || krylov.remainder < nothing) return krylov;
-    if (steps < 0 && size % looked_at == 0 && leading_converged(krylov)) return krylov;
+    double distance = 0;
+    if (steps < 0 && size % looked_at == 0 && leading_converged(krylov, without_shift(monodromy, krylov, distance)))
+      return krylov;
     check(VecScale(next, 1 / krylov.remainder));
     krylov.base.push_back(std::move(next));
   }
@@ -205,21 +236,6 @@ Eigen::MatrixXd whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   for (PetscInt k = 0; k < 2 * dofs; ++k)
     M.col(k) = coordinates_of(columns[static_cast<std::size_t>(k)], monodromy.orbit.period);
   return M;
-}
-
-/// The place of the shift in time among the pairs: near 1, with the vector that is closest to the flow.
-std::size_t find_shift(const std::vector<Eigenpair>& pairs, const Eigen::VectorXd& flow)
-{
-  std::size_t place = 0;
-  double best = -1;
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-  {
-    const double likeness = std::abs(pairs[i].vector.dot(flow.normalized())) - 10 * std::abs(pairs[i].value - 1.);
-    if (i > 0 && likeness <= best) continue;
-    best = likeness;
-    place = i;
-  }
-  return place;
 }
 
 /// Says what the bars allow. `complete`: no larger multiplier is to be expected. The `converged` largest values alone
@@ -291,27 +307,39 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   return result;
 }
 
+/// Takes the flow's own direction out of the space: an exact eigenvector only as far as the shift's multiplier is 1.
+void take_out_shift(Monodromy& monodromy)
+{
+  const double speed = energy_norm(monodromy.flow, monodromy.orbit.rate);
+  monodromy.phase = zeros_like(monodromy.orbit.rate);
+  energy_image(monodromy.flow, monodromy.orbit.rate, monodromy.phase);
+  check(VecScale(monodromy.phase, 1 / (speed * speed)));
+}
+
 /// Of a large system. Bars: twice the residual of each Ritz pair.
 FloquetAnalysis from_arnoldi(Monodromy& monodromy, Owned<Vec> start, PetscInt steps)
 {
   FloquetAnalysis result;
   Multipliers& multipliers = result.multipliers;
   const Orbit& orbit = monodromy.orbit;
-  if (monodromy.exact()) monodromy.flow.record_period(orbit.period, orbit.state, 0);
-  const double speed = energy_norm(monodromy.flow, orbit.rate);
-  monodromy.phase = zeros_like(orbit.rate);
-  energy_image(monodromy.flow, orbit.rate, monodromy.phase);
-  check(VecScale(monodromy.phase, 1 / (speed * speed)));
+  if (monodromy.exact())
+  {
+    monodromy.flow.record_period(orbit.period, orbit.state, 0);
+    check(VecAXPY(start, energy_norm(monodromy.flow, start) / energy_norm(monodromy.flow, orbit.rate), orbit.rate));
+  }
+  else
+    take_out_shift(monodromy);
   const Krylov krylov = arnoldi(monodromy, std::move(start), steps);
-  const std::vector<Eigenpair> pairs = eigenpairs(krylov.H);
-  multipliers.periods = static_cast<long>(krylov.base.size()) + 1;
-  multipliers.trivial_error = std::abs(shift_multiplier(monodromy) - 1);
+  if (!monodromy.exact()) multipliers.trivial_error = std::abs(shift_multiplier(monodromy) - 1);
+  const std::vector<Eigenpair> pairs = without_shift(monodromy, krylov, multipliers.trivial_error);
+  multipliers.periods = static_cast<long>(krylov.base.size()) + (monodromy.exact() ? 0 : 1);
+  if (pairs.empty()) return result;
   for (const Eigenpair& pair : pairs)
   {
     multipliers.values.push_back(pair.value);
     multipliers.errors.push_back(2 * residual_of(krylov, pair));
   }
-  decide(multipliers, leading_converged(krylov), 1);
+  decide(multipliers, leading_converged(krylov, pairs), 1);
   result.fastest = zeros_like(orbit.state);
   const Eigen::VectorXd fastest = real_part(pairs.front().vector);
   for (std::size_t i = 0; i < krylov.base.size(); ++i)

@@ -3,9 +3,9 @@
 ///
 /// A small system's matrix is formed whole, a large one's projected on an Arnoldi space in the energy product. Both use
 /// the flow's exact tangent; a flow without one is left to difference quotients. The Arnoldi space starts from the
-/// motions that may grow: a change of amplitude and the other unstable modes, which the orbit may leave unexcited. The
-/// flow's own direction d is taken out of it along itself, so that the shift in time, whose multiplier is 1, is not
-/// found.
+/// motions that may grow and from the flow d: a change of amplitude and the other unstable modes, which the orbit may
+/// leave unexcited. The shift in time, whose multiplier is 1, is the value near 1 whose vector is closest to d. With
+/// difference quotients d is taken out of the space along itself instead.
 ///
 /// Each multiplier has an error bar of its own. Of a whole matrix it is what the multiplier changes by when the grid of
 /// time moves by half a step. Of a Ritz value it is twice its residual. The distance of the shift's own multiplier from
