@@ -12,9 +12,9 @@
 
 #include <cmath>
 #include <cstdio>
+#include <Eigen/Dense>
 #include <map>
 #include <numeric>
-#include <petscblaslapack.h>
 
 using namespace squeal;
 
@@ -133,28 +133,23 @@ std::vector<double> last_triangle(const cholmod_factor* L, std::size_t border)
   return triangle;
 }
 
-/// sigma I - T T' of a lower triangle, by blocks of columns.
+/// sigma I - T T' of a lower triangle, by blocks of columns, whole.
 std::vector<double> sigma_minus_square(const std::vector<double>& triangle, std::size_t size, double sigma)
 {
-  std::vector<double> W(size * size);
-  for (std::size_t i = 0; i < size; ++i) W[i * size + i] = sigma;
-  constexpr std::size_t wide = 128;
-  const double one = 1, minus = -1;
-  const auto n = static_cast<PetscBLASInt>(size);
-  for (std::size_t first = 0; first < size; first += wide)
+  std::vector<double> entries(size * size);
+  const auto n = static_cast<Eigen::Index>(size);
+  const Eigen::Map<const Eigen::MatrixXd> T(triangle.data(), n, n);
+  Eigen::Map<Eigen::MatrixXd> W(entries.data(), n, n);
+  W.diagonal().setConstant(sigma);
+  constexpr Eigen::Index wide = 128;
+  for (Eigen::Index first = 0; first < n; first += wide)
   {
-    const auto width = static_cast<PetscBLASInt>(std::min(wide, size - first));
-    const auto depth = static_cast<PetscBLASInt>(first) + width,
-               below = static_cast<PetscBLASInt>(size - first) - width;
-    double* const corner = &W[first * size + first];
-    const double* const row = &triangle[first];
-    BLASsyrk_("L", "N", &width, &depth, &minus, row, &n, &one, corner, &n);
-    if (below > 0)
-      BLASgemm_("N", "T", &below, &width, &depth, &minus, row + width, &n, row, &n, &one, corner + width, &n);
-    for (std::size_t i = first; i < size; ++i)
-      for (std::size_t j = first; j < std::min(i, first + wide); ++j) W[i * size + j] = W[j * size + i];
+    const Eigen::Index width = std::min(wide, n - first), depth = first + width;
+    W.block(first, first, n - first, width).noalias() -=
+        T.block(first, 0, n - first, depth) * T.block(first, 0, width, depth).transpose();
+    W.block(first, depth, width, n - depth) = W.block(depth, first, n - depth, width).transpose();
   }
-  return W;
+  return entries;
 }
 
 /// W from the factor of the bordered matrix, its border last.
@@ -345,7 +340,9 @@ void run(int argc, char** argv)
     const Owned<Mat> A = step_matrix(structure, h, 0.5);
     compare_factors(A, interface.B, rounds, figures, comparison);
   }
-  const ThetaStep step = make_theta_step(structure, interface, h, 0.5);
+  StepOptions options;
+  read_options(options_of(options));
+  const ThetaStep step = make_theta_step(structure, interface, h, 0.5, options);
   for (const int count : {1, 16})
     compare_solves(step, structure, interface, start, count, 7 * rounds, figures, comparison);
   std::printf("{\"dofs\": %d, \"border\": %zu, \"ordering\": %d, \"entries\": %.6g, \"CHOLMOD entries\": %.6g, "

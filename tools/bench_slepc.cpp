@@ -8,7 +8,7 @@
 /// -bench_write FOLDER writes M, C, K of the quadratic problem and the sizes |lambda| of its pairs, for another solver.
 #include "bench_timing.hpp"
 #include "squeal/algebra/shift_invert.hpp"
-#include "squeal/equilibrium/closed_contact.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/model.hpp"
 #include "squeal/modes/real_modes.hpp"
 #include "squeal/modes/slices.hpp"
@@ -38,13 +38,12 @@ Problem read_problem(const char* file, const std::vector<std::string>& overrides
   const Scene scene = read_scene(file, overrides);
   const Model model = build_model(scene, PETSC_COMM_WORLD);
   const Structure& structure = model.structure;
-  const Equilibrium equilibrium = find_equilibrium(structure, model.interface);
-  const ClosedContact contact = eliminate_closed_pairs(structure, model.interface, equilibrium);
-  const Owned<Mat> C = sliding_damping(structure, model.interface, equilibrium);
-  return {{project(structure.M, contact.Y, contact.Z), project(C, contact.Y, contact.Z),
-           project(structure.K, contact.Y, contact.Z)},
-          project_symmetric(structure.M, contact.Z),
-          project_symmetric(structure.K, contact.Z)};
+  const Equilibrium equilibrium = find_equilibrium(structure, model.interface, {});
+  LinearisedSliding linearised = linearise({structure, model.interface, equilibrium});
+  const Mat Y = linearised.contact.Y, Z = linearised.contact.Z;
+  return {{project(structure.M, Y, Z), project(linearised.C, Y, Z), project(structure.K, Y, Z)},
+          std::move(linearised.M_z),
+          std::move(linearised.K_z)};
 }
 
 struct Answer

@@ -108,7 +108,9 @@ void run(const std::vector<std::string>& words)
   const Interface interface = read_interface(folder, structure, {mu, true}, comm);
   const State start = read_state(words.at(1), structure);
   const double begin = processor_time();
-  const ThetaStep step = make_theta_step(structure, interface, h, .5);
+  StepOptions options;
+  read_options(options_of(options));
+  const ThetaStep step = make_theta_step(structure, interface, h, 0.5, options);
   const double prepared = processor_time() - begin;
 
   std::vector<State> states;
