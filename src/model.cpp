@@ -1,6 +1,7 @@
 #include "squeal/model.hpp"
 
 #include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/solid/probes.hpp"
 
 #include <cmath>
 #include <numbers>

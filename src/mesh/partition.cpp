@@ -2,6 +2,8 @@
 ///
 /// Graph: two nodes are neighbours when an element has both. The nodes of a contact pair are merged into one vertex, so
 /// that both have the same owner. The weight of a vertex is the number of its nodal degrees of freedom.
+#include "squeal/mesh/partition.hpp"
+
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/shapes.hpp"
 

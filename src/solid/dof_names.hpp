@@ -1,6 +1,6 @@
 #pragma once
 /// Names of degrees of freedom for messages.
-#include "squeal/solid/structure.hpp"
+#include "squeal/solid/dofs.hpp"
 
 namespace squeal
 {

@@ -7,6 +7,8 @@
 ///                   theta = I^-1 sum r_i x u_i,   r_i = x_i - mean x,   I = sum |r_i|^2 1 - r_i r_i^T,
 ///                   which is exact for rigid motions. The moment of the shell then acts on the solid nodes as the
 ///                   couple (I^-1 moment) x r_i. I is regular because no solid element is a line.
+#include "squeal/solid/dofs.hpp"
+
 #include "dof_names.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"

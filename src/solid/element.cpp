@@ -1,10 +1,8 @@
 #include "squeal/solid/element.hpp"
 
-#include "kernels.hpp"
+#include "shell_kernel.hpp"
+#include "solid_kernel.hpp"
 #include "squeal/mesh/shapes.hpp"
-
-#include <sstream>
-#include <stdexcept>
 
 namespace squeal
 {
@@ -12,15 +10,6 @@ namespace squeal
 int dofs_per_node(Shape shape)
 {
   return is_shell(shape) ? 6 : 3;
-}
-
-double positive_jacobian(double determinant, std::size_t point)
-{
-  if (determinant > 0) return determinant;
-  std::ostringstream text;
-  text << "the Jacobian is " << determinant << " at integration point " << point
-       << ": the element is too distorted, folded or numbered inside out; correct the mesh there";
-  throw std::runtime_error(text.str());
 }
 
 ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Material& material, double thickness)

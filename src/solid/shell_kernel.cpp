@@ -8,9 +8,12 @@
 /// of the displacements, with sides curved by the rotations of their ends, and rho h^3/12 N_i N_j on all three
 /// rotations. The drilling rotation is included, so that M is positive definite and the same in all axes. Caveat: flat
 /// elements do not couple membrane and bending, so that curved shells converge with the mesh only.
+#include "shell_kernel.hpp"
+
 #include "condensation.hpp"
-#include "kernels.hpp"
-#include "shell_strains.hpp"
+#include "jacobian.hpp"
+#include "shell_membrane.hpp"
+#include "shell_plate.hpp"
 #include "squeal/mesh/quadrature.hpp"
 
 #include <stdexcept>

@@ -11,7 +11,7 @@
 ///     strain = mean + 3/2 sqrt(beta_0) T_e Q theta~,   theta~_i = rz_i - rotation of the linear triangle
 /// At the middle of side ij, Q is the mean of its values at the corners i and j. The deviations from the mean strain at
 /// the three points sum to zero.
-#include "shell_strains.hpp"
+#include "shell_membrane.hpp"
 
 #include <cmath>
 

@@ -8,7 +8,7 @@
 /// w,s + beta_s = gamma_k on the side:
 ///     a_k = -3 / (2 L (1 + phi_k)) (w_j - w_i + L/2 t . (beta_i + beta_j)).
 /// The shear strain is the field with the constant tangential value gamma_k on each side (edge functions).
-#include "shell_strains.hpp"
+#include "shell_plate.hpp"
 
 namespace squeal
 {

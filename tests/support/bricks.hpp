@@ -1,5 +1,6 @@
 #pragma once
 /// Meshes of boxes and strips for tests, and fields on their degrees of freedom.
+#include "squeal/solid/dofs.hpp"
 #include "squeal/solid/structure.hpp"
 
 #include <array>

@@ -1,6 +1,9 @@
 // ranks: 1 2 3
 #include "squeal/base/petsc.hpp"
+#include "squeal/mesh/build.hpp"
 #include "squeal/mesh/mesh_file.hpp"
+#include "squeal/mesh/node_pairs.hpp"
+#include "squeal/mesh/partition.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <doctest/doctest.h>

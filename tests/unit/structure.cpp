@@ -3,6 +3,7 @@
 // Tolerances are round-off of sums of some thousand terms unless said otherwise.
 #include "../support/approx.hpp"
 #include "../support/bricks.hpp"
+#include "squeal/solid/probes.hpp"
 
 #include <algorithm>
 #include <doctest/doctest.h>

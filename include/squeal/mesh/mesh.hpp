@@ -64,31 +64,4 @@ struct Mesh
 /// in no part; a part, group or point that the mesh does not have.
 Mesh read_mesh(const Scene& scene, MPI_Comm comm);
 
-/// A node-to-node contact pair.
-struct NodePair
-{
-  int a = 0;       // node of the rotor
-  int b = 0;       // node of the stator
-  Vec3 normal{};   // [-] unit, out of the rotor into the stator
-  double area = 0; // [m2] tributary area of node a; 0 for points
-  int contact = 0; // index in Scene::contacts
-  double gap = 0;  // [m] distance of the nodes along the normal; 0 for a contact without a reach
-};
-
-/// Returns the contact pairs in the order of the contacts.
-/// Throws Error for: a node of either surface without a partner within 1e-6 of the surface's size; partners farther
-/// apart than the contact's reach; faces with nodal weights that are not all positive; a missing surface or point.
-std::vector<NodePair> match_pairs(const Mesh& mesh, const std::vector<Contact>& contacts);
-
-/// Owner of each node and of each element.
-struct Partition
-{
-  std::vector<int> node_rank;
-  std::vector<int> element_rank; // the rank that owns most of the element's nodes
-};
-
-/// Returns a partition by METIS, the same on every rank. Both nodes of a pair have the same owner. Collective.
-/// Throws Error if there are more ranks than nodes.
-Partition partition_mesh(const Mesh& mesh, const std::vector<NodePair>& pairs, MPI_Comm comm);
-
 } // namespace squeal

@@ -30,9 +30,6 @@ struct FileMesh
 /// a build without libgmsh.
 FileMesh read_mesh_file(const MeshSource& source);
 
-/// Returns the parts, surfaces and groups of a file under the names that the scene gives. Throws Error as read_mesh.
-Mesh build_mesh(const FileMesh& file, const Scene& scene);
-
 /// Returns the names in the DefineConstant lists of a .geo file and of the files it includes.
 std::vector<std::string> geometry_parameters(const std::filesystem::path& file);
 

@@ -1,7 +1,9 @@
 /// The mesh of a scene on every rank: from the file on rank 0, with the scene's points and reference points.
+#include "squeal/mesh/mesh.hpp"
+
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/mesh_file.hpp"
+#include "squeal/mesh/build.hpp"
 #include "squeal/mesh/names.hpp"
 
 namespace squeal

@@ -4,6 +4,8 @@
 /// direction is the pair's normal; the sum of the lengths is the pair's area. All weights of 3-, 4- and 9-node faces
 /// are positive. Those of 6-node triangles and 8-node quadrilaterals are zero or negative at the corners, which no
 /// unilateral nodal reaction can balance.
+#include "squeal/mesh/node_pairs.hpp"
+
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shape_functions.hpp"

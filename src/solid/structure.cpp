@@ -4,6 +4,8 @@
 /// whole mesh, so that it counts the entries of its own rows exactly and without communication. Contributions to rows
 /// of other ranks are sent at the end of the assembly. All three matrices receive every contribution, zeros included,
 /// which gives them one pattern.
+#include "squeal/solid/structure.hpp"
+
 #include "loads.hpp"
 #include "matrices.hpp"
 #include "squeal/mesh/names.hpp"

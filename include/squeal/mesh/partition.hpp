@@ -1,0 +1,19 @@
+#pragma once
+/// Distribution of nodes and elements over the ranks.
+#include "squeal/mesh/node_pairs.hpp"
+
+namespace squeal
+{
+
+/// Owner of each node and of each element.
+struct Partition
+{
+  std::vector<int> node_rank;
+  std::vector<int> element_rank; // the rank that owns most of the element's nodes
+};
+
+/// Returns a partition by METIS, the same on every rank. Both nodes of a pair have the same owner. Collective.
+/// Throws Error if there are more ranks than nodes.
+Partition partition_mesh(const Mesh& mesh, const std::vector<NodePair>& pairs, MPI_Comm comm);
+
+} // namespace squeal

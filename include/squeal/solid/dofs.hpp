@@ -1,0 +1,52 @@
+#pragma once
+/// Free degrees of freedom q and the constraints u = T q on the nodal degrees of freedom u.
+/// Nodal degree of freedom 6 * node + c is component c of a node, c = 0..5 for x y z rx ry rz.
+#include "squeal/base/petsc.hpp"
+#include "squeal/mesh/partition.hpp"
+
+#include <span>
+#include <string>
+#include <vector>
+
+namespace squeal
+{
+
+/// What each free degree of freedom is. Texts are made on demand only, since a model has many degrees of freedom.
+struct DofNames
+{
+  std::vector<std::string> bodies; // "part disc", "point tip", "rigid body carrier"
+  std::vector<int> body;           // index in `bodies` of each node
+  std::vector<Vec3> at;            // [m] position of each node
+  std::vector<PetscInt> nodal_dof; // of each free degree of freedom; empty on a matrix scene
+};
+
+/// Returns "part disc, node 12 at (x, y, z), direction ry", or "dof 12" on a matrix scene.
+std::string describe(const DofNames& names, PetscInt dof);
+
+struct DofTerm
+{
+  PetscInt dof = 0;  // free degree of freedom
+  double factor = 0; // [-, m]
+};
+
+/// The rows of T, the same on every rank. Both nodes of a contact pair have their degrees of freedom on one rank.
+struct DofMap
+{
+  PetscInt size = 0;                // number of free degrees of freedom on all ranks
+  PetscInt first = 0;               // this rank owns first to last - 1
+  PetscInt last = 0;                // end of this rank's range
+  std::vector<std::size_t> offsets; // of each nodal degree of freedom in `terms`, and the end
+  std::vector<DofTerm> terms;       // all rows
+  DofNames names;
+
+  /// Row of a nodal degree of freedom. It is empty where the motion is fixed or the node does not have it.
+  std::span<const DofTerm> terms_of(PetscInt nodal_dof) const;
+};
+
+/// Numbers the free degrees of freedom and eliminates supports and rigid bodies. Collective.
+/// The rotation of a node that shells and solids share follows the least-squares rotation of the solid nodes around it,
+/// so that the moments of the shell act on the solid as couples.
+/// Throws Error for a support or rigid body that contradicts another, and if nothing is free.
+DofMap number_dofs(const Mesh& mesh, const Scene& scene, const Partition& partition, MPI_Comm comm);
+
+} // namespace squeal
