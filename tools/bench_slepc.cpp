@@ -2,9 +2,10 @@
 /// of JSON on standard output.
 ///     bench_slepc SCENE band rounds [key=value …]
 /// All alternate in every round; figures are medians of processor seconds. SLEPc's factors are MUMPS's.
-///     real modes: Krylov-Schur with spectrum slicing (EPSSetInterval), and around one shift;
+///     real modes: around one shift by squeal, beside spectrum slicing (EPSSetInterval);
 ///     subspace:   of the undamped problem with friction, around the band's middle: the start of a slice;
 ///     quadratic:  TOAR, shift-inverted near zero, as -modes_solver toar asks for it.
+/// -bench_real_only leaves out all but the real modes.
 /// -bench_write FOLDER writes M, C, K of the quadratic problem and the sizes |lambda| of its pairs, for another solver.
 #include "bench_timing.hpp"
 #include "squeal/algebra/shift_invert.hpp"
@@ -52,15 +53,15 @@ struct Answer
   double residual = 0, seconds = 0;
 };
 
-/// theta below a limit, and their x.
-struct Found
+/// theta = omega^2 of real modes, and their shapes.
+struct RealPairs
 {
   std::vector<double> theta;
   std::vector<Owned<Vec>> x;
 };
 
 /// Largest |K x - theta M x| / (|K| |x|).
-double largest_residual(const Found& found, Mat M, Mat K)
+double largest_residual(const RealPairs& found, Mat M, Mat K)
 {
   Owned<Vec> left, inertia;
   check(MatCreateVecs(K, left.put(), inertia.put()));
@@ -79,18 +80,6 @@ double largest_residual(const Found& found, Mat M, Mat K)
   return largest;
 }
 
-/// A Krylov-Schur solver of SLEPc's for K x = theta M x.
-EPS make_solver(const Problem& problem)
-{
-  EPS eps = nullptr;
-  check(EPSCreate(PETSC_COMM_WORLD, &eps));
-  check(EPSSetOperators(eps, problem.K, problem.M));
-  check(EPSSetProblemType(eps, EPS_GHEP));
-  check(EPSSetType(eps, EPSKRYLOVSCHUR));
-  check(EPSSetTolerances(eps, 1e-9, 200));
-  return eps;
-}
-
 /// Shift and inverse by MUMPS's L D L'.
 void use_cholesky(ST transformation, KSP solver)
 {
@@ -102,34 +91,17 @@ void use_cholesky(ST transformation, KSP solver)
   check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
 }
 
-/// Adds what a solve found below `limit`.
-void take(EPS eps, double limit, Found& found)
-{
-  check(EPSSetOptionsPrefix(eps, "bench_"));
-  check(EPSSetFromOptions(eps));
-  check(EPSSolve(eps));
-  PetscInt converged = 0;
-  Mat K = nullptr;
-  check(EPSGetConverged(eps, &converged));
-  check(EPSGetOperators(eps, &K, nullptr));
-  for (PetscInt i = 0; i < converged; ++i)
-  {
-    double theta = 0;
-    check(EPSGetEigenvalue(eps, i, &theta, nullptr));
-    if (theta >= limit) continue;
-    found.theta.push_back(theta);
-    check(MatCreateVecs(K, found.x.emplace_back().put(), nullptr));
-    check(EPSGetEigenvector(eps, i, found.x.back(), nullptr));
-  }
-}
-
 /// Spectrum slicing: shifts of SLEPc's own, with `subspace` modes sought at each.
-Found modes_by_interval(const Problem& problem, double limit, PetscInt subspace)
+RealPairs modes_by_interval(const Problem& problem, double limit, PetscInt subspace)
 {
-  Found found;
-  EPS eps = make_solver(problem);
+  EPS eps = nullptr;
   ST transformation = nullptr;
   KSP solver = nullptr;
+  check(EPSCreate(PETSC_COMM_WORLD, &eps));
+  check(EPSSetOperators(eps, problem.K, problem.M));
+  check(EPSSetProblemType(eps, EPS_GHEP));
+  check(EPSSetType(eps, EPSKRYLOVSCHUR));
+  check(EPSSetTolerances(eps, 1e-9, 200));
   check(EPSGetST(eps, &transformation));
   check(STSetType(transformation, STSINVERT));
   check(EPSSetWhichEigenpairs(eps, EPS_ALL));
@@ -137,42 +109,26 @@ Found modes_by_interval(const Problem& problem, double limit, PetscInt subspace)
   check(EPSKrylovSchurSetDimensions(eps, subspace, 2 * subspace, 2 * subspace));
   check(EPSKrylovSchurGetKSP(eps, &solver));
   use_cholesky(transformation, solver);
-  take(eps, limit, found);
-  check(EPSDestroy(&eps));
-  return found;
-}
-
-/// One factor just below zero and one at the limit, whose inertia says how many modes there are; what is missing is
-/// sought again beside those found.
-Found modes_by_one_shift(const Problem& problem, double limit)
-{
-  Found found;
-  RealCount real = make_real_count(problem.M, problem.K, 0);
-  const int expected = count_below(real, std::sqrt(limit));
-  EPS eps = make_solver(problem);
-  ST transformation = nullptr;
-  KSP solver = nullptr;
-  check(EPSGetST(eps, &transformation));
-  check(STGetKSP(transformation, &solver));
-  use_cholesky(transformation, solver);
-  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
-  check(EPSSetTarget(eps, shift_below_zero(problem.M, problem.K)));
-  for (int attempt = 0; attempt < 4 && static_cast<int>(found.theta.size()) < expected; ++attempt)
+  check(EPSSetOptionsPrefix(eps, "bench_"));
+  check(EPSSetFromOptions(eps));
+  check(EPSSolve(eps));
+  PetscInt converged = 0;
+  check(EPSGetConverged(eps, &converged));
+  RealPairs found;
+  for (PetscInt i = 0; i < converged; ++i)
   {
-    const int missing = expected - static_cast<int>(found.theta.size());
-    std::vector<Vec> known(found.x.begin(), found.x.end());
-    if (attempt > 0) check(EPSSetDeflationSpace(eps, static_cast<PetscInt>(known.size()), known.data()));
-    check(EPSSetDimensions(eps, missing + 1, PETSC_DEFAULT, PETSC_DEFAULT));
-    take(eps, limit, found);
+    found.theta.emplace_back();
+    check(MatCreateVecs(problem.K, found.x.emplace_back().put(), nullptr));
+    check(EPSGetEigenpair(eps, i, &found.theta.back(), nullptr, found.x.back(), nullptr));
   }
   check(EPSDestroy(&eps));
   return found;
 }
 
-template <class Search> Answer real_modes_by(const Search& search, const Problem& problem)
+Answer real_modes_by_slicing(const Problem& problem, double limit, PetscInt subspace)
 {
   const double start = processor_time();
-  const Found found = search();
+  const RealPairs found = modes_by_interval(problem, limit, subspace);
   return {static_cast<int>(found.theta.size()), largest_residual(found, problem.M, problem.K),
           processor_time() - start};
 }
@@ -295,6 +251,8 @@ void run(int argc, char** argv)
   char folder[PETSC_MAX_PATH_LEN] = "";
   check(PetscOptionsGetString(nullptr, nullptr, "-bench_write", folder, sizeof folder, nullptr));
   if (*folder) write_problem(problem, band, folder);
+  PetscBool real_only = PETSC_FALSE;
+  check(PetscOptionsGetBool(nullptr, nullptr, "-bench_real_only", &real_only, nullptr));
   Figures figures;
   std::map<std::string, Answer> last;
   const auto note = [&](const std::string& name, const Answer& answer)
@@ -305,8 +263,8 @@ void run(int argc, char** argv)
   for (int round = 0; round < rounds; ++round)
   {
     note("real modes", real_modes_by_squeal(problem, band));
-    note("interval", real_modes_by([&] { return modes_by_interval(problem, omega * omega, subspace); }, problem));
-    note("one shift", real_modes_by([&] { return modes_by_one_shift(problem, omega * omega); }, problem));
+    note("interval", real_modes_by_slicing(problem, omega * omega, subspace));
+    if (real_only) continue;
     note("subspace", subspace_by([&](auto... what) { return theta_by_squeal(problem, what...); }, problem, omega));
     note("subspace, Krylov-Schur",
          subspace_by([&](auto... what) { return theta_by_slepc(problem, what...); }, problem, omega));

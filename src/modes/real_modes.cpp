@@ -2,6 +2,7 @@
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/multivector.hpp"
+#include "squeal/base/callback.hpp"
 #include "squeal/base/integers.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
@@ -9,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 namespace squeal
 {
@@ -47,173 +49,162 @@ RealModes first_of(const SymmetricEigenpairs& all, Mat K, Index count)
   return modes;
 }
 
-/// What a sweep must find: all theta = omega^2 below `limit`, or the first `count`.
-struct Goal
+/// Ascending theta = omega^2 and M-normalised shapes.
+struct RealPairs
 {
-  double limit = 0; // [1/s2]
-  int count = 0;
+  Eigen::VectorXd theta{};
+  MultiVector x;
+
+  int number_below(double limit) const { return static_cast<int>((theta.array() < limit).count()); }
 };
 
-/// What a sweep has found: ascending theta, and M-normalised shapes.
-struct Found
+/// The factor that SLEPc calls for, and what a call threw.
+struct Inverse
 {
-  std::vector<double> theta{};
-  MultiVector shapes;
-  double covered = -HUGE_VAL; // every theta below is in the list
-  bool complete = false;      // the goal is met, as the count of negative pivots says
-  int iterations = 0;
+  const PencilFactor& factor;
+  std::exception_ptr failure{};
+};
 
-  int count() const { return static_cast<int>(theta.size()); }
-  int below(double limit) const
+PetscErrorCode apply_inverse(PC preconditioner, Vec b, Vec x)
+{
+  Inverse* inverse = nullptr;
+  PetscCall(PCShellGetContext(preconditioner, &inverse));
+  return guarded(inverse->failure,
+                 [&] { copy_column(inverse->factor.solve(columns_of(std::span<const Vec>(&b, 1))), 0, x); });
+}
+
+/// Krylov-Schur for the `count` theta nearest the pencil's shift.
+Owned<EPS> make_solver(const ShiftInvert& pencil, PetscInt count, Inverse& inverse)
+{
+  Owned<EPS> eps;
+  ST transformation = nullptr;
+  KSP solver = nullptr;
+  PC factor = nullptr;
+  check(EPSCreate(comm_of(pencil.K), eps.put()));
+  check(EPSSetOperators(eps, pencil.K, pencil.M));
+  check(EPSSetProblemType(eps, EPS_GHEP));
+  check(EPSSetType(eps, EPSKRYLOVSCHUR));
+  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
+  check(EPSSetTarget(eps, pencil.shift));
+  check(EPSSetDimensions(eps, count, PETSC_DEFAULT, PETSC_DEFAULT));
+  check(EPSSetTolerances(eps, 1e-9, 200));
+  check(EPSGetST(eps, &transformation));
+  check(STSetType(transformation, STSINVERT));
+  check(STSetMatMode(transformation, ST_MATMODE_SHELL));
+  check(STGetKSP(transformation, &solver));
+  check(KSPSetType(solver, KSPPREONLY));
+  check(KSPGetPC(solver, &factor));
+  check(PCSetType(factor, PCSHELL));
+  check(PCShellSetContext(factor, &inverse));
+  check(PCShellSetApply(factor, apply_inverse));
+  return eps;
+}
+
+/// Adds to X, whose columns are M-orthonormal, the `count` eigenvectors nearest the pencil's shift that are
+/// M-orthogonal to them. Returns the number of restarts.
+int append_nearest(MultiVector& X, const ShiftInvert& pencil, PetscInt count)
+{
+  Inverse inverse{*pencil.factor};
+  const Owned<EPS> eps = make_solver(pencil, count, inverse);
+  const auto vector = [&](const MultiVector& columns, Index j)
   {
-    return static_cast<int>(std::lower_bound(theta.begin(), theta.end(), limit) - theta.begin());
+    Owned<Vec> x;
+    check(MatCreateVecs(pencil.K, x.put(), nullptr));
+    copy_column(columns, j, x);
+    return x;
+  };
+  std::vector<Owned<Vec>> known;
+  for (Index j = 0; j < X.columns(); ++j) known.push_back(vector(X, j));
+  std::vector<Vec> borrowed(known.begin(), known.end());
+  if (!known.empty()) check(EPSSetDeflationSpace(eps, static_cast<PetscInt>(known.size()), borrowed.data()));
+  const Owned<Vec> start = vector(random_multivector(pencil.K, 1), 0), x = zeros_like(start);
+  Vec initial = start;
+  check(EPSSetInitialSpace(eps, 1, &initial));
+  check_after_callbacks(EPSSolve(eps), inverse.failure);
+  PetscInt iterations = 0, converged = 0;
+  check(EPSGetIterationNumber(eps, &iterations));
+  check(EPSGetConverged(eps, &converged));
+  for (PetscInt i = 0; i < converged; ++i)
+  {
+    check(EPSGetEigenvector(eps, i, x, nullptr));
+    append(X, x);
   }
-};
-
-/// The middle of the widest gap between the values of the last third of an ascending list. A cluster is not cut there.
-double widest_gap(const std::vector<double>& values)
-{
-  std::size_t best = values.size() - 1;
-  for (std::size_t k = best; 3 * k >= 2 * values.size() && k > 0; --k)
-    if (values[k] - values[k - 1] > values[best] - values[best - 1]) best = k;
-  return (values[best] + values[best - 1]) / 2;
+  return static_cast<int>(iterations);
 }
 
-/// theta and M-normalised shapes of the symmetric problem on an invariant subspace.
-SymmetricEigenpairs ritz_modes(const Nearest& nearest, Mat M, Mat K)
+/// theta and shapes on the span of X. Beside the motions of a free body 1/(theta - shift) varies by 1e7, and SLEPc's
+/// theta are off by that times the rounding. Here the dense problem is shifted by the mean theta instead.
+RealPairs ritz_pairs(const MultiVector& X, Mat M, Mat K)
 {
-  const MultiVector& space = nearest.space;
-  double largest = 0;
-  for (const std::complex<double> theta : nearest.theta) largest = std::max(largest, std::abs(theta));
-  return solve_dense_symmetric_shared(space.comm, inner_products(space, product(M, space)),
-                                      inner_products(space, product(K, space)), -largest);
-}
-
-/// Appends the Ritz values between found.covered and a gap before `end`.
-void append(Found& found, const SymmetricEigenpairs& ritz, const MultiVector& space, double end, double limit)
-{
-  std::vector<double> values = {found.covered};
-  for (const double theta : ritz.lambda)
-    if (theta > found.covered && theta < end) values.push_back(theta);
-  values.push_back(end);
-  found.covered = end >= limit ? limit : widest_gap(values);
-  std::vector<Index> chosen;
-  for (Index k = 0; k < ritz.lambda.size(); ++k)
-    if (ritz.lambda(k) > values.front() && ritz.lambda(k) < found.covered)
-    {
-      chosen.push_back(k);
-      found.theta.push_back(ritz.lambda(k));
-    }
-  append(found.shapes, combination(space, ritz.y(Eigen::all, chosen)));
+  if (X.columns() == 0) return {.x = X};
+  const Eigen::MatrixXd mass = inner_products(X, product(M, X)), stiffness = inner_products(X, product(K, X));
+  const double mean = stiffness.trace() / mass.trace();
+  const SymmetricEigenpairs ritz =
+      solve_dense_symmetric_shared(X.comm, mass, stiffness, std::min(-mean, shift_below_zero(M, K)));
+  return {ritz.lambda, combination(X, ritz.y)};
 }
 
 /// The largest |K x - theta M x| / (|K| |x|).
-double largest_residual(const Found& found, Mat M, Mat K)
+double largest_residual(const RealPairs& pairs, Mat M, Mat K)
 {
-  MultiVector residual = product(K, found.shapes);
-  const auto theta = Eigen::VectorXd::Map(found.theta.data(), found.shapes.columns());
-  residual.entries -= product(M, found.shapes).entries * theta.asDiagonal();
+  if (pairs.x.columns() == 0) return 0;
+  MultiVector residual = product(K, pairs.x);
+  residual.entries -= product(M, pairs.x).entries * pairs.theta.asDiagonal();
   double stiffness = 0;
   check(MatNorm(K, NORM_1, &stiffness));
-  const Eigen::ArrayXd ratio = column_norms(residual).array() / (stiffness * column_norms(found.shapes).array());
-  return ratio.size() > 0 ? ratio.maxCoeff() : 0;
+  return (column_norms(residual).array() / column_norms(pairs.x).array()).maxCoeff() / stiffness;
 }
 
-// Numbers of values between what is covered and the next shift, and at most beyond that shift.
-constexpr int below_shift = 20, above_shift = 40;
-
-/// Raises the shift until about `below_shift` values lie between what is covered and the shift. Returns their number.
-int raise_shift(ShiftInvert& pencil, const Found& found, double step, double limit)
+/// A limit [1/s2] and the number of eigenvalues below it.
+struct Inertia
 {
-  int between = 0;
-  for (int attempt = 0; attempt < 6; ++attempt)
-  {
-    const double shift = std::min(found.covered + step, limit);
-    move_to(pencil, shift);
-    between = pencil.factor->negative_pivots() - found.count();
-    if (between <= below_shift + below_shift / 4 && (2 * between >= below_shift || shift == limit)) break;
-    step = (shift - found.covered) * std::min(3.0, below_shift / std::max(1.0, static_cast<double>(between)));
-  }
-  return between;
-}
+  double limit = 0;
+  int below = 0;
+};
 
-/// Drops the values above `verified`, which no count has confirmed.
-void drop_unverified(Found& found, double verified)
+/// Counts at `limit`, or slightly lower where that is an eigenvalue.
+Inertia inertia_at(double limit, ShiftInvert& pencil)
 {
-  const int kept = found.below(verified);
-  found.theta.resize(static_cast<std::size_t>(kept));
-  found.shapes.entries.conservativeResize(Eigen::NoChange, kept);
-  found.covered = verified;
+  move_to(pencil, limit);
+  return {pencil.shift, pencil.factor->negative_pivots()};
 }
 
-/// Solves for `count` values about the shift, and appends them if `between` of them lie below the shift, as the inertia
-/// demands. Returns whether it did.
-bool extend(Found& found, const ShiftInvert& pencil, PetscInt count, int between, double limit)
-{
-  const Nearest nearest = solve_nearest(pencil, count, pencil.shift - found.covered, 1e-9);
-  ++found.iterations;
-  if (!nearest.converged) return false;
-  const SymmetricEigenpairs ritz = ritz_modes(nearest, pencil.M, pencil.K);
-  const auto below = std::count_if(ritz.lambda.begin(), ritz.lambda.end(),
-                                   [&](double theta) { return theta > found.covered && theta < pencil.shift; });
-  if (below != between) return false;
-  append(found, ritz, nearest.space, pencil.shift + nearest.reach, limit);
-  return true;
-}
-
-/// Raises shifts through the spectrum. The factor at each counts the values below it, and all of them must be found.
-Found sweep(Mat M, Mat K, const Goal& goal)
+/// The modes with theta < limit, at most `count` of them. One factor just below zero finds them, and one above the last
+/// of them counts them. A space grown from one vector may miss copies of multiple modes; those are sought again.
+RealModes search_from_below_zero(Mat M, Mat K, double limit, int count)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
+  const double shift = shift_below_zero(M, K);
   ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric);
-  double verified = shift_below_zero(M, K); // the list is complete below
-  Found found{.shapes = empty_multivector(K), .covered = verified};
-  move_to(pencil, verified);
-  for (int failures = 0, between = 0; failures < 4;)
-  {
-    const int missing = std::clamp(goal.count - found.count() - between + 2, 5, above_shift);
-    const double start = std::max(0.0, found.covered);
-    const int before = found.count();
-    const bool good =
-        extend(found, pencil, std::min<PetscInt>(n, between + missing * (1 + failures)), between, goal.limit);
-    found.complete = good && std::isinf(found.covered); // the whole spectrum
-    if (found.complete) break;
-    failures = good ? 0 : failures + 1;
-    if (good) verified = pencil.shift;
-    if (good && found.covered < goal.limit && found.count() < goal.count)
-    {
-      const double spacing = (found.covered - start) / std::max(1, found.count() - before);
-      between = raise_shift(pencil, found, below_shift * spacing, goal.limit);
-      continue;
-    }
-    // The goal is met if the count agrees. If not, values are missing below, and a lower shift is nearer to them.
-    if (good) move_to(pencil, found.covered);
-    found.complete = good && pencil.factor->negative_pivots() == found.below(pencil.shift);
-    if (found.complete) break;
-    drop_unverified(found, verified);
-    if (!good) move_to(pencil, (verified + pencil.shift) / 2);
-    between = pencil.factor->negative_pivots() - found.count();
-  }
-  return found;
-}
-
-RealModes to_modes(const Found& found, Mat M, Mat K, int count)
-{
+  std::optional<Inertia> inertia;
+  if (std::isfinite(limit)) inertia = inertia_at(limit, pencil);
+  RealPairs found{.x = empty_multivector(K)};
   RealModes modes;
-  modes.outcome = {OutcomeKind::converged, "", found.iterations, largest_residual(found, M, K)};
-  if (!found.complete)
+  int missing = inertia ? inertia->below : count;
+  for (int attempt = 0; attempt < 6 && missing > 0 && found.x.columns() < n; ++attempt)
   {
-    modes.outcome.kind = OutcomeKind::not_converged;
-    modes.outcome.reason = std::to_string(found.count()) + " real modes found, and more are missing";
+    move_to(pencil, shift);
+    const PetscInt wanted = std::min<PetscInt>(n - found.x.columns(), missing + 1);
+    modes.outcome.iterations += append_nearest(found.x, pencil, wanted);
+    found = ritz_pairs(found.x, M, K);
+    // The count lies above the last mode by 1e-6 of its distance from the shift, far above the error of theta.
+    if (!inertia && found.theta.size() >= count)
+      inertia = inertia_at(found.theta[count - 1] + 1e-6 * (found.theta[count - 1] - shift), pencil);
+    missing = inertia ? inertia->below - found.number_below(inertia->limit) : count - to_int(found.theta.size());
   }
-  for (int k = 0; k < std::min(found.count(), count); ++k)
+  modes.outcome.kind = missing == 0 ? OutcomeKind::converged : OutcomeKind::not_converged;
+  if (missing != 0)
+    modes.outcome.reason = std::to_string(found.theta.size()) + " real modes found, and the inertia says that " +
+                           std::to_string(missing) + " are missing";
+  const Index kept = std::min(count, found.number_below(limit));
+  found = {found.theta.head(kept), {found.x.comm, found.x.entries.leftCols(kept)}};
+  modes.outcome.residual = largest_residual(found, M, K);
+  for (Index k = 0; k < kept; ++k)
   {
-    Owned<Vec> shape;
-    check(MatCreateVecs(K, shape.put(), nullptr));
-    copy_column(found.shapes, k, shape);
-    modes.omega.push_back(std::sqrt(std::max(0.0, found.theta[static_cast<std::size_t>(k)])));
-    modes.shapes.push_back(std::move(shape));
+    modes.omega.push_back(std::sqrt(std::max(0.0, found.theta[k])));
+    check(MatCreateVecs(K, modes.shapes.emplace_back().put(), nullptr));
+    copy_column(found.x, k, modes.shapes.back());
   }
   return modes;
 }
@@ -283,8 +274,7 @@ RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit)
   check(MatGetSize(K, &n, nullptr));
   if (count <= 0) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (n <= dense_limit) return first_of(solve_whole(M, K), K, count);
-  const Goal goal{HUGE_VAL, static_cast<int>(std::min<PetscInt>(count, n))};
-  return to_modes(sweep(M, K, goal), M, K, goal.count);
+  return search_from_below_zero(M, K, HUGE_VAL, static_cast<int>(std::min<PetscInt>(count, n)));
 }
 
 RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit)
@@ -298,8 +288,7 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit)
     const auto below = std::lower_bound(all.lambda.begin(), all.lambda.end(), omega * omega);
     return first_of(all, K, below - all.lambda.begin());
   }
-  const Goal goal{omega * omega, to_int(n)};
-  return to_modes(sweep(M, K, goal), M, K, goal.count);
+  return search_from_below_zero(M, K, omega * omega, to_int(n));
 }
 
 RealModes find_real_modes_below(const LinearisedSliding& linearised, double band, const ModesOptions& options)

@@ -1,7 +1,7 @@
 #pragma once
-/// The symmetric eigenproblem K y = omega^2 M y of the real modes. Small problems are solved by LAPACK. Large ones are
-/// solved by block Krylov spaces about shifts that rise from just below zero (after Grimes, Lewis, Simon 1994). By
-/// Sylvester's law the factor at each shift counts the eigenvalues below it, so that none is missed.
+/// Real modes, K x = omega^2 M x (src/README.md, section 3.6). Small problems are solved by LAPACK. Large ones are
+/// solved by SLEPc's Krylov-Schur method about one shift just below zero. By Sylvester's law a factor at a second shift
+/// counts the eigenvalues below it, and modes that are missing are sought again.
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/modes/modes.hpp"
 
@@ -32,10 +32,10 @@ int count_below(RealCount& count, double omega);
 /// missed makes a count below some limit too large, not too small.
 std::vector<double> omegas_between(RealCount& count, double least, double top);
 
-/// The lowest `count` modes, or all if there are fewer; shapes are y.
+/// The lowest `count` modes, or all if there are fewer. Shapes are x, in the rows of K.
 RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit);
 
-/// All modes with frequency below `band` [Hz]; shapes are y.
+/// All modes with frequency below `band` [Hz]. Shapes are x, in the rows of K.
 RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit);
 
 } // namespace squeal
