@@ -126,6 +126,46 @@ SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const MatrixXd& 
   return pairs;
 }
 
+std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)
+{
+  const Eigen::EigenSolver<MatrixXd> solver(A);
+  if (solver.info() != Eigen::Success) throw Error("the eigenvalues of a dense matrix did not converge");
+  std::vector<DenseEigenpair> pairs;
+  const Eigen::MatrixXcd vectors = solver.eigenvectors();
+  for (Eigen::Index i = 0; i < A.rows(); ++i)
+    if (solver.eigenvalues()(i).imag() >= 0) pairs.push_back({solver.eigenvalues()(i), vectors.col(i).normalized()});
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const DenseEigenpair& a, const DenseEigenpair& b)
+                   { return std::abs(a.lambda) > std::abs(b.lambda); });
+  std::vector<DenseEigenpair> all;
+  for (DenseEigenpair& pair : pairs)
+  {
+    const bool real = pair.lambda.imag() == 0;
+    DenseEigenpair conjugate{std::conj(pair.lambda), pair.y.conjugate()};
+    all.push_back(std::move(pair));
+    if (!real) all.push_back(std::move(conjugate));
+  }
+  return all;
+}
+
+std::vector<std::size_t> nearest_places(const std::vector<std::complex<double>>& references,
+                                        const std::vector<std::complex<double>>& values)
+{
+  std::vector<std::size_t> places;
+  std::vector<char> taken(values.size(), 0);
+  for (const std::complex<double> reference : references)
+  {
+    std::size_t nearest = values.size();
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (!taken[i] &&
+          (nearest == values.size() || std::abs(values[i] - reference) < std::abs(values[nearest] - reference)))
+        nearest = i;
+    taken[nearest] = 1;
+    places.push_back(nearest);
+  }
+  return places;
+}
+
 std::optional<SchurForm> schur_form(const MatrixXd& A)
 {
   const Eigen::RealSchur<MatrixXd> solver(A);

@@ -1,5 +1,6 @@
 #include "squeal/cycle/limit_cycle.hpp"
 
+#include "floquet.hpp"
 #include "preconditioner.hpp"
 
 #include <algorithm>
@@ -49,8 +50,9 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   const CycleSettings& settings = problem.settings;
   PeriodMap map{problem.sliding, problem.step, settings.steps_per_period, settings.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
-  ShootingResult found =
-      shoot(flow_of(map), preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
+  Flow flow = flow_of(map);
+  add_slow_motions(problem, map, flow);
+  ShootingResult found = shoot(flow, preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
                    settings.steps_per_period,
                    settings.theta,

@@ -85,6 +85,8 @@ void move_by_part(const PeriodMap& map, double part, State& state)
   state.reactions = next.reactions;
 }
 
+} // namespace
+
 void record_period(PeriodMap& map, double period, Vec start, double shift)
 {
   set_period(map, period);
@@ -93,6 +95,9 @@ void record_period(PeriodMap& map, double period, Vec start, double shift)
   map.records =
       record_steps(map.step, map.sliding.structure, map.sliding.interface, state, map.steps, Recorded::contact);
 }
+
+namespace
+{
 
 void apply_tangent(const PeriodMap& map, std::span<const Vec> states)
 {

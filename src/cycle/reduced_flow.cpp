@@ -96,7 +96,7 @@ MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const R
   const VectorXd flow = stacked(f), image = stacked({model.K_z * f.q, model.M_z * f.v});
   // dPhi S S' - f f^+ = U V', and (U V' - I)^-1 + I = -U (I - V'U)^-1 V'
   MatrixXd U(2 * n, 2 * slow + 1), V = MatrixXd::Zero(2 * slow + 1, 2 * n);
-  U << monodromy(map, period, state, slow, comm), -flow;
+  U << monodromy(map, period, record_contacts(map, period, state), comm), -flow;
   V.topLeftCorner(slow, slow).diagonal().setOnes();
   V.block(slow, n, slow, slow).diagonal().setOnes();
   V.bottomRows(1) = image.transpose() / flow.dot(image);

@@ -289,11 +289,18 @@ void set_active_pairs(ReducedModel& model, const Interface& interface, const Equ
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
                     const Reduction& reduction)
 {
+  PairRoles roles{std::move(active), sliding.equilibrium.closed, sliding.equilibrium.reactions};
+  for (const int pair : roles.active) roles.sliding[static_cast<std::size_t>(pair)] = 0;
+  return reduce(sliding, modes, roles, reduction);
+}
+
+ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, const PairRoles& roles,
+                    const Reduction& reduction)
+{
   const auto& [structure, interface, equilibrium] = sliding;
+  const std::vector<int>& active = roles.active;
   ReducedModel model;
-  std::vector<char> stays_closed = equilibrium.closed;
-  for (const int pair : active) stays_closed[static_cast<std::size_t>(pair)] = 0;
-  const ClosedContact contact = eliminate_closed_pairs(structure, interface, stays_closed);
+  const ClosedContact contact = eliminate_closed_pairs(structure, interface, roles.sliding);
   const double omega = modes.front().lambda.imag();
 
   // the modes and the shapes of the pairs' forces, as they come
@@ -312,9 +319,10 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
 
   project(model, structure, contact, columns, X);
   const MultiVector left = product(contact.Y, columns);
-  if (const Owned<Mat> turning =
-          direction_damping(interface, reduction.sliding ? equilibrium.closed : stays_closed, equilibrium.reactions);
-      turning.get())
+  std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
+  if (reduction.sliding)
+    for (const int pair : active) follows[static_cast<std::size_t>(pair)] = 1; // no reaction while open
+  if (const Owned<Mat> turning = direction_damping(interface, follows, roles.reactions); turning.get())
   {
     const std::vector<PetscInt> turns = own_rows(turning);
     model.C += inner_products(rows_of(left, turns), rows_of(product(turning, X), turns));
@@ -326,9 +334,28 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   model.omega = omega;
   choose_basis(model, X, of_modes, reduction.threshold);
 
-  model.active = std::move(active);
+  model.active = active;
   set_active_pairs(model, interface, equilibrium, reduction);
   return model;
+}
+
+ReducedModel truncated(const ReducedModel& model, Index size)
+{
+  ReducedModel result;
+  for (MatrixXd ReducedModel::*const part : {&ReducedModel::M, &ReducedModel::C, &ReducedModel::K, &ReducedModel::M_z,
+                                             &ReducedModel::C_z, &ReducedModel::K_z})
+    result.*part = (model.*part).topLeftCorner(size, size);
+  result.H = model.H.topRows(size);
+  result.G = model.G.leftCols(size);
+  result.active = model.active;
+  result.directions = model.directions;
+  result.friction = model.friction;
+  result.gap = model.gap;
+  result.drive = model.drive;
+  result.reactions = model.reactions;
+  result.omega = model.omega;
+  result.slow = std::min(model.slow, size);
+  return result;
 }
 
 ReducedState coordinates(const ReducedModel& model, const Structure& structure, Vec du, Vec v)

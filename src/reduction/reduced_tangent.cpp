@@ -1,7 +1,11 @@
-/// The reduced period map's derivative.
+/// The reduced period map's derivative (src/README.md, sections 4.13 and 7.5) along recorded contact. With x = (v, q),
+/// db = b x the changes of the closed pairs' rows and dr = -A^-1 T db their reactions, a step is
+///     v+ = F x + P dr,     q+ = q + h (theta v+ + (1-theta) v).
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/contact/sliding_direction.hpp"
 #include "squeal/reduction/reduced_model.hpp"
+
+#include <Eigen/LU>
 
 namespace squeal
 {
@@ -9,20 +13,9 @@ namespace squeal
 namespace
 {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-using Eigen::Index;
-
-/// Pairs that touch at the end of a step.
-std::vector<std::size_t> closed_pairs(const ReducedContact& contact, int directions)
-{
-  const PairView<const double> r(contact.r, directions);
-  std::vector<std::size_t> closed;
-  for (std::size_t pair = 0; pair < r.pairs(); ++pair)
-    if (r.normal(pair) > 0) closed.push_back(pair);
-  return closed;
-}
 
 std::vector<Index> rows_of(const std::vector<std::size_t>& pairs, int directions)
 {
@@ -33,18 +26,41 @@ std::vector<Index> rows_of(const std::vector<std::size_t>& pairs, int directions
   return result;
 }
 
-/// dr of w = W r + b in the rows of the closed pairs for changes db of these, under the contact law where it is smooth:
-/// at w and r of the step just made (src/README.md, section 4.13).
-MatrixXd contact_response(const ReducedMap& map, const ReducedContact& contact, const std::vector<std::size_t>& closed,
-                          const MatrixXd& db)
+/// The pair's part of T: damping of the friction that slides, symmetric.
+struct Turn
+{
+  Index tangential = 0; // the pair's first tangential row among those of the closed pairs
+  MatrixXd damping;     // [N s/m]
+};
+
+/// The contact of one step, linearised.
+struct LinearStep
+{
+  std::vector<Index> rows; // of the closed pairs
+  MatrixXd rates;          // b
+  std::vector<Turn> turns; // T is the identity but there
+  Eigen::PartialPivLU<MatrixXd> A{};
+};
+
+void turn(const LinearStep& step, MatrixXd& x)
+{
+  for (const Turn& pair : step.turns)
+  {
+    const Index d = pair.damping.rows();
+    x.middleRows(pair.tangential, d) = (pair.damping * x.middleRows(pair.tangential, d)).eval();
+  }
+}
+
+/// A of the closed pairs at w and r of the step: friction that slides follows the normal reactions and turns.
+void linearise_contact(const ReducedMap& map, const RecordedContact& contact, const std::vector<std::size_t>& closed,
+                       LinearStep& step)
 {
   const ReducedModel& model = map.model;
   const Index d = model.directions;
   const PairRows<Index> rows(model.directions);
   const PairView<const double> r(contact.r, model.directions), w(contact.w, model.directions);
   const std::vector<ContactStatus> status = contact_status(r, model.friction);
-  const std::vector<Index> all = rows_of(closed, model.directions);
-  MatrixXd A = map.W(all, all), right = -db;
+  MatrixXd A = map.W(step.rows, step.rows);
   for (std::size_t i = 0; i < closed.size(); ++i)
   {
     const std::span<const double> s = w.tangential(closed[i]);
@@ -56,12 +72,13 @@ MatrixXd contact_response(const ReducedMap& map, const ReducedContact& contact, 
       for (Index l = 0; l < d; ++l)
         damping(k, l) = friction.damping[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)];
     A.middleRows(tangential, d) = (damping * A.middleRows(tangential, d)).eval();
-    right.middleRows(tangential, d) = (damping * right.middleRows(tangential, d)).eval();
     A.block(tangential, tangential, d, d) += MatrixXd::Identity(d, d);
     A.block(tangential, normal, d, 1) += VectorXd::Map(friction.along.data(), d);
+    step.turns.push_back({tangential, std::move(damping)});
   }
-  A.diagonal() *= 1 + 1e-10; // of pairs that stick there may be more rows than the shapes can tell apart
-  return solve_dense(std::move(A), right, "reduced model: the contact of a step determines no reactions");
+  for (Index i = 0; i < A.rows(); ++i) // of pairs that stick there may be more rows than the shapes can tell apart
+    A(i, i) = A.row(i).isZero(0) ? 1 : A(i, i) * (1 + 1e-10);
+  step.A.compute(A);
 }
 
 /// db of all rows for changes of the start (v, q), without past sliding.
@@ -80,54 +97,153 @@ MatrixXd free_rates(const ReducedMap& map)
   return rates;
 }
 
-/// db of the closed pairs' rows for changes of the start (v, q): of those of all rows, with past sliding.
-MatrixXd closed_rates(const ReducedMap& map, const MatrixXd& rates_of_all, const ReducedContact& contact,
-                      const std::vector<std::size_t>& closed)
+LinearStep linear_step(const ReducedMap& map, const MatrixXd& rates_of_all, const RecordedContact& contact)
 {
   const ReducedModel& model = map.model;
   const Index n = model.size(), d = model.directions;
-  const PairRows<Index> all(model.directions);
-  MatrixXd rates = rates_of_all(rows_of(closed, model.directions), Eigen::all);
+  const PairRows<Index> rows(model.directions);
+  const PairView<const double> r(contact.r, model.directions);
+  std::vector<std::size_t> closed;
+  for (std::size_t pair = 0; pair < r.pairs(); ++pair)
+    if (r.normal(pair) > 0) closed.push_back(pair);
+  LinearStep step{rows_of(closed, model.directions), {}, {}};
+  if (closed.empty()) return step;
+  step.rates = rates_of_all(step.rows, Eigen::all);
   for (std::size_t i = 0; i < closed.size(); ++i)
-    if (!opposes_end(PairView<const double>(contact.past, model.directions), closed[i]))
-      rates.middleRows(all.tangential(static_cast<Index>(i)), d).leftCols(n) +=
-          (1 - map.theta) / map.theta * model.G.middleRows(all.tangential(static_cast<Index>(closed[i])), d);
-  return rates;
+    if (contact.opposes_theta[closed[i]])
+      step.rates.middleRows(rows.tangential(static_cast<Index>(i)), d).leftCols(n) +=
+          (1 - map.theta) / map.theta * model.G.middleRows(rows.tangential(static_cast<Index>(closed[i])), d);
+  linearise_contact(map, contact, closed, step);
+  return step;
+}
+
+/// Columns of the start, rows (v, q), to those of the step's end.
+void advance_columns(const ReducedMap& map, const LinearStep& step, MatrixXd& X)
+{
+  const Index n = map.model.size();
+  MatrixXd v = map.from_state * X;
+  if (!step.rows.empty())
+  {
+    MatrixXd db = step.rates * X;
+    turn(step, db);
+    v.noalias() -= map.from_reactions(Eigen::all, step.rows) * step.A.solve(db);
+  }
+  X.bottomRows(n) += map.h * (map.theta * v + (1 - map.theta) * X.topRows(n));
+  X.topRows(n) = v;
+}
+
+/// Columns of the step's end to those of its start, by the transpose.
+void go_back(const ReducedMap& map, const LinearStep& step, MatrixXd& X)
+{
+  const Index n = map.model.size();
+  const MatrixXd v = X.topRows(n) + map.h * map.theta * X.bottomRows(n); // on v+
+  MatrixXd start = map.from_state.transpose() * v;
+  start.topRows(n) += map.h * (1 - map.theta) * X.bottomRows(n);
+  start.bottomRows(n) += X.bottomRows(n);
+  if (!step.rows.empty())
+  {
+    MatrixXd y = step.A.transpose().solve(MatrixXd(map.from_reactions(Eigen::all, step.rows).transpose() * v));
+    turn(step, y);
+    start.noalias() -= step.rates.transpose() * y;
+  }
+  X = std::move(start);
+}
+
+/// Rows (v, q) for (q, v), and back.
+MatrixXd halves_exchanged(const MatrixXd& X)
+{
+  const Index n = X.rows() / 2;
+  MatrixXd result(X.rows(), X.cols());
+  result << X.bottomRows(n), X.topRows(n);
+  return result;
+}
+
+/// This rank's share of the columns.
+struct Share
+{
+  Index first, last;
+};
+
+Share share_of(Index columns, MPI_Comm comm)
+{
+  return {columns * rank_of(comm) / ranks_of(comm), columns * (rank_of(comm) + 1) / ranks_of(comm)};
+}
+
+/// All columns on every rank. Every entry is one rank's: a sum of it and zeros has the same bits everywhere.
+MatrixXd gathered(const MatrixXd& own, Index columns, MPI_Comm comm)
+{
+  MatrixXd result = MatrixXd::Zero(own.rows(), columns);
+  result.middleCols(share_of(columns, comm).first, own.cols()) = own;
+  MPI_Allreduce(MPI_IN_PLACE, result.data(), static_cast<int>(result.size()), MPI_DOUBLE, MPI_SUM, comm);
+  return result;
 }
 
 } // namespace
 
-MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, Eigen::Index slow, MPI_Comm comm)
+std::vector<RecordedContact> record_contacts(ReducedMap& map, double period, ReducedState state)
 {
   prepare(map, period);
-  const ReducedModel& model = map.model;
-  const double h = map.h, theta = map.theta;
-  const Index n = model.size();
-  const MatrixXd rates = free_rates(map);
-  // this rank's columns, of (q, v); the rows are (v, q), as in the step
-  const Index first = 2 * slow * rank_of(comm) / ranks_of(comm), last = 2 * slow * (rank_of(comm) + 1) / ranks_of(comm);
-  MatrixXd X = MatrixXd::Zero(2 * n, last - first);
-  for (Index column = first; column < last; ++column) X(column < slow ? n + column : column - slow, column - first) = 1;
+  std::vector<RecordedContact> contacts;
   ReducedContact contact{map.reactions};
   for (int i = 0; i < map.steps; ++i)
   {
     if (!advance(map, state, contact)) ++map.unconverged;
-    MatrixXd v = map.from_state * X;
-    if (const auto closed = closed_pairs(contact, model.directions); !closed.empty())
-    {
-      const MatrixXd db = closed_rates(map, rates, contact, closed) * X;
-      const std::vector<Index> rows = rows_of(closed, model.directions);
-      v += map.from_reactions(Eigen::all, rows) * contact_response(map, contact, closed, db);
-    }
-    X.bottomRows(n) += h * (theta * v + (1 - theta) * X.topRows(n));
-    X.topRows(n) = v;
+    RecordedContact& now = contacts.emplace_back(RecordedContact{contact.r, contact.w, {}});
+    for (std::size_t pair = 0; pair < map.model.active.size(); ++pair)
+      now.opposes_theta.push_back(!opposes_end(PairView<const double>(contact.past, map.model.directions), pair));
   }
-  MatrixXd result = MatrixXd::Zero(2 * n, 2 * slow);
-  result.topRows(n).middleCols(first, last - first) = X.bottomRows(n);
-  result.bottomRows(n).middleCols(first, last - first) = X.topRows(n);
-  // every entry is one rank's: a sum of it and zeros has the same bits everywhere
-  MPI_Allreduce(MPI_IN_PLACE, result.data(), static_cast<int>(result.size()), MPI_DOUBLE, MPI_SUM, comm);
-  return result;
+  return contacts;
+}
+
+std::vector<RecordedContact> recorded_contacts(const ReducedModel& model, int directions,
+                                               std::span<const StepRecord> records)
+{
+  std::vector<RecordedContact> contacts;
+  const auto rows = static_cast<Index>(model.active.size()) * (1 + model.directions);
+  for (const StepRecord& record : records)
+  {
+    RecordedContact& contact = contacts.emplace_back(RecordedContact{VectorXd(rows), VectorXd(rows), {}});
+    const PairView<double> r(contact.r, model.directions), w(contact.w, model.directions);
+    for (std::size_t i = 0; i < model.active.size(); ++i)
+    {
+      const auto pair = static_cast<std::size_t>(model.active[i]);
+      r.set(i, PairView(record.reactions, directions).vector(pair));
+      w.set(i, PairView(record.contact_velocity, directions).vector(pair));
+      contact.opposes_theta.push_back(record.opposes_theta[pair]);
+    }
+  }
+  return contacts;
+}
+
+MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+                       const MatrixXd& columns, MPI_Comm comm)
+{
+  prepare(map, period);
+  const MatrixXd rates = free_rates(map);
+  const Share share = share_of(columns.cols(), comm);
+  MatrixXd X = halves_exchanged(columns.middleCols(share.first, share.last - share.first));
+  for (const RecordedContact& contact : contacts) advance_columns(map, linear_step(map, rates, contact), X);
+  return gathered(halves_exchanged(X), columns.cols(), comm);
+}
+
+MatrixXd apply_adjoint(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+                       const MatrixXd& columns, MPI_Comm comm)
+{
+  prepare(map, period);
+  const MatrixXd rates = free_rates(map);
+  const Share share = share_of(columns.cols(), comm);
+  MatrixXd X = halves_exchanged(columns.middleCols(share.first, share.last - share.first));
+  for (std::size_t i = contacts.size(); i-- > 0;) go_back(map, linear_step(map, rates, contacts[i]), X);
+  return gathered(halves_exchanged(X), columns.cols(), comm);
+}
+
+MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedContact> contacts, MPI_Comm comm)
+{
+  const Index n = map.model.size(), slow = map.model.slow;
+  MatrixXd columns = MatrixXd::Zero(2 * n, 2 * slow);
+  columns.topLeftCorner(slow, slow).diagonal().setOnes();
+  columns.block(n, slow, slow, slow).diagonal().setOnes();
+  return apply_tangent(map, period, contacts, columns, comm);
 }
 
 } // namespace squeal

@@ -145,6 +145,7 @@ Json multiplier_entry(const Multipliers& multipliers)
                     {"imaginary", multipliers.values[i].imag()},
                     {"error", multipliers.errors[i]}});
   Json entry = {{"stability", word(multipliers.stability)},
+                {"method", word(multipliers.method)},
                 {"trivial_error", multipliers.trivial_error},
                 {"periods_integrated", multipliers.periods},
                 {"values", list}};

@@ -23,8 +23,10 @@ OptionList options_of(ShootingOptions& options)
        "iterations without progress before the finish starts again, or falls back"},
       {"-cycle_max_periods", &options.max_periods, Range::not_negative, "periods that may be integrated in all"},
       {"-cycle_multipliers", &options.multipliers, Range::any,
-       "Arnoldi steps of the Floquet multipliers, 0: none; below 0: all of a small system, else until the largest is "
-       "found"},
+       "columns that the search for Floquet multipliers may take, 0: none; below 0: as many as it needs, within "
+       "limits"},
+      {"-cycle_multiplier_method", choice_of(options.multiplier_method), Range::any,
+       "of the Floquet multipliers: auto, whole, oblique or arnoldi"},
   };
 }
 

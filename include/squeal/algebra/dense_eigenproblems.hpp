@@ -25,6 +25,14 @@ std::vector<DenseEigenpair> solve_dense_quadratic(const Eigen::MatrixXd& M, cons
 std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Eigen::MatrixXd& M,
                                                          const Eigen::MatrixXd& C, const Eigen::MatrixXd& K);
 
+/// All eigenpairs of A, the largest modulus first, of a complex pair first the one with Im(lambda) > 0.
+std::vector<DenseEigenpair> solve_dense_unsymmetric(const Eigen::MatrixXd& A);
+
+/// For each reference the place of the nearest of the values that no earlier reference has. There are at least as many
+/// values.
+std::vector<std::size_t> nearest_places(const std::vector<std::complex<double>>& references,
+                                        const std::vector<std::complex<double>>& values);
+
 /// Eigenvalues in ascending order and a vector for each, as the columns of y.
 struct SymmetricEigenpairs
 {

@@ -25,6 +25,9 @@ struct PeriodMap
 /// Makes A and W those of this period, unless they are already.
 void set_period(PeriodMap& map, double period);
 
+/// Records the contact of each step of a period; `shift`: the part of a step by which the grid of time is moved.
+void record_period(PeriodMap& map, double period, Vec start, double shift);
+
 /// Gives the flow the exact tangent of the map. Borrows the map.
 void add_tangent(PeriodMap& map, Flow& flow);
 

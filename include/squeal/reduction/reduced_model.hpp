@@ -22,9 +22,11 @@
 #include "squeal/contact/pair_law.hpp"
 #include "squeal/contact/solver.hpp"
 #include "squeal/modes/modes.hpp"
+#include "squeal/transient/step_record.hpp"
 
 #include <Eigen/Dense>
 #include <functional>
+#include <span>
 
 namespace squeal
 {
@@ -65,6 +67,20 @@ struct Reduction
 
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
                     const Reduction& reduction);
+
+/// What each pair does in the motion that a model is made for. Pairs that are neither active nor sliding stay open.
+struct PairRoles
+{
+  std::vector<int> active;       // ascending
+  std::vector<char> sliding;     // by pairs: closed and sliding throughout, eliminated
+  std::vector<double> reactions; // [N] a contact vector: means over the motion, which turn the friction of C_f
+};
+
+ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, const PairRoles& roles,
+                    const Reduction& reduction);
+
+/// The model on its first `size` shapes, those of longest period, without the shapes themselves.
+ReducedModel truncated(const ReducedModel& model, Eigen::Index size);
 
 /// Position and velocity about the equilibrium.
 struct ReducedState
@@ -133,8 +149,30 @@ struct Passage
 
 Passage pass(ReducedMap& map, double period, ReducedState state);
 
-/// The derivative of a period's end (q, v) in the first `slow` coordinates of q and of v: the product of the steps'
-/// own, exact where no pair changes its state within rounding. Collective: each rank does its share of the columns.
-Eigen::MatrixXd monodromy(ReducedMap& map, double period, ReducedState state, Eigen::Index slow, MPI_Comm comm);
+/// The contact of the active pairs in one step, on which the step's tangent is a linear map (src/README.md, 4.13).
+struct RecordedContact
+{
+  Eigen::VectorXd r, w;            // [N, m/s] contact vectors: reactions, contact velocity
+  std::vector<char> opposes_theta; // by pairs
+};
+
+/// The contact of each step of a period.
+std::vector<RecordedContact> record_contacts(ReducedMap& map, double period, ReducedState state);
+
+/// The same of the full model's recorded steps, as the reduced model sees them.
+std::vector<RecordedContact> recorded_contacts(const ReducedModel& model, int directions,
+                                               std::span<const StepRecord> records);
+
+/// Columns of changes of the start, (q, v), to those of the period's end: the product of the steps' own tangents on the
+/// recorded contact. Collective: each rank does its share of the columns.
+Eigen::MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+                              const Eigen::MatrixXd& columns, MPI_Comm comm);
+
+/// Columns x to (dPhi/dx)'x.
+Eigen::MatrixXd apply_adjoint(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+                              const Eigen::MatrixXd& columns, MPI_Comm comm);
+
+/// The derivative of a period's end (q, v) in the coordinates q and v of the slow shapes.
+Eigen::MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedContact> contacts, MPI_Comm comm);
 
 } // namespace squeal

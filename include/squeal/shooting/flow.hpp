@@ -4,11 +4,27 @@
 /// The shooting solver sees nothing else of a model.
 #include "squeal/base/petsc.hpp"
 
+#include <complex>
 #include <functional>
 #include <span>
+#include <string>
+#include <vector>
 
 namespace squeal
 {
+
+/// Approximate eigenvectors of dPhi_T/dx whose multipliers are largest (src/README.md, section 6.9). A complex pair
+/// takes two places of each list, its vectors as real and imaginary parts.
+struct SlowMotions
+{
+  std::vector<std::complex<double>> values; // largest first
+  std::vector<double> errors;               // what a value changes by with the grid of time
+  std::vector<Owned<Vec>> right, left;      // left ones act by the energy product
+  std::vector<Owned<Vec>> others;           // more motions that decay slowly, the slowest first
+  bool confirmed = false;                   // another approximation has as many large values
+  std::string missing;                      // why there are none
+  long periods = 0;                         // integrated to find them
+};
 
 /// The period map Phi_T: the state a time T after a start.
 struct Flow
@@ -23,6 +39,8 @@ struct Flow
   std::function<void(double period, Vec start, double shift)> record_period{};
   /// x_k = dPhi_period/dx x_k along the period recorded last, all at once, in place.
   std::function<void(std::span<const Vec> states)> apply_tangent{};
+  /// The slow motions of this period, which becomes the one recorded last. Empty: none are known.
+  std::function<SlowMotions(double period, Vec start)> slow_motions{};
 };
 
 /// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; x and y are states. Empty: P = -I.

@@ -1,17 +1,15 @@
 #pragma once
 /// Floquet multipliers: eigenvalues of the monodromy matrix dPhi_T/dx at a periodic orbit (src/README.md, section 6.9).
 ///
-/// A small system's matrix is formed whole, a large one's projected on an Arnoldi space in the energy product. Both use
-/// the flow's exact tangent; a flow without one is left to difference quotients. The Arnoldi space starts from the
-/// motions that may grow and from the flow d: a change of amplitude and the other unstable modes, which the orbit may
-/// leave unexcited. The shift in time, whose multiplier is 1, is the value near 1 whose vector is closest to d. With
-/// difference quotients d is taken out of the space along itself instead.
+/// A small system's matrix is formed whole. A large one's is projected obliquely on approximate right and left vectors
+/// where the flow knows some, else on an Arnoldi space in the energy product. All use the flow's exact tangent; a flow
+/// without one is left to difference quotients. The shift in time, whose multiplier is 1, is the value near 1 whose
+/// vector is closest to d.
 ///
-/// Each multiplier has an error bar of its own. Of a whole matrix it is what the multiplier changes by when the grid of
-/// time moves by half a step. Of a Ritz value it is twice its residual. The distance of the shift's own multiplier from
-/// 1 says nothing about the others.
+/// Each multiplier has an error bar of its own. The distance of the shift's own multiplier from 1 says nothing about
+/// the others.
 ///
-/// Caveat: an Arnoldi space may lack a motion that grows. That its leading value has converged makes it unlikely.
+/// Caveat: a projection may lack a motion that grows. What is done about that makes it unlikely.
 #include "squeal/shooting/options.hpp"
 #include "squeal/shooting/orbit.hpp"
 
@@ -62,6 +60,7 @@ struct Multipliers
   std::string would_decide;           // of an undecided one, in a sentence
   double trivial_error = 0;           // distance of the shift's own multiplier from 1
   long periods = 0;                   // columns of the tangent, or difference quotients, over one period each
+  MultiplierMethod method = MultiplierMethod::automatic; // that was used
 };
 
 struct FloquetAnalysis
@@ -70,9 +69,9 @@ struct FloquetAnalysis
   Owned<Vec> fastest; // the motion of the largest multiplier, of energy norm 1; null if none was examined
 };
 
-/// All multipliers of a system of up to 100 degrees of freedom, or 25 without an exact tangent. Of a larger one as many
-/// Arnoldi steps as its leading value needs: its residual must be below a tenth of its distance from the unit circle.
-/// At most 96 steps are made, or 24 beyond 10 000 degrees of freedom. -cycle_multipliers gives another number.
+/// All multipliers of a system of up to 100 degrees of freedom, or 25 without an exact tangent. Of a larger one those
+/// of the slow motions, or as many Arnoldi steps as its leading value needs: at most 96, or 24 beyond 10 000 degrees of
+/// freedom. -cycle_multiplier_method forces a method.
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable);
 

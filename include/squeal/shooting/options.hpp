@@ -22,6 +22,22 @@ inline Words words_of(Finish)
   return finish_words;
 }
 
+/// How Floquet multipliers are found (src/README.md, section 6.9).
+enum class MultiplierMethod
+{
+  automatic, // by the size of the system
+  whole,     // from the whole monodromy matrix
+  oblique,   // by projection on approximate right and left vectors; arnoldi where there are none
+  arnoldi,
+};
+
+inline constexpr std::array multiplier_method_words = {"auto", "whole", "oblique", "arnoldi"};
+
+inline Words words_of(MultiplierMethod)
+{
+  return multiplier_method_words;
+}
+
 struct ShootingOptions
 {
   Finish finish = Finish::multisecant;
@@ -34,7 +50,8 @@ struct ShootingOptions
   double clamp = 0.3;             // longest multisecant step over the fluctuation
   PetscInt stall = 30;            // iterations without progress before the multisecant stage gives up
   PetscInt max_periods = 400;     // integrated in all
-  PetscInt multipliers = -1;      // Arnoldi steps; 0: none; below 0: as many as find_multipliers says
+  PetscInt multipliers = -1;      // columns sought; 0: none; below 0: as many as find_multipliers says
+  MultiplierMethod multiplier_method = MultiplierMethod::automatic;
 };
 
 OptionList options_of(ShootingOptions& options);

@@ -1,0 +1,222 @@
+#include "floquet.hpp"
+
+#include "reduced_spectrum.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// What a pair did over recorded periods.
+struct PairHistory
+{
+  bool opened = false, closed = false, stuck = false;
+  bool turned = false; // slid otherwise than along the drive
+  double reaction = 0; // [N] sum of r_n
+};
+
+std::vector<PairHistory> histories(const Interface& interface, std::span<const std::vector<StepRecord>> periods)
+{
+  std::vector<PairHistory> pairs(static_cast<std::size_t>(interface.pairs));
+  const TangentView drive(interface.drive, interface.directions);
+  for (const std::vector<StepRecord>& records : periods)
+    for (const StepRecord& record : records)
+    {
+      const std::vector<ContactStatus> status = contact_status(interface, record.reactions);
+      const PairView r(record.reactions, interface.directions), w(record.contact_velocity, interface.directions);
+      for (std::size_t i = 0; i < pairs.size(); ++i)
+      {
+        PairHistory& pair = pairs[i];
+        (status[i] == ContactStatus::open ? pair.opened : pair.closed) = true;
+        pair.stuck = pair.stuck || status[i] == ContactStatus::stick;
+        pair.turned = pair.turned || (status[i] == ContactStatus::slip && dot(w.tangential(i), drive.of(i)) >= 0);
+        pair.reaction += r.normal(i);
+      }
+    }
+  return pairs;
+}
+
+/// Pairs whose status changes are active, those that always slide are eliminated.
+PairRoles roles_of(const std::vector<PairHistory>& pairs, const Interface& interface, std::size_t steps)
+{
+  PairRoles roles{{}, std::vector<char>(pairs.size(), 0), std::vector<double>(interface.size(), 0.)};
+  const PairView reactions(roles.reactions, interface.directions);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+  {
+    reactions.normal(i) = pairs[i].reaction / static_cast<double>(steps);
+    if (!pairs[i].closed) continue;
+    if (pairs[i].opened || pairs[i].stuck || pairs[i].turned)
+      roles.active.push_back(static_cast<int>(i));
+    else
+      roles.sliding[i] = 1;
+  }
+  return roles;
+}
+
+/// The recorded periods of a cycle: its own, one with the grid of time moved by half a step, one of half as many steps.
+struct RecordedPeriods
+{
+  enum
+  {
+    own,
+    moved,
+    coarse,
+    count
+  };
+  std::array<std::vector<StepRecord>, count> records;
+};
+
+/// Leaves the map with its own period recorded.
+RecordedPeriods record_periods(PeriodMap& map, double period, Vec start)
+{
+  RecordedPeriods result;
+  PeriodMap half{map.sliding, map.options, map.steps / 2, map.theta};
+  half.reactions = map.reactions;
+  record_period(half, period, start, 0);
+  result.records[RecordedPeriods::coarse] = std::move(half.records);
+  record_period(map, period, start, 0.5);
+  result.records[RecordedPeriods::moved] = std::move(map.records);
+  record_period(map, period, start, 0);
+  for (const StepRecord& record : map.records)
+    result.records[RecordedPeriods::own].push_back(
+        {record.wanted, record.reactions, record.contact_velocity, record.opposes_theta, {}, {}, {}});
+  return result;
+}
+
+/// Of as many large multipliers both ways; a value within `margin` of the limit may fall on either side.
+bool as_many_above(double limit, const std::vector<Complex>& a, const std::vector<Complex>& b)
+{
+  constexpr double margin = 5e-3;
+  const auto above = [](double least, const std::vector<Complex>& values)
+  { return std::count_if(values.begin(), values.end(), [&](Complex value) { return std::abs(value) > least; }); };
+  return above(limit + margin, a) <= above(limit - margin, b) && above(limit + margin, b) <= above(limit - margin, a);
+}
+
+/// Reduced vectors as states of the full model; of left ones those that act on the model's states by the energy
+/// product.
+std::vector<Owned<Vec>> lifted(const ReducedModel& model, const MatrixXd& vectors, Vec pattern)
+{
+  const Index n = model.size();
+  std::vector<Owned<Vec>> states;
+  for (Index k = 0; k < vectors.cols(); ++k)
+  {
+    states.push_back(zeros_like(pattern));
+    add_motion(model, 1, vectors.col(k).head(n), displacement(states.back()));
+    add_motion(model, 1, vectors.col(k).tail(n), velocity(states.back()));
+  }
+  return states;
+}
+
+MatrixXd energy_representatives(const ReducedModel& model, const MatrixXd& left)
+{
+  const Index n = model.size();
+  MatrixXd result(left.rows(), left.cols());
+  result << solve_dense(model.K_z, left.topRows(n), "cycle: the reduced model has a motion without stiffness"),
+      model.M_factor.solve(left.bottomRows(n));
+  return result;
+}
+
+/// The sliding modes that decay slowest, as states.
+std::vector<Owned<Vec>> slow_sliding_motions(const std::vector<ComplexMode>& modes, Vec pattern)
+{
+  constexpr std::size_t at_most = 60; // of which the search beside the slow motions takes a few
+  std::vector<const ComplexMode*> order;
+  for (const ComplexMode& mode : modes) order.push_back(&mode);
+  std::stable_sort(order.begin(), order.end(),
+                   [](const ComplexMode* a, const ComplexMode* b) { return a->lambda.real() > b->lambda.real(); });
+  order.resize(std::min(order.size(), at_most));
+  std::vector<Owned<Vec>> states;
+  for (const ComplexMode* mode : order)
+    for (const bool real : {true, false}) // the parts of phi e^{lambda t} at t = 0
+    {
+      const double a = mode->lambda.real(), b = mode->lambda.imag();
+      const Vec u = real ? mode->real.get() : mode->imaginary.get();
+      states.push_back(zeros_like(pattern));
+      check(VecCopy(u, displacement(states.back())));
+      const Vec v = velocity(states.back());
+      check(VecAXPY(v, a, u));
+      check(VecAXPY(v, real ? -b : b, real ? mode->imaginary.get() : mode->real.get()));
+    }
+  return states;
+}
+
+/// The reduced model for the recorded periods.
+ReducedModel model_for(const CycleProblem& problem, const RecordedPeriods& periods)
+{
+  const Interface& interface = problem.sliding.interface;
+  const std::vector<PairHistory> pairs = histories(interface, periods.records);
+  std::size_t steps = 0;
+  for (const auto& records : periods.records) steps += records.size();
+  const PairRoles roles = roles_of(pairs, interface, steps);
+  const bool slide =
+      std::none_of(pairs.begin(), pairs.end(), [](const PairHistory& pair) { return pair.stuck || pair.turned; });
+  const bool many = roles.active.size() * static_cast<std::size_t>(1 + interface.directions) > 150;
+  return reduce(problem.sliding, problem.modes, roles, {static_cast<int>(problem.modes.size()), 1e-5, slide && many});
+}
+
+SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, double period, Vec start)
+{
+  const MPI_Comm comm = comm_of(problem.sliding.structure.load);
+  const int directions = problem.sliding.interface.directions;
+  const RecordedPeriods periods = record_periods(map, period, start);
+  SlowMotions slow;
+  slow.periods = 3;
+  const ReducedModel model = model_for(problem, periods);
+  const auto contacts = [&](int which)
+  { return recorded_contacts(model, directions, periods.records[static_cast<std::size_t>(which)]); };
+  ReducedMap own{model, map.steps, map.theta}, coarse{model, map.steps / 2, map.theta};
+  const auto recorded = contacts(RecordedPeriods::own);
+  const ReducedSpectrum spectrum = large_multipliers(own, period, recorded, {0.85, 4, 48}, comm);
+  const auto moved = multipliers_along(spectrum, own, period, contacts(RecordedPeriods::moved), comm);
+  const auto halved = multipliers_along(spectrum, coarse, period, contacts(RecordedPeriods::coarse), comm);
+  slow.values = spectrum.values;
+  for (std::size_t i = 0; i < slow.values.size(); ++i)
+  {
+    slow.errors.push_back(std::abs(moved[i] - slow.values[i]));
+    if (map.steps <= 128) slow.errors.back() += std::abs(std::abs(halved[i]) - std::abs(slow.values[i]));
+  }
+  const ReducedModel smaller = truncated(model, (3 * model.size() + 3) / 4);
+  ReducedMap few{smaller, map.steps, map.theta};
+  slow.confirmed =
+      as_many_above(0.95, spectrum.values, large_multipliers(few, period, recorded, {0.85, 4, 48}, comm).values);
+  slow.right = lifted(model, spectrum.right, start);
+  slow.left = lifted(model, energy_representatives(model, spectrum.left), start);
+  slow.others = slow_sliding_motions(problem.modes, start);
+  return slow;
+}
+
+} // namespace
+
+void add_slow_motions(const CycleProblem& problem, PeriodMap& map, Flow& flow)
+{
+  flow.slow_motions = [&problem, &map](double period, Vec start)
+  { return slow_motions_of(problem, map, period, start); };
+}
+
+FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, PeriodMap& map, const Orbit& orbit)
+{
+  Flow flow = flow_of(map);
+  add_slow_motions(problem, map, flow);
+  const Vec u0 = problem.sliding.equilibrium.u;
+  const Preconditioner none;
+  const OrbitProblem found = problem_of(
+      flow, none, {u0, displacement(orbit.state), velocity(orbit.state), orbit.period}, problem.settings.tolerance);
+  std::vector<Owned<Vec>> other_unstable;
+  for (std::size_t i = 1; i < problem.unstable.modes.size(); ++i)
+    if (const auto motion =
+            estimated_motion(problem.sliding.equilibrium, problem.unstable.modes[i], problem.unstable.estimates[i]))
+      other_unstable.push_back(state_of(motion->u, motion->v));
+  return find_multipliers(found, options, orbit, other_unstable);
+}
+
+} // namespace squeal

@@ -1,0 +1,125 @@
+#include "reduced_spectrum.hpp"
+
+#include "squeal/algebra/dense_eigenproblems.hpp"
+
+namespace squeal
+{
+
+namespace
+{
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// Real eigenvectors or real and imaginary parts, one column a value; of A or of its transpose.
+struct Eigencolumns
+{
+  std::vector<Complex> values;
+  MatrixXd columns;
+};
+
+Eigencolumns eigencolumns(const MatrixXd& A)
+{
+  Eigencolumns result{{}, MatrixXd(A.rows(), A.rows())};
+  for (const DenseEigenpair& pair : solve_dense_unsymmetric(A))
+  {
+    const auto at = static_cast<Index>(result.values.size());
+    result.values.push_back(pair.lambda);
+    result.columns.col(at) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.y.imag()) : Eigen::VectorXd(pair.y.real());
+  }
+  return result;
+}
+
+/// How many of the values are wanted, complex pairs whole.
+std::size_t number_of(const std::vector<Complex>& values, const LargeValues& wanted)
+{
+  std::size_t count = 0;
+  while (count < values.size() &&
+         (std::abs(values[count]) > wanted.above || count < static_cast<std::size_t>(wanted.at_least)))
+  {
+    const std::size_t next = count + (values[count].imag() == 0 ? 1 : 2);
+    if (next > static_cast<std::size_t>(wanted.at_most)) break;
+    count = next;
+  }
+  return count;
+}
+
+/// Gives every rank the values that rank 0 has.
+void broadcast_values(std::vector<Complex>& values, MPI_Comm comm)
+{
+  MatrixXd parts(2, static_cast<Index>(values.size()));
+  for (Index i = 0; i < parts.cols(); ++i)
+    parts.col(i) << values[static_cast<std::size_t>(i)].real(), values[static_cast<std::size_t>(i)].imag();
+  broadcast(parts, comm);
+  values.clear();
+  for (Index i = 0; i < parts.cols(); ++i) values.emplace_back(parts(0, i), parts(1, i));
+}
+
+/// Coordinates of the slow shapes for all of them, and back.
+MatrixXd slow_rows(const MatrixXd& X, Index size, Index slow)
+{
+  MatrixXd result(2 * slow, X.cols());
+  result << X.topRows(slow), X.middleRows(size, slow);
+  return result;
+}
+
+MatrixXd with_fast_rows(const MatrixXd& X, Index size, Index slow)
+{
+  MatrixXd result = MatrixXd::Zero(2 * size, X.cols());
+  result.topRows(slow) = X.topRows(slow);
+  result.middleRows(size, slow) = X.bottomRows(slow);
+  return result;
+}
+
+} // namespace
+
+ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+                                  const LargeValues& wanted, MPI_Comm comm)
+{
+  const Index size = map.model.size(), slow = map.model.slow;
+  const MatrixXd columns = monodromy(map, period, contacts, comm);
+  ReducedSpectrum result;
+  MatrixXd right, left;
+  on_rank_zero(comm,
+               [&]
+               {
+                 const MatrixXd square = slow_rows(columns, size, slow);
+                 const Eigencolumns of = eigencolumns(square), adjoint = eigencolumns(square.transpose());
+                 const std::size_t count = number_of(of.values, wanted);
+                 result.values.assign(of.values.begin(), of.values.begin() + static_cast<std::ptrdiff_t>(count));
+                 right = of.columns.leftCols(static_cast<Index>(count));
+                 left.resize(right.rows(), right.cols());
+                 const std::vector<std::size_t> places = nearest_places(result.values, adjoint.values);
+                 for (std::size_t i = 0; i < count; ++i)
+                   left.col(static_cast<Index>(i)) = adjoint.columns.col(static_cast<Index>(places[i]));
+               });
+  broadcast_values(result.values, comm);
+  broadcast(right, comm);
+  broadcast(left, comm);
+  // what the slow coordinates miss of both comes with one more passage
+  result.right = columns * right;
+  result.left = apply_adjoint(map, period, contacts, with_fast_rows(left, size, slow), comm);
+  for (MatrixXd* vectors : {&result.right, &result.left}) vectors->colwise().normalize();
+  return result;
+}
+
+std::vector<Complex> multipliers_along(const ReducedSpectrum& spectrum, ReducedMap& map, double period,
+                                       std::span<const RecordedContact> contacts, MPI_Comm comm)
+{
+  const MatrixXd image = apply_tangent(map, period, contacts, spectrum.right, comm);
+  std::vector<Complex> values;
+  on_rank_zero(comm,
+               [&]
+               {
+                 const MatrixXd small =
+                     solve_dense(spectrum.left.transpose() * spectrum.right, spectrum.left.transpose() * image,
+                                 "cycle: left and right vectors of the reduced monodromy matrix are orthogonal");
+                 const std::vector<Complex> found = eigencolumns(small).values;
+                 for (const std::size_t place : nearest_places(spectrum.values, found)) values.push_back(found[place]);
+               });
+  broadcast_values(values, comm);
+  return values;
+}
+
+} // namespace squeal

@@ -1,0 +1,34 @@
+#pragma once
+/// Largest multipliers of a reduced model's monodromy matrix on recorded contact, with right and left vectors
+/// (src/README.md, sections 6.9 and 7.5). The same on every rank.
+#include "squeal/reduction/reduced_model.hpp"
+
+#include <complex>
+
+namespace squeal
+{
+
+/// Largest first. A complex pair takes two columns, real and imaginary part of the vector of Im > 0.
+struct ReducedSpectrum
+{
+  std::vector<std::complex<double>> values;
+  Eigen::MatrixXd right, left; // (q, v); left'(q, v) is a number for each
+};
+
+/// Which multipliers are wanted.
+struct LargeValues
+{
+  double above = 0; // in modulus
+  int at_least = 0, at_most = 0;
+};
+
+/// Collective.
+ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+                                  const LargeValues& wanted, MPI_Comm comm);
+
+/// The multipliers that these vectors give on other contact or with other steps: eigenvalues of (L'R)^-1 L'Phi R, in
+/// the order of the spectrum's values. Collective.
+std::vector<std::complex<double>> multipliers_along(const ReducedSpectrum& spectrum, ReducedMap& map, double period,
+                                                    std::span<const RecordedContact> contacts, MPI_Comm comm);
+
+} // namespace squeal

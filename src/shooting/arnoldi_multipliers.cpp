@@ -1,0 +1,155 @@
+/// Multipliers from an Arnoldi space of the monodromy matrix, in the energy product.
+#include "monodromy.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Takes the flow's own direction out of x.
+void project(const Monodromy& monodromy, Vec x)
+{
+  if (!monodromy.phase.get()) return;
+  double along = 0;
+  check(VecDot(monodromy.phase, x, &along));
+  check(VecAXPY(x, -along, monodromy.orbit.rate));
+}
+
+struct Krylov
+{
+  std::vector<Owned<Vec>> base; // energy-orthonormal
+  Eigen::MatrixXd H;            // the monodromy matrix on it
+  double remainder = 0;         // norm of what the last image adds to the space
+};
+
+/// Of each Ritz pair the norm of its residual.
+double residual_of(const Krylov& krylov, const DenseEigenpair& pair)
+{
+  return krylov.remainder * std::abs(pair.y(pair.y.size() - 1));
+}
+
+/// The Ritz pairs without that of the shift in time, which is in the space unless it was taken out. `distance`: of the
+/// shift's own multiplier from 1.
+std::vector<DenseEigenpair> without_shift(const Monodromy& monodromy, const Krylov& krylov, double& distance)
+{
+  std::vector<DenseEigenpair> pairs = solve_dense_unsymmetric(krylov.H);
+  if (monodromy.phase.get()) return pairs;
+  Eigen::VectorXd flow(krylov.H.rows());
+  for (Eigen::Index i = 0; i < flow.size(); ++i)
+    flow(i) = energy_product(monodromy.flow, krylov.base[static_cast<std::size_t>(i)], monodromy.orbit.rate);
+  const std::size_t shift = find_shift(pairs, flow);
+  distance = std::abs(pairs[shift].lambda - 1.);
+  pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
+  return pairs;
+}
+
+/// Whether the residual of the largest Ritz value is below a tenth of its distance from the unit circle.
+bool leading_converged(const Krylov& krylov, const std::vector<DenseEigenpair>& pairs)
+{
+  return !pairs.empty() && residual_of(krylov, pairs.front()) < 0.1 * std::abs(std::abs(pairs.front().lambda) - 1);
+}
+
+/// Appends the image of the base's last member to the space. Returns the part of it that is new.
+Owned<Vec> extend(const Monodromy& monodromy, Krylov& krylov)
+{
+  const auto k = static_cast<Eigen::Index>(krylov.base.size()) - 1;
+  krylov.H.conservativeResizeLike(Eigen::MatrixXd::Zero(k + 1, k + 1));
+  if (k > 0) krylov.H(k, k - 1) = krylov.remainder;
+  Owned<Vec> image = copy_of(krylov.base.back().get());
+  multiply(monodromy, std::span(&image, 1));
+  project(monodromy, image);
+  for (int pass = 0; pass < 2; ++pass)
+    for (Eigen::Index i = 0; i <= k; ++i)
+    {
+      const Vec member = krylov.base[static_cast<std::size_t>(i)];
+      const double along = energy_product(monodromy.flow, member, image);
+      krylov.H(i, k) += along;
+      check(VecAXPY(image, -along, member));
+    }
+  krylov.remainder = energy_norm(monodromy.flow, image);
+  return image;
+}
+
+/// `steps` Arnoldi steps; where `steps` is negative, at most -`steps` until the largest value has converged.
+Krylov arnoldi(const Monodromy& monodromy, Owned<Vec> start, PetscInt steps)
+{
+  constexpr std::size_t looked_at = 8;                     // steps between two looks at the leading value
+  const double nothing = monodromy.exact() ? 1e-13 : 1e-6; // below: rounding, noise of the differences
+  Krylov krylov;
+  project(monodromy, start);
+  normalise(monodromy.flow, start);
+  krylov.base.push_back(std::move(start));
+  for (;;)
+  {
+    Owned<Vec> next = extend(monodromy, krylov);
+    const std::size_t size = krylov.base.size();
+    if (size == static_cast<std::size_t>(std::abs(steps)) || krylov.remainder < nothing) return krylov;
+    double distance = 0;
+    if (steps < 0 && size % looked_at == 0 && leading_converged(krylov, without_shift(monodromy, krylov, distance)))
+      return krylov;
+    check(VecScale(next, 1 / krylov.remainder));
+    krylov.base.push_back(std::move(next));
+  }
+}
+
+/// The shift's own multiplier, in the middle of what the monodromy matrix makes of it.
+double shift_multiplier(const Monodromy& monodromy)
+{
+  const Owned<Vec> shift = copy_of(monodromy.orbit.rate.get());
+  normalise(monodromy.flow, shift);
+  Owned<Vec> image = copy_of(shift.get());
+  multiply(monodromy, std::span(&image, 1));
+  return energy_product(monodromy.flow, shift, image);
+}
+
+/// Takes the flow's own direction out of the space: an exact eigenvector only as far as the shift's multiplier is 1.
+void take_out_shift(Monodromy& monodromy)
+{
+  const double speed = energy_norm(monodromy.flow, monodromy.orbit.rate);
+  monodromy.phase = zeros_like(monodromy.orbit.rate);
+  energy_image(monodromy.flow, monodromy.orbit.rate, monodromy.phase);
+  check(VecScale(monodromy.phase, 1 / (speed * speed)));
+}
+
+} // namespace
+
+FloquetAnalysis multipliers_by_arnoldi(Monodromy& monodromy, Owned<Vec> start, PetscInt steps)
+{
+  FloquetAnalysis result;
+  Multipliers& multipliers = result.multipliers;
+  multipliers.method = MultiplierMethod::arnoldi;
+  const Orbit& orbit = monodromy.orbit;
+  if (monodromy.exact())
+  {
+    monodromy.flow.record_period(orbit.period, orbit.state, 0);
+    check(VecAXPY(start, energy_norm(monodromy.flow, start) / energy_norm(monodromy.flow, orbit.rate), orbit.rate));
+  }
+  else
+    take_out_shift(monodromy);
+  const Krylov krylov = arnoldi(monodromy, std::move(start), steps);
+  if (!monodromy.exact()) multipliers.trivial_error = std::abs(shift_multiplier(monodromy) - 1);
+  const std::vector<DenseEigenpair> pairs = without_shift(monodromy, krylov, multipliers.trivial_error);
+  multipliers.periods = static_cast<long>(krylov.base.size()) + (monodromy.exact() ? 0 : 1);
+  if (pairs.empty()) return result;
+  for (const DenseEigenpair& pair : pairs)
+  {
+    multipliers.values.push_back(pair.lambda);
+    multipliers.errors.push_back(2 * residual_of(krylov, pair));
+  }
+  decide(multipliers,
+         {leading_converged(krylov, pairs),
+          "the largest multiplier has not converged: a larger -cycle_multipliers would decide"},
+         1);
+  result.fastest = zeros_like(orbit.state);
+  const Eigen::VectorXd fastest = real_part(pairs.front().y);
+  for (std::size_t i = 0; i < krylov.base.size(); ++i)
+    check(VecAXPY(result.fastest, fastest(static_cast<Eigen::Index>(i)), krylov.base[i]));
+  normalise(monodromy.flow, result.fastest);
+  return result;
+}
+
+} // namespace squeal

@@ -1,0 +1,77 @@
+#include "monodromy.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+void multiply(const Monodromy& monodromy, std::span<const Owned<Vec>> states)
+{
+  const Orbit& orbit = monodromy.orbit;
+  if (monodromy.exact())
+  {
+    monodromy.flow.apply_tangent(std::vector<Vec>(states.begin(), states.end()));
+    return;
+  }
+  const Owned<Vec> moved = zeros_like(orbit.state);
+  for (const Owned<Vec>& state : states)
+  {
+    const double step = monodromy.step / std::max(energy_norm(monodromy.flow, state), 1e-300);
+    check(VecWAXPY(moved, step, state, orbit.state));
+    monodromy.flow.integrate(orbit.period, moved, state, nullptr);
+    check(VecAXPY(state, -1, orbit.state));
+    check(VecAXPY(state, -1, orbit.defect));
+    check(VecScale(state, 1 / step));
+  }
+}
+
+Eigen::VectorXd real_part(Eigen::VectorXcd y)
+{
+  Eigen::Index largest = 0;
+  y.cwiseAbs().maxCoeff(&largest);
+  y *= std::conj(y(largest)) / std::abs(y(largest));
+  return y.real();
+}
+
+std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::VectorXd& flow)
+{
+  std::size_t place = 0;
+  double best = -1;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+  {
+    const double likeness = std::abs(pairs[i].y.dot(flow.normalized())) - 10 * std::abs(pairs[i].lambda - 1.);
+    if (i > 0 && likeness <= best) continue;
+    best = likeness;
+    place = i;
+  }
+  return place;
+}
+
+void decide(Multipliers& multipliers, const Coverage& coverage, std::size_t converged)
+{
+  multipliers.stability = coverage.complete ? Stability::stable : Stability::undecided;
+  multipliers.would_decide = coverage.complete ? "" : coverage.would_decide;
+  for (std::size_t i = 0; i < multipliers.values.size(); ++i)
+  {
+    const std::complex<double> value = multipliers.values[i];
+    const double size = std::abs(value), error = multipliers.errors[i];
+    if (size - error > 1)
+    {
+      multipliers.stability = Stability::unstable;
+      multipliers.crossing = value.imag() != 0  ? Crossing::neimark_sacker
+                             : value.real() < 0 ? Crossing::period_doubling
+                                                : Crossing::fold;
+      multipliers.would_decide.clear();
+      return;
+    }
+    if (i >= converged || size + error < 1 || multipliers.stability == Stability::undecided) continue;
+    multipliers.stability = Stability::undecided;
+    multipliers.would_decide =
+        format("a multiplier of %.6f with an error of %.1e reaches across 1: a smaller tolerance "
+               "or more steps a period would decide",
+               size, error);
+  }
+}
+
+} // namespace squeal

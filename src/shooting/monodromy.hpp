@@ -1,0 +1,49 @@
+#pragma once
+/// The monodromy matrix dPhi_T/dx at an orbit, applied to states, and what is said of its eigenvalues.
+#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/shooting/multipliers.hpp"
+
+namespace squeal
+{
+
+/// dPhi_T/dx, or what it does beside the flow's own direction.
+struct Monodromy
+{
+  const Flow& flow;
+  const Orbit& orbit;
+  double step = 0;    // of difference quotients, in the energy norm
+  Owned<Vec> phase{}; // energy image of the unit flow, divided by |d|; null: nothing is taken out
+
+  bool exact() const { return static_cast<bool>(flow.apply_tangent); }
+};
+
+/// x_k = dPhi_T/dx x_k
+void multiply(const Monodromy& monodromy, std::span<const Owned<Vec>> states);
+
+/// The real part of a vector whose largest entry is made real.
+Eigen::VectorXd real_part(Eigen::VectorXcd y);
+
+/// The place of the shift in time among the pairs: near 1, with the vector that is closest to the flow.
+std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::VectorXd& flow);
+
+/// Whether larger multipliers than those found are to be expected, and how to find out.
+struct Coverage
+{
+  bool complete = false;
+  std::string would_decide; // of one that is not
+};
+
+/// Says what the bars allow. Only the `converged` largest values can leave it undecided: an Arnoldi space always holds
+/// smaller ones that have not converged.
+void decide(Multipliers& multipliers, const Coverage& coverage, std::size_t converged);
+
+/// From an Arnoldi space of `steps` columns at most; where `steps` is negative, at most -`steps` until the largest
+/// value has converged. Bars: twice the residual of each Ritz pair.
+FloquetAnalysis multipliers_by_arnoldi(Monodromy& monodromy, Owned<Vec> start, PetscInt steps);
+
+/// By oblique projection on approximate right and left vectors (src/README.md, section 6.9). `columns`: at most for the
+/// search beside them. Nothing, with the reason in `refusal`, where these vectors do not serve.
+std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodromy, PetscInt columns,
+                                                         std::string& refusal);
+
+} // namespace squeal
