@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace squeal
 {
@@ -63,27 +64,32 @@ PairRoles roles_of(const std::vector<PairHistory>& pairs, const Interface& inter
   return roles;
 }
 
-/// The recorded periods of a cycle: its own, one with the grid of time moved by half a step, one of half as many steps.
+constexpr int enough_steps = 128; // a period; with fewer the step's error is looked at
+
+/// The recorded periods of a cycle: its own, one with the grid of time moved by half a step, one of other steps.
 struct RecordedPeriods
 {
   enum
   {
     own,
     moved,
-    coarse,
+    other,
     count
   };
-  std::array<std::vector<StepRecord>, count> records;
+  std::array<std::vector<StepRecord>, count> records; // that of other steps may be empty
 };
 
 /// Leaves the map with its own period recorded.
-RecordedPeriods record_periods(PeriodMap& map, double period, Vec start)
+RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, Vec start)
 {
   RecordedPeriods result;
-  PeriodMap half{map.sliding, map.options, map.steps / 2, map.theta};
-  half.reactions = map.reactions;
-  record_period(half, period, start, 0);
-  result.records[RecordedPeriods::coarse] = std::move(half.records);
+  if (other_steps > 0)
+  {
+    PeriodMap other{map.sliding, map.options, other_steps, map.theta};
+    other.reactions = map.reactions;
+    record_period(other, period, start, 0);
+    result.records[RecordedPeriods::other] = std::move(other.records);
+  }
   record_period(map, period, start, 0.5);
   result.records[RecordedPeriods::moved] = std::move(map.records);
   record_period(map, period, start, 0);
@@ -164,31 +170,42 @@ ReducedModel model_for(const CycleProblem& problem, const RecordedPeriods& perio
   return reduce(problem.sliding, problem.modes, roles, {static_cast<int>(problem.modes.size()), 1e-5, slide && many});
 }
 
-SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, double period, Vec start)
+/// What the grid of time changes each value of the spectrum by; other steps a modulus.
+std::vector<double> grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, int other_steps, double period,
+                                const std::function<std::vector<RecordedContact>(int)>& contacts, MPI_Comm comm)
+{
+  std::vector<double> errors;
+  const auto moved = multipliers_along(spectrum, map, period, contacts(RecordedPeriods::moved), comm);
+  for (std::size_t i = 0; i < moved.size(); ++i) errors.push_back(std::abs(moved[i] - spectrum.values[i]));
+  if (other_steps == 0) return errors;
+  ReducedMap other{map.model, other_steps, map.theta};
+  const auto compared = multipliers_along(spectrum, other, period, contacts(RecordedPeriods::other), comm);
+  for (std::size_t i = 0; i < errors.size(); ++i)
+    errors[i] += std::abs(std::abs(compared[i]) - std::abs(spectrum.values[i]));
+  return errors;
+}
+
+SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int other_steps, double period, Vec start)
 {
   const MPI_Comm comm = comm_of(problem.sliding.structure.load);
-  const int directions = problem.sliding.interface.directions;
-  const RecordedPeriods periods = record_periods(map, period, start);
+  const RecordedPeriods periods = record_periods(map, other_steps, period, start);
   SlowMotions slow;
-  slow.periods = 3;
+  slow.periods = other_steps > 0 ? 3 : 2;
   const ReducedModel model = model_for(problem, periods);
   const auto contacts = [&](int which)
-  { return recorded_contacts(model, directions, periods.records[static_cast<std::size_t>(which)]); };
-  ReducedMap own{model, map.steps, map.theta}, coarse{model, map.steps / 2, map.theta};
-  const auto recorded = contacts(RecordedPeriods::own);
-  const ReducedSpectrum spectrum = large_multipliers(own, period, recorded, {0.85, 4, 48}, comm);
-  const auto moved = multipliers_along(spectrum, own, period, contacts(RecordedPeriods::moved), comm);
-  const auto halved = multipliers_along(spectrum, coarse, period, contacts(RecordedPeriods::coarse), comm);
-  slow.values = spectrum.values;
-  for (std::size_t i = 0; i < slow.values.size(); ++i)
   {
-    slow.errors.push_back(std::abs(moved[i] - slow.values[i]));
-    if (map.steps <= 128) slow.errors.back() += std::abs(std::abs(halved[i]) - std::abs(slow.values[i]));
-  }
+    return recorded_contacts(model, problem.sliding.interface.directions,
+                             periods.records[static_cast<std::size_t>(which)]);
+  };
+  ReducedMap own{model, map.steps, map.theta};
+  const auto recorded = contacts(RecordedPeriods::own);
+  constexpr LargeValues wanted{0.85, 4, 48};
+  const ReducedSpectrum spectrum = large_multipliers(own, period, recorded, wanted, comm);
+  slow.values = spectrum.values;
+  slow.errors = grid_errors(spectrum, own, other_steps, period, contacts, comm);
   const ReducedModel smaller = truncated(model, (3 * model.size() + 3) / 4);
   ReducedMap few{smaller, map.steps, map.theta};
-  slow.confirmed =
-      as_many_above(0.95, spectrum.values, large_multipliers(few, period, recorded, {0.85, 4, 48}, comm).values);
+  slow.confirmed = as_many_above(0.95, spectrum.values, large_multipliers(few, period, recorded, wanted, comm).values);
   slow.right = lifted(model, spectrum.right, start);
   slow.left = lifted(model, energy_representatives(model, spectrum.left), start);
   slow.others = slow_sliding_motions(problem.modes, start);
@@ -197,16 +214,24 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, double 
 
 } // namespace
 
-void add_slow_motions(const CycleProblem& problem, PeriodMap& map, Flow& flow)
+void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_steps, Flow& flow)
 {
-  flow.slow_motions = [&problem, &map](double period, Vec start)
-  { return slow_motions_of(problem, map, period, start); };
+  flow.slow_motions = [&problem, &map, other_steps](double period, Vec start)
+  { return slow_motions_of(problem, map, other_steps, period, start); };
 }
 
-FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, PeriodMap& map, const Orbit& orbit)
+int steps_to_compare(int steps)
 {
-  Flow flow = flow_of(map);
-  add_slow_motions(problem, map, flow);
+  return steps <= enough_steps ? steps / 2 : 0;
+}
+
+FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, const PeriodMap& map,
+                        const Orbit& orbit)
+{
+  PeriodMap examined{map.sliding, map.options, std::min(map.steps, enough_steps), map.theta};
+  examined.reactions = map.reactions;
+  Flow flow = flow_of(examined);
+  add_slow_motions(problem, examined, map.steps > enough_steps ? map.steps : steps_to_compare(map.steps), flow);
   const Vec u0 = problem.sliding.equilibrium.u;
   const Preconditioner none;
   const OrbitProblem found = problem_of(

@@ -6,11 +6,15 @@
 namespace squeal
 {
 
-/// Gives the flow the slow motions of the map. Borrows all three.
-void add_slow_motions(const CycleProblem& problem, PeriodMap& map, Flow& flow);
+/// Gives the flow the slow motions of the map. Errors hold what `other_steps` steps a period change; 0: none are
+/// compared. Borrows problem and map.
+void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_steps, Flow& flow);
 
-/// Of a converged cycle of the map.
-FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, PeriodMap& map,
+/// Another number of steps a period that tells the error of this one: half of it, 0 where it is fine.
+int steps_to_compare(int steps);
+
+/// Of a converged cycle of the map, by at most 128 steps a period: what the others change is in the bars.
+FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, const PeriodMap& map,
                         const Orbit& orbit);
 
 } // namespace squeal

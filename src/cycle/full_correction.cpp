@@ -1,5 +1,6 @@
 #include "full_correction.hpp"
 
+#include "floquet.hpp"
 #include "squeal/shooting/multisecant.hpp"
 
 #include <algorithm>
@@ -178,6 +179,8 @@ std::string correct_on_full_model(ReducedSearch& search, const ShootingStart& st
   fidelity.energy_error = shooting.multisecant.remaining.energy;
   fidelity.full_seconds += MPI_Wtime() - clock;
   result.outcome = {OutcomeKind::converged, "", log.convergence.iterations, shooting.orbit.residual};
+  if (reason.empty()) result.multipliers = examine(given, shooting.options, map, shooting.orbit).multipliers;
+  refuse_repelling(result.multipliers, given.unstable.modes.size() - 1, result.outcome);
   result.steps_per_period = map.steps;
   result.theta = map.theta;
   result.orbit = std::move(shooting.orbit);

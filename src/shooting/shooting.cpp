@@ -122,18 +122,6 @@ Outcome outcome_of(const Convergence& convergence, const StageResult& found)
   return outcome;
 }
 
-/// An orbit that repels is no answer; with other unstable modes the motion need not be periodic at all.
-void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable, Outcome& outcome)
-{
-  if (outcome.kind != OutcomeKind::converged || multipliers.stability != Stability::unstable) return;
-  outcome.kind = other_unstable == 0 ? OutcomeKind::unstable_cycle : OutcomeKind::not_periodic;
-  outcome.reason = format("the cycle found repels: a small motion beside it grows %.4g times a period (%s)",
-                          std::abs(multipliers.values.front()), word(multipliers.crossing));
-  outcome.reason += other_unstable == 0 ? "; try another start or more free periods"
-                                        : "; " + std::to_string(other_unstable + 1) +
-                                              " modes are unstable and the motion may be quasi-periodic: integrate it";
-}
-
 } // namespace
 
 OrbitProblem problem_of(const Flow& flow, const Preconditioner& preconditioner, const ShootingStart& start,
@@ -166,6 +154,17 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   result.orbit = std::move(found.orbit);
   result.convergence = std::move(log.convergence);
   return result;
+}
+
+void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable, Outcome& outcome)
+{
+  if (outcome.kind != OutcomeKind::converged || multipliers.stability != Stability::unstable) return;
+  outcome.kind = other_unstable == 0 ? OutcomeKind::unstable_cycle : OutcomeKind::not_periodic;
+  outcome.reason = format("the cycle found repels: a small motion beside it grows %.4g times a period (%s)",
+                          std::abs(multipliers.values.front()), word(multipliers.crossing));
+  outcome.reason += other_unstable == 0 ? "; try another start or more free periods"
+                                        : "; " + std::to_string(other_unstable + 1) +
+                                              " modes are unstable and the motion may be quasi-periodic: integrate it";
 }
 
 void declare_solver_options()

@@ -40,6 +40,9 @@ struct ShootingResult
   Multipliers multipliers;
 };
 
+/// An orbit that repels is no answer; with other unstable modes the motion need not be periodic at all.
+void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable, Outcome& outcome);
+
 /// The problem of finding an orbit near the start. Borrows flow and preconditioner.
 OrbitProblem problem_of(const Flow& flow, const Preconditioner& preconditioner, const ShootingStart& start,
                         double tolerance);
