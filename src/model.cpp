@@ -21,10 +21,10 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   return model;
 }
 
-Model model_of_mesh(const Scene& scene, MPI_Comm comm)
+Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
 {
   Model model;
-  model.mesh = read_mesh(scene, comm);
+  model.mesh = std::move(mesh);
   const std::vector<NodePair> pairs = match_pairs(model.mesh, scene.contacts);
   const Partition partition = partition_mesh(model.mesh, pairs, comm);
   model.dofs = number_dofs(model.mesh, scene, partition, comm);
@@ -38,7 +38,12 @@ Model model_of_mesh(const Scene& scene, MPI_Comm comm)
 
 Model build_model(const Scene& scene, MPI_Comm comm)
 {
-  return scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, comm);
+  return scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh(scene, comm), comm);
+}
+
+Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm)
+{
+  return scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, model.mesh, comm);
 }
 
 ModelSummary summary_of(const Model& model, MPI_Comm comm)

@@ -1,5 +1,6 @@
 #include "squeal/run.hpp"
 
+#include "squeal/branch/brake_branch.hpp"
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/model.hpp"
 #include "squeal/report/report.hpp"
@@ -121,6 +122,32 @@ FittedCycle run_cycle(const Chain& chain)
   return result;
 }
 
+/// Why no branch can start from the cycle; empty if it can.
+std::string no_cycle_to_follow(const LimitCycle& cycle, double tolerance)
+{
+  if (!has_run(cycle.outcome) || !cycle.orbit.state.get()) return "there is no cycle to start from";
+  // one that repels is a cycle as well
+  if (!(cycle.orbit.residual <= tolerance)) return "the cycle to start from did not converge to cycle.tolerance";
+  return {};
+}
+
+BrakeBranch run_branch(const Chain& chain)
+{
+  const Scene& scene = chain.scene;
+  const Report& report = chain.report;
+  if (!scene.branch) return not_run<BrakeBranch>(OutcomeKind::off, "the scene has no [branch]");
+  const std::string reason = no_cycle_to_follow(report.cycle, scene.cycle.tolerance);
+  if (!reason.empty()) return not_run<BrakeBranch>(OutcomeKind::skipped, reason);
+  const auto model_at = [&](double parameter)
+  {
+    Model model = rebuild_model(chain.model, scene_on_branch(scene, parameter), comm_of(chain.model.structure.load));
+    return BranchModel{std::move(model.structure), std::move(model.interface)};
+  };
+  return find_branch({*scene.branch, model_at, chain.sliding(), report.cycle, scene.cycle.tolerance, chain.model.probes,
+                      scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.step,
+                      chain.options.cycle.shooting});
+}
+
 std::vector<std::string> stages_run(const Report& report)
 {
   std::vector<std::string> stages;
@@ -166,6 +193,8 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, const std::files
   FittedCycle fitted = timed(report, "cycle", comm, [&] { return run_cycle(chain); });
   report.cycle = std::move(fitted.cycle);
   report.fidelity = std::move(fitted.fidelity);
+
+  report.branch = timed(report, "branch", comm, [&] { return run_branch(chain); });
 
   report.model.memory_bytes = peak_memory(comm);
   write_results(report, scene, {model.mesh, model.dofs, model.structure, model.interface.nodes}, output, comm);

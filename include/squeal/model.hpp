@@ -18,6 +18,9 @@ struct Model
 /// Collective.
 Model build_model(const Scene& scene, MPI_Comm comm);
 
+/// The model of a scene on the same mesh, in the same layout. Collective.
+Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm);
+
 /// What the model is, as far as it is known before anything is solved. Collective.
 ModelSummary summary_of(const Model& model, MPI_Comm comm);
 

@@ -1,5 +1,7 @@
 #include "squeal/report/history.hpp"
 
+#include "branch_results.hpp"
+#include "derived.hpp"
 #include "squeal/report/files.hpp"
 
 #include <algorithm>
@@ -9,13 +11,6 @@ namespace squeal
 
 namespace
 {
-
-/// HDF5 reads a slash in a name as a group.
-std::string without_slash(std::string name)
-{
-  std::replace(name.begin(), name.end(), '/', '_');
-  return name;
-}
 
 void write_group(Hdf5File& file, const std::string& group, const History& history, const Scene& scene)
 {
@@ -57,6 +52,7 @@ void write_history(const Report& report, const Scene& scene, const std::filesyst
     write_group(file, "cycle", report.cycle.measured.history, scene);
     write_statuses(file, report.cycle.measured.statuses);
   }
+  if (has_run(report.branch.outcome)) write_branch(file, report.branch, scene);
   file.keep();
 }
 

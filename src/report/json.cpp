@@ -1,5 +1,6 @@
 #include "squeal/report/json.hpp"
 
+#include "branch_results.hpp"
 #include "derived.hpp"
 #include "squeal/report/files.hpp"
 #include "warnings.hpp"
@@ -139,16 +140,11 @@ Json newton_list(const std::vector<NewtonRecord>& records)
 
 Json multiplier_entry(const Multipliers& multipliers)
 {
-  Json list = Json::array();
-  for (std::size_t i = 0; i < multipliers.values.size(); ++i)
-    list.push_back({{"real", multipliers.values[i].real()},
-                    {"imaginary", multipliers.values[i].imag()},
-                    {"error", multipliers.errors[i]}});
   Json entry = {{"stability", word(multipliers.stability)},
                 {"method", word(multipliers.method)},
                 {"trivial_error", multipliers.trivial_error},
                 {"periods_integrated", multipliers.periods},
-                {"values", list}};
+                {"values", multiplier_list(multipliers)}};
   if (multipliers.crossing != Crossing::none) entry["crossing"] = word(multipliers.crossing);
   if (!multipliers.would_decide.empty()) entry["would_decide"] = multipliers.would_decide;
   return entry;
@@ -209,6 +205,13 @@ Json fidelity_entry(const Fidelity& fidelity)
   return entry;
 }
 
+Json branch_entry(const Report& report, const Scene& scene)
+{
+  Json entry = entry_of(report.branch.outcome);
+  if (has_run(report.branch.outcome)) add_branch(report.branch, scene, entry);
+  return entry;
+}
+
 } // namespace
 
 std::string report_json(const Report& report, const Scene& scene)
@@ -236,6 +239,7 @@ std::string report_json(const Report& report, const Scene& scene)
   json["transient"] = transient_entry(report);
   json["cycle"] = cycle_entry(report, scene);
   json["fidelity"] = fidelity_entry(report.fidelity);
+  json["branch"] = branch_entry(report, scene);
   const Warnings warnings = warnings_of(report);
   const auto warn = [&json](const char* stage, const std::vector<std::string>& sentences)
   {

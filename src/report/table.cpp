@@ -1,5 +1,6 @@
 #include "squeal/report/table.hpp"
 
+#include "branch_results.hpp"
 #include "derived.hpp"
 #include "warnings.hpp"
 
@@ -159,6 +160,15 @@ std::string fidelity_text(const Fidelity& fidelity)
   return text;
 }
 
+std::string branch_text(const BrakeBranch& branch, const Scene& scene)
+{
+  if (branch.outcome.kind == OutcomeKind::off) return "";
+  std::string text = row("branch", outcome_text(branch.outcome));
+  if (has_run(branch.outcome))
+    for (const std::string& line : branch_lines(branch, scene)) text += row("", line);
+  return text;
+}
+
 std::string timings_text(const Report& report)
 {
   double total = 0;
@@ -187,6 +197,7 @@ std::string table(const Report& report, const Scene& scene)
   text += transient_text(report) + warning_rows(warnings.transient);
   text += cycle_text(report, scene) + warning_rows(warnings.cycle);
   text += fidelity_text(report.fidelity);
+  text += branch_text(report.branch, scene);
   return text + timings_text(report);
 }
 

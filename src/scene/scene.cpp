@@ -40,6 +40,7 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
   Places places{file.string(), {}};
   read_tables(root, scene, places);
   check_scene(scene, places);
+  resolve_branch(scene, places);
   return scene;
 }
 

@@ -202,6 +202,16 @@ SceneKeys keys_of(CycleSettings& c)
   };
 }
 
+SceneKeys keys_of(BranchSettings& b)
+{
+  return {
+      {"key", &b.key, required, Rule::any, "text", "number of the scene, as --set names it"},
+      {"from", &b.from, required, Rule::any, "-", "its value at one end, in its own unit"},
+      {"to", &b.to, required, Rule::any, "-", "its value at the other end"},
+      {"points", &b.points, optional, Rule::positive, "-", "number of points if it alone changed along the branch"},
+  };
+}
+
 SceneKeys keys_of(Probe& p)
 {
   return {

@@ -76,6 +76,7 @@ SceneKeys keys_of(ModesSettings& modes);
 SceneKeys keys_of(EstimateSettings& estimate);
 SceneKeys keys_of(TransientSettings& transient);
 SceneKeys keys_of(CycleSettings& cycle);
+SceneKeys keys_of(BranchSettings& branch);
 SceneKeys keys_of(Probe& probe);
 
 /// Calls visit(key, member, meaning) for each table of a scene file, in the order in which they are written.
@@ -98,6 +99,7 @@ template <class Visit> void for_each_table(Scene& scene, Visit visit)
   visit("estimate", scene.estimate, "energy estimate of the cycle's amplitude");
   visit("transient", scene.transient, "time integration; runs when the table is present");
   visit("cycle", scene.cycle, "limit cycle by shooting; runs when the table is present");
+  visit("branch", scene.branch, "the limit cycle along a number of the scene; runs when the table is present");
   visit("probe", scene.probes, "a displacement that is recorded in time");
 }
 
@@ -113,5 +115,9 @@ struct Places
 
 /// Throws Error on contradictions between keys: undefined or repeated names, tables that exclude each other.
 void check_scene(const Scene& scene, const Places& places);
+
+/// Finds the scene's own value of the number that a branch follows. Throws Error if there is none, or no branch from
+/// it.
+void resolve_branch(Scene& scene, const Places& places);
 
 } // namespace squeal

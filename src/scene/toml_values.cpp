@@ -44,6 +44,21 @@ toml::table parse_override(const std::string& text)
 
 void merge(toml::table& into, toml::table& from);
 
+/// Returns the entry of a list with this name, or else with this index; null if there is none. `known`: its names.
+toml::node* entry_of(toml::array& list, const std::string& wanted, std::vector<std::string>& known)
+{
+  toml::node* entry = nullptr;
+  for (std::size_t i = 0; i < list.size(); ++i)
+  {
+    const toml::table* candidate = list.get(i)->as_table();
+    const std::string index = std::to_string(i);
+    const std::string name = candidate ? (*candidate)["name"].value_or(index) : index;
+    known.push_back(name);
+    if (wanted == name || (!entry && wanted == index)) entry = list.get(i);
+  }
+  return entry;
+}
+
 /// Moves the values of `from` into the entries of a list, which it selects by name or by index.
 void merge_list(const std::string& key, toml::array& list, toml::table& from)
 {
@@ -51,19 +66,15 @@ void merge_list(const std::string& key, toml::array& list, toml::table& from)
   {
     const std::string wanted(selector.str());
     std::vector<std::string> known;
-    toml::table* entry = nullptr;
-    for (std::size_t i = 0; i < list.size(); ++i)
-    {
-      toml::table* candidate = list.get(i)->as_table();
-      const std::string index = std::to_string(i);
-      const std::string name = candidate ? (*candidate)["name"].value_or(index) : index;
-      known.push_back(name);
-      if (wanted == name || (!entry && wanted == index)) entry = candidate;
-    }
+    toml::node* entry = entry_of(list, wanted, known);
     if (!entry)
       throw Error(place_of(value) + ": no [[" + key + "]] is called '" + wanted + "'" + hint_or_list(wanted, known));
-    if (!value.is_table()) throw Error(place_of(value) + ": expected " + key + "." + wanted + ".KEY=VALUE");
-    merge(*entry, *value.as_table());
+    if (entry->is_table() != value.is_table())
+      throw Error(place_of(value) + ": expected " + key + "." + wanted + (entry->is_table() ? ".KEY=VALUE" : "=VALUE"));
+    if (entry->is_table())
+      merge(*entry->as_table(), *value.as_table());
+    else
+      value.visit([&](auto& typed) { list.replace(list.cbegin() + std::stol(wanted), std::move(typed)); });
   }
 }
 
@@ -75,14 +86,40 @@ void merge(toml::table& into, toml::table& from)
     toml::node* present = into.get(key.str());
     if (value.is_table() && present && present->is_table())
       merge(*present->as_table(), *value.as_table());
-    else if (value.is_table() && present && present->is_array_of_tables())
+    else if (value.is_table() && present && present->is_array())
       merge_list(std::string(key.str()), *present->as_array(), *value.as_table());
     else
       value.visit([&](auto& typed) { into.insert_or_assign(key.str(), std::move(typed)); });
   }
 }
 
+/// The names that an override goes through, from the outermost table on.
+std::vector<std::string> names_of(const toml::table& change)
+{
+  std::vector<std::string> names;
+  for (const toml::table* table = &change; table && !table->empty();)
+  {
+    names.emplace_back(table->begin()->first.str());
+    table = table->begin()->second.as_table();
+  }
+  return names;
+}
+
 } // namespace
+
+toml::node* find_value(toml::table& root, const std::string& key)
+{
+  toml::node* node = &root;
+  for (const std::string& name : names_of(parse_override(key + "=0")))
+  {
+    std::vector<std::string> known;
+    if (node && node->is_table())
+      node = node->as_table()->get(name);
+    else
+      node = node && node->is_array() ? entry_of(*node->as_array(), name, known) : nullptr;
+  }
+  return node;
+}
 
 std::string place_of(const toml::node& node)
 {

@@ -28,6 +28,9 @@ std::string hint_or_list(const std::string& word, const std::vector<std::string>
 /// Applies "table.key=value" to the tables of a scene.
 void apply_override(toml::table& root, const std::string& text);
 
+/// Returns the value that an override of this key would replace; null if there is none.
+toml::node* find_value(toml::table& root, const std::string& key);
+
 /// Fills the scene from its tables and records where each value was given.
 void read_tables(const toml::table& root, Scene& scene, Places& places);
 

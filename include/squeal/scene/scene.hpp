@@ -217,6 +217,15 @@ struct CycleSettings
   std::filesystem::path save_state; // state file of the start of the cycle; none if empty
 };
 
+/// The branch of the limit cycle along a number of the scene.
+struct BranchSettings
+{
+  std::string key;         // of the number, as overrides name it
+  double from = 0, to = 0; // in the key's unit
+  int points = 30;         // [-] number of points if the number alone changed along the branch
+  double own = 0;          // the scene's own value of the number, which the branch starts from; no key of its own
+};
+
 /// A displacement that is recorded in time: of the node of a point, body or group, along a direction.
 struct Probe
 {
@@ -248,6 +257,7 @@ struct Scene
   EstimateSettings estimate;
   TransientSettings transient;
   CycleSettings cycle;
+  std::optional<BranchSettings> branch;
   std::vector<Probe> probes;
 };
 
@@ -260,6 +270,9 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
 
 /// Returns the scene as TOML with all defaults; read_scene of it gives the same scene.
 std::string resolved_scene(const Scene& scene);
+
+/// Returns the scene with another value of the number that the branch follows. Throws Error if there is no such number.
+Scene scene_on_branch(const Scene& scene, double value);
 
 /// Returns a list of all keys of a scene file with their meanings, units and defaults.
 std::string scene_reference();

@@ -1,0 +1,65 @@
+#pragma once
+/// The branch of a brake's limit cycle along a number of its scene, beside the stability of its sliding equilibrium
+/// (src/README.md, section 10).
+///
+/// States are absolute, so that a change of the parameter changes the step alone.
+#include "squeal/branch/continuation.hpp"
+#include "squeal/cycle/limit_cycle.hpp"
+
+#include <optional>
+
+namespace squeal
+{
+
+/// What a value of the parameter makes of the scene. Matrices have the layout of the scene's own.
+struct BranchModel
+{
+  Structure structure;
+  Interface interface;
+};
+
+/// The stability of the sliding equilibrium at a value of the parameter.
+struct EquilibriumStability
+{
+  double parameter = 0;
+  bool known = false;                                // there is an equilibrium, and its modes converged
+  int unstable_modes = 0;                            // in the band
+  double growth_rate = 0;                            // [1/s] of the least stable mode that oscillates
+  double frequency_hz = 0;                           // of that mode
+  std::vector<double> growth_rates{}, frequencies{}; // of all, falling growth rate
+};
+
+/// A range of the parameter.
+struct ParameterRange
+{
+  double from = 0, to = 0;
+};
+
+/// outcome: "converged" (both sides came to a bound, to first lift-off or to a Hopf point), "not converged" (how far
+/// they came), "skipped", "off".
+struct BrakeBranch
+{
+  Outcome outcome;
+  Branch branch;                                // its events include those of the equilibrium
+  std::vector<EquilibriumStability> equilibria; // by rising parameter
+  std::vector<ParameterRange> coexistence;      // of a stable cycle and a stable equilibrium
+};
+
+struct BrakeBranchProblem
+{
+  const BranchSettings& settings;
+  std::function<BranchModel(double parameter)> model_at;
+  SlidingEquilibrium sliding; // of the scene itself
+  const LimitCycle& cycle;    // where the branch starts
+  double tolerance = 0;       // on the full-space residual
+  Mat probes = nullptr;
+  const ModesSettings& modes;
+  const ModesOptions& modes_options;
+  const EquilibriumOptions& equilibrium_options;
+  const StepOptions& step;
+  const ShootingOptions& shooting;
+};
+
+BrakeBranch find_branch(const BrakeBranchProblem& problem);
+
+} // namespace squeal

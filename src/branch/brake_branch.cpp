@@ -1,0 +1,78 @@
+#include "squeal/branch/brake_branch.hpp"
+
+#include "equilibrium_stability.hpp"
+
+#include <algorithm>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Whether a side ended where the branch ends, and not where the method does.
+bool natural(BranchEnding ending)
+{
+  return ending != BranchEnding::step_too_small && ending != BranchEnding::number_of_points;
+}
+
+Outcome outcome_of(const BrakeBranchProblem& problem, const Branch& branch)
+{
+  Outcome outcome{OutcomeKind::converged, "", static_cast<int>(branch.points.size()), 0};
+  for (const BranchPoint& point : branch.points) outcome.residual = std::max(outcome.residual, point.residual);
+  const auto note = [&](BranchEnding ending, const BranchPoint& end)
+  {
+    if (natural(ending)) return;
+    outcome.kind = OutcomeKind::not_converged;
+    outcome.reason += (outcome.reason.empty() ? "" : "; ") +
+                      format(ending == BranchEnding::step_too_small
+                                 ? "the branch was followed to %s = %.6g: no cycle was found a step on"
+                                 : "the branch was followed to %s = %.6g, where the number of points ran out",
+                             problem.settings.key.c_str(), end.parameter);
+  };
+  note(branch.ends.backward, branch.points.front());
+  note(branch.ends.forward, branch.points.back());
+  return outcome;
+}
+
+/// Where a stable cycle stands beside a stable equilibrium: ranges of successive points.
+std::vector<ParameterRange> coexistence_of(const BrakeBranch& found, const std::vector<BranchEvent>& hopf)
+{
+  std::vector<ParameterRange> ranges;
+  bool open = false;
+  for (const BranchPoint& point : found.branch.points)
+  {
+    const bool both = point.multipliers.stability == Stability::stable &&
+                      unstable_modes_at(point.parameter, found.equilibria, hopf) == 0;
+    if (both && !open) ranges.push_back({point.parameter, point.parameter});
+    if (both)
+    {
+      ranges.back().from = std::min(ranges.back().from, point.parameter);
+      ranges.back().to = std::max(ranges.back().to, point.parameter);
+    }
+    open = both;
+  }
+  return ranges;
+}
+
+} // namespace
+
+BrakeBranch find_branch(const BrakeBranchProblem& problem)
+{
+  const BranchSettings& settings = problem.settings;
+  const ContinuationSettings continuation{std::min(settings.from, settings.to), std::max(settings.from, settings.to),
+                                          settings.points, problem.tolerance};
+  BrakeFamily family(problem);
+  BrakeBranch found;
+  found.equilibria = equilibria_along(family, problem);
+  std::vector<BranchEvent> hopf = hopf_points(family, problem, found.equilibria);
+  family.set_parameter(problem.settings.own);
+  found.branch =
+      trace_branch(family.flows(), continuation, problem.shooting, problem.cycle.orbit, problem.settings.own);
+  found.coexistence = coexistence_of(found, hopf);
+  found.outcome = outcome_of(problem, found.branch);
+  found.branch.events.insert(found.branch.events.begin(), hopf.begin(), hopf.end());
+  return found;
+}
+
+} // namespace squeal

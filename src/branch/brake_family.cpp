@@ -1,0 +1,131 @@
+#include "brake_family.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Counts over a period from the statuses of its steps.
+void count_statuses(const MeasuredPeriod& measured, const std::vector<char>& closed, PointMeasures& measures)
+{
+  const auto& statuses = measured.statuses;
+  for (std::size_t pair = 0; pair < closed.size(); ++pair)
+    for (std::size_t step = 0; step < statuses.size(); ++step)
+    {
+      const ContactStatus now = statuses[step][pair];
+      if (now == ContactStatus::stick) ++measures.stick_steps;
+      if (now != ContactStatus::open || !closed[pair]) continue;
+      ++measures.open_steps;
+      const ContactStatus before = statuses[step > 0 ? step - 1 : statuses.size() - 1][pair];
+      if (before != ContactStatus::open) ++measures.lift_offs;
+    }
+}
+
+} // namespace
+
+BrakeAt::BrakeAt(double value, BranchModel made, const BrakeBranchProblem& problem)
+    : parameter(value), model(std::move(made)), map{{model.structure, model.interface, equilibrium},
+                                                    problem.step,
+                                                    problem.cycle.steps_per_period,
+                                                    problem.cycle.theta},
+      flow(flow_of(map))
+{
+}
+
+BrakeFamily::BrakeFamily(const BrakeBranchProblem& problem)
+    : problem_(problem), friction_(problem.settings.key == "friction.coefficient"),
+      range_(std::abs(problem.settings.to - problem.settings.from))
+{
+  set_parameter(problem.settings.own);
+  at_->map.reactions = problem.sliding.equilibrium.reactions;
+}
+
+void BrakeFamily::set_parameter(double parameter)
+{
+  if (at_ && at_->parameter == parameter) return;
+  if (at_ && friction_) // A and W do not depend on it
+  {
+    at_->parameter = parameter;
+    at_->model.interface.friction.coefficient = parameter;
+    at_->equilibrium_known = false;
+    return;
+  }
+  auto next = std::make_unique<BrakeAt>(parameter, problem_.model_at(parameter), problem_);
+  if (at_) next->map.reactions = at_->map.reactions;
+  at_ = std::move(next);
+}
+
+SlidingEquilibrium BrakeFamily::sliding()
+{
+  BrakeAt& at = *at_;
+  if (!at.equilibrium_known)
+    at.equilibrium = find_equilibrium(at.model.structure, at.model.interface, problem_.equilibrium_options);
+  at.equilibrium_known = true;
+  return at.map.sliding;
+}
+
+Owned<Vec> BrakeFamily::rest()
+{
+  // where there is no equilibrium its displacements are zero: a reference for the fluctuation none the less
+  const Owned<Vec> at_rest = zeros_like(sliding().structure.load);
+  return state_of(at_->equilibrium.u, at_rest);
+}
+
+void BrakeFamily::parameter_column(double period, Vec start, Vec column)
+{
+  if (!friction_)
+  {
+    // 1e-5 of the range: the contact's tolerance of 1e-10 is then below 1e-4 of the quotient
+    const double parameter = at_->parameter, change = 1e-5 * range_;
+    const Owned<Vec> below = zeros_like(column);
+    set_parameter(parameter + change);
+    at_->flow.integrate(period, start, column, nullptr);
+    set_parameter(parameter - change);
+    at_->flow.integrate(period, start, below, nullptr);
+    set_parameter(parameter);
+    check(VecAXPBY(column, -0.5 / change, 0.5 / change, below));
+    return;
+  }
+  at_->flow.record_period(period, start, 0);
+  const Vec load = at_->model.structure.load;
+  TangentColumn change{zeros_like(load), zeros_like(load), 0, 1};
+  PeriodMap& map = at_->map;
+  advance_tangents(map.step, map.sliding.structure, map.sliding.interface, map.records, std::span(&change, 1));
+  check(VecCopy(change.u, displacement(column)));
+  check(VecCopy(change.v, velocity(column)));
+}
+
+PointMeasures BrakeFamily::measure(const Orbit& orbit)
+{
+  (void)sliding(); // energies refer to it
+  MeasuredPeriod measured = measure_period(at_->map, {problem_.probes, 0}, orbit.period, orbit.state, nullptr);
+  PointMeasures measures{measured.mean_energy, measured.mean_fluctuating_energy, std::move(measured.peak_to_peak),
+                         measured.open_pairs_mean};
+  count_statuses(measured, at_->equilibrium.closed, measures);
+  return measures;
+}
+
+FlowFamily BrakeFamily::flows()
+{
+  FlowFamily family;
+  family.flow.M = problem_.sliding.structure.M;
+  family.flow.K = problem_.sliding.structure.K;
+  family.flow.integrate = [this](double period, Vec start, Vec end, Vec rate)
+  { at_->flow.integrate(period, start, end, rate); };
+  family.flow.integrate_many = [this](double period, std::span<const Vec> starts, std::span<const Vec> ends)
+  { at_->flow.integrate_many(period, starts, ends); };
+  family.flow.record_period = [this](double period, Vec start, double shift)
+  { at_->flow.record_period(period, start, shift); };
+  family.flow.apply_tangent = [this](std::span<const Vec> states) { at_->flow.apply_tangent(states); };
+  family.set_parameter = [this](double parameter) { set_parameter(parameter); };
+  family.rest = [this] { return rest(); };
+  family.parameter_column = [this](double period, Vec start, Vec column) { parameter_column(period, start, column); };
+  family.measure = [this](const Orbit& orbit) { return measure(orbit); };
+  return family;
+}
+
+} // namespace squeal

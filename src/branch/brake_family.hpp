@@ -1,0 +1,48 @@
+#pragma once
+/// The period maps of a brake at the values of a parameter, as a family of flows.
+#include "squeal/branch/brake_branch.hpp"
+#include "squeal/cycle/period_map.hpp"
+
+#include <memory>
+
+namespace squeal
+{
+
+/// The brake at a value of the parameter.
+struct BrakeAt
+{
+  BrakeAt(double value, BranchModel made, const BrakeBranchProblem& problem);
+
+  double parameter;
+  BranchModel model;
+  Equilibrium equilibrium{};
+  bool equilibrium_known = false;
+  PeriodMap map;
+  Flow flow; // of the map
+};
+
+class BrakeFamily
+{
+public:
+  explicit BrakeFamily(const BrakeBranchProblem& problem);
+  BrakeFamily(const BrakeFamily&) = delete;
+  BrakeFamily& operator=(const BrakeFamily&) = delete;
+
+  /// Borrows the object.
+  FlowFamily flows();
+
+  void set_parameter(double parameter);
+  SlidingEquilibrium sliding(); // at the value set last; finds its equilibrium
+
+private:
+  Owned<Vec> rest();
+  void parameter_column(double period, Vec start, Vec column);
+  PointMeasures measure(const Orbit& orbit);
+
+  const BrakeBranchProblem& problem_;
+  bool friction_; // the parameter is the friction coefficient
+  double range_;
+  std::unique_ptr<BrakeAt> at_;
+};
+
+} // namespace squeal

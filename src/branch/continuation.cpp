@@ -1,0 +1,221 @@
+#include "squeal/branch/continuation.hpp"
+
+#include "events.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// One side of a branch, from its start on.
+struct BranchSide
+{
+  std::vector<ExaminedOrbit> orbits; // the start first
+  std::vector<BranchEvent> events;
+  BranchEnding ending = BranchEnding::number_of_points;
+};
+
+/// Measures changes about an orbit, and the distances of states from the rest of its parameter.
+void refer_to(BranchCorrector& corrector, CorrectedOrbit& corrected)
+{
+  corrector.family.set_parameter(corrected.parameter);
+  corrector.rest = corrector.family.rest();
+  corrector.period = corrected.orbit.period;
+  corrected.orbit.fluctuation =
+      energy_norm(corrector.family.flow, fluctuation_of(problem_of(corrector), corrected.orbit));
+  corrector.scales.fluctuation = corrected.orbit.fluctuation;
+  corrector.scales.period = corrected.orbit.period;
+}
+
+/// Steps along a branch.
+struct Walk
+{
+  BranchVector tangent; // of scaled length 1
+  double length, least, greatest;
+};
+
+/// The part of the unit step that the parameter may make.
+double limited(const BranchCorrector& corrector, const Walk& walk)
+{
+  const double share = std::abs(walk.tangent.parameter) / corrector.scales.parameter;
+  return std::min(walk.length, 1.5 / corrector.settings.points / std::max(share, 1e-12));
+}
+
+bool inside(const ContinuationSettings& settings, double parameter)
+{
+  return parameter >= settings.least && parameter <= settings.greatest;
+}
+
+/// The orbit a step on, on the bound where the step would pass it; none if it was not found.
+std::optional<CorrectedOrbit> step_on(BranchCorrector& corrector, const CorrectedOrbit& from, const Walk& walk,
+                                      double length)
+{
+  const ContinuationSettings& settings = corrector.settings;
+  BranchVector predicted = vector_of(from);
+  add(length, walk.tangent, predicted);
+  if (!inside(settings, predicted.parameter))
+  {
+    const double bound = std::clamp(predicted.parameter, settings.least, settings.greatest);
+    add(-(predicted.parameter - bound) / walk.tangent.parameter, walk.tangent, predicted);
+    predicted.parameter = bound;
+    return correct(corrector, predicted, {zeros_like(predicted.state), 0, corrector.scales.parameter});
+  }
+  std::optional<CorrectedOrbit> next = correct(corrector, predicted, walk.tangent);
+  if (!next) return next;
+  BranchVector error = vector_of(*next);
+  add(-1, predicted, error);
+  // far from the prediction another branch may have been met
+  if (std::sqrt(scaled_product(corrector, error, error)) > 0.5 * length || !inside(settings, next->parameter))
+    return {};
+  return next;
+}
+
+/// The direction from one orbit to the next, of scaled length 1 about the next.
+BranchVector direction_between(const BranchCorrector& corrector, const CorrectedOrbit& from, const CorrectedOrbit& to)
+{
+  BranchVector direction = vector_of(to);
+  add(-1, vector_of(from), direction);
+  scale(1 / std::sqrt(scaled_product(corrector, direction, direction)), direction);
+  return direction;
+}
+
+void note_events(BranchCorrector& corrector, BranchSide& side)
+{
+  const std::size_t count = side.orbits.size();
+  std::vector<BranchEvent> fresh = events_between(corrector, side.orbits[count - 2], side.orbits[count - 1]);
+  if (count > 2)
+    if (auto fold = fold_among(corrector, {&side.orbits[count - 3], &side.orbits[count - 2], &side.orbits[count - 1]}))
+      fresh.push_back(*fold);
+  side.events.insert(side.events.end(), fresh.begin(), fresh.end());
+}
+
+/// Whether a pair opens, or comes to rest.
+bool is_nonlinear(const PointMeasures& measures)
+{
+  return measures.open_steps > 0 || measures.stick_steps > 0;
+}
+
+/// Whether the side has come to its natural end.
+std::optional<BranchEnding> natural_end(const ContinuationSettings& settings, const BranchSide& side)
+{
+  constexpr double small = 0.02; // of the start's fluctuation: the parameter is then within 4e-4 of its change to Hopf
+  const ExaminedOrbit &last = side.orbits.back(), &before = side.orbits[side.orbits.size() - 2];
+  if (last.corrected.parameter == settings.least || last.corrected.parameter == settings.greatest)
+    return BranchEnding::bound;
+  if (is_nonlinear(before.measures) && !is_nonlinear(last.measures)) return BranchEnding::linear_motion;
+  if (last.corrected.orbit.fluctuation < small * side.orbits.front().corrected.orbit.fluctuation)
+    return BranchEnding::small_amplitude;
+  return {};
+}
+
+/// Where the branch meets its equilibrium: the parameter is linear in the square of a small amplitude.
+BranchEvent hopf_beyond(const ExaminedOrbit& before, const ExaminedOrbit& last)
+{
+  const double p1 = before.corrected.parameter, p2 = last.corrected.parameter;
+  const double square1 = std::pow(before.corrected.orbit.fluctuation, 2),
+               square2 = std::pow(last.corrected.orbit.fluctuation, 2);
+  const double further = (p2 - p1) * square2 / (square1 - square2);
+  return {BranchEventKind::hopf, p2 + further, std::abs(further), last.corrected.orbit.period, 0, 0};
+}
+
+ExaminedOrbit copy_of(const ExaminedOrbit& orbit)
+{
+  return {{squeal::copy_of(orbit.corrected.orbit), orbit.corrected.parameter, 0}, orbit.multipliers, orbit.measures};
+}
+
+/// Follows the branch from its start in the direction of the tangent.
+BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, BranchVector tangent)
+{
+  const int points = corrector.settings.points;
+  BranchSide side;
+  side.orbits.push_back(copy_of(start));
+  refer_to(corrector, side.orbits.back().corrected);
+  Walk walk{std::move(tangent), 1. / points, 2e-3 / points, 6. / points};
+  if (!inside(corrector.settings,
+              start.corrected.parameter + std::copysign(1e-9 * corrector.scales.parameter, walk.tangent.parameter)))
+  {
+    side.ending = BranchEnding::not_followed;
+    return side;
+  }
+  while (static_cast<int>(side.orbits.size()) <= 8 * points)
+  {
+    const double length = limited(corrector, walk);
+    std::optional<CorrectedOrbit> next = step_on(corrector, side.orbits.back().corrected, walk, length);
+    if (!next)
+    {
+      walk.length = length / 2;
+      if (walk.length < walk.greatest / 50) // the last step was short, and its direction perhaps that of a kink
+        walk.tangent = tangent_at(corrector, side.orbits.back().corrected, walk.tangent);
+      if (walk.length >= walk.least) continue;
+      side.ending = BranchEnding::step_too_small;
+      return side;
+    }
+    walk.length = std::clamp(length * (next->iterations <= 4  ? 1.5
+                                       : next->iterations > 7 ? 0.7
+                                                              : 1),
+                             walk.least, walk.greatest);
+    refer_to(corrector, *next);
+    walk.tangent = direction_between(corrector, side.orbits.back().corrected, *next);
+    side.orbits.push_back(examine(corrector, std::move(*next), Examined::multipliers_too));
+    note_events(corrector, side);
+    if (const auto ending = natural_end(corrector.settings, side))
+    {
+      side.ending = *ending;
+      if (*ending == BranchEnding::small_amplitude)
+        side.events.push_back(hopf_beyond(side.orbits[side.orbits.size() - 2], side.orbits.back()));
+      return side;
+    }
+  }
+  return side;
+}
+
+BranchPoint point_of(ExaminedOrbit& examined)
+{
+  Orbit& orbit = examined.corrected.orbit;
+  return {examined.corrected.parameter,    std::move(orbit.state),      orbit.period, orbit.residual, orbit.fluctuation,
+          std::move(examined.multipliers), std::move(examined.measures)};
+}
+
+/// The backward side turned round, the start, the forward side.
+Branch joined(BranchSide backward, BranchSide forward)
+{
+  Branch branch;
+  branch.ends = {backward.ending, forward.ending};
+  for (std::size_t i = backward.orbits.size(); i-- > 1;) branch.points.push_back(point_of(backward.orbits[i]));
+  for (ExaminedOrbit& orbit : forward.orbits) branch.points.push_back(point_of(orbit));
+  std::reverse(backward.events.begin(), backward.events.end());
+  for (BranchEvent& event : backward.events) event.change = -event.change;
+  branch.events = std::move(backward.events);
+  branch.events.insert(branch.events.end(), forward.events.begin(), forward.events.end());
+  return branch;
+}
+
+} // namespace
+
+Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settings, const ShootingOptions& options,
+                    const Orbit& start, double parameter)
+{
+  Progress progress(comm_of(displacement(start.state)), "branch", 10. * settings.points);
+  ConvergenceLog log{progress};
+  BranchCorrector corrector{family, settings, options, log};
+  corrector.scales.parameter = settings.greatest - settings.least;
+  CorrectedOrbit first{squeal::copy_of(start), parameter, 0};
+  refer_to(corrector, first);
+  ExaminedOrbit examined = examine(corrector, std::move(first), Examined::multipliers_too);
+  const BranchVector rising{zeros_like(start.state), 0, corrector.scales.parameter};
+  BranchVector tangent = tangent_at(corrector, examined.corrected, rising), back = copy_of(tangent);
+  scale(-1, back);
+  BranchSide backward = follow(corrector, examined, std::move(back));
+  corrector.secants.clear();
+  BranchSide forward = follow(corrector, examined, std::move(tangent));
+  Branch branch = joined(std::move(backward), std::move(forward));
+  branch.periods = log.convergence.periods;
+  branch.columns = corrector.columns;
+  return branch;
+}
+
+} // namespace squeal

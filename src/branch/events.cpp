@@ -1,0 +1,177 @@
+#include "events.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// What is counted on an orbit. A change of a count is an event.
+using Count = std::function<int(const ExaminedOrbit&)>;
+
+/// How the event of a count is looked for.
+struct Search
+{
+  BranchEventKind kind;
+  Count count;
+  Examined examined;
+  int halvings; // of the interval between the points
+};
+
+bool counts(BranchEventKind kind, std::complex<double> multiplier)
+{
+  if (!(std::abs(multiplier) > 1)) return false;
+  if (kind == BranchEventKind::neimark_sacker) return multiplier.imag() > 0;
+  return kind == BranchEventKind::period_doubling && multiplier.imag() == 0 && multiplier.real() < 0;
+}
+
+Count multipliers_of(BranchEventKind kind)
+{
+  return [kind](const ExaminedOrbit& orbit)
+  {
+    const auto& values = orbit.multipliers.values;
+    return static_cast<int>(
+        std::count_if(values.begin(), values.end(), [kind](std::complex<double> m) { return counts(kind, m); }));
+  };
+}
+
+/// z on the straight line between two orbits.
+BranchVector between(const BranchVector& from, const BranchVector& to, double part)
+{
+  BranchVector z = copy_of(from);
+  scale(1 - part, z);
+  add(part, to, z);
+  return z;
+}
+
+std::optional<CorrectedOrbit> correct_between(BranchCorrector& corrector, const ExaminedOrbit& from,
+                                              const ExaminedOrbit& to, double part)
+{
+  const BranchVector a = vector_of(from.corrected), b = vector_of(to.corrected);
+  BranchVector normal = copy_of(b);
+  add(-1, a, normal);
+  scale(1 / std::sqrt(scaled_product(corrector, normal, normal)), normal);
+  return correct(corrector, between(a, b, part), normal);
+}
+
+BranchEvent event_at(BranchEventKind kind, const ExaminedOrbit& orbit, double error)
+{
+  return {kind, orbit.corrected.parameter, error, orbit.corrected.orbit.period, orbit.measures.mean_fluctuating_energy,
+          0};
+}
+
+/// Halves the interval between two orbits of different counts. The event is put to the end of higher energy of what is
+/// left: there the orbit has what the event is about.
+BranchEvent locate(BranchCorrector& corrector, const Search& search, const ExaminedOrbit& from, const ExaminedOrbit& to)
+{
+  const int first = search.count(from);
+  double low = 0, high = 1;
+  double low_parameter = from.corrected.parameter, high_parameter = to.corrected.parameter;
+  double period = to.corrected.orbit.period, energy = to.measures.mean_fluctuating_energy;
+  for (int i = 0; i < search.halvings; ++i)
+  {
+    const double middle = 0.5 * (low + high);
+    std::optional<CorrectedOrbit> corrected = correct_between(corrector, from, to, middle);
+    if (!corrected) break;
+    const ExaminedOrbit orbit = examine(corrector, std::move(*corrected), search.examined);
+    const bool before = search.count(orbit) == first;
+    (before ? low : high) = middle;
+    (before ? low_parameter : high_parameter) = orbit.corrected.parameter;
+    period = orbit.corrected.orbit.period;
+    energy = orbit.measures.mean_fluctuating_energy;
+  }
+  return {search.kind,
+          0.5 * (low_parameter + high_parameter),
+          0.5 * std::abs(high_parameter - low_parameter),
+          period,
+          energy,
+          search.count(to) - first};
+}
+
+bool moves(const PointMeasures& measures)
+{
+  return measures.open_steps > 0;
+}
+
+std::vector<Search> searches(const ExaminedOrbit& from, const ExaminedOrbit& to)
+{
+  const auto lifts = [](const ExaminedOrbit& orbit) { return moves(orbit.measures) ? 1 : 0; };
+  const auto sticks = [](const ExaminedOrbit& orbit) { return orbit.measures.stick_steps > 0 ? 1 : 0; };
+  const auto opens = [](const ExaminedOrbit& orbit) { return orbit.measures.lift_offs; };
+  std::vector<Search> found = {
+      {BranchEventKind::first_lift_off, lifts, Examined::measures_alone, 7},
+      {BranchEventKind::first_stick, sticks, Examined::measures_alone, 5},
+      {BranchEventKind::neimark_sacker, multipliers_of(BranchEventKind::neimark_sacker), Examined::multipliers_too, 5},
+      {BranchEventKind::period_doubling, multipliers_of(BranchEventKind::period_doubling), Examined::multipliers_too,
+       5},
+  };
+  // the first opening is no grazing of an impacting motion
+  if (moves(from.measures) && moves(to.measures))
+    found.push_back({BranchEventKind::grazing, opens, Examined::measures_alone, 4});
+  std::erase_if(found, [&](const Search& search) { return search.count(from) == search.count(to); });
+  return found;
+}
+
+/// Where the parabola through (s, p) of three points turns.
+double vertex(const std::array<double, 3>& s, const std::array<double, 3>& p)
+{
+  const double first = (p[1] - p[0]) / (s[1] - s[0]), second = (p[2] - p[1]) / (s[2] - s[1]);
+  const double bend = (second - first) / (s[2] - s[0]);
+  return 0.5 * (s[0] + s[1]) - first / (2 * bend);
+}
+
+double distance(const BranchCorrector& corrector, const ExaminedOrbit& from, const ExaminedOrbit& to)
+{
+  BranchVector step = vector_of(to.corrected);
+  add(-1, vector_of(from.corrected), step);
+  return std::sqrt(scaled_product(corrector, step, step));
+}
+
+} // namespace
+
+ExaminedOrbit examine(BranchCorrector& corrector, CorrectedOrbit corrected, Examined wanted)
+{
+  ExaminedOrbit examined{std::move(corrected), {}, {}};
+  const Orbit& orbit = examined.corrected.orbit;
+  corrector.family.set_parameter(examined.corrected.parameter);
+  if (corrector.family.measure) examined.measures = corrector.family.measure(orbit);
+  if (wanted == Examined::measures_alone) return examined;
+  examined.multipliers = find_multipliers(problem_of(corrector), corrector.options, orbit, {}).multipliers;
+  corrector.columns += examined.multipliers.periods;
+  return examined;
+}
+
+std::vector<BranchEvent> events_between(BranchCorrector& corrector, const ExaminedOrbit& from, const ExaminedOrbit& to)
+{
+  std::vector<BranchEvent> events;
+  for (const Search& search : searches(from, to)) events.push_back(locate(corrector, search, from, to));
+  return events;
+}
+
+std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::array<const ExaminedOrbit*, 3>& points)
+{
+  std::array<const ExaminedOrbit*, 3> now = points;
+  const auto parameter = [&](std::size_t i) { return now[i]->corrected.parameter; };
+  if (!((parameter(1) - parameter(0)) * (parameter(2) - parameter(1)) < 0)) return {};
+  std::array<ExaminedOrbit, 2> found;
+  BranchEvent event = event_at(BranchEventKind::fold, *points[1], 0.5 * std::abs(parameter(2) - parameter(0)));
+  for (ExaminedOrbit& fold : found)
+  {
+    const double before = distance(corrector, *now[0], *now[1]), after = distance(corrector, *now[1], *now[2]);
+    const double at = vertex({-before, 0, after}, {parameter(0), parameter(1), parameter(2)});
+    const std::size_t side = at < 0 ? 0 : 1;
+    const double part = std::clamp(at < 0 ? 1 + at / before : at / after, 0., 1.);
+    std::optional<CorrectedOrbit> corrected = correct_between(corrector, *now[side], *now[side + 1], part);
+    if (!corrected) break;
+    fold = examine(corrector, std::move(*corrected), Examined::measures_alone);
+    event = event_at(BranchEventKind::fold, fold, std::abs(fold.corrected.parameter - event.parameter));
+    now = side == 0 ? std::array{now[0], static_cast<const ExaminedOrbit*>(&fold), now[1]}
+                    : std::array{now[1], static_cast<const ExaminedOrbit*>(&fold), now[2]};
+  }
+  return event;
+}
+
+} // namespace squeal

@@ -1,0 +1,160 @@
+#include "branch_results.hpp"
+
+#include "derived.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Json = nlohmann::ordered_json;
+
+Json point_entry(const BranchPoint& point, const Scene& scene)
+{
+  Json entry = {{"parameter", point.parameter},
+                {"period", point.period},
+                {"frequency_hz", 1 / point.period},
+                {"residual", point.residual},
+                {"mean_energy", point.measures.mean_energy},
+                {"mean_fluctuating_energy", point.measures.mean_fluctuating_energy},
+                {"open_pairs_mean", point.measures.open_pairs_mean},
+                {"open_steps", point.measures.open_steps},
+                {"lift_offs", point.measures.lift_offs},
+                {"stick_steps", point.measures.stick_steps},
+                {"stability", word(point.multipliers.stability)},
+                {"multipliers", multiplier_list(point.multipliers)}};
+  Json swings = Json::object();
+  for (std::size_t i = 0; i < point.measures.peak_to_peak.size(); ++i)
+    swings[scene.probes[i].name] = point.measures.peak_to_peak[i];
+  entry["peak_to_peak"] = swings;
+  return entry;
+}
+
+/// Of the largest multiplier; NaN where none is known.
+double largest(const BranchPoint& point)
+{
+  const auto& values = point.multipliers.values;
+  return values.empty() ? std::nan("") : std::abs(values.front());
+}
+
+std::string event_line(const BranchEvent& event)
+{
+  return format("%s at %.6g +- %.1e, %.6g Hz", word(event.kind), event.parameter, event.error, 1 / event.period) +
+         (event.change == 0 ? "" : format(" (%+d)", event.change));
+}
+
+/// Places of at most `shown` of `count` entries, spread evenly.
+std::vector<std::size_t> spread(std::size_t count, std::size_t shown)
+{
+  std::vector<std::size_t> places;
+  const std::size_t taken = std::min(count, shown);
+  for (std::size_t i = 0; i < taken; ++i) places.push_back(taken < 2 ? 0 : i * (count - 1) / (taken - 1));
+  return places;
+}
+
+} // namespace
+
+Json multiplier_list(const Multipliers& multipliers)
+{
+  Json list = Json::array();
+  for (std::size_t i = 0; i < multipliers.values.size(); ++i)
+    list.push_back({{"real", multipliers.values[i].real()},
+                    {"imaginary", multipliers.values[i].imag()},
+                    {"error", multipliers.errors[i]}});
+  return list;
+}
+
+void add_branch(const BrakeBranch& branch, const Scene& scene, Json& entry)
+{
+  const BranchSettings& settings = *scene.branch;
+  entry["key"] = settings.key;
+  entry["from"] = settings.from;
+  entry["to"] = settings.to;
+  entry["periods_integrated"] = branch.branch.periods;
+  entry["tangent_columns"] = branch.branch.columns;
+  entry["ends"] = {{"backward", word(branch.branch.ends.backward)}, {"forward", word(branch.branch.ends.forward)}};
+  entry["points"] = Json::array();
+  for (const BranchPoint& point : branch.branch.points) entry["points"].push_back(point_entry(point, scene));
+  entry["events"] = Json::array();
+  for (const BranchEvent& event : branch.branch.events)
+    entry["events"].push_back({{"kind", word(event.kind)},
+                               {"parameter", event.parameter},
+                               {"error", event.error},
+                               {"frequency_hz", 1 / event.period},
+                               {"mean_fluctuating_energy", event.mean_fluctuating_energy},
+                               {"change", event.change}});
+  entry["equilibria"] = Json::array();
+  for (const EquilibriumStability& equilibrium : branch.equilibria)
+    if (equilibrium.known)
+      entry["equilibria"].push_back({{"parameter", equilibrium.parameter},
+                                     {"unstable_modes", equilibrium.unstable_modes},
+                                     {"growth_rate", equilibrium.growth_rate},
+                                     {"frequency_hz", equilibrium.frequency_hz}});
+  entry["coexistence"] = Json::array();
+  for (const ParameterRange& range : branch.coexistence)
+    entry["coexistence"].push_back({{"from", range.from}, {"to", range.to}});
+}
+
+void write_branch(Hdf5File& file, const BrakeBranch& branch, const Scene& scene)
+{
+  const auto write = [&](const std::string& name, const std::string& unit, const auto& list, auto value)
+  {
+    std::vector<std::decay_t<decltype(value(list.front()))>> data;
+    for (const auto& member : list) data.push_back(value(member));
+    file.write("branch/" + name, {data.size()}, data, unit);
+  };
+  const auto& points = branch.branch.points;
+  using Cycle = const BranchPoint&;
+  write("parameter", "unit of the key", points, [](Cycle p) { return p.parameter; });
+  write("frequency", "Hz", points, [](Cycle p) { return 1 / p.period; });
+  write("mean_energy", "J", points, [](Cycle p) { return p.measures.mean_energy; });
+  write("mean_fluctuating_energy", "J", points, [](Cycle p) { return p.measures.mean_fluctuating_energy; });
+  write("largest_multiplier", "-", points, [](Cycle p) { return largest(p); });
+  write("stability", "1 stable, 2 unstable, 3 undecided", points,
+        [](Cycle p) { return static_cast<int>(p.multipliers.stability); });
+  write("open_steps", "steps of pairs", points, [](Cycle p) { return p.measures.open_steps; });
+  write("stick_steps", "steps of pairs", points, [](Cycle p) { return p.measures.stick_steps; });
+  for (std::size_t i = 0; i < scene.probes.size() && !points.empty(); ++i)
+    write("probes/" + without_slash(scene.probes[i].name), "m", points,
+          [i](Cycle p) { return p.measures.peak_to_peak[i]; });
+  std::vector<EquilibriumStability> known = branch.equilibria;
+  std::erase_if(known, [](const EquilibriumStability& equilibrium) { return !equilibrium.known; });
+  using Equilibria = const EquilibriumStability&;
+  write("equilibrium/parameter", "unit of the key", known, [](Equilibria e) { return e.parameter; });
+  write("equilibrium/growth_rate", "1/s", known, [](Equilibria e) { return e.growth_rate; });
+  write("equilibrium/frequency", "Hz", known, [](Equilibria e) { return e.frequency_hz; });
+}
+
+std::vector<std::string> branch_lines(const BrakeBranch& branch, const Scene& scene)
+{
+  constexpr std::size_t points_shown = 12, grazings_shown = 4;
+  const Branch& followed = branch.branch;
+  std::vector<std::string> lines = {
+      format("%zu cycles along %s from %.6g to %.6g; %ld periods and %ld columns of the tangent",
+             followed.points.size(), scene.branch->key.c_str(), followed.points.front().parameter,
+             followed.points.back().parameter, followed.periods, followed.columns),
+      format("%12s %14s %14s %18s", "parameter", "frequency", "energy", "largest multiplier"),
+      format("%12s %14s %14s %18s", "", "[Hz]", "[J]", "[-]")};
+  for (const std::size_t i : spread(followed.points.size(), points_shown))
+  {
+    const BranchPoint& point = followed.points[i];
+    lines.push_back(format("%12.6g %14.7g %14.5g %18.6f  %s", point.parameter, 1 / point.period,
+                           point.measures.mean_fluctuating_energy, largest(point), word(point.multipliers.stability)));
+  }
+  std::size_t grazings = 0;
+  for (const BranchEvent& event : followed.events)
+    if (event.kind != BranchEventKind::grazing || ++grazings <= grazings_shown) lines.push_back(event_line(event));
+  if (grazings > grazings_shown)
+    lines.push_back(format("%zu more grazings are in report.json", grazings - grazings_shown));
+  for (const ParameterRange& range : branch.coexistence)
+    lines.push_back(
+        format("from %.6g to %.6g a stable cycle stands beside a stable equilibrium", range.from, range.to));
+  return lines;
+}
+
+} // namespace squeal
