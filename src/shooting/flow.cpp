@@ -54,7 +54,8 @@ double energy_product(const Flow& flow, Vec a, Vec b)
 
 double energy_norm(const Flow& flow, Vec a)
 {
-  return std::sqrt(std::max(0., energy_product(flow, a, a)));
+  const double square = energy_product(flow, a, a);
+  return square < 0 ? 0 : std::sqrt(square); // what is not a number stays so
 }
 
 void normalise(const Flow& flow, Vec x)

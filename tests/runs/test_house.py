@@ -6,7 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 # What each room may include, besides itself and what stands in the same line before it.
-CHAIN = ["base", "algebra", "solid", "contact", "equilibrium", "modes", "transient", "reduction", "cycle", "report"]
+CHAIN = ["base", "algebra", "solid", "contact", "equilibrium", "modes", "transient", "reduction", "cycle", "branch", "report"]
 ALLOWED = {room: set(CHAIN[: place + 1]) | {"scene", "mesh"} for place, room in enumerate(CHAIN)}
 ALLOWED |= {
     "base": {"base"},
@@ -16,6 +16,7 @@ ALLOWED |= {
     "shooting": {"base", "algebra", "shooting"},
 }
 ALLOWED["cycle"] |= {"shooting"}
+ALLOWED["branch"] |= {"shooting"}
 ALLOWED["report"] |= {"shooting"}
 PROGRAM = set(ALLOWED["report"])  # src/*.cpp and include/squeal/*.hpp
 
@@ -93,6 +94,15 @@ def test_shooting_knows_no_brake():
     assert files and {target for _, target in includes} <= {"base", "algebra", "shooting"}, includes
     brake = re.compile(r"\b(structure|interface|equilibrium|contact|scene|transient|modes)/\w+\.hpp|Structure&|Interface&")
     assert not [f.name for f in files if brake.search(f.read_text())]
+
+
+def test_continuation_knows_no_brake():
+    """Nor does the tracing of a branch: it sees a family of flows."""
+    generic = {"continuation.hpp", "continuation.cpp", "corrector.hpp", "corrector.cpp", "events.hpp", "events.cpp"}
+    files, includes = includes_of("branch")
+    assert generic <= {file.name for file in files}
+    assert {target for name, target in includes if name in generic} <= {"base", "shooting", "branch"}
+    assert not [f.name for f in files if f.name in generic and "brake" in f.read_text()]
 
 
 def test_the_reduced_model_knows_no_flow():

@@ -110,7 +110,9 @@ def test_every_option_is_explained(helped):
 RUNS = {
     # every stage, from points; too small to be reduced, with the reason
     "oscillator": [INPUTS / "oscillator" / "scene.toml", "--set", "cycle.steps_per_period=100", "--set",
-                   "transient.periods=20", "--set", "transient.steps_per_period=50", "--set", "fidelity=auto"],
+                   "transient.periods=20", "--set", "transient.steps_per_period=50", "--set", "fidelity=auto",
+                   "--set", "branch.key=friction.coefficient", "--set", "branch.from=0.28", "--set", "branch.to=0.32",
+                   "--set", "branch.points=4"],
     # the reduced model, a rotation, a mesh; coarse, and damped like this, its cycle is found in a second
     "pin_on_disc": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
                     "damping.beta=6e-7", "--set", "cycle.steps_per_period=40", "--set", "fidelity=auto"],
@@ -147,6 +149,8 @@ def data_sets_of(file):
 
 # Written with a verdict that is unstable or undecided, which no run here ends in.
 UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide"}
+# Written of branches with events, and where a stable cycle stands beside a stable equilibrium.
+OF_SOME_BRANCHES = re.compile(r"branch\.(events|coexistence)\[\]\.\w+")
 
 
 def compare(documented, written):
@@ -157,7 +161,7 @@ def compare(documented, written):
     unknown = {name for name in written if not any(pattern.fullmatch(name) for pattern in patterns.values())}
     assert not unknown, f"written and not explained: {sorted(unknown)}"
     missing = {name for name, pattern in patterns.items() if not any(pattern.fullmatch(path) for path in written)}
-    missing -= UNLESS_STABLE
+    missing = {name for name in missing - UNLESS_STABLE if not OF_SOME_BRANCHES.fullmatch(name)}
     assert not missing, f"explained and never written: {sorted(missing)}"
     return patterns
 

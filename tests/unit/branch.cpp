@@ -155,9 +155,8 @@ TEST_CASE("a Neimark-Sacker point is located within its error, and both bounds a
   CHECK(passed->error < 1e-3);
 }
 
-TEST_CASE("a range whose end no cycle reaches says how far the branch came")
+TEST_CASE("both bounds of a range are reached exactly, and no event is made up between")
 {
-  // below the fold there is no circle, and the branch turns: the bound is never met from the upper side
   const auto made = family_of(subcritical, {1});
   const double radius = std::sqrt((1 + std::sqrt(3.)) / 2);
   const Branch branch = branch_from(*made, {radius}, 2 * pi, 0.5, {-0.2, 0.6, 20, 1e-9});
@@ -166,4 +165,18 @@ TEST_CASE("a range whose end no cycle reaches says how far the branch came")
   CHECK(branch.points.front().parameter == -0.2);
   CHECK(branch.points.back().parameter == 0.6);
   CHECK(branch.events.empty());
+}
+
+TEST_CASE("a branch that breaks off says so, and where")
+{
+  // circles of radius 1 + sqrt(p): no flow below p = 0
+  const auto broken = [](double p, const std::vector<double>& x, std::vector<double>& rate) {
+    rate = {x[1], (1 + std::sqrt(p) - std::hypot(x[0], x[1])) * x[1] - x[0]};
+  };
+  const auto made = family_of(broken, {1});
+  const Branch branch = branch_from(*made, {1.5}, 2 * pi, 0.25, {-0.1, 0.3, 20, 1e-9});
+  CHECK(branch.ends.backward == BranchEnding::step_too_small);
+  CHECK(branch.ends.forward == BranchEnding::bound);
+  CHECK(branch.points.front().parameter > 0);
+  CHECK(branch.points.front().parameter < 0.02); // a step spans 0.4/20
 }

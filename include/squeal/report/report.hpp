@@ -42,7 +42,7 @@ struct Report
   std::vector<Estimate> estimates; // of the unstable modes, the followed one first; else one that says why not
   Trajectory transient;
   LimitCycle cycle;
-  Fidelity fidelity;           // of the cycle
+  Fidelity fidelity; // of the cycle
   BrakeBranch branch;
   std::vector<Timing> timings; // in order
 };

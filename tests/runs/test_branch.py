@@ -1,0 +1,110 @@
+"""Branches of cycles: against single runs, exact thresholds, other ranks; bad input; the picture."""
+
+import subprocess
+import sys
+
+import pytest
+from conftest import INPUTS, ROOT
+
+SCENE = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=200"]
+HOPF = 0.17649288  # exact: the characteristic polynomial of the sliding oscillator has an imaginary pair
+
+
+def branch_of(key, start, end):
+    return ["--set", f"branch.key={key}", "--set", f"branch.from={start}", "--set", f"branch.to={end}"]
+
+
+def events(report):
+    return [(event["kind"], event["parameter"], event["error"]) for event in report["branch"]["events"]]
+
+
+@pytest.fixture(scope="module")
+def friction(module_run):
+    return module_run(*SCENE, *branch_of("friction.coefficient", 0.15, 0.5), ranks=1)
+
+
+def test_points_are_the_cycles_of_single_runs(friction, converged):
+    """At three frictions, from their own estimates: period, energy, amplitude and multiplier."""
+    points = friction["branch"]["points"]
+    for wanted in (0.2, 0.35, 0.45):
+        point = min(points, key=lambda point: abs(point["parameter"] - wanted))
+        single = converged(*SCENE, "--set", f"friction.coefficient={point['parameter']!r}").report["cycle"]
+        # The step is off by 8e-5 of the period. The phase of its grid against the events moves a twentieth of that.
+        assert point["period"] == pytest.approx(single["period"], rel=5e-6)
+        assert point["mean_fluctuating_energy"] == pytest.approx(single["mean_fluctuating_energy"], rel=1e-3)
+        assert point["peak_to_peak"]["pad_y"] == pytest.approx(single["peak_to_peak"]["pad_y"], rel=1e-3)
+        largest = single["multipliers"]["values"][0]
+        bar = point["multipliers"][0]["error"] + largest["error"] + 1e-6
+        assert abs(point["multipliers"][0]["real"] - largest["real"]) < bar
+
+
+def test_the_branch_starts_at_the_hopf_point(friction):
+    """Friction is linear below first lift-off, so the branch ends straight above the Hopf point, its multiplier 1."""
+    branch = friction["branch"]
+    found = {kind: (parameter, error) for kind, parameter, error in events(friction)}
+    assert abs(found["Hopf"][0] - HOPF) < found["Hopf"][1] + 1e-8
+    # the step moves the threshold: Re(lambda_h) = Re(lambda) (1 - (omega h)^2/4), which vanishes where Re(lambda) does
+    assert abs(found["first lift-off"][0] - HOPF) < 1e-6
+    assert branch["ends"] == {"backward": "linear motion", "forward": "bound"}
+    first = branch["points"][0]
+    assert first["open_steps"] == 0 and abs(first["multipliers"][0]["real"] - 1) < 1e-6
+    assert branch["points"][-1]["parameter"] == 0.5
+    assert found["first stick"][0] - found["first stick"][1] > HOPF
+    for point in branch["points"]:
+        assert (point["stick_steps"] > 0) == (point["parameter"] > found["first stick"][0])
+
+
+@pytest.mark.parametrize("key, start, end, override", [
+    ("contact.0.velocity.0", 0.5, 0.8, "contact.0.velocity=[{},0,0]"),
+    ("spring.0.damping", 0.01, 0.03, "spring.0.damping={}"),
+    ("force.0.vector.1", -1.2, -0.9, "force.0.vector=[0,{},0]"),
+])
+def test_any_number_of_the_scene(key, start, end, override, converged):
+    """Models are built again at each value: the last point is the cycle of the scene with that value."""
+    report = converged(*SCENE, *branch_of(key, start, end), "--set", "branch.points=6").report
+    points = report["branch"]["points"]
+    assert [points[0]["parameter"], points[-1]["parameter"]] == [start, end]
+    single = converged(*SCENE, "--set", override.format(end)).report["cycle"]
+    assert points[-1]["period"] == pytest.approx(single["period"], rel=5e-6)
+    assert points[-1]["mean_fluctuating_energy"] == pytest.approx(single["mean_fluctuating_energy"], rel=1e-3)
+
+
+def test_ranks_agree_on_the_events(friction, module_run):
+    other = module_run(*SCENE, *branch_of("friction.coefficient", 0.15, 0.5), ranks=2)
+    assert [kind for kind, *_ in events(friction)] == [kind for kind, *_ in events(other)]
+    for (_, first, error), (_, second, _) in zip(events(friction), events(other)):
+        assert abs(first - second) <= error + 1e-9
+    for first, second in zip(friction["branch"]["points"], other["branch"]["points"], strict=True):
+        assert first["parameter"] == pytest.approx(second["parameter"], rel=1e-6)
+        assert first["period"] == pytest.approx(second["period"], rel=5e-6)
+
+
+@pytest.mark.parametrize("key, start, end, words", [
+    ("friction.coefficent", 0.2, 0.4, "not in the scene"),
+    ("friction.direction_damping", 0.2, 0.4, "not a number"),
+    ("force.0.vector", 0.2, 0.4, "name an entry"),
+    ("mesh.parameters.size", 0.2, 0.4, "change the mesh"),
+    ("cycle.tolerance", 0.2, 0.4, "known: part"),
+    ("spring.9.stiffness", 0.2, 0.4, "not in the scene"),
+    ("friction.coefficient", 0.3, 0.3, "give a range"),
+    ("friction.coefficient", 0.4, 0.5, "must lie between"),
+    ("friction.coefficient", -0.1, 0.5, "zero or a positive number"),
+])
+def test_bad_branches_are_refused_before_the_first_stage(key, start, end, words, squeal):
+    run = squeal(*SCENE, *branch_of(key, start, end), "--dry-run", ranks=1)
+    assert run.code == 1
+    assert len(run.messages) == 1 and words in run.messages[0] and "--set branch." in run.messages[0]
+    assert "model …" not in run.printed
+
+
+def test_a_branch_needs_a_cycle(squeal):
+    run = squeal(*SCENE, *branch_of("friction.coefficient", 0.2, 0.4), "--set", "cycle.enabled=false", ranks=1)
+    assert run.code == 1 and "[cycle]" in run.messages[0]
+    run = squeal(*SCENE, *branch_of("friction.coefficient", 0.1, 0.4), "--set", "friction.coefficient=0.12", ranks=1)
+    assert run.code == 0 and run.report["branch"]["outcome"] == "skipped"
+
+
+def test_the_picture_is_drawn(converged):
+    run = converged(*SCENE, *branch_of("friction.coefficient", 0.28, 0.32), "--set", "branch.points=3", ranks=1)
+    subprocess.run([sys.executable, ROOT / "tools" / "plot", run.output], check=True, capture_output=True)
+    assert (run.output / "branch.png").stat().st_size > 10000
