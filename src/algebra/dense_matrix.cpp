@@ -49,6 +49,7 @@ void broadcast(VectorXd& x, MPI_Comm comm)
 MatrixXd solve_dense(MatrixXd A, const MatrixXd& B, const char* singular)
 {
   if (A.size() == 0) return B;
+  if (!A.allFinite()) throw Error(singular); // LAPACK would return without the permutation that Eigen then applies
   const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> factor(A);
   if ((factor.matrixLU().diagonal().array() == 0).any()) throw Error(singular);
   return factor.solve(B);

@@ -1,6 +1,8 @@
 #include "squeal/cycle/fidelity.hpp"
 
-#include "full_correction.hpp"
+#include "preconditioner.hpp"
+#include "reduced_cycle.hpp"
+#include "step_refinement.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,65 +13,105 @@ namespace squeal
 namespace
 {
 
-/// The cycle by way of the reduced model. Returns why there is none, or nothing.
-std::string find_by_reduced_model(ReducedSearch& search, LimitCycle& cycle)
+constexpr int first_steps = 64;          // a period, where the scene leaves them open
+constexpr int most_steps = 4096;         // tried, until the growth at these is not misleading
+constexpr int plain_steps = 100;         // a period of a model that the scene names
+constexpr double plain_tolerance = 1e-5; // on the full-space residual
+
+/// Why theta and the steps a period would give misleading growth; empty if they would not.
+std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
+{
+  const ComplexMode& mode = problem.unstable.modes.front();
+  return step_refusal(problem.sliding.structure, &mode, problem.settings.theta,
+                      1 / mode.frequency_hz() / steps_per_period, problem.step);
+}
+
+/// The settings, with steps and tolerance where the scene leaves them open.
+CycleSettings with_choices(const CycleProblem& problem, CycleModel model)
+{
+  CycleSettings settings = problem.settings;
+  const bool chooses = model == CycleModel::automatic;
+  if (settings.tolerance == 0) settings.tolerance = plain_tolerance;
+  if (settings.steps_per_period > 0) return settings;
+  settings.steps_per_period = chooses ? first_steps : plain_steps;
+  while (chooses && settings.steps_per_period < most_steps &&
+         !step_refusal_of(problem, settings.steps_per_period).empty())
+    settings.steps_per_period *= 2;
+  return settings;
+}
+
+/// The problem with other settings.
+CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
+{
+  return {problem.sliding, problem.linearised, problem.modes,         problem.unstable,
+          settings,        problem.step,       problem.modes_options, problem.probes};
+}
+
+/// The full model's cycle from the reduced model's, its derivative for a preconditioner, and the finer steps that the
+/// accuracy needs. Returns why there is none, or nothing.
+std::string find_by_reduced_model(ReducedSearch& search, bool steps_open, LimitCycle& cycle)
 {
   const CycleProblem& problem = search.problem;
   if (problem.unstable.modes.size() > 1)
     return "several modes are unstable: only the full model's shooting excites them all";
   ReducedCycle reduced;
   if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
+  const double clock = MPI_Wtime();
   const Preconditioner preconditioner = preconditioner_of(search.correction, search.model, problem.sliding.structure);
   const Owned<Vec> state = full_motion(search, reduced.state);
   check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
   const ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
-  if (search.fidelity.asked != CycleModel::full)
-    return correct_on_full_model(search, start, preconditioner, reduced, cycle);
-  cycle = find_cycle_from(problem, search.options, start, preconditioner, 0);
+  const CycleCorrection correction{problem, search.options, preconditioner, search.fidelity};
+  if (search.fidelity.asked == CycleModel::reduced)
+  {
+    estimate_reduced_step_errors(search, reduced);
+    cycle = measure_reduced_cycle(correction, start);
+  }
+  else
+  {
+    cycle = find_cycle_from(problem, search.options, start, preconditioner, 0);
+    if (cycle.outcome.kind == OutcomeKind::not_converged)
+      return "the full model's shooting from the reduced model's cycle stalled";
+    search.fidelity.full_periods = cycle.convergence.periods;
+    if (steps_open)
+      refine_steps(correction, cycle);
+    else
+      estimate_model_errors(correction, cycle);
+  }
+  search.fidelity.full_seconds += MPI_Wtime() - clock;
   return {};
 }
 
-/// Why the cycle's own theta and steps a period would give misleading growth; empty if they would not.
-std::string step_refusal_of(const CycleProblem& problem)
-{
-  const ComplexMode& mode = problem.unstable.modes.front();
-  const double period = 1 / mode.frequency_hz();
-  return step_refusal(problem.sliding.structure, &mode, problem.settings.theta,
-                      period / problem.settings.steps_per_period, problem.step);
-}
-
-/// The cycle of the full model, from the estimate, with at least `steps` steps a period.
-void find_by_full_model(const CycleProblem& problem, const CycleOptions& options, int steps, FittedCycle& result)
+/// The cycle of the full model, from the estimate.
+void find_by_full_model(const CycleProblem& problem, const CycleOptions& options, bool steps_open, FittedCycle& result)
 {
   const double clock = MPI_Wtime();
   Fidelity& fidelity = result.fidelity;
-  fidelity.used = CycleModel::full; // of whose errors nothing is known
-  fidelity.frequency_error = fidelity.energy_error = std::nan("");
-  fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
-  CycleSettings refined = problem.settings;
-  refined.steps_per_period = std::max(refined.steps_per_period, steps);
-  const CycleProblem at_steps{problem.sliding, problem.linearised, problem.modes,         problem.unstable,
-                              refined,         problem.step,       problem.modes_options, problem.probes};
-  result.cycle = find_cycle_from_estimate(at_steps, options);
-  fidelity.steps_per_period = refined.steps_per_period;
+  fidelity.used = CycleModel::full;
+  LimitCycle found = find_cycle_from_estimate(problem, options);
+  found.convergence.periods += fidelity.full_periods; // of a search that stalled
+  result.cycle = std::move(found);
+  fidelity.full_periods = result.cycle.convergence.periods;
+  if (steps_open)
+  {
+    const Preconditioner preconditioner = estimated_preconditioner(problem, options.band_factor);
+    refine_steps({problem, options, preconditioner, fidelity}, result.cycle);
+  }
   fidelity.full_seconds += MPI_Wtime() - clock;
-  fidelity.full_periods += result.cycle.convergence.periods;
 }
 
 /// The cycle on the model asked for, or on the full one where "auto" cannot do without it.
-void find_on_model(const CycleProblem& problem, const CycleOptions& options, FittedCycle& result)
+void find_on_model(const CycleProblem& problem, const CycleOptions& options, bool steps_open, FittedCycle& result)
 {
   Fidelity& fidelity = result.fidelity;
-  const bool by_full_model = fidelity.asked == CycleModel::full;
-  ReducedSearch search{problem, options, fidelity, problem.settings.steps_per_period};
-  if (fidelity.asked == CycleModel::automatic) search.steps = std::min(64, search.steps);
-  // a start need not be better; slow motions multiply its error
-  search.tolerance = by_full_model ? 1e-3 : 3e-4 * fidelity.accuracy;
-  if (!by_full_model || options.start == CycleStart::reduced_model)
+  if (fidelity.asked != CycleModel::full)
   {
-    fidelity.used = by_full_model ? CycleModel::full : CycleModel::reduced;
+    fidelity.used = CycleModel::reduced;
     fidelity.contact_tolerance = 1e-3 * fidelity.accuracy;
-    fidelity.reason = find_by_reduced_model(search, result.cycle);
+    ReducedSearch search{problem, options, fidelity, problem.settings.steps_per_period};
+    // a start need not be better; slow motions multiply its error
+    search.tolerance = fidelity.asked == CycleModel::automatic ? 1e-3 : 3e-4 * fidelity.accuracy;
+    fidelity.reason = find_by_reduced_model(search, steps_open, result.cycle);
     if (fidelity.reason.empty()) return;
   }
   if (fidelity.asked == CycleModel::reduced)
@@ -78,25 +120,30 @@ void find_on_model(const CycleProblem& problem, const CycleOptions& options, Fit
     result.cycle.outcome.reason = fidelity.reason;
     return;
   }
-  find_by_full_model(problem, options, search.steps, result);
+  find_by_full_model(problem, options, steps_open, result);
 }
 
 } // namespace
 
-FittedCycle find_fitted_cycle(const CycleProblem& problem, const FidelityRequest& request, const CycleOptions& options)
+FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options)
 {
   declare_solver_options();
   FittedCycle result;
-  if (const std::string refusal = step_refusal_of(problem); !refusal.empty())
+  const CycleSettings settings = with_choices(given, request.model);
+  const CycleProblem problem = with_settings(given, settings);
+  if (const std::string refusal = step_refusal_of(problem, settings.steps_per_period); !refusal.empty())
   {
     result.cycle.outcome = {OutcomeKind::refused, refusal, 0, 0};
     return result;
   }
   result.fidelity.asked = request.model;
   result.fidelity.accuracy = request.accuracy;
-  find_on_model(problem, options, result);
+  result.fidelity.verdict_steps = settings.steps_per_period;
+  const bool steps_open = request.model == CycleModel::automatic && given.settings.steps_per_period == 0;
+  find_on_model(problem, options, steps_open, result);
+  result.fidelity.steps_per_period = result.cycle.steps_per_period;
   const State& start = result.cycle.measured.start;
-  const std::filesystem::path& file = problem.settings.save_state;
+  const std::filesystem::path& file = settings.save_state;
   if (!file.empty() && start.u.get()) write_state(start, problem.sliding.structure, file);
   return result;
 }

@@ -34,14 +34,6 @@ void add_remedies(const PeriodMap& map, Outcome& outcome)
                       " steps left the contact unconverged (-transient_contact_max_it)";
 }
 
-/// From the real modes up to a multiple of the followed mode's frequency; none for a factor of 0.
-Preconditioner estimated_preconditioner(const CycleProblem& problem, double band_factor)
-{
-  if (!(band_factor > 0)) return {};
-  const double band = band_factor * problem.unstable.modes.front().frequency_hz();
-  return sliding_preconditioner(problem, find_real_modes_below(problem.linearised, band, problem.modes_options));
-}
-
 } // namespace
 
 LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
@@ -55,6 +47,7 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   ShootingResult found = shoot(flow, preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
                    settings.steps_per_period,
+                   settings.tolerance,
                    settings.theta,
                    std::move(found.orbit),
                    std::move(found.convergence),

@@ -7,8 +7,6 @@ OptionList options_of(CycleOptions& options)
 {
   ReducedOptions& reduced = options.reduced;
   OptionList list = {
-      {"-cycle_start", choice_of(options.start), Range::any,
-       "of the full model's shooting: estimate, or reduced (that model's cycle)"},
       {"-cycle_start_amplitude", &options.start_amplitude, Range::positive,
        "multiple of the estimate's amplitude to start from"},
       {"-cycle_start_phase", &options.start_phase, Range::any, "degrees, added to the estimate's phase of the start"},
@@ -21,12 +19,14 @@ OptionList options_of(CycleOptions& options)
        "pairs that part at this many times the motion's amplitude keep their contact"},
       {"-reduced_threshold", &reduced.threshold, Range::not_negative,
        "an attachment shape is dropped when less than this part of it is new"},
+      {"-reduced_band_factor", &reduced.band_factor, Range::not_negative,
+       "frictionless modes above the band reach this many times the mode's frequency; 0: none"},
       {"-reduced_modes", &reduced.modes, Range::natural,
        "complex modes taken, the followed one and the nearest in frequency"},
       {"-reduced_free_periods", &reduced.free_periods, Range::not_negative,
        "at most integrated on the reduced model until its motion is periodic"},
       {"-reduced_corrections", &reduced.corrections, Range::not_negative,
-       "periods of the full model at most, from the reduced model's cycle on"},
+       "periods of the full model at most, while the steps a period are refined"},
   };
   for (Option& option : options_of(options.shooting)) list.push_back(std::move(option));
   return list;

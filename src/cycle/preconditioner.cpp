@@ -160,4 +160,11 @@ Preconditioner sliding_preconditioner(const CycleProblem& problem, const RealMod
   { apply_inverse(inside, M, period, x, y); };
 }
 
+Preconditioner estimated_preconditioner(const CycleProblem& problem, double band_factor)
+{
+  if (!(band_factor > 0)) return {};
+  const double band = band_factor * problem.unstable.modes.front().frequency_hz();
+  return sliding_preconditioner(problem, find_real_modes_below(problem.linearised, band, problem.modes_options));
+}
+
 } // namespace squeal

@@ -18,4 +18,7 @@ namespace squeal
 /// On the real modes given; no preconditioner without any. Borrows the structure's M.
 Preconditioner sliding_preconditioner(const CycleProblem& problem, const RealModes& modes);
 
+/// On the real modes up to a multiple of the followed mode's frequency; none for a factor of 0.
+Preconditioner estimated_preconditioner(const CycleProblem& problem, double band_factor);
+
 } // namespace squeal

@@ -1,5 +1,7 @@
 #include "reduced_cycle.hpp"
 
+#include "step_refinement.hpp"
+
 #include "squeal/shooting/full_space.hpp"
 
 #include <algorithm>
@@ -59,7 +61,7 @@ void build_model(ReducedSearch& search, double amplitude)
   const bool sliding = search.fidelity.asked != CycleModel::reduced &&
                        slide_throughout(problem.sliding.interface, problem.unstable.modes.front(), amplitude);
   search.model = reduce(problem.sliding, problem.modes, search.active,
-                        {static_cast<int>(options.modes), options.threshold, sliding});
+                        {static_cast<int>(options.modes), options.threshold, sliding, &search.real});
   search.energy = energy_matrices(search.model);
   describe_model(search);
   search.fidelity.reduction_seconds += MPI_Wtime() - clock;
@@ -218,6 +220,15 @@ ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start
   return cycle;
 }
 
+void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cycle)
+{
+  Fidelity& fidelity = search.fidelity;
+  const ReducedCycle twice = find_reduced_cycle(search, cycle, 2 * search.steps);
+  estimate_step_errors(fidelity, {2 * search.steps, twice.period, twice.energy},
+                       {search.steps, cycle.period, cycle.energy}, 1);
+  if (!twice.converged) fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
+}
+
 std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
 {
   const CycleProblem& problem = search.problem;
@@ -226,6 +237,8 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
   double amplitude = search.options.start_amplitude * problem.unstable.estimates.front().start_amplitude;
   const Owned<Vec> estimated = estimated_fluctuation(problem, amplitude);
   Owned<Vec> motion = copy_of(estimated.get());
+  search.real = find_real_modes_below(problem.linearised, search.options.reduced.band_factor * mode.frequency_hz(),
+                                      problem.modes_options);
   FreeMotion free{{}, 1 / mode.frequency_hz(), 0};
   double unit = 0; // [J] energy at amplitude 1
   const auto on_model = [&](Vec x)
@@ -239,6 +252,7 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
     free.state = on_model(motion);
     if (unit == 0) unit = doubled_energy(search.model, free.state) / 2 / (amplitude * amplitude);
     run_until_periodic(search, free, 1.5 * unit * amplitude * amplitude);
+    if (!std::isfinite(free.energy)) return "the motion of the reduced model grew beyond all bounds";
     const double reached = std::sqrt(free.energy / unit);
     if (reached <= 1.2 * amplitude || search.fidelity.reduced_periods >= search.options.reduced.free_periods) break;
     motion = full_motion(search, free.state);

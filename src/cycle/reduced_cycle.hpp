@@ -14,6 +14,7 @@ struct ReducedSearch
   Fidelity& fidelity;
   int steps = 0;        // a period
   double tolerance = 0; // on the residual of the reduced model's cycles
+  RealModes real{}; // of the basis
   std::vector<int> active{};
   ReducedModel model{};
   EnergyMatrices energy{};
@@ -35,6 +36,9 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
 
 /// The cycle of the reduced model near `start`, with another number of steps a period. The same on every rank.
 ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start, int steps);
+
+/// The reduced model's cycle at twice as many steps gives the step's errors. Further ones are unknown, NaN.
+void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cycle);
 
 /// A motion of the reduced model as a state (du, v) of the full one, about the equilibrium.
 Owned<Vec> full_motion(const ReducedSearch& search, const ReducedState& state);

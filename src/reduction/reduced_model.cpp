@@ -44,8 +44,19 @@ Owned<VecScatter> to_kept(Mat Z, Vec u, Vec y)
   return scatter;
 }
 
-/// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts.
-MultiVector mode_columns(const std::vector<ComplexMode>& modes, int count, Mat Z)
+/// The shapes of the real modes above all complex ones.
+std::vector<Vec> shapes_above(const RealModes* real, const std::vector<ComplexMode>& modes)
+{
+  std::vector<Vec> shapes;
+  double highest = 0;
+  for (const ComplexMode& mode : modes) highest = std::max(highest, mode.lambda.imag());
+  for (std::size_t i = 0; real && i < real->shapes.size(); ++i)
+    if (real->omega[i] > highest) shapes.push_back(real->shapes[i]);
+  return shapes;
+}
+
+/// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts. Then real modes.
+MultiVector mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction, Mat Z)
 {
   const double omega = modes.front().lambda.imag();
   std::vector<const ComplexMode*> taken;
@@ -53,18 +64,20 @@ MultiVector mode_columns(const std::vector<ComplexMode>& modes, int count, Mat Z
   std::sort(taken.begin() + 1, taken.end(),
             [&](const ComplexMode* a, const ComplexMode* b)
             { return std::abs(a->lambda.imag() - omega) < std::abs(b->lambda.imag() - omega); });
-  taken.resize(std::min(taken.size(), static_cast<std::size_t>(count)));
+  taken.resize(std::min(taken.size(), static_cast<std::size_t>(reduction.modes)));
   Owned<Vec> y;
   check(MatCreateVecs(Z, y.put(), nullptr));
   const Owned<VecScatter> scatter = to_kept(Z, modes.front().real, y);
   MultiVector columns = empty_multivector(Z);
-  for (const ComplexMode* mode : taken)
-    for (const Vec part : {mode->real.get(), mode->imaginary.get()})
-    {
-      check(VecScatterBegin(scatter, part, y, INSERT_VALUES, SCATTER_FORWARD));
-      check(VecScatterEnd(scatter, part, y, INSERT_VALUES, SCATTER_FORWARD));
-      append(columns, y);
-    }
+  std::vector<Vec> shapes;
+  for (const ComplexMode* mode : taken) shapes.insert(shapes.end(), {mode->real.get(), mode->imaginary.get()});
+  for (const Vec shape : shapes_above(reduction.real, modes)) shapes.push_back(shape);
+  for (const Vec shape : shapes)
+  {
+    check(VecScatterBegin(scatter, shape, y, INSERT_VALUES, SCATTER_FORWARD));
+    check(VecScatterEnd(scatter, shape, y, INSERT_VALUES, SCATTER_FORWARD));
+    append(columns, y);
+  }
   return columns;
 }
 
@@ -205,27 +218,28 @@ void project(ReducedModel& model, const Structure& structure, const ClosedContac
   }
 }
 
-/// From the columns X to the basis: the modes, the attachments next to them, all by falling period.
-void choose_basis(ReducedModel& model, const MultiVector& X, Index of_modes, double threshold)
+/// The symmetric X'AX.
+MatrixXd gram_matrix(Mat A, const MultiVector& X)
 {
-  const double omega = model.omega;
-  const MatrixXd energy = model.K_z + omega * omega * model.M_z;
-  Orthonormal basis{energy, MatrixXd(X.columns(), 0)};
+  const MatrixXd G = inner_products(X, product(A, X));
+  return (G + G.transpose()) / 2;
+}
+
+/// Replaces the columns by the basis: the modes, the attachments next to them, all by falling period. `E`: K_z +
+/// omega^2 M_z.
+void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, Index of_modes, double threshold)
+{
+  const MatrixXd energy = gram_matrix(E, columns);
+  Orthonormal basis{energy, MatrixXd(columns.columns(), 0)};
   model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
   model.modes += extend(basis, of_modes - 2, 1e-6);
-  model.attachments = extend(basis, X.columns() - of_modes, threshold);
+  model.attachments = extend(basis, columns.columns() - of_modes, threshold);
   // of falling period: u'M u against the energy
-  const MatrixXd mass = basis.T.transpose() * (model.M_z * basis.T);
+  const MatrixXd mass = basis.T.transpose() * (gram_matrix(M_z, columns) * basis.T);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((mass + mass.transpose()) / 2);
-  const MatrixXd T = basis.T * spectrum.eigenvectors().rowwise().reverse();
   constexpr double fastest = 4; // times omega
-  model.slow = (spectrum.eigenvalues().array() * (1 + fastest * fastest) * omega * omega > 1).count();
-  for (MatrixXd* A : {&model.M, &model.M_z, &model.C, &model.C_z, &model.K, &model.K_z}) *A = T.transpose() * (*A * T);
-  model.H = T.transpose() * model.H;
-  model.G = model.G * T;
-  model.shapes = combination(X, T);
-  model.E_factor.compute(model.K_z + omega * omega * model.M_z);
-  model.M_factor.compute(model.M_z);
+  model.slow = (spectrum.eigenvalues().array() * (1 + fastest * fastest) * model.omega * model.omega > 1).count();
+  columns = combination(columns, basis.T * spectrum.eigenvectors().rowwise().reverse());
 }
 
 } // namespace
@@ -312,11 +326,13 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   check(MatMatMult(B, contact.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
   const auto forces = [&](Mat rows)
   { return reduction.sliding ? sliding_forces(transposed(rows), interface, active) : transposed(rows); };
-  MultiVector columns = mode_columns(modes, reduction.modes, contact.Z);
+  MultiVector columns = mode_columns(modes, reduction, contact.Z);
   const Index of_modes = columns.columns();
   append(columns, attachment_columns(E, forces(BZ)));
-  const MultiVector X = product(contact.Z, columns);
-
+  model.omega = omega;
+  choose_basis(model, E, M_z, columns, of_modes, reduction.threshold);
+  // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
+  MultiVector X = product(contact.Z, columns);
   project(model, structure, contact, columns, X);
   const MultiVector left = product(contact.Y, columns);
   std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
@@ -331,9 +347,12 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   const Owned<Mat> read = rows_of(interface, active, reduction.sliding ? RowsTaken::normal : RowsTaken::all);
   model.G = inner_products(transposed(read), X);
 
-  model.omega = omega;
-  choose_basis(model, X, of_modes, reduction.threshold);
-
+  model.E_factor.compute(model.K_z + omega * omega * model.M_z);
+  model.M_factor.compute(model.M_z);
+  if (model.M_factor.info() != Eigen::Success || model.E_factor.info() != Eigen::Success)
+    throw Error("reduced model: a shape has no mass or no stiffness: give massless points a mass, or set "
+                "fidelity = \"full\"");
+  model.shapes = std::move(X);
   model.active = active;
   set_active_pairs(model, interface, equilibrium, reduction);
   return model;

@@ -158,7 +158,7 @@ Json cycle_entry(const Report& report, const Scene& scene)
   entry["period"] = cycle.orbit.period;
   entry["frequency_hz"] = 1 / cycle.orbit.period;
   entry["steps_per_period"] = cycle.steps_per_period;
-  entry["tolerance"] = scene.cycle.tolerance;
+  entry["tolerance"] = cycle.tolerance;
   entry["residual_projected"] = cycle.convergence.residual_projected;
   entry["residual_full"] = cycle.orbit.residual;
   entry["growth_rate_bias"] = cycle_bias(report).growth;
@@ -192,6 +192,7 @@ Json fidelity_entry(const Fidelity& fidelity)
   entry["active_pairs"] = fidelity.active_pairs;
   entry["sliding_pairs"] = fidelity.sliding_pairs;
   entry["steps_per_period"] = fidelity.steps_per_period;
+  entry["verdict_steps"] = fidelity.verdict_steps;
   entry["contact_tolerance"] = fidelity.contact_tolerance;
   entry["reduced_periods"] = fidelity.reduced_periods;
   entry["full_periods"] = fidelity.full_periods;

@@ -118,9 +118,10 @@ std::string cycle_text(const Report& report, const Scene& scene)
   const std::string projected = std::isfinite(cycle.convergence.residual_projected)
                                     ? format("%.2e", cycle.convergence.residual_projected)
                                     : std::string("not tried");
-  text += row("", format("residual: full space %.2e (tolerance %.0e), projected ", cycle.orbit.residual,
-                         scene.cycle.tolerance) +
-                      projected);
+  const std::string judged =
+      cycle.tolerance > 0 ? format("tolerance %.0e", cycle.tolerance) : std::string("ended by the accuracy below");
+  text +=
+      row("", format("residual: full space %.2e (%s), projected ", cycle.orbit.residual, judged.c_str()) + projected);
   text += row("", format("%d Newton steps, %ld periods integrated, %d steps a period", cycle.convergence.iterations,
                          cycle.convergence.periods, cycle.steps_per_period));
   if (cycle.outcome.kind != OutcomeKind::converged) return text; // the figures of no cycle would mislead
@@ -132,9 +133,10 @@ std::string cycle_text(const Report& report, const Scene& scene)
       row("", format("open pairs: %.2f on average, %d at most; sticking: %d at most", cycle.measured.open_pairs_mean,
                      cycle.measured.open_pairs_max, cycle.measured.stick_pairs_max));
   if (!cycle.multipliers.values.empty())
-    text += row("", format("%s by %zu multipliers: the largest is %.6f, error bar %.1e",
+    text += row("", format("%s by %zu multipliers at %d steps a period: the largest is %.6f, error bar %.1e",
                            word(cycle.multipliers.stability), cycle.multipliers.values.size(),
-                           std::abs(cycle.multipliers.values.front()), cycle.multipliers.errors.front()));
+                           report.fidelity.verdict_steps, std::abs(cycle.multipliers.values.front()),
+                           cycle.multipliers.errors.front()));
   const std::size_t probes = std::min(scene.probes.size(), cycle.measured.peak_to_peak.size());
   for (std::size_t i = 0; i < probes; ++i)
     text +=
@@ -147,16 +149,18 @@ std::string fidelity_text(const Fidelity& fidelity)
   if (fidelity.asked == CycleModel::full) return "";
   std::string text = row("fidelity", format("%s: %s model used", word(fidelity.asked), word(fidelity.used)) +
                                          (fidelity.reason.empty() ? "" : ", " + fidelity.reason));
-  if (fidelity.used == CycleModel::full || fidelity.full_periods == 0) return text;
-  text +=
-      row("", format("%d shapes: %d of modes, %d of attachment; %d pairs in contact with friction, %d taken to slide",
-                     fidelity.size, fidelity.modes, fidelity.attachment_shapes, fidelity.active_pairs,
-                     fidelity.sliding_pairs));
+  if (fidelity.full_periods == 0) return text;
+  if (fidelity.used == CycleModel::reduced)
+    text +=
+        row("", format("%d shapes: %d of modes, %d of attachment; %d pairs in contact with friction, %d taken to slide",
+                       fidelity.size, fidelity.modes, fidelity.attachment_shapes, fidelity.active_pairs,
+                       fidelity.sliding_pairs));
   text += row("", format("%ld periods of the reduced model, %ld of the full one", fidelity.reduced_periods,
                          fidelity.full_periods));
-  text += row("", format("error estimates (asked for %.0e): frequency %.1e, energy %.1e; of the steps %.1e, %.1e",
-                         fidelity.accuracy, fidelity.frequency_error, fidelity.energy_error,
-                         fidelity.step_frequency_error, fidelity.step_energy_error));
+  if (std::isfinite(fidelity.frequency_error))
+    text += row("", format("error estimates (asked for %.0e): frequency %.1e, energy %.1e; of the steps %.1e, %.1e",
+                           fidelity.accuracy, fidelity.frequency_error, fidelity.energy_error,
+                           fidelity.step_frequency_error, fidelity.step_energy_error));
   return text;
 }
 

@@ -22,7 +22,7 @@ SceneKeys keys_of(Scene& scene)
   return {
       {"title", &scene.title, optional, Rule::any, "text", "what the scene shows"},
       {"fidelity", choice_of(scene.fidelity), optional, Rule::any, "word",
-       "of the cycle's model: full, reduced, or auto (reduced as far as the accuracy allows)"},
+       "of the cycle's model: full, reduced, or auto (what the scene leaves open, as the accuracy needs it)"},
       {"accuracy", &scene.accuracy, optional, Rule::positive, "-",
        "required relative accuracy of the cycle's frequency and energy"},
   };
@@ -194,8 +194,8 @@ SceneKeys keys_of(CycleSettings& c)
 {
   return {
       {"enabled", &c.enabled, optional, Rule::any, "switch", "run this stage"},
-      {"steps_per_period", &c.steps_per_period, optional, Rule::positive, "-", "time steps a period"},
-      {"tolerance", &c.tolerance, optional, Rule::positive, "-", "on the full-space residual"},
+      {"steps_per_period", &c.steps_per_period, optional, Rule::not_negative, "-", "time steps a period; 0: chosen"},
+      {"tolerance", &c.tolerance, optional, Rule::not_negative, "-", "on the full-space residual; 0: chosen"},
       {"free_periods", &c.free_periods, optional, Rule::not_negative, "-", "integrated before the first Newton step"},
       {"theta", &c.theta, optional, Rule::fraction, "-", "of the theta-method; 0.5 conserves energy"},
       {"save_state", &c.save_state, optional, Rule::any, "path", "state file of the cycle's start"},

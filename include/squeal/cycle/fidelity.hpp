@@ -2,17 +2,14 @@
 /// The cycle on no larger a model than the accuracy asked for needs (src/README.md, section 7).
 ///
 /// The reduced model (reduction/reduced_model.hpp) runs free from the estimate until its motion is periodic, its active
-/// pairs chosen again where it outgrows the amplitude they were chosen for, and is shot at. Its cycle x_r is the start
-/// on the full model, its derivative the preconditioner: P^-1 (Phi(x) - x) is what remains to be corrected, less and
-/// less of it by secants, one period of the full model each. What a step would change frequency and energy by is the
-/// error of x: twice that, or half of the step before, since their signs alternate.
+/// pairs chosen again where it outgrows the amplitude they were chosen for, and is shot at. Its cycle is the start on
+/// the full model, its derivative the preconditioner.
 ///
 /// "reduced": a period of the full model gives the reduced cycle's error, a cycle at twice as many steps the step's.
-/// "auto": the full model's cycle to the accuracy, at few steps a period and at twice as many. Both, and the scheme's
-/// order, give the number of steps that the accuracy needs and the cycle to be expected there, which one or two periods
-/// correct. Three such cycles give the order. Where that does not converge, where the reduced model would not be small,
-/// or where several modes are unstable, the full model is shot at instead. The active pairs and the reduced model's
-/// errors decide how soon this ends, not where.
+/// "auto": what the scene gives is kept. Where it leaves the steps open, the full model's cycle is found at few, its
+/// stability is judged there, and two further numbers of steps give the error of the step and the number that the
+/// accuracy needs. Where the reduced model would not be small or has no cycle, or where several modes are unstable,
+/// the start is the estimate on the full model. The reduced model decides how soon this ends, not where.
 #include "squeal/cycle/limit_cycle.hpp"
 
 namespace squeal
@@ -32,12 +29,13 @@ struct Fidelity
   std::string reason;                                           // in a sentence
   double accuracy = 0;                                          // asked for
   int size = 0, modes = 0, attachment_shapes = 0;
-  int active_pairs = 0, sliding_pairs = 0; // sliding: eliminated; the rest stays open
-  int steps_per_period = 0;
+  int active_pairs = 0, sliding_pairs = 0;     // sliding: eliminated; the rest stays open
+  int steps_per_period = 0, verdict_steps = 0; // of the cycle; where its stability was judged
   double contact_tolerance = 0;
   long reduced_periods = 0, full_periods = 0;
-  double frequency_error = 0, energy_error = 0;           // of the model: what all further corrections would change
-  double step_frequency_error = 0, step_energy_error = 0; // of the step size
+  /// Of the model: what all further corrections would change. NaN: not known.
+  double frequency_error = std::numeric_limits<double>::quiet_NaN(), energy_error = frequency_error;
+  double step_frequency_error = frequency_error, step_energy_error = frequency_error; // of the step size
   double reduction_seconds = 0, reduced_seconds = 0, full_seconds = 0;
 };
 

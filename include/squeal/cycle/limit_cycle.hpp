@@ -19,6 +19,7 @@ struct LimitCycle
 {
   Outcome outcome;
   int steps_per_period = 0;
+  double tolerance = 0; // that the residual met; 0: the accuracy was judged instead
   double theta = 0.5;
   Orbit orbit;             // the cycle, or the best candidate met
   Convergence convergence; // its periods include the measured one

@@ -5,33 +5,19 @@
 namespace squeal
 {
 
-/// Where the full model's shooting starts.
-enum class CycleStart
-{
-  estimate,      // the energy estimate of the unstable modes
-  reduced_model, // the reduced model's cycle
-};
-
-inline constexpr std::array cycle_start_words = {"estimate", "reduced"};
-
-inline Words words_of(CycleStart)
-{
-  return cycle_start_words;
-}
-
 struct ReducedOptions
 {
   double margin = 1.5;         // pairs that part at this many times the motion's amplitude keep their contact
   double threshold = 1e-5;     // an attachment shape is dropped when less than this part of it is new
+  double band_factor = 4.5;    // frictionless modes above the band reach this many times the squeal's frequency
   PetscInt modes = 100000;     // complex modes taken at most, the followed one and the nearest in frequency
   PetscInt free_periods = 100; // at most, until the reduced model's motion is periodic
-  PetscInt corrections = 40;   // periods of the full model at most, from the reduced model's cycle on
+  PetscInt corrections = 40;   // periods of the full model at most, while the steps a period are refined
 };
 
 struct CycleOptions
 {
   ShootingOptions shooting;
-  CycleStart start = CycleStart::estimate;
   double start_amplitude = 1; // over the estimate's
   double start_phase = 0;     // [degrees] from the estimate's
   double start_period = 1;    // over the followed mode's

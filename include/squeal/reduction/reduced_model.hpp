@@ -6,7 +6,8 @@
 ///     M q'' + C q' + K q = H (r - r0),   M = (Y V)'M (Z V) ...,  H = (Y V)'B_a',
 ///     g = g0 + G_n q >= 0,   s = G_t q' - v_d,   G = B_a Z V,
 /// all three matrices unsymmetric. V holds the complex modes of the full problem in the band (real and imaginary
-/// parts, so that the reduced model has exactly their growth rates) and the attachment shapes of the active pairs,
+/// parts, so that the reduced model has exactly their growth rates), frictionless real modes above the band, and the
+/// attachment shapes of the active pairs,
 ///     (K_z + w^2 M_z) X = Z'B_a',   K_z = Z'K Z, w the followed mode's,
 /// orthonormal in the energy of K_z + w^2 M_z; of the attachments what is new above a threshold.
 ///
@@ -63,6 +64,7 @@ struct Reduction
   int modes = 0;           // complex modes taken, nearest in frequency to the followed one, which is the first of all
   double threshold = 1e-5; // an attachment shape is dropped when less than this part of it is new
   bool sliding = false;    // the active pairs slide along the drive throughout
+  const RealModes* real = nullptr; // frictionless ones; those above the complex modes are taken, too. Null: none
 };
 
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,

@@ -210,8 +210,8 @@ struct TransientSettings
 struct CycleSettings
 {
   bool enabled = false;
-  int steps_per_period = 100;       // [-]
-  double tolerance = 1e-5;          // [-] on the residual of the full state
+  int steps_per_period = 0;         // [-] 0: chosen
+  double tolerance = 0;             // [-] on the residual of the full state; 0: chosen
   int free_periods = 10;            // [-] number of periods integrated before the first Newton step
   double theta = 0.5;               // [-] of the theta method
   std::filesystem::path save_state; // state file of the start of the cycle; none if empty
@@ -238,7 +238,7 @@ struct Probe
 struct Scene
 {
   std::string title;
-  CycleModel fidelity = CycleModel::full;
+  CycleModel fidelity = CycleModel::automatic;
   double accuracy = 1e-3;                        // [-] required relative accuracy of the cycle's frequency and energy
   std::filesystem::path file;                    // scene file; absolute
   std::optional<MeshSource> mesh;                // either a mesh

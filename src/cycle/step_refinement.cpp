@@ -1,0 +1,224 @@
+#include "step_refinement.hpp"
+
+#include "floquet.hpp"
+
+#include "squeal/shooting/multisecant.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// For errors that fall with this power of the steps: the error at c steps over the difference between a and b steps.
+double error_fraction(int a, int b, int c, double order)
+{
+  return std::pow(c, -order) / (std::pow(a, -order) - std::pow(b, -order));
+}
+
+double largest_step_error(const Fidelity& fidelity)
+{
+  return std::max(fidelity.step_frequency_error, fidelity.step_energy_error);
+}
+
+/// The order at which three energies converge: 2 where the motion is smooth, less through impacts, never below 1.
+double observed_order(const CycleAtSteps& coarse, const CycleAtSteps& middle, const CycleAtSteps& fine)
+{
+  const double seen = (coarse.energy - middle.energy) / (middle.energy - fine.energy);
+  double order = 1;
+  const auto expected = [&](double p)
+  {
+    return (std::pow(coarse.steps, -p) - std::pow(middle.steps, -p)) /
+           (std::pow(middle.steps, -p) - std::pow(fine.steps, -p));
+  };
+  while (order < 2 && expected(order) < seen) order += 0.05;
+  return order;
+}
+
+/// The full model's iteration, from one number of steps a period to the next.
+struct FullShooting
+{
+  const CycleCorrection& correction;
+  const OrbitProblem& problem;
+  ConvergenceLog& log;
+  PeriodMap& map;
+  const MeasuredPeriod& measured; // of the last period integrated
+  ShootingOptions options;
+  Multisecant multisecant{};
+  Orbit orbit{};
+
+  CycleAtSteps cycle() const { return {map.steps, orbit.period, measured.mean_fluctuating_energy}; }
+};
+
+void restart(FullShooting& shooting, Vec state, double period, int steps)
+{
+  shooting.map.steps = steps;
+  shooting.orbit = evaluate(shooting.problem, shooting.log, state, period);
+  record_full(shooting.log, ShootingStage::full_period, shooting.orbit);
+}
+
+/// Shoots until what further steps would change is below half of the accuracy, as two steps say: one alone may change
+/// the energy by nothing by chance. Returns why it did not get there, or nothing.
+std::string shoot_to_accuracy(FullShooting& shooting)
+{
+  shooting.multisecant.last_step = {HUGE_VAL, HUGE_VAL};
+  shooting.multisecant.target_error = shooting.correction.fidelity.accuracy / 2;
+  StageResult found =
+      shoot_by_multisecant(shooting.problem, shooting.options, shooting.log, shooting.multisecant, shooting.orbit);
+  shooting.orbit = std::move(found.orbit);
+  if (found.ending == StageEnding::converged) return {};
+  return "the accuracy was not reached in " + std::to_string(shooting.log.convergence.periods) +
+         " periods of the full model at more steps a period";
+}
+
+/// Shoots from two cycles' extrapolation to `steps` steps a period: one or two periods do. `last` is the coarse cycle's
+/// orbit and becomes the fine one's.
+std::string shoot_extrapolated(FullShooting& shooting, Orbit& last, double beyond, int steps)
+{
+  Orbit now = std::exchange(shooting.orbit, {});
+  check(VecAXPBY(last.state, 1 + beyond, -beyond, now.state));
+  restart(shooting, last.state, now.period + beyond * (now.period - last.period), steps);
+  last = std::move(now);
+  return shoot_to_accuracy(shooting);
+}
+
+/// From the cycle at few steps a period to twice as many and on. Returns why the accuracy was not reached, or nothing.
+std::string refine(FullShooting& shooting, CycleAtSteps coarse)
+{
+  Fidelity& fidelity = shooting.correction.fidelity;
+  Orbit last = copy_of(shooting.orbit);
+  restart(shooting, last.state, last.period, 2 * coarse.steps);
+  if (const std::string problem = shoot_to_accuracy(shooting); !problem.empty()) return problem;
+  CycleAtSteps fine = shooting.cycle();
+  double sure = 1, likely = 2; // orders, until a third number of steps tells
+  for (int tries = 0;; ++tries)
+  {
+    estimate_step_errors(fidelity, coarse, fine, likely);
+    const double needed = fine.steps * std::pow(3 * largest_step_error(fidelity) / fidelity.accuracy, 1 / likely);
+    estimate_step_errors(fidelity, coarse, fine, sure);
+    if (largest_step_error(fidelity) <= fidelity.accuracy / 2) return {};
+    if (tries == 5) return "the accuracy needs more than " + std::to_string(fine.steps) + " steps a period";
+    const int steps = 4 * static_cast<int>(std::ceil(std::max(needed, 1.5 * fine.steps) / 4));
+    const double beyond = error_fraction(coarse.steps, fine.steps, fine.steps, likely) -
+                          error_fraction(coarse.steps, fine.steps, steps, likely);
+    if (const std::string problem = shoot_extrapolated(shooting, last, beyond, steps); !problem.empty()) return problem;
+    sure = likely = observed_order(coarse, fine, shooting.cycle());
+    coarse = std::exchange(fine, shooting.cycle());
+  }
+}
+
+/// The flow whose every period is measured, on contact as exact as the accuracy needs.
+struct MeasuredFlow
+{
+  PeriodMap map;
+  MeasuredPeriod measured{};
+  Flow flow{};
+};
+
+void make_flow(const CycleCorrection& correction, MeasuredFlow& result)
+{
+  const CycleProblem& problem = correction.problem;
+  result.map.reactions = problem.sliding.equilibrium.reactions;
+  result.map.options.contact.tolerance =
+      std::min(result.map.options.contact.tolerance, 1e-3 * correction.fidelity.accuracy);
+  const Recording recording{problem.probes, static_cast<int>(correction.options.samples)};
+  const auto integrate = [&result, recording](double period, Vec from, Vec end, Vec rate)
+  {
+    result.measured = measure_period(result.map, recording, period, from, rate);
+    check(VecCopy(result.measured.end.u, displacement(end)));
+    check(VecCopy(result.measured.end.v, velocity(end)));
+  };
+  result.flow = {integrate, problem.sliding.structure.M, problem.sliding.structure.K};
+}
+
+OrbitProblem orbit_problem(const CycleCorrection& correction, const Flow& flow, double period, double tolerance)
+{
+  const Owned<Vec> rest = zeros_like(correction.problem.sliding.equilibrium.u);
+  return {flow, correction.preconditioner, state_of(correction.problem.sliding.equilibrium.u, rest), period, tolerance,
+          0};
+}
+
+void note_model_errors(Fidelity& fidelity, const Multisecant& multisecant)
+{
+  fidelity.frequency_error = multisecant.remaining.frequency;
+  fidelity.energy_error = multisecant.remaining.energy;
+}
+
+} // namespace
+
+/// Errors of a cycle from another with more or fewer steps.
+void estimate_step_errors(Fidelity& fidelity, const CycleAtSteps& other, const CycleAtSteps& cycle, double order)
+{
+  const double fraction = std::abs(error_fraction(other.steps, cycle.steps, cycle.steps, order));
+  fidelity.step_frequency_error = fraction * std::abs(other.period / cycle.period - 1);
+  fidelity.step_energy_error = fraction * std::abs(other.energy / cycle.energy - 1);
+}
+
+void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
+{
+  Fidelity& fidelity = correction.fidelity;
+  if (cycle.outcome.kind != OutcomeKind::converged) return;
+  const CycleProblem& problem = correction.problem;
+  MeasuredFlow flow{{problem.sliding, problem.step, cycle.steps_per_period, problem.settings.theta}};
+  make_flow(correction, flow);
+  Progress progress(comm_of(problem.sliding.structure.load), "cycle, finer steps", 20);
+  ConvergenceLog log{progress, std::move(cycle.convergence)};
+  const OrbitProblem orbit = orbit_problem(correction, flow.flow, cycle.orbit.period, 0);
+  FullShooting shooting{correction, orbit, log, flow.map, flow.measured, correction.options.shooting};
+  shooting.options.max_periods = log.convergence.periods + correction.options.reduced.corrections;
+  shooting.orbit = copy_of(cycle.orbit);
+  const std::string problem_met =
+      refine(shooting, {cycle.steps_per_period, cycle.orbit.period, cycle.measured.mean_fluctuating_energy});
+  if (!problem_met.empty()) fidelity.reason = problem_met;
+  note_model_errors(fidelity, shooting.multisecant);
+  cycle.convergence = std::move(log.convergence);
+  fidelity.full_periods = cycle.convergence.periods;
+  cycle.tolerance = 0;
+  cycle.outcome.residual = shooting.orbit.residual;
+  cycle.steps_per_period = flow.map.steps;
+  cycle.orbit = std::move(shooting.orbit);
+  cycle.measured = std::move(flow.measured);
+  cycle.costs = {flow.map.step.factor_seconds, flow.map.step.condensed_seconds};
+}
+
+void estimate_model_errors(const CycleCorrection& correction, const LimitCycle& cycle)
+{
+  const Flow flow{{}, correction.problem.sliding.structure.M, correction.problem.sliding.structure.K};
+  const OrbitProblem orbit = orbit_problem(correction, flow, cycle.orbit.period, 0);
+  Multisecant multisecant;
+  estimate_remaining_change(orbit, correction.options.shooting, multisecant, cycle.orbit);
+  note_model_errors(correction.fidelity, multisecant);
+}
+
+LimitCycle measure_reduced_cycle(const CycleCorrection& correction, const ShootingStart& start)
+{
+  const CycleProblem& problem = correction.problem;
+  MeasuredFlow flow{{problem.sliding, problem.step, problem.settings.steps_per_period, problem.settings.theta}};
+  make_flow(correction, flow);
+  Progress progress(comm_of(start.u), "cycle", 1);
+  ConvergenceLog log{progress};
+  const OrbitProblem orbit = orbit_problem(correction, flow.flow, start.period, 0);
+  const Owned<Vec> first = state_of(start.u, start.v);
+  LimitCycle cycle;
+  cycle.orbit = evaluate(orbit, log, first, start.period);
+  record_full(log, ShootingStage::full_period, cycle.orbit);
+  Multisecant multisecant;
+  estimate_remaining_change(orbit, correction.options.shooting, multisecant, cycle.orbit);
+  note_model_errors(correction.fidelity, multisecant);
+  cycle.outcome = {OutcomeKind::converged, "", 0, cycle.orbit.residual};
+  cycle.multipliers = examine(problem, correction.options.shooting, flow.map, cycle.orbit).multipliers;
+  refuse_repelling(cycle.multipliers, problem.unstable.modes.size() - 1, cycle.outcome);
+  cycle.steps_per_period = flow.map.steps;
+  cycle.theta = flow.map.theta;
+  cycle.convergence = std::move(log.convergence);
+  correction.fidelity.full_periods = cycle.convergence.periods;
+  cycle.measured = std::move(flow.measured);
+  cycle.costs = {flow.map.step.factor_seconds, flow.map.step.condensed_seconds};
+  return cycle;
+}
+
+} // namespace squeal
