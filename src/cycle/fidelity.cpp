@@ -76,7 +76,10 @@ std::string find_by_reduced_model(ReducedSearch& search, bool steps_open, LimitC
     if (steps_open)
       refine_steps(correction, cycle);
     else
+    {
       estimate_model_errors(correction, cycle);
+      estimate_reduced_step_errors(search, reduced);
+    }
   }
   search.fidelity.full_seconds += MPI_Wtime() - clock;
   return {};
