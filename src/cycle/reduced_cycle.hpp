@@ -14,7 +14,7 @@ struct ReducedSearch
   Fidelity& fidelity;
   int steps = 0;        // a period
   double tolerance = 0; // on the residual of the reduced model's cycles
-  RealModes real{}; // of the basis
+  RealModes real{};     // of the basis
   std::vector<int> active{};
   ReducedModel model{};
   EnergyMatrices energy{};
