@@ -1,5 +1,6 @@
 #include "squeal/run.hpp"
 
+#include "squeal/attractors/attractors.hpp"
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/model.hpp"
@@ -122,6 +123,17 @@ FittedCycle run_cycle(const Chain& chain)
   return result;
 }
 
+Attractors run_attractors(const Chain& chain)
+{
+  const CycleSettings& settings = chain.scene.cycle;
+  if (!settings.enabled || settings.starts == 0)
+    return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
+  const std::string reason = no_mode_to_follow(chain.report);
+  if (!reason.empty()) return not_run<Attractors>(OutcomeKind::skipped, reason);
+  return find_attractors({chain.sliding(), chain.report.modes.modes, chain.unstable(), settings, chain.options.step},
+                         chain.options.attractors);
+}
+
 /// Why no branch can start from the cycle; empty if it can.
 std::string no_cycle_to_follow(const LimitCycle& cycle, double tolerance)
 {
@@ -194,6 +206,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, const std::files
   report.cycle = std::move(fitted.cycle);
   report.fidelity = std::move(fitted.fidelity);
 
+  report.attractors = timed(report, "attractors", comm, [&] { return run_attractors(chain); });
   report.branch = timed(report, "branch", comm, [&] { return run_branch(chain); });
 
   report.model.memory_bytes = peak_memory(comm);

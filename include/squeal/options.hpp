@@ -2,6 +2,7 @@
 /// All algorithm options of squeal: one struct a stage, each described in its own room; read and refused together.
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/algebra/pencil_factor.hpp"
+#include "squeal/attractors/attractors.hpp"
 #include "squeal/cycle/options.hpp"
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/transient.hpp"
@@ -18,6 +19,7 @@ struct ProgramOptions
   EstimateOptions estimate;
   StepOptions step; // of the transient and of the cycle
   CycleOptions cycle;
+  AttractorOptions attractors;
 };
 
 OptionList options_of(ProgramOptions& options);

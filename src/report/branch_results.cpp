@@ -100,6 +100,36 @@ void add_branch(const BrakeBranch& branch, const Scene& scene, Json& entry)
     entry["coexistence"].push_back({{"from", range.from}, {"to", range.to}});
 }
 
+void add_attractors(const Attractors& attractors, Json& entry)
+{
+  entry["periods"] = attractors.periods;
+  entry["starts"] = attractors.starts;
+  entry["motions"] = Json::array();
+  for (const ReachedMotion& motion : attractors.motions)
+    entry["motions"].push_back({{"kind", word(motion.kind)},
+                                {"mean_fluctuating_energy", motion.energy.value},
+                                {"energy_error", motion.energy.error},
+                                {"frequency_hz", motion.frequency.value},
+                                {"frequency_error", motion.frequency.error},
+                                {"starts", motion.starts}});
+}
+
+std::vector<std::string> attractor_lines(const Attractors& attractors)
+{
+  std::vector<std::string> lines = {
+      format("%zu starts, each over %ld periods of the mode", attractors.starts.size(), attractors.periods)};
+  for (const ReachedMotion& motion : attractors.motions)
+  {
+    const std::string reached = format("%zu of them lead to %s: ", motion.starts.size(), word(motion.kind));
+    lines.push_back(motion.kind == ReachedKind::rest
+                        ? reached.substr(0, reached.size() - 2)
+                        : reached + format("%.6g +- %.1e Hz, mean fluctuating energy %.5g +- %.1e J",
+                                           motion.frequency.value, motion.frequency.error, motion.energy.value,
+                                           motion.energy.error));
+  }
+  return lines;
+}
+
 void write_branch(Hdf5File& file, const BrakeBranch& branch, const Scene& scene)
 {
   const auto write = [&](const std::string& name, const std::string& unit, const auto& list, auto value)

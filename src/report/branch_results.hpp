@@ -1,5 +1,5 @@
 #pragma once
-/// The branch in report.json, in history.h5 and in the printed table.
+/// The branch, and the motions that many starts lead to, in report.json, in history.h5 and in the printed table.
 #include "squeal/report/files.hpp"
 #include "squeal/report/report.hpp"
 
@@ -13,6 +13,11 @@ void add_branch(const BrakeBranch& branch, const Scene& scene, nlohmann::ordered
 
 /// The values of multipliers with their errors.
 nlohmann::ordered_json multiplier_list(const Multipliers& multipliers);
+
+/// Adds the motions that the starts lead to.
+void add_attractors(const Attractors& attractors, nlohmann::ordered_json& entry);
+
+std::vector<std::string> attractor_lines(const Attractors& attractors);
 
 void write_branch(Hdf5File& file, const BrakeBranch& branch, const Scene& scene);
 

@@ -213,6 +213,13 @@ Json branch_entry(const Report& report, const Scene& scene)
   return entry;
 }
 
+Json attractors_entry(const Report& report)
+{
+  Json entry = entry_of(report.attractors.outcome);
+  if (has_run(report.attractors.outcome)) add_attractors(report.attractors, entry);
+  return entry;
+}
+
 } // namespace
 
 std::string report_json(const Report& report, const Scene& scene)
@@ -240,6 +247,7 @@ std::string report_json(const Report& report, const Scene& scene)
   json["transient"] = transient_entry(report);
   json["cycle"] = cycle_entry(report, scene);
   json["fidelity"] = fidelity_entry(report.fidelity);
+  json["attractors"] = attractors_entry(report);
   json["branch"] = branch_entry(report, scene);
   const Warnings warnings = warnings_of(report);
   const auto warn = [&json](const char* stage, const std::vector<std::string>& sentences)

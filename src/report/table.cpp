@@ -164,12 +164,13 @@ std::string fidelity_text(const Fidelity& fidelity)
   return text;
 }
 
-std::string branch_text(const BrakeBranch& branch, const Scene& scene)
+/// A stage that most scenes have off, and the lines that it has if it ran.
+template <class Lines> std::string optional_text(const char* head, const Outcome& outcome, Lines lines)
 {
-  if (branch.outcome.kind == OutcomeKind::off) return "";
-  std::string text = row("branch", outcome_text(branch.outcome));
-  if (has_run(branch.outcome))
-    for (const std::string& line : branch_lines(branch, scene)) text += row("", line);
+  if (outcome.kind == OutcomeKind::off) return "";
+  std::string text = row(head, outcome_text(outcome));
+  if (has_run(outcome))
+    for (const std::string& line : lines()) text += row("", line);
   return text;
 }
 
@@ -201,7 +202,8 @@ std::string table(const Report& report, const Scene& scene)
   text += transient_text(report) + warning_rows(warnings.transient);
   text += cycle_text(report, scene) + warning_rows(warnings.cycle);
   text += fidelity_text(report.fidelity);
-  text += branch_text(report.branch, scene);
+  text += optional_text("attractors", report.attractors.outcome, [&] { return attractor_lines(report.attractors); });
+  text += optional_text("branch", report.branch.outcome, [&] { return branch_lines(report.branch, scene); });
   return text + timings_text(report);
 }
 

@@ -197,6 +197,7 @@ SceneKeys keys_of(CycleSettings& c)
       {"steps_per_period", &c.steps_per_period, optional, Rule::not_negative, "-", "time steps a period; 0: chosen"},
       {"tolerance", &c.tolerance, optional, Rule::not_negative, "-", "on the full-space residual; 0: chosen"},
       {"free_periods", &c.free_periods, optional, Rule::not_negative, "-", "integrated before the first Newton step"},
+      {"starts", &c.starts, optional, Rule::not_negative, "-", "starts whose motions are listed; 0: none"},
       {"theta", &c.theta, optional, Rule::fraction, "-", "of the theta-method; 0.5 conserves energy"},
       {"save_state", &c.save_state, optional, Rule::any, "path", "state file of the cycle's start"},
   };

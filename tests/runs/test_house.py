@@ -6,7 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 # What each room may include, besides itself and what stands in the same line before it.
-CHAIN = ["base", "algebra", "solid", "contact", "equilibrium", "modes", "transient", "reduction", "cycle", "branch", "report"]
+CHAIN = ["base", "algebra", "solid", "contact", "equilibrium", "modes", "transient", "reduction", "cycle", "attractors", "branch", "report"]
 ALLOWED = {room: set(CHAIN[: place + 1]) | {"scene", "mesh"} for place, room in enumerate(CHAIN)}
 ALLOWED |= {
     "base": {"base"},

@@ -112,7 +112,7 @@ RUNS = {
     "oscillator": [INPUTS / "oscillator" / "scene.toml", "--set", "cycle.steps_per_period=100", "--set",
                    "transient.periods=20", "--set", "transient.steps_per_period=50", "--set", "fidelity=auto",
                    "--set", "branch.key=friction.coefficient", "--set", "branch.from=0.28", "--set", "branch.to=0.32",
-                   "--set", "branch.points=4"],
+                   "--set", "branch.points=4", "--set", "cycle.starts=2"],
     # the reduced model, a rotation, a mesh; coarse, and damped like this, its cycle is found in a second
     "pin_on_disc": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
                     "damping.beta=6e-7", "--set", "cycle.steps_per_period=40", "--set", "fidelity=auto"],

@@ -2,6 +2,7 @@
 /// All results of a run, and what it leaves behind: report.json, fields.h5 + fields.xdmf, history.h5, scene.toml
 /// (resolved), options.txt, and the printed table. Every number comes with its unit and with what it is worth
 /// (residual, backward error, defect).
+#include "squeal/attractors/attractors.hpp"
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/contact/resultants.hpp"
 #include "squeal/cycle/fidelity.hpp"
@@ -43,6 +44,7 @@ struct Report
   Trajectory transient;
   LimitCycle cycle;
   Fidelity fidelity; // of the cycle
+  Attractors attractors;
   BrakeBranch branch;
   std::vector<Timing> timings; // in order
 };
@@ -51,7 +53,7 @@ struct Report
 const Estimate& followed_estimate(const Report& report);
 
 /// The outcome of every stage, in the order they run in, by the stage's name.
-std::array<std::pair<const char*, Outcome>, 6> outcomes_of(const Report& report);
+std::array<std::pair<const char*, Outcome>, 7> outcomes_of(const Report& report);
 
 /// Where the nodes of the fields are.
 struct FieldNodes

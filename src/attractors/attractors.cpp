@@ -1,0 +1,146 @@
+#include "squeal/attractors/attractors.hpp"
+
+#include "squeal/base/progress.hpp"
+#include "starts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+constexpr int block = 50;              // periods between two looks at the energies
+constexpr std::size_t coordinates = 4; // of the least stable modes
+constexpr double at_rest = 1e-4;       // of the least energy of a start
+
+/// What is kept of one trajectory.
+struct Watched
+{
+  std::vector<double> energies; // [J] fluctuating, mean of each period
+  std::array<double, coordinates> last{}, squares{};
+  std::array<std::vector<double>, coordinates> crossings; // [s] upwards through zero
+  double sum = 0;                                         // of the energies of the period at hand
+};
+
+/// Trajectories that are integrated together.
+class Swarm
+{
+public:
+  Swarm(const AttractorProblem& problem, std::vector<NamedStart> starts)
+      : problem_(problem), rest_force_(zeros_like(problem.sliding.equilibrium.u)), watched_(starts.size())
+  {
+    const auto& [structure, interface, equilibrium] = problem.sliding;
+    const double period = 1 / problem.unstable.modes.front().frequency_hz();
+    step_ = make_theta_step(structure, interface, period / problem.settings.steps_per_period, problem.settings.theta,
+                            problem.step);
+    check(MatMult(structure.K, equilibrium.u, rest_force_));
+    check(VecDot(rest_force_, equilibrium.u, &rest_energy_));
+    rest_energy_ /= 2;
+    for (std::size_t i = 0; i < std::min(coordinates, problem.modes.size()); ++i)
+      shapes_.push_back(problem.modes[i].real);
+    for (NamedStart& start : starts) states_.push_back(std::move(start.state));
+    for (State& state : states_) works_.push_back(begin_steps(step_, structure, interface, state));
+  }
+
+  void integrate_period()
+  {
+    for (Watched& watched : watched_) watched.sum = 0;
+    for (int i = 0; i < problem_.settings.steps_per_period; ++i)
+    {
+      ++steps_;
+      const std::vector<StepReport> reports =
+          advance(step_, problem_.sliding.structure, problem_.sliding.interface, works_, states_);
+      for (std::size_t k = 0; k < states_.size(); ++k) watch(reports[k], k);
+    }
+    for (Watched& watched : watched_) watched.energies.push_back(watched.sum / problem_.settings.steps_per_period);
+  }
+
+  std::vector<ReachedMotion> reached() const
+  {
+    double least = watched_.front().energies.front();
+    for (const Watched& watched : watched_) least = std::min(least, watched.energies.front());
+    std::vector<ReachedMotion> motions;
+    for (std::size_t k = 0; k < watched_.size(); ++k)
+    {
+      const Watched& watched = watched_[k];
+      const auto moving = std::max_element(watched.squares.begin(), watched.squares.end()) - watched.squares.begin();
+      motions.push_back(
+          reached_by(watched.energies, watched.crossings[static_cast<std::size_t>(moving)], at_rest * least));
+      motions.back().starts = {k};
+    }
+    return motions;
+  }
+
+private:
+  /// Takes the energy of the fluctuation and the velocities along the modes.
+  void watch(const StepReport& report, std::size_t k)
+  {
+    Watched& watched = watched_[k];
+    const double h = step_.h;
+    double work = 0;
+    check(VecDot(rest_force_, states_[k].u, &work));
+    watched.sum += report.energy - work + rest_energy_;
+    std::array<double, coordinates> now{};
+    check(VecMDot(works_[k].Mv, static_cast<PetscInt>(shapes_.size()), shapes_.data(), now.data()));
+    for (std::size_t i = 0; i < shapes_.size(); ++i)
+    {
+      watched.squares[i] += now[i] * now[i];
+      if (watched.last[i] < 0 && now[i] >= 0)
+        watched.crossings[i].push_back(h * (static_cast<double>(steps_) - now[i] / (now[i] - watched.last[i])));
+    }
+    watched.last = now;
+  }
+
+  const AttractorProblem& problem_;
+  ThetaStep step_;
+  Owned<Vec> rest_force_; // K u0
+  double rest_energy_ = 0;
+  std::vector<Vec> shapes_;
+  std::vector<State> states_;
+  std::vector<StepWork> works_;
+  std::vector<Watched> watched_;
+  long steps_ = 0;
+};
+
+bool all_settled(const std::vector<ReachedMotion>& motions)
+{
+  return std::none_of(motions.begin(), motions.end(),
+                      [](const ReachedMotion& motion) { return motion.kind == ReachedKind::unsettled; });
+}
+
+} // namespace
+
+OptionList options_of(AttractorOptions& options)
+{
+  return {{"-attractors_periods", &options.periods, Range::positive, "that each start is integrated over, at most"},
+          {"-attractors_seed", &options.seed, Range::not_negative, "of the random starts"}};
+}
+
+Attractors find_attractors(const AttractorProblem& problem, const AttractorOptions& options)
+{
+  std::vector<NamedStart> starts = make_starts(problem, options);
+  Attractors found;
+  for (const NamedStart& start : starts) found.starts.push_back(start.name);
+  Swarm swarm(problem, std::move(starts));
+  Progress progress(comm_of(problem.sliding.structure.load), "attractors", static_cast<double>(options.periods));
+  std::vector<ReachedMotion> motions;
+  do
+  {
+    for (int i = 0; i < block; ++i) swarm.integrate_period();
+    found.periods += block;
+    motions = swarm.reached();
+    progress.update(static_cast<double>(found.periods), format("%ld periods", found.periods));
+  } while (!all_settled(motions) && found.periods + block <= options.periods);
+  const bool settled = all_settled(motions);
+  found.motions = joined(std::move(motions));
+  found.outcome = {
+      settled ? OutcomeKind::completed : OutcomeKind::not_converged,
+      settled ? "" : format("some motions had not settled after %ld periods: -attractors_periods", found.periods), 0,
+      0};
+  return found;
+}
+
+} // namespace squeal

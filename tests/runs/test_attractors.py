@@ -1,0 +1,36 @@
+"""The motions that many starts lead to, on the oscillator."""
+
+import pytest
+from conftest import INPUTS
+
+SCENE = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=100"]
+
+
+def test_all_starts_lead_to_the_cycle_that_attracts(converged):
+    report = converged(*SCENE, "--set", "cycle.starts=6", ranks=1).report
+    found, cycle = report["attractors"], report["cycle"]
+    assert found["outcome"] == "completed"
+    assert found["starts"] == ["mode 1"] + [f"random {i}" for i in range(1, 6)]
+    (motion,) = found["motions"]
+    assert motion["kind"] == "steady" and sorted(motion["starts"]) == list(range(6))
+    # means over periods of the mode, of which the cycle's is a hundredth longer, come within their bar
+    assert abs(motion["mean_fluctuating_energy"] - cycle["mean_fluctuating_energy"]) < (
+        motion["energy_error"] + 2e-3 * cycle["mean_fluctuating_energy"])
+    assert abs(motion["frequency_hz"] - cycle["frequency_hz"]) < motion["frequency_error"] + 1e-4 * cycle["frequency_hz"]
+
+
+def test_ranks_and_seeds(module_run):
+    """Ranks agree on what is reached, and so do other random starts."""
+    one = module_run(*SCENE, "--set", "cycle.starts=4", ranks=1)["attractors"]["motions"]
+    two = module_run(*SCENE, "--set", "cycle.starts=4", ranks=2)["attractors"]["motions"]
+    other = module_run(*SCENE, "--set", "cycle.starts=4", "-attractors_seed", "7", ranks=1)["attractors"]["motions"]
+    assert [motion["starts"] for motion in one] == [motion["starts"] for motion in two]
+    for a, b in zip(one, two):
+        assert a["mean_fluctuating_energy"] == pytest.approx(b["mean_fluctuating_energy"], rel=1e-6)
+    assert len(other) == len(one)
+    assert other[0]["mean_fluctuating_energy"] == pytest.approx(one[0]["mean_fluctuating_energy"], rel=1e-2)
+
+
+def test_a_negative_number_of_starts_is_refused(squeal):
+    run = squeal(*SCENE, "--set", "cycle.starts=-1", "--dry-run", ranks=1)
+    assert run.code == 1 and len(run.messages) == 1 and "cycle.starts=-1" in run.messages[0]

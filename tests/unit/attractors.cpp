@@ -1,0 +1,65 @@
+// ranks: 1
+// What starts lead to: means, trends and which motions are the same, on series with known answers.
+#include "squeal/attractors/attractors.hpp"
+
+#include <cmath>
+#include <doctest/doctest.h>
+#include <numbers>
+
+using namespace squeal;
+
+namespace
+{
+
+std::vector<double> series(int count, const std::function<double(int)>& value)
+{
+  std::vector<double> values;
+  for (int i = 0; i < count; ++i) values.push_back(value(i));
+  return values;
+}
+
+std::vector<double> crossings(double frequency)
+{
+  return series(200, [frequency](int i) { return (i + 0.5) / frequency; });
+}
+
+ReachedMotion motion(ReachedKind kind, double energy, double frequency, std::size_t start)
+{
+  return {kind, {energy, 1e-3 * energy}, {frequency, 0}, {start}};
+}
+
+} // namespace
+
+TEST_CASE("a decay towards a constant is unsettled while its trend shows, and steady after")
+{
+  const auto decay = [](int i) { return 1 + std::exp(-i / 20.); };
+  CHECK(reached_by(series(60, decay), crossings(50), 1e-4).kind == ReachedKind::unsettled);
+  const ReachedMotion late = reached_by(series(400, decay), crossings(50), 1e-4);
+  CHECK(late.kind == ReachedKind::steady);
+  CHECK(std::abs(late.energy.value - 1) <= late.energy.error); // the window holds exp(-10) of the decay
+  CHECK(late.frequency.value == doctest::Approx(50));
+}
+
+TEST_CASE("a motion that dies out is at rest, one that wanders without a trend is varying")
+{
+  CHECK(reached_by(series(200, [](int i) { return std::exp(-i / 10.); }), crossings(50), 1e-4).kind ==
+        ReachedKind::rest);
+  // 8 slow beats in the window, out of step with its ten parts
+  const auto beat = [](int i) { return 1 + 0.5 * std::sin(2 * std::numbers::pi * i / 25.3); };
+  const ReachedMotion wandering = reached_by(series(400, beat), crossings(50), 1e-4);
+  CHECK(wandering.kind == ReachedKind::varying);
+  CHECK(std::abs(wandering.energy.value - 1) <= wandering.energy.error);
+}
+
+TEST_CASE("motions are joined by energy and frequency, the one with most starts first")
+{
+  std::vector<ReachedMotion> motions;
+  motions.push_back(motion(ReachedKind::steady, 1, 100, 0));
+  motions.push_back(motion(ReachedKind::steady, 2, 100, 1));
+  motions.push_back(motion(ReachedKind::steady, 2.01, 100.05, 2));
+  motions.push_back(motion(ReachedKind::steady, 2, 101, 3));
+  motions.push_back(motion(ReachedKind::varying, 2, 100, 4));
+  const std::vector<ReachedMotion> list = joined(std::move(motions));
+  REQUIRE(list.size() == 4);
+  CHECK(list.front().starts == std::vector<std::size_t>{1, 2});
+}
