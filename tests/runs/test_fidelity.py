@@ -58,7 +58,8 @@ def test_corrections_converge_to_the_full_cycle(fitted):
 
 def test_few_modes_show_in_the_residual(module_run, reduced):
     """A single mode makes a poor model, and its period of the full one says so: a residual of twice and more."""
-    run = module_run(*PIN, "--set", "fidelity=reduced", "-reduced_modes", "1", "-cycle_multipliers", "0", ranks=1)
+    run = module_run(*PIN, "--set", "fidelity=reduced", "-reduced_modes", "1", "-reduced_band_factor", "0",
+                     "-cycle_multipliers", "0", ranks=1)
     assert run["fidelity"]["modes"] <= 2
     assert run["cycle"]["residual_full"] > 2 * reduced[0]["cycle"]["residual_full"]
 
