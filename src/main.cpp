@@ -129,7 +129,7 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
   if (arguments.dry_run)
   {
-    dry_run(scene, comm);
+    dry_run(scene, options, comm);
     return 0;
   }
   const auto output = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;

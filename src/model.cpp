@@ -68,7 +68,7 @@ std::vector<double> probe_values(Mat probes, Vec u)
   return all_entries(values);
 }
 
-MemoryForecast forecast_memory(const Model& model)
+MemoryForecast forecast_memory(const Model& model, const FactorOptions& options)
 {
   MemoryForecast forecast;
   const Structure& structure = model.structure;
@@ -78,7 +78,7 @@ MemoryForecast forecast_memory(const Model& model)
     check(MatGetInfo(matrix, MAT_GLOBAL_SUM, &info));
     forecast.matrices += info.nz_used * (sizeof(PetscScalar) + sizeof(PetscInt)); // info.memory is 0 in most builds
   }
-  forecast.factor = factor_memory(structure.K, model.interface.pairs > 0 ? model.interface.B.get() : nullptr);
+  forecast.factor = factor_memory(structure.K, model.interface.pairs > 0 ? model.interface.B.get() : nullptr, options);
   const double contact_size = static_cast<double>(model.interface.size());
   forecast.condensed_operator = 8 * contact_size * contact_size;
   return forecast;

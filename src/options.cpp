@@ -108,6 +108,8 @@ ProgramOptions read_program_options(MPI_Comm comm)
   check_option_names(comm);
   ProgramOptions options;
   on_every_rank(comm, [&] { read_options(options_of(options)); });
+  options.equilibrium.factor = options.step.factor = options.factor;
+  options.modes.pencil = options.pencil;
   return options;
 }
 

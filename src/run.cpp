@@ -28,7 +28,7 @@ struct Chain
   UnstableModes unstable() const { return {report.modes.unstable(), report.estimates}; }
 };
 
-/// Runs one stage under its -log_view name, times it, and tells a person which one is at work.
+/// Runs one stage under its -log_view name, times it, and prints which one is at work.
 template <class Work> auto timed(Report& report, const char* name, MPI_Comm comm, Work work)
 {
   const LogStage log(name);
@@ -217,13 +217,13 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, const std::files
   return exit_code_of(report);
 }
 
-void dry_run(const Scene& scene, MPI_Comm comm)
+void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
 {
   const Model model = build_model(scene, comm);
   if (rank_of(comm) == 0)
     std::printf("# the scene, every default written out\n%s\n# the model\n", resolved_scene(scene).c_str());
   print_model(summary_of(model, comm), comm);
-  const MemoryForecast memory = forecast_memory(model);
+  const MemoryForecast memory = forecast_memory(model, options.factor);
   if (rank_of(comm) == 0)
     std::printf("  memory forecast, all ranks together: matrices %.3g MB, one factorisation %.3g MB, condensed contact "
                 "operator %.3g MB\n",

@@ -248,14 +248,14 @@ void compare_factors(Mat A, Mat B, int rounds, Figures& figures, Comparison& com
     figures["factor and W"].push_back(seconds_of(
         [&]
         {
-          Factor factor(A, B, Factor::Kind::supernodal);
+          Factor factor(A, B, FactorOptions{.kind = FactorKind::supernodal});
           W = factor.condensed(1);
         }));
-    figures["factor"].push_back(seconds_of([&] { Factor(A, nullptr, Factor::Kind::supernodal); }));
+    figures["factor"].push_back(seconds_of([&] { Factor(A, nullptr, FactorOptions{.kind = FactorKind::supernodal}); }));
     time_cholmod(A, B, W, figures, comparison);
   }
-  comparison.own_entries = Factor(A, nullptr, Factor::Kind::supernodal).entries();
-  comparison.own_memory = factor_memory(A, B) + 8. * std::pow(rows_of(B), 2);
+  comparison.own_entries = Factor(A, nullptr, FactorOptions{.kind = FactorKind::supernodal}).entries();
+  comparison.own_memory = factor_memory(A, B, {}) + 8. * std::pow(rows_of(B), 2);
 }
 
 /// Right-hand sides of several trajectories, for either library, and their solutions.
@@ -286,7 +286,7 @@ void compare_solves(const ThetaStep& step, const Structure& structure, const Int
 {
   const std::string name = std::to_string(count);
   const Owned<Mat> A = step_matrix(structure, step.h, step.theta);
-  const Factor plain(A, nullptr, Factor::Kind::supernodal);
+  const Factor plain(A, nullptr, FactorOptions{.kind = FactorKind::supernodal});
   Common common;
   const Held<cholmod_factor> L =
       factored(upper_triangle(A).to_cholmod(at(rows_of(A)), 1, common).get(), comparison.ordering, nullptr, common);

@@ -26,6 +26,7 @@ using namespace squeal;
 namespace
 {
 
+const ModesOptions large{.dense_limit = 0}; // the methods of large problems
 using Figures = std::map<std::string, std::vector<double>>;
 
 struct Problem
@@ -136,7 +137,7 @@ Answer real_modes_by_slicing(const Problem& problem, double limit, PetscInt subs
 Answer real_modes_by_squeal(const Problem& problem, double band)
 {
   const double start = processor_time();
-  const RealModes modes = solve_real_modes_below(problem.M, problem.K, band, 0);
+  const RealModes modes = solve_real_modes_below(problem.M, problem.K, band, large);
   return {static_cast<int>(modes.omega.size()), modes.outcome.residual, processor_time() - start};
 }
 
@@ -146,7 +147,7 @@ Answer real_modes_by_squeal(const Problem& problem, double band)
 template <class Search> Answer subspace_by(const Search& search, const Problem& problem, double omega)
 {
   const double start = processor_time(), limit = omega * omega;
-  RealCount real = make_real_count(problem.M, problem.K, 0);
+  RealCount real = make_real_count(problem.M, problem.K, large);
   const std::vector<std::complex<double>> theta = search(limit / 2, count_below(real, omega), 1.06 * limit / 2);
   return {static_cast<int>(
               std::count_if(theta.begin(), theta.end(), [&](std::complex<double> t) { return std::abs(t) < limit; })),
@@ -155,7 +156,7 @@ template <class Search> Answer subspace_by(const Search& search, const Problem& 
 
 std::vector<std::complex<double>> theta_by_squeal(const Problem& problem, double middle, int count, double radius)
 {
-  ShiftInvert pencil = make_shift_invert(problem.quadratic.K, problem.quadratic.M, Symmetry::none);
+  ShiftInvert pencil = make_shift_invert(problem.quadratic.K, problem.quadratic.M, Symmetry::none, {});
   move_to(pencil, middle);
   return solve_nearest(pencil, count, radius, 1e-9).theta;
 }
@@ -199,8 +200,8 @@ std::vector<std::complex<double>> theta_by_slepc(const Problem& problem, double 
 Answer pairs_by_slices(const Problem& problem, double band)
 {
   const double start = processor_time();
-  RealCount real = make_real_count(problem.M, problem.K, 0);
-  const CountedSolution result = solve_by_slices(problem.quadratic, real, band);
+  RealCount real = make_real_count(problem.M, problem.K, large);
+  const CountedSolution result = solve_by_slices(problem.quadratic, real, band, {});
   const double limit = 2 * std::numbers::pi * band;
   const auto& pairs = result.solution.pairs;
   return {static_cast<int>(std::count_if(pairs.begin(), pairs.end(),
@@ -211,7 +212,7 @@ Answer pairs_by_slices(const Problem& problem, double band)
 Answer pairs_by_toar(const Problem& problem, double band)
 {
   const double start = processor_time(), end = 2 * std::numbers::pi * band;
-  RealCount real = make_real_count(problem.M, problem.K, 0);
+  RealCount real = make_real_count(problem.M, problem.K, large);
   const QuadraticSolution solution = solve_quadratic(
       problem.quadratic, {band, std::sqrt(-shift_below_zero(problem.M, problem.K)) / end, count_below(real, end), 0});
   return {static_cast<int>(solution.pairs.size()), solution.outcome.residual, processor_time() - start};
@@ -228,9 +229,9 @@ void write_problem(const Problem& problem, double band, const std::filesystem::p
     check(PetscViewerBinaryOpen(PETSC_COMM_WORLD, (folder / name).c_str(), FILE_MODE_WRITE, viewer.put()));
     check(MatView(matrix, viewer));
   }
-  RealCount real = make_real_count(problem.M, problem.K, 0);
+  RealCount real = make_real_count(problem.M, problem.K, large);
   std::vector<double> sizes;
-  for (const Eigenpair& pair : solve_by_slices(problem.quadratic, real, band).solution.pairs)
+  for (const Eigenpair& pair : solve_by_slices(problem.quadratic, real, band, {}).solution.pairs)
     if (std::abs(pair.lambda) < 2 * std::numbers::pi * band) sizes.push_back(std::abs(pair.lambda));
   std::sort(sizes.begin(), sizes.end());
   std::ofstream file(folder / "pairs.txt");

@@ -64,17 +64,17 @@ std::pair<double, int> cold_contact(const ThetaStep& step, const FrictionLaw& fr
 /// Entries of the factor of A alone.
 double plain_factor_entries(const Structure& structure, double h)
 {
-  return Factor(step_matrix(structure, h, .5), nullptr, Factor::Kind::supernodal).entries();
+  return Factor(step_matrix(structure, h, .5), nullptr, FactorOptions{.kind = FactorKind::supernodal}).entries();
 }
 
 /// Seconds to factor A bordered by B with its condensed corner, and of one solve in two halves.
-std::pair<double, double> factor_times(Mat A, Mat B, Factor::Kind kind, Vec b, Vec x)
+std::pair<double, double> factor_times(Mat A, Mat B, FactorKind kind, Vec b, Vec x)
 {
   Factor factor;
   const double factoring = seconds(5,
                                    [&]
                                    {
-                                     factor = Factor(A, B, kind);
+                                     factor = Factor(A, B, {.kind = kind});
                                      (void)factor.condensed(1);
                                    });
   if (factor.failed()) throw Error("the matrix to be factored is not positive definite");
@@ -87,8 +87,8 @@ void compare_factors(const std::filesystem::path& folder, double h)
   const Interface interface = read_interface(folder, structure, {0, true}, PETSC_COMM_WORLD);
   const Owned<Mat> A = step_matrix(structure, h, .5);
   const auto x = zeros_like(structure.load);
-  const auto [dense, dense_solve] = factor_times(A, interface.B, Factor::Kind::dense, structure.load, x);
-  const auto [sparse, sparse_solve] = factor_times(A, interface.B, Factor::Kind::supernodal, structure.load, x);
+  const auto [dense, dense_solve] = factor_times(A, interface.B, FactorKind::dense, structure.load, x);
+  const auto [sparse, sparse_solve] = factor_times(A, interface.B, FactorKind::supernodal, structure.load, x);
   MatInfo info;
   check(MatGetInfo(A, MAT_GLOBAL_SUM, &info));
   std::printf("{\"entries\": %.0f, \"dense\": %.4g, \"dense_solve\": %.4g, \"sparse\": %.4g, \"sparse_solve\": "

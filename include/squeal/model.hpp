@@ -33,6 +33,6 @@ struct MemoryForecast
   double matrices = 0, factor = 0, condensed_operator = 0;
 };
 
-MemoryForecast forecast_memory(const Model& model);
+MemoryForecast forecast_memory(const Model& model, const FactorOptions& options);
 
 } // namespace squeal

@@ -12,8 +12,8 @@ namespace squeal
 
 struct ProgramOptions
 {
-  FactorOptions factor; // the classes that factor a matrix read their options where they do so
-  PencilOptions pencil;
+  FactorOptions factor; // handed on to equilibrium and step
+  PencilOptions pencil; // handed on to modes
   EquilibriumOptions equilibrium;
   ModesOptions modes;
   EstimateOptions estimate;

@@ -18,6 +18,6 @@ enum class ExitCode : int
 ExitCode run(const Scene& scene, const ProgramOptions& options, const std::filesystem::path& output, MPI_Comm comm);
 
 /// Checks scene and mesh and prints what the model would be; computes and writes nothing.
-void dry_run(const Scene& scene, MPI_Comm comm);
+void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm);
 
 } // namespace squeal

@@ -60,23 +60,21 @@ bool is_small_or_full(Mat A, const Triplets& own)
 /// What will be factored, how and in which order.
 struct Plan
 {
-  Factor::Kind kind;       // not automatic
+  FactorKind kind;         // not automatic
   Triplets entries;        // on rank 0; without values for MUMPS, to which every rank gives its share
   SymbolicFactor symbolic; // on rank 0, but for dense
   double memory = 0;       // of a supernodal factor [bytes]
 };
 
-Plan make_plan(Factor::Kind kind, Mat A, Mat B)
+Plan make_plan(Mat A, Mat B, const FactorOptions& options)
 {
   const MPI_Comm comm = comm_of(A);
-  FactorOptions options;
-  read_options(options_of(options));
-  if (kind == Factor::Kind::automatic) kind = options.kind;
+  FactorKind kind = options.kind;
   Triplets own = bordered(A, B);
-  if (kind == Factor::Kind::automatic && is_small_or_full(A, own)) kind = Factor::Kind::dense;
-  const auto content = kind == Factor::Kind::mumps ? TripletContent::pattern : TripletContent::values;
+  if (kind == FactorKind::automatic && is_small_or_full(A, own)) kind = FactorKind::dense;
+  const auto content = kind == FactorKind::mumps ? TripletContent::pattern : TripletContent::values;
   Plan plan{kind, gather(std::move(own), content, comm), {}, 0};
-  if (kind == Factor::Kind::dense) return plan;
+  if (kind == FactorKind::dense) return plan;
   on_rank_zero(comm,
                [&]
                {
@@ -86,7 +84,7 @@ Plan make_plan(Factor::Kind kind, Mat A, Mat B)
   MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);
   constexpr double gigabyte = 1e9;
   const bool too_large = ranks_of(comm) > 1 && plan.memory > options.limit * gigabyte;
-  if (kind == Factor::Kind::automatic) plan.kind = too_large ? Factor::Kind::mumps : Factor::Kind::supernodal;
+  if (kind == FactorKind::automatic) plan.kind = too_large ? FactorKind::mumps : FactorKind::supernodal;
   return plan;
 }
 
@@ -124,15 +122,15 @@ Factor::Factor(Factor&&) noexcept = default;
 Factor& Factor::operator=(Factor&&) noexcept = default;
 Factor::~Factor() = default;
 
-Factor::Factor(Mat A, Mat B, Kind kind) : parts_(std::make_unique<Parts>())
+Factor::Factor(Mat A, Mat B, const FactorOptions& options) : parts_(std::make_unique<Parts>())
 {
   Parts& parts = *parts_;
   parts.comm = comm_of(A);
   parts.layout = row_layout(A);
   parts.dofs = parts.layout.total();
   parts.border = rows_of(B);
-  Plan plan = make_plan(kind, A, B);
-  if (plan.kind == Kind::mumps)
+  Plan plan = make_plan(A, B, options);
+  if (plan.kind == FactorKind::mumps)
   {
     plan.entries = {};
     parts.factor.emplace<MumpsFactor>(
@@ -142,7 +140,7 @@ Factor::Factor(Mat A, Mat B, Kind kind) : parts_(std::make_unique<Parts>())
     on_rank_zero(parts.comm,
                  [&]
                  {
-                   if (plan.kind == Kind::supernodal)
+                   if (plan.kind == FactorKind::supernodal)
                      parts.factor.emplace<Cholesky>(std::move(plan.entries), std::move(plan.symbolic));
                    else
                      parts.factor.emplace<DenseFactor>(plan.entries, parts.dofs, parts.border);
@@ -213,13 +211,13 @@ OptionList options_of(FactorOptions& options)
   };
 }
 
-double factor_memory(Mat A, Mat B)
+double factor_memory(Mat A, Mat B, const FactorOptions& options)
 {
   const int dofs = rows_of(A), border = rows_of(B);
-  const Plan plan = make_plan(Factor::Kind::automatic, A, B);
-  if (plan.kind == Factor::Kind::dense)
+  const Plan plan = make_plan(A, B, options);
+  if (plan.kind == FactorKind::dense)
     return sizeof(double) * static_cast<double>(dofs) * (static_cast<double>(dofs) + border);
-  if (plan.kind == Factor::Kind::supernodal) return plan.memory;
+  if (plan.kind == FactorKind::supernodal) return plan.memory;
   return mumps_factor_memory({bordered(A, B), plan.symbolic.position, dofs, border, comm_of(A)});
 }
 

@@ -36,7 +36,8 @@ std::vector<MUMPS_INT> elimination_order(Mat K, int dofs)
 
 } // namespace
 
-PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry) : parts_(std::make_unique<Parts>())
+PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options)
+    : parts_(std::make_unique<Parts>())
 {
   Parts& parts = *parts_;
   parts.comm = comm_of(K);
@@ -48,8 +49,6 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry) : parts_(std::make_u
   append(M);
   parts.values.resize(parts.entries.value.size());
   std::vector<MUMPS_INT> order = elimination_order(K, parts.layout.total());
-  PencilOptions options;
-  read_options(options_of(options));
   parts.mumps = start_mumps(parts.comm, symmetry == Symmetry::none ? MumpsSymmetry::none : MumpsSymmetry::symmetric);
   set_entries(parts.mumps, parts.entries, parts.layout.total());
   DMUMPS_STRUC_C& mumps = *parts.mumps;

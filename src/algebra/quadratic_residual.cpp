@@ -3,16 +3,18 @@
 namespace squeal
 {
 
-void quadratic_residual(Mat M, Mat C, Mat K, std::complex<double> lambda, Vec y_r, Vec y_i, Vec real, Vec imaginary)
+void quadratic_residual(const QuadraticMatrices& A, std::complex<double> lambda, ComplexVector y,
+                        ComplexVector residual)
 {
+  const auto [real, imaginary] = residual;
   const std::complex<double> square = lambda * lambda;
   const Owned<Vec> a = zeros_like(real), b = zeros_like(real);
-  check(MatMult(K, y_r, real));
-  check(MatMult(K, y_i, imaginary));
-  for (const auto& [A, factor] : {std::pair{C, lambda}, std::pair{M, square}})
+  check(MatMult(A.K, y.real, real));
+  check(MatMult(A.K, y.imaginary, imaginary));
+  for (const auto& [matrix, factor] : {std::pair{A.C, lambda}, std::pair{A.M, square}})
   {
-    check(MatMult(A, y_r, a));
-    check(MatMult(A, y_i, b));
+    check(MatMult(matrix, y.real, a));
+    check(MatMult(matrix, y.imaginary, b));
     check(VecAXPBYPCZ(real, factor.real(), -factor.imag(), 1, a, b));
     check(VecAXPBYPCZ(imaginary, factor.imag(), factor.real(), 1, a, b));
   }

@@ -56,7 +56,7 @@ PetscInt largest_entry(Vec x)
 
 /// After a failed factorisation: finds the motion that A resists least, with a little added to A's diagonal. If that
 /// matrix does not factor either, A is indefinite.
-void find_loose(Mat A, Vec D, Factored& result)
+void find_loose(Mat A, Vec D, const FactorOptions& options, Factored& result)
 {
   double largest = 0, part = 1e-8;
   check(VecNorm(D, NORM_INFINITY, &largest));
@@ -68,7 +68,7 @@ void find_loose(Mat A, Vec D, Factored& result)
     Owned<Mat> shifted;
     check(MatDuplicate(A, MAT_COPY_VALUES, shifted.put()));
     check(MatShift(shifted, largest > 0 ? part * largest : 1));
-    const Factor factor(shifted, nullptr, Factor::Kind::automatic);
+    const Factor factor(shifted, nullptr, options);
     failed = factor.failed();
     if (failed) result.indefinite = true;
     if (!failed) least_resistance(factor, uniform, x);
@@ -78,17 +78,17 @@ void find_loose(Mat A, Vec D, Factored& result)
 
 } // namespace
 
-Factored factor_positive(Mat A, const Interface& interface)
+Factored factor_positive(Mat A, const Interface& interface, const FactorOptions& options)
 {
   Factored result;
   Mat B = interface.pairs > 0 ? interface.B.get() : nullptr;
-  result.factor = Factor(A, B, Factor::Kind::automatic);
+  result.factor = Factor(A, B, options);
   Owned<Vec> D;
   check(MatCreateVecs(A, D.put(), nullptr));
   check(MatGetDiagonal(A, D));
   if (result.factor.failed())
   {
-    find_loose(A, D, result);
+    find_loose(A, D, options, result);
     return result;
   }
   // a singular matrix often factors without complaint; rounding leaves it this much resistance and no more
@@ -98,9 +98,10 @@ Factored factor_positive(Mat A, const Interface& interface)
   return result;
 }
 
-CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names)
+CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names,
+                           const FactorOptions& options)
 {
-  auto [factor, loose, indefinite, resistance] = factor_positive(A, interface);
+  auto [factor, loose, indefinite, resistance] = factor_positive(A, interface, options);
   if (loose)
     throw Error((indefinite ? "not positive definite: driven on, not back, is" : "singular: nothing resists") +
                 (" a motion that is largest at " + describe(names, *loose)) + "; give it a support, a spring or mass");

@@ -46,7 +46,4 @@ double residual_of(const ContactWork& work);
 /// W r of each, reading W once.
 void form_products(std::span<ContactWork* const> works);
 
-/// Block Gauss-Seidel on all of them at once; W r must be fresh, and is in the end.
-void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& settings);
-
 } // namespace squeal

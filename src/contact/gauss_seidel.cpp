@@ -4,7 +4,7 @@
 /// Let w = w_0 + dw with w_0 = W r_0 + b from the last product with W, and dw the effect of the changes since. The
 /// sweeps update dw alone. It is small, so the near field and single precision suffice; where they did not lead to
 /// convergence, W itself is swept over. A problem counts as converged only by the residual after a product with W.
-#include "contact_work.hpp"
+#include "gauss_seidel.hpp"
 
 #include <algorithm>
 #include <cmath>

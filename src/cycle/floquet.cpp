@@ -167,7 +167,8 @@ ReducedModel model_for(const CycleProblem& problem, const RecordedPeriods& perio
   const bool slide =
       std::none_of(pairs.begin(), pairs.end(), [](const PairHistory& pair) { return pair.stuck || pair.turned; });
   const bool many = roles.active.size() * static_cast<std::size_t>(1 + interface.directions) > 150;
-  return reduce(problem.sliding, problem.modes, roles, {static_cast<int>(problem.modes.size()), 1e-5, slide && many});
+  return reduce(problem.sliding, problem.modes, roles,
+                {static_cast<int>(problem.modes.size()), 1e-5, slide && many, nullptr, problem.step.factor});
 }
 
 /// What the grid of time changes each value of the spectrum by; other steps a modulus.

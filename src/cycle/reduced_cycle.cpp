@@ -60,8 +60,9 @@ void build_model(ReducedSearch& search, double amplitude)
   // where its cycle is the answer, friction is left free
   const bool sliding = search.fidelity.asked != CycleModel::reduced &&
                        slide_throughout(problem.sliding.interface, problem.unstable.modes.front(), amplitude);
-  search.model = reduce(problem.sliding, problem.modes, search.active,
-                        {static_cast<int>(options.modes), options.threshold, sliding, &search.real});
+  search.model =
+      reduce(problem.sliding, problem.modes, search.active,
+             {static_cast<int>(options.modes), options.threshold, sliding, &search.real, problem.step.factor});
   search.energy = energy_matrices(search.model);
   describe_model(search);
   search.fidelity.reduction_seconds += MPI_Wtime() - clock;
@@ -80,15 +81,15 @@ struct FreeMotion
 double run_one_period(ReducedMap& map, FreeMotion& motion, double& correction)
 {
   const ReducedModel& model = map.model;
-  const Passage passage = pass(map, motion.period, motion.state);
-  const ReducedState& f = passage.rate;
-  ReducedState way{passage.end.q - motion.state.q, passage.end.v - motion.state.v};
-  correction = -(way.q.dot(model.K_z * f.q) + way.v.dot(model.M_z * f.v)) / doubled_energy(model, f);
-  way.q += correction * f.q;
-  way.v += correction * f.v;
-  motion.state = passage.end;
+  const PeriodEnd period_end = end_of_period(map, motion.period, motion.state);
+  const ReducedState& f = period_end.rate;
+  ReducedState defect{period_end.end.q - motion.state.q, period_end.end.v - motion.state.v};
+  correction = -(defect.q.dot(model.K_z * f.q) + defect.v.dot(model.M_z * f.v)) / doubled_energy(model, f);
+  defect.q += correction * f.q;
+  defect.v += correction * f.v;
+  motion.state = period_end.end;
   motion.energy = doubled_energy(model, motion.state) / 2;
-  return std::sqrt(doubled_energy(model, way) / (2 * motion.energy));
+  return std::sqrt(doubled_energy(model, defect) / (2 * motion.energy));
 }
 
 /// Free periods until one comes back to within half a percent, or its energy exceeds `most`.

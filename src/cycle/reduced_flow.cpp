@@ -81,9 +81,9 @@ Flow flow_of(ReducedMap& map, const EnergyMatrices& energy)
 {
   const auto period_map = [&map](double period, Vec start, Vec end, Vec rate)
   {
-    const Passage passage = pass(map, period, reduced_state(start));
-    put(passage.end, end);
-    if (rate) put(passage.rate, rate);
+    const PeriodEnd period_end = end_of_period(map, period, reduced_state(start));
+    put(period_end.end, end);
+    if (rate) put(period_end.rate, rate);
   };
   return {period_map, energy.M, energy.K, {}};
 }
@@ -92,7 +92,7 @@ MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const R
 {
   const ReducedModel& model = map.model;
   const Eigen::Index n = model.size(), slow = model.slow;
-  const ReducedState f = pass(map, period, state).rate;
+  const ReducedState f = end_of_period(map, period, state).rate;
   const VectorXd flow = stacked(f), image = stacked({model.K_z * f.q, model.M_z * f.v});
   // dPhi S S' - f f^+ = U V', and (U V' - I)^-1 + I = -U (I - V'U)^-1 V'
   MatrixXd U(2 * n, 2 * slow + 1), V = MatrixXd::Zero(2 * slow + 1, 2 * n);

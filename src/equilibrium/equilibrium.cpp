@@ -52,11 +52,11 @@ double typical_stiffness(Mat K)
   return largest > 0 ? largest : 1;
 }
 
-Held hold(const Structure& structure, const Interface& interface)
+Held hold(const Structure& structure, const Interface& interface, const FactorOptions& options)
 {
   // Springs this soft beside the rest lose the digits of the reactions, which contact would hold.
   constexpr double soft = 1e-10;
-  Factored first = factor_positive(structure.K, interface);
+  Factored first = factor_positive(structure.K, interface, options);
   Held held;
   if (interface.pairs > 0 && (first.loose || first.resistance < soft))
   {
@@ -65,7 +65,7 @@ Held hold(const Structure& structure, const Interface& interface)
     check(MatDuplicate(structure.K, MAT_COPY_VALUES, held.augmented.put()));
     check(MatAXPY(held.augmented, held.kappa, normal_springs(interface), DIFFERENT_NONZERO_PATTERN));
     check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
-    Factored second = factor_positive(held.augmented, interface);
+    Factored second = factor_positive(held.augmented, interface, options);
     if (!second.loose && second.resistance > 10 * first.resistance)
     {
       held.factor = std::move(second.factor);
@@ -80,7 +80,7 @@ Held hold(const Structure& structure, const Interface& interface)
     else
     {
       second.factor = Factor();
-      first = factor_positive(structure.K, interface);
+      first = factor_positive(structure.K, interface, options);
     }
   }
   if (first.loose && first.indefinite)
@@ -252,45 +252,58 @@ void settle(const Held& held, const Structure& structure, const Interface& inter
   }
 }
 
-void judge(const Structure& structure, const Interface& interface, const Search& search,
-           const EquilibriumOptions& options, Equilibrium& equilibrium, MPI_Comm comm)
+/// What rank 0 computes from D and the problem.
+struct Checks
 {
+  double residual = 0, check_residual = 0, check_difference = 0;
+  int check_iterations = 0;
+  Uniqueness uniqueness = Uniqueness::not_checked;
+};
+
+Checks check_reactions(const Search& search, const std::vector<double>& gap, const EquilibriumOptions& options)
+{
+  const std::vector<double>& reaction = search.solution.reaction;
+  const std::size_t pairs = gap.size();
+  Checks checks;
+  std::vector<double> rho(pairs, search.rho);
+  checks.check_residual = unilateral_residual(reaction, gap, rho, gap);
+  for (std::size_t i = 0; i < pairs; ++i)
+    if (const double own = search.D_nn.diagonal()[static_cast<Eigen::Index>(i)]; own > 0) rho[i] = 1 / own;
+  checks.residual = unilateral_residual(reaction, gap, rho, gap);
+  if (search.problem.N.size() > 0) return checks;
+  checks.uniqueness = has_one_solution(search.problem) ? Uniqueness::assured : Uniqueness::not_assured;
+  const int limit = check_iterations(options, static_cast<int>(pairs));
+  if (limit == 0 || pairs == 0) return checks;
+  const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12, limit);
+  checks.check_iterations = run.iterations;
+  const double largest = *std::max_element(reaction.begin(), reaction.end());
+  for (std::size_t i = 0; i < pairs && largest > 0; ++i)
+    checks.check_difference = std::max(checks.check_difference, std::abs(run.reaction[i] - reaction[i]) / largest);
+  if (!(run.residual <= 1e-12)) checks.check_difference = std::numeric_limits<double>::quiet_NaN();
+  return checks;
+}
+
+/// Sets the residuals, the outcome and what else is checked of a solution.
+void check_solution(const Structure& structure, const Interface& interface, const Search& search,
+                    const EquilibriumOptions& options, Equilibrium& equilibrium)
+{
+  const MPI_Comm comm = comm_of(structure.load);
   const bool balanced = balances(structure, interface, equilibrium);
   const auto gap = gaps_of(interface, equilibrium.u);
-  const std::vector<double>& reaction = search.solution.reaction;
-  std::array<double, 5> told{};
-  on_rank_zero(comm,
-               [&]
-               {
-                 const std::size_t pairs = gap.size();
-                 std::vector<double> rho(pairs, search.rho);
-                 told[1] = unilateral_residual(reaction, gap, rho, gap);
-                 for (std::size_t i = 0; i < pairs; ++i)
-                   if (const double own = search.D_nn.diagonal()[static_cast<Eigen::Index>(i)]; own > 0)
-                     rho[i] = 1 / own;
-                 told[0] = unilateral_residual(reaction, gap, rho, gap);
-                 if (search.problem.N.size() == 0) told[4] = has_one_solution(search.problem) ? 1 : 2;
-                 const int limit = check_iterations(options, interface.pairs);
-                 if (limit == 0 || pairs == 0 || search.problem.N.size() > 0) return;
-                 const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12, limit);
-                 told[2] = run.iterations;
-                 const double largest = *std::max_element(reaction.begin(), reaction.end());
-                 for (std::size_t i = 0; i < pairs && largest > 0; ++i)
-                   told[3] = std::max(told[3], std::abs(run.reaction[i] - reaction[i]) / largest);
-                 if (!(run.residual <= 1e-12)) told[3] = std::numeric_limits<double>::quiet_NaN();
-               });
-  MPI_Bcast(told.data(), 5, MPI_DOUBLE, 0, comm);
-  equilibrium.outcome.residual = told[0];
-  equilibrium.check_residual = told[1];
-  equilibrium.check_iterations = static_cast<int>(told[2]);
-  equilibrium.check_difference = told[3];
-  equilibrium.uniqueness = told[4] == 0 ? "not checked" : told[4] == 1 ? "assured" : "not assured";
-  const bool good = told[0] <= 1e-9 && balanced;
+  Checks checks;
+  on_rank_zero(comm, [&] { checks = check_reactions(search, gap, options); });
+  MPI_Bcast(&checks, sizeof checks, MPI_BYTE, 0, comm);
+  equilibrium.outcome.residual = checks.residual;
+  equilibrium.check_residual = checks.check_residual;
+  equilibrium.check_iterations = checks.check_iterations;
+  equilibrium.check_difference = checks.check_difference;
+  equilibrium.uniqueness = checks.uniqueness;
+  const bool good = checks.residual <= 1e-9 && balanced;
   equilibrium.outcome.kind = good ? OutcomeKind::converged : OutcomeKind::not_converged;
   if (!good) equilibrium.outcome.reason = "the closed set was found, but rounding leaves residuals above 1e-9";
 }
 
-/// The words of a search that found nothing.
+/// The outcome of a search that found nothing.
 Outcome failure(const StatusSolution& solution, double friction)
 {
   Outcome outcome{OutcomeKind::no_equilibrium, "", solution.iterations, 1};
@@ -308,10 +321,8 @@ Outcome failure(const StatusSolution& solution, double friction)
 
 void share(StatusSolution& solution, std::size_t pairs, MPI_Comm comm)
 {
-  std::array<int, 2> told = {static_cast<int>(solution.outcome), solution.iterations};
-  MPI_Bcast(told.data(), 2, MPI_INT, 0, comm);
-  solution.outcome = static_cast<StatusOutcome>(told[0]);
-  solution.iterations = told[1];
+  MPI_Bcast(&solution.outcome, sizeof solution.outcome, MPI_BYTE, 0, comm);
+  MPI_Bcast(&solution.iterations, 1, MPI_INT, 0, comm);
   solution.closed.resize(pairs);
   MPI_Bcast(solution.closed.data(), static_cast<int>(pairs), MPI_CHAR, 0, comm);
   broadcast(solution.gap, pairs, comm);
@@ -352,7 +363,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
     equilibrium.outcome = {OutcomeKind::converged, "", 0, 0};
     return equilibrium;
   }
-  Held held = hold(structure, interface);
+  Held held = hold(structure, interface, options.factor);
   equilibrium.auxiliary_stiffness = held.kappa;
   const std::vector<double> nothing(pairs, 0.);
   displace(held, structure, interface, pair_forces(interface, nothing, nothing, held.kappa), equilibrium.u);
@@ -387,7 +398,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   }
   settle(held, structure, interface, search, equilibrium, comm);
   equilibrium.reactions = pair_forces(interface, search.solution.reaction, interface.gap, 0);
-  judge(structure, interface, search, options, equilibrium, comm);
+  check_solution(structure, interface, search, options, equilibrium);
   equilibrium.outcome.iterations = search.solution.iterations;
   return equilibrium;
 }

@@ -309,7 +309,7 @@ std::vector<std::complex<double>> normal_reactions(const ReactionOperator& react
   Owned<Vec> re, im;
   check(MatCreateVecs(reaction.K, nullptr, re.put()));
   check(MatCreateVecs(reaction.K, nullptr, im.put()));
-  quadratic_residual(reaction.M, reaction.C, reaction.K, s, real, imaginary, re, im);
+  quadratic_residual({reaction.M, reaction.C, reaction.K}, s, {real, imaginary}, {re, im});
   const std::vector<double> first = all_entries(re), second = all_entries(im);
   std::vector<std::complex<double>> result;
   for (std::size_t i = 0; i < first.size(); ++i) result.emplace_back(first[i], second[i]);

@@ -99,7 +99,7 @@ CountedSolution solve_full(const ModesProblem& problem, RealCount& real)
   CountedSolution result;
   if (n > limit && problem.options.solver == ModesSolver::slices)
   {
-    result = solve_by_slices(problem.reduced, real, band);
+    result = solve_by_slices(problem.reduced, real, band, problem.options.pencil);
     if (result.count.expected == result.count.found) return result;
     result.count = count_in_band(problem.reduced, result.solution, real, band);
     if (result.count.found >= result.count.expected) return result;
@@ -122,13 +122,13 @@ QuadraticSolution solve_by_projection(const ModesProblem& problem)
   const ModesSettings& settings = problem.settings;
   const ModesOptions& options = problem.options;
   const Mat M = problem.linearised.M_z, K = problem.linearised.K_z;
-  const int limit = static_cast<int>(options.dense_limit);
   RealModes basis;
-  if (settings.real_modes == 0) basis = solve_real_modes_below(M, K, 1.05 * settings.band, limit);
+  if (settings.real_modes == 0) basis = solve_real_modes_below(M, K, 1.05 * settings.band, options);
   const int wanted = settings.real_modes > 0 ? settings.real_modes : fewest;
-  if (static_cast<int>(basis.omega.size()) < wanted) basis = solve_real_modes(M, K, wanted, limit);
-  return solve_projected(problem.reduced, M, K, basis,
-                         {settings.band, settings.residual_passes, static_cast<int>(options.candidates)});
+  if (static_cast<int>(basis.omega.size()) < wanted) basis = solve_real_modes(M, K, wanted, options);
+  return solve_projected(
+      problem.reduced, M, K, basis,
+      {settings.band, settings.residual_passes, static_cast<int>(options.candidates), options.pencil});
 }
 
 int unstable_in(const std::vector<ComplexMode>& modes)
@@ -228,7 +228,7 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
       {project(sliding.structure.M, Y, Z), project(linearised.C, Y, Z), project(sliding.structure.K, Y, Z)},
       settings,
       options};
-  RealCount real = make_real_count(linearised.M_z, linearised.K_z, static_cast<int>(options.dense_limit));
+  RealCount real = make_real_count(linearised.M_z, linearised.K_z, options);
   CountedSolution found;
   if (settings.method != ModesMethod::full)
   {

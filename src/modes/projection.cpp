@@ -168,7 +168,7 @@ QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K,
   {
     MultiVector shapes = empty_multivector(K);
     for (const Owned<Vec>& shape : modes.shapes) append(shapes, shape);
-    ShiftInvert stiffness = make_shift_invert(K, M, Symmetry::symmetric);
+    ShiftInvert stiffness = make_shift_invert(K, M, Symmetry::symmetric, settings.pencil);
     if (settings.passes > 0) move_to(stiffness, shift_below_zero(M, K));
     const double omega = 2 * std::numbers::pi * settings.band;
     const Window window{vibration_floor(norms_of(problem)), omega * omega};

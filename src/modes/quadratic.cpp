@@ -178,7 +178,7 @@ double vibration_floor(const QuadraticNorms& norms)
 double backward_error(const QuadraticProblem& problem, const QuadraticNorms& norms, const Eigenpair& pair)
 {
   const Owned<Vec> r = zeros_like(pair.real), s = zeros_like(pair.real);
-  quadratic_residual(problem.M, problem.C, problem.K, pair.lambda, pair.real, pair.imaginary, r, s);
+  quadratic_residual({problem.M, problem.C, problem.K}, pair.lambda, {pair.real, pair.imaginary}, {r, s});
   double residual[2], size[2];
   check(VecNorm(r, NORM_2, &residual[0]));
   check(VecNorm(s, NORM_2, &residual[1]));

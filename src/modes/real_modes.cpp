@@ -171,12 +171,12 @@ Inertia inertia_at(double limit, ShiftInvert& pencil)
 
 /// The modes with theta < limit, at most `count` of them. One factor just below zero finds them, and one above the last
 /// of them counts them. A space grown from one vector may miss copies of multiple modes; those are sought again.
-RealModes search_from_below_zero(Mat M, Mat K, double limit, int count)
+RealModes search_from_below_zero(Mat M, Mat K, double limit, int count, const PencilOptions& options)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
   const double shift = shift_below_zero(M, K);
-  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric);
+  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
   std::optional<Inertia> inertia;
   if (std::isfinite(limit)) inertia = inertia_at(limit, pencil);
   RealPairs found{.x = empty_multivector(K)};
@@ -227,16 +227,16 @@ double shift_below_zero(Mat M, Mat K)
   return -1e-8 * trace(K) / trace(M);
 }
 
-RealCount make_real_count(Mat M, Mat K, int dense_limit)
+RealCount make_real_count(Mat M, Mat K, const ModesOptions& options)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  if (n <= dense_limit)
+  if (n <= options.dense_limit)
   {
     const SymmetricEigenpairs all = solve_whole(M, K);
     return {{}, {all.lambda.begin(), all.lambda.end()}, {}};
   }
-  return {make_shift_invert(K, M, Symmetry::symmetric), {}, {{0, 0}}};
+  return {make_shift_invert(K, M, Symmetry::symmetric, options.pencil), {}, {{0, 0}}};
 }
 
 int count_below(RealCount& count, double omega)
@@ -268,32 +268,32 @@ std::vector<double> omegas_between(RealCount& count, double least, double top)
   return omega;
 }
 
-RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit)
+RealModes solve_real_modes(Mat M, Mat K, int count, const ModesOptions& options)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
   if (count <= 0) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
-  if (n <= dense_limit) return first_of(solve_whole(M, K), K, count);
-  return search_from_below_zero(M, K, HUGE_VAL, static_cast<int>(std::min<PetscInt>(count, n)));
+  if (n <= options.dense_limit) return first_of(solve_whole(M, K), K, count);
+  return search_from_below_zero(M, K, HUGE_VAL, static_cast<int>(std::min<PetscInt>(count, n)), options.pencil);
 }
 
-RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit)
+RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
   const double omega = 2 * std::numbers::pi * band;
-  if (n <= dense_limit)
+  if (n <= options.dense_limit)
   {
     const SymmetricEigenpairs all = solve_whole(M, K);
     const auto below = std::lower_bound(all.lambda.begin(), all.lambda.end(), omega * omega);
     return first_of(all, K, below - all.lambda.begin());
   }
-  return search_from_below_zero(M, K, omega * omega, to_int(n));
+  return search_from_below_zero(M, K, omega * omega, to_int(n), options.pencil);
 }
 
 RealModes find_real_modes_below(const LinearisedSliding& linearised, double band, const ModesOptions& options)
 {
-  RealModes modes = solve_real_modes_below(linearised.M_z, linearised.K_z, band, static_cast<int>(options.dense_limit));
+  RealModes modes = solve_real_modes_below(linearised.M_z, linearised.K_z, band, options);
   to_structure(modes, linearised.contact.Z);
   return modes;
 }

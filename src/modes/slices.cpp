@@ -107,11 +107,12 @@ PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, int fr
   return whole;
 }
 
-CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real, double band)
+CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real, double band,
+                                const PencilOptions& options)
 {
   const double floor = std::sqrt(vibration_floor(norms_of(problem))), end = two_pi * band, reach = reach_of_count * end;
   std::vector<Slice> slices = make_slices(real, floor, reach);
-  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none);
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
   CountedSolution result;
   const auto search = [&](double angle)
   {

@@ -4,8 +4,7 @@
 /// solvers of contact/solver.hpp do not fit. The normal laws are swept over alone, each pair's friction turned as it
 /// slides at the time: a row of W a pair, in single precision, since it acts on changes only. One product with W then
 /// gives the rates, and pairs that still miss the law - those that stick or turn - are solved one by one.
-#include "squeal/contact/solver.hpp"
-#include "squeal/reduction/reduced_model.hpp"
+#include "reduced_contact.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -121,9 +121,9 @@ MultiVector sliding_forces(const MultiVector& rows, const Interface& interface, 
 }
 
 /// (K_z + w^2 M_z)^-1 forces
-MultiVector attachment_columns(Mat A, const MultiVector& forces)
+MultiVector attachment_columns(Mat A, const MultiVector& forces, const FactorOptions& options)
 {
-  const Factor factor(A, nullptr, Factor::Kind::automatic);
+  const Factor factor(A, nullptr, options);
   if (factor.failed()) throw Error("reduced model: K + omega^2 M is not positive definite with the active pairs open");
   Owned<Vec> pattern;
   check(MatCreateVecs(A, pattern.put(), nullptr));
@@ -328,7 +328,7 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   { return reduction.sliding ? sliding_forces(transposed(rows), interface, active) : transposed(rows); };
   MultiVector columns = mode_columns(modes, reduction, contact.Z);
   const Index of_modes = columns.columns();
-  append(columns, attachment_columns(E, forces(BZ)));
+  append(columns, attachment_columns(E, forces(BZ), reduction.factor));
   model.omega = omega;
   choose_basis(model, E, M_z, columns, of_modes, reduction.threshold);
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.

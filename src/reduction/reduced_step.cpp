@@ -1,7 +1,8 @@
-/// The modified theta-method on the reduced model: the scheme of transient/transient.hpp, in few dense products.
+/// The modified theta-method on the reduced model: the scheme of transient/theta_step.hpp, in few dense products.
+#include "squeal/reduction/reduced_step.hpp"
+#include "reduced_contact.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/contact/sliding_direction.hpp"
-#include "squeal/reduction/reduced_model.hpp"
 
 namespace squeal
 {
@@ -144,7 +145,7 @@ ReducedState integrate(ReducedMap& map, double period, ReducedState state,
   return state;
 }
 
-Passage pass(ReducedMap& map, double period, ReducedState state)
+PeriodEnd end_of_period(ReducedMap& map, double period, ReducedState state)
 {
   prepare(map, period);
   ReducedContact contact{map.reactions};
@@ -155,7 +156,7 @@ Passage pass(ReducedMap& map, double period, ReducedState state)
         {
           if (++done == map.steps - 1) last_but_one = now;
         });
-  Passage result{state, {}};
+  PeriodEnd result{state, {}};
   (void)advance(map, state, contact);
   result.rate = {(state.q - last_but_one.q) / (2 * map.h), (state.v - last_but_one.v) / (2 * map.h)};
   return result;

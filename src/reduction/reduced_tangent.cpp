@@ -1,9 +1,10 @@
 /// The reduced period map's derivative (src/README.md, sections 4.13 and 7.5) along recorded contact. With x = (v, q),
 /// db = b x the changes of the closed pairs' rows and dr = -A^-1 T db their reactions, a step is
 ///     v+ = F x + P dr,     q+ = q + h (theta v+ + (1-theta) v).
+#include "squeal/reduction/reduced_tangent.hpp"
+
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/contact/sliding_direction.hpp"
-#include "squeal/reduction/reduced_model.hpp"
 
 #include <Eigen/LU>
 

@@ -40,7 +40,7 @@ XdmfShape xdmf_shape(Shape shape)
   case Shape::shell3:
     return {4, {0, 1, 2}};
   }
-  throw Error("an element shape that XDMF is not told of");
+  throw Error("an element shape without an XDMF type");
 }
 
 constexpr int polyvertex = 1; // followed by its number of nodes

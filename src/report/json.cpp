@@ -41,7 +41,7 @@ Json equilibrium_entry(const Report& report, const Scene& scene)
   entry["check_iterations"] = equilibrium.check_iterations;
   entry["check_difference"] = equilibrium.check_difference;
   entry["auxiliary_stiffness"] = equilibrium.auxiliary_stiffness;
-  entry["uniqueness"] = equilibrium.uniqueness;
+  entry["uniqueness"] = word(equilibrium.uniqueness);
   for (std::size_t i = 0; i < report.contacts.size(); ++i)
   {
     entry["contacts"].push_back({{"rotor", scene.contacts[i].rotor},

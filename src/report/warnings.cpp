@@ -16,7 +16,7 @@ using Sentences = std::vector<std::string>;
 Sentences of_equilibrium(const Report& report)
 {
   Sentences sentences;
-  if (report.equilibrium.uniqueness == "not assured")
+  if (report.equilibrium.uniqueness == Uniqueness::not_assured)
     sentences.push_back("with this much friction other equilibria may exist beside this one");
   return sentences;
 }

@@ -1,6 +1,6 @@
 #pragma once
 /// Contact within a theta step (src/README.md, sections 4.3 to 4.7).
-#include "squeal/transient/transient.hpp"
+#include "squeal/transient/theta_step.hpp"
 
 namespace squeal
 {

@@ -1,6 +1,6 @@
 #include "squeal/transient/step_guards.hpp"
 
-#include "squeal/transient/transient.hpp"
+#include "squeal/transient/theta_step.hpp"
 
 #include <cmath>
 #include <numbers>
@@ -67,11 +67,11 @@ std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double the
   return std::log((1. + (1 - theta) * h * lambda) / (1. - theta * h * lambda)) / h;
 }
 
-double free_growth(const Structure& structure, double theta, double h)
+double free_growth(const Structure& structure, double theta, double h, const FactorOptions& options)
 {
   FreeStep step{structure, theta, h, {}, {}, {}, {}, {}, {}, {}};
   step.A = step_matrix(structure, h, theta);
-  step.factor = Factor(step.A, nullptr, Factor::Kind::automatic);
+  step.factor = Factor(step.A, nullptr, options);
   for (Owned<Vec>* x : {&step.u, &step.v, &step.next, &step.rhs, &step.image}) *x = zeros_like(structure.load);
   PetscInt first = 0, last = 0;
   check(VecGetOwnershipRange(step.u, &first, &last));
@@ -99,7 +99,7 @@ std::string step_refusal(const Structure& structure, const ComplexMode* mode, do
   if (mode)
     if (const std::string reason = mode_refusal(*mode, theta, h); !reason.empty()) return reason;
   if (theta >= 0.5) return {};
-  const double growth = free_growth(structure, theta, h);
+  const double growth = free_growth(structure, theta, h, options.factor);
   constexpr double negligible = 2e-6; // less than what the fit sees, and no harm in 100 000 steps
   if (growth <= negligible) return {};
   return format("with theta = %.4g a step of %.4g s multiplies free vibrations by exp(%.4g), more than damping takes: "

@@ -140,7 +140,8 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.law = options.law;
   step.opposed = options.opposed;
   step.contact = options.contact;
-  CondensedOperator condensed = condense(step_matrix(structure, h, theta), interface, h, structure.names);
+  CondensedOperator condensed =
+      condense(step_matrix(structure, h, theta), interface, h, structure.names, options.factor);
   step.factor = std::move(condensed.factor);
   step.factor_seconds = MPI_Wtime() - start;
   if (rank_of(comm_of(structure.load)) == 0)

@@ -49,9 +49,10 @@ double energy(const Fluctuation& fluctuation, const State& state, const StepWork
   return (kinetic + potential) / 2;
 }
 
-void record(const StepReport& report, double h, const State& state, int directions, Mat probes, Vec probe_values,
-            History& history)
+void record(const StepReport& report, double h, const State& state, int directions, Vec probe_values,
+            const Recorder& recorder)
 {
+  History& history = recorder.history;
   history.time.push_back(state.time);
   history.energy.push_back(report.energy);
   history.damping_power.push_back(report.damping_work / h);
@@ -64,8 +65,8 @@ void record(const StepReport& report, double h, const State& state, int directio
   history.open.push_back(report.open);
   history.stick.push_back(report.stick);
   history.slip.push_back(report.slip);
-  if (!probes) return;
-  check(MatMult(probes, state.u, probe_values));
+  if (!recorder.probes) return;
+  check(MatMult(recorder.probes, state.u, probe_values));
   const std::vector<double> values = all_entries(probe_values);
   for (std::size_t i = 0; i < values.size(); ++i) history.probes[i].push_back(values[i]);
 }
@@ -157,7 +158,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     const double scale = std::max({report.energy, std::abs(report.contact_work), std::abs(report.load_work)});
     if (defect > 0) summary.energy_defect_max = std::max(summary.energy_defect_max, defect / scale);
     update(fluctuation, state, work);
-    record(report, step.h, state, interface.directions, probes, probe_values, history);
+    record(report, step.h, state, interface.directions, probe_values, recorder);
     history.fluctuating_energy.push_back(energy(fluctuation, state, work));
     if (monitor) monitor(state, report, work);
     if (!std::isfinite(report.energy)) break;

@@ -14,7 +14,8 @@ using namespace squeal::test;
 namespace
 {
 
-constexpr double band = 10; // [Hz], all of the chain
+constexpr double band = 10;                 // [Hz], all of the chain
+const ModesOptions large{.dense_limit = 0}; // the methods of large problems
 
 } // namespace
 
@@ -23,15 +24,15 @@ TEST_CASE("slices miss none of a hundred crowded pairs, and the frictionless str
 {
   const int cells = 50;
   const QuadraticProblem frictionless = flutter_chain(cells, 0);
-  const RealModes real = solve_real_modes_below(frictionless.M, frictionless.K, band, 0);
+  const RealModes real = solve_real_modes_below(frictionless.M, frictionless.K, band, large);
   REQUIRE(real.outcome.kind == OutcomeKind::converged);
   REQUIRE(real.omega.size() == 100);
   for (const auto& [mu, flutter] : {std::pair{.38, 44}, std::pair{.36, 17}, std::pair{0., 0}})
   {
     CAPTURE(mu);
     const QuadraticProblem problem = flutter_chain(cells, mu);
-    RealCount count = make_real_count(frictionless.M, frictionless.K, 0);
-    const CountedSolution sliced = solve_by_slices(problem, count, band);
+    RealCount count = make_real_count(frictionless.M, frictionless.K, large);
+    const CountedSolution sliced = solve_by_slices(problem, count, band, {});
     CHECK(sliced.count.expected == 100);
     CHECK(sliced.count.found == 100);
     CHECK(count_unstable(sliced.solution) == flutter);
@@ -67,8 +68,8 @@ TEST_CASE("slices find heavily and unevenly damped pairs as LAPACK does, and no 
       C[i][i + 1] = C[i + 1][i] = -dashpot;
     }
     const QuadraticProblem problem = problem_of(M, C, K);
-    RealCount count = make_real_count(frictionless.M, frictionless.K, 0);
-    const QuadraticSolution sliced = solve_by_slices(problem, count, edge).solution;
+    RealCount count = make_real_count(frictionless.M, frictionless.K, large);
+    const QuadraticSolution sliced = solve_by_slices(problem, count, edge, {}).solution;
     const QuadraticSolution whole = solve_quadratic(problem, {edge, 0, 0, 1000});
     REQUIRE(whole.pairs.size() > 20);
     const auto inside = std::count_if(sliced.pairs.begin(), sliced.pairs.end(),
@@ -96,7 +97,7 @@ TEST_CASE("real modes of ten equal bodies are all found, though every frequency 
   }
   const QuadraticProblem problem =
       problem_of(diagonal(std::vector<double>(K.size(), 1.)), zeros(K.size(), K.size()), K);
-  const RealModes modes = solve_real_modes(problem.M, problem.K, 35, 0);
+  const RealModes modes = solve_real_modes(problem.M, problem.K, 35, large);
   REQUIRE(modes.outcome.kind == OutcomeKind::converged);
   REQUIRE(modes.omega.size() == 35);
   for (std::size_t k = 0; k < 35; ++k) // omega_j = 2 sin(j pi / 2 (masses + 1))
@@ -121,10 +122,10 @@ TEST_CASE("real modes of ten equal free bodies include every rigid motion")
   const QuadraticProblem problem =
       problem_of(diagonal(std::vector<double>(K.size(), 1.)), zeros(K.size(), K.size()), K);
   const auto exact = [](std::size_t k) { return 2 * std::sin(static_cast<double>(k / bodies) * M_PI / (2 * masses)); };
-  const RealModes below = solve_real_modes_below(problem.M, problem.K, (exact(10) + exact(20)) / (4 * M_PI), 0);
+  const RealModes below = solve_real_modes_below(problem.M, problem.K, (exact(10) + exact(20)) / (4 * M_PI), large);
   CHECK(below.outcome.kind == OutcomeKind::converged);
   CHECK(below.omega.size() == 20);
-  const RealModes first = solve_real_modes(problem.M, problem.K, 35, 0);
+  const RealModes first = solve_real_modes(problem.M, problem.K, 35, large);
   CHECK(first.outcome.kind == OutcomeKind::converged);
   REQUIRE(first.omega.size() == 35);
   for (std::size_t k = 0; k < 35; ++k) CHECK(std::abs(std::pow(first.omega[k], 2) - std::pow(exact(k), 2)) < 1e-12);
@@ -142,7 +143,7 @@ TEST_CASE("the projection misses unstable pairs with too few real modes, and its
   const QuadraticProblem problem = flutter_chain(cells, .38), frictionless = flutter_chain(cells, 0);
   const Mat M = frictionless.M, K = frictionless.K;
   const auto projected = [&](int modes, int passes) {
-    return solve_projected(problem, M, K, solve_real_modes(M, K, modes, 0), {band, passes, 100});
+    return solve_projected(problem, M, K, solve_real_modes(M, K, modes, large), {band, passes, 100});
   };
   const QuadraticSolution few = projected(40, 0), all = projected(100, 0);
   CHECK(count_unstable(few) == 0); // lower branch alone: nothing to couple with
@@ -158,8 +159,7 @@ TEST_CASE("the projection misses unstable pairs with too few real modes, and its
 TEST_CASE("a factor that runs short of its estimated memory is made again with more")
 {
   const QuadraticProblem chain = flutter_chain(400, 0);
-  check(PetscOptionsSetValue(nullptr, "-modes_factor_room", "-90"));
-  ShiftInvert pencil = make_shift_invert(chain.K, chain.M, Symmetry::symmetric);
+  ShiftInvert pencil = make_shift_invert(chain.K, chain.M, Symmetry::symmetric, {.room = -90});
   for (const double shift : {-1., 12.})
   {
     move_to(pencil, shift);
@@ -171,7 +171,6 @@ TEST_CASE("a factor that runs short of its estimated memory is made again with m
     Y.entries -= X.entries;
     for (Eigen::Index j = 0; j < 3; ++j) CHECK(column_norms(Y)[j] < 1e-12 * column_norms(X)[j]);
   }
-  check(PetscOptionsClearValue(nullptr, "-modes_factor_room"));
 }
 
 // Diagonal, K = 1, 2, …, so that K - 3 M has a pivot that is exactly zero: the shift moves below it, 1e-6 of it.
@@ -180,13 +179,13 @@ TEST_CASE("a shift that is an eigenvalue moves just below it, and the counts are
   std::vector<double> values;
   for (int i = 1; i <= 40; ++i) values.push_back(i);
   const QuadraticProblem problem = problem_of(diagonal(std::vector<double>(40, 1.)), zeros(40, 40), diagonal(values));
-  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::symmetric);
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::symmetric, {});
   move_to(pencil, 3);
   CHECK(pencil.shift < 3);
   CHECK(pencil.shift > 2.9999);
   CHECK(pencil.factor->negative_pivots() == 2);
   const double edge = std::sqrt(3.) / (2 * M_PI), omega = 2 * M_PI * edge; // rounding decides if 3 lies below
-  const RealModes modes = solve_real_modes_below(problem.M, problem.K, edge, 0);
+  const RealModes modes = solve_real_modes_below(problem.M, problem.K, edge, large);
   CHECK(modes.outcome.kind == OutcomeKind::converged);
   CHECK(modes.omega.size() == (3 < omega * omega ? 3u : 2u));
 }

@@ -1,4 +1,4 @@
-// Where theta and the step size make growth rates lie: the boundary from both sides, and the refusals that guard it.
+// Where theta and the step size make growth rates wrong: the boundary from both sides, and the refusals that guard it.
 #include "../support/oscillator_mode.hpp"
 #include "squeal/transient/growth.hpp"
 #include "squeal/transient/transient.hpp"
@@ -119,9 +119,9 @@ TEST_CASE("theta < 1/2 with C = beta K blows up beyond beta/(1 - 2 theta), or 2/
       const bool overdamped = beta * highest > 2;
       const double fastest = overdamped ? beta * w2 / 2 + std::sqrt(beta * beta * w2 * w2 / 4 - w2) : 0;
       const double limit = overdamped ? 2 / ((1 - 2 * theta) * fastest) : beta / (1 - 2 * theta);
-      CHECK(free_growth(structure, theta, .97 * limit) < 2e-6); // the slowest decays by 5e-6 a step
+      CHECK(free_growth(structure, theta, .97 * limit, {}) < 2e-6); // the slowest decays by 5e-6 a step
       CHECK(step_refusal(structure, nullptr, theta, .97 * limit, {}).empty());
-      CHECK(free_growth(structure, theta, 1.03 * limit) > 1e-4);
+      CHECK(free_growth(structure, theta, 1.03 * limit, {}) > 1e-4);
       const std::string reason = step_refusal(structure, nullptr, theta, 1.03 * limit, {});
       CHECK(reason.find("theta = 1/2 needs no damping") != std::string::npos);
     }

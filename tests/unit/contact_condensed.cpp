@@ -72,7 +72,7 @@ void check_condensed(const test::Rows& K, const test::Rows& B, int directions)
   const auto interface =
       test::make_interface(B, directions, std::vector<double>(pairs, 0.),
                            std::vector<double>(pairs * static_cast<std::size_t>(directions), 1.), .3, structure.K);
-  const auto condensed = condense(structure.K, interface, 2.5, {});
+  const auto condensed = condense(structure.K, interface, 2.5, {}, {});
   CHECK(condensed.size == static_cast<int>(B.size()));
   if (rank_of(PETSC_COMM_WORLD) == 0)
   {
@@ -138,10 +138,10 @@ TEST_CASE("a structure that nothing holds is refused, and the loose part is name
     if (!other_body) K[5][5] = K[6][6] = K[8][8] = 1;
     const auto structure = test::make_structure(K, K, K, std::vector<double>(9, 1.));
     const auto interface = test::make_interface(test::zeros(2, 9), 1, {0}, {1}, .3, structure.K);
-    const auto factored = factor_positive(structure.K, interface);
+    const auto factored = factor_positive(structure.K, interface, {});
     REQUIRE(factored.loose);
     CHECK((other_body ? *factored.loose >= 5 : *factored.loose == 7));
-    CHECK_THROWS_AS(condense(structure.K, interface, 1, {}), Error);
+    CHECK_THROWS_AS(condense(structure.K, interface, 1, {}, {}), Error);
   }
 }
 
@@ -149,7 +149,7 @@ TEST_CASE("a soft support is a support: twelve decades between springs still fac
 {
   test::Rows K = {{1e12, -1e12}, {-1e12, 1e12 + 1}};
   const auto structure = test::make_structure(K, K, K, {0, 0});
-  CHECK(factor_positive(structure.K, Interface{}).loose.has_value() == false);
+  CHECK(factor_positive(structure.K, Interface{}, {}).loose.has_value() == false);
 }
 
 namespace
@@ -183,10 +183,10 @@ test::Rows lattice_stiffness(std::size_t side, std::size_t width)
   return K;
 }
 
-constexpr std::array sparse_kinds = {Factor::Kind::supernodal, Factor::Kind::mumps};
+constexpr std::array sparse_kinds = {FactorKind::supernodal, FactorKind::mumps};
 
 /// The condensed operator and both halves of a solve with `columns` right-hand sides, by a sparse factor and the dense.
-void check_agreement(Factor::Kind kind, const test::Rows& K, std::size_t rows, std::size_t columns)
+void check_agreement(FactorKind kind, const test::Rows& K, std::size_t rows, std::size_t columns)
 {
   const std::size_t n = K.size();
   test::Rows B = test::zeros(rows, n);
@@ -194,7 +194,7 @@ void check_agreement(Factor::Kind kind, const test::Rows& K, std::size_t rows, s
   const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
   const auto interface =
       test::make_interface(B, 1, std::vector<double>(rows / 2, 0.), std::vector<double>(rows / 2, 1.), .3, structure.K);
-  Factor sparse(structure.K, interface.B, kind), dense(structure.K, interface.B, Factor::Kind::dense);
+  Factor sparse(structure.K, interface.B, {.kind = kind}), dense(structure.K, interface.B, {.kind = FactorKind::dense});
   CHECK(!sparse.failed());
   CHECK(!dense.failed());
   CHECK(largest_difference(sparse.condensed(2), dense.condensed(2)) < 1e-12);
@@ -243,7 +243,7 @@ void check_agreement(Factor::Kind kind, const test::Rows& K, std::size_t rows, s
 TEST_CASE("sparse and dense factors agree: the condensed operator, both halves of a solve, several columns at once")
 {
   const auto lattice = lattice_stiffness(6, 2);
-  for (const Factor::Kind kind : sparse_kinds)
+  for (const FactorKind kind : sparse_kinds)
   {
     check_agreement(kind, chain_stiffness(60), 6, 2);
     check_agreement(kind, lattice, 30, 1);
@@ -259,10 +259,10 @@ TEST_CASE("a factor is used again and again: later right-hand sides see nothing 
   test::Rows B = test::zeros(2, n);
   B[0][3] = B[1][150] = 1;
   const auto interface = test::make_interface(B, 1, {0}, {1}, .3, structure.K);
-  for (const Factor::Kind kind : sparse_kinds)
+  for (const FactorKind kind : sparse_kinds)
     for (Mat border : {Mat(nullptr), interface.B.get()})
     {
-      const Factor factor(structure.K, border, kind);
+      const Factor factor(structure.K, border, {.kind = kind});
       const auto x = zeros_like(structure.load), y = zeros_like(structure.load), twice = copy_of(structure.load);
       check(VecScale(twice, 2));
       solve(factor, structure.load, x);
@@ -283,7 +283,7 @@ TEST_CASE("a sparse factor says of a matrix with one negative eigenvalue that it
   auto K = lattice_stiffness(4, 2);
   K[77][77] = -1;
   const auto structure = test::make_structure(K, K, K, std::vector<double>(K.size(), 1.));
-  for (const Factor::Kind kind : sparse_kinds) CHECK(Factor(structure.K, nullptr, kind).failed());
+  for (const FactorKind kind : sparse_kinds) CHECK(Factor(structure.K, nullptr, {.kind = kind}).failed());
 }
 
 TEST_CASE("the memory foreseen for a factor holds its entries, and more with a border than without")
@@ -295,19 +295,20 @@ TEST_CASE("the memory foreseen for a factor holds its entries, and more with a b
   const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
   const auto interface =
       test::make_interface(B, 1, std::vector<double>(150, 0.), std::vector<double>(150, 1.), .3, structure.K);
-  const auto entries = [&](Factor::Kind kind) { return Factor(structure.K, interface.B, kind).entries(); };
-  const auto foreseen = [&] { return factor_memory(structure.K, interface.B); };
-  const double bordered = foreseen();
-  CHECK(bordered >= 8 * entries(Factor::Kind::automatic));
-  CHECK(bordered > factor_memory(structure.K, nullptr));
-  CHECK(entries(Factor::Kind::automatic) == entries(Factor::Kind::supernodal));
+  const auto entries = [&](const FactorOptions& options)
+  { return Factor(structure.K, interface.B, options).entries(); };
+  const auto foreseen = [&](const FactorOptions& options) { return factor_memory(structure.K, interface.B, options); };
+  const FactorOptions automatic, supernodal{.kind = FactorKind::supernodal}, mumps{.kind = FactorKind::mumps};
+  const double bordered = foreseen(automatic);
+  CHECK(bordered >= 8 * entries(automatic));
+  CHECK(bordered > factor_memory(structure.K, nullptr, automatic));
+  CHECK(entries(automatic) == entries(supernodal));
 
-  const test::Option small("-factor_limit", "0"); // several ranks share it then
-  const double shared = foreseen();
+  const FactorOptions small{.limit = 0}; // several ranks share it then
   const bool several = ranks_of(PETSC_COMM_WORLD) > 1;
-  CHECK(entries(Factor::Kind::automatic) == entries(several ? Factor::Kind::mumps : Factor::Kind::supernodal));
-  CHECK(shared >= 8 * entries(Factor::Kind::automatic));
-  const test::Option named("-factor", "supernodal"); // whatever the limit
-  CHECK(foreseen() == bordered);
-  CHECK(entries(Factor::Kind::automatic) == entries(Factor::Kind::supernodal));
+  CHECK(entries(small) == entries(several ? mumps : supernodal));
+  CHECK(foreseen(small) >= 8 * entries(small));
+  const FactorOptions named{.kind = FactorKind::supernodal, .limit = 0}; // whatever the limit
+  CHECK(foreseen(named) == bordered);
+  CHECK(entries(named) == entries(automatic));
 }

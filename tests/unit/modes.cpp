@@ -106,8 +106,8 @@ TEST_CASE("the equations of the structure hold with the reactions of each mode, 
   for (const ComplexMode& mode : modes.modes)
   {
     Owned<Vec> real = zeros_like(mode.real), imaginary = zeros_like(mode.real);
-    quadratic_residual(model.structure.M, C, model.structure.K, mode.lambda, mode.real, mode.imaginary, real,
-                       imaginary);
+    quadratic_residual({model.structure.M, C, model.structure.K}, mode.lambda, {mode.real, mode.imaginary},
+                       {real, imaginary});
     std::vector<double> r, s;
     for (const Complex rho : mode.reactions)
     {

@@ -16,24 +16,40 @@
 namespace squeal
 {
 
+enum class FactorKind
+{
+  automatic,  // dense if A is small or full; else supernodal, or mumps where FactorOptions::limit says so
+  supernodal, // L L' by supernodes in METIS's ordering, on rank 0; the fastest
+  mumps,      // MUMPS in the same ordering, spread over all ranks
+  dense,      // on rank 0
+};
+
+inline constexpr std::array factor_kind_words = {"automatic", "supernodal", "mumps", "dense"};
+
+inline Words words_of(FactorKind)
+{
+  return factor_kind_words;
+}
+
+/// Of every stage that factors a symmetric positive definite matrix.
+struct FactorOptions
+{
+  FactorKind kind = FactorKind::automatic;
+  double limit = 0.3; // [GB] of a supernodal factor; beyond it several ranks share MUMPS's
+};
+
+OptionList options_of(FactorOptions& options);
+
 class Factor
 {
 public:
-  enum class Kind
-  {
-    automatic,  // dense if A is small or full; else supernodal, or mumps where FactorOptions::limit says so
-    supernodal, // L L' by supernodes in METIS's ordering, on rank 0; the fastest
-    mumps,      // MUMPS in the same ordering, spread over all ranks
-    dense,      // on rank 0
-  };
-
   Factor();
   Factor(Factor&&) noexcept;
   Factor& operator=(Factor&&) noexcept;
   ~Factor();
 
-  /// Collective. `B` may be null, for no border. The kind `automatic` is the one that FactorOptions name.
-  Factor(Mat A, Mat B, Kind kind);
+  /// Collective. `B` may be null, for no border.
+  Factor(Mat A, Mat B, const FactorOptions& options);
 
   /// Whether a pivot was zero or negative: A is not positive definite, and the factor is not to be used.
   bool failed() const;
@@ -57,24 +73,8 @@ private:
   std::unique_ptr<Parts> parts_;
 };
 
-inline constexpr std::array factor_kind_words = {"automatic", "supernodal", "mumps", "dense"};
-
-inline Words words_of(Factor::Kind)
-{
-  return factor_kind_words;
-}
-
-struct FactorOptions
-{
-  Factor::Kind kind = Factor::Kind::automatic;
-  double limit = 0.3; // [GB] of a supernodal factor; beyond it several ranks share MUMPS's
-};
-
-OptionList options_of(FactorOptions& options);
-
-/// The largest memory that an automatic Factor of A and B takes, without its Schur complement [bytes]. B may be null.
-/// Collective.
-double factor_memory(Mat A, Mat B);
+/// The largest memory that a Factor of A and B takes, without its Schur complement [bytes]. B may be null. Collective.
+double factor_memory(Mat A, Mat B, const FactorOptions& options);
 
 /// x = A^-1 b.
 void solve(const Factor& factor, Vec b, Vec x);

@@ -15,11 +15,18 @@ enum class Symmetry
   symmetric, // L D L', which counts eigenvalues
 };
 
+struct PencilOptions
+{
+  PetscInt room = 30; // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
+};
+
+OptionList options_of(PencilOptions& options);
+
 /// The order of elimination is found once and serves every shift. Borrows K and M.
 class PencilFactor
 {
 public:
-  PencilFactor(Mat K, Mat M, Symmetry symmetry);
+  PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options);
   ~PencilFactor();
 
   /// Returns false if the shift is an eigenvalue. Throws LibraryError if memory runs out.
@@ -35,12 +42,5 @@ private:
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };
-
-struct PencilOptions
-{
-  PetscInt room = 30; // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
-};
-
-OptionList options_of(PencilOptions& options);
 
 } // namespace squeal

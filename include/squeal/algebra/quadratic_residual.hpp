@@ -7,7 +7,20 @@
 namespace squeal
 {
 
-/// real + i imaginary = (lambda^2 M + lambda C + K) (y_r + i y_i)
-void quadratic_residual(Mat M, Mat C, Mat K, std::complex<double> lambda, Vec y_r, Vec y_i, Vec real, Vec imaginary);
+/// Borrowed.
+struct QuadraticMatrices
+{
+  Mat M, C, K;
+};
+
+/// Borrowed; the two parts of a complex vector.
+struct ComplexVector
+{
+  Vec real, imaginary;
+};
+
+/// residual = (lambda^2 M + lambda C + K) y
+void quadratic_residual(const QuadraticMatrices& A, std::complex<double> lambda, ComplexVector y,
+                        ComplexVector residual);
 
 } // namespace squeal

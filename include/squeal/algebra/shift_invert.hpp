@@ -19,7 +19,7 @@ struct ShiftInvert
   std::unique_ptr<PencilFactor> factor{}; // of K - shift M
 };
 
-ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry);
+ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options);
 
 /// Factors K - shift M, or with a slightly lower shift where this one is an eigenvalue. Throws LibraryError if memory
 /// runs out.

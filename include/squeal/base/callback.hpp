@@ -8,7 +8,7 @@
 namespace squeal
 {
 
-/// Runs `work`. An exception is kept in `failure`, and the library is told that its callback failed.
+/// Runs `work`. An exception is kept in `failure`, and the library gets an error code.
 template <class Work> PetscErrorCode guarded(std::exception_ptr& failure, Work work)
 {
   try

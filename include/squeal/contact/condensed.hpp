@@ -18,7 +18,8 @@ struct CondensedOperator
 
 /// Factors A (symmetric) and forms W. Collective.
 /// Error: A singular, naming (`describe`) the offending degree of freedom.
-CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names);
+CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names,
+                           const FactorOptions& options);
 
 /// A symmetric matrix A, bordered by the interface's B, and whether it is positive definite.
 struct Factored
@@ -30,6 +31,6 @@ struct Factored
   double resistance = 0;   // x'A x / x' diag(A) x, the least that inverse iteration found
 };
 
-Factored factor_positive(Mat A, const Interface& interface);
+Factored factor_positive(Mat A, const Interface& interface, const FactorOptions& options);
 
 } // namespace squeal

@@ -5,6 +5,7 @@
 /// modes included.
 #include "squeal/shooting/flow.hpp"
 #include "squeal/transient/step_tangent.hpp"
+#include "squeal/transient/transient.hpp"
 
 namespace squeal
 {

@@ -13,11 +13,26 @@
 /// Caveat: at large mu an equilibrium may not exist, or not be the only one. It is the only one if the symmetric part
 /// of D_nn + mu D_nt e is positive definite, which is checked where K alone is regular; whether it is stable, modes
 /// say.
-#include "squeal/base/options.hpp"
+#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/equilibrium/state.hpp"
 
 namespace squeal
 {
+
+/// Whether the equilibrium is the only one (src/README.md, section 2.7).
+enum class Uniqueness
+{
+  not_checked, // contact alone holds a body
+  assured,
+  not_assured,
+};
+
+inline constexpr std::array uniqueness_words = {"not checked", "assured", "not assured"};
+
+inline Words words_of(Uniqueness)
+{
+  return uniqueness_words;
+}
 
 /// outcome: "converged", "no equilibrium" (the status sets cycle, or no set balances the load: mu is too large),
 /// "not converged". u and the reactions are zero without an equilibrium.
@@ -34,7 +49,7 @@ struct Equilibrium
   int check_iterations = 0;       // of an independent run of the fixed point; 0: not run
   double check_difference = 0;    // of its reactions, over the largest; NaN if it did not converge
   double auxiliary_stiffness = 0; // kappa [N/m]; 0: K holds the structure by itself
-  std::string uniqueness;         // "assured", "not assured", "not checked"
+  Uniqueness uniqueness = Uniqueness::not_checked;
 };
 
 struct EquilibriumOptions
@@ -42,6 +57,7 @@ struct EquilibriumOptions
   PetscInt max_iterations = 100;
   PetscInt check_max_iterations = -1; // of the fixed point; -1: 20000 up to 600 pairs, else none
   double check_rho = 1.5;             // of the fixed point, over 1/lambda_max(D_nn)
+  FactorOptions factor{};             // listed by itself
 };
 
 OptionList options_of(EquilibriumOptions& options);

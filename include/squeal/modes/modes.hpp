@@ -3,6 +3,7 @@
 ///     (lambda^2 Y'M Z + lambda Y'(C + C_f) Z + Y'K Z) phi = 0,   u(t) ~ phi exp(lambda t),   Re(lambda) > 0:
 ///     squeal may start.
 /// Z keeps closed pairs closed, Y removes their normal reactions; all three matrices are unsymmetric.
+#include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include <complex>
@@ -83,6 +84,7 @@ struct ModesOptions
   PetscInt dense_limit = 400; // up to this size eigenproblems are solved whole by LAPACK
   ModesSolver solver = ModesSolver::slices;
   PetscInt candidates = 20; // pairs that each residual pass of the projection corrects
+  PencilOptions pencil{};   // listed by itself
 };
 
 OptionList options_of(ModesOptions& options);

@@ -32,6 +32,7 @@ struct ProjectionSettings
   double band = 0;    // [Hz]
   int passes = 0;     // of residual correction
   int candidates = 0; // pairs corrected in each pass
+  PencilOptions pencil{};
 };
 
 /// Solves on the first real modes, corrected by static responses of the symmetric stiffness without friction (Brizard,

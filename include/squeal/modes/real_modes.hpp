@@ -23,7 +23,7 @@ struct RealCount
   std::map<double, int> below; // the counts so far
 };
 
-RealCount make_real_count(Mat M, Mat K, int dense_limit);
+RealCount make_real_count(Mat M, Mat K, const ModesOptions& options);
 
 /// The number of eigenvalues below omega [rad/s].
 int count_below(RealCount& count, double omega);
@@ -33,9 +33,9 @@ int count_below(RealCount& count, double omega);
 std::vector<double> omegas_between(RealCount& count, double least, double top);
 
 /// The lowest `count` modes, or all if there are fewer. Shapes are x, in the rows of K.
-RealModes solve_real_modes(Mat M, Mat K, int count, int dense_limit);
+RealModes solve_real_modes(Mat M, Mat K, int count, const ModesOptions& options);
 
 /// All modes with frequency below `band` [Hz]. Shapes are x, in the rows of K.
-RealModes solve_real_modes_below(Mat M, Mat K, double band, int dense_limit);
+RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options);
 
 } // namespace squeal

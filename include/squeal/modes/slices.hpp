@@ -38,6 +38,7 @@ struct CountedSolution
 };
 
 /// All pairs below the band [Hz] and, for the count, a little beyond. `real` gives the slices and the expected count.
-CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real, double band);
+CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real, double band,
+                                const PencilOptions& options);
 
 } // namespace squeal

@@ -21,13 +21,9 @@
 /// Everything reduced is dense, small, and the same on every rank.
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/contact/pair_law.hpp"
-#include "squeal/contact/solver.hpp"
 #include "squeal/modes/modes.hpp"
-#include "squeal/transient/step_record.hpp"
 
 #include <Eigen/Dense>
-#include <functional>
-#include <span>
 
 namespace squeal
 {
@@ -65,6 +61,7 @@ struct Reduction
   double threshold = 1e-5; // an attachment shape is dropped when less than this part of it is new
   bool sliding = false;    // the active pairs slide along the drive throughout
   const RealModes* real = nullptr; // frictionless ones; those above the complex modes are taken, too. Null: none
+  FactorOptions factor{};
 };
 
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
@@ -95,86 +92,5 @@ ReducedState coordinates(const ReducedModel& model, const Structure& structure, 
 
 /// target += factor shapes q
 void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd& q, Vec target);
-
-/// The active pairs at the end of a step, and what the next one starts from.
-struct ReducedContact
-{
-  Eigen::VectorXd r;                       // [N] a contact vector, as all vectors here
-  Eigen::VectorXd Wr{};                    // W r; empty: not known
-  Eigen::VectorXd w{};                     // [m/s] W r + b
-  Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
-  int unread = 0;                          // steps since W was read in double precision
-  std::vector<double> past{};              // [m/s] w_t - s+, as sliding_direction.hpp says
-  /// W_nn + mu W_nt d, d the direction of each pair's friction when W was read: normal rates by normal reactions.
-  Eigen::MatrixXf normal_responses{};
-};
-
-/// The period map of the reduced model by theta steps (src/README.md, section 4), whose matrices are formed
-/// once per step size:  (v, q) -> v_free,  r -> v+ - v_free,  W r.
-struct ReducedMap
-{
-  const ReducedModel& model;
-  int steps = 0;
-  double theta = 0.5;
-  double h = 0;                 // [s] of the matrices below
-  Eigen::MatrixXd from_state{}; // v_free = from_state (v, q) + from_equilibrium
-  Eigen::VectorXd from_equilibrium{};
-  Eigen::MatrixXd from_reactions{};  // h A^-1 H
-  Eigen::MatrixXd W{};               // G h A^-1 H
-  Eigen::MatrixXf W_single{}, W_n{}; // the same for changes; its normal rows
-  Eigen::MatrixXd G_n{};             // normal rows of G
-  std::vector<PairBlock> own{};      // the symmetric part of each pair's own block of W
-  Eigen::VectorXd reactions{};       // [N] every period's warm start
-  ContactSettings contact{};
-  long unconverged = 0;
-};
-
-/// The matrices of the period's step size, unless they are those already.
-void prepare(ReducedMap& map, double period);
-
-/// The reactions after a step whose contact velocities are b without them; `contact` is of the step before. Residual:
-/// the natural map over the largest reaction. Returns whether it converged.
-bool solve_contact(const ReducedMap& map, const Eigen::VectorXd& b, ReducedContact& contact);
-
-/// One step. Returns whether contact converged.
-bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact);
-
-/// N steps of the period; `watch` after each.
-ReducedState integrate(ReducedMap& map, double period, ReducedState state,
-                       const std::function<void(const ReducedState&)>& watch);
-
-/// A period's end and dPhi/dT there.
-struct Passage
-{
-  ReducedState end, rate;
-};
-
-Passage pass(ReducedMap& map, double period, ReducedState state);
-
-/// The contact of the active pairs in one step, on which the step's tangent is a linear map (src/README.md, 4.13).
-struct RecordedContact
-{
-  Eigen::VectorXd r, w;            // [N, m/s] contact vectors: reactions, contact velocity
-  std::vector<char> opposes_theta; // by pairs
-};
-
-/// The contact of each step of a period.
-std::vector<RecordedContact> record_contacts(ReducedMap& map, double period, ReducedState state);
-
-/// The same of the full model's recorded steps, as the reduced model sees them.
-std::vector<RecordedContact> recorded_contacts(const ReducedModel& model, int directions,
-                                               std::span<const StepRecord> records);
-
-/// Columns of changes of the start, (q, v), to those of the period's end: the product of the steps' own tangents on the
-/// recorded contact. Collective: each rank does its share of the columns.
-Eigen::MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
-                              const Eigen::MatrixXd& columns, MPI_Comm comm);
-
-/// Columns x to (dPhi/dx)'x.
-Eigen::MatrixXd apply_adjoint(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
-                              const Eigen::MatrixXd& columns, MPI_Comm comm);
-
-/// The derivative of a period's end (q, v) in the coordinates q and v of the slow shapes.
-Eigen::MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedContact> contacts, MPI_Comm comm);
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #pragma once
-/// When theta and the step size h would tell a lie (src/README.md, section 4). In sliding an eigenvalue lambda is
-/// marched as
+/// When theta and the step size h would show a wrong growth (src/README.md, section 4). In sliding an eigenvalue lambda
+/// is marched as
 ///     lambda_h = ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h,   Re(lambda_h) = 0 where
 ///     2 Re(lambda) = (2 theta - 1) h |lambda|^2:
 /// - theta > 1/2 with fewer than 2 pi (theta - 1/2) |lambda|^2/(omega sigma) steps a period: what grows looks stable;
@@ -20,7 +20,7 @@ std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double the
 
 /// Growth of the energy norm in one step of the structure free of load and contact, asymptotically: the logarithm,
 /// per step, by 300 steps from a state that excites every mode. Collective; factors A anew.
-double free_growth(const Structure& structure, double theta, double h);
+double free_growth(const Structure& structure, double theta, double h, const FactorOptions& options);
 
 /// Why a run with this theta and h is refused, in a sentence with the remedy; empty if it is not. `mode`: the followed
 /// one, or null.

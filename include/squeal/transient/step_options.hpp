@@ -1,5 +1,6 @@
 #pragma once
 /// Which variant of the theta step is marched (src/README.md, section 4), of the transient and of the cycle.
+#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/contact/solver.hpp"
 
 namespace squeal
@@ -39,7 +40,8 @@ struct StepOptions
   ContactLaw law = ContactLaw::displacement;
   Opposed opposed = Opposed::theta;
   ContactSettings contact{};
-  bool refuse = true; // what step_guards.hpp refuses
+  bool refuse = true;     // what step_guards.hpp refuses
+  FactorOptions factor{}; // listed by itself
 };
 
 OptionList options_of(StepOptions& options);

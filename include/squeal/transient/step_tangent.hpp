@@ -5,7 +5,7 @@
 /// iterations. Columns share each reading of the factor, of M, K and of W.
 ///
 /// Caveat: the step is piecewise smooth. The tangent does not see a change of the start that changes a status.
-#include "squeal/transient/transient.hpp"
+#include "squeal/transient/theta_step.hpp"
 
 namespace squeal
 {

@@ -1,91 +1,13 @@
 #pragma once
-/// Exact-contact transient by the modified theta-method (src/README.md, section 4):
-///     A v+ = [M - h(1-theta) C - h^2 theta(1-theta) K] v - h K u + h F + h B'r+,   A = M + h theta C + h^2 theta^2 K,
-///     0 <= gap + B_n ut + h B_n v+  _|_  r_n+ >= 0,   ut = u + h(1-theta) v,   r_t+ in the Coulomb disc.
-/// Reactions are implicit, an impulse h r+ of the whole step; theta = 1/2 adds no damping of its own.
-///
-/// Friction opposes s_theta = theta s+ + (1-theta) s, the velocity that its work is done with: a step is then of second
-/// order in sliding where friction turns, too, and friction never gives energy. Where that would stop a pair or turn
-/// it back it opposes s+ instead, since s_theta = 0 is not rest. (The paper's s+ everywhere is of first order where
-/// friction turns.)
-#include "squeal/algebra/paired_matrices.hpp"
-#include "squeal/contact/condensed.hpp"
-#include "squeal/contact/solver.hpp"
+/// The transient: theta steps from a start state, and what is recorded of them (src/README.md, section 4).
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/step_guards.hpp"
-#include "squeal/transient/step_options.hpp"
-#include "squeal/transient/step_record.hpp"
+#include "squeal/transient/theta_step.hpp"
 
 #include <functional>
-#include <span>
 
 namespace squeal
 {
-
-/// Everything that depends on h: factored A and W = h B A^-1 B', so that contact solves w = W r + b for r in N.
-/// Built once per h.
-struct ThetaStep
-{
-  double h = 0, theta = 0.5;              // [s], [-]
-  std::optional<PairedMatrices> matrices; // M and K; not on several ranks
-  Factor factor;                          // of A bordered by B
-  ContactOperator W;                      // on rank 0
-  ContactLaw law = ContactLaw::displacement;
-  Opposed opposed = Opposed::theta;
-  ContactSettings contact;
-  double factor_seconds = 0, condensed_seconds = 0; // to factor A with the corner that W is, to prepare W
-};
-
-/// A
-Owned<Mat> step_matrix(const Structure& structure, double h, double theta);
-
-/// Error: h not above 0, theta not in (0, 1].
-ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta,
-                          const StepOptions& options);
-
-/// M v_k and K u_k of (v, u) into a pair of spans, each matrix read once.
-void multiply_mass_and_stiffness(const ThetaStep& step, const Structure& structure,
-                                 const std::array<std::span<const Vec>, 2>& of,
-                                 const std::array<std::span<const Vec>, 2>& to);
-
-/// The products of a state that a step starts from and leaves behind for the next one (two multiplications and one
-/// solve a step), and its work vectors. Belongs to one state and one ThetaStep.
-struct StepWork
-{
-  Owned<Vec> Mv, Av, Ku;                // of the state at hand
-  Owned<Vec> Mv_next, Av_next, Ku_next; // of the one being computed
-  Owned<Vec> v_next, v_theta, dv, f;    // f: h B'r
-  ContactMemory memory;                 // of the reactions, on rank 0
-  double energy = 0;                    // [J]
-  StepRecord* record = nullptr;         // of the next step, borrowed; null: none is wanted
-};
-
-/// Must be called again after the state was changed by anything but `advance`.
-StepWork begin_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state);
-
-/// What one step tells: the terms of the energy identity
-///     E+ - E = (1/2 - theta)(dv'M dv + du'K du) - damping_work + contact_work + load_work   (+ defect),
-/// and the contact.
-struct StepReport
-{
-  double energy = 0;                 // [J] v'Mv/2 + u'Ku/2 at the end
-  double damping_work = 0;           // [J] h v_theta' C v_theta, >= 0
-  double contact_work = 0;           // [J] v_theta' B'(impulses)
-  double load_work = 0;              // [J] h v_theta' F
-  double energy_defect = 0;          // [J] of the energy identity
-  int open = 0, stick = 0, slip = 0; // pairs
-  int contact_iterations = 0;
-  double contact_residual = 0; // natural map, relative
-  bool contact_converged = true;
-};
-
-/// One step in place of several trajectories: each reading of the factor and of W serves them all.
-std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                                std::span<StepWork> works, std::span<State> states);
-
-/// Of one.
-StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
-                   State& state);
 
 /// Called after every step.
 using Monitor = std::function<void(const State&, const StepReport&, const StepWork&)>;
@@ -125,8 +47,9 @@ struct Recorder
 MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, long steps, State& state,
                    const Recorder& recorder);
 
-/// outcome: "completed", "refused" (step_guards.hpp: theta and h would tell a lie), "not converged" (contact, or an
-/// energy that is no longer finite). residual: the largest contact residual; iterations: contact iterations in all.
+/// outcome: "completed", "refused" (step_guards.hpp: theta and h would show a wrong growth), "not converged" (contact,
+/// or an energy that is no longer finite). residual: the largest contact residual; iterations: contact iterations in
+/// all.
 struct Trajectory
 {
   Outcome outcome;

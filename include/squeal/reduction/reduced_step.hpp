@@ -1,0 +1,62 @@
+#pragma once
+/// The modified theta-method on the reduced model (src/README.md, section 7.4), in few dense products.
+#include "squeal/contact/solver.hpp"
+#include "squeal/reduction/reduced_model.hpp"
+
+#include <functional>
+
+namespace squeal
+{
+
+/// The active pairs at the end of a step, and what the next one starts from.
+struct ReducedContact
+{
+  Eigen::VectorXd r;                       // [N] a contact vector, as all vectors here
+  Eigen::VectorXd Wr{};                    // W r; empty: not known
+  Eigen::VectorXd w{};                     // [m/s] W r + b
+  Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
+  int unread = 0;                          // steps since W was read in double precision
+  std::vector<double> past{};              // [m/s] w_t - s+, as sliding_direction.hpp says
+  /// W_nn + mu W_nt d, d the direction of each pair's friction when W was read: normal rates by normal reactions.
+  Eigen::MatrixXf normal_responses{};
+};
+
+/// The period map of the reduced model by theta steps (src/README.md, section 4), whose matrices are formed
+/// once per step size:  (v, q) -> v_free,  r -> v+ - v_free,  W r.
+struct ReducedMap
+{
+  const ReducedModel& model;
+  int steps = 0;
+  double theta = 0.5;
+  double h = 0;                 // [s] of the matrices below
+  Eigen::MatrixXd from_state{}; // v_free = from_state (v, q) + from_equilibrium
+  Eigen::VectorXd from_equilibrium{};
+  Eigen::MatrixXd from_reactions{};  // h A^-1 H
+  Eigen::MatrixXd W{};               // G h A^-1 H
+  Eigen::MatrixXf W_single{}, W_n{}; // the same for changes; its normal rows
+  Eigen::MatrixXd G_n{};             // normal rows of G
+  std::vector<PairBlock> own{};      // the symmetric part of each pair's own block of W
+  Eigen::VectorXd reactions{};       // [N] every period's warm start
+  ContactSettings contact{};
+  long unconverged = 0;
+};
+
+/// The matrices of the period's step size, unless they are those already.
+void prepare(ReducedMap& map, double period);
+
+/// One step. Returns whether contact converged.
+bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact);
+
+/// N steps of the period; `watch` after each.
+ReducedState integrate(ReducedMap& map, double period, ReducedState state,
+                       const std::function<void(const ReducedState&)>& watch);
+
+/// The state at the end of a period, and dPhi/dT there.
+struct PeriodEnd
+{
+  ReducedState end, rate;
+};
+
+PeriodEnd end_of_period(ReducedMap& map, double period, ReducedState state);
+
+} // namespace squeal

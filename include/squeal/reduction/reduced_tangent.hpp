@@ -1,0 +1,37 @@
+#pragma once
+/// The derivative of the reduced period map (src/README.md, sections 4.13 and 7.5).
+#include "squeal/reduction/reduced_step.hpp"
+#include "squeal/transient/step_record.hpp"
+
+#include <span>
+
+namespace squeal
+{
+
+/// The contact of the active pairs in one step, on which the step's tangent is a linear map (src/README.md, 4.13).
+struct RecordedContact
+{
+  Eigen::VectorXd r, w;            // [N, m/s] contact vectors: reactions, contact velocity
+  std::vector<char> opposes_theta; // by pairs
+};
+
+/// The contact of each step of a period.
+std::vector<RecordedContact> record_contacts(ReducedMap& map, double period, ReducedState state);
+
+/// The same of the full model's recorded steps, as the reduced model sees them.
+std::vector<RecordedContact> recorded_contacts(const ReducedModel& model, int directions,
+                                               std::span<const StepRecord> records);
+
+/// Columns of changes of the start, (q, v), to those of the period's end: the product of the steps' own tangents on the
+/// recorded contact. Collective: each rank does its share of the columns.
+Eigen::MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+                              const Eigen::MatrixXd& columns, MPI_Comm comm);
+
+/// Columns x to (dPhi/dx)'x.
+Eigen::MatrixXd apply_adjoint(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+                              const Eigen::MatrixXd& columns, MPI_Comm comm);
+
+/// The derivative of a period's end (q, v) in the coordinates q and v of the slow shapes.
+Eigen::MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedContact> contacts, MPI_Comm comm);
+
+} // namespace squeal

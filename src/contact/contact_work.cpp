@@ -1,0 +1,53 @@
+#include "contact_work.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+double ContactWork::force_scale(std::size_t pair, double largest) const
+{
+  const NaturalScale& rho = W.scale(pair);
+  const double own = speed * std::min(rho.normal, rho.tangential);
+  return own == 0 ? largest : largest == 0 ? own : std::min(own, largest);
+}
+
+double largest_reaction(const std::vector<double>& r)
+{
+  double largest = 0;
+  for (const double value : r) largest = std::max(largest, std::abs(value));
+  return largest;
+}
+
+double residual_of(const ContactWork& work)
+{
+  const double largest = largest_reaction(work.r);
+  double residual = 0;
+  for (std::size_t pair = 0; pair < work.W.pairs(); ++pair)
+  {
+    if (!work.takes_part(pair)) continue;
+    const PairVector w = work.velocity(pair);
+    const double defect = natural_map(work.reaction(pair), w, work.friction, work.W.scale(pair));
+    if (!std::isfinite(defect + w[0] + w[1] + w[2])) return std::numeric_limits<double>::infinity();
+    if (defect > 0) residual = std::max(residual, defect / work.force_scale(pair, largest));
+  }
+  return residual;
+}
+
+void form_products(std::span<ContactWork* const> works)
+{
+  if (works.empty()) return;
+  std::vector<std::span<const double>> r;
+  std::vector<std::span<double>> Wr;
+  for (ContactWork* work : works)
+  {
+    work->Wr.resize(work->r.size());
+    r.emplace_back(work->r);
+    Wr.emplace_back(work->Wr);
+    ++work->reads;
+  }
+  works.front()->W.multiply(r, Wr);
+}
+
+} // namespace squeal
