@@ -16,10 +16,11 @@ sys.path.insert(0, str(ROOT / "tools"))  # where chart finds its own
 loader = importlib.machinery.SourceFileLoader("chart", str(ROOT / "tools" / "chart"))
 chart = importlib.util.module_from_spec(importlib.util.spec_from_loader("chart", loader))
 loader.exec_module(chart)
+import chart_points  # noqa: E402
 
 
 def point(seconds, error):
-    return chart.Point(seconds, {chart.PERIOD: 1 + error})
+    return chart_points.Point(seconds, {chart_points.PERIOD: 1 + error})
 
 
 def test_period_and_energy_of_a_sampled_motion(tmp_path):
@@ -40,18 +41,18 @@ def test_period_and_energy_of_a_sampled_motion(tmp_path):
         def report(_):
             return {"processor_seconds": {"transient": 8.0}}
 
-    points = chart.direct_points(Runs, "direct_1", 1.01 * period)
+    points = chart_points.direct_points(Runs, "direct_1", 1.01 * period)
     assert points[-1].seconds == 8 and points[0].seconds < 2.1
-    assert points[-1].value[chart.PERIOD] == pytest.approx(period, rel=1e-6)
-    assert points[-1].value[chart.ENERGY] == pytest.approx(3, rel=1e-5)
-    assert points[0].value[chart.ENERGY] > 3.01  # the start still rings
+    assert points[-1].value[chart_points.PERIOD] == pytest.approx(period, rel=1e-6)
+    assert points[-1].value[chart_points.ENERGY] == pytest.approx(3, rel=1e-5)
+    assert points[0].value[chart_points.ENERGY] > 3.01  # the start still rings
 
 
 def test_front_takes_the_cheapest_and_no_lucky_crossing():
     judge = point(0, 0)
-    lucky = chart.Line("lucky", [point(1, 1e-6), point(2, 1e-2), point(4, 1e-3)], "b", "o")
-    dear = chart.Line("dear", [point(3, 5e-3), point(8, 1e-4)], "r", "o")
-    corners = chart.front([lucky, dear], judge, chart.PERIOD, "seconds")
+    lucky = chart_points.Line("lucky", [point(1, 1e-6), point(2, 1e-2), point(4, 1e-3)], "b", "o")
+    dear = chart_points.Line("dear", [point(3, 5e-3), point(8, 1e-4)], "r", "o")
+    corners = chart_points.front([lucky, dear], judge, chart_points.PERIOD, "seconds")
     assert [(corner[0], corner[2].label) for corner in corners] == [(1, "lucky"), (3, "dear"), (4, "lucky"), (8, "dear")]
     assert [corner[1] for corner in corners] == pytest.approx([1e-2, 5e-3, 1e-3, 1e-4])
     assert chart.choice(corners, 2e-3, 1e-5).startswith("lucky: 4 s")

@@ -1,0 +1,109 @@
+"""Pictures of tools/atlas: where shooting leads."""
+
+import re
+
+import common
+
+common.needs("matplotlib", "numpy")
+import numpy as np
+from atlas_runs import OSCILLATOR, PIN, plt, run, runs, save
+from common import BLUE, GREEN, GREY, ORANGE, RED
+
+
+def cycle_look(entry, period, energy):
+    """Marker, colour and label of a cycle's outcome; `period`, `energy`: of the cycle on which direct integration settles."""
+    word = entry["outcome"]
+    if word == "converged":
+        heard = abs(entry["period"] / period - 1) < 3e-3 and abs(entry["mean_energy"] / energy - 1) < 0.03
+        return ("o", BLUE, "the cycle of direct integration") if heard else ("s", ORANGE, "another cycle that attracts")
+    return {"unstable cycle": ("D", "black", "unstable cycle"),
+            "collapsed to equilibrium": ("x", GREY, "collapsed to equilibrium"),
+            "not periodic": ("v", GREEN, "not periodic")
+            }.get(word, ("^", RED, "not converged"))
+
+
+def draw_basin(axes, points, heard):
+    for x, y, entry in points:
+        marker, colour, label = cycle_look(entry, *heard)
+        old = axes.get_legend_handles_labels()[1]
+        axes.plot(x, y, marker, color=colour, ms=7, label=None if label in old else label)
+
+
+def basin_map(results):
+    """Where shooting leads, over start amplitude, phase and period (oscillator) and free periods (pin on a disc)."""
+    amplitudes = [0.05, 0.1, 0.2, 0.35, 0.6, 1, 1.7, 3, 5, 9, 14, 20]
+    fixed = dict(transient__enabled="false", cycle__steps_per_period=100, cycle__tolerance=1e-6)
+    phases, periods = [0, 45, 90, 135, 180, 225, 270, 315], [0.6, 0.75, 0.85, 0.95, 1, 1.05, 1.15, 1.3, 1.6]
+    free = [0, 5, 10, 20]
+    small = dict(mesh__parameters__divisions=3, modes__method="full", modes__band=6000)
+    jobs = [(OSCILLATOR, ["-cycle_start_amplitude", a, "-cycle_start_phase", p], fixed) for p in phases for a in amplitudes]
+    jobs += [(OSCILLATOR, ["-cycle_start_amplitude", a, "-cycle_start_period", p], fixed) for p in periods for a in amplitudes]
+    jobs += [(PIN, ["-cycle_start_amplitude", a], dict(small, cycle__free_periods=n)) for n in free for a in amplitudes]
+    done = [r["cycle"] for r in runs(results, jobs)]
+    count = len(amplitudes)
+    parts = [done[: count * len(phases)], done[count * len(phases) : -count * len(free)], done[-count * len(free) :]]
+    long = run(results, PIN, cycle__enabled="false", transient__enabled="true", transient__periods=150,
+               transient__steps_per_period=100, **small)
+    settled = long.history("energy")[-5000:].mean()
+    pin = min((entry for entry in parts[2] if entry["outcome"] == "converged"),
+              key=lambda entry: abs(entry["mean_energy"] - settled))
+    heard = [(5.954461004653, 1.77650678461)] * 2 + [(pin["period"], settled)]
+    figure, rows = plt.subplots(1, 3, figsize=(13, 4.6))
+    for axes, entries, values, known, title, label in zip(
+            rows, parts, (phases, periods, free), heard,
+            ("Oscillator: phase of the start", "Oscillator: period at the start", "Pin on a disc: free periods"),
+            ("degrees from the estimate's", "of the mode's", "periods integrated before Newton")):
+        pairs = [(a, value) for value in values for a in amplitudes]
+        draw_basin(axes, [(a, value, entry) for (a, value), entry in zip(pairs, entries)], known)
+        axes.set(xscale="log", xlabel="start amplitude over the estimate's", ylabel=label, title=title)
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.42 * (high - low))
+        axes.legend(loc="upper left", fontsize=8)
+    save(results, "basin_map", figure)
+
+
+def two_oscillators(folder, slower):
+    """inputs/oscillator beside its own copy, `slower` times as slow: two unstable modes without a common period."""
+    text = OSCILLATOR.read_text()
+    one = text[text.index("[[point]]") : text.index("[friction]")]
+    scaled = {"mass": slower**2, "damping": slower}
+    two = re.sub(r"(mass|damping) = ([\d.]+)", lambda m: f"{m[1]} = {float(m[2]) * scaled[m[1]]!r}", one)
+    two = two.replace('"pad"', '"slow_pad"').replace('"disc"', '"slow_disc"')
+    two = two.replace("velocity = [0.6, 0, 0]", f"velocity = [{0.6 / slower!r}, 0, 0]")
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "scene.toml").write_text(text.replace(one, one + two) +
+                                       '\n[[probe]]\nname = "slow"\non = "slow_pad"\ndirection = "x"\n')
+    return folder / "scene.toml"
+
+
+def torus_map(results):
+    """Two unstable modes without a common period: the motion winds round a torus, and the cycle found repels."""
+    scene = two_oscillators(results / "torus", 1.2720196495)
+    saved, fixed = results / "torus" / "cycle.state", dict(cycle__steps_per_period=100)
+    found = run(results, scene, transient__enabled="false", cycle__save_state=saved, **fixed)["cycle"]
+    h = found["period"] / 100
+    march = dict(cycle__enabled="false", transient__steps=40000, transient__step_size=h)
+    free = run(results, scene, transient__start="estimate", **march)
+    found_again = run(results, scene, transient__start=saved, **march)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4))
+    x, y = (free.history(f"probes/{name}")[20000:] for name in ("pad_x", "slow"))
+    left.plot(x, y, ",", color=GREY, alpha=0.5)
+    up = np.nonzero((x[:-1] < x.mean()) & (x[1:] >= x.mean()))[0]
+    left.plot(x[up], y[up], ".", color=RED, ms=4, label="once a turn of the fast one")
+    left.set(xlabel="displacement of the fast pad", ylabel="displacement of the slow pad",
+             title="from both estimates: no turn repeats")
+    left.legend(loc="upper right")
+    slow = found_again.history("probes/slow")
+    time = found_again.history("time") / found["period"]
+    moved = np.abs(slow - slow[0]).reshape(-1, 200).max(axis=1)
+    right.semilogy(time[::200], moved, color=BLUE, label="slow pad, started on the cycle found")
+    rate = min(mode["growth_rate"] for mode in free["modes"]["modes"][:2])
+    start = np.searchsorted(moved, 1e-6 * moved[-1])
+    line = moved[start] * np.exp(rate * found["period"] * (time[::200] - time[200 * start]))
+    right.semilogy(time[::200], np.where(line < moved[-1], line, np.nan), "--", color=ORANGE,
+                   label="growth rate of its mode")
+    largest = found["multipliers"]["values"][0]
+    right.set(xlabel="periods of the cycle", ylabel="displacement from rest", ylim=(moved[5] / 10, 20 * moved.max()),
+              title=f"outcome: {found['outcome']}; multiplier {np.hypot(largest['real'], largest['imaginary']):.3f}")
+    right.legend(loc="lower right")
+    save(results, "torus_map", figure)
