@@ -64,7 +64,7 @@ std::pair<double, int> cold_contact(const ThetaStep& step, const FrictionLaw& fr
 /// Entries of the factor of A alone.
 double plain_factor_entries(const Structure& structure, double h)
 {
-  return Factor(step_matrix(structure, h, .5), nullptr, FactorOptions{.kind = FactorKind::supernodal}).entries();
+  return Factor(step_matrix(structure, h, 0.5), nullptr, FactorOptions{.kind = FactorKind::supernodal}).entries();
 }
 
 /// Seconds to factor A bordered by B with its condensed corner, and of one solve in two halves.
@@ -85,7 +85,7 @@ void compare_factors(const std::filesystem::path& folder, double h)
 {
   const Structure structure = read_structure(folder, PETSC_COMM_WORLD);
   const Interface interface = read_interface(folder, structure, {0, true}, PETSC_COMM_WORLD);
-  const Owned<Mat> A = step_matrix(structure, h, .5);
+  const Owned<Mat> A = step_matrix(structure, h, 0.5);
   const auto x = zeros_like(structure.load);
   const auto [dense, dense_solve] = factor_times(A, interface.B, FactorKind::dense, structure.load, x);
   const auto [sparse, sparse_solve] = factor_times(A, interface.B, FactorKind::supernodal, structure.load, x);

@@ -25,7 +25,7 @@ Sentences of_modes(const Report& report)
 {
   Sentences sentences;
   const Modes& modes = report.modes;
-  if (report.model.rounding_hz > .001 * modes.band)
+  if (report.model.rounding_hz > 0.001 * modes.band)
     sentences.push_back(
         format("modes below %.3g Hz are lost in rounding beside the stiffest entry of K: make what is rigid "
                "a rigid body, not a stiff spring",
@@ -72,7 +72,7 @@ Sentences of_estimate(const Report& report)
 void add_chatter(const History& history, Sentences& sentences)
 {
   const double share = chatter(history);
-  if (share > .1)
+  if (share > 0.1)
     sentences.push_back(
         format("the normal force jumps between steps by %.0f %% of its mean: impacts of the contact nodes' own "
                "mass; average it over steps, or refine the contact surface",
@@ -84,11 +84,11 @@ Sentences of_transient(const Report& report)
   Sentences sentences;
   const Trajectory& transient = report.transient;
   const double bias = transient_bias(report).growth;
-  if (std::abs(bias) > .1)
+  if (std::abs(bias) > 0.1)
     sentences.push_back(format(
         "theta and the step change the growth rate by %+.0f %%: more steps a period, or theta = 1/2", 100 * bias));
   const double fit = transient.growth_rate_fit, predicted = transient.predicted.real();
-  if (std::abs(fit - predicted) > .01 * std::abs(predicted))
+  if (std::abs(fit - predicted) > 0.01 * std::abs(predicted))
     sentences.push_back("the fitted growth rate is not the predicted one: other motion than the mode is in the start");
   if (transient.law == ContactLaw::velocity)
     sentences.push_back("by the velocity law the gap drifts, by up to what an impact covers in a step");
@@ -104,7 +104,7 @@ Sentences of_cycle(const Report& report)
   const LimitCycle& cycle = report.cycle;
   if (cycle.outcome.kind != OutcomeKind::converged) return sentences;
   const StepBias bias = cycle_bias(report);
-  if (std::abs(bias.growth) > .1)
+  if (std::abs(bias.growth) > 0.1)
     sentences.push_back(format("theta and the step change the growth rate by %+.0f %%: the cycle's amplitude suffers",
                                100 * bias.growth));
   if (cycle.orbit.residual > 1e-3 && report.fidelity.used == CycleModel::full)

@@ -12,16 +12,12 @@
 
 using namespace squeal;
 using test::solve_contact;
+using test::uniform;
 
 namespace
 {
 
 using Vector = std::vector<double>;
-
-double uniform(std::mt19937& random)
-{
-  return std::uniform_real_distribution<double>(-1, 1)(random);
-}
 
 /// Symmetric with eigenvalues spread evenly in the logarithm from 1/condition to 1, in random directions; then rows
 /// and columns of pair i scaled by 10^(spread u_i), u_i in [-1, 1]: pairs of light and heavy bodies.
@@ -92,7 +88,7 @@ Tally try_all(double condition, double spread, double mu, int directions)
     Vector b(static_cast<std::size_t>(pairs) * block), r;
     for (double& value : b) value = uniform(random);
     (void)solve_contact(op, b, {mu}, {}, r); // a warm start
-    for (double& value : b) value += .01 * uniform(random);
+    for (double& value : b) value += 0.01 * uniform(random);
     const ContactResult result = solve_contact(op, b, {mu}, {}, r);
     if (!result.converged)
     {
@@ -114,7 +110,7 @@ TEST_CASE("no cone is left unsolved silently, however ill-conditioned W and howe
   for (const int directions : {1, 2})
     for (const double spread : {0., 1., 3.}) // bodies whose mobilities differ by up to 10^(4 spread)
       for (const double condition : {1e1, 1e3, 1e6, 1e10})
-        for (const double mu : {.3, 1., 3.})
+        for (const double mu : {0.3, 1., 3.})
         {
           CAPTURE(directions);
           CAPTURE(spread);
@@ -134,8 +130,8 @@ TEST_CASE("a light pair beside a heavy one is solved from a warm start too")
   const Vector W = {1e-6, 0, 0, 0, 0, 1e-6, 0, 0, 0, 0, 1e6, 0, 0, 0, 0, 1e6}; // reactions of 1e6 and 1e-6
   const ContactOperator op = make_contact_operator(W, 2, 1);
   Vector r;
-  REQUIRE(solve_contact(op, {-1, 0, -1, 0}, {.3}, {}, r).converged);
-  REQUIRE(solve_contact(op, {-1, 0, -2, 0}, {.3}, {}, r).converged);
+  REQUIRE(solve_contact(op, {-1, 0, -1, 0}, {0.3}, {}, r).converged);
+  REQUIRE(solve_contact(op, {-1, 0, -2, 0}, {0.3}, {}, r).converged);
   CHECK(std::abs(r[0] - 1e6) < 1e-4);
   CHECK(std::abs(r[2] - 2e-6) < 1e-15);
 }
@@ -176,8 +172,8 @@ TEST_CASE("the fixed point contracts for 0 < rho lambda_max(W) < 2 at a rate set
   }
   // ln(tolerance)/ln(1 - rho lambda_min): proportional to cond(W)/rho, but for the decay of the first iterations
   const double once = fixed_point_iterations(20, 1), tenfold = fixed_point_iterations(200, 1);
-  CHECK(tenfold / once == doctest::Approx(10).epsilon(.2));
-  CHECK(fixed_point_iterations(200, .5) / tenfold == doctest::Approx(2).epsilon(.05));
+  CHECK(tenfold / once == doctest::Approx(10).epsilon(0.2));
+  CHECK(fixed_point_iterations(200, 0.5) / tenfold == doctest::Approx(2).epsilon(0.05));
 }
 
 TEST_CASE("at rest the same bound holds, on one pair exactly")
@@ -200,7 +196,7 @@ TEST_CASE("one equilibrium is promised only where there is one")
     const std::size_t n = 4;
     ComplementarityProblem problem;
     Vector M = random_compliance(4, 1, 20, 0, random);
-    for (double& entry : M) entry += (trial % 4) * .3 * uniform(random); // friction couples without symmetry
+    for (double& entry : M) entry += (trial % 4) * 0.3 * uniform(random); // friction couples without symmetry
     problem.M = Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(M.data());
     problem.compliance = 1;
     for (std::size_t i = 0; i < n; ++i) problem.q.push_back(uniform(random));

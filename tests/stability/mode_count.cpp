@@ -27,7 +27,7 @@ TEST_CASE("slices miss none of a hundred crowded pairs, and the frictionless str
   const RealModes real = solve_real_modes_below(frictionless.M, frictionless.K, band, large);
   REQUIRE(real.outcome.kind == OutcomeKind::converged);
   REQUIRE(real.omega.size() == 100);
-  for (const auto& [mu, flutter] : {std::pair{.38, 44}, std::pair{.36, 17}, std::pair{0., 0}})
+  for (const auto& [mu, flutter] : {std::pair{0.38, 44}, std::pair{0.36, 17}, std::pair{0., 0}})
   {
     CAPTURE(mu);
     const QuadraticProblem problem = flutter_chain(cells, mu);
@@ -37,18 +37,18 @@ TEST_CASE("slices miss none of a hundred crowded pairs, and the frictionless str
     CHECK(sliced.count.found == 100);
     CHECK(count_unstable(sliced.solution) == flutter);
     CHECK(sliced.solution.outcome.residual < 1e-12);
-    if (mu == .38)
-      CHECK(std::abs(sliced.solution.pairs[0].lambda - std::complex<double>(.111240406422, 4.328534114602)) < 1e-10);
+    if (mu == 0.38)
+      CHECK(std::abs(sliced.solution.pairs[0].lambda - std::complex<double>(0.111240406422, 4.328534114602)) < 1e-10);
   }
 }
 
 // Dashpots across every eighth spring of a chain, of 5 N s/m and of 50, which all but lock it: no C = alpha M + beta K
-// comes near. All C beside them, .06 M, damps by 8 to 14 %. LAPACK solves the chain whole; 1e-9 is what backward errors
-// of 1e-12 leave of eigenvalues that are 1e2 times as sensitive.
+// comes near. All C beside them, 0.06 M, damps by 8 to 14 %. LAPACK solves the chain whole; 1e-9 is what backward
+// errors of 1e-12 leave of eigenvalues that are 1e2 times as sensitive.
 TEST_CASE("slices find heavily and unevenly damped pairs as LAPACK does, and no others")
 {
   constexpr std::size_t masses = 200;
-  constexpr double edge = .5 / (2 * M_PI); // a quarter of the spectrum
+  constexpr double edge = 0.5 / (2 * M_PI); // a quarter of the spectrum
   Rows K = zeros(masses, masses);
   const Rows M = diagonal(std::vector<double>(masses, 1.));
   for (std::size_t i = 0; i < masses; ++i)
@@ -57,14 +57,14 @@ TEST_CASE("slices find heavily and unevenly damped pairs as LAPACK does, and no 
     if (i > 0) K[i][i - 1] = K[i - 1][i] = -1;
   }
   const QuadraticProblem frictionless = problem_of(M, M, K);
-  for (std::size_t i = 0; i + 4 < masses; i += 10) K[i][i + 3] += .02;
+  for (std::size_t i = 0; i + 4 < masses; i += 10) K[i][i + 3] += 0.02;
   for (const double dashpot : {5., 50.})
   {
     CAPTURE(dashpot);
-    Rows C = diagonal(std::vector<double>(masses, .06));
+    Rows C = diagonal(std::vector<double>(masses, 0.06));
     for (std::size_t i = 0; i + 1 < masses; i += 8)
     {
-      C[i][i] = C[i + 1][i + 1] = .06 + dashpot;
+      C[i][i] = C[i + 1][i + 1] = 0.06 + dashpot;
       C[i][i + 1] = C[i + 1][i] = -dashpot;
     }
     const QuadraticProblem problem = problem_of(M, C, K);
@@ -73,14 +73,14 @@ TEST_CASE("slices find heavily and unevenly damped pairs as LAPACK does, and no 
     const QuadraticSolution whole = solve_quadratic(problem, {edge, 0, 0, 1000});
     REQUIRE(whole.pairs.size() > 20);
     const auto inside = std::count_if(sliced.pairs.begin(), sliced.pairs.end(),
-                                      [](const Eigenpair& pair) { return std::abs(pair.lambda) < .5; });
+                                      [](const Eigenpair& pair) { return std::abs(pair.lambda) < 0.5; });
     CHECK(static_cast<std::size_t>(inside) == whole.pairs.size());
     for (const Eigenpair& pair : whole.pairs)
     {
       double nearest = INFINITY;
       for (const Eigenpair& other : sliced.pairs) nearest = std::min(nearest, std::abs(other.lambda - pair.lambda));
       CHECK(nearest < 1e-9 * std::abs(pair.lambda));
-      CHECK(pair.lambda.real() < -.05 * std::abs(pair.lambda));
+      CHECK(pair.lambda.real() < -0.05 * std::abs(pair.lambda));
     }
   }
 }
@@ -140,7 +140,7 @@ TEST_CASE("real modes of ten equal free bodies include every rigid motion")
 TEST_CASE("the projection misses unstable pairs with too few real modes, and its backward errors say so")
 {
   const int cells = 50;
-  const QuadraticProblem problem = flutter_chain(cells, .38), frictionless = flutter_chain(cells, 0);
+  const QuadraticProblem problem = flutter_chain(cells, 0.38), frictionless = flutter_chain(cells, 0);
   const Mat M = frictionless.M, K = frictionless.K;
   const auto projected = [&](int modes, int passes) {
     return solve_projected(problem, M, K, solve_real_modes(M, K, modes, large), {band, passes, 100});

@@ -12,8 +12,8 @@ using namespace squeal;
 namespace
 {
 
-/// The weakly unstable oscillator: .07 % above the critical friction.
-const double weak = .1785;
+/// The weakly unstable oscillator: 0.07 % above the critical friction.
+const double weak = 0.1785;
 
 double period_of(const ComplexMode& mode)
 {
@@ -23,14 +23,14 @@ double period_of(const ComplexMode& mode)
 /// |theta - 1/2| decides it exactly at this many steps a period.
 double boundary(const ComplexMode& mode, double theta)
 {
-  return std::abs(theta - .5) * std::norm(mode.lambda) * period_of(mode) / mode.lambda.real();
+  return std::abs(theta - 0.5) * std::norm(mode.lambda) * period_of(mode) / mode.lambda.real();
 }
 
 /// Growth rate fitted to a march of four periods.
 double marched(const test::SmallModel& model, const test::Sliding& sliding, double theta, double h)
 {
   const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, {});
-  State state = test::mode_start(sliding, .05);
+  State state = test::mode_start(sliding, 0.05);
   History history;
   ModeAmplitude amplitude = follow(model.structure, sliding.equilibrium, sliding.mode);
   const long steps = std::lround(std::ceil(4.2 * period_of(sliding.mode) / h));
@@ -67,51 +67,51 @@ double growth_bias(std::complex<double> lambda, double theta, double h)
 TEST_CASE("theta > 1/2: an unstable mode looks stable below the stated number of steps, and is refused there only")
 {
   const auto model = test::unilateral_oscillator(weak, 1);
-  const auto sliding = test::persistent_sliding(model, test::Complex(.0007, 1.06));
+  const auto sliding = test::persistent_sliding(model, test::Complex(0.0007, 1.06));
   const double sigma = sliding.mode.lambda.real();
   REQUIRE(sigma > 0);
-  for (const double theta : {.502, .51, .55})
+  for (const double theta : {0.502, 0.51, 0.55})
   {
     CAPTURE(theta);
     const double steps = boundary(sliding.mode, theta);
     // the boundary is sharp: 2 % on either side; the discrete rate there is 2 % of sigma
-    const double fine = period_of(sliding.mode) / (1.02 * steps), coarse = period_of(sliding.mode) / (.98 * steps);
+    const double fine = period_of(sliding.mode) / (1.02 * steps), coarse = period_of(sliding.mode) / (0.98 * steps);
     CHECK(step_refusal(model.structure, &sliding.mode, theta, fine, {}).empty());
-    CHECK(marched(model, sliding, theta, fine) > .01 * sigma);
+    CHECK(marched(model, sliding, theta, fine) > 0.01 * sigma);
     CHECK(growth_bias(sliding.mode.lambda, theta, fine) > -1);
     const std::string reason = step_refusal(model.structure, &sliding.mode, theta, coarse, {});
     CHECK(reason.find("would look stable") != std::string::npos);
     CHECK(reason.find("or theta = 1/2") != std::string::npos);
-    CHECK(marched(model, sliding, theta, coarse) < -.01 * sigma);
+    CHECK(marched(model, sliding, theta, coarse) < -0.01 * sigma);
     CHECK(growth_bias(sliding.mode.lambda, theta, coarse) < -1);
   }
   // theta = 1/2 never changes the sign, however coarse: (1 - (omega h)^2/4) of the rate at small omega h
   for (const double steps : {7., 25., 400.})
   {
     const double h = period_of(sliding.mode) / steps;
-    CHECK(step_refusal(model.structure, &sliding.mode, .5, h, {}).empty());
-    CHECK(growth_bias(sliding.mode.lambda, .5, h) < 0);
-    CHECK(growth_bias(sliding.mode.lambda, .5, h) > -.25 * std::norm(sliding.mode.lambda) * h * h);
+    CHECK(step_refusal(model.structure, &sliding.mode, 0.5, h, {}).empty());
+    CHECK(growth_bias(sliding.mode.lambda, 0.5, h) < 0);
+    CHECK(growth_bias(sliding.mode.lambda, 0.5, h) > -0.25 * std::norm(sliding.mode.lambda) * h * h);
   }
 }
 
 TEST_CASE("theta < 1/2: growth that is mostly the step's own is refused")
 {
   auto model = test::unilateral_oscillator(weak, 1);
-  const auto sliding = test::persistent_sliding(model, test::Complex(.0007, 1.06));
-  const double h = period_of(sliding.mode) / (.98 * boundary(sliding.mode, .49));
-  CHECK(growth_bias(sliding.mode.lambda, .49, h) > 1);
-  CHECK(step_refusal(model.structure, &sliding.mode, .49, h, {}).find("owe most of its growth") != std::string::npos);
-  const double fine = period_of(sliding.mode) / (1.02 * boundary(sliding.mode, .49));
-  CHECK(growth_bias(sliding.mode.lambda, .49, fine) < 1);
-  CHECK(step_refusal(model.structure, &sliding.mode, .49, fine, {}).empty());
+  const auto sliding = test::persistent_sliding(model, test::Complex(0.0007, 1.06));
+  const double h = period_of(sliding.mode) / (0.98 * boundary(sliding.mode, 0.49));
+  CHECK(growth_bias(sliding.mode.lambda, 0.49, h) > 1);
+  CHECK(step_refusal(model.structure, &sliding.mode, 0.49, h, {}).find("owe most of its growth") != std::string::npos);
+  const double fine = period_of(sliding.mode) / (1.02 * boundary(sliding.mode, 0.49));
+  CHECK(growth_bias(sliding.mode.lambda, 0.49, fine) < 1);
+  CHECK(step_refusal(model.structure, &sliding.mode, 0.49, fine, {}).empty());
 }
 
 TEST_CASE("theta < 1/2 with C = beta K blows up beyond beta/(1 - 2 theta), or 2/((1 - 2 theta)|lambda|) if overdamped")
 {
   const double highest = 2 * std::sin(12 * std::numbers::pi / 26), w2 = highest * highest;
-  for (const double theta : {.3, .45})
-    for (const double beta : {.1, .5, 4.})
+  for (const double theta : {0.3, 0.45})
+    for (const double beta : {0.1, 0.5, 4.})
     {
       CAPTURE(theta);
       CAPTURE(beta);
@@ -119,20 +119,20 @@ TEST_CASE("theta < 1/2 with C = beta K blows up beyond beta/(1 - 2 theta), or 2/
       const bool overdamped = beta * highest > 2;
       const double fastest = overdamped ? beta * w2 / 2 + std::sqrt(beta * beta * w2 * w2 / 4 - w2) : 0;
       const double limit = overdamped ? 2 / ((1 - 2 * theta) * fastest) : beta / (1 - 2 * theta);
-      CHECK(free_growth(structure, theta, .97 * limit, {}) < 2e-6); // the slowest decays by 5e-6 a step
-      CHECK(step_refusal(structure, nullptr, theta, .97 * limit, {}).empty());
+      CHECK(free_growth(structure, theta, 0.97 * limit, {}) < 2e-6); // the slowest decays by 5e-6 a step
+      CHECK(step_refusal(structure, nullptr, theta, 0.97 * limit, {}).empty());
       CHECK(free_growth(structure, theta, 1.03 * limit, {}) > 1e-4);
       const std::string reason = step_refusal(structure, nullptr, theta, 1.03 * limit, {});
       CHECK(reason.find("theta = 1/2 needs no damping") != std::string::npos);
     }
   // without damping there is no such step; at theta = 1/2 there is no such limit
-  CHECK_FALSE(step_refusal(chain(0), nullptr, .49, .1, {}).empty());
-  CHECK(step_refusal(chain(0), nullptr, .5, 1e3, {}).empty());
+  CHECK_FALSE(step_refusal(chain(0), nullptr, 0.49, 0.1, {}).empty());
+  CHECK(step_refusal(chain(0), nullptr, 0.5, 1e3, {}).empty());
 }
 
 TEST_CASE("the refusal is lifted by its option only")
 {
   const Structure structure = chain(0);
-  CHECK(step_refusal(structure, nullptr, .4, 1, {.refuse = false}).empty());
-  CHECK_FALSE(step_refusal(structure, nullptr, .4, 1, {}).empty());
+  CHECK(step_refusal(structure, nullptr, 0.4, 1, {.refuse = false}).empty());
+  CHECK_FALSE(step_refusal(structure, nullptr, 0.4, 1, {}).empty());
 }

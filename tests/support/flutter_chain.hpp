@@ -1,6 +1,6 @@
 #pragma once
-/// A chain of cells of two modes each that friction couples (M = I, C = .02 I): 100 pairs of 50 cells lie within 1 % to
-/// 30 % of each other, many close to coalescence.
+/// A chain of cells of two modes each that friction couples (M = I, C = 0.02 I): 100 pairs of 50 cells lie within 1 %
+/// to 30 % of each other, many close to coalescence.
 #include "small_models.hpp"
 #include "squeal/modes/modes.hpp"
 #include "squeal/modes/quadratic.hpp"
@@ -32,7 +32,7 @@ inline QuadraticProblem flutter_chain(int cells, double mu)
     K[i + 1][i + 1] = 18.75;
     if (i + 2 < n) K[i][i + 2] = K[i + 2][i] = -1;
   }
-  return problem_of(diagonal(std::vector<double>(n, 1.)), diagonal(std::vector<double>(n, .02)), K);
+  return problem_of(diagonal(std::vector<double>(n, 1.)), diagonal(std::vector<double>(n, 0.02)), K);
 }
 
 inline int count_unstable(const QuadraticSolution& solution)

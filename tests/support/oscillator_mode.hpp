@@ -37,10 +37,10 @@ inline Sliding persistent_sliding(const SmallModel& model, Complex guess)
 {
   const Structure& structure = model.structure;
   const double mu = model.interface.friction.coefficient;
-  // y = y1 = y2 = 1: r = -(.5 l^2 + .02 l + 1.2), (l^2 + .02 l + 1.1) x = .1 + mu r, and the pad's own
-  // -.1 x + l^2 + .02 l + .5 - r = 0
-  const auto x_of = [&](Complex l) { return (.1 - mu * (.5 * l * l + .02 * l + 1.2)) / (l * l + .02 * l + 1.1); };
-  const auto defect = [&](Complex l) { return -.1 * x_of(l) + 1.5 * l * l + .04 * l + 1.7; };
+  // y = y1 = y2 = 1: r = -(0.5 l^2 + 0.02 l + 1.2), (l^2 + 0.02 l + 1.1) x = 0.1 + mu r, and the pad's own
+  // -0.1 x + l^2 + 0.02 l + 0.5 - r = 0
+  const auto x_of = [&](Complex l) { return (0.1 - mu * (0.5 * l * l + 0.02 * l + 1.2)) / (l * l + 0.02 * l + 1.1); };
+  const auto defect = [&](Complex l) { return -0.1 * x_of(l) + 1.5 * l * l + 0.04 * l + 1.7; };
   Complex l = guess;
   for (int i = 0; i < 50; ++i)
   {
@@ -73,6 +73,6 @@ inline State mode_start(const Sliding& sliding, double q)
   return state;
 }
 
-inline const Complex at_three_tenths(.0245, 1.06); // where to look at mu = .3
+inline const Complex at_three_tenths(0.0245, 1.06); // where to look at mu = 0.3
 
 } // namespace squeal::test

@@ -107,13 +107,13 @@ inline Interface make_interface(const Rows& B, int directions, const std::vector
   return interface;
 }
 
-/// Pad (x, y1) of mass 1 pressed on a disc (y2) of mass .5, with unilateral contact and plane friction on a belt of
+/// Pad (x, y1) of mass 1 pressed on a disc (y2) of mass 0.5, with unilateral contact and plane friction on a belt of
 /// speed V: the smallest system that squeals, lifts off, sticks and slips.
 inline SmallModel unilateral_oscillator(double friction, double belt_speed)
 {
   SmallModel model;
-  model.structure = make_structure(diagonal({1, 1, .5}), diagonal({.02, .02, .02}),
-                                   {{1.1, -.1, 0}, {-.1, .5, 0}, {0, 0, 1.2}}, {0, -1, 0});
+  model.structure = make_structure(diagonal({1, 1, 0.5}), diagonal({0.02, 0.02, 0.02}),
+                                   {{1.1, -0.1, 0}, {-0.1, 0.5, 0}, {0, 0, 1.2}}, {0, -1, 0});
   model.interface = make_interface({{0, 1, -1}, {1, 0, 0}}, 1, {0}, {belt_speed}, friction, model.structure.K);
   return model;
 }

@@ -1,4 +1,5 @@
 // ranks: 1
+#include "../support/contact_problem.hpp"
 #include "squeal/contact/complementarity.hpp"
 
 #include <algorithm>
@@ -7,14 +8,11 @@
 #include <random>
 
 using namespace squeal;
+using test::difference;
+using test::uniform;
 
 namespace
 {
-
-double uniform(std::mt19937& random)
-{
-  return std::uniform_real_distribution<double>(-1, 1)(random);
-}
 
 /// D + mu E: a symmetric positive definite part and a friction part of any sign.
 ComplementarityProblem random_problem(std::size_t n, double mu, std::mt19937& random)
@@ -31,7 +29,7 @@ ComplementarityProblem random_problem(std::size_t n, double mu, std::mt19937& ra
     {
       double& entry = problem.M(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
       for (std::size_t k = 0; k < n; ++k) entry += H[i * n + k] * H[j * n + k] / static_cast<double>(n);
-      entry += (i == j ? .1 : 0.) + mu * uniform(random);
+      entry += (i == j ? 0.1 : 0.) + mu * uniform(random);
     }
   }
   problem.compliance = problem.M.diagonal().cwiseAbs().maxCoeff();
@@ -55,13 +53,6 @@ std::vector<std::vector<double>> all_solutions(const ComplementarityProblem& pro
   return found;
 }
 
-double difference(const std::vector<double>& a, const std::vector<double>& b)
-{
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
-  return largest;
-}
-
 } // namespace
 
 TEST_CASE("the status iteration finds what trying every split finds")
@@ -69,13 +60,13 @@ TEST_CASE("the status iteration finds what trying every split finds")
   std::mt19937 random(5);
   for (int trial = 0; trial < 200; ++trial)
   {
-    const auto problem = random_problem(1 + static_cast<std::size_t>(trial % 8), trial % 2 == 0 ? 0 : .02, random);
+    const auto problem = random_problem(1 + static_cast<std::size_t>(trial % 8), trial % 2 == 0 ? 0 : 0.02, random);
     const auto truth = all_solutions(problem);
     const auto found = solve_by_status(problem, std::vector<char>(problem.q.size(), trial % 3 == 0), 200);
     REQUIRE(truth.size() == 1); // little friction: one solution
     CHECK(found.outcome == StatusOutcome::converged);
     CHECK(difference(found.reaction, truth[0]) < 1e-9); // condition below 1e5
-    const auto projected = solve_by_projection(problem, .5 / largest_eigenvalue(problem.M, 30), 1e-12, 100000);
+    const auto projected = solve_by_projection(problem, 0.5 / largest_eigenvalue(problem.M, 30), 1e-12, 100000);
     CHECK(projected.residual <= 1e-12);
     CHECK(difference(projected.reaction, truth[0]) < 1e-8);
   }

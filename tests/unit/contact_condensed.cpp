@@ -49,7 +49,7 @@ test::Rows chain_stiffness(std::size_t n)
   {
     if (i % 3 == 0) K[i][i] += 2;
     if (i + 1 == n) break;
-    const double k = 1 + .1 * static_cast<double>(i % 7);
+    const double k = 1 + 0.1 * static_cast<double>(i % 7);
     K[i][i] += k;
     K[i + 1][i + 1] += k;
     K[i][i + 1] -= k;
@@ -71,7 +71,7 @@ void check_condensed(const test::Rows& K, const test::Rows& B, int directions)
   const std::size_t pairs = B.size() / static_cast<std::size_t>(1 + directions);
   const auto interface =
       test::make_interface(B, directions, std::vector<double>(pairs, 0.),
-                           std::vector<double>(pairs * static_cast<std::size_t>(directions), 1.), .3, structure.K);
+                           std::vector<double>(pairs * static_cast<std::size_t>(directions), 1.), 0.3, structure.K);
   const auto condensed = condense(structure.K, interface, 2.5, {}, {});
   CHECK(condensed.size == static_cast<int>(B.size()));
   if (rank_of(PETSC_COMM_WORLD) == 0)
@@ -107,7 +107,7 @@ TEST_CASE("W of a chain is B K^-1 B', over several blocks of right-hand sides")
   {
     B[3 * p][(4 * p + 7) % n] = 1;
     B[3 * p][(4 * p + 201) % n] = -1;
-    B[3 * p + 1][(3 * p + 2) % n] = .5;
+    B[3 * p + 1][(3 * p + 2) % n] = 0.5;
     if (p % 10 != 0) B[3 * p + 2][p] = 1; // else immovable
   }
   check_condensed(chain_stiffness(n), B, 2);
@@ -115,8 +115,8 @@ TEST_CASE("W of a chain is B K^-1 B', over several blocks of right-hand sides")
 
 TEST_CASE("W of three degrees of freedom, and of pairs that cannot move at all")
 {
-  check_condensed({{1.1, -.1, 0}, {-.1, .5, 0}, {0, 0, 1.2}}, {{0, 1, -1}, {1, 0, 0}}, 1);
-  check_condensed({{1.1, -.1, 0}, {-.1, .5, 0}, {0, 0, 1.2}}, test::zeros(2, 3), 1);
+  check_condensed({{1.1, -0.1, 0}, {-0.1, 0.5, 0}, {0, 0, 1.2}}, {{0, 1, -1}, {1, 0, 0}}, 1);
+  check_condensed({{1.1, -0.1, 0}, {-0.1, 0.5, 0}, {0, 0, 1.2}}, test::zeros(2, 3), 1);
 }
 
 TEST_CASE("a structure that nothing holds is refused, and the loose part is named")
@@ -137,7 +137,7 @@ TEST_CASE("a structure that nothing holds is refused, and the loose part is name
     }
     if (!other_body) K[5][5] = K[6][6] = K[8][8] = 1;
     const auto structure = test::make_structure(K, K, K, std::vector<double>(9, 1.));
-    const auto interface = test::make_interface(test::zeros(2, 9), 1, {0}, {1}, .3, structure.K);
+    const auto interface = test::make_interface(test::zeros(2, 9), 1, {0}, {1}, 0.3, structure.K);
     const auto factored = factor_positive(structure.K, interface, {});
     REQUIRE(factored.loose);
     CHECK((other_body ? *factored.loose >= 5 : *factored.loose == 7));
@@ -176,10 +176,10 @@ test::Rows lattice_stiffness(std::size_t side, std::size_t width)
       if (!near) continue;
       for (std::size_t i = 0; i < width; ++i)
         for (std::size_t j = 0; j < width; ++j)
-          couple(a * width + i, b * width + j, .02 + .002 * static_cast<double>((a + 3 * b + i + 2 * j) % 7));
+          couple(a * width + i, b * width + j, 0.02 + 0.002 * static_cast<double>((a + 3 * b + i + 2 * j) % 7));
     }
-  couple(0, n - 1, .5); // neighbours of their own
-  couple(1, n / 2, .5);
+  couple(0, n - 1, 0.5); // neighbours of their own
+  couple(1, n / 2, 0.5);
   return K;
 }
 
@@ -190,10 +190,10 @@ void check_agreement(FactorKind kind, const test::Rows& K, std::size_t rows, std
 {
   const std::size_t n = K.size();
   test::Rows B = test::zeros(rows, n);
-  for (std::size_t i = 0; i < rows; ++i) B[i][7 * i + 3] = 1, B[i][n - 1 - i] = -.7;
+  for (std::size_t i = 0; i < rows; ++i) B[i][7 * i + 3] = 1, B[i][n - 1 - i] = -0.7;
   const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
-  const auto interface =
-      test::make_interface(B, 1, std::vector<double>(rows / 2, 0.), std::vector<double>(rows / 2, 1.), .3, structure.K);
+  const auto interface = test::make_interface(B, 1, std::vector<double>(rows / 2, 0.),
+                                              std::vector<double>(rows / 2, 1.), 0.3, structure.K);
   Factor sparse(structure.K, interface.B, {.kind = kind}), dense(structure.K, interface.B, {.kind = FactorKind::dense});
   CHECK(!sparse.failed());
   CHECK(!dense.failed());
@@ -258,7 +258,7 @@ TEST_CASE("a factor is used again and again: later right-hand sides see nothing 
   const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
   test::Rows B = test::zeros(2, n);
   B[0][3] = B[1][150] = 1;
-  const auto interface = test::make_interface(B, 1, {0}, {1}, .3, structure.K);
+  const auto interface = test::make_interface(B, 1, {0}, {1}, 0.3, structure.K);
   for (const FactorKind kind : sparse_kinds)
     for (Mat border : {Mat(nullptr), interface.B.get()})
     {
@@ -294,7 +294,7 @@ TEST_CASE("the memory foreseen for a factor holds its entries, and more with a b
   for (std::size_t i = 0; i < rows; ++i) B[i][2 * i] = 1;
   const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
   const auto interface =
-      test::make_interface(B, 1, std::vector<double>(150, 0.), std::vector<double>(150, 1.), .3, structure.K);
+      test::make_interface(B, 1, std::vector<double>(150, 0.), std::vector<double>(150, 1.), 0.3, structure.K);
   const auto entries = [&](const FactorOptions& options)
   { return Factor(structure.K, interface.B, options).entries(); };
   const auto foreseen = [&](const FactorOptions& options) { return factor_memory(structure.K, interface.B, options); };

@@ -9,8 +9,8 @@ TEST_CASE("the oscillator's pad rests on the disc with the reaction that both sp
 {
   // closed, frictionless: 0.5 y + 1.2 y - 0.1 x = -1, 1.1 x = 0.1 y: r = -1.2 y
   const auto model = test::unilateral_oscillator(0, 1);
-  const double y = -1 / (1.7 - .01 / 1.1), r = -1.2 * y;
-  const auto u = test::vector_like(model.structure.K, {.1 * y / 1.1, y, y});
+  const double y = -1 / (1.7 - 0.01 / 1.1), r = -1.2 * y;
+  const auto u = test::vector_like(model.structure.K, {0.1 * y / 1.1, y, y});
   const auto force = zeros_like(u), reaction = zeros_like(u);
   check(MatMult(model.structure.K, u, force));
   check(VecAXPY(force, -1, model.structure.load));
@@ -28,7 +28,7 @@ TEST_CASE("the oscillator's pad rests on the disc with the reaction that both sp
 
 TEST_CASE("a chain without ground springs has one rigid motion")
 {
-  const auto model = test::mass_spring_chain(7, 2, 3, .1, -1);
+  const auto model = test::mass_spring_chain(7, 2, 3, 0.1, -1);
   const auto u = test::vector_like(model.structure.K, std::vector<double>(7, 1.));
   const auto force = zeros_like(u);
   check(MatMult(model.structure.K, u, force));

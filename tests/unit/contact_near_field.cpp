@@ -27,7 +27,7 @@ Vector decaying_compliance()
     for (std::size_t j = 0; j < size; ++j)
     {
       const double distance = std::abs(static_cast<double>(i / 3) - static_cast<double>(j / 3));
-      const double along = i % 3 == j % 3 ? 1 : .2;
+      const double along = i % 3 == j % 3 ? 1 : 0.2;
       W[i * size + j] = along * std::exp(-1.5 * distance) + 4e-9 * std::cos(static_cast<double>(i % 7 + j % 7));
     }
   return W;
@@ -38,8 +38,8 @@ Vector velocity_at(double time)
   Vector b(size);
   for (std::size_t i = 0; i < size; ++i)
   {
-    const double phase = .7 * static_cast<double>(i);
-    b[i] = i % 3 == 0 ? -.5 + std::cos(phase + time) : 2 * std::sin(.3 * phase + 2 * time);
+    const double phase = 0.7 * static_cast<double>(i);
+    b[i] = i % 3 == 0 ? -0.5 + std::cos(phase + time) : 2 * std::sin(0.3 * phase + 2 * time);
   }
   return b;
 }
@@ -53,7 +53,7 @@ double difference(const Vector& a, const Vector& b)
 
 double true_residual(const Vector& W, const Vector& b, const Vector& r)
 {
-  return contact_residual(make_contact_operator(W, pairs, 2), {.4}, b, r);
+  return contact_residual(make_contact_operator(W, pairs, 2), {0.4}, b, r);
 }
 
 } // namespace
@@ -62,13 +62,13 @@ TEST_CASE("sweeps over the near field in single precision end at the answer of W
 {
   const Vector W = decaying_compliance(), b = velocity_at(0);
   const ContactOperator op = make_contact_operator(W, pairs, 2);
-  CHECK(op.near_share() < .25); // 25 of 120 neighbours
+  CHECK(op.near_share() < 0.25); // 25 of 120 neighbours
   CHECK(op.has_near_field());
   Vector swept, projected;
-  const auto result = solve_contact(op, b, {.4}, {}, swept);
+  const auto result = solve_contact(op, b, {0.4}, {}, swept);
   CHECK(result.converged);
   CHECK(true_residual(W, b, swept) < 1.01e-10); // another order of summation
-  CHECK(solve_contact(op, b, {.4}, {ContactSolver::fixed_point, 1e-12, 20000, 0}, projected).converged);
+  CHECK(solve_contact(op, b, {0.4}, {ContactSolver::fixed_point, 1e-12, 20000, 0}, projected).converged);
   CHECK(difference(swept, projected) < 1e-8 * *std::max_element(projected.begin(), projected.end())); // cond(W) < 100
   CHECK(std::count_if(swept.begin(), swept.end(), [](double r) { return r == 0; }) > 30); // some pairs are open
 
@@ -76,7 +76,7 @@ TEST_CASE("sweeps over the near field in single precision end at the answer of W
   for (double& entry : without_tail)
     if (std::abs(entry) < 1e-8) entry = 0;
   Vector other;
-  CHECK(solve_contact(make_contact_operator(without_tail, pairs, 2), b, {.4}, {}, other).converged);
+  CHECK(solve_contact(make_contact_operator(without_tail, pairs, 2), b, {0.4}, {}, other).converged);
   CHECK(true_residual(W, b, other) > 1e-8); // the tail counts
 }
 
@@ -91,16 +91,16 @@ TEST_CASE("problems solved together have the answers of each alone, and what is 
   for (int step = 0; step < steps; ++step)
   {
     std::vector<Vector> b;
-    for (int k = 0; k < together; ++k) b.push_back(velocity_at(.02 * step + .3 * k));
+    for (int k = 0; k < together; ++k) b.push_back(velocity_at(0.02 * step + 0.3 * k));
     std::vector<ContactProblem> problems;
     for (std::size_t k = 0; k < together; ++k) problems.push_back({b[k], r[k], memory[k]});
-    const auto results = solve_contacts(op, {.4}, {}, problems);
+    const auto results = solve_contacts(op, {0.4}, {}, problems);
     for (std::size_t k = 0; k < together; ++k)
     {
       CHECK(results[k].converged);
       CHECK(true_residual(W, b[k], r[k]) < 1.01e-10);
       Vector alone;
-      CHECK(solve_contact(op, b[k], {.4}, {}, alone).converged);
+      CHECK(solve_contact(op, b[k], {0.4}, {}, alone).converged);
       CHECK(difference(r[k], alone) < 1e-8);
     }
     sweeps.push_back(results[0].iterations);
@@ -114,10 +114,10 @@ TEST_CASE("a pair of infinite free velocity takes no part")
   const ContactOperator op = make_contact_operator(W, pairs, 2);
   const std::size_t out = 51;
   b[out] = std::numeric_limits<double>::infinity();
-  CHECK(solve_contact(op, b, {.4}, {}, r).converged);
+  CHECK(solve_contact(op, b, {0.4}, {}, r).converged);
   CHECK(r[out] == 0);
   CHECK(r[out + 1] == 0);
   b[out] = 1e3; // so far open that nothing closes it
-  CHECK(solve_contact(op, b, {.4}, {ContactSolver::gauss_seidel, 1e-13, 1000, 0}, elsewhere).converged);
+  CHECK(solve_contact(op, b, {0.4}, {ContactSolver::gauss_seidel, 1e-13, 1000, 0}, elsewhere).converged);
   CHECK(difference(r, elsewhere) < 1e-8);
 }

@@ -64,9 +64,9 @@ TEST_CASE("row numbers, the blocks of a dense matrix and tangential vectors foll
 
 TEST_CASE("the derivatives of sliding friction are those of r_t = -mu r_n s/|s|")
 {
-  const FrictionLaw law{.4};
+  const FrictionLaw law{0.4};
   const double r_n = 7, d = 1e-6;
-  const std::array<double, 2> s = {.3, -.2};
+  const std::array<double, 2> s = {0.3, -0.2};
   const SlidingFriction friction = sliding_friction(law, r_n, s);
   for (std::size_t k = 0; k < 2; ++k)
   {
@@ -89,9 +89,9 @@ TEST_CASE("friction opposes s_theta, but s+ where the pair stuck or where its so
   const Vector velocity = {9, 3, 9, 3, 9, 3, 9, 3}, drive = {1, 1, 1, 1}; // s = 2
   const std::vector<ContactStatus> status = {ContactStatus::slip, ContactStatus::stick, ContactStatus::open,
                                              ContactStatus::slip};
-  Vector past = past_sliding(PairView(velocity, 1), TangentView(drive, 1), status, .5);
-  CHECK(past == Vector{0, 1, 0, 0, 0, 1, 0, 1});                                // nothing on normal rows
-  const Vector r = {1, 0, 1, 0, 0, 0, 1, 0}, w = {0, .5, 0, -5, 0, -5, 0, 1.5}; // s+: -.5, -5, -6, .5
+  Vector past = past_sliding(PairView(velocity, 1), TangentView(drive, 1), status, 0.5);
+  CHECK(past == Vector{0, 1, 0, 0, 0, 1, 0, 1});                                 // nothing on normal rows
+  const Vector r = {1, 0, 1, 0, 0, 0, 1, 0}, w = {0, 0.5, 0, -5, 0, -5, 0, 1.5}; // s+: -0.5, -5, -6, 0.5
   CHECK(leave_out_where_turned(PairView(r, 1), PairView(w, 1), PairView(past, 1)));
   CHECK(past == Vector{0, 0, 0, 0, 0, 1, 0, 1}); // the third pair is open, the fourth slides on
   CHECK(opposes_end(PairView<const double>(past, 1), 0));
@@ -102,11 +102,11 @@ TEST_CASE("friction opposes s_theta, but s+ where the pair stuck or where its so
 
 TEST_CASE("what is admissible stays, what is not goes to the cone along its normal and its tangential part")
 {
-  CHECK(admissible({2, .5, -.5}, {}, {.5}) == PairVector{2, .5, -.5});
-  const PairVector onto_cone = admissible({2, 3, 4}, {}, {.5});
+  CHECK(admissible({2, 0.5, -0.5}, {}, {0.5}) == PairVector{2, 0.5, -0.5});
+  const PairVector onto_cone = admissible({2, 3, 4}, {}, {0.5});
   CHECK(onto_cone[0] == 2);
-  CHECK(std::abs(onto_cone[1] - .6) < 1e-15); // rounding of one division
-  CHECK(std::abs(onto_cone[2] - .8) < 1e-15);
-  CHECK(admissible({-2, 3, 4}, {}, {.5})[0] == 0);
-  CHECK(length(admissible({-2, 3, 4}, {}, {.5})[1], admissible({-2, 3, 4}, {}, {.5})[2]) == 0);
+  CHECK(std::abs(onto_cone[1] - 0.6) < 1e-15); // rounding of one division
+  CHECK(std::abs(onto_cone[2] - 0.8) < 1e-15);
+  CHECK(admissible({-2, 3, 4}, {}, {0.5})[0] == 0);
+  CHECK(length(admissible({-2, 3, 4}, {}, {0.5})[1], admissible({-2, 3, 4}, {}, {0.5})[2]) == 0);
 }

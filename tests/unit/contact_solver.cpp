@@ -6,17 +6,14 @@
 #include <random>
 
 using namespace squeal;
+using test::difference;
 using test::solve_contact;
+using test::uniform;
 
 namespace
 {
 
 using Vector = std::vector<double>;
-
-double uniform(std::mt19937& random)
-{
-  return std::uniform_real_distribution<double>(-1, 1)(random);
-}
 
 /// H H' plus a share of the identity: symmetric positive definite, worse conditioned as the share falls.
 Vector random_spd(std::size_t n, double share, std::mt19937& random)
@@ -48,13 +45,6 @@ double law_defect(const PairVector& r, const PairVector& w, double mu)
   return std::max({0., -r[0], -w[0], r_t - mu * r[0], std::abs(r[0] * w[0]), dissipation});
 }
 
-double difference(const Vector& a, const Vector& b)
-{
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
-  return largest;
-}
-
 } // namespace
 
 TEST_CASE("one pair: the local solution obeys Signorini's and Coulomb's laws to round-off, at any friction")
@@ -64,9 +54,9 @@ TEST_CASE("one pair: the local solution obeys Signorini's and Coulomb's laws to 
   for (int trial = 0; trial < 20000; ++trial)
   {
     const int directions = 1 + trial % 2;
-    const double mu = trial % 3 == 0 ? 3 : .4;
+    const double mu = trial % 3 == 0 ? 3 : 0.4;
     const std::size_t block = static_cast<std::size_t>(1 + directions);
-    const Vector W = random_spd(block, trial % 5 == 0 ? 1e-3 : .3, random);
+    const Vector W = random_spd(block, trial % 5 == 0 ? 1e-3 : 0.3, random);
     PairBlock A{};
     PairVector q{}, last{};
     for (std::size_t i = 0; i < block; ++i)
@@ -91,44 +81,44 @@ TEST_CASE("one pair: the local solution obeys Signorini's and Coulomb's laws to 
 TEST_CASE("a pair sticks below the Coulomb limit and slips above it, against the sliding")
 {
   const PairBlock A = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  CHECK(solve_pair(A, {-2, .6, -.7}, 2, {.5}, {}) == PairVector{2, -.6, .7}); // .92 < 1: stick
-  const PairVector r = solve_pair(A, {-2, 3, -4}, 2, {.5}, {});               // 5 > 1: slip along (-.6, .8)
-  CHECK(std::abs(r[0] - 2) + std::abs(r[1] + .6) + std::abs(r[2] - .8) < 1e-14);
-  CHECK(solve_pair(A, {1e-20, 3, 4}, 2, {.5}, {1, 0, 0}) == PairVector{0, 0, 0});
-  const PairVector plane = solve_pair(A, {-2, -3, 0}, 1, {.5}, {});
+  CHECK(solve_pair(A, {-2, 0.6, -0.7}, 2, {0.5}, {}) == PairVector{2, -0.6, 0.7}); // 0.92 < 1: stick
+  const PairVector r = solve_pair(A, {-2, 3, -4}, 2, {0.5}, {});                   // 5 > 1: slip along (-0.6, 0.8)
+  CHECK(std::abs(r[0] - 2) + std::abs(r[1] + 0.6) + std::abs(r[2] - 0.8) < 1e-14);
+  CHECK(solve_pair(A, {1e-20, 3, 4}, 2, {0.5}, {1, 0, 0}) == PairVector{0, 0, 0});
+  const PairVector plane = solve_pair(A, {-2, -3, 0}, 1, {0.5}, {});
   CHECK(plane == PairVector{2, 1, 0});
 }
 
 TEST_CASE("an immovable direction gets no reaction at rest and never a number that is not one")
 {
   const PairBlock A = {{{2, 0, 0}, {0, 0, 0}, {0, 0, 0}}};
-  CHECK(solve_pair(A, {-1, 0, 0}, 1, {.3}, {}) == PairVector{.5, 0, 0});
-  CHECK(solve_pair(A, {-1, 0, 0}, 2, {.3}, {}) == PairVector{.5, 0, 0});
+  CHECK(solve_pair(A, {-1, 0, 0}, 1, {0.3}, {}) == PairVector{0.5, 0, 0});
+  CHECK(solve_pair(A, {-1, 0, 0}, 2, {0.3}, {}) == PairVector{0.5, 0, 0});
   const PairBlock fixed{};
-  CHECK(solve_pair(fixed, {-1, 1, 1}, 2, {.3}, {}) == PairVector{0, 0, 0});
+  CHECK(solve_pair(fixed, {-1, 1, 1}, 2, {0.3}, {}) == PairVector{0, 0, 0});
   const PairBlock one = {{{2, 0, 0}, {0, 1, 0}, {0, 0, 0}}}; // t2 immovable, pair at rest along it
-  CHECK(solve_pair(one, {-1, .1, 0}, 2, {.3}, {}) == PairVector{.5, -.1, 0});
-  CHECK(std::abs(solve_pair(one, {-1, 5, 0}, 2, {.3}, {})[1] + .15) < 1e-15);
+  CHECK(solve_pair(one, {-1, 0.1, 0}, 2, {0.3}, {}) == PairVector{0.5, -0.1, 0});
+  CHECK(std::abs(solve_pair(one, {-1, 5, 0}, 2, {0.3}, {})[1] + 0.15) < 1e-15);
 }
 
 TEST_CASE("the natural map is zero on a solution, and sees each law broken")
 {
-  CHECK(natural_map({1, -.5, 0}, {0, 2, 0}, {.5}, {1, 1}) == 0);
-  CHECK(natural_map({0, 0, 0}, {1, 2, 3}, {.5}, {1, 1}) == 0);
-  CHECK(natural_map({0, 0, 0}, {-1, 0, 0}, {.5}, {1, 1}) == 1); // penetrates
-  CHECK(natural_map({1, 0, 0}, {2, 0, 0}, {.5}, {1, 1}) == 1);  // pushes while open
-  CHECK(natural_map({1, .5, 0}, {0, 2, 0}, {.5}, {1, 1}) == 1); // pushes along the sliding
+  CHECK(natural_map({1, -0.5, 0}, {0, 2, 0}, {0.5}, {1, 1}) == 0);
+  CHECK(natural_map({0, 0, 0}, {1, 2, 3}, {0.5}, {1, 1}) == 0);
+  CHECK(natural_map({0, 0, 0}, {-1, 0, 0}, {0.5}, {1, 1}) == 1);  // penetrates
+  CHECK(natural_map({1, 0, 0}, {2, 0, 0}, {0.5}, {1, 1}) == 1);   // pushes while open
+  CHECK(natural_map({1, 0.5, 0}, {0, 2, 0}, {0.5}, {1, 1}) == 1); // pushes along the sliding
 }
 
 TEST_CASE("Gauss-Seidel and the projection fixed point find the same reactions")
 {
   std::mt19937 random(7);
   for (const int directions : {1, 2})
-    for (const double mu : {0., .2, .5})
+    for (const double mu : {0., 0.2, 0.5})
     {
       const int pairs = 12;
       const std::size_t n = static_cast<std::size_t>(pairs * (1 + directions));
-      const Vector W = random_spd(n, .3, random), b = random_velocity(n, random);
+      const Vector W = random_spd(n, 0.3, random), b = random_velocity(n, random);
       const ContactOperator op = make_contact_operator(W, pairs, directions);
       Vector swept, projected;
       const auto first = solve_contact(op, b, {mu}, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, swept);
@@ -167,15 +157,15 @@ TEST_CASE("forces a million times larger or smaller give the same relative answe
 {
   std::mt19937 random(13);
   const int pairs = 8;
-  const Vector W = random_spd(24, .2, random), b = random_velocity(24, random);
+  const Vector W = random_spd(24, 0.2, random), b = random_velocity(24, random);
   const ContactOperator op = make_contact_operator(W, pairs, 2);
   Vector reference;
-  CHECK(solve_contact(op, b, {.3}, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, reference).converged);
+  CHECK(solve_contact(op, b, {0.3}, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, reference).converged);
   for (const double factor : {1e6, 1e-6, 1e-20})
   {
     Vector scaled = b, r;
     for (double& value : scaled) value *= factor;
-    CHECK(solve_contact(op, scaled, {.3}, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, r).converged);
+    CHECK(solve_contact(op, scaled, {0.3}, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, r).converged);
     for (double& value : r) value /= factor;
     CHECK(difference(r, reference) < 1e-10);
   }
@@ -184,22 +174,22 @@ TEST_CASE("forces a million times larger or smaller give the same relative answe
 TEST_CASE("a warm start at the solution takes no sweep, and an inadmissible one does no harm")
 {
   std::mt19937 random(17);
-  const Vector W = random_spd(24, .2, random), b = random_velocity(24, random);
+  const Vector W = random_spd(24, 0.2, random), b = random_velocity(24, random);
   const ContactOperator op = make_contact_operator(W, 8, 2);
   Vector r;
   const ContactSettings settings{ContactSolver::gauss_seidel, 1e-12, 1000, 0};
-  CHECK(solve_contact(op, b, {.3}, settings, r).converged);
+  CHECK(solve_contact(op, b, {0.3}, settings, r).converged);
   Vector again = r;
-  const auto result = solve_contact(op, b, {.3}, settings, again);
+  const auto result = solve_contact(op, b, {0.3}, settings, again);
   CHECK(result.iterations <= 1); // rounding of w alone
   Vector wild(24, std::nan(""));
   wild[0] = -5;
-  CHECK(solve_contact(op, b, {.3}, settings, wild).converged);
+  CHECK(solve_contact(op, b, {0.3}, settings, wild).converged);
   CHECK(difference(wild, r) < 1e-10);
 }
 
 TEST_CASE("what is not a number ends as not converged")
 {
   Vector W = {1, 0, 0, 1}, r;
-  CHECK_FALSE(solve_contact(make_contact_operator(W, 1, 1), {std::nan(""), 0}, {.3}, {}, r).converged);
+  CHECK_FALSE(solve_contact(make_contact_operator(W, 1, 1), {std::nan(""), 0}, {0.3}, {}, r).converged);
 }

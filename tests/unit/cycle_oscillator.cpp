@@ -11,8 +11,8 @@ using namespace squeal::test;
 
 TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
 {
-  const SmallModel once = unilateral_oscillator(.3, 1);
-  SmallModel twice = unilateral_oscillator(.3, 2);
+  const SmallModel once = unilateral_oscillator(0.3, 1);
+  SmallModel twice = unilateral_oscillator(0.3, 2);
   check(VecScale(twice.structure.load, 2));
   const LimitCycle a = cycle_of(once, 100, 5, 1e-11);
   REQUIRE(a.outcome.kind == OutcomeKind::converged);
@@ -35,7 +35,7 @@ TEST_CASE("doubling load and drive doubles the cycle and keeps its period")
 
 TEST_CASE("without instability the oscillator falls back to rest: collapsed, not converged")
 {
-  // mu_c = .1765: at .1 every motion decays
-  const LimitCycle cycle = cycle_of(unilateral_oscillator(.1, 1), 100, 5, 1e-8);
+  // mu_c = 0.1765: at 0.1 every motion decays
+  const LimitCycle cycle = cycle_of(unilateral_oscillator(0.1, 1), 100, 5, 1e-8);
   CHECK(cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium);
 }

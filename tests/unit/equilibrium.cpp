@@ -18,7 +18,7 @@ namespace
 /// held along the belt's motion by a spring at that height; nothing but contact holds y and theta.
 test::SmallModel overturning_block(double friction, double weight)
 {
-  const double b = .2, h = .15;
+  const double b = 0.2, h = 0.15;
   test::SmallModel model;
   const test::Rows K = test::diagonal({1e6, 0, 0});
   model.structure = test::make_structure(test::diagonal({1, 1, 1}), K, K, {0, -weight, 0});
@@ -55,7 +55,7 @@ test::SmallModel random_pads(std::size_t pairs, double friction, double load)
     force[3 * p] = load * draw(-3, 1);
     gap[p] = p % 3 == 0 ? 0 : load * draw(-2e-7, 3e-7);
     drive[2 * p] = draw(-1, 1);
-    drive[2 * p + 1] = draw(.1, 1);
+    drive[2 * p + 1] = draw(0.1, 1);
   }
   test::SmallModel model;
   model.structure = test::make_structure(test::diagonal(std::vector<double>(n, 1.)), K, K, force);
@@ -69,12 +69,12 @@ TEST_CASE("an overturning block: the feet share the weight as statics says, and 
 {
   // moments: r_1 - r_2 = 2 mu W h/b
   for (const double weight : {100., 1e8, 1e-4})
-    for (const double friction : {0., .2, .4, .6})
+    for (const double friction : {0., 0.2, 0.4, 0.6})
     {
       const auto model = overturning_block(friction, weight);
       const auto result = find_equilibrium(model.structure, model.interface, {});
       CHECK(result.outcome.kind == OutcomeKind::converged);
-      const double small = (.5 - friction * .75) * weight, large = weight - small;
+      const double small = (0.5 - friction * 0.75) * weight, large = weight - small;
       const std::vector<double>& r = result.reactions;
       CHECK(std::abs(std::min(r[0], r[2]) - small) < 1e-12 * weight);
       CHECK(std::abs(std::max(r[0], r[2]) - large) < 1e-12 * weight);
@@ -84,7 +84,7 @@ TEST_CASE("an overturning block: the feet share the weight as statics says, and 
       CHECK(result.outcome.residual < 1e-12);
       CHECK(result.closed == std::vector<char>{1, 1});
     }
-  for (const double friction : {.68, .7, 1., 5.})
+  for (const double friction : {0.68, 0.7, 1., 5.})
   {
     const auto model = overturning_block(friction, 100);
     const auto result = find_equilibrium(model.structure, model.interface, {});
@@ -98,7 +98,7 @@ TEST_CASE("pads that partly lift off: every law of the equilibrium, the fixed po
   std::vector<double> reference;
   for (const double load : {1., 1e6, 1e-6})
   {
-    const auto model = random_pads(40, .3, load);
+    const auto model = random_pads(40, 0.3, load);
     const auto result = find_equilibrium(model.structure, model.interface, {});
     CHECK(result.outcome.kind == OutcomeKind::converged);
     CHECK(result.outcome.residual < 1e-12); // rounding, after settling
@@ -116,8 +116,8 @@ TEST_CASE("pads that partly lift off: every law of the equilibrium, the fixed po
       CHECK(gap > -1e-20 * load);
       CHECK((result.closed[p] != 0) == (r_n > 0));
       CHECK((r_n == 0 || std::abs(gap) < 1e-20 * load)); // gaps of open pairs are 1e-7 load
-      CHECK(result.reactions[3 * p + 1] == .3 * r_n * e[2 * p]);
-      CHECK(result.reactions[3 * p + 2] == .3 * r_n * e[2 * p + 1]);
+      CHECK(result.reactions[3 * p + 1] == 0.3 * r_n * e[2 * p]);
+      CHECK(result.reactions[3 * p + 2] == 0.3 * r_n * e[2 * p + 1]);
       open += result.closed[p] ? 0 : 1;
     }
     CHECK(open > 5);
@@ -132,8 +132,8 @@ TEST_CASE("pads that partly lift off: every law of the equilibrium, the fixed po
 TEST_CASE("the oscillator at rest: closed, with the reaction of both springs")
 {
   // y: 1.7 y - 0.1 x = -1 and x: 1.1 x - 0.1 y = mu r, r = -1.2 y
-  const double mu = .3, y = -1 / (1.7 - .1 * (.1 - 1.2 * mu) / 1.1), r = -1.2 * y;
-  const auto model = test::unilateral_oscillator(mu, .6);
+  const double mu = 0.3, y = -1 / (1.7 - 0.1 * (0.1 - 1.2 * mu) / 1.1), r = -1.2 * y;
+  const auto model = test::unilateral_oscillator(mu, 0.6);
   const auto result = find_equilibrium(model.structure, model.interface, {});
   CHECK(result.outcome.kind == OutcomeKind::converged);
   CHECK(std::abs(result.reactions[0] - r) < 1e-14);
@@ -157,11 +157,11 @@ TEST_CASE("far from contact nothing is closed, and a body that nothing can hold 
   const test::Rows K = {{3, -1, 0}, {-1, 2, 0}, {0, 0, 0}}, held = {{3, -1, 0}, {-1, 2, 0}, {0, 0, 1}};
   const test::Rows B = {{1, 0, 0}, {0, 1, 0}};
   const auto open = test::make_structure(held, held, held, {-1, -2, 0});
-  const auto result = find_equilibrium(open, test::make_interface(B, 1, {5}, {1}, .3, open.K), {});
+  const auto result = find_equilibrium(open, test::make_interface(B, 1, {5}, {1}, 0.3, open.K), {});
   CHECK(result.outcome.kind == OutcomeKind::converged);
   CHECK(result.closed == std::vector<char>{0});
   CHECK(result.outcome.residual == 0);
   const auto loose = test::make_structure(held, held, K, {-1, -2, 0});
-  const auto interface = test::make_interface(B, 1, {0}, {1}, .3, loose.K);
+  const auto interface = test::make_interface(B, 1, {0}, {1}, 0.3, loose.K);
   CHECK_THROWS_WITH_AS(find_equilibrium(loose, interface, {}), doctest::Contains("dof 2"), Error);
 }

@@ -44,10 +44,10 @@ TEST_CASE("the energy balance of the unilateral oscillator has its exact roots")
   const struct
   {
     double V, exact, published;
-  } cases[] = {{.6, .471991674487, .471996196}, {1, .796805571968, .796797853}, {2, 1.612609298722, 1.612637123}};
+  } cases[] = {{0.6, 0.471991674487, 0.471996196}, {1, 0.796805571968, 0.796797853}, {2, 1.612609298722, 1.612637123}};
   for (const auto& [V, exact, published] : cases)
   {
-    const Found found = estimate_of(.3, V);
+    const Found found = estimate_of(0.3, V);
     CHECK(found.estimate.outcome.kind == OutcomeKind::balance);
     CHECK(found.estimate.amplitude * found.per_y == doctest::Approx(exact).epsilon(1e-10));
     CHECK(found.estimate.amplitude * found.per_y == doctest::Approx(published).epsilon(2e-5));
@@ -58,7 +58,7 @@ TEST_CASE("the energy balance of the unilateral oscillator has its exact roots")
 // A belt so fast that the sliding never reverses within the six decades leaves lift-off alone.
 TEST_CASE("lift-off alone balances weak friction and not strong friction")
 {
-  const Found weak = estimate_of(.18, 1e9), strong = estimate_of(.3, 1e9);
+  const Found weak = estimate_of(0.18, 1e9), strong = estimate_of(0.3, 1e9);
   CHECK(weak.estimate.amplitude * weak.per_y == doctest::Approx(1.574918604).epsilon(2e-9));
   CHECK(strong.estimate.outcome.kind == OutcomeKind::no_balance);
   CHECK(strong.estimate.amplitude == 0);
@@ -66,13 +66,13 @@ TEST_CASE("lift-off alone balances weak friction and not strong friction")
 
 TEST_CASE("at small amplitude the interface and the damping make the mode's growth")
 {
-  for (const double mu : {.3, .18})
+  for (const double mu : {0.3, 0.18})
   {
     const Found found = estimate_of(mu, 1);
     const Estimate& estimate = found.estimate;
     const double growth = 2 * found.mode.growth_rate();
     // The reaction is taken at i w instead of lambda, which leaves the inertia of one row times the growth: 1 % here.
-    CHECK(estimate.friction_rate_linear - estimate.damping_rate == approx(growth, .015));
+    CHECK(estimate.friction_rate_linear - estimate.damping_rate == approx(growth, 0.015));
     // Two decades below the first event, where the curve starts, the force is linear: quadrature and rounding only.
     CHECK(estimate.curve_rate[0] == approx(estimate.friction_rate_linear, 1e-10));
   }
@@ -80,10 +80,10 @@ TEST_CASE("at small amplitude the interface and the damping make the mode's grow
 
 TEST_CASE("the start has its reaction at the largest, and is the mode's own motion")
 {
-  const Found found = estimate_of(.3, 1);
+  const Found found = estimate_of(0.3, 1);
   const std::complex<double> rho = found.mode.reactions[0] * std::polar(1., found.estimate.phase);
   CHECK(rho.real() == doctest::Approx(std::abs(rho)).epsilon(1e-12));
-  const double q = .01, h = 1e-4;
+  const double q = 0.01, h = 1e-4;
   const State start = mode_state(found.equilibrium, found.mode, q, found.estimate.phase);
   const std::complex<double> later = std::exp(found.mode.lambda * h);
   const State next =

@@ -27,12 +27,12 @@ struct Stack
 Stack stack()
 {
   Stack s;
-  s.scene.parts = {{"disc", {210e9, .3, 7850}, 0, {}}, {"pad", {1e9, .2, 2000}, 0, {}}};
-  s.scene.friction.coefficient = .3;
+  s.scene.parts = {{"disc", {210e9, 0.3, 7850}, 0, {}}, {"pad", {1e9, 0.2, 2000}, 0, {}}};
+  s.scene.friction.coefficient = 0.3;
   s.scene.contacts = {{"disc:z+", "pad:z-", 1e-4, {}, {}, Rotation{{0, 0, 1}, {0, 0, 0}, 20}, {}}};
-  add_box(s.mesh, "disc", 0, {.1, .1, -.1}, {.3, .2, 0}, {2, 2, 1});
+  add_box(s.mesh, "disc", 0, {0.1, 0.1, -0.1}, {0.3, 0.2, 0}, {2, 2, 1});
   Mesh pad; // built apart, so that coincident nodes stay apart
-  add_box(pad, "pad", 1, {.1, .1, 0}, {.3, .2, .1}, {2, 2, 1});
+  add_box(pad, "pad", 1, {0.1, 0.1, 0}, {0.3, 0.2, 0.1}, {2, 2, 1});
   const auto shift = static_cast<int>(s.mesh.nodes.size());
   s.mesh.nodes.insert(s.mesh.nodes.end(), pad.nodes.begin(), pad.nodes.end());
   for (Element element : pad.elements)
@@ -92,7 +92,7 @@ TEST_CASE("a pad that lifts opens every gap, one that rides with its disc none")
   REQUIRE(interface.pairs == 9);
   REQUIRE(interface.directions == 2);
   const auto lifted = relative(interface, sample_pad(joined.structure, rigid_motion({0, 0, 2}, {})));
-  const auto ridden = relative(interface, sample(joined.structure, rigid_motion({1, 2, 3}, {.4, .5, .6})));
+  const auto ridden = relative(interface, sample(joined.structure, rigid_motion({1, 2, 3}, {0.4, 0.5, 0.6})));
   for (std::size_t i = 0; i < interface.size(); ++i)
   {
     CHECK(lifted[i] == doctest::Approx(i % 3 == 0 ? 2 : 0).epsilon(round_off));
@@ -163,14 +163,14 @@ TEST_CASE("one tangent is plane friction along it")
 TEST_CASE("friction without a drive, and a pair that cannot part, are refused")
 {
   auto s = stack();
-  s.scene.contacts[0].rotation->centre = {.1, .1, 0}; // a corner pair sits on the axis
+  s.scene.contacts[0].rotation->centre = {0.1, 0.1, 0}; // a corner pair sits on the axis
   CHECK_THROWS_WITH_AS(join(s), doctest::Contains("at (0.100000, 0.100000, 0.000000) has no tangential drive"), Error);
   s.scene.friction.coefficient = 0;
   CHECK_NOTHROW(join(s));
   s.scene.supports = {{"disc", all}, {"pad:z-", {false, false, true}}};
   CHECK_THROWS_WITH_AS(join(s), doctest::Contains("cannot move along its normal"), Error);
   s.scene.supports.clear();
-  s.scene.rigid_bodies = {{"both", {"disc:z+", "pad:z-"}, {.7, .1, .3}, 1, {}, all}}; // one body on both sides
+  s.scene.rigid_bodies = {{"both", {"disc:z+", "pad:z-"}, {0.7, 0.1, 0.3}, 1, {}, all}}; // one body on both sides
   add_points(s.mesh, s.scene);
   CHECK_THROWS_WITH_AS(join(s), doctest::Contains("cannot move along its normal"), Error);
 }

@@ -1,14 +1,15 @@
 // ranks: 1 2 3
 // Matrix scenes: what is written is what is read, on any number of ranks, and a damaged folder is one message.
+#include "../support/temporary_folder.hpp"
 #include "squeal/contact/interface.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>
 #include <fstream>
 #include <limits>
-#include <unistd.h>
 
 using namespace squeal;
+using test::TemporaryFolder;
 
 namespace
 {
@@ -16,26 +17,6 @@ namespace
 using Dense = std::vector<std::vector<double>>;
 
 const MPI_Comm& world = PETSC_COMM_WORLD; // set when the session starts
-
-/// A folder of its own for every test, removed when the test ends.
-struct Folder
-{
-  std::filesystem::path path;
-
-  explicit Folder(const std::string& name)
-  {
-    int process = getpid();
-    MPI_Bcast(&process, 1, MPI_INT, 0, world);
-    path = std::filesystem::temp_directory_path() / ("squeal_" + name + "_" + std::to_string(process));
-    if (rank_of(world) == 0) std::filesystem::create_directories(path);
-    MPI_Barrier(world);
-  }
-  ~Folder()
-  {
-    MPI_Barrier(world);
-    if (rank_of(world) == 0) std::filesystem::remove_all(path);
-  }
-};
 
 void write(const std::filesystem::path& file, const Dense& rows)
 {
@@ -78,15 +59,15 @@ void write(const std::filesystem::path& file, const std::vector<double>& values)
 void write_scene(const std::filesystem::path& folder)
 {
   write(folder / "M.petsc", Dense{{2, 0, 0, 0}, {0, 2, 0, 0}, {0, 0, 3, 0}, {0, 0, 0, 3}});
-  write(folder / "C.petsc", Dense{{.1, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, .2}});
+  write(folder / "C.petsc", Dense{{0.1, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0.2}});
   write(folder / "K.petsc", Dense{{5, -1, 0, 0}, {-1, 6, 0, -2}, {0, 0, 7, 0}, {0, -2, 0, 8}});
   write(folder / "F.petsc", std::vector<double>{0, -1, 0, -2});
   write(folder / "B.petsc", Dense{{0, 1, 0, 0}, {1, 0, 0, 0}, {0, 0, 0, 1}, {0, 0, 1, 0}});
   write(folder / "gap.petsc", std::vector<double>{0, 1e-3});
-  write(folder / "drive.petsc", std::vector<double>{3, -.5});
+  write(folder / "drive.petsc", std::vector<double>{3, -0.5});
 }
 
-const FrictionLaw friction{.coefficient = .3, .direction_damping = true};
+const FrictionLaw friction{.coefficient = 0.3, .direction_damping = true};
 
 std::string message(const std::filesystem::path& folder)
 {
@@ -142,13 +123,13 @@ double form(Mat A, const std::vector<double>& x, const std::vector<double>& y)
 
 TEST_CASE("a folder of matrices is read as it was written, with one pattern")
 {
-  const Folder folder("read");
+  const TemporaryFolder folder;
   write_scene(folder.path);
   const auto structure = read_structure(folder.path, world);
   // Entries are copied, never computed: equality is exact.
   const std::vector<double> x{1, 2, 3, 4}, y{1, -1, 2, 5};
   CHECK(form(structure.M, x, y) == 2 - 4 + 18 + 60);
-  CHECK(form(structure.C, x, y) == doctest::Approx(.1 + 4).epsilon(1e-15));
+  CHECK(form(structure.C, x, y) == doctest::Approx(0.1 + 4).epsilon(1e-15));
   CHECK(form(structure.K, x, y) == (5 + 1) + 2 * (-1 - 6 - 10) + 3 * 14 + 4 * (2 + 40));
   double load = 0;
   check(VecSum(structure.load, &load));
@@ -168,7 +149,7 @@ TEST_CASE("a folder of matrices is read as it was written, with one pattern")
 
 TEST_CASE("relative and add_reactions are B x and B'r, whole on every rank")
 {
-  const Folder folder("operators");
+  const TemporaryFolder folder;
   write_scene(folder.path);
   const auto structure = read_structure(folder.path, world);
   const auto interface = read_interface(folder.path, structure, friction, world);
@@ -188,7 +169,7 @@ TEST_CASE("relative and add_reactions are B x and B'r, whole on every rank")
 
 TEST_CASE("a damaged folder is one message on every rank")
 {
-  const Folder folder("damaged");
+  const TemporaryFolder folder;
   const auto& path = folder.path;
   write_scene(path);
   REQUIRE(message(path) == "");

@@ -1,5 +1,5 @@
 // ranks: 1 2 3
-#include "squeal/base/petsc.hpp"
+#include "../support/temporary_folder.hpp"
 #include "squeal/mesh/build.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/node_pairs.hpp"
@@ -7,11 +7,9 @@
 #include "squeal/mesh/shapes.hpp"
 
 #include <doctest/doctest.h>
-#include <fstream>
 #include <functional>
 #include <numeric>
 #include <set>
-#include <unistd.h>
 
 using namespace squeal;
 
@@ -20,29 +18,17 @@ namespace
 
 const MPI_Comm comm = MPI_COMM_WORLD;
 
-// A file that lives as long as the object, written by rank 0 under a name no other process has.
+/// A file of this text and extension in a folder of its own.
 class TemporaryFile
 {
 public:
-  TemporaryFile(const std::string& text, const std::string& extension)
+  TemporaryFile(const std::string& text, const std::string& extension) : path_(folder_.write("file" + extension, text))
   {
-    static int count = 0;
-    int process = static_cast<int>(getpid());
-    MPI_Bcast(&process, 1, MPI_INT, 0, comm);
-    path_ = std::filesystem::temp_directory_path() /
-            ("squeal-mesh-" + std::to_string(process) + "-" + std::to_string(count++) + extension);
-    if (rank_of(comm) == 0) std::ofstream(path_) << text;
   }
-  ~TemporaryFile()
-  {
-    MPI_Barrier(comm);
-    if (rank_of(comm) == 0) std::filesystem::remove(path_);
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
   const std::filesystem::path& path() const { return path_; }
 
 private:
+  test::TemporaryFolder folder_;
   std::filesystem::path path_;
 };
 
@@ -301,7 +287,7 @@ TEST_CASE("an empty mesh is an error, and so are tetrahedra that lock")
 TEST_CASE("parameters are found in lists, with braces, comments and includes")
 {
   const TemporaryFile inner("DefineConstant[ deep = 1 ];", ".geo");
-  const TemporaryFile outer("Include \"" + inner.path().filename().string() +
+  const TemporaryFile outer("Include \"" + inner.path().string() +
                                 "\";\nDefineConstant[ a = {1, Min 0, Name \"b = 2\"} // c = 3\n, d, e=4*(1+2) ]; /*" +
                                 std::string(1000000, 'x') + "*/",
                             ".geo");

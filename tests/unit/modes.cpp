@@ -37,18 +37,18 @@ SmallModel crowded_model(int dofs, int pairs)
   {
     mass[i] = 1.5 + random(generator);
     K[i][i] = 10. + 10. * static_cast<double>(i);
-    C[i][i] = .01 * mass[i] + 1e-4 * K[i][i];
+    C[i][i] = 0.01 * mass[i] + 1e-4 * K[i][i];
     if (i > 0) K[i][i - 1] = K[i - 1][i] = -3;
     if (i > 0) C[i][i - 1] = C[i - 1][i] = -3e-4;
   }
   for (std::vector<double>& row : B)
     for (std::size_t j = 0; j < 5; ++j) row[j] = random(generator);
   std::vector<double> drive;
-  for (int i = 0; i < pairs; ++i) drive.insert(drive.end(), {.6, .8});
+  for (int i = 0; i < pairs; ++i) drive.insert(drive.end(), {0.6, 0.8});
   SmallModel model;
   model.structure = make_structure(diagonal(mass), C, K, std::vector<double>(n, 0.));
   model.interface =
-      make_interface(B, 2, std::vector<double>(static_cast<std::size_t>(pairs), 0.), drive, .3, model.structure.K);
+      make_interface(B, 2, std::vector<double>(static_cast<std::size_t>(pairs), 0.), drive, 0.3, model.structure.K);
   return model;
 }
 
@@ -58,7 +58,7 @@ Equilibrium all_closed(const SmallModel& model)
   equilibrium.outcome.kind = OutcomeKind::converged;
   equilibrium.u = zeros_like(model.structure.load);
   for (int i = 0; i < model.interface.pairs; ++i)
-    equilibrium.reactions.insert(equilibrium.reactions.end(), {2, .36, .48});
+    equilibrium.reactions.insert(equilibrium.reactions.end(), {2, 0.36, 0.48});
   equilibrium.closed.assign(static_cast<std::size_t>(model.interface.pairs), 1);
   return equilibrium;
 }
@@ -89,7 +89,7 @@ TEST_CASE("B_n Z = 0 and (B_n + mu e.B_t) Y = 0, though every pair shares its de
     for (Eigen::Index i = 0; i < 9; i += 3)
     {
       CHECK(std::abs(Z(i, column)) < 1e-13);
-      CHECK(std::abs(Y(i, column) + mu * (.6 * Y(i + 1, column) + .8 * Y(i + 2, column))) < 1e-13);
+      CHECK(std::abs(Y(i, column) + mu * (0.6 * Y(i + 1, column) + 0.8 * Y(i + 2, column))) < 1e-13);
     }
 }
 
@@ -111,8 +111,8 @@ TEST_CASE("the equations of the structure hold with the reactions of each mode, 
     std::vector<double> r, s;
     for (const Complex rho : mode.reactions)
     {
-      r.insert(r.end(), {-rho.real(), -.3 * .6 * rho.real(), -.3 * .8 * rho.real()});
-      s.insert(s.end(), {-rho.imag(), -.3 * .6 * rho.imag(), -.3 * .8 * rho.imag()});
+      r.insert(r.end(), {-rho.real(), -0.3 * 0.6 * rho.real(), -0.3 * 0.8 * rho.real()});
+      s.insert(s.end(), {-rho.imag(), -0.3 * 0.6 * rho.imag(), -0.3 * 0.8 * rho.imag()});
     }
     add_reactions(model.interface, r, real);
     add_reactions(model.interface, s, imaginary);
@@ -130,13 +130,13 @@ TEST_CASE("C_f resists turning of the friction force and nothing else")
   const SmallModel model = crowded_model(12, 1);
   const Equilibrium equilibrium = all_closed(model);
   const Owned<Mat> Cf = direction_damping(model.interface, equilibrium.closed, equilibrium.reactions);
-  const Owned<Vec> v = vector_like(model.structure.K, {1, -2, .5, 3, 1, 0, 0, 0, 0, 0, 0, 0}), force = zeros_like(v);
+  const Owned<Vec> v = vector_like(model.structure.K, {1, -2, 0.5, 3, 1, 0, 0, 0, 0, 0, 0, 0}), force = zeros_like(v);
   check(MatMult(Cf, v, force));
   double power = 0;
   check(VecDot(v, force, &power));
   const std::vector<double> s = relative(model.interface, v);
-  const double across = -.8 * s[1] + .6 * s[2]; // speed across the drive, |v_d| = 1
-  CHECK(power == doctest::Approx(.3 * 2 * across * across).epsilon(1e-13));
+  const double across = -0.8 * s[1] + 0.6 * s[2]; // speed across the drive, |v_d| = 1
+  CHECK(power == doctest::Approx(0.3 * 2 * across * across).epsilon(1e-13));
 }
 
 TEST_CASE("a pair that the others already hold is an error that names it")
@@ -146,7 +146,7 @@ TEST_CASE("a pair that the others already hold is an error that names it")
       {0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, {0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0}};
   Rows twice = one;
   twice.insert(twice.end(), one.begin(), one.end());
-  model.interface = make_interface(twice, 2, {0, 0}, {1, 0, 1, 0}, .3, model.structure.K);
+  model.interface = make_interface(twice, 2, {0, 0}, {1, 0, 1, 0}, 0.3, model.structure.K);
   CHECK_THROWS_WITH_AS(eliminate_closed_pairs(model.structure, model.interface, all_closed(model).closed),
                        doctest::Contains("contact pair 1"), Error);
 }
@@ -179,7 +179,7 @@ TEST_CASE("residual passes bring the growth rate of a truncated basis to that of
     REQUIRE(modes.projected.size() == modes.modes.size());
     double error = 0;
     for (const ComplexMode& mode : modes.projected) error = std::max(error, mode.backward_error);
-    CHECK((error < .3 * before || error < 1e-13)); // each pass divides by (omega/omega_20)^2 or better
+    CHECK((error < 0.3 * before || error < 1e-13)); // each pass divides by (omega/omega_20)^2 or better
     before = error;
   }
   CHECK(before < 1e-7);

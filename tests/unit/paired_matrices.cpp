@@ -18,7 +18,7 @@ Owned<Mat> striped(PetscInt size, PetscInt every)
   check(MatGetOwnershipRange(A, &first, &last));
   for (PetscInt i = first; i < last; ++i)
     for (PetscInt j = i % every; j < size; j += every)
-      check(MatSetValue(A, i, j, std::cos(static_cast<double>(i + j)) + .1 * static_cast<double>(i * j % 5),
+      check(MatSetValue(A, i, j, std::cos(static_cast<double>(i + j)) + 0.1 * static_cast<double>(i * j % 5),
                         INSERT_VALUES));
   check(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
@@ -32,7 +32,7 @@ Owned<Vec> wave(Mat A, double number)
   PetscInt first = 0, last = 0;
   check(VecGetOwnershipRange(x, &first, &last));
   for (PetscInt i = first; i < last; ++i)
-    check(VecSetValue(x, i, std::sin(number + .3 * static_cast<double>(i)), INSERT_VALUES));
+    check(VecSetValue(x, i, std::sin(number + 0.3 * static_cast<double>(i)), INSERT_VALUES));
   check(VecAssemblyBegin(x));
   check(VecAssemblyEnd(x));
   return x;

@@ -1,4 +1,5 @@
 // ranks: 1 2 3
+#include "../support/temporary_folder.hpp"
 #include "squeal/model.hpp"
 #include "squeal/report/fields.hpp"
 #include "squeal/report/files.hpp"
@@ -14,34 +15,14 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <sstream>
-#include <unistd.h>
 
 using namespace squeal;
+using test::TemporaryFolder;
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 namespace
 {
-
-/// A folder of its own, the same on every rank; rank 0 removes it.
-struct Folder
-{
-  fs::path path;
-  Folder()
-  {
-    std::string pattern = (fs::temp_directory_path() / "squeal-report-XXXXXX").string();
-    if (rank_of(PETSC_COMM_WORLD) == 0) REQUIRE(mkdtemp(pattern.data()) != nullptr);
-    MPI_Bcast(pattern.data(), static_cast<int>(pattern.size()), MPI_CHAR, 0, PETSC_COMM_WORLD);
-    path = pattern;
-  }
-  ~Folder()
-  {
-    MPI_Barrier(PETSC_COMM_WORLD);
-    if (rank_of(PETSC_COMM_WORLD) == 0) fs::remove_all(path);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-};
 
 std::string text_of(const fs::path& file)
 {
@@ -205,7 +186,7 @@ void check_middles(const std::vector<double>& topology, std::size_t at, const Ed
 
 TEST_CASE("fields: every set the XDMF names is in the file with that shape, and nodes follow VTK's order")
 {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Model model = one_of_each();
   write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path, PETSC_COMM_WORLD);
   if (rank_of(PETSC_COMM_WORLD) != 0) return;
@@ -238,7 +219,7 @@ TEST_CASE("fields: every set the XDMF names is in the file with that shape, and 
 
 TEST_CASE("history: one entry a step, statuses as step by pair")
 {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Model model = one_of_each();
   write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path, PETSC_COMM_WORLD);
   if (rank_of(PETSC_COMM_WORLD) != 0) return;
@@ -302,7 +283,7 @@ TEST_CASE("the table never shows figures of a cycle that did not converge")
 
 TEST_CASE("a folder that cannot be written is an error on every rank, and nothing is left half-written")
 {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Model model = one_of_each();
   on_rank_zero(PETSC_COMM_WORLD, [&] { write_text(folder.path / "taken", "a file where the folder should be"); });
   CHECK_THROWS_AS(
@@ -320,7 +301,7 @@ TEST_CASE("a folder that cannot be written is an error on every rank, and nothin
 
 TEST_CASE("a matrix scene has no mesh to draw: fields of an earlier run are removed")
 {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Model model = one_of_each();
   Scene scene = scene_of_test();
   write_results(full_report(model), scene, nodes_of(model), folder.path, PETSC_COMM_WORLD);

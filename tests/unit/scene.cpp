@@ -1,37 +1,15 @@
 // ranks: 1
 #include "squeal/scene/scene.hpp"
-#include "squeal/base/petsc.hpp"
+#include "../support/temporary_folder.hpp"
 
-#include <cstdlib>
 #include <doctest/doctest.h>
-#include <fstream>
-#include <unistd.h>
 
 using namespace squeal;
+using test::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace
 {
-
-/// A folder of its own for the scene files of one test.
-struct Folder
-{
-  fs::path path;
-  Folder()
-  {
-    std::string pattern = (fs::temp_directory_path() / "squeal-scene-XXXXXX").string();
-    path = mkdtemp(pattern.data());
-  }
-  ~Folder() { fs::remove_all(path); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  fs::path write(const std::string& name, const std::string& text) const
-  {
-    std::ofstream(path / name) << text;
-    return path / name;
-  }
-};
 
 const std::string brake = R"(title = "a \"small\" brake"
 [mesh]
@@ -127,7 +105,7 @@ coefficient = 0.3
 /// The text of the error that reading `text` gives; empty if it is read.
 std::string error_of(const std::string& text, const std::vector<std::string>& overrides)
 {
-  const Folder folder;
+  const TemporaryFolder folder;
   folder.write("brake.geo", "");
   folder.write("state.bin", "");
   fs::create_directory(folder.path / "matrices");
@@ -165,7 +143,7 @@ void check_message(const std::string& message, const std::vector<std::string>& p
 
 TEST_CASE("every key reaches its member, in SI units, with unit directions and absolute paths")
 {
-  const Folder folder;
+  const TemporaryFolder folder;
   folder.write("brake.geo", "");
   folder.write("state.bin", "");
   const Scene s = read_scene(folder.write("scene.toml", brake), {});
@@ -211,7 +189,7 @@ TEST_CASE("every key reaches its member, in SI units, with unit directions and a
 
 TEST_CASE("the resolved text of a scene reads back as the same scene")
 {
-  const Folder folder, elsewhere; // paths are absolute, so the resolved scene may lie anywhere
+  const TemporaryFolder folder, elsewhere; // paths are absolute, so the resolved scene may lie anywhere
   folder.write("brake.geo", "");
   folder.write("state.bin", "");
   fs::create_directory(folder.path / "matrices");
@@ -227,7 +205,7 @@ TEST_CASE("the resolved text of a scene reads back as the same scene")
 
 TEST_CASE("a title of any characters comes through --set and the resolved text")
 {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string title = "C:\\tmp \"squeal\",\ta second\nline at 20 °C";
   const Scene scene = read_scene(folder.write("a.toml", points), {"title=" + title});
   CHECK(scene.title == title);
@@ -236,7 +214,7 @@ TEST_CASE("a title of any characters comes through --set and the resolved text")
 
 TEST_CASE("stages after the estimate run when their table is there, unless it says otherwise")
 {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Scene plain = read_scene(folder.write("a.toml", points), {});
   CHECK(plain.modes.enabled);
   CHECK(plain.estimate.enabled);
@@ -249,7 +227,7 @@ TEST_CASE("stages after the estimate run when their table is there, unless it sa
 
 TEST_CASE("an override reaches any key: by table, by name in a list, by index, as a bare word")
 {
-  const Folder folder;
+  const TemporaryFolder folder;
   folder.write("brake.geo", "");
   folder.write("state.bin", "");
   const Scene s = read_scene(folder.write("scene.toml", brake),

@@ -16,7 +16,7 @@ namespace
 
 const MPI_Comm& world = PETSC_COMM_WORLD; // set when the session starts
 constexpr double round_off = 1e-12;
-const Material steel{210e9, .3, 7850};
+const Material steel{210e9, 0.3, 7850};
 const Motions all{true, true, true, true, true, true};
 
 Scene one_part()
@@ -74,10 +74,10 @@ std::string message(const Mesh& mesh, const Scene& scene)
 TEST_CASE("a free body feels no force in a rigid motion, and has its mass and inertia")
 {
   const Scene scene = one_part();
-  const Vec3 size{.3, .2, .1};
+  const Vec3 size{0.3, 0.2, 0.1};
   const auto built = build(box(size, {3, 2, 2}), scene, world);
   CHECK(built.dofs.size == 3 * 4 * 3 * 3);
-  for (const auto& motion : {rigid_motion({1, 2, 3}, {}), rigid_motion({}, {1, -2, .5})})
+  for (const auto& motion : {rigid_motion({1, 2, 3}, {}), rigid_motion({}, {1, -2, 0.5})})
     CHECK(relative_force(built.structure.K, sample(built.structure, motion)) < round_off);
   const double mass = 7850 * size[0] * size[1] * size[2];
   const auto x = sample(built.structure, rigid_motion({1, 0, 0}, {}));
@@ -91,10 +91,10 @@ TEST_CASE("the matrices do not depend on the number of ranks")
 {
   Scene scene = one_part();
   scene.damping = {3, 1e-6};
-  scene.rigid_bodies = {{"cap", {"block:z+"}, {.1, .1, .2}, 2, {.1, .2, .3, .01, .02, .03}, all}};
+  scene.rigid_bodies = {{"cap", {"block:z+"}, {0.1, 0.1, 0.2}, 2, {0.1, 0.2, 0.3, 0.01, 0.02, 0.03}, all}};
   scene.springs = {{"cap", "ground", {0, 0, 1}, 1e6, 5}};
   Mesh mesh;
-  add_box(mesh, "block", 0, {}, {.3, .2, .1}, {3, 3, 3});
+  add_box(mesh, "block", 0, {}, {0.3, 0.2, 0.1}, {3, 3, 3});
   scene.supports = {{"block:z-", all}};
   scene.pressures = {{"block:y+", 2e5}};
   add_points(mesh, scene);
@@ -111,8 +111,8 @@ TEST_CASE("the matrices do not depend on the number of ranks")
 TEST_CASE("M, C and K have one pattern, counted exactly before they are filled")
 {
   Scene scene = one_part();
-  scene.rigid_bodies = {{"cap", {"block:z+"}, {.1, .1, .2}, 2, {}, all}};
-  Mesh mesh = box({.3, .2, .1}, {3, 2, 2});
+  scene.rigid_bodies = {{"cap", {"block:z+"}, {0.1, 0.1, 0.2}, 2, {}, all}};
+  Mesh mesh = box({0.3, 0.2, 0.1}, {3, 2, 2});
   add_points(mesh, scene);
   const auto built = build(mesh, scene, world);
   std::array<double, 3> entries{};
@@ -136,7 +136,7 @@ TEST_CASE("damping is alpha M + beta K, of the part where it has its own")
 {
   Scene scene = one_part();
   scene.damping = {3, 1e-6};
-  const Mesh mesh = box({.3, .2, .1}, {2, 2, 2});
+  const Mesh mesh = box({0.3, 0.2, 0.1}, {2, 2, 2});
   const auto of_form = [&](double alpha, double beta)
   {
     const auto built = build(mesh, scene, world);
@@ -151,15 +151,15 @@ TEST_CASE("damping is alpha M + beta K, of the part where it has its own")
 
 TEST_CASE("points, springs and dashpots give the oscillator's matrices")
 {
-  // K_pad = [[1.1, -.1], [-.1, .5]]: springs 1 along x, .4 along y, .2 along the diagonal (1, -1)/sqrt(2).
-  const double s = std::sqrt(.5);
+  // K_pad = [[1.1, -0.1], [-0.1, 0.5]]: springs 1 along x, 0.4 along y, 0.2 along the diagonal (1, -1)/sqrt(2).
+  const double s = std::sqrt(0.5);
   Scene scene;
-  scene.points = {{"pad", {0, 0, 0}, 1, {true, true}}, {"disc", {0, 0, 0}, .5, {false, true}}};
-  scene.springs = {{"pad", "ground", {1, 0, 0}, 1, .02},
-                   {"pad", "ground", {0, 1, 0}, .4, .02},
-                   {"ground", "pad", {s, -s, 0}, .2, 0},
-                   {"disc", "ground", {0, 1, 0}, 1.2, .02},
-                   {"disc", "pad", {0, 1, 0}, 5, .3}};
+  scene.points = {{"pad", {0, 0, 0}, 1, {true, true}}, {"disc", {0, 0, 0}, 0.5, {false, true}}};
+  scene.springs = {{"pad", "ground", {1, 0, 0}, 1, 0.02},
+                   {"pad", "ground", {0, 1, 0}, 0.4, 0.02},
+                   {"ground", "pad", {s, -s, 0}, 0.2, 0},
+                   {"disc", "ground", {0, 1, 0}, 1.2, 0.02},
+                   {"disc", "pad", {0, 1, 0}, 5, 0.3}};
   scene.forces = {{"pad", {0, -1, 0}}};
   Mesh mesh;
   add_points(mesh, scene);
@@ -167,9 +167,9 @@ TEST_CASE("points, springs and dashpots give the oscillator's matrices")
   const DofMap dofs = number_dofs(mesh, scene, partition, world);
   const Structure structure = assemble(mesh, scene, partition, dofs, world);
   REQUIRE(dofs.size == 3); // pad x, pad y, disc y
-  const double M[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, .5}};
-  const double C[3][3] = {{.02, 0, 0}, {0, .32, -.3}, {0, -.3, .32}};
-  const double K[3][3] = {{1.1, -.1, 0}, {-.1, 5.5, -5}, {0, -5, 6.2}};
+  const double M[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 0.5}};
+  const double C[3][3] = {{0.02, 0, 0}, {0, 0.32, -0.3}, {0, -0.3, 0.32}};
+  const double K[3][3] = {{1.1, -0.1, 0}, {-0.1, 5.5, -5}, {0, -5, 6.2}};
   for (PetscInt i = dofs.first; i < dofs.last; ++i)
     for (PetscInt j = 0; j < 3; ++j)
     {
@@ -188,20 +188,20 @@ TEST_CASE("points, springs and dashpots give the oscillator's matrices")
 TEST_CASE("a rigid body is the exact constraint u = u_ref + theta x r")
 {
   Scene scene = one_part();
-  Mesh mesh = box({.3, .2, .1}, {3, 2, 2});
+  Mesh mesh = box({0.3, 0.2, 0.1}, {3, 2, 2});
   const auto unconstrained = build(mesh, scene, world);
-  const Vec3 reference{.1, .4, .3};
-  const double m = 5, Ixx = .3, Iyy = .2, Izz = .4, Ixy = .05, Iyz = -.02, Izx = .01;
+  const Vec3 reference{0.1, 0.4, 0.3};
+  const double m = 5, Ixx = 0.3, Iyy = 0.2, Izz = 0.4, Ixy = 0.05, Iyz = -0.02, Izx = 0.01;
   scene.rigid_bodies = {{"cap", {"block:z+", "block:x+"}, reference, m, {Ixx, Iyy, Izz, Ixy, Iyz, Izx}, all}};
   scene.forces = {{"block:x+", {0, 700, 0}}};
   add_points(mesh, scene);
   const auto built = build(mesh, scene, world);
   const auto& structure = built.structure;
   // The cap moves rigidly, all else is held still: the energies are those of the free block moved alike at its nodes.
-  const Vec3 shift{1e-3, -2e-3, 3e-3}, turn{.02, -.03, .05};
+  const Vec3 shift{1e-3, -2e-3, 3e-3}, turn{0.02, -0.03, 0.05};
   const auto cap = [&](const Vec3& x) -> std::array<double, 6>
   {
-    const bool tied = x[2] > .1 - 1e-9 || x[0] > .3 - 1e-9;
+    const bool tied = x[2] > 0.1 - 1e-9 || x[0] > 0.3 - 1e-9;
     if (!tied) return {};
     const Vec3 u = shift + cross(turn, x - reference);
     return {u[0], u[1], u[2], turn[0], turn[1], turn[2]};
@@ -212,18 +212,18 @@ TEST_CASE("a rigid body is the exact constraint u = u_ref + theta x r")
                         2 * (Ixy * turn[0] * turn[1] + Iyz * turn[1] * turn[2] + Izx * turn[2] * turn[0]);
   CHECK(form(structure.M, u, u) ==
         approx(form(unconstrained.structure.M, nodal, nodal) + m * dot(shift, shift) + rotary, round_off));
-  CHECK(relative_force(structure.K, sample(structure, rigid_motion({1, 2, 3}, {.4, .5, .6}))) < round_off);
+  CHECK(relative_force(structure.K, sample(structure, rigid_motion({1, 2, 3}, {0.4, 0.5, 0.6}))) < round_off);
   // Its face's force arrives at the reference point with its moment: work = F . u(face centre).
-  const auto rigid = rigid_motion({1, 2, 3}, {.4, .5, .6});
-  CHECK(work(structure, rigid) == approx(700 * rigid({.3, .1, .05})[1], round_off));
+  const auto rigid = rigid_motion({1, 2, 3}, {0.4, 0.5, 0.6});
+  CHECK(work(structure, rigid) == approx(700 * rigid({0.3, 0.1, 0.05})[1], round_off));
 }
 
 TEST_CASE("a rigid body that may only move along its normal carries one degree of freedom")
 {
   Scene scene = one_part();
-  scene.rigid_bodies = {{"cap", {"block:z+"}, {.15, .1, .2}, 5, {}, {false, false, true}}};
+  scene.rigid_bodies = {{"cap", {"block:z+"}, {0.15, 0.1, 0.2}, 5, {}, {false, false, true}}};
   scene.supports = {{"block:z-", all}, {"block:z+", {true, true}}}; // the second holds what the body holds: no quarrel
-  Mesh mesh = box({.3, .2, .1}, {3, 2, 1});
+  Mesh mesh = box({0.3, 0.2, 0.1}, {3, 2, 1});
   add_points(mesh, scene);
   const auto built = build(mesh, scene, world);
   CHECK(built.dofs.size == 1);
@@ -235,18 +235,18 @@ TEST_CASE("a pressure presses with p A against the outward normal, a force is sh
   Scene scene = one_part();
   scene.pressures = {{"block:z+", 3e5}};
   scene.forces = {{"block:x-", {10, 20, 30}}};
-  const auto built = build(box({.3, .2, .1}, {3, 2, 2}), scene, world);
+  const auto built = build(box({0.3, 0.2, 0.1}, {3, 2, 2}), scene, world);
   CHECK(work(built.structure, rigid_motion({1, 0, 0}, {})) == approx(10, round_off));
   CHECK(work(built.structure, rigid_motion({0, 1, 0}, {})) == approx(20, round_off));
-  CHECK(work(built.structure, rigid_motion({0, 0, 1}, {})) == approx(30 - 3e5 * .06, round_off));
+  CHECK(work(built.structure, rigid_motion({0, 0, 1}, {})) == approx(30 - 3e5 * 0.06, round_off));
 }
 
 TEST_CASE("a probe reads the node it names")
 {
   const Scene scene = one_part();
-  const Mesh mesh = box({.3, .2, .1}, {3, 2, 2});
+  const Mesh mesh = box({0.3, 0.2, 0.1}, {3, 2, 2});
   const auto built = build(mesh, scene, world);
-  const std::vector<Probe> probes{{"tip", "block:x+", Vec3{.31, .19, .09}, {0, .6, .8}}};
+  const std::vector<Probe> probes{{"tip", "block:x+", Vec3{0.31, 0.19, 0.09}, {0, 0.6, 0.8}}};
   const auto P = probe_rows(probes, mesh, built.dofs, world);
   const auto u = sample(built.structure, wavy);
   Owned<Vec> values;
@@ -254,8 +254,8 @@ TEST_CASE("a probe reads the node it names")
   check(MatMult(P, u, values));
   double read = 0;
   check(VecSum(values, &read));
-  const auto expected = wavy({.3, .2, .1});
-  CHECK(read == approx(.6 * expected[1] + .8 * expected[2], round_off));
+  const auto expected = wavy({0.3, 0.2, 0.1});
+  CHECK(read == approx(0.6 * expected[1] + 0.8 * expected[2], round_off));
   const auto D = probe_rows({{"d", "dof:7", {}, {}}}, built.structure, world);
   PetscInt rows = 0;
   check(MatGetSize(D, &rows, nullptr));
@@ -270,7 +270,7 @@ TEST_CASE("a probe reads the node it names")
 TEST_CASE("contradictions name the node and both sides")
 {
   Scene scene = one_part();
-  Mesh mesh = box({.3, .2, .1}, {3, 2, 2});
+  Mesh mesh = box({0.3, 0.2, 0.1}, {3, 2, 2});
   const auto says = [&](const Scene& s, const std::string& text)
   {
     Mesh whole = mesh;

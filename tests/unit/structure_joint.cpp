@@ -13,14 +13,14 @@ namespace
 
 const MPI_Comm& world = PETSC_COMM_WORLD; // set when the session starts
 const Motions all{true, true, true, true, true, true};
-constexpr double length = .2, width = .1, thickness = .004, young = 210e9;
+constexpr double length = 0.2, width = 0.1, thickness = 0.004, young = 210e9;
 
-/// A cube of edge .1 with a strip that stands out of the middle of its face x = .1, as wide as the face.
+/// A cube of edge 0.1 with a strip that stands out of the middle of its face x = 0.1, as wide as the face.
 Mesh cube_and_strip(int cells)
 {
   Mesh mesh;
-  add_box(mesh, "cube", 0, {0, 0, -.05}, {.1, .1, .05}, {cells, cells, cells});
-  add_strip(mesh, "strip", 1, {.1, 0, 0}, {length, 0, 0}, {0, width, 0}, 2 * cells, cells);
+  add_box(mesh, "cube", 0, {0, 0, -0.05}, {0.1, 0.1, 0.05}, {cells, cells, cells});
+  add_strip(mesh, "strip", 1, {0.1, 0, 0}, {length, 0, 0}, {0, width, 0}, 2 * cells, cells);
   return mesh;
 }
 
@@ -68,7 +68,7 @@ double motion_at(const Mesh& mesh, const Built& built, Vec u, const Vec3& at, in
 TEST_CASE("a shell on a solid, with a rigid cap and a spring, has six motions without energy")
 {
   Scene scene = two_parts();
-  scene.rigid_bodies = {{"cap", {"strip:end"}, {.4, .05, .02}, 1, {.1, .1, .1}, all}};
+  scene.rigid_bodies = {{"cap", {"strip:end"}, {0.4, 0.05, 0.02}, 1, {0.1, 0.1, 0.1}, all}};
   Mesh mesh = cube_and_strip(2);
   add_points(mesh, scene);
   const auto built = build(mesh, scene, world);
@@ -92,20 +92,20 @@ TEST_CASE("the rotation of a shared node is the solid's: exact where the solid t
 {
   const Mesh mesh = cube_and_strip(2);
   const auto built = build(mesh, two_parts(), world);
-  const Vec3 turn{.3, -.2, .5};
+  const Vec3 turn{0.3, -0.2, 0.5};
   const auto u = sample(built.structure, rigid_motion({1, 2, 3}, turn));
   for (int c = 0; c < 3; ++c)
-    CHECK(motion_at(mesh, built, u, {.1, .05, 0}, 3 + c) ==
+    CHECK(motion_at(mesh, built, u, {0.1, 0.05, 0}, 3 + c) ==
           doctest::Approx(turn[static_cast<std::size_t>(c)]).epsilon(1e-12));
   const auto& nodal_dofs = built.structure.names.nodal_dof;
   Mesh copy = mesh;
-  const int shared = node_at(copy, {.1, .05, 0});
+  const int shared = node_at(copy, {0.1, 0.05, 0});
   CHECK(std::count_if(nodal_dofs.begin(), nodal_dofs.end(), [&](PetscInt i) { return i / 6 == shared; }) == 3);
 }
 
 TEST_CASE("a cantilever strip on a cube bends like a clamped beam")
 {
-  // Measured: .9989 and .9971 of the beam with 2 cells, .9996 and .9983 with 4.
+  // Measured: 0.9989 and 0.9971 of the beam with 2 cells, 0.9996 and 0.9983 with 4.
   // Beam: deflection F L^3/(3 E I), rotation F L^2/(2 E I); a joint that let moments slip would be a hinge, and K
   // singular.
   const double inertia = width * thickness * thickness * thickness / 12, force = 10;
@@ -119,22 +119,22 @@ TEST_CASE("a cantilever strip on a cube bends like a clamped beam")
     const Mesh mesh = cube_and_strip(cells);
     const auto built = build(mesh, scene, world);
     const auto u = static_solution(built.structure);
-    const double w = motion_at(mesh, built, u, {.1 + length, .05, 0}, 2) / deflection;
-    const double ry = -motion_at(mesh, built, u, {.1 + length, .05, 0}, 4) / rotation;
-    CHECK(w == doctest::Approx(1).epsilon(.01));
-    CHECK(ry == doctest::Approx(1).epsilon(.01));
+    const double w = motion_at(mesh, built, u, {0.1 + length, 0.05, 0}, 2) / deflection;
+    const double ry = -motion_at(mesh, built, u, {0.1 + length, 0.05, 0}, 4) / rotation;
+    CHECK(w == doctest::Approx(1).epsilon(0.01));
+    CHECK(ry == doctest::Approx(1).epsilon(0.01));
   }
 }
 
 TEST_CASE("a shared node of a rigid body turns with the body")
 {
   Scene scene = two_parts();
-  scene.rigid_bodies = {{"clamp", {"cube:x+"}, {.1, .05, 0}, 1, {1, 1, 1}, all}};
+  scene.rigid_bodies = {{"clamp", {"cube:x+"}, {0.1, 0.05, 0}, 1, {1, 1, 1}, all}};
   Mesh mesh = cube_and_strip(2);
   add_points(mesh, scene);
   const auto built = build(mesh, scene, world);
   Mesh copy = mesh;
-  const auto terms = built.dofs.terms_of(6 * node_at(copy, {.1, .1, 0}) + 4);
+  const auto terms = built.dofs.terms_of(6 * node_at(copy, {0.1, 0.1, 0}) + 4);
   REQUIRE(terms.size() == 1);
   CHECK(terms[0].factor == 1);
   CHECK(describe(built.dofs.names, terms[0].dof).find("rigid body clamp") == 0);

@@ -35,7 +35,7 @@ TEST_CASE("a falling mass meets the ground in the step of its impact, and stays"
 {
   const auto model = test::mass_spring_chain(1, 2, 0, 1, -9.81);
   const double h = 4e-3, impact = std::sqrt(2 / 9.81);
-  const ThetaStep step = make_theta_step(model.structure, model.interface, h, .5, {});
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, 0.5, {});
   State state = state_of(model.structure, {0}, {0});
   StepWork work = begin_steps(step, model.structure, model.interface, state);
   double first = 0;
@@ -64,7 +64,7 @@ TEST_CASE("a pressed mass stays pressed, whatever the rounding of its gap")
       CAPTURE(word(law));
       CAPTURE(gap);
       const auto model = test::mass_spring_chain(1, 2, 0, gap, -9.81);
-      const ThetaStep step = make_theta_step(model.structure, model.interface, 1e-3, .5, {.law = law});
+      const ThetaStep step = make_theta_step(model.structure, model.interface, 1e-3, 0.5, {.law = law});
       State state = state_of(model.structure, {0}, {0});
       StepWork work = begin_steps(step, model.structure, model.interface, state);
       for (int i = 0; i < 8; ++i)
@@ -92,8 +92,8 @@ Bounce bouncing_bar(int elements)
   const double length = 10. / elements;
   const auto model = test::mass_spring_chain(elements + 1, length, 900 / length, 5, -10);
   const std::vector<double> zero(static_cast<std::size_t>(elements) + 1, 0);
-  const int steps_per_second = 10 * elements; // h = .3 of an element's length over the wave speed
-  const ThetaStep step = make_theta_step(model.structure, model.interface, 1. / steps_per_second, .5, {});
+  const int steps_per_second = 10 * elements; // h = 0.3 of an element's length over the wave speed
+  const ThetaStep step = make_theta_step(model.structure, model.interface, 1. / steps_per_second, 0.5, {});
   State state = state_of(model.structure, zero, zero);
   StepWork work = begin_steps(step, model.structure, model.interface, state);
   Bounce bounce;
@@ -115,7 +115,7 @@ Bounce bouncing_bar(int elements)
     energy = energy_in_load(model.structure, state, report.energy);
   }
   bounce.loss = -energy; // it started with none
-  bounce.pressure = impulse / .2;
+  bounce.pressure = impulse / 0.2;
   return bounce;
 }
 
@@ -124,15 +124,15 @@ Bounce bouncing_bar(int elements)
 TEST_CASE("a bouncing bar takes off when its wave comes back, and loses an energy that falls with its elements")
 {
   const Bounce coarse = bouncing_bar(20), fine = bouncing_bar(40);
-  CHECK(std::abs(fine.release - 5. / 3) < 3 * .25 / 30); // three elements of the front's way
-  CHECK(std::abs(fine.pressure - 390) < 4);              // mean of 300 + 300 (t - 1), behind the front's ripple
-  CHECK(fine.gap_error < .01);
-  CHECK(fine.top_error < .12); // the front passes there: slowest
+  CHECK(std::abs(fine.release - 5. / 3) < 3 * 0.25 / 30); // three elements of the front's way
+  CHECK(std::abs(fine.pressure - 390) < 4);               // mean of 300 + 300 (t - 1), behind the front's ripple
+  CHECK(fine.gap_error < 0.01);
+  CHECK(fine.top_error < 0.12); // the front passes there: slowest
   CHECK(coarse.top_error / fine.top_error > 1.5);
   CHECK(fine.gain < 1e-14); // theta = 1/2: no step gains energy from normal contact
   CHECK(fine.gap_min > -1e-12);
   CHECK(fine.loss > 0);
-  CHECK(coarse.loss / fine.loss == doctest::Approx(2).epsilon(.01)); // the end mass's kinetic energy
+  CHECK(coarse.loss / fine.loss == doctest::Approx(2).epsilon(0.01)); // the end mass's kinetic energy
 }
 
 TEST_CASE("the velocity law penetrates by what an impact covers in a step, the displacement law not at all")
@@ -140,27 +140,27 @@ TEST_CASE("the velocity law penetrates by what an impact covers in a step, the d
   const auto penetration = [](ContactLaw law, double h)
   {
     const auto model = test::mass_spring_chain(1, 2, 0, 1, -9.81);
-    const ThetaStep step = make_theta_step(model.structure, model.interface, h, .5, {.law = law});
+    const ThetaStep step = make_theta_step(model.structure, model.interface, h, 0.5, {.law = law});
     State state = state_of(model.structure, {0}, {0});
-    test::run_steps(model, step, static_cast<int>(.6 / h), state);
+    test::run_steps(model, step, static_cast<int>(0.6 / h), state);
     return -gap_of(model.interface, state.u);
   };
   const double speed = std::sqrt(2 * 9.81);
   CHECK(std::abs(penetration(ContactLaw::displacement, 8e-3)) < 1e-13);
   for (const double h : {8e-3, 2e-3})
   {
-    CHECK(std::abs(penetration(ContactLaw::velocity, h)) > .01 * speed * h);
+    CHECK(std::abs(penetration(ContactLaw::velocity, h)) > 0.01 * speed * h);
     CHECK(std::abs(penetration(ContactLaw::velocity, h)) < speed * h);
   }
 }
 
 TEST_CASE("a sliding brick stops where and when Coulomb says")
 {
-  const double g = 9.81, mu = .3, v0 = 2, stop = v0 / (mu * g), h = 4e-3;
+  const double g = 9.81, mu = 0.3, v0 = 2, stop = v0 / (mu * g), h = 4e-3;
   test::SmallModel model;
   model.structure = test::make_structure(test::diagonal({3, 3}), test::zeros(2, 2), test::zeros(2, 2), {-3 * g, 0});
   model.interface = test::make_interface({{1, 0}, {0, 1}}, 1, {0}, {0}, mu, model.structure.K);
-  const ThetaStep step = make_theta_step(model.structure, model.interface, h, .5, {});
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, 0.5, {});
   State state = state_of(model.structure, {0, 0}, {0, v0});
   StepWork work = begin_steps(step, model.structure, model.interface, state);
   double stopped = 0;
@@ -184,14 +184,14 @@ namespace
 /// h mu r_n |s_theta|.
 std::vector<double> swung_across(int steps, Opposed opposed, double& worst)
 {
-  const double mu = .5, h = 1. / steps, theta = .5;
+  const double mu = 0.5, h = 1. / steps, theta = 0.5;
   const std::vector<double> belt = {1, 0};
   test::SmallModel model;
   model.structure =
       test::make_structure(test::diagonal({1, 1, 1}), test::zeros(3, 3), test::diagonal({1, 30, 50}), {-2, 0, 0});
   model.interface = test::make_interface({{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, 2, {0}, belt, mu, model.structure.K);
   const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, {.opposed = opposed});
-  State state = state_of(model.structure, {0, 0, .05}, {0, 0, .3});
+  State state = state_of(model.structure, {0, 0, 0.05}, {0, 0, 0.3});
   StepWork work = begin_steps(step, model.structure, model.interface, state);
   worst = 0;
   for (int i = 0; i < steps; ++i)
@@ -225,23 +225,23 @@ TEST_CASE("sliding is of second order where friction turns, and friction takes m
 {
   double worst = 0;
   CHECK(error_ratio(50, Opposed::theta, worst) ==
-        doctest::Approx(4).epsilon(.05)); // the next order is h^2 of it, and the least phase
+        doctest::Approx(4).epsilon(0.05)); // the next order is h^2 of it, and the least phase
   CHECK(worst < 1e-14);
   CHECK(error_ratio(50, Opposed::end, worst) ==
-        doctest::Approx(2).epsilon(.1)); // mixed with the second order of the rest
+        doctest::Approx(2).epsilon(0.1)); // mixed with the second order of the rest
   CHECK(worst > 1e-8);
 }
 
 TEST_CASE("the energy identity holds in every step: lift-off, touch, stick and slip, any theta, both laws")
 {
   for (const ContactLaw law : {ContactLaw::displacement, ContactLaw::velocity})
-    for (const double theta : {.5, .55, 1.})
+    for (const double theta : {0.5, 0.55, 1.})
     {
-      const auto model = test::unilateral_oscillator(.3, .6);
+      const auto model = test::unilateral_oscillator(0.3, 0.6);
       const Structure& structure = model.structure;
-      const double h = .05;
+      const double h = 0.05;
       const ThetaStep step = make_theta_step(structure, model.interface, h, theta, {.law = law});
-      State state = state_of(structure, {-.5, 1, -.3}, {.3, -.2, .6});
+      State state = state_of(structure, {-0.5, 1, -0.3}, {0.3, -0.2, 0.6});
       StepWork work = begin_steps(step, structure, model.interface, state);
       int open = 0, stick = 0, slip = 0;
       double worst = 0, worst_reported = 0;
@@ -270,7 +270,7 @@ TEST_CASE("the energy identity holds in every step: lift-off, touch, stick and s
       CAPTURE(theta);
       CAPTURE(word(law));
       CHECK(open * slip > 0);
-      if (theta == .5) CHECK(stick > 0);
+      if (theta == 0.5) CHECK(stick > 0);
       CHECK(worst < 1e-12);
       CHECK(worst_reported < 1e-12);
     }
@@ -278,37 +278,37 @@ TEST_CASE("the energy identity holds in every step: lift-off, touch, stick and s
 
 TEST_CASE("a mode grows in persistent sliding at its discrete rate, fitted over five periods")
 {
-  const auto model = test::unilateral_oscillator(.3, 1);
+  const auto model = test::unilateral_oscillator(0.3, 1);
   const Sliding sliding = persistent_sliding(model, at_three_tenths);
-  CHECK(sliding.mode.lambda.real() == approx(.024503265987, 1e-10));
+  CHECK(sliding.mode.lambda.real() == approx(0.024503265987, 1e-10));
   CHECK(sliding.mode.lambda.imag() == approx(1.059820289428, 1e-11));
   TransientSettings settings;
   settings.periods = 5.2;
   settings.steps_per_period = 50;
   const Trajectory run =
-      integrate(test::view_of(model, sliding), &sliding.mode, settings, {}, mode_start(sliding, .05), nullptr);
+      integrate(test::view_of(model, sliding), &sliding.mode, settings, {}, mode_start(sliding, 0.05), nullptr);
   CHECK(run.outcome.kind == OutcomeKind::completed);
   CHECK(run.steps == 260);
   CHECK(run.history.open.back() + run.history.stick.back() == 0);
   CHECK(run.growth_rate_fit == approx(run.predicted.real(), 1e-6));
-  CHECK(run.predicted.real() < sliding.mode.lambda.real() * .998); // what 50 steps a period lose is seen
+  CHECK(run.predicted.real() < sliding.mode.lambda.real() * 0.998); // what 50 steps a period lose is seen
   CHECK(run.energy_defect_max < 1e-12);
 }
 
 TEST_CASE("theta = .51 with 50 steps a period hides a weak instability, as predicted, and is refused")
 {
-  const double mu = .1766; // just above the critical .17649
+  const double mu = 0.1766; // just above the critical 0.17649
   const auto model = test::unilateral_oscillator(mu, 1);
   const Sliding sliding = persistent_sliding(model, Complex(0, 1.06));
   const double sigma = sliding.mode.lambda.real(), omega = sliding.mode.lambda.imag();
   REQUIRE(sigma > 0);
-  REQUIRE(sigma / omega < .0013);
+  REQUIRE(sigma / omega < 0.0013);
   TransientSettings settings;
   settings.periods = 5;
   settings.steps_per_period = 50;
-  settings.theta = .51;
+  settings.theta = 0.51;
   const Trajectory run =
-      integrate(test::view_of(model, sliding), &sliding.mode, settings, {}, mode_start(sliding, .05), nullptr);
+      integrate(test::view_of(model, sliding), &sliding.mode, settings, {}, mode_start(sliding, 0.05), nullptr);
   CHECK(run.outcome.kind == OutcomeKind::refused);
   CHECK(run.outcome.reason.find("2 pi (theta - 1/2) omega/sigma") != std::string::npos);
   CHECK(run.steps == 0);
@@ -316,27 +316,27 @@ TEST_CASE("theta = .51 with 50 steps a period hides a weak instability, as predi
   // marched all the same, it decays at the discrete rate
   const ThetaStep step =
       make_theta_step(model.structure, model.interface, 2 * std::numbers::pi / (50 * omega), settings.theta, {});
-  State state = mode_start(sliding, .05);
+  State state = mode_start(sliding, 0.05);
   History history;
   ModeAmplitude amplitude = follow(model.structure, sliding.equilibrium, sliding.mode);
   march(step, test::view_of(model, sliding), 260, state,
         {nullptr, history, [&](const State& now, const StepReport&, const StepWork& work) {
            observe(amplitude, now.time, work.Ku, work.Mv);
          }});
-  const double predicted = discrete_eigenvalue(sliding.mode.lambda, .51, step.h).real();
+  const double predicted = discrete_eigenvalue(sliding.mode.lambda, 0.51, step.h).real();
   CHECK(predicted < 0);
   CHECK(growth_rate(amplitude, 2 * std::numbers::pi / omega) == approx(predicted, 1e-6));
 }
 
 TEST_CASE("between events the trajectory converges with the square of the step")
 {
-  const auto model = test::unilateral_oscillator(.3, 1);
+  const auto model = test::unilateral_oscillator(0.3, 1);
   const Sliding sliding = persistent_sliding(model, at_three_tenths);
-  const double time = 10, q = .1;
+  const double time = 10, q = 0.1;
   const Complex end = q * std::exp(sliding.mode.lambda * time);
   const auto error = [&](int steps)
   {
-    const ThetaStep step = make_theta_step(model.structure, model.interface, time / steps, .5, {});
+    const ThetaStep step = make_theta_step(model.structure, model.interface, time / steps, 0.5, {});
     State state = mode_start(sliding, q);
     test::run_steps(model, step, steps, state);
     Owned<Vec> difference = copy_of(state.u.get());
@@ -347,18 +347,18 @@ TEST_CASE("between events the trajectory converges with the square of the step")
     check(VecNorm(difference, NORM_2, &norm));
     return norm;
   };
-  CHECK(error(50) / error(100) == doctest::Approx(4).epsilon(.02));
+  CHECK(error(50) / error(100) == doctest::Approx(4).epsilon(0.02));
 }
 
 TEST_CASE("the two contact solvers give one trajectory")
 {
-  const auto model = test::unilateral_oscillator(.3, .6);
+  const auto model = test::unilateral_oscillator(0.3, 0.6);
   const auto end = [&](ContactSolver solver)
   {
     StepOptions options;
     options.contact.solver = solver;
-    const ThetaStep step = make_theta_step(model.structure, model.interface, .03, .5, options);
-    State state = state_of(model.structure, {-.5, 1, -.3}, {.3, -.2, .6});
+    const ThetaStep step = make_theta_step(model.structure, model.interface, 0.03, 0.5, options);
+    State state = state_of(model.structure, {-0.5, 1, -0.3}, {0.3, -0.2, 0.6});
     CHECK(test::run_steps(model, step, 200, state) == 0);
     return all_entries(state.u);
   };
@@ -370,13 +370,13 @@ TEST_CASE("contact that does not converge is an outcome, not a crash")
 {
   StepOptions options;
   options.contact = {ContactSolver::fixed_point, 1e-300, 1, 0, 2};
-  const auto model = test::unilateral_oscillator(.3, .6);
+  const auto model = test::unilateral_oscillator(0.3, 0.6);
   const Sliding sliding = persistent_sliding(model, at_three_tenths);
   TransientSettings settings;
   settings.steps = 20;
-  settings.step_size = .05;
+  settings.step_size = 0.05;
   const Trajectory run =
-      integrate(test::view_of(model, sliding), nullptr, settings, options, mode_start(sliding, .05), nullptr);
+      integrate(test::view_of(model, sliding), nullptr, settings, options, mode_start(sliding, 0.05), nullptr);
   CHECK(run.outcome.kind == OutcomeKind::not_converged);
   CHECK(run.outcome.reason.find("first at t = ") != std::string::npos);
   CHECK(run.steps == 20);

@@ -20,10 +20,22 @@ const std::vector<std::pair<std::string, Shape>> solids = {
 small_fem::Mesh patch_of_bricks()
 {
   small_fem::Mesh mesh{Shape::hex8, {}, {}};
-  mesh.x = {{0, 0, 0},          {1, 0, 0},          {1, 1, 0},          {0, 1, 0},
-            {0, 0, 1},          {1, 0, 1},          {1, 1, 1},          {0, 1, 1},
-            {.249, .342, .192}, {.826, .288, .288}, {.850, .649, .263}, {.273, .750, .230},
-            {.320, .186, .643}, {.677, .305, .683}, {.788, .693, .644}, {.165, .745, .702}};
+  mesh.x = {{0, 0, 0},
+            {1, 0, 0},
+            {1, 1, 0},
+            {0, 1, 0},
+            {0, 0, 1},
+            {1, 0, 1},
+            {1, 1, 1},
+            {0, 1, 1},
+            {0.249, 0.342, 0.192},
+            {0.826, 0.288, 0.288},
+            {0.850, 0.649, 0.263},
+            {0.273, 0.750, 0.230},
+            {0.320, 0.186, 0.643},
+            {0.677, 0.305, 0.683},
+            {0.788, 0.693, 0.644},
+            {0.165, 0.745, 0.702}};
   mesh.elements = {{8, 9, 10, 11, 12, 13, 14, 15}};
   for (const std::array<int, 4>& side :
        {std::array{0, 1, 2, 3}, {4, 7, 6, 5}, {0, 4, 5, 1}, {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}})
@@ -41,7 +53,7 @@ small_fem::Mesh skew_cube()
   const auto bend = [](double s, double by) { return s + by * s * (1 - s); };
   return bricks({2, 2, 2},
                 [&](double x, double y, double z) {
-                  return Vec3{bend(x, .3 * y - .2 * z), bend(y, .25 * z + .2 * x), bend(z, .3 - .4 * x * y)};
+                  return Vec3{bend(x, 0.3 * y - 0.2 * z), bend(y, 0.25 * z + 0.2 * x), bend(z, 0.3 - 0.4 * x * y)};
                 });
 }
 
@@ -58,7 +70,7 @@ void check_patch(const small_fem::Mesh& mesh)
     const double sum = x[0] + x[1] + x[2];
     return Vec3{5e-4 * (sum + x[0]), 5e-4 * (sum + x[1]), 5e-4 * (sum + x[2])};
   };
-  const Material material{1e6, .25, 1};
+  const Material material{1e6, 0.25, 1};
   Prescribed prescribed;
   for (std::size_t node = 0; node < mesh.x.size(); ++node)
     for (int k = 0; k < 3; ++k)
@@ -108,7 +120,7 @@ TEST_CASE("an unsupported solid has six zero frequencies and no other")
       auto mesh = in_shape(skew_cube(), shape);
       mesh.elements.resize(1); // one element: what a neighbour could hide shows
       std::vector<Vec3> x = positions(mesh, mesh.elements[0]);
-      const auto [K, M] = element_matrices(shape, x, {210e9, .3, 7850}, 0);
+      const auto [K, M] = element_matrices(shape, x, {210e9, 0.3, 7850}, 0);
       const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> pairs(K, M);
       const auto& values = pairs.eigenvalues();
       CHECK(pairs.info() == Eigen::Success); // M is positive definite
@@ -121,7 +133,7 @@ TEST_CASE("the mass of a solid is its density times its volume")
 {
   for (const auto& [name, shape] : solids)
   {
-    const auto M = assemble({in_shape(skew_cube(), shape), {1, .3, 7850}, 0}).M;
+    const auto M = assemble({in_shape(skew_cube(), shape), {1, 0.3, 7850}, 0}).M;
     Eigen::VectorXd along = Eigen::VectorXd::Zero(M.rows());
     for (Eigen::Index i = 1; i < M.rows(); i += 3) along(i) = 1;
     CHECK_MESSAGE(along.dot(M * along) == approx(7850, 1e-12), name); // the cube's faces stay plane
@@ -132,7 +144,7 @@ TEST_CASE("a folded solid is refused by the name of its Jacobian")
 {
   const std::vector<Vec3> x = {{0, 0, 0},  {1, 0, 0},  {1, 1, 0},  {0, 1, 0},
                                {0, 0, -1}, {1, 0, -1}, {1, 1, -1}, {0, 1, -1}};
-  CHECK_THROWS_AS(element_matrices(Shape::hex8, x, {1, .3, 1}, 0), std::runtime_error);
+  CHECK_THROWS_AS(element_matrices(Shape::hex8, x, {1, 0.3, 1}, 0), std::runtime_error);
 }
 
 TEST_CASE("the weights of a closed surface of faces are its area vector, and a square shares evenly")
@@ -143,7 +155,7 @@ TEST_CASE("the weights of a closed surface of faces are its area vector, and a s
   for (const auto& w : weights(FaceShape::quad4, 4)) CHECK(w[2] == approx(1, 1e-14));
   CHECK(weights(FaceShape::quad8, 8)[0][2] == approx(-1. / 3, 1e-13)); // why quad8 cannot touch
   CHECK(weights(FaceShape::quad9, 9)[8][2] == approx(16. / 9, 1e-13));
-  const std::vector<Vec3> triangle = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {.5, 0, 0}, {.5, .5, 0}, {0, .5, 0}};
+  const std::vector<Vec3> triangle = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.5, 0, 0}, {0.5, 0.5, 0}, {0, 0.5, 0}};
   const auto w = face_weights(FaceShape::triangle6, triangle);
   CHECK(std::abs(w[0][2]) < 1e-15);
   CHECK(w[4][2] == approx(1. / 6, 1e-13));
@@ -193,43 +205,43 @@ namespace
 /// Displacement of the end of a 6 x 0.2 x 0.1 cantilever over beam theory's, under a unit end load along x, y and z.
 Eigen::Vector3d cantilever(Shape shape, std::array<int, 3> elements)
 {
-  const auto box = [](double x, double y, double z) { return Vec3{6 * x, .2 * (y - .5), .1 * (z - .5)}; };
+  const auto box = [](double x, double y, double z) { return Vec3{6 * x, 0.2 * (y - 0.5), 0.1 * (z - 0.5)}; };
   const auto mesh = in_shape(bricks(elements, box), shape);
-  const Eigen::Vector3d exact(2.9978e-5, .107937, .431132);
+  const Eigen::Vector3d exact(2.9978e-5, 0.107937, 0.431132);
   Eigen::Vector3d ratio;
   for (int k = 0; k < 3; ++k)
   {
     Vec3 traction{};
-    traction[k] = 1 / .02;
-    ratio(k) = response(mesh, {1e7, .3, 1}, end_load(mesh, 6, [&](const Vec3&) { return traction; })) / exact(k);
+    traction[k] = 1 / 0.02;
+    ratio(k) = response(mesh, {1e7, 0.3, 1}, end_load(mesh, 6, [&](const Vec3&) { return traction; })) / exact(k);
   }
   return ratio;
 }
 
-/// Twist per unit torque of the same cantilever over the exact .034089, 6 x 6 x 4 elements.
+/// Twist per unit torque of the same cantilever over the exact 0.034089, 6 x 6 x 4 elements.
 double twist(Shape shape)
 {
-  const auto box = [](double x, double y, double z) { return Vec3{6 * x, .2 * (y - .5), .1 * (z - .5)}; };
+  const auto box = [](double x, double y, double z) { return Vec3{6 * x, 0.2 * (y - 0.5), 0.1 * (z - 0.5)}; };
   const auto mesh = in_shape(bricks({6, 6, 4}, box), shape);
   const Eigen::VectorXd load = end_load(mesh, 6, [](const Vec3& x) { return Vec3{0, -x[2], x[1]}; });
   double torque = 0;
   for (std::size_t i = 0; i < mesh.x.size(); ++i)
     torque += mesh.x[i][1] * load(3 * Eigen::Index(i) + 2) - mesh.x[i][2] * load(3 * Eigen::Index(i) + 1);
-  return response(mesh, {1e7, .3, 1}, load / torque) / .034089;
+  return response(mesh, {1e7, 0.3, 1}, load / torque) / 0.034089;
 }
 
 } // namespace
 
 TEST_CASE("a straight cantilever of six elements stretches and bends as beam theory says")
 {
-  // a constant curvature an element cannot follow the linear one: 1 - 1 / (4 6^2) = .7 %; the rest is the clamp, which
+  // a constant curvature an element cannot follow the linear one: 1 - 1 / (4 6^2) = 0.7 %; the rest is the clamp, which
   // holds the width of the section and, coarsely meshed, of a whole element. Without the modes 90 % would be missing.
   const Eigen::Vector3d hex8 = cantilever(Shape::hex8, {6, 1, 1});
-  for (int k = 0; k < 3; ++k) CHECK(hex8(k) == approx(1, .03));
+  for (int k = 0; k < 3; ++k) CHECK(hex8(k) == approx(1, 0.03));
   for (const Shape shape : {Shape::hex20, Shape::tet10}) // the clamp's hold is felt a little more by full integration
   {
     const Eigen::Vector3d ratio = cantilever(shape, {6, 1, 1});
-    for (int k = 0; k < 3; ++k) CHECK(ratio(k) == approx(1, .045));
+    for (int k = 0; k < 3; ++k) CHECK(ratio(k) == approx(1, 0.045));
   }
 }
 
@@ -238,49 +250,49 @@ TEST_CASE("the linear wedge is stiff in bending and converges")
   const double coarse = 1 - cantilever(Shape::wedge6, {12, 2, 1})(2),
                fine = 1 - cantilever(Shape::wedge6, {48, 8, 2})(2);
   CHECK(fine > 0);
-  CHECK(fine < .5 * coarse);
+  CHECK(fine < 0.5 * coarse);
 }
 
 TEST_CASE("a straight cantilever twists by Saint-Venant's torsion")
 {
-  // one element across has the warping y z alone and gives .858 of it; six by four leave 2 %, and the clamp's hold
+  // one element across has the warping y z alone and gives 0.858 of it; six by four leave 2 %, and the clamp's hold
   for (const Shape shape : {Shape::hex8, Shape::hex20, Shape::tet10})
   {
-    CHECK(twist(shape) == approx(1, .04));
+    CHECK(twist(shape) == approx(1, 0.04));
   }
 }
 
 TEST_CASE("the twisted beam of 12 x 2 x 1 bricks bends as beam theory says")
 {
-  const double thickness = .32, width = 1.1;
+  const double thickness = 0.32, width = 1.1;
   const auto beam = [&](double s, double b, double c)
   {
-    const double angle = s * M_PI / 2, y = width * (b - .5), z = thickness * (.5 - c);
+    const double angle = s * M_PI / 2, y = width * (b - 0.5), z = thickness * (0.5 - c);
     return Vec3{12 * s, z * std::cos(angle) - y * std::sin(angle), z * std::sin(angle) + y * std::cos(angle)};
   };
   for (const Shape shape : {Shape::hex8, Shape::hex20, Shape::tet10})
   {
     const auto mesh = in_shape(bricks({12, 2, 1}, beam), shape);
     const auto tip = [&](const Vec3& traction) {
-      return response(mesh, {29e6, .22, 1}, end_load(mesh, 12, [&](const Vec3&) { return traction; }));
+      return response(mesh, {29e6, 0.22, 1}, end_load(mesh, 12, [&](const Vec3&) { return traction; }));
     };
     const double unit = 1 / (thickness * width);
-    CHECK(tip({0, unit, 0}) == approx(.0054244, .02));
-    CHECK(tip({0, 0, unit}) == approx(.0017533, .02));
+    CHECK(tip({0, unit, 0}) == approx(0.0054244, 0.02));
+    CHECK(tip({0, 0, unit}) == approx(0.0017533, 0.02));
   }
 }
 
 namespace
 {
 
-/// Ring of outer radius .32, inner .145, thickness .045; nodes between corners lie on their circle.
+/// Ring of outer radius 0.32, inner 0.145, thickness 0.045; nodes between corners lie on their circle.
 small_fem::Mesh ring(int around, int across, int through, Shape shape)
 {
   auto mesh = in_shape(joined({bricks({across, around, through},
                                       [](double r, double a, double z)
                                       {
-                                        const double radius = .145 + .175 * r, angle = 2 * M_PI * a;
-                                        return Vec3{radius * std::cos(angle), radius * std::sin(angle), .045 * z};
+                                        const double radius = 0.145 + 0.175 * r, angle = 2 * M_PI * a;
+                                        return Vec3{radius * std::cos(angle), radius * std::sin(angle), 0.045 * z};
                                       })}),
                        shape);
   for (auto& x : mesh.x)
@@ -301,17 +313,17 @@ TEST_CASE("a free thick disc rings as three-dimensional elasticity says, its dou
                                      1708.8579, 1708.8579, 2150.7736, 2150.7736, 2928.6487, 2928.6487};
   const auto check = [&](const small_fem::Mesh& mesh, double tolerance)
   {
-    const auto f = frequencies(assemble({mesh, {210e9, .3, 7850}, 0}), {}, 6 + int(exact.size()), 1e7);
+    const auto f = frequencies(assemble({mesh, {210e9, 0.3, 7850}, 0}), {}, 6 + int(exact.size()), 1e7);
     for (std::size_t i = 0; i < exact.size(); ++i) CHECK(f[i + 6] == approx(exact[i], tolerance));
     for (const std::size_t i : {0, 3, 5, 7, 9, 11}) CHECK(f[i + 7] / f[i + 6] - 1 < 1e-4);
   };
-  // second order in the size: 96 x 10 x 4 hex8, too long for here, are within .9 %
+  // second order in the size: 96 x 10 x 4 hex8, too long for here, are within 0.9 %
   SUBCASE("48 x 5 x 2 hex8")
   {
-    check(ring(48, 5, 2, Shape::hex8), .03);
+    check(ring(48, 5, 2, Shape::hex8), 0.03);
   }
   SUBCASE("32 x 3 x 1 hex20")
   {
-    check(ring(32, 3, 1, Shape::hex20), .02);
+    check(ring(32, 3, 1, Shape::hex20), 0.02);
   }
 }

@@ -10,7 +10,7 @@ namespace
 
 struct Cycle
 {
-  double mu = .3, speed = 0, period = 0, mean_energy = 0;
+  double mu = 0.3, speed = 0, period = 0, mean_energy = 0;
   int free_periods = 0;
 };
 
@@ -20,12 +20,12 @@ TEST_CASE("long integration of the unilateral oscillator falls on its exact limi
 {
   // T and mean energy by matrix exponentials between events; as many periods as the largest multiplier asks for 1e-4
   for (const Cycle& exact :
-       {Cycle{.3, .3, 5.938028240916, .77336848489, 60}, Cycle{.3, .6, 5.954461004653, 1.77650678461, 30},
-        Cycle{.3, 1, 5.984555109780, 2.44704680486, 30}, Cycle{.3, 2, 5.993768001880, 4.62721318386, 30}})
+       {Cycle{0.3, 0.3, 5.938028240916, 0.77336848489, 60}, Cycle{0.3, 0.6, 5.954461004653, 1.77650678461, 30},
+        Cycle{0.3, 1, 5.984555109780, 2.44704680486, 30}, Cycle{0.3, 2, 5.993768001880, 4.62721318386, 30}})
   {
     const auto model = test::unilateral_oscillator(exact.mu, exact.speed);
     const test::Sliding sliding = test::persistent_sliding(model, test::at_three_tenths);
-    const ThetaStep step = make_theta_step(model.structure, model.interface, exact.period / 400, .5, {});
+    const ThetaStep step = make_theta_step(model.structure, model.interface, exact.period / 400, 0.5, {});
     State state = test::mode_start(sliding, 2 * exact.speed);
     const Owned<Mat> probe = test::sparse({{1, 0, 0}}, {{1, 0, 0}});
     History history;
@@ -42,6 +42,6 @@ TEST_CASE("long integration of the unilateral oscillator falls on its exact limi
     const double period = (crossings.back() - crossings.front()) / static_cast<double>(crossings.size() - 1);
     CAPTURE(exact.speed);
     CHECK(std::abs(period / exact.period - 1) < 1e-4);
-    CHECK(std::abs(mean_energy / exact.mean_energy - 1) < .01);
+    CHECK(std::abs(mean_energy / exact.mean_energy - 1) < 0.01);
   }
 }

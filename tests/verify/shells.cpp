@@ -36,8 +36,8 @@ using Motion = Eigen::Matrix<double, 6, 1>; // translations and rotations of a n
 small_fem::Mesh patch_of_quads()
 {
   small_fem::Mesh mesh{Shape::shell4, {}, {}};
-  mesh.x = {{0, 0, 0},     {.24, 0, 0},   {.24, .12, 0}, {0, .12, 0},
-            {.04, .02, 0}, {.18, .03, 0}, {.16, .08, 0}, {.08, .08, 0}};
+  mesh.x = {{0, 0, 0},       {0.24, 0, 0},    {0.24, 0.12, 0}, {0, 0.12, 0},
+            {0.04, 0.02, 0}, {0.18, 0.03, 0}, {0.16, 0.08, 0}, {0.08, 0.08, 0}};
   mesh.elements = {{4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
   return mesh;
 }
@@ -56,8 +56,8 @@ void check_patch(Shape shape, const Eigen::Matrix3d& R, const std::function<Moti
   }
   Prescribed prescribed;
   for (int dof = 0; dof < 24; ++dof) prescribed[dof] = exact(dof);
-  const Material material{1e6, .25, 1};
-  const auto K = assemble({mesh, material, .001}).K;
+  const Material material{1e6, 0.25, 1};
+  const auto K = assemble({mesh, material, 0.001}).K;
   const Eigen::VectorXd u = solve(K, Eigen::VectorXd::Zero(K.rows()), prescribed);
   CHECK((u - exact).cwiseAbs().maxCoeff() < 1e-9 * exact.cwiseAbs().maxCoeff());
   const Eigen::Vector3d x_axis = R.col(0);
@@ -67,12 +67,12 @@ void check_patch(Shape shape, const Eigen::Matrix3d& R, const std::function<Moti
     for (int node : element)
       for (int k = 0; k < 6; ++k) ue.push_back(u(6 * node + k));
     for (const auto& r :
-         shell_resultants(shape, positions(mesh, element), material, .001, {x_axis(0), x_axis(1), x_axis(2)}, ue))
+         shell_resultants(shape, positions(mesh, element), material, 0.001, {x_axis(0), x_axis(1), x_axis(2)}, ue))
     {
       // forces times thickness and moments are of one scale; 1e-9 of the largest stress either can bring
       const Motion error = Eigen::Map<const Motion>(r.data()) - resultants;
-      const double scale = std::max(resultants.head<3>().norm() * .001, resultants.tail<3>().norm());
-      CHECK(error.head<3>().norm() * .001 < 1e-9 * scale);
+      const double scale = std::max(resultants.head<3>().norm() * 0.001, resultants.tail<3>().norm());
+      CHECK(error.head<3>().norm() * 0.001 < 1e-9 * scale);
       CHECK(error.tail<3>().norm() < 1e-9 * scale);
     }
   }
@@ -82,14 +82,14 @@ void check_patch(Shape shape, const Eigen::Matrix3d& R, const std::function<Moti
 
 TEST_CASE("a constant membrane strain or curvature is reproduced on a skew mesh, turned any way in space")
 {
-  const std::vector<Eigen::Matrix3d> turns = {Eigen::Matrix3d::Identity(), turn(.7, 1.1), turn(-2.5, 1.9)};
+  const std::vector<Eigen::Matrix3d> turns = {Eigen::Matrix3d::Identity(), turn(0.7, 1.1), turn(-2.5, 1.9)};
   for (const auto& [name, shape] : shells)
     for (std::size_t t = 0; t < turns.size(); ++t)
     {
       CAPTURE(name);
       CAPTURE(t);
       Motion forces, moments;
-      forces << 1.33333333333333, 1.33333333333333, .4, 0, 0, 0; // stress times thickness
+      forces << 1.33333333333333, 1.33333333333333, 0.4, 0, 0, 0; // stress times thickness
       check_patch(
           shape, turns[t],
           [](double x, double y)
@@ -116,15 +116,18 @@ TEST_CASE("a constant membrane strain or curvature is reproduced on a skew mesh,
 TEST_CASE("an unsupported shell, flat or warped, has six zero frequencies and no other")
 {
   for (const auto& [name, shape] : shells)
-    for (const double warp : {0., .2})
+    for (const double warp : {0., 0.2})
     {
       CAPTURE(name);
       CAPTURE(warp);
-      const auto bent = quads(1, 1, [&](double x, double y) { return Vec3{x + .3 * y, y - .2 * x * y, warp * x * y}; });
+      const auto bent = quads(1, 1,
+                              [&](double x, double y) {
+                                return Vec3{x + 0.3 * y, y - 0.2 * x * y, warp * x * y};
+                              });
       for (const auto& mesh : {in_shell(bent, shape), in_shell(patch_of_quads(), shape)})
       {
         // thick enough that the dense solver's rounding, 1e-16 of the highest w^2, stays below the bar
-        const auto system = assemble({mesh, {210e9, .3, 7850}, .05});
+        const auto system = assemble({mesh, {210e9, 0.3, 7850}, 0.05});
         const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> pairs{Eigen::MatrixXd(system.K),
                                                                               Eigen::MatrixXd(system.M)};
         const auto& values = pairs.eigenvalues();
@@ -136,14 +139,14 @@ TEST_CASE("an unsupported shell, flat or warped, has six zero frequencies and no
 
 TEST_CASE("a flat shell's mass is that of its volume, and its inertia about any axis is exact but for the drilling")
 {
-  const Eigen::Matrix3d R = turn(.4, -1.3);
+  const Eigen::Matrix3d R = turn(0.4, -1.3);
   for (const auto& [name, shape] : shells)
   {
     CAPTURE(name);
-    const double a = 2, b = 3, h = .2, density = 7850;
-    auto mesh = in_shell(quads(2, 2, [&](double x, double y) { return Vec3{a * (x - .5), b * (y - .5), 0}; }), shape);
+    const double a = 2, b = 3, h = 0.2, density = 7850;
+    auto mesh = in_shell(quads(2, 2, [&](double x, double y) { return Vec3{a * (x - 0.5), b * (y - 0.5), 0}; }), shape);
     for (auto& x : mesh.x) Eigen::Map<Eigen::Vector3d>(x.data()) = R * vector(x);
-    const auto M = assemble({mesh, {1, .3, density}, h}).M;
+    const auto M = assemble({mesh, {1, 0.3, density}, h}).M;
     const auto energy = [&](const Eigen::Vector3d& shift, const Eigen::Vector3d& spin)
     {
       Eigen::VectorXd v(M.rows());
@@ -175,17 +178,17 @@ double twisted_beam_tip(Shape shape, double thickness, int direction)
   const auto mesh = in_shell(quads(12, 2,
                                    [&](double s, double t)
                                    {
-                                     const double angle = s * M_PI / 2, r = width * (t - .5);
+                                     const double angle = s * M_PI / 2, r = width * (t - 0.5);
                                      return Vec3{length * s, -r * std::sin(angle), r * std::cos(angle)};
                                    }),
                              shape);
   Prescribed prescribed;
-  const auto K = assemble({mesh, {29e6, .22, 1}, thickness}).K;
+  const auto K = assemble({mesh, {29e6, 0.22, 1}, thickness}).K;
   Eigen::VectorXd load = Eigen::VectorXd::Zero(K.rows());
   for (int row = 0; row < 3; ++row)
   {
     fix(prescribed, 13 * row, {0, 1, 2, 3, 4, 5});
-    load(6 * (13 * row + 12) + direction) = row == 1 ? .5 : .25;
+    load(6 * (13 * row + 12) + direction) = row == 1 ? 0.5 : 0.25;
   }
   return load.dot(solve(K, load, prescribed));
 }
@@ -199,7 +202,7 @@ double scordelis_lo(Shape shape, int n)
                                      return Vec3{half_length * s, R * std::sin(angle * t), R * std::cos(angle * t)};
                                    }),
                              shape);
-  const Body body{mesh, {4.32e8, 0, 90 / .25}, .25}; // own weight of 90 a unit of surface
+  const Body body{mesh, {4.32e8, 0, 90 / 0.25}, 0.25}; // own weight of 90 a unit of surface
   const auto [K, M] = assemble(body);
   Prescribed prescribed;
   for (std::size_t i = 0; i < mesh.x.size(); ++i)
@@ -225,7 +228,7 @@ double pinched_cylinder(Shape shape, int n)
                                      return Vec3{half_length * s, R * std::sin(a), R * std::cos(a)};
                                    }),
                              shape);
-  const auto K = assemble({mesh, {3e6, .3, 1}, 3}).K;
+  const auto K = assemble({mesh, {3e6, 0.3, 1}, 3}).K;
   Prescribed prescribed;
   for (std::size_t i = 0; i < mesh.x.size(); ++i)
   {
@@ -235,7 +238,7 @@ double pinched_cylinder(Shape shape, int n)
     if (mesh.x[i][2] < 1e-9) fix(prescribed, i, {2, 3, 4});
   }
   Eigen::VectorXd load = Eigen::VectorXd::Zero(K.rows());
-  load(2) = -.25;
+  load(2) = -0.25;
   return -solve(K, load, prescribed)(2);
 }
 
@@ -246,16 +249,16 @@ TEST_CASE("the twisted beam bends as beam theory says")
   for (const auto& [name, shape] : shells)
   {
     CAPTURE(name);
-    const double through = twisted_beam_tip(shape, .32, 1), in_width = twisted_beam_tip(shape, .32, 2);
-    CHECK(through == approx(.0054244, .02));
-    CHECK(in_width == approx(.0017533, .02));
+    const double through = twisted_beam_tip(shape, 0.32, 1), in_width = twisted_beam_tip(shape, 0.32, 2);
+    CHECK(through == approx(0.0054244, 0.02));
+    CHECK(in_width == approx(0.0017533, 0.02));
   }
 }
 
 TEST_CASE("a thin twisted beam does not lock as quadrilaterals, though each is warped")
 {
-  CHECK(twisted_beam_tip(Shape::shell4, .0032, 1) == approx(5256, .02));
-  CHECK(twisted_beam_tip(Shape::shell4, .0032, 2) == approx(1294, .02));
+  CHECK(twisted_beam_tip(Shape::shell4, 0.0032, 1) == approx(5256, 0.02));
+  CHECK(twisted_beam_tip(Shape::shell4, 0.0032, 2) == approx(1294, 0.02));
 }
 
 TEST_CASE("the Scordelis-Lo roof sags by 0.3006 to 0.3024")
@@ -264,18 +267,18 @@ TEST_CASE("the Scordelis-Lo roof sags by 0.3006 to 0.3024")
   {
     CAPTURE(name);
     const double sag = scordelis_lo(shape, 32);
-    CHECK(sag > .3006);
-    CHECK(sag < .3024);
+    CHECK(sag > 0.3006);
+    CHECK(sag < 0.3024);
   }
 }
 
 TEST_CASE("the pinched cylinder gives way by 1.825e-5 and a little more")
 {
   // 1.825e-5 is thin shell theory. Transverse shear, which it leaves out, adds P / (2 pi kappa G h) ln(..) under the
-  // point load: measured at this mesh .7 %, and growing without bound. The rest, 1 % at most, is the mesh.
+  // point load: measured at this mesh 0.7 %, and growing without bound. The rest, 1 % at most, is the mesh.
   for (const auto& [name, shape] : shells)
   {
     CAPTURE(name);
-    CHECK(pinched_cylinder(shape, 32) == approx(1.007 * 1.825e-5, .012));
+    CHECK(pinched_cylinder(shape, 32) == approx(1.007 * 1.825e-5, 0.012));
   }
 }

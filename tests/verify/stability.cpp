@@ -54,8 +54,10 @@ TEST_CASE("two coupled modes flutter from the exact friction coefficient on, wit
   const struct
   {
     double mu, c1, c2;
-  } thresholds[] = {
-      {.472377492973330, 0, 0}, {.395110300148, .2, .02}, {.395453847416, .02, .2}, {.473602175363, .05, .05}};
+  } thresholds[] = {{0.472377492973330, 0, 0},
+                    {0.395110300148, 0.2, 0.02},
+                    {0.395453847416, 0.02, 0.2},
+                    {0.473602175363, 0.05, 0.05}};
   for (const auto& [mu, c1, c2] : thresholds)
   {
     CAPTURE(mu);
@@ -66,41 +68,41 @@ TEST_CASE("two coupled modes flutter from the exact friction coefficient on, wit
   }
   const QuadraticProblem problem =
       problem_of(diagonal({1, 1}), diagonal({0, 0}), {{23.25, 3.897114317029974 - 5.5}, {3.897114317029974, 18.75}});
-  CHECK(distance(solve(problem, by_lapack), {.118690019, 4.584112490}) < 1e-8); // all the digits that are given
+  CHECK(distance(solve(problem, by_lapack), {0.118690019, 4.584112490}) < 1e-8); // all the digits that are given
 }
 
 TEST_CASE("the Ziegler column loses stability at its exact loads, sooner with vanishing damping")
 {
-  const double flutter = 3.5 - std::sqrt(2.), damped = 41. / 28 + .1 * .1 / 2;
+  const double flutter = 3.5 - std::sqrt(2.), damped = 41. / 28 + 0.1 * 0.1 / 2;
   CHECK(unstable_modes_of_ziegler(flutter - 1e-8, 0) == 0);
   CHECK(unstable_modes_of_ziegler(flutter + 1e-8, 0) == 1);
-  CHECK(unstable_modes_of_ziegler(damped - 1e-6, .1) == 0);
-  CHECK(unstable_modes_of_ziegler(damped + 1e-6, .1) == 1);
+  CHECK(unstable_modes_of_ziegler(damped - 1e-6, 0.1) == 0);
+  CHECK(unstable_modes_of_ziegler(damped + 1e-6, 0.1) == 1);
 }
 
 TEST_CASE("no unstable mode of a chain of cells is missed, solved whole or by Arnoldi")
 {
   for (const int limit : {by_lapack, by_arnoldi})
   {
-    const QuadraticSolution many = solve(flutter_chain(50, .38), limit), fewer = solve(flutter_chain(50, .36), limit);
+    const QuadraticSolution many = solve(flutter_chain(50, 0.38), limit), fewer = solve(flutter_chain(50, 0.36), limit);
     CHECK(many.outcome.kind == OutcomeKind::converged);
     CHECK(many.pairs.size() == 100);
     CHECK(count_unstable(many) == 44);
     CHECK(count_unstable(fewer) == 17);
-    CHECK(std::abs(many.pairs[0].lambda - Complex(.111240406422, 4.328534114602)) < 1e-11);
+    CHECK(std::abs(many.pairs[0].lambda - Complex(0.111240406422, 4.328534114602)) < 1e-11);
     CHECK(many.outcome.residual < 1e-12); // rounding of a companion matrix of order 200
   }
 }
 
 TEST_CASE("the wing of the NLEVP collection has its published eigenvalues")
 {
-  const QuadraticProblem wing = problem_of({{17.6, 1.28, 2.89}, {1.28, .824, .413}, {2.89, .413, .725}},
-                                           {{7.66, 2.45, 2.1}, {.23, 1.04, .223}, {.6, .756, .658}},
-                                           {{121, 18.9, 15.9}, {0, 2.7, .145}, {11.9, 3.64, 15.5}});
+  const QuadraticProblem wing = problem_of({{17.6, 1.28, 2.89}, {1.28, 0.824, 0.413}, {2.89, 0.413, 0.725}},
+                                           {{7.66, 2.45, 2.1}, {0.23, 1.04, 0.223}, {0.6, 0.756, 0.658}},
+                                           {{121, 18.9, 15.9}, {0, 2.7, 0.145}, {11.9, 3.64, 15.5}});
   const QuadraticSolution solution = solve(wing, by_lapack);
   REQUIRE(solution.pairs.size() == 3);
   for (const Complex lambda :
-       {Complex(.09472173, 2.52287659), Complex(-.88483025, 8.44151216), Complex(-.91799817, 1.76058420)})
+       {Complex(0.09472173, 2.52287659), Complex(-0.88483025, 8.44151216), Complex(-0.91799817, 1.76058420)})
     CHECK(distance(solution, lambda) < 1e-8); // all the digits that are given
 }
 
@@ -113,11 +115,11 @@ TEST_CASE("the unilateral oscillator slides into flutter at the exact friction c
     const SmallModel oscillator = unilateral_oscillator(mu, 1);
     return test::modes_of(oscillator, sliding_equilibrium(oscillator), settings, {});
   };
-  const Modes modes = modes_at(.3);
+  const Modes modes = modes_at(0.3);
   REQUIRE(modes.modes.size() == 2);
-  CHECK(std::abs(modes.modes[0].lambda - Complex(.024503265987, 1.059820289428)) < 1e-12);
+  CHECK(std::abs(modes.modes[0].lambda - Complex(0.024503265987, 1.059820289428)) < 1e-12);
   CHECK(modes.unstable_count == 1);
   CHECK(modes.outcome.residual < 1e-14);
-  CHECK(modes_at(.17649336676940 - 1e-8).unstable_count == 0);
-  CHECK(modes_at(.17649336676940 + 1e-7).unstable_count == 1);
+  CHECK(modes_at(0.17649336676940 - 1e-8).unstable_count == 0);
+  CHECK(modes_at(0.17649336676940 + 1e-7).unstable_count == 1);
 }
