@@ -198,8 +198,8 @@ void broadcast(std::vector<double>& values, std::size_t size, MPI_Comm comm)
   MPI_Bcast(values.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm);
 }
 
-/// Sets the force residual; returns whether it is small, or all that rounding of K u allows (a soft support lets u be
-/// large next to the strains).
+/// Sets the force residual. Returns whether it is small, or at the rounding of K u: a soft support lets u be large
+/// beside the strains.
 bool balances(const Structure& structure, const Interface& interface, Equilibrium& equilibrium)
 {
   const auto residual = zeros_like(structure.load);

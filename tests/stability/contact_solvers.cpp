@@ -19,8 +19,8 @@ namespace
 
 using Vector = std::vector<double>;
 
-/// Symmetric with eigenvalues spread evenly in the logarithm from 1/condition to 1, in random directions; then rows
-/// and columns of pair i scaled by 10^(spread u_i), u_i in [-1, 1]: pairs of light and heavy bodies.
+/// A symmetric matrix with eigenvalues spread evenly in the logarithm from 1/condition to 1, in random directions. Rows
+/// and columns of pair i are scaled by 10^(spread u_i), u_i in [-1, 1]: pairs of light and heavy bodies.
 Vector random_compliance(int pairs, std::size_t block, double condition, double spread, std::mt19937& random)
 {
   const auto n = static_cast<Eigen::Index>(pairs * static_cast<int>(block));

@@ -154,8 +154,8 @@ TEST_CASE("the projection misses unstable pairs with too few real modes, and its
   CHECK(count_unstable(corrected) > count_unstable(few));
 }
 
-// MUMPS estimates its memory before it meets the pivots that rounding makes it put off; at -90 % of that it is always
-// short, and the solve of a factor that never came to be would fail. X = A^-1 (A X) to 1e-12: cond(A) is below 1e3.
+// MUMPS estimates its memory before it meets the pivots that rounding makes it put off. At -90 % of that it is always
+// short, and a solve without a factor would fail. X = A^-1 (A X) to 1e-12: cond(A) is below 1e3.
 TEST_CASE("a factor that runs short of its estimated memory is made again with more")
 {
   const QuadraticProblem chain = flutter_chain(400, 0);

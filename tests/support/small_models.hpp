@@ -108,7 +108,7 @@ inline Interface make_interface(const Rows& B, int directions, const std::vector
 }
 
 /// Pad (x, y1) of mass 1 pressed on a disc (y2) of mass 0.5, with unilateral contact and plane friction on a belt of
-/// speed V: the smallest system that squeals, lifts off, sticks and slips.
+/// speed V. It is the smallest system that squeals, lifts off, sticks and slips.
 inline SmallModel unilateral_oscillator(double friction, double belt_speed)
 {
   SmallModel model;
@@ -118,9 +118,9 @@ inline SmallModel unilateral_oscillator(double friction, double belt_speed)
   return model;
 }
 
-/// N masses on a line, spring `stiffness` between neighbours, none to ground; mass 0 faces the rigid ground below it
-/// at distance `gap`; half masses at both ends, so that it is a bar of N - 1 elements with lumped mass. No friction
-/// and no tangential motion (an immovable direction). `load`: force on every unit of mass.
+/// N masses on a line with springs `stiffness` between neighbours and none to ground. Mass 0 faces the rigid ground
+/// below it at distance `gap`. Both ends have half masses: a bar of N - 1 elements with lumped mass. There is no
+/// friction and no tangential motion (an immovable direction). `load`: force on every unit of mass.
 inline SmallModel mass_spring_chain(int count, double mass, double stiffness, double gap, double load)
 {
   const auto n = static_cast<std::size_t>(count);

@@ -14,8 +14,8 @@ using namespace squeal;
 namespace
 {
 
-/// A rigid block (x, y, theta of a point at the load's height h above the middle of its feet), width b, weight W,
-/// held along the belt's motion by a spring at that height; nothing but contact holds y and theta.
+/// A rigid block of width b and weight W. Its unknowns are x, y, theta of a point at the load's height h above the
+/// middle of its feet. A spring at that height holds it along the belt's motion; contact alone holds y and theta.
 test::SmallModel overturning_block(double friction, double weight)
 {
   const double b = 0.2, h = 0.15;

@@ -47,8 +47,8 @@ double distance(const QuadraticSolution& solution, Complex lambda)
 
 } // namespace
 
-// At the threshold the undamped pair is defective: it leaves the axis like the square root of the distance, so 1e-9 of
-// distance shows as 1e-5 of growth, and a bracket is the sharpest test there is.
+// At the threshold the undamped pair is defective. It leaves the axis like the square root of the distance, so 1e-9 of
+// distance shows as 1e-5 of growth. A bracket is the sharpest test.
 TEST_CASE("two coupled modes flutter from the exact friction coefficient on, with and without damping")
 {
   const struct

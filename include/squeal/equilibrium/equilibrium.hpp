@@ -11,8 +11,8 @@
 /// Springs so soft that rounding would spoil the reactions are treated in the same way.
 ///
 /// Caveat: at large mu an equilibrium may not exist, or not be the only one. It is the only one if the symmetric part
-/// of D_nn + mu D_nt e is positive definite, which is checked where K alone is regular; whether it is stable, modes
-/// say.
+/// of D_nn + mu D_nt e is positive definite. That is checked where K alone is regular. Its stability is found by the
+/// modes.
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/equilibrium/state.hpp"
 

@@ -11,8 +11,7 @@
 /// E is twice the mean kinetic energy, which is the mean energy of a free vibration (friction makes the mean potential
 /// energy of the mode differ). Then (P_R - P_C)/E -> 2 Re(lambda) as q -> 0, up to that difference of rho, provided the
 /// modes have the damping of the friction direction, which the law above always has.
-/// Caveat: a start for the shooting, not a prediction. On the oscillator of inputs/oscillator it is 0.4 of the cycle
-/// where pairs stick, 1.1 to 4 of it otherwise, and 300 where slip reversal alone holds it far above first lift-off.
+/// Caveat: a start for the shooting, not a prediction (src/README.md, section 5.5).
 #include "squeal/modes/modes.hpp"
 
 #include <optional>

@@ -3,7 +3,7 @@
 ///
 /// In persistent sliding the step is linear and leaves the plane of the mode invariant: (u - u0, v) = Re(q (phi, lambda
 /// phi)), and q grows by exp(lambda_h h) a step, lambda_h the discrete eigenvalue. |q| is found by projection in the
-/// energy inner product; unlike the energy it has no ripple at 2 omega, so its logarithm is a straight line in time.
+/// energy inner product. Unlike the energy it has no ripple at 2 omega, so its logarithm is a straight line in time.
 #include "squeal/modes/modes.hpp"
 
 namespace squeal

@@ -18,8 +18,8 @@ namespace squeal
 /// ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h
 std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h);
 
-/// Growth of the energy norm in one step of the structure free of load and contact, asymptotically: the logarithm,
-/// per step, by 300 steps from a state that excites every mode. Collective; factors A anew.
+/// The asymptotic growth of the energy norm in one step of the structure without load and contact, as a logarithm. It
+/// is found by 300 steps from a state that excites every mode. Collective; factors A anew.
 double free_growth(const Structure& structure, double theta, double h, const FactorOptions& options);
 
 /// Why a run with this theta and h is refused, in a sentence with the remedy; empty if it is not. `mode`: the followed
