@@ -10,8 +10,8 @@ namespace squeal
 /// compared. Borrows problem and map.
 void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_steps, Flow& flow);
 
-/// Another number of steps a period that tells the error of this one: half of it, 0 where it is fine.
-int steps_to_compare(int steps);
+/// The number of steps a period that tells the error of another: twice as many of a large model with few, else 0.
+int steps_to_compare(const Structure& structure, int steps);
 
 /// Of a converged cycle of the map, by at most 128 steps a period: what the others change is in the bars.
 FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, const PeriodMap& map,

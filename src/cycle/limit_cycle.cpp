@@ -43,7 +43,7 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   PeriodMap map{problem.sliding, problem.step, settings.steps_per_period, settings.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
   Flow flow = flow_of(map);
-  add_slow_motions(problem, map, steps_to_compare(map.steps), flow);
+  add_slow_motions(problem, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
   ShootingResult found = shoot(flow, preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
                    settings.steps_per_period,

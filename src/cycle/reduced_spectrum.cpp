@@ -2,6 +2,8 @@
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 
+#include <Eigen/QR>
+
 namespace squeal
 {
 
@@ -72,6 +74,13 @@ MatrixXd with_fast_rows(const MatrixXd& X, Index size, Index slow)
   return result;
 }
 
+/// An orthonormal basis of the span of independent columns.
+MatrixXd orthonormal_columns(const MatrixXd& A)
+{
+  const Eigen::HouseholderQR<MatrixXd> qr(A);
+  return qr.householderQ() * MatrixXd::Identity(A.rows(), A.cols());
+}
+
 } // namespace
 
 ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
@@ -100,7 +109,7 @@ ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<cons
   // what the slow coordinates miss of both comes with one more passage
   result.right = columns * right;
   result.left = apply_adjoint(map, period, contacts, with_fast_rows(left, size, slow), comm);
-  for (MatrixXd* vectors : {&result.right, &result.left}) vectors->colwise().normalize();
+  for (MatrixXd* vectors : {&result.right, &result.left}) *vectors = orthonormal_columns(*vectors);
   return result;
 }
 
@@ -112,10 +121,8 @@ std::vector<Complex> multipliers_along(const ReducedSpectrum& spectrum, ReducedM
   on_rank_zero(comm,
                [&]
                {
-                 const MatrixXd small =
-                     solve_dense(spectrum.left.transpose() * spectrum.right, spectrum.left.transpose() * image,
-                                 "cycle: left and right vectors of the reduced monodromy matrix are orthogonal");
-                 const std::vector<Complex> found = eigencolumns(small).values;
+                 const Eigen::ColPivHouseholderQR<MatrixXd> gram(spectrum.left.transpose() * spectrum.right);
+                 const std::vector<Complex> found = eigencolumns(gram.solve(spectrum.left.transpose() * image)).values;
                  for (const std::size_t place : nearest_places(spectrum.values, found)) values.push_back(found[place]);
                });
   broadcast_values(values, comm);

@@ -8,11 +8,10 @@
 namespace squeal
 {
 
-/// Largest first. A complex pair takes two columns, real and imaginary part of the vector of Im > 0.
 struct ReducedSpectrum
 {
-  std::vector<std::complex<double>> values;
-  Eigen::MatrixXd right, left; // (q, v); left'(q, v) is a number for each
+  std::vector<std::complex<double>> values; // largest first, complex pairs whole
+  Eigen::MatrixXd right, left;              // orthonormal bases of the right and left vectors' spans, (q, v)
 };
 
 /// Which multipliers are wanted.

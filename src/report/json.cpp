@@ -146,6 +146,7 @@ Json multiplier_entry(const Multipliers& multipliers)
                 {"periods_integrated", multipliers.periods},
                 {"values", multiplier_list(multipliers)}};
   if (multipliers.crossing != Crossing::none) entry["crossing"] = word(multipliers.crossing);
+  if (!multipliers.refusal.empty()) entry["refusal"] = multipliers.refusal;
   if (!multipliers.would_decide.empty()) entry["would_decide"] = multipliers.would_decide;
   return entry;
 }

@@ -132,7 +132,10 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
   if (method == MultiplierMethod::oblique && problem.flow.slow_motions)
     if (auto found = multipliers_by_projection(monodromy, options.multipliers, refusal)) return std::move(*found);
   const PetscInt steps = options.multipliers > 0 ? options.multipliers : dofs <= 10000 ? -96 : -24;
-  return multipliers_by_arnoldi(monodromy, motions_that_may_grow(problem, orbit, other_unstable), steps);
+  FloquetAnalysis result =
+      multipliers_by_arnoldi(monodromy, motions_that_may_grow(problem, orbit, other_unstable), steps);
+  result.multipliers.refusal = std::move(refusal);
+  return result;
 }
 
 } // namespace squeal

@@ -1,6 +1,7 @@
 /// Multipliers by oblique projection (src/README.md, section 6.9). V and W are energy-orthonormal bases of approximate
 /// right and left vectors. A pass takes Z = (dPhi_T/dx) V, all columns at once, and
-///     mu = eig((W'V)^-1 W'Z),     V <- Z,     bar_i = 2 |mu_i - its last value| + errors_i.
+///     mu = eig((W'V)^-1 W'Z),     bar_i = 2 |mu_i - its last value| + errors_i.
+/// Blocks of passes make a Krylov space: V becomes those of its Ritz vectors whose values are nearest to mu.
 /// Beside V the largest Ritz values of (1 - V (W'V)^-1 W') dPhi_T/dx are sought in a block Arnoldi space: where they
 /// lie below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not proven.
 #include "monodromy.hpp"
@@ -8,7 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <Eigen/LU>
+#include <Eigen/QR>
 #include <Eigen/SVD>
 
 namespace squeal
@@ -38,15 +39,13 @@ StateBlock image_of(const Monodromy& monodromy, const StateBlock& X)
 struct Projector
 {
   StateBlock V, W; // W holds energy images of left vectors
-  Eigen::PartialPivLU<MatrixXd> gram{};
+  Eigen::ColPivHouseholderQR<MatrixXd> gram{};
 };
 
-/// Makes V orthonormal and the projector fit it. Returns the condition of W'V.
-double fit(const Flow& flow, Projector& projector)
+/// Makes the projector fit V, which is orthonormal. Returns the condition of W'V.
+double fit(Projector& projector)
 {
-  projector.V = orthonormal(flow, std::move(projector.V), least_part);
   const MatrixXd gram = inner_products(projector.W, projector.V);
-  if (gram.rows() != gram.cols()) return HUGE_VAL;
   const Eigen::VectorXd sizes = Eigen::JacobiSVD<MatrixXd>(gram).singularValues();
   projector.gram.compute(gram);
   return sizes.size() == 0 ? 1 : sizes(0) / std::max(sizes(sizes.size() - 1), 1e-300);
@@ -79,6 +78,8 @@ struct Passes
   Projector projector;
   std::vector<DenseEigenpair> pairs{};
   std::vector<double> bars{};
+  std::vector<Complex> values{}; // with that of the shift in time
+  double shift_distance = 0;     // of that one from 1
   long columns = 0;
 };
 
@@ -89,43 +90,124 @@ bool reaches_across(const Passes& passes)
   return false;
 }
 
-/// Removes the shift in time from the pairs. Returns the distance of its multiplier from 1.
+/// Removes the shift in time from the pairs. Where it has met another real multiplier in a complex pair, the sum of
+/// both is the pair's: the other one stays. Returns the distance of the shift's multiplier from 1.
 double take_out_shift(const Monodromy& monodromy, Passes& passes)
 {
   const Owned<Vec> rate = copy_of(monodromy.orbit.rate.get());
   const StateBlock flow = block_of(std::span(&rate, 1));
   const Eigen::VectorXd along = inner_products(passes.projector.V, energy_images(monodromy.flow, flow)).col(0);
   const std::size_t shift = find_shift(passes.pairs, along);
-  const double distance = std::abs(passes.pairs[shift].lambda - 1.);
+  const Complex value = passes.pairs[shift].lambda;
+  const double distance = std::abs(value - 1.);
+  if (value.imag() != 0)
+    for (std::size_t i = 0; i < passes.pairs.size(); ++i)
+      if (passes.pairs[i].lambda == std::conj(value))
+      {
+        passes.pairs[i].lambda = 2 * value.real() - 1;
+        passes.bars[i] += distance;
+      }
   passes.pairs.erase(passes.pairs.begin() + static_cast<std::ptrdiff_t>(shift));
   passes.bars.erase(passes.bars.begin() + static_cast<std::ptrdiff_t>(shift));
   return distance;
 }
 
-/// Two passes or more, until no bar reaches across 1. Returns why the vectors do not serve, or nothing.
-std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Passes& passes, double& shift_distance)
+/// Whether values that matter still change so much that they cannot be taken for multipliers.
+bool meaningless(const std::vector<Complex>& values, const std::vector<double>& changes)
+{
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (std::abs(values[i]) > 0.95 && changes[i] > 0.05) return true; // as far as 1 is from there
+  return false;
+}
+
+/// An energy-orthonormal basis, its image and the monodromy matrix on it.
+struct KrylovSpace
+{
+  StateBlock Q, image;
+  MatrixXd H;
+};
+
+/// Takes in a block and applies the monodromy matrix to what is new of it.
+void extend(const Monodromy& monodromy, StateBlock block, KrylovSpace& space)
+{
+  const Flow& flow = monodromy.flow;
+  if (space.H.rows() > 0)
+    for (int pass = 0; pass < 2; ++pass) // the second removes what rounding left
+      subtract(block, space.Q, inner_products(energy_images(flow, space.Q), block));
+  block = orthonormal(flow, std::move(block), 1e-8);
+  if (block.columns() == 0) return;
+  StateBlock image = image_of(monodromy, block);
+  if (space.H.rows() == 0)
+  {
+    space.Q = std::move(block);
+    space.image = std::move(image);
+  }
+  else
+  {
+    append(space.Q, block);
+    append(space.image, image);
+  }
+  space.H = inner_products(energy_images(flow, space.Q), space.image);
+}
+
+/// Real columns that span the Ritz vectors of the values nearest to these.
+MatrixXd nearest_ritz_vectors(const MatrixXd& H, const std::vector<Complex>& values)
+{
+  const std::vector<DenseEigenpair> ritz = solve_dense_unsymmetric(H);
+  MatrixXd result(H.rows(), static_cast<Index>(values.size()));
+  Index column = 0;
+  for (const std::size_t place : nearest_places(values, values_of(ritz)))
+    result.col(column++) =
+        ritz[place].lambda.imag() < 0 ? Eigen::VectorXd(-ritz[place].y.imag()) : Eigen::VectorXd(ritz[place].y.real());
+  return result;
+}
+
+/// An orthonormal basis of the span of independent columns.
+MatrixXd orthonormal_columns(const MatrixXd& A)
+{
+  const Eigen::HouseholderQR<MatrixXd> qr(A);
+  return qr.householderQ() * MatrixXd::Identity(A.rows(), A.cols());
+}
+
+/// Values, bars and pairs of the projection on V, the columns U of the space.
+std::string project(const Monodromy& monodromy, const SlowMotions& slow, const KrylovSpace& space, const MatrixXd& U,
+                    const std::vector<Complex>& last, Passes& passes)
 {
   Projector& projector = passes.projector;
-  projector.V = block_of(slow.right);
-  projector.W = energy_images(monodromy.flow, orthonormal(monodromy.flow, block_of(slow.left), least_part));
+  projector.V = combination(space.Q, U);
+  const double condition = fit(projector);
+  if (!(condition <= largest_condition))
+    return format("right and left vectors of the reduced model do not fit together: condition %.0e", condition);
+  passes.pairs = solve_dense_unsymmetric(coefficients(projector, combination(space.image, U)));
+  passes.values = values_of(passes.pairs);
+  passes.bars = distances(passes.values, last);
+  if (passes.columns > static_cast<long>(slow.right.size()) && meaningless(passes.values, passes.bars))
+    return "the reduced model's multipliers differ too much from the full model's";
+  const std::vector<std::size_t> own = nearest_places(passes.values, slow.values);
+  for (std::size_t i = 0; i < own.size(); ++i)
+    passes.bars[i] = std::max(2 * passes.bars[i] + slow.errors[own[i]], 1e-9);
+  passes.shift_distance = take_out_shift(monodromy, passes);
+  return {};
+}
+
+/// Two passes or more, until no bar reaches across 1. Returns why the vectors do not serve, or nothing.
+std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Passes& passes)
+{
+  passes.projector.W = energy_images(monodromy.flow, orthonormal(monodromy.flow, block_of(slow.left), least_part));
+  KrylovSpace space;
+  StateBlock block = block_of(slow.right);
   std::vector<Complex> last = slow.values;
   for (int pass = 1;; ++pass)
   {
-    const double condition = fit(monodromy.flow, projector);
-    if (!(condition <= largest_condition))
-      return format("right and left vectors of the reduced model do not fit together: condition %.0e", condition);
-    StateBlock Z = image_of(monodromy, projector.V);
-    passes.columns += static_cast<long>(Z.columns());
-    passes.pairs = solve_dense_unsymmetric(coefficients(projector, Z));
-    const std::vector<Complex> values = values_of(passes.pairs);
-    passes.bars = distances(values, last);
-    const std::vector<std::size_t> own = nearest_places(values, slow.values);
-    for (std::size_t i = 0; i < values.size(); ++i)
-      passes.bars[i] = std::max(2 * passes.bars[i] + slow.errors[own[i]], 1e-9);
-    shift_distance = take_out_shift(monodromy, passes);
-    if (pass == passes_at_most || (pass > 1 && !reaches_across(passes))) return {};
-    last = values;
-    projector.V = std::move(Z);
+    const Index before = space.H.rows();
+    extend(monodromy, std::move(block), space);
+    passes.columns = static_cast<long>(space.H.rows());
+    const MatrixXd U = pass == 1 ? MatrixXd::Identity(space.H.rows(), space.H.cols()).eval()
+                                 : orthonormal_columns(nearest_ritz_vectors(space.H, last));
+    if (std::string refusal = project(monodromy, slow, space, U, last, passes); !refusal.empty()) return refusal;
+    if (pass == passes_at_most || space.H.rows() == before || (pass > 1 && !reaches_across(passes))) return {};
+    last = passes.values;
+    block = {columns_from(space.image.u, before), columns_from(space.image.v, before)};
   }
 }
 
@@ -246,8 +328,9 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
   Multipliers& multipliers = result.multipliers;
   multipliers.method = MultiplierMethod::oblique;
   Passes passes;
-  refusal = make_passes(monodromy, slow, passes, multipliers.trivial_error);
+  refusal = make_passes(monodromy, slow, passes);
   if (!refusal.empty()) return std::nullopt;
+  multipliers.trivial_error = passes.shift_distance;
   const Index limit = columns > 0 ? columns : 96;
   const Search search = search_beside(monodromy, passes.projector, slow.others, limit);
   multipliers.values = values_of(passes.pairs);

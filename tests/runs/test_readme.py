@@ -147,8 +147,8 @@ def data_sets_of(file):
     return found
 
 
-# Written with a verdict that is unstable or undecided, which no run here ends in.
-UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide"}
+# Written with a verdict that is unstable or undecided, or by Arnoldi in place of a projection: no run here ends so.
+UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide", "cycle.multipliers.refusal"}
 # Written of branches with events, and where a stable cycle stands beside a stable equilibrium.
 OF_SOME_BRANCHES = re.compile(r"branch\.(events|coexistence)\[\]\.\w+")
 

@@ -13,13 +13,13 @@
 namespace squeal
 {
 
-/// Approximate eigenvectors of dPhi_T/dx whose multipliers are largest (src/README.md, section 6.9). A complex pair
-/// takes two places of each list, its vectors as real and imaginary parts.
+/// Approximations of the largest multipliers of dPhi_T/dx and of the spans of their eigenvectors (src/README.md,
+/// section 6.9). All lists are of one size but `others`.
 struct SlowMotions
 {
   std::vector<std::complex<double>> values; // largest first
-  std::vector<double> errors;               // what a value changes by with the grid of time
-  std::vector<Owned<Vec>> right, left;      // left ones act by the energy product
+  std::vector<double> errors;               // what a modulus changes by with the grid of time
+  std::vector<Owned<Vec>> right, left;      // of the spans; left ones act by the energy product
   std::vector<Owned<Vec>> others;           // more motions that decay slowly, the slowest first
   bool confirmed = false;                   // another approximation has as many large values
   std::string missing;                      // why there are none

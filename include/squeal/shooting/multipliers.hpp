@@ -61,6 +61,7 @@ struct Multipliers
   double trivial_error = 0;           // distance of the shift's own multiplier from 1
   long periods = 0;                   // columns of the tangent, or difference quotients, over one period each
   MultiplierMethod method = MultiplierMethod::automatic; // that was used
+  std::string refusal;                                   // why the oblique projection did not serve
 };
 
 struct FloquetAnalysis
