@@ -6,6 +6,7 @@
 #include "squeal/model.hpp"
 #include "squeal/report/report.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <optional>
 
@@ -130,7 +131,9 @@ Attractors run_attractors(const Chain& chain)
     return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
   const std::string reason = no_mode_to_follow(chain.report);
   if (!reason.empty()) return not_run<Attractors>(OutcomeKind::skipped, reason);
-  return find_attractors({chain.sliding(), chain.report.modes.modes, chain.unstable(), settings, chain.options.step},
+  CycleSettings used = settings;
+  if (used.steps_per_period == 0) used.steps_per_period = 64; // the step's error of the energy is then about a percent
+  return find_attractors({chain.sliding(), chain.report.modes.modes, chain.unstable(), used, chain.options.step},
                          chain.options.attractors);
 }
 
@@ -139,7 +142,8 @@ std::string no_cycle_to_follow(const LimitCycle& cycle, double tolerance)
 {
   if (!has_run(cycle.outcome) || !cycle.orbit.state.get()) return "there is no cycle to start from";
   // one that repels is a cycle as well
-  if (!(cycle.orbit.residual <= tolerance)) return "the cycle to start from did not converge to cycle.tolerance";
+  if (cycle.outcome.kind != OutcomeKind::converged && !(cycle.orbit.residual <= tolerance))
+    return "the cycle to start from did not converge";
   return {};
 }
 
@@ -148,14 +152,17 @@ BrakeBranch run_branch(const Chain& chain)
   const Scene& scene = chain.scene;
   const Report& report = chain.report;
   if (!scene.branch) return not_run<BrakeBranch>(OutcomeKind::off, "the scene has no [branch]");
-  const std::string reason = no_cycle_to_follow(report.cycle, scene.cycle.tolerance);
+  const double tolerance = scene.cycle.tolerance > 0 ? scene.cycle.tolerance : 1e-5;
+  const int steps = scene.cycle.steps_per_period;
+  const std::string reason = no_cycle_to_follow(report.cycle, tolerance);
   if (!reason.empty()) return not_run<BrakeBranch>(OutcomeKind::skipped, reason);
   const auto model_at = [&](double parameter)
   {
     Model model = rebuild_model(chain.model, scene_on_branch(scene, parameter), comm_of(chain.model.structure.load));
     return BranchModel{std::move(model.structure), std::move(model.interface)};
   };
-  return find_branch({*scene.branch, model_at, chain.sliding(), report.cycle, scene.cycle.tolerance, chain.model.probes,
+  return find_branch({*scene.branch, model_at, chain.sliding(), report.cycle,
+                      steps > 0 ? steps : std::min(report.cycle.steps_per_period, 128), tolerance, chain.model.probes,
                       scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.step,
                       chain.options.cycle.shooting});
 }

@@ -19,6 +19,13 @@ bool natural(BranchEnding ending)
 Outcome outcome_of(const BrakeBranchProblem& problem, const Branch& branch)
 {
   Outcome outcome{OutcomeKind::converged, "", static_cast<int>(branch.points.size()), 0};
+  if (branch.points.empty())
+  {
+    outcome.kind = OutcomeKind::not_converged;
+    outcome.reason = format("the cycle to start from does not close within %.0e at %d steps a period",
+                            problem.tolerance, problem.steps_per_period);
+    return outcome;
+  }
   for (const BranchPoint& point : branch.points) outcome.residual = std::max(outcome.residual, point.residual);
   const auto note = [&](BranchEnding ending, const BranchPoint& end)
   {

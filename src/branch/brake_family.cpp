@@ -30,7 +30,7 @@ void count_statuses(const MeasuredPeriod& measured, const std::vector<char>& clo
 BrakeAt::BrakeAt(double value, BranchModel made, const BrakeBranchProblem& problem)
     : parameter(value), model(std::move(made)), map{{model.structure, model.interface, equilibrium},
                                                     problem.step,
-                                                    problem.cycle.steps_per_period,
+                                                    problem.steps_per_period,
                                                     problem.cycle.theta},
       flow(flow_of(map))
 {

@@ -194,6 +194,15 @@ Branch joined(BranchSide backward, BranchSide forward)
   return branch;
 }
 
+/// A branch that could not begin.
+Branch without_start(long periods)
+{
+  Branch branch;
+  branch.ends = {BranchEnding::step_too_small, BranchEnding::step_too_small};
+  branch.periods = periods;
+  return branch;
+}
+
 } // namespace
 
 Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settings, const ShootingOptions& options,
@@ -205,8 +214,11 @@ Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settin
   corrector.scales.parameter = settings.greatest - settings.least;
   CorrectedOrbit first{squeal::copy_of(start), parameter, 0};
   refer_to(corrector, first);
-  ExaminedOrbit examined = examine(corrector, std::move(first), Examined::multipliers_too);
   const BranchVector rising{zeros_like(start.state), 0, corrector.scales.parameter};
+  std::optional<CorrectedOrbit> closed = correct(corrector, vector_of(first), rising);
+  if (!closed) return without_start(log.convergence.periods);
+  refer_to(corrector, *closed);
+  ExaminedOrbit examined = examine(corrector, std::move(*closed), Examined::multipliers_too);
   BranchVector tangent = tangent_at(corrector, examined.corrected, rising), back = copy_of(tangent);
   scale(-1, back);
   BranchSide backward = follow(corrector, examined, std::move(back));

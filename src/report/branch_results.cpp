@@ -164,6 +164,7 @@ std::vector<std::string> branch_lines(const BrakeBranch& branch, const Scene& sc
 {
   constexpr std::size_t points_shown = 12, grazings_shown = 4;
   const Branch& followed = branch.branch;
+  if (followed.points.empty()) return {};
   std::vector<std::string> lines = {
       format("%zu cycles along %s from %.6g to %.6g; %ld periods and %ld columns of the tangent",
              followed.points.size(), scene.branch->key.c_str(), followed.points.front().parameter,

@@ -51,7 +51,8 @@ struct BrakeBranchProblem
   std::function<BranchModel(double parameter)> model_at;
   SlidingEquilibrium sliding; // of the scene itself
   const LimitCycle& cycle;    // where the branch starts
-  double tolerance = 0;       // on the full-space residual
+  int steps_per_period = 0;
+  double tolerance = 0; // on the full-space residual
   Mat probes = nullptr;
   const ModesSettings& modes;
   const ModesOptions& modes_options;

@@ -116,7 +116,7 @@ struct ContinuationSettings
   double tolerance = 0;           // on the full-space residual
 };
 
-/// The branch through a closed orbit (state, period) of the value `parameter`.
+/// The branch through the orbit of the value `parameter` that closes near this one; without points where none does.
 Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settings, const ShootingOptions& options,
                     const Orbit& start, double parameter);
 
