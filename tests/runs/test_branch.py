@@ -6,7 +6,8 @@ import sys
 import pytest
 from conftest import INPUTS, ROOT
 
-SCENE = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=200"]
+SCENE = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=200",
+         "--set", "fidelity=full"]
 HOPF = 0.17649288  # exact: the characteristic polynomial of the sliding oscillator has an imaginary pair
 
 
@@ -28,7 +29,7 @@ def test_points_are_the_cycles_of_single_runs(friction, converged):
     points = friction["branch"]["points"]
     for wanted in (0.2, 0.35, 0.45):
         point = min(points, key=lambda point: abs(point["parameter"] - wanted))
-        single = converged(*SCENE, "--set", f"friction.coefficient={point['parameter']!r}").report["cycle"]
+        single = converged(*SCENE, "--set", f"friction.coefficient={point['parameter']!r}", ranks=1).report["cycle"]
         # The step is off by 8e-5 of the period. The phase of its grid against the events moves a twentieth of that.
         assert point["period"] == pytest.approx(single["period"], rel=5e-6)
         assert point["mean_fluctuating_energy"] == pytest.approx(single["mean_fluctuating_energy"], rel=1e-3)
@@ -61,10 +62,10 @@ def test_the_branch_starts_at_the_hopf_point(friction):
 ])
 def test_any_number_of_the_scene(key, start, end, override, converged):
     """Models are built again at each value: the last point is the cycle of the scene with that value."""
-    report = converged(*SCENE, *branch_of(key, start, end), "--set", "branch.points=6").report
+    report = converged(*SCENE, *branch_of(key, start, end), "--set", "branch.points=6", ranks=1).report
     points = report["branch"]["points"]
     assert [points[0]["parameter"], points[-1]["parameter"]] == [start, end]
-    single = converged(*SCENE, "--set", override.format(end)).report["cycle"]
+    single = converged(*SCENE, "--set", override.format(end), ranks=1).report["cycle"]
     assert points[-1]["period"] == pytest.approx(single["period"], rel=5e-6)
     assert points[-1]["mean_fluctuating_energy"] == pytest.approx(single["mean_fluctuating_energy"], rel=1e-3)
 
