@@ -13,8 +13,8 @@ namespace squeal
 namespace
 {
 
-constexpr std::array stages = {"equilibrium_", "modes_",    "transient_", "cycle_",
-                               "cycle_full_",  "estimate_", "reduced_",   "attractors_"};
+constexpr std::array stages = {"equilibrium_", "modes_",   "transient_",  "cycle_",  "cycle_full_",
+                               "estimate_",    "reduced_", "attractors_", "settled_"};
 
 // What a stage hands on to a solver object, which checks the rest itself.
 constexpr std::array solver_parts = {"snes_", "ksp_", "pc_", "pep_", "eps_", "st_",
@@ -85,7 +85,7 @@ OptionList options_of(ProgramOptions& options)
   OptionList all;
   for (OptionList list : {options_of(options.factor), options_of(options.equilibrium), options_of(options.modes),
                           options_of(options.pencil), options_of(options.estimate), options_of(options.step),
-                          options_of(options.cycle), options_of(options.attractors)})
+                          options_of(options.cycle), options_of(options.settled), options_of(options.attractors)})
     all.insert(all.end(), list.begin(), list.end());
   return all;
 }

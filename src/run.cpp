@@ -24,6 +24,7 @@ struct Chain
   const Model& model;
   Report& report;
   std::optional<LinearisedSliding> linearised; // once there is an equilibrium and a stage needs it
+  std::optional<State> cycle_file{}; // the state that the scene starts the cycle's search from, if it is a file
 
   SlidingEquilibrium sliding() const { return {model.structure, model.interface, report.equilibrium}; }
   UnstableModes unstable() const { return {report.modes.unstable(), report.estimates}; }
@@ -108,20 +109,65 @@ Trajectory run_transient(const Chain& chain)
                    transient_start(chain.sliding(), chain.unstable(), settings), chain.model.probes);
 }
 
+/// The state that the cycle's search starts from, where it is none of the modes'.
+const State* given_start(const Chain& chain)
+{
+  if (chain.cycle_file) return &*chain.cycle_file;
+  return chain.scene.cycle.start.kind == CycleStartKind::transient ? &chain.report.transient.end : nullptr;
+}
+
+/// Why the search for the cycle cannot run; empty if it can.
+std::string no_cycle_start(const Chain& chain)
+{
+  const std::string reason = no_mode_to_follow(chain.report);
+  if (!reason.empty() || chain.scene.cycle.start.kind != CycleStartKind::transient) return reason;
+  const bool ended = chain.report.transient.outcome.kind == OutcomeKind::completed;
+  return ended ? "" : "the transient that it starts from the end of was not completed";
+}
+
+CycleProblem cycle_problem(const Chain& chain)
+{
+  return {chain.sliding(),    *chain.linearised,   chain.report.modes.modes, chain.unstable(),  chain.scene.cycle,
+          chain.options.step, chain.options.modes, chain.model.probes,       given_start(chain)};
+}
+
 FittedCycle run_cycle(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   FittedCycle result;
-  const std::string reason = no_mode_to_follow(chain.report);
+  const std::string reason = no_cycle_start(chain);
   if (!scene.cycle.enabled)
     result.cycle = not_run<LimitCycle>(OutcomeKind::off, "the scene has no [cycle]");
   else if (!reason.empty())
     result.cycle = not_run<LimitCycle>(OutcomeKind::skipped, reason);
   else
-    result = find_fitted_cycle({chain.sliding(), *chain.linearised, chain.report.modes.modes, chain.unstable(),
-                                scene.cycle, chain.options.step, chain.options.modes, chain.model.probes},
-                               {scene.fidelity, scene.accuracy}, chain.options.cycle);
+    result = find_fitted_cycle(cycle_problem(chain), {scene.fidelity, scene.accuracy}, chain.options.cycle);
   return result;
+}
+
+/// Whether the search for a cycle ended without one that attracts, on a free motion that goes on.
+bool motion_goes_on(const LimitCycle& cycle)
+{
+  return cycle.outcome.kind != OutcomeKind::collapsed_to_equilibrium && cycle.free.state.get();
+}
+
+/// What the motion settles on where no cycle attracts.
+SettledMotion run_settled(const Chain& chain)
+{
+  const LimitCycle& cycle = chain.report.cycle;
+  if (!has_run(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::off, "no cycle was sought");
+  if (succeeded(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::skipped, "the cycle is the answer");
+  if (!motion_goes_on(cycle)) return not_run<SettledMotion>(OutcomeKind::skipped, "there is no motion to go on from");
+  return find_settled_motion(cycle_problem(chain), cycle, chain.options.settled);
+}
+
+/// A settled motion answers where no cycle does.
+void accept_settled_motion(Report& report)
+{
+  Outcome& outcome = report.cycle.outcome;
+  if (report.settled.outcome.kind != OutcomeKind::settled) return;
+  outcome.reason = std::string(word(outcome.kind)) + ": " + outcome.reason;
+  outcome.kind = OutcomeKind::settled;
 }
 
 Attractors run_attractors(const Chain& chain)
@@ -199,6 +245,8 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, const std::files
   print_model(report.model, comm);
 
   Chain chain{scene, options, model, report, {}};
+  if (scene.cycle.enabled && scene.cycle.start.kind == CycleStartKind::file)
+    chain.cycle_file = read_state(scene.cycle.start.file, model.structure);
   report.equilibrium = timed(report, "equilibrium", comm,
                              [&] { return find_equilibrium(model.structure, model.interface, options.equilibrium); });
   if (report.equilibrium.outcome.kind == OutcomeKind::converged)
@@ -212,6 +260,8 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, const std::files
   FittedCycle fitted = timed(report, "cycle", comm, [&] { return run_cycle(chain); });
   report.cycle = std::move(fitted.cycle);
   report.fidelity = std::move(fitted.fidelity);
+  report.settled = timed(report, "settled", comm, [&] { return run_settled(chain); });
+  accept_settled_motion(report);
 
   report.attractors = timed(report, "attractors", comm, [&] { return run_attractors(chain); });
   report.branch = timed(report, "branch", comm, [&] { return run_branch(chain); });

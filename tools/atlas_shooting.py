@@ -16,7 +16,7 @@ def cycle_look(entry, period, energy):
     if word == "converged":
         heard = abs(entry["period"] / period - 1) < 3e-3 and abs(entry["mean_energy"] / energy - 1) < 0.03
         return ("o", BLUE, "the cycle of direct integration") if heard else ("s", ORANGE, "another cycle that attracts")
-    return {"unstable cycle": ("D", "black", "unstable cycle"),
+    return {"unstable cycle": ("D", "black", "unstable cycle"), "settled": ("P", "purple", "no cycle attracts"),
             "collapsed to equilibrium": ("x", GREY, "collapsed to equilibrium"),
             "not periodic": ("v", GREEN, "not periodic")
             }.get(word, ("^", RED, "not converged"))
@@ -30,32 +30,28 @@ def draw_basin(axes, points, heard):
 
 
 def basin_map(results):
-    """Where shooting leads, over start amplitude, phase and period (oscillator) and free periods (pin on a disc)."""
+    """Where the search leads, over start amplitude and free periods (oscillator, pin on a disc)."""
     amplitudes = [0.05, 0.1, 0.2, 0.35, 0.6, 1, 1.7, 3, 5, 9, 14, 20]
-    fixed = dict(transient__enabled="false", cycle__steps_per_period=100, cycle__tolerance=1e-6)
-    phases, periods = [0, 45, 90, 135, 180, 225, 270, 315], [0.6, 0.75, 0.85, 0.95, 1, 1.05, 1.15, 1.3, 1.6]
     free = [0, 5, 10, 20]
-    small = dict(mesh__parameters__divisions=3, modes__method="full", modes__band=6000)
-    jobs = [(OSCILLATOR, ["-cycle_start_amplitude", a, "-cycle_start_phase", p], fixed) for p in phases for a in amplitudes]
-    jobs += [(OSCILLATOR, ["-cycle_start_amplitude", a, "-cycle_start_period", p], fixed) for p in periods for a in amplitudes]
-    jobs += [(PIN, ["-cycle_start_amplitude", a], dict(small, cycle__free_periods=n)) for n in free for a in amplitudes]
+    models = [(OSCILLATOR, dict(transient__enabled="false", cycle__steps_per_period=100, cycle__tolerance=1e-6)),
+              (PIN, dict(mesh__parameters__divisions=3, modes__method="full", modes__band=6000))]
+    estimates = [run(results, scene, **dict(fixed, cycle__enabled="false"))["estimate"]["amplitude"] for scene, fixed in models]
+    jobs = [(scene, [], dict(fixed, cycle__start="mode", cycle__amplitude=a * estimate, cycle__free_periods=n))
+            for (scene, fixed), estimate in zip(models, estimates) for n in free for a in amplitudes]
     done = [r["cycle"] for r in runs(results, jobs)]
-    count = len(amplitudes)
-    parts = [done[: count * len(phases)], done[count * len(phases) : -count * len(free)], done[-count * len(free) :]]
+    parts = [done[: len(done) // 2], done[len(done) // 2 :]]
     long = run(results, PIN, cycle__enabled="false", transient__enabled="true", transient__periods=150,
-               transient__steps_per_period=100, **small)
+               transient__steps_per_period=100, **models[1][1])
     settled = long.history("energy")[-5000:].mean()
-    pin = min((entry for entry in parts[2] if entry["outcome"] == "converged"),
+    pin = min((entry for entry in parts[1] if entry["outcome"] == "converged"), default={"period": 1},
               key=lambda entry: abs(entry["mean_energy"] - settled))
-    heard = [(5.954461004653, 1.77650678461)] * 2 + [(pin["period"], settled)]
-    figure, rows = plt.subplots(1, 3, figsize=(13, 4.6))
-    for axes, entries, values, known, title, label in zip(
-            rows, parts, (phases, periods, free), heard,
-            ("Oscillator: phase of the start", "Oscillator: period at the start", "Pin on a disc: free periods"),
-            ("degrees from the estimate's", "of the mode's", "periods integrated before Newton")):
-        pairs = [(a, value) for value in values for a in amplitudes]
-        draw_basin(axes, [(a, value, entry) for (a, value), entry in zip(pairs, entries)], known)
-        axes.set(xscale="log", xlabel="start amplitude over the estimate's", ylabel=label, title=title)
+    heard = [(5.954461004653, 1.77650678461), (pin["period"], settled)]
+    figure, rows = plt.subplots(1, 2, figsize=(9, 4.6))
+    for axes, entries, known, title in zip(rows, parts, heard, ("Oscillator", "Pin on a disc")):
+        pairs = [(a, n) for n in free for a in amplitudes]
+        draw_basin(axes, [(a, n, entry) for (a, n), entry in zip(pairs, entries)], known)
+        axes.set(xscale="log", xlabel="start amplitude over the estimate's", ylabel="free periods before the first attempt",
+                 title=title)
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + 0.42 * (high - low))
         axes.legend(loc="upper left", fontsize=8)

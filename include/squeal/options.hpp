@@ -4,6 +4,7 @@
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/cycle/options.hpp"
+#include "squeal/settled/motion.hpp"
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/transient.hpp"
 
@@ -19,6 +20,7 @@ struct ProgramOptions
   EstimateOptions estimate;
   StepOptions step; // of the transient and of the cycle
   CycleOptions cycle;
+  SettledOptions settled;
   AttractorOptions attractors;
 };
 

@@ -43,8 +43,8 @@ CycleSettings with_choices(const CycleProblem& problem, CycleModel model)
 /// The problem with other settings.
 CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
 {
-  return {problem.sliding, problem.linearised, problem.modes,         problem.unstable,
-          settings,        problem.step,       problem.modes_options, problem.probes};
+  return {problem.sliding, problem.linearised,    problem.modes,  problem.unstable, settings,
+          problem.step,    problem.modes_options, problem.probes, problem.given};
 }
 
 /// The full model's cycle from the reduced model's, its derivative for a preconditioner, and the finer steps that the
@@ -70,9 +70,10 @@ std::string find_by_reduced_model(ReducedSearch& search, bool steps_open, LimitC
   else
   {
     cycle = find_cycle_from(problem, search.options, start, preconditioner, 0);
-    if (cycle.outcome.kind == OutcomeKind::not_converged)
-      return "the full model's shooting from the reduced model's cycle stalled";
     search.fidelity.full_periods = cycle.convergence.periods;
+    if (cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium || cycle.outcome.kind == OutcomeKind::not_periodic)
+      return "the full model's shooting from the reduced model's cycle left it";
+    if (cycle.outcome.kind != OutcomeKind::converged) return {}; // the free motion went on from there
     if (steps_open)
       refine_steps(correction, cycle);
     else
@@ -91,7 +92,7 @@ void find_by_full_model(const CycleProblem& problem, const CycleOptions& options
   const double clock = MPI_Wtime();
   Fidelity& fidelity = result.fidelity;
   fidelity.used = CycleModel::full;
-  LimitCycle found = find_cycle_from_estimate(problem, options);
+  LimitCycle found = find_cycle_from_start(problem, options);
   found.convergence.periods += fidelity.full_periods; // of a search that stalled
   result.cycle = std::move(found);
   fidelity.full_periods = result.cycle.convergence.periods;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace squeal
 {
@@ -22,10 +21,16 @@ double fluctuation_norm(const CycleProblem& problem, const State& state)
       2 * (potential_energy(problem.sliding.structure, moved) + kinetic_energy(problem.sliding.structure, state.v)));
 }
 
+/// Of the followed mode at an amplitude of 1.
+double unit_norm(const CycleProblem& problem)
+{
+  return fluctuation_norm(problem, mode_state(problem.sliding.equilibrium, problem.unstable.modes.front(), 1,
+                                              problem.unstable.estimates.front().phase));
+}
+
 /// Adds to the reason of an outcome what the brake's options can do about it.
 void add_remedies(const PeriodMap& map, Outcome& outcome)
 {
-  if (outcome.kind == OutcomeKind::unstable_cycle) outcome.reason += " (-cycle_start_amplitude, cycle.free_periods)";
   if (map.step.law == ContactLaw::velocity && outcome.kind != OutcomeKind::converged)
     outcome.reason += "; by the velocity law the period map jumps where a step begins open or closed: "
                       "-transient_contact_law displacement";
@@ -53,7 +58,9 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
                    std::move(found.convergence),
                    std::move(found.multipliers),
                    {},
+                   {},
                    {}};
+  cycle.free = std::move(found.free);
   cycle.measured = measure_period(map, {problem.probes, static_cast<int>(options.samples)}, cycle.orbit.period,
                                   cycle.orbit.state, nullptr);
   ++cycle.convergence.periods;
@@ -62,13 +69,37 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   return cycle;
 }
 
-LimitCycle find_cycle_from_estimate(const CycleProblem& problem, const CycleOptions& options)
+std::optional<State> cycle_start(const CycleProblem& problem)
+{
+  const CycleStartKind kind = problem.settings.start.kind;
+  if (kind == CycleStartKind::file || kind == CycleStartKind::transient) return copy_of(*problem.given);
+  const ComplexMode& mode = problem.unstable.modes.front();
+  const Estimate& estimate = problem.unstable.estimates.front();
+  double amplitude = estimate.start_amplitude;
+  if (kind == CycleStartKind::mode)
+    amplitude = problem.settings.amplitude > 0 ? problem.settings.amplitude : 2 * estimate.lift_off_amplitude;
+  if (!(amplitude > 0) || !std::isfinite(amplitude)) return {};
+  State start = mode_state(problem.sliding.equilibrium, mode, amplitude, estimate.phase);
+  if (kind == CycleStartKind::mode) return start;
+  for (std::size_t i = 1; i < problem.unstable.modes.size(); ++i)
+    if (const auto motion =
+            estimated_motion(problem.sliding.equilibrium, problem.unstable.modes[i], problem.unstable.estimates[i]))
+      add_motion(*motion, 1, start);
+  return start;
+}
+
+double equivalent_amplitude(const CycleProblem& problem, const State& state)
+{
+  return fluctuation_norm(problem, state) / unit_norm(problem);
+}
+
+LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions& options)
 {
   const ComplexMode& mode = problem.unstable.modes.front();
   const Estimate& estimate = problem.unstable.estimates.front();
   const Equilibrium& equilibrium = problem.sliding.equilibrium;
-  const double amplitude = options.start_amplitude * estimate.start_amplitude;
-  if (!(amplitude > 0) || !std::isfinite(amplitude) || mode.lambda.imag() == 0)
+  const std::optional<State> first = cycle_start(problem);
+  if (!first || mode.lambda.imag() == 0)
   {
     LimitCycle skipped;
     skipped.outcome = {OutcomeKind::skipped,
@@ -76,23 +107,13 @@ LimitCycle find_cycle_from_estimate(const CycleProblem& problem, const CycleOpti
                        std::nan("")};
     return skipped;
   }
-  State first = mode_state(equilibrium, mode, amplitude, estimate.phase + options.start_phase * std::numbers::pi / 180);
-  const double first_event =
-      std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude) / amplitude * fluctuation_norm(problem, first);
-  ShootingStart start{equilibrium.u,
-                      first.u,
-                      first.v,
-                      options.start_period / mode.frequency_hz(),
-                      {mode.real, mode.imaginary, equilibrium.u},
-                      {},
-                      first_event};
+  const double first_event = std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude) * unit_norm(problem);
+  ShootingStart start{
+      equilibrium.u, first->u, first->v, 1 / mode.frequency_hz(), {mode.real, mode.imaginary, equilibrium.u}, {},
+      first_event};
   for (std::size_t i = 1; i < problem.unstable.modes.size(); ++i)
-  {
-    const auto motion = estimated_motion(equilibrium, problem.unstable.modes[i], problem.unstable.estimates[i]);
-    if (!motion) continue;
-    add_motion(*motion, options.start_amplitude, first);
-    start.other_unstable.push_back(state_of(motion->u, motion->v));
-  }
+    if (const auto motion = estimated_motion(equilibrium, problem.unstable.modes[i], problem.unstable.estimates[i]))
+      start.other_unstable.push_back(state_of(motion->u, motion->v));
   return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),
                          problem.settings.free_periods);
 }

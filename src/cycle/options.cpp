@@ -7,10 +7,6 @@ OptionList options_of(CycleOptions& options)
 {
   ReducedOptions& reduced = options.reduced;
   OptionList list = {
-      {"-cycle_start_amplitude", &options.start_amplitude, Range::positive,
-       "multiple of the estimate's amplitude to start from"},
-      {"-cycle_start_phase", &options.start_phase, Range::any, "degrees, added to the estimate's phase of the start"},
-      {"-cycle_start_period", &options.start_period, Range::positive, "multiple of the mode's period to start from"},
       {"-cycle_band_factor", &options.band_factor, Range::not_negative,
        "real modes of the preconditioner reach this many times the mode's frequency"},
       {"-cycle_samples", &options.samples, Range::natural,

@@ -24,14 +24,36 @@ void complete_rate(PeriodMap& map, StepWork& work, State& end, Vec rate)
 namespace
 {
 
+/// Makes room for the records of a period from this start.
+void begin_record(PeriodMap& map, Vec start)
+{
+  map.records.clear();
+  map.records.resize(static_cast<std::size_t>(map.steps));
+  map.recorded_start = copy_of(start);
+  map.recorded_step = map.step.h;
+}
+
+/// Whether the records are those of the period from this start.
+bool is_recorded(const PeriodMap& map, Vec start)
+{
+  if (!map.recorded_start.get() || map.recorded_step != map.step.h ||
+      map.records.size() != static_cast<std::size_t>(map.steps))
+    return false;
+  PetscBool same = PETSC_FALSE;
+  check(VecEqual(map.recorded_start, start, &same));
+  return same == PETSC_TRUE;
+}
+
 void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
 {
   const auto& [structure, interface, equilibrium] = map.sliding;
   set_period(map, period);
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
   StepWork work = begin_steps(map.step, structure, interface, state);
+  if (rate) begin_record(map, start);
   for (int i = 0; i < map.steps; ++i)
   {
+    work.record = rate ? &map.records[static_cast<std::size_t>(i)] : nullptr;
     if (rate && i + 1 == map.steps)
     {
       check(VecCopy(state.u, displacement(rate)));
@@ -39,6 +61,7 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
     }
     if (!advance(map.step, structure, interface, work, state).contact_converged) ++map.unconverged;
   }
+  work.record = nullptr;
   check(VecCopy(state.u, displacement(end)));
   check(VecCopy(state.v, velocity(end)));
   if (rate) complete_rate(map, work, state, rate);
@@ -90,8 +113,10 @@ void move_by_part(const PeriodMap& map, double part, State& state)
 void record_period(PeriodMap& map, double period, Vec start, double shift)
 {
   set_period(map, period);
+  if (shift == 0 && is_recorded(map, start)) return;
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
   if (shift > 0) move_by_part(map, shift, state);
+  map.recorded_start = {};
   map.records =
       record_steps(map.step, map.sliding.structure, map.sliding.interface, state, map.steps, Recorded::contact);
 }

@@ -180,13 +180,12 @@ std::string size_refusal(const ReducedSearch& search)
          " degrees of freedom";
 }
 
-/// The estimated fluctuation (du, v) of the followed mode.
-Owned<Vec> estimated_fluctuation(const CycleProblem& problem, double amplitude)
+/// The fluctuation (du, v) of a state.
+Owned<Vec> fluctuation_of(const CycleProblem& problem, const State& state)
 {
-  const State first = mode_state(problem.sliding.equilibrium, problem.unstable.modes.front(), amplitude,
-                                 problem.unstable.estimates.front().phase);
-  check(VecAXPY(first.u, -1, problem.sliding.equilibrium.u));
-  return state_of(first.u, first.v);
+  const Owned<Vec> moved = copy_of(state.u.get());
+  check(VecAXPY(moved, -1, problem.sliding.equilibrium.u));
+  return state_of(moved, state.v);
 }
 
 } // namespace
@@ -235,8 +234,10 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
   const CycleProblem& problem = search.problem;
   const ComplexMode& mode = problem.unstable.modes.front();
   const double margin = search.options.reduced.margin;
-  double amplitude = search.options.start_amplitude * problem.unstable.estimates.front().start_amplitude;
-  const Owned<Vec> estimated = estimated_fluctuation(problem, amplitude);
+  const std::optional<State> start = cycle_start(problem);
+  if (!start) return "there is no amplitude to start from";
+  double amplitude = equivalent_amplitude(problem, *start);
+  const Owned<Vec> estimated = fluctuation_of(problem, *start);
   Owned<Vec> motion = copy_of(estimated.get());
   search.real = find_real_modes_below(problem.linearised, search.options.reduced.band_factor * mode.frequency_hz(),
                                       problem.modes_options);

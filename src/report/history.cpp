@@ -31,6 +31,23 @@ void write_group(Hdf5File& file, const std::string& group, const History& histor
     write("probes/" + without_slash(scene.probes[i].name), history.probes[i], "m");
 }
 
+/// The spectrum of a settled motion, and its lines, strongest first. `unit`: of the amplitudes.
+void write_spectrum(Hdf5File& file, const Spectrum& spectrum, const std::string& unit)
+{
+  const auto write = [&](const std::string& name, const std::vector<double>& data, const std::string& of)
+  { file.write("settled/spectrum/" + name, {data.size()}, data, of); };
+  write("frequency", spectrum.frequency_hz, "Hz");
+  write("amplitude", spectrum.amplitude, unit);
+  std::vector<double> frequency, amplitude;
+  for (const Line& line : spectrum.lines)
+  {
+    frequency.push_back(line.frequency_hz);
+    amplitude.push_back(line.amplitude);
+  }
+  write("line_frequency", frequency, "Hz");
+  write("line_amplitude", amplitude, unit);
+}
+
 /// Steps in rows, pairs in columns; 0 open, 1 stick, 2 slip.
 void write_statuses(Hdf5File& file, const std::vector<std::vector<ContactStatus>>& statuses)
 {
@@ -51,6 +68,11 @@ void write_history(const Report& report, const Scene& scene, const std::filesyst
   {
     write_group(file, "cycle", report.cycle.measured.history, scene);
     write_statuses(file, report.cycle.measured.statuses);
+  }
+  if (has_run(report.settled.outcome))
+  {
+    write_group(file, "settled", report.settled.history, scene);
+    write_spectrum(file, report.settled.examined.spectrum, report.settled.spectrum_probe < 0 ? "N" : "m");
   }
   if (has_run(report.branch.outcome)) write_branch(file, report.branch, scene);
   file.keep();

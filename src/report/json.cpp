@@ -2,6 +2,7 @@
 
 #include "branch_results.hpp"
 #include "derived.hpp"
+#include "heard.hpp"
 #include "squeal/report/files.hpp"
 #include "warnings.hpp"
 
@@ -181,6 +182,60 @@ Json cycle_entry(const Report& report, const Scene& scene)
   return entry;
 }
 
+Json estimated(const Estimated& value)
+{
+  return {{"mean", value.value}, {"error", value.error}};
+}
+
+Json base_entry(const BaseFrequencies& base)
+{
+  return {{"first", base.first},
+          {"second", base.second},
+          {"closes_after", base.closes_after},
+          {"explained", base.explained}};
+}
+
+Json settled_entry(const Report& report, const Scene& scene)
+{
+  const SettledMotion& settled = report.settled;
+  const ExaminedMotion& motion = settled.examined;
+  Json entry = entry_of(settled.outcome);
+  if (!has_run(settled.outcome)) return entry;
+  entry["kind"] = word(motion.verdict.kind);
+  entry["between"] = motion.verdict.between;
+  entry["would_decide"] = motion.verdict.would_decide;
+  entry["periods"] = motion.periods();
+  entry["discarded"] = motion.discarded;
+  entry["period"] = settled.period;
+  entry["steps_per_period"] = settled.steps_per_period;
+  entry["mean_energy"] = estimated(settled.energy);
+  entry["mean_fluctuating_energy"] = estimated(settled.fluctuating_energy);
+  entry["least_energy"] = settled.least_energy;
+  entry["greatest_energy"] = settled.greatest_energy;
+  entry["damping_power"] = estimated(settled.damping_power);
+  entry["contact_power"] = estimated(settled.contact_power);
+  entry["load_power"] = estimated(settled.load_power);
+  entry["open_fraction"] = estimated(settled.open_fraction);
+  entry["stick_fraction"] = estimated(settled.stick_fraction);
+  entry["slip_fraction"] = estimated(settled.slip_fraction);
+  entry["peak_to_peak"] = Json::object();
+  const std::size_t probes = std::min(scene.probes.size(), settled.peak_to_peak.size());
+  for (std::size_t i = 0; i < probes; ++i)
+    entry["peak_to_peak"][scene.probes[i].name] = estimated(settled.peak_to_peak[i]);
+  entry["exponents"] = Json::array();
+  for (const Estimated& one : motion.exponents) entry["exponents"].push_back(estimated(one));
+  entry["base_frequencies_hz"] = base_entry(motion.base);
+  const bool of_probe = settled.spectrum_probe >= 0;
+  entry["spectrum_of"] =
+      of_probe ? scene.probes[static_cast<std::size_t>(settled.spectrum_probe)].name : std::string("normal force");
+  entry["lines"] = Json::array();
+  constexpr std::size_t most = 20;
+  for (std::size_t i = 0; i < std::min(most, motion.spectrum.lines.size()); ++i)
+    entry["lines"].push_back(
+        {{"frequency_hz", motion.spectrum.lines[i].frequency_hz}, {"amplitude", motion.spectrum.lines[i].amplitude}});
+  return entry;
+}
+
 Json fidelity_entry(const Fidelity& fidelity)
 {
   Json entry = {{"asked", word(fidelity.asked)}, {"used", word(fidelity.used)}};
@@ -229,6 +284,7 @@ std::string report_json(const Report& report, const Scene& scene)
   json["format_version"] = format_version;
   json["title"] = scene.title;
   json["scene"] = scene.file.string();
+  json["heard"] = heard(report, scene);
   json["model"] = {{"dofs", report.model.dofs},
                    {"pairs", report.model.pairs},
                    {"elements", report.model.elements},
@@ -247,6 +303,7 @@ std::string report_json(const Report& report, const Scene& scene)
   json["estimate"] = estimate_entry(followed_estimate(report));
   json["transient"] = transient_entry(report);
   json["cycle"] = cycle_entry(report, scene);
+  json["settled"] = settled_entry(report, scene);
   json["fidelity"] = fidelity_entry(report.fidelity);
   json["attractors"] = attractors_entry(report);
   json["branch"] = branch_entry(report, scene);

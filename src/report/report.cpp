@@ -46,13 +46,14 @@ const Estimate& followed_estimate(const Report& report)
   return report.estimates.empty() ? none : report.estimates.front();
 }
 
-std::array<std::pair<const char*, Outcome>, 7> outcomes_of(const Report& report)
+std::array<std::pair<const char*, Outcome>, 8> outcomes_of(const Report& report)
 {
   return {{{"equilibrium", report.equilibrium.outcome},
            {"modes", report.modes.outcome},
            {"estimate", followed_estimate(report).outcome},
            {"transient", report.transient.outcome},
            {"cycle", report.cycle.outcome},
+           {"settled", report.settled.outcome},
            {"attractors", report.attractors.outcome},
            {"branch", report.branch.outcome}}};
 }

@@ -2,6 +2,7 @@
 
 #include "branch_results.hpp"
 #include "derived.hpp"
+#include "heard.hpp"
 #include "warnings.hpp"
 
 #include <algorithm>
@@ -144,6 +145,39 @@ std::string cycle_text(const Report& report, const Scene& scene)
   return text;
 }
 
+std::string mean_text(const char* name, const Estimated& mean, const char* unit)
+{
+  return format("%s %.4g +- %.1g %s", name, mean.value, mean.error, unit);
+}
+
+std::string settled_text(const SettledMotion& settled, const Scene& scene)
+{
+  if (!has_run(settled.outcome)) return "";
+  const ExaminedMotion& motion = settled.examined;
+  std::string text = row("settled", outcome_text(settled.outcome));
+  text += row("", format("%s: %zu periods of %.6g s, the first %zu left out; error bars of 95 %%",
+                         word(motion.verdict.kind), motion.periods(), settled.period, motion.discarded));
+  text += row("", mean_text("mean energy", settled.energy, "J,") + " " +
+                      mean_text("fluctuating", settled.fluctuating_energy, "J") +
+                      format(", of single periods %.3g to %.3g J", settled.least_energy, settled.greatest_energy));
+  text += row("", mean_text("power of damping", settled.damping_power, "W,") + " " +
+                      mean_text("of contact", settled.contact_power, "W,") + " " +
+                      mean_text("of the load", settled.load_power, "W"));
+  text +=
+      row("", format("of the pairs %.1f %% are open, %.1f %% stick, %.1f %% slip", 100 * settled.open_fraction.value,
+                     100 * settled.stick_fraction.value, 100 * settled.slip_fraction.value));
+  std::string exponents = "Lyapunov exponents a period:";
+  for (const Estimated& one : motion.exponents) exponents += format(" %.4f +- %.4f", one.value, one.error);
+  text += row("", exponents);
+  text += row("", format("base frequencies %.6g and %.6g Hz, of %zu lines", motion.base.first, motion.base.second,
+                         motion.spectrum.lines.size()));
+  const std::size_t probes = std::min(scene.probes.size(), settled.peak_to_peak.size());
+  for (std::size_t i = 0; i < probes; ++i)
+    text +=
+        row("", mean_text(("probe " + scene.probes[i].name + ":").c_str(), settled.peak_to_peak[i], "m peak to peak"));
+  return text;
+}
+
 std::string fidelity_text(const Fidelity& fidelity)
 {
   if (fidelity.asked == CycleModel::full) return "";
@@ -192,6 +226,7 @@ std::string table(const Report& report, const Scene& scene)
 {
   const ModelSummary& model = report.model;
   std::string text = "\n" + (scene.title.empty() ? scene.file.filename().string() : scene.title) + "\n";
+  text += row("heard", heard(report, scene));
   text += row("model", format("%lld degrees of freedom, %ld elements, %d contact pairs, %d rank%s",
                               static_cast<long long>(model.dofs), model.elements, model.pairs, model.ranks,
                               model.ranks == 1 ? "" : "s"));
@@ -201,6 +236,7 @@ std::string table(const Report& report, const Scene& scene)
   text += estimate_text(followed_estimate(report)) + warning_rows(warnings.estimate);
   text += transient_text(report) + warning_rows(warnings.transient);
   text += cycle_text(report, scene) + warning_rows(warnings.cycle);
+  text += settled_text(report.settled, scene);
   text += fidelity_text(report.fidelity);
   text += optional_text("attractors", report.attractors.outcome, [&] { return attractor_lines(report.attractors); });
   text += optional_text("branch", report.branch.outcome, [&] { return branch_lines(report.branch, scene); });

@@ -38,6 +38,7 @@ public:
     for (const Contact& contact : scene_.contacts) check_contact(contact);
     for (const Probe& probe : scene_.probes) check_probe(probe);
     check_transient();
+    check_cycle();
   }
 
 private:
@@ -182,6 +183,15 @@ private:
     if ((t.steps > 0) != (t.step_size > 0))
       fail(t.steps > 0 ? static_cast<const void*>(&t.steps) : &t.step_size,
            "[transient] steps and step_size go together: give both, or periods and steps_per_period");
+  }
+
+  void check_cycle() const
+  {
+    const CycleSettings& c = scene_.cycle;
+    if (c.start.kind == CycleStartKind::transient && c.enabled && !scene_.transient.enabled)
+      fail(&c.start, "[cycle] start = 'transient' needs the [transient] that it starts from the end of");
+    if (c.amplitude > 0 && c.start.kind != CycleStartKind::mode)
+      fail(&c.amplitude, "[cycle] amplitude belongs to start = \"mode\": give that too, or leave it out");
   }
 
   const Scene& scene_;

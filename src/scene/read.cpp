@@ -243,20 +243,25 @@ private:
     target.set(target.member, static_cast<std::size_t>(found - words.begin()));
   }
 
-  void read(const toml::node& node, Start& target) const
+  void read(const toml::node& node, Start& target) const { read_start<StartKind>(node, target); }
+  void read(const toml::node& node, CycleStart& target) const { read_start<CycleStartKind>(node, target); }
+
+  /// A word of the kinds of start, or a state file.
+  template <class Kind, class Target> void read_start(const toml::node& node, Target& target) const
   {
     const std::string given = text(node);
+    const Words kinds = words_of(Kind::file);
     std::vector<std::string> words;
-    for (std::size_t place = 0; place < start_kind_words.size(); ++place)
+    for (std::size_t place = 0; place < kinds.size(); ++place)
     {
-      const auto kind = static_cast<StartKind>(place);
-      if (kind == StartKind::file) continue;
+      const auto kind = static_cast<Kind>(place);
+      if (kind == Kind::file) continue;
       words.emplace_back(word(kind));
       if (given != words.back()) continue;
       target = {kind, {}};
       return;
     }
-    target = {StartKind::file, absolute(given)};
+    target = {Kind::file, absolute(given)};
     if (!std::filesystem::is_regular_file(target.file))
       throw Error(place_of(node) + ": " + label_ + key_->name + " = '" + given + "' is none of " + joined(words) +
                   ", and there is no file " + target.file.string());

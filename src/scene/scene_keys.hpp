@@ -20,7 +20,7 @@ struct DampingTarget
 using Target =
     std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*, std::optional<Vec3>*,
                  std::vector<Vec3>*, std::vector<std::string>*, std::array<double, 6>*, Motions*,
-                 std::map<std::string, double>*, std::optional<Rotation>*, DampingTarget, Start*, Choice>;
+                 std::map<std::string, double>*, std::optional<Rotation>*, DampingTarget, Start*, CycleStart*, Choice>;
 
 /// Whether a key must be given.
 enum class Need

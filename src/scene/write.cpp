@@ -118,6 +118,11 @@ std::string print(const Start& start)
   return print(start.kind == StartKind::file ? start.file.string() : std::string(word(start.kind)));
 }
 
+std::string print(const CycleStart& start)
+{
+  return print(start.kind == CycleStartKind::file ? start.file.string() : std::string(word(start.kind)));
+}
+
 /// Whether a vector was not given. Optional vectors are directions and velocities, for which zero is no valid value.
 bool is_absent(const SceneKey& key)
 {

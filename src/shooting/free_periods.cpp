@@ -6,21 +6,41 @@
 namespace squeal
 {
 
-Orbit integrate_free_periods(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period, int count)
+namespace
+{
+
+/// The recurrence nearest to the start lies where the defect is orthogonal to the flow. [s], from the period's end.
+double nearest_recurrence(const OrbitProblem& problem, const Orbit& orbit)
+{
+  const double speed = energy_norm(problem.flow, orbit.rate);
+  const double away = speed > 0 ? -energy_product(problem.flow, orbit.defect, orbit.rate) / (speed * speed) : 0;
+  return std::clamp(away, -0.2 * orbit.period, 0.2 * orbit.period);
+}
+
+} // namespace
+
+double return_residual(const OrbitProblem& problem, const Orbit& orbit)
+{
+  const Owned<Vec> missed = copy_of(orbit.defect.get());
+  check(VecAXPY(missed, nearest_recurrence(problem, orbit), orbit.rate));
+  return energy_norm(problem.flow, missed) / orbit.fluctuation;
+}
+
+Orbit integrate_free_periods(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period,
+                             const FreeIntegration& asked)
 {
   Owned<Vec> current = copy_of(state);
-  for (int done = 0; done < count; ++done)
+  for (int done = 0; done < asked.periods; ++done)
   {
     const Orbit orbit = evaluate(problem, log, current, period);
     record(log, ShootingStage::free_periods, orbit, 0, std::nan(""));
     check(VecAXPY(current, 1, orbit.defect));
-    // The recurrence nearest to the start lies where the defect is orthogonal to the flow. A new period costs a
-    // factorisation, so a small correction waits for the last one.
-    const double speed = energy_norm(problem.flow, orbit.rate);
-    double correction = speed > 0 ? -energy_product(problem.flow, orbit.defect, orbit.rate) / (speed * speed) : 0;
-    correction = std::clamp(correction, -0.2 * period, 0.2 * period);
-    const bool worth_it = done + 1 == count || std::abs(correction) > 0.02 * period;
+    // A new period costs a factorisation, so a small correction waits for the last one.
+    const bool last = done + 1 == asked.periods || return_residual(problem, orbit) <= asked.near_periodic;
+    const double correction = nearest_recurrence(problem, orbit);
+    const bool worth_it = last || std::abs(correction) > 0.02 * period;
     if (worth_it && admissible_period(problem, period + correction)) period += correction;
+    if (last) break;
   }
   return evaluate(problem, log, current, period);
 }

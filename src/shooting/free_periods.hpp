@@ -6,7 +6,18 @@
 namespace squeal
 {
 
-/// `count` periods from the state, then the evaluation of the end with the period of the best recurrence.
-Orbit integrate_free_periods(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period, int count);
+/// The residual without its part along the flow: how far the motion misses its start at the nearest recurrence.
+double return_residual(const OrbitProblem& problem, const Orbit& orbit);
+
+/// When free integration ends.
+struct FreeIntegration
+{
+  int periods = 0;          // at most
+  double near_periodic = 0; // return residual at which it ends before; 0: never
+};
+
+/// Free periods from the state, then the evaluation of the end with the period of the best recurrence.
+Orbit integrate_free_periods(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period,
+                             const FreeIntegration& asked);
 
 } // namespace squeal

@@ -1,5 +1,6 @@
 #include "squeal/shooting/full_space.hpp"
 
+#include "exact_newton.hpp"
 #include "free_periods.hpp"
 #include "newton_krylov.hpp"
 #include "squeal/shooting/multisecant.hpp"
@@ -7,26 +8,30 @@
 namespace squeal
 {
 
+StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit start)
+{
+  if (start.residual <= problem.tolerance) return {std::move(start), StageEnding::converged};
+  if (options.finish == Finish::none) return {std::move(start), StageEnding::stalled};
+  if (options.finish == Finish::newton_krylov) return shoot_by_newton_krylov(problem, options, log, start);
+  if (has_small_tangent(problem)) return shoot_by_exact_newton(problem, options, log, start);
+  Multisecant memory;
+  return shoot_by_multisecant(problem, options, log, memory, start);
+}
+
 StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
                                 Orbit start)
 {
-  StageResult result{std::move(start), StageEnding::stalled};
-  if (result.orbit.residual <= problem.tolerance) return {std::move(result.orbit), StageEnding::converged};
-  if (options.finish == Finish::none) return result;
-  if (options.finish == Finish::multisecant)
+  StageResult result = shoot_once(problem, options, log, std::move(start));
+  const auto given_up = [&]
+  { return result.ending != StageEnding::converged && log.convergence.periods < options.max_periods; };
+  if (options.finish != Finish::multisecant) return result;
+  if (given_up())
   {
-    Multisecant first, second;
-    result = shoot_by_multisecant(problem, options, log, first, result.orbit);
-    if (result.ending == StageEnding::converged) return result;
-    if (log.convergence.periods < options.max_periods)
-    {
-      Orbit again = integrate_free_periods(problem, log, result.orbit.state, result.orbit.period, 10);
-      if (collapsing(problem, again)) return {std::move(again), StageEnding::collapsed};
-      result = shoot_by_multisecant(problem, options, log, second, again);
-      if (result.ending == StageEnding::converged) return result;
-    }
+    Orbit again = integrate_free_periods(problem, log, result.orbit.state, result.orbit.period, {10, 0});
+    if (collapsing(problem, again)) return {std::move(again), StageEnding::collapsed};
+    result = shoot_once(problem, options, log, std::move(again));
   }
-  if (log.convergence.periods >= options.max_periods) return result;
+  if (!given_up()) return result;
   const StageEnding before = result.ending;
   result = shoot_by_newton_krylov(problem, options, log, result.orbit);
   if (result.ending == StageEnding::stalled) result.ending = before;

@@ -1,10 +1,10 @@
 #include "squeal/shooting/multipliers.hpp"
 
 #include "monodromy.hpp"
+#include "whole_matrix.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace squeal
 {
@@ -22,50 +22,6 @@ Owned<Vec> motions_that_may_grow(const OrbitProblem& problem, const Orbit& orbit
   return start;
 }
 
-/// Entries of a state, velocities over 2 pi/T: of the displacements' size in a vibration.
-Eigen::VectorXd coordinates_of(Vec state, double period)
-{
-  const std::vector<double> u = all_entries(displacement(state)), v = all_entries(velocity(state));
-  Eigen::VectorXd all(static_cast<Eigen::Index>(u.size() + v.size()));
-  all << Eigen::VectorXd::Map(u.data(), static_cast<Eigen::Index>(u.size())),
-      Eigen::VectorXd::Map(v.data(), static_cast<Eigen::Index>(v.size())) * (period / (2 * std::numbers::pi));
-  return all;
-}
-
-void add_entry(Vec part, PetscInt row, double value)
-{
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(part, &first, &last));
-  if (row >= first && row < last) check(VecSetValue(part, row, value, INSERT_VALUES));
-  check(VecAssemblyBegin(part));
-  check(VecAssemblyEnd(part));
-}
-
-/// The state of these coordinates.
-Owned<Vec> state_at(const Eigen::VectorXd& coordinates, const Orbit& orbit)
-{
-  Owned<Vec> state = zeros_like(orbit.state);
-  const auto dofs = static_cast<PetscInt>(coordinates.size() / 2);
-  for (PetscInt i = 0; i < 2 * dofs; ++i)
-    if (coordinates(i) != 0)
-      add_entry(i < dofs ? displacement(state) : velocity(state), i % dofs,
-                coordinates(i) * (i < dofs ? 1 : 2 * std::numbers::pi / orbit.period));
-  return state;
-}
-
-/// The matrix in the coordinates of the states.
-Eigen::MatrixXd whole_matrix(const Monodromy& monodromy, PetscInt dofs)
-{
-  Eigen::MatrixXd M(2 * dofs, 2 * dofs);
-  std::vector<Owned<Vec>> columns;
-  for (PetscInt k = 0; k < 2 * dofs; ++k)
-    columns.push_back(state_at(Eigen::VectorXd::Unit(2 * dofs, k), monodromy.orbit));
-  multiply(monodromy, columns);
-  for (PetscInt k = 0; k < 2 * dofs; ++k)
-    M.col(k) = coordinates_of(columns[static_cast<std::size_t>(k)], monodromy.orbit.period);
-  return M;
-}
-
 /// All multipliers. Bars: the change of each when the grid of time moves by half a step.
 FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
 {
@@ -74,14 +30,15 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   multipliers.method = MultiplierMethod::whole;
   const Orbit& orbit = monodromy.orbit;
   std::vector<DenseEigenpair> moved;
+  const auto by_multiplying = [&](std::span<const Owned<Vec>> states) { multiply(monodromy, states); };
   if (monodromy.exact())
   {
     monodromy.flow.record_period(orbit.period, orbit.state, 0.5);
-    moved = solve_dense_unsymmetric(whole_matrix(monodromy, dofs));
+    moved = solve_dense_unsymmetric(whole_matrix(orbit, by_multiplying));
     monodromy.flow.record_period(orbit.period, orbit.state, 0);
     multipliers.periods += 2 * dofs;
   }
-  std::vector<DenseEigenpair> pairs = solve_dense_unsymmetric(whole_matrix(monodromy, dofs));
+  std::vector<DenseEigenpair> pairs = solve_dense_unsymmetric(whole_matrix(orbit, by_multiplying));
   multipliers.periods += 2 * dofs;
   const std::size_t shift = find_shift(pairs, coordinates_of(orbit.rate, orbit.period));
   multipliers.trivial_error = std::abs(pairs[shift].lambda - 1.);

@@ -6,8 +6,8 @@ namespace squeal
 OptionList options_of(ShootingOptions& options)
 {
   return {
-      {"-cycle_subspace_newtons", &options.subspace_newtons, Range::not_negative,
-       "iterations on the subspace of the mode's shapes; 0: not tried"},
+      {"-cycle_subspace_newtons", &options.subspace_newtons, Range::any,
+       "iterations on the subspace of the mode's shapes; 0: not tried; below 0: 10 without a finish, else 0"},
       {"-cycle_base_growths", &options.base_growths, Range::any,
        "times the subspace may grow by what it missed; below 0: 4 without a finish, else 0"},
       {"-cycle_rank_tolerance", &options.rank_tolerance, Range::not_negative,
@@ -20,8 +20,10 @@ OptionList options_of(ShootingOptions& options)
        "a secant is dropped when less than this part of it is new"},
       {"-cycle_clamp", &options.clamp, Range::positive, "longest step of the finish over the fluctuation"},
       {"-cycle_stall", &options.stall, Range::not_negative,
-       "iterations without progress before the finish starts again, or falls back"},
+       "iterations without progress before an attempt of the finish is given up"},
       {"-cycle_max_periods", &options.max_periods, Range::not_negative, "periods that may be integrated in all"},
+      {"-cycle_free_periods", &options.free_periods, Range::not_negative,
+       "integrated freely at most, while shooting finds no cycle that attracts"},
       {"-cycle_multipliers", &options.multipliers, Range::any,
        "columns that the search for Floquet multipliers may take, 0: none; below 0: as many as it needs, within "
        "limits"},

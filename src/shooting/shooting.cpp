@@ -58,50 +58,136 @@ StageResult prefer_half_period(const OrbitProblem& problem, const ShootingOption
   return once.ending == StageEnding::converged ? std::move(once) : std::move(found);
 }
 
-/// Another orbit from a start beside one that repels, displaced along the motion that grows, first towards less energy,
-/// far enough that free periods lead elsewhere. Without one, the orbit itself.
-StageResult search_beside(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
-                          const Orbit& orbit, Vec growing)
+/// A search for an orbit that attracts.
+struct Search
 {
+  const OrbitProblem& problem;
+  const ShootingOptions& options;
+  ConvergenceLog& log;
+  const ShootingStart& start;
+};
+
+/// What shooting from one state led to.
+struct Attempt
+{
+  StageResult found;
+  FloquetAnalysis floquet{}; // of a converged orbit
+  double first_return = 0;   // return residual where it started
+  bool left = false;         // a motion beside it was seen to leave
+
+  bool converged() const { return found.ending == StageEnding::converged; }
+  bool repels() const { return converged() && (left || floquet.multipliers.stability == Stability::unstable); }
+  bool answers() const { return converged() && !repels(); }
+};
+
+/// A state beside an orbit, displaced by a part of its fluctuation along the motion that grows most. `part`: positive
+/// towards less energy.
+Owned<Vec> state_beside(const OrbitProblem& problem, const Attempt& attempt, double part)
+{
+  const Orbit& orbit = attempt.found.orbit;
   const Owned<Vec> fluctuation = fluctuation_of(problem, orbit);
-  const double outwards = energy_product(problem.flow, fluctuation, growing) > 0 ? 1 : -1;
-  for (const double side : {-outwards, outwards})
-  {
-    if (log.convergence.periods >= options.max_periods) break;
-    const Owned<Vec> start = copy_of(orbit.state);
-    check(VecAXPY(start, 0.1 * side * orbit.fluctuation, growing));
-    StageResult other =
-        shoot_in_full_space(problem, options, log, integrate_free_periods(problem, log, start, orbit.period, 20));
-    if (other.ending == StageEnding::converged) return other;
-  }
-  return {copy_of(orbit), StageEnding::converged};
+  const double outwards = energy_product(problem.flow, fluctuation, attempt.floquet.fastest) > 0 ? 1 : -1;
+  Owned<Vec> state = copy_of(orbit.state.get());
+  check(VecAXPY(state, -part * outwards * orbit.fluctuation, attempt.floquet.fastest));
+  return state;
 }
 
-/// Sets the multipliers of a converged orbit. One that repels is exchanged for another that may not, if one is found.
-StageResult prefer_attracting(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
-                              StageResult found, const std::vector<Owned<Vec>>& other_unstable,
-                              Multipliers& multipliers)
+/// Whether a motion beside an orbit is seen to leave it: the return residual, which is in proportion to the distance,
+/// doubles over as many periods as should make it four times as large. Where the largest multiplier itself is below 1,
+/// its bar alone reaching across, that many periods do not exist.
+bool is_left(const Search& search, const Attempt& attempt)
 {
-  FloquetAnalysis first = find_multipliers(problem, options, found.orbit, other_unstable);
-  multipliers = std::move(first.multipliers);
-  if (multipliers.stability != Stability::unstable || log.convergence.periods >= options.max_periods) return found;
-  StageResult other = search_beside(problem, options, log, found.orbit, first.fastest);
-  Multipliers second = find_multipliers(problem, options, other.orbit, other_unstable).multipliers;
-  second.periods += multipliers.periods;
-  if (second.stability == Stability::unstable)
-  {
-    multipliers.periods = second.periods;
-    return found;
-  }
-  multipliers = std::move(second);
-  return other;
+  const auto& [problem, options, log, start] = search;
+  const auto& values = attempt.floquet.multipliers.values;
+  const double largest = values.empty() ? 0 : std::abs(values.front());
+  if (!attempt.floquet.fastest.get() || largest < 1.005) return false;
+  const int count = std::clamp(static_cast<int>(std::ceil(std::log(4) / std::log(largest))), 10, 80);
+  if (log.convergence.periods + count > options.max_periods) return false;
+  const double period = attempt.found.orbit.period;
+  const Owned<Vec> beside = state_beside(problem, attempt, 0.03);
+  const Orbit first = evaluate(problem, log, beside, period);
+  check(VecAXPY(beside, 1, first.defect));
+  const Orbit last = integrate_free_periods(problem, log, beside, period, {count - 1, 0});
+  return !(return_residual(problem, last) <= 2 * return_residual(problem, first));
 }
 
-/// How the search for an orbit ended.
-Outcome outcome_of(const Convergence& convergence, const StageResult& found)
+/// Shoots from the end of the free motion.
+Attempt attempt_from(const Search& search, const Orbit& free)
+{
+  const auto& [problem, options, log, start] = search;
+  Orbit orbit = copy_of(free);
+  const double first_return = return_residual(problem, free);
+  const bool on_subspace =
+      options.subspace_newtons > 0 || (options.subspace_newtons < 0 && options.finish == Finish::none);
+  if (orbit.residual > problem.tolerance && on_subspace && !start.shapes.empty())
+    orbit = shoot_on_subspaces(problem, options, log, std::move(orbit), start.shapes);
+  Attempt attempt{shoot_once(problem, options, log, std::move(orbit)), {}, first_return};
+  if (!attempt.converged()) return attempt;
+  attempt.found = prefer_half_period(problem, options, log, std::move(attempt.found));
+  attempt.floquet = find_multipliers(problem, options, attempt.found.orbit, start.other_unstable);
+  if (attempt.floquet.multipliers.stability == Stability::undecided) attempt.left = is_left(search, attempt);
+  return attempt;
+}
+
+/// Whether the second attempt is worth more than the first.
+bool better(const Attempt& first, const Attempt& second)
+{
+  if (first.converged() != second.converged()) return second.converged();
+  return second.answers() || (!first.converged() && second.found.orbit.residual < first.found.orbit.residual);
+}
+
+/// Goes on integrating for 20, 40, 80 … periods, and shoots again after each or as soon as the motion returns three
+/// times better than where the last attempt started. The motion goes on by itself; once, from beside an orbit that
+/// repels. Sets `free` to where it ends.
+Attempt search_on(const Search& search, Attempt best, int done, Orbit& free)
+{
+  const auto& [problem, options, log, start] = search;
+  double last_return = best.first_return, side = 0; // side: of the orbit that repels; 0: none was left yet
+  int collapses = 0;
+  for (int count = 20; !best.answers(); count *= 2)
+  {
+    const auto left = std::min<long>(options.free_periods - done, options.max_periods - log.convergence.periods);
+    if (left <= 0) break;
+    Owned<Vec> state = copy_of(free.state.get());
+    double period = free.period;
+    check(VecAXPY(state, 1, free.defect));
+    const bool other_side = side > 0 && collapses > 0; // it fell to rest on the one
+    if (best.repels() && (side == 0 || other_side))
+    {
+      side = other_side ? -1 : 1;
+      state = state_beside(problem, best, 0.1 * side); // far enough to leave it in a few periods
+      period = best.found.orbit.period;
+      collapses = 0;
+    }
+    const double before = free.fluctuation;
+    const long periods = log.convergence.periods;
+    free = integrate_free_periods(problem, log, state, period,
+                                  {static_cast<int>(std::min<long>(count, left)), last_return / 3});
+    done += static_cast<int>(log.convergence.periods - periods);
+    if (!std::isfinite(free.residual)) break;
+    // A motion that decays below what limits it rests in the end; one that grows there is on its way.
+    if (collapsing(problem, free))
+    {
+      if (free.fluctuation < before && ++collapses > 1) break;
+      continue;
+    }
+    Attempt next = attempt_from(search, free);
+    last_return = next.first_return;
+    if (better(best, next)) best = std::move(next);
+  }
+  return best;
+}
+
+/// How the search for an orbit ended. `rests`: the free motion decays to the equilibrium.
+Outcome outcome_of(const Convergence& convergence, const StageResult& found, bool rests)
 {
   Outcome outcome{OutcomeKind::not_converged, "", convergence.iterations, found.orbit.residual};
-  switch (found.ending)
+  StageEnding ending = found.ending;
+  if (ending != StageEnding::converged && rests)
+    ending = StageEnding::collapsed;
+  else if (ending == StageEnding::collapsed)
+    ending = StageEnding::stalled; // the correction alone fell there
+  switch (ending)
   {
   case StageEnding::converged:
     outcome.kind = OutcomeKind::converged;
@@ -138,20 +224,25 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   ConvergenceLog log{progress};
   OrbitProblem problem = problem_of(flow, preconditioner, start, settings.tolerance);
   const Owned<Vec> first = state_of(start.u, start.v);
-  Orbit orbit = integrate_free_periods(problem, log, first, start.period, settings.free_periods);
+  Orbit free = integrate_free_periods(problem, log, first, start.period, {settings.free_periods, 0});
   // Below the first event nothing limits a motion; above it a start may be ten times too large and still find one.
-  problem.least_fluctuation = std::min(orbit.fluctuation, start.first_event) * std::sqrt(0.1);
-  if (orbit.residual > problem.tolerance && options.subspace_newtons != 0 && !start.shapes.empty())
-    orbit = shoot_on_subspaces(problem, options, log, std::move(orbit), start.shapes);
-  StageResult found = shoot_in_full_space(problem, options, log, std::move(orbit));
+  problem.least_fluctuation = std::min(free.fluctuation, start.first_event) * std::sqrt(0.1);
+  const Search search{problem, options, log, start};
+  Attempt found = attempt_from(search, free);
+  if (options.finish != Finish::none) found = search_on(search, std::move(found), settings.free_periods, free);
+  const bool goes_on = std::isfinite(free.residual);
 
   ShootingResult result;
-  if (found.ending == StageEnding::converged) found = prefer_half_period(problem, options, log, std::move(found));
-  if (found.ending == StageEnding::converged)
-    found = prefer_attracting(problem, options, log, std::move(found), start.other_unstable, result.multipliers);
-  result.outcome = outcome_of(log.convergence, found);
+  result.outcome = outcome_of(log.convergence, found.found, goes_on && collapsing(problem, free));
+  result.multipliers = std::move(found.floquet.multipliers);
   refuse_repelling(result.multipliers, start.other_unstable.size(), result.outcome);
-  result.orbit = std::move(found.orbit);
+  if (found.left && result.outcome.kind == OutcomeKind::converged)
+  {
+    result.outcome.kind = OutcomeKind::unstable_cycle;
+    result.outcome.reason = "the cycle found repels: integrated beside it, a motion leaves it";
+  }
+  result.orbit = std::move(found.found.orbit);
+  if (goes_on) result.free = std::move(free);
   result.convergence = std::move(log.convergence);
   return result;
 }

@@ -134,7 +134,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
                    const Recorder& recorder)
 {
   const auto& [structure, interface, equilibrium] = sliding;
-  const auto& [probes, history, monitor] = recorder;
+  const auto& [probes, history, monitor, records] = recorder;
   MarchSummary summary;
   Fluctuation fluctuation = about(structure, equilibrium);
   Owned<Vec> probe_values;
@@ -149,6 +149,8 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
   double iterations = 0;
   while (summary.steps < steps)
   {
+    const auto next = static_cast<std::size_t>(summary.steps);
+    work.record = next < records.size() ? &records[next] : nullptr;
     const StepReport report = advance(step, structure, interface, work, state);
     ++summary.steps;
     if (!report.contact_converged && summary.unconverged++ == 0) summary.first_unconverged = state.time;

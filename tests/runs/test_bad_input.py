@@ -112,6 +112,18 @@ def with_negative_stiffness(folder):
 # name: how to write it, what the message must speak of
 CASES = {
     "missing scene file": (lambda folder: [folder / "absent.toml"], ["absent.toml"]),
+    "cycle from no transient": (point_scene('periods = 10\nsteps_per_period = 400\n\n[cycle]\n',
+                                            'periods = 10\nenabled = false\n\n[cycle]\nstart = "transient"\n'),
+                                ["[cycle] start", "[transient]"]),
+    "amplitude of no mode": (point_scene("[cycle]\n", "[cycle]\namplitude = 0.1\n"), ["[cycle] amplitude", 'start = "mode"']),
+    "negative amplitude": (point_scene("[cycle]\n", '[cycle]\nstart = "mode"\namplitude = -0.1\n'), ["amplitude", "-0.1"]),
+    "start of no kind": (point_scene("[cycle]\n", '[cycle]\nstart = "estimat"\n'), ["estimat", "estimate, mode, transient"]),
+    "no windows": (lambda folder: [*point_scene("[cycle]\n", "[cycle]\n")(folder), "-settled_periods", "0"],
+                   ["-settled_periods", "0"]),
+    "no exponents": (lambda folder: [*point_scene("[cycle]\n", "[cycle]\n")(folder), "-settled_exponents", "-1"],
+                     ["-settled_exponents", "-1"]),
+    "negative free periods": (lambda folder: [*point_scene("[cycle]\n", "[cycle]\n")(folder), "-cycle_free_periods", "-3"],
+                              ["-cycle_free_periods", "-3"]),
     "broken TOML": (point_scene("mass = 1\n", "mass = = 1\n"), ["line", "scene.toml"]),
     "unknown key": (point_scene("stiffness = 1.0", "stifness = 1.0"), ["stifness", "stiffness"]),
     "negative mass": (point_scene("mass = 1\n", "mass = -1\n"), ["mass", "-1"]),

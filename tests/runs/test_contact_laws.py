@@ -58,7 +58,8 @@ def test_an_impact_costs_the_contact_nodes_kinetic_energy_and_little_without_its
 
 def test_the_velocity_law_warns_of_what_it_cannot_do(squeal):
     """Its gap drifts by O(h), and its period map jumps where a step begins open or closed: shooting stalls above 1e-8."""
-    scene = [INPUTS / "oscillator" / "scene.toml", "--set", "cycle.steps_per_period=100", "-cycle_max_periods", "60"]
+    scene = [INPUTS / "oscillator" / "scene.toml", "--set", "cycle.steps_per_period=100", "-cycle_max_periods", "60",
+             "-settled_periods", "4"]
     run = squeal(*scene, "-transient_contact_law", "velocity", ranks=1)
     assert run.code == 2 and run.report["transient"]["contact_law"] == "velocity"
     assert "the gap drifts" in run.printed

@@ -29,7 +29,7 @@ def test_without_friction_the_chain_stops_after_the_modes(converged):
 
 def test_a_cycle_that_may_not_converge_says_so(squeal):
     run = squeal(INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set",
-                 "cycle.free_periods=2", "-cycle_max_periods", "3", ranks=1)
+                 "cycle.free_periods=2", "-cycle_max_periods", "3", "-settled_periods", "4", ranks=1)
     assert run.code == 2
     assert run.report["cycle"]["outcome"] == "not converged" and "periods" in run.report["cycle"]["reason"]
 

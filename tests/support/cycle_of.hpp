@@ -28,7 +28,7 @@ inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double 
   const ModesOptions modes_options;
   const CycleProblem problem{sliding,  linearised, modes.modes,   {{&mode, 1}, {&estimate, 1}},
                              settings, step,       modes_options, nullptr};
-  return find_cycle_from_estimate(problem, options);
+  return find_cycle_from_start(problem, options);
 }
 
 inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance)

@@ -63,12 +63,11 @@ inline void scatter(const std::vector<double>& x, Vec state)
   }
 }
 
-/// Classical Runge-Kutta, 2000 steps a period: a period error of about 1e-12, below every tolerance here.
-inline Flow runge_kutta(Rate rate_of, Mat M, Mat K)
+/// Classical Runge-Kutta in a number of steps a call.
+inline Flow runge_kutta_in(int steps, Rate rate_of, Mat M, Mat K)
 {
-  const auto integrate = [rate_of](double period, Vec start, Vec end, Vec rate)
+  const auto integrate = [rate_of, steps](double period, Vec start, Vec end, Vec rate)
   {
-    const int steps = 2000;
     const double h = period / steps;
     std::vector<double> x = gather(start), k(x.size()), sum(x.size()), at(x.size());
     for (int step = 0; step < steps && !x.empty(); ++step)
@@ -93,6 +92,12 @@ inline Flow runge_kutta(Rate rate_of, Mat M, Mat K)
     scatter(k, rate);
   };
   return {integrate, M, K};
+}
+
+/// 2000 steps a period: a period error of about 1e-12, below every tolerance here.
+inline Flow runge_kutta(Rate rate_of, Mat M, Mat K)
+{
+  return runge_kutta_in(2000, std::move(rate_of), M, K);
 }
 
 inline void van_der_pol(const std::vector<double>& x, std::vector<double>& rate)

@@ -22,12 +22,16 @@ enum class OutcomeKind
   collapsed_to_equilibrium,
   not_periodic,
   unstable_cycle,
+  settled, // no cycle attracts: the settled motion is the answer
 };
 
-inline constexpr std::array outcome_words = {
-    "skipped",      "off",           "refused",       "converged",      "completed",
-    "balance",      "no balance",    "not converged", "no equilibrium", "collapsed to equilibrium",
-    "not periodic", "unstable cycle"};
+inline constexpr std::array outcome_words = {"skipped",        "off",
+                                             "refused",        "converged",
+                                             "completed",      "balance",
+                                             "no balance",     "not converged",
+                                             "no equilibrium", "collapsed to equilibrium",
+                                             "not periodic",   "unstable cycle",
+                                             "settled"};
 
 inline Words words_of(OutcomeKind)
 {
@@ -60,6 +64,7 @@ inline bool succeeded(const Outcome& outcome)
   case OutcomeKind::completed:
   case OutcomeKind::balance:
   case OutcomeKind::no_balance:
+  case OutcomeKind::settled:
     return true;
   default:
     return false;

@@ -25,6 +25,7 @@ struct LimitCycle
   Convergence convergence; // its periods include the measured one
   Multipliers multipliers;
   MeasuredPeriod measured; // from the orbit's state
+  Orbit free;              // the end of the free motion that the search went on from; null where there was none
   StepCosts costs;         // of the last theta step made
 };
 
@@ -39,11 +40,18 @@ struct CycleProblem
   const StepOptions& step;
   const ModesOptions& modes_options; // of the preconditioner's real modes
   Mat probes = nullptr;
+  const State* given = nullptr; // where CycleStartKind::transient and ::file start
 };
 
-/// The cycle from the energy estimate of the followed mode, with those of the other unstable modes added: none may
-/// start unexcited.
-LimitCycle find_cycle_from_estimate(const CycleProblem& problem, const CycleOptions& options);
+/// The state that the scene asks the search to start from: the modes at their estimated amplitudes, the followed one at
+/// an amplitude, or the state given. Nothing where there is no amplitude to start from.
+std::optional<State> cycle_start(const CycleProblem& problem);
+
+/// The amplitude of the followed mode whose fluctuating energy is the state's. [m]
+double equivalent_amplitude(const CycleProblem& problem, const State& state);
+
+/// The cycle from the scene's start.
+LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions& options);
 
 /// The cycle from any start, after a number of free periods.
 LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,

@@ -18,11 +18,8 @@ struct ReducedOptions
 struct CycleOptions
 {
   ShootingOptions shooting;
-  double start_amplitude = 1; // over the estimate's
-  double start_phase = 0;     // [degrees] from the estimate's
-  double start_period = 1;    // over the followed mode's
-  double band_factor = 3;     // the preconditioner's real modes reach this many times the mode's frequency; 0: none
-  PetscInt samples = 32;      // displacements kept over the last period
+  double band_factor = 3; // the preconditioner's real modes reach this many times the mode's frequency; 0: none
+  PetscInt samples = 32;  // displacements kept over the last period
   ReducedOptions reduced;
 };
 

@@ -21,6 +21,8 @@ struct PeriodMap
   std::vector<double> reactions{};   // warm start: at the end of the last period integrated with its rate
   long unconverged = 0;              // steps whose contact did not converge
   std::vector<StepRecord> records{}; // of the period recorded last, with the step at hand
+  Owned<Vec> recorded_start{};       // of that period, if it was one that the flow integrated with its rate
+  double recorded_step = 0;          // [s]
 };
 
 /// Makes A and W those of this period, unless they are already.

@@ -6,6 +6,7 @@
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/contact/resultants.hpp"
 #include "squeal/cycle/fidelity.hpp"
+#include "squeal/settled/settled_motion.hpp"
 
 #include <array>
 #include <filesystem>
@@ -43,7 +44,8 @@ struct Report
   std::vector<Estimate> estimates; // of the unstable modes, the followed one first; else one that says why not
   Trajectory transient;
   LimitCycle cycle;
-  Fidelity fidelity; // of the cycle
+  Fidelity fidelity;     // of the cycle
+  SettledMotion settled; // where no cycle attracts
   Attractors attractors;
   BrakeBranch branch;
   std::vector<Timing> timings; // in order
@@ -53,7 +55,7 @@ struct Report
 const Estimate& followed_estimate(const Report& report);
 
 /// The outcome of every stage, in the order they run in, by the stage's name.
-std::array<std::pair<const char*, Outcome>, 7> outcomes_of(const Report& report);
+std::array<std::pair<const char*, Outcome>, 8> outcomes_of(const Report& report);
 
 /// Where the nodes of the fields are.
 struct FieldNodes

@@ -179,6 +179,28 @@ struct Start
   std::filesystem::path file; // of StartKind::file; absolute
 };
 
+/// Where the search for the cycle starts.
+enum class CycleStartKind
+{
+  estimate,  // the unstable modes at their estimated amplitudes
+  mode,      // the unstable mode at a given amplitude
+  transient, // the end of the run's own transient
+  file,      // a state file
+};
+
+inline constexpr std::array cycle_start_kind_words = {"estimate", "mode", "transient", "file"};
+
+inline Words words_of(CycleStartKind)
+{
+  return cycle_start_kind_words;
+}
+
+struct CycleStart
+{
+  CycleStartKind kind = CycleStartKind::estimate;
+  std::filesystem::path file; // of CycleStartKind::file; absolute
+};
+
 /// Settings of a stage. A stage runs if it is enabled, or if a later enabled stage needs it.
 struct ModesSettings
 {
@@ -210,6 +232,8 @@ struct TransientSettings
 struct CycleSettings
 {
   bool enabled = false;
+  CycleStart start;
+  double amplitude = 0;             // [m] largest displacement of the mode at CycleStartKind::mode; 0: twice lift-off
   int steps_per_period = 0;         // [-] 0: chosen
   double tolerance = 0;             // [-] on the residual of the full state; 0: chosen
   int free_periods = 10;            // [-] number of periods integrated before the first Newton step

@@ -6,8 +6,10 @@
 namespace squeal
 {
 
-/// The multisecant iteration; where it gives up, ten more free periods and the iteration once again; where that gives
-/// up, Newton-Krylov.
+/// One attempt: Newton with the whole matrix of a small system's exact tangent, else the multisecant iteration.
+StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit start);
+
+/// The same; where it gives up, ten free periods and one more attempt; where that gives up, Newton-Krylov.
 StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
                                 Orbit start);
 

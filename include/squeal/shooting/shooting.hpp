@@ -36,6 +36,7 @@ struct ShootingResult
 {
   Outcome outcome;
   Orbit orbit; // the solution, or the best candidate met
+  Orbit free;  // the end of the free motion, evaluated over one more period; null where it is not finite
   Convergence convergence;
   Multipliers multipliers;
 };

@@ -40,7 +40,8 @@ struct Recorder
 {
   Mat probes = nullptr;
   History& history;
-  Monitor monitor; // may be empty
+  Monitor monitor;                 // may be empty
+  std::span<StepRecord> records{}; // of each step, for its tangent; may be empty
 };
 
 /// `steps` steps in place, recorded.

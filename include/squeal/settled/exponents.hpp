@@ -1,0 +1,29 @@
+#pragma once
+/// The largest Lyapunov exponents of a flow along a motion, from its batched tangent (src/README.md, section 7.10): a
+/// few columns are carried along and made orthonormal again in the energy product after every period. The logarithms of
+/// what they were stretched by are the exponents, per period.
+#include "squeal/settled/statistics.hpp"
+#include "squeal/shooting/flow.hpp"
+
+#include <vector>
+
+namespace squeal
+{
+
+struct TangentBundle
+{
+  std::vector<Owned<Vec>> columns;         // energy-orthonormal
+  std::vector<std::vector<double>> growth; // [column][period] logarithm of its stretching
+};
+
+/// `count` columns in no special direction.
+TangentBundle make_bundle(const Flow& flow, Vec like, int count);
+
+/// Carries the columns along the period that the flow recorded last.
+void follow_period(const Flow& flow, TangentBundle& bundle);
+
+/// Largest first, per period, from the periods after the first `skipped`. A column that shears without growing, as on a
+/// torus, is stretched in proportion to the time: ln 2 over the last half of the periods, which the bars include.
+std::vector<Estimated> exponents_of(const TangentBundle& bundle, std::size_t skipped);
+
+} // namespace squeal

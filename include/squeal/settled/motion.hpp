@@ -1,0 +1,79 @@
+#pragma once
+/// What a motion settles on where no cycle attracts: its statistics and its kind, on any flow with a tangent
+/// (src/README.md, section 7.10).
+#include "squeal/base/options.hpp"
+#include "squeal/base/words.hpp"
+#include "squeal/settled/exponents.hpp"
+#include "squeal/settled/spectrum.hpp"
+
+#include <array>
+#include <string>
+
+namespace squeal
+{
+
+enum class MotionKind
+{
+  undecided,
+  periodic,       // a cycle attracts, which may close after several periods
+  quasi_periodic, // a torus attracts
+  irregular,      // small differences grow
+};
+
+inline constexpr std::array motion_kind_words = {"undecided", "periodic", "quasi-periodic", "irregular"};
+
+inline Words words_of(MotionKind)
+{
+  return motion_kind_words;
+}
+
+struct SettledOptions
+{
+  PetscInt periods = 512; // integrated at most
+  PetscInt exponents = 4; // Lyapunov exponents
+};
+
+OptionList options_of(SettledOptions& options);
+
+/// The kind of a motion, or what it is undecided between.
+struct MotionVerdict
+{
+  MotionKind kind = MotionKind::undecided;
+  std::string between, would_decide; // of an undecided one, in words
+};
+
+/// What is seen of one period.
+struct PeriodSample
+{
+  std::vector<double> means;      // of each channel; the first is the energy that stationarity is judged by
+  std::vector<double> coordinate; // of the spectrum, at equal steps
+  std::vector<double> beside;     // another, where a second frequency is sought that the first does not see; or empty
+};
+
+/// Integrates one period in place, such that the flow's tangent then belongs to it.
+using PeriodSampler = std::function<PeriodSample(Vec state)>;
+
+struct ExaminedMotion
+{
+  std::vector<std::vector<double>> channels; // [channel][period], from the start
+  std::vector<double> coordinate, beside;    // all samples
+  std::size_t discarded = 0;                 // periods before the motion was stationary; all of them if it never was
+  std::vector<Estimated> means;              // of each channel, from the periods after those
+  std::vector<Estimated> exponents;          // per period, largest first
+  Spectrum spectrum;                         // of the same periods
+  BaseFrequencies base;
+  MotionVerdict verdict;
+
+  std::size_t periods() const { return channels.empty() ? 0 : channels.front().size(); }
+};
+
+/// The kind that exponents, energies of the periods and base frequencies show.
+MotionVerdict judge_motion(const std::vector<Estimated>& exponents, std::span<const double> energies,
+                           const BaseFrequencies& base);
+
+/// Integrates 128 periods, and twice as many until the kind is decided or the options' number is reached. The state
+/// goes along.
+ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, Vec state, double period,
+                              const SettledOptions& options);
+
+} // namespace squeal

@@ -1,0 +1,29 @@
+#pragma once
+/// The settled motion of the brake where no cycle attracts (src/README.md, section 7.10).
+#include "squeal/cycle/limit_cycle.hpp"
+#include "squeal/settled/motion.hpp"
+
+namespace squeal
+{
+
+/// outcome: "settled"; "not converged" where the motion never became stationary or its kind is undecided; "skipped"
+/// where a cycle answers.
+struct SettledMotion
+{
+  Outcome outcome;
+  int steps_per_period = 0;
+  double period = 0; // [s] of the windows that are called periods here
+  ExaminedMotion examined;
+  int spectrum_probe = -1;              // whose spectrum it is: the one that swings most [m]; -1: the normal force [N]
+  Estimated fluctuating_energy, energy; // [J]
+  double least_energy = 0, greatest_energy = 0;       // [J] of the means of the fluctuating energy over single periods
+  Estimated damping_power, contact_power, load_power; // [W]
+  Estimated open_fraction, stick_fraction, slip_fraction;
+  std::vector<Estimated> peak_to_peak; // [m] within a period, of each probe
+  History history;                     // of all periods
+};
+
+/// Integrates on from the end of the search's free motion.
+SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, const SettledOptions& options);
+
+} // namespace squeal

@@ -1,0 +1,31 @@
+#pragma once
+/// Means of a series with their error bars, and whether it is stationary (src/README.md, section 7.10).
+#include <cstddef>
+#include <span>
+
+namespace squeal
+{
+
+/// A value and its error bar, of 95 %.
+struct Estimated
+{
+  double value = 0, error = 0;
+};
+
+/// The mean, its bar by means of 8, 16 and 32 batches: the widest of the three. Neighbouring values may depend on each
+/// other over less than a batch. Of fewer than 16 values 4 batches; of fewer than 4 no bar (NaN).
+Estimated batch_mean(std::span<const double> series);
+
+/// Whether the means of the first quarter and of the last half agree within the bar of their difference, as the last
+/// half alone gives it (Geweke), or to 1e-3.
+bool is_stationary(std::span<const double> series);
+
+/// How many values to leave out until the rest is stationary: none, an eighth, a quarter or a half; all where that does
+/// not do either.
+std::size_t values_before_stationary(std::span<const double> series);
+
+/// The rate at which the spread of the series about its mean decays, per value: the slope of the logarithm of its
+/// standard deviation over 8 batches, positive for a decay.
+Estimated decay_of_spread(std::span<const double> series);
+
+} // namespace squeal

@@ -1,0 +1,127 @@
+#include "heard.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// A length with a prefix that leaves one to three digits before the point.
+std::string length_text(double metres)
+{
+  const double size = std::abs(metres);
+  if (size == 0) return "0 m";
+  if (size >= 0.1) return format("%.3g m", metres);
+  if (size >= 1e-3) return format("%.3g mm", 1e3 * metres);
+  if (size >= 1e-6) return format("%.3g um", 1e6 * metres);
+  return format("%.3g nm", 1e9 * metres);
+}
+
+/// The probe that swings most; empty without probes.
+template <class Swings, class Size>
+std::string largest_swing(const Scene& scene, const Swings& swings, const Size& size_of)
+{
+  const std::size_t probes = std::min(scene.probes.size(), swings.size());
+  if (probes == 0) return {};
+  const auto largest = std::max_element(swings.begin(), swings.begin() + static_cast<std::ptrdiff_t>(probes),
+                                        [&](const auto& a, const auto& b) { return size_of(a) < size_of(b); });
+  return ", " + scene.probes[static_cast<std::size_t>(largest - swings.begin())].name + " " +
+         length_text(size_of(*largest)) + " peak to peak";
+}
+
+/// Where the frequency is 2 % or more off the unstable mode's, that too: a shift that a listener hears.
+std::string beside_mode(const Report& report, double frequency_hz)
+{
+  if (report.modes.modes.empty()) return {};
+  const double mode = report.modes.modes.front().frequency_hz(), away = frequency_hz / mode - 1;
+  if (!(std::abs(away) >= 0.02)) return {};
+  return format(", %.2g %% %s the unstable mode at %.5g Hz", 100 * std::abs(away), away < 0 ? "below" : "above", mode);
+}
+
+std::string stability_text(const Multipliers& multipliers)
+{
+  if (multipliers.values.empty()) return ", whether it lasts was not examined";
+  const std::string largest =
+      format(" (largest multiplier %.4f +- %.0e)", std::abs(multipliers.values.front()), multipliers.errors.front());
+  switch (multipliers.stability)
+  {
+  case Stability::stable:
+    return ", stable" + largest;
+  case Stability::unstable:
+    return ", which repels" + largest;
+  default:
+    return ", whether it lasts is undecided" + largest;
+  }
+}
+
+/// As many digits as the error leaves, at least two.
+std::string energy_text(const Estimated& energy)
+{
+  const double ratio = energy.value / std::max(energy.error, 1e-5 * energy.value);
+  const int digits = std::clamp(static_cast<int>(std::ceil(std::log10(std::max(ratio, 1.)))) + 1, 2, 6);
+  return format(", mean energy %.*g +- %.0e J", digits, energy.value, energy.error);
+}
+
+std::string settled_text(const Report& report, const Scene& scene)
+{
+  const ExaminedMotion& motion = report.settled.examined;
+  const MotionVerdict& verdict = motion.verdict;
+  const double first = motion.base.first, second = motion.base.second;
+  std::string text;
+  switch (verdict.kind)
+  {
+  case MotionKind::periodic:
+    text = format("a cycle attracts that shooting did not find: %.5g Hz", first);
+    if (motion.base.closes_after > 1) text += format(", closing after %d periods", motion.base.closes_after);
+    break;
+  case MotionKind::quasi_periodic:
+    text = format("no cycle attracts: quasi-periodic, %.5g and %.5g Hz", first, second);
+    break;
+  case MotionKind::irregular:
+    text = format("no cycle attracts: irregular, strongest line %.5g Hz", first);
+    break;
+  case MotionKind::undecided:
+    text = "no cycle attracts that was found: undecided between " + verdict.between +
+           format(", strongest line %.5g Hz", first);
+    break;
+  }
+  return text + beside_mode(report, first) + energy_text(report.settled.fluctuating_energy) +
+         largest_swing(scene, report.settled.peak_to_peak, [](const Estimated& swing) { return swing.value; });
+}
+
+std::string cycle_text(const Report& report, const Scene& scene)
+{
+  const LimitCycle& cycle = report.cycle;
+  const double frequency = 1 / cycle.orbit.period;
+  return format("squeals at %.5g Hz", frequency) + beside_mode(report, frequency) +
+         largest_swing(scene, cycle.measured.peak_to_peak, [](double swing) { return swing; }) +
+         stability_text(cycle.multipliers);
+}
+
+/// Without a cycle.
+std::string linear_text(const Report& report)
+{
+  if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "nothing is known: there is no equilibrium";
+  if (!has_run(report.modes.outcome)) return "nothing is known: the modes were not computed";
+  if (report.modes.unstable_count == 0)
+    return report.modes.outcome.kind == OutcomeKind::converged ? "silent: no mode grows in the band"
+                                                               : "nothing is known: the modes are incomplete";
+  return format("the equilibrium is unstable at %.5g Hz", report.modes.modes.front().frequency_hz());
+}
+
+} // namespace
+
+std::string heard(const Report& report, const Scene& scene)
+{
+  if (has_run(report.settled.outcome)) return settled_text(report, scene);
+  const Outcome& outcome = report.cycle.outcome;
+  if (outcome.kind == OutcomeKind::converged) return cycle_text(report, scene);
+  if (!has_run(outcome)) return linear_text(report);
+  return linear_text(report) + "; what is heard was not found: the search for a cycle ended with " +
+         std::string(word(outcome.kind));
+}
+
+} // namespace squeal

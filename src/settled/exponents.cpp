@@ -1,0 +1,87 @@
+#include "squeal/settled/exponents.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Entries that depend on their place and the column alone.
+void fill(Vec part, int column, double shift)
+{
+  PetscInt first = 0, last = 0;
+  double* entries = nullptr;
+  check(VecGetOwnershipRange(part, &first, &last));
+  check(VecGetArray(part, &entries));
+  for (PetscInt i = first; i < last; ++i)
+    entries[i - first] = std::sin(shift + (1.7 + 0.61 * column) * static_cast<double>(i + 1));
+  check(VecRestoreArray(part, &entries));
+}
+
+/// Gram-Schmidt. Returns the length of each column before it was scaled, beside those before it.
+std::vector<double> orthonormalise(const Flow& flow, std::vector<Owned<Vec>>& columns)
+{
+  std::vector<double> lengths;
+  for (std::size_t k = 0; k < columns.size(); ++k)
+  {
+    for (int pass = 0; pass < 2; ++pass)
+      for (std::size_t j = 0; j < k; ++j)
+        check(VecAXPY(columns[k], -energy_product(flow, columns[j], columns[k]), columns[j]));
+    lengths.push_back(std::max(energy_norm(flow, columns[k]), 1e-300));
+    check(VecScale(columns[k], 1 / lengths.back()));
+  }
+  return lengths;
+}
+
+} // namespace
+
+TangentBundle make_bundle(const Flow& flow, Vec like, int count)
+{
+  TangentBundle bundle;
+  for (int k = 0; k < count; ++k)
+  {
+    Owned<Vec> column = zeros_like(like);
+    fill(displacement(column), k, 0.3);
+    fill(velocity(column), k, 2.1);
+    // both parts weigh about the same, each column's in a ratio of its own: one degree of freedom has two columns
+    const Owned<Vec> image = zeros_like(like);
+    energy_image(flow, column, image);
+    double of_u = 0, of_v = 0;
+    check(VecDot(displacement(column), displacement(image), &of_u));
+    check(VecDot(velocity(column), velocity(image), &of_v));
+    if (of_u > 0 && of_v > 0) check(VecScale(velocity(column), (1 + 0.37 * k) * std::sqrt(of_u / of_v)));
+    bundle.columns.push_back(std::move(column));
+  }
+  orthonormalise(flow, bundle.columns);
+  bundle.growth.resize(static_cast<std::size_t>(count));
+  return bundle;
+}
+
+void follow_period(const Flow& flow, TangentBundle& bundle)
+{
+  flow.apply_tangent(std::vector<Vec>(bundle.columns.begin(), bundle.columns.end()));
+  const std::vector<double> lengths = orthonormalise(flow, bundle.columns);
+  for (std::size_t k = 0; k < lengths.size(); ++k) bundle.growth[k].push_back(std::log(lengths[k]));
+}
+
+std::vector<Estimated> exponents_of(const TangentBundle& bundle, std::size_t skipped)
+{
+  std::vector<Estimated> exponents;
+  for (const std::vector<double>& growth : bundle.growth)
+  {
+    if (growth.size() < skipped + 4) return {};
+    const std::span<const double> counted = std::span(growth).subspan(skipped);
+    Estimated exponent = batch_mean(counted);
+    exponent.error += std::numbers::ln2 / static_cast<double>(counted.size());
+    exponents.push_back(exponent);
+  }
+  std::stable_sort(exponents.begin(), exponents.end(),
+                   [](const Estimated& a, const Estimated& b) { return a.value > b.value; });
+  return exponents;
+}
+
+} // namespace squeal

@@ -1,0 +1,102 @@
+#include "squeal/settled/motion.hpp"
+
+#include "squeal/base/progress.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Of two exponents that are zero: a torus, or a motion that winds down to a cycle.
+MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencies& base)
+{
+  const Estimated decay = decay_of_spread(energies);
+  const double length = static_cast<double>(energies.size());
+  if (base.explained < 0.8)
+    return {MotionKind::undecided, "quasi-periodic and weakly irregular",
+            format("%.0f %% of the side bands lie on combinations of two frequencies: more periods would decide "
+                   "(-settled_periods)",
+                   100 * base.explained)};
+  // Had the modulation decayed to a half, the window would show it.
+  const double slowest = std::log(2.) / length;
+  if (decay.value - decay.error <= 0 && decay.value + decay.error < slowest)
+    return {MotionKind::quasi_periodic, "", ""};
+  return {MotionKind::undecided, "quasi-periodic and a slow decay to a cycle",
+          format("the modulation decays by %.1e +- %.1e a period: %.0f periods more would decide (-settled_periods)",
+                 decay.value, decay.error, 3 / std::max({decay.value, decay.error, 1e-6}))};
+}
+
+} // namespace
+
+OptionList options_of(SettledOptions& options)
+{
+  return {
+      {"-settled_periods", &options.periods, Range::natural,
+       "at most integrated to see what a motion settles on where no cycle attracts"},
+      {"-settled_exponents", &options.exponents, Range::natural, "Lyapunov exponents of a settled motion"},
+  };
+}
+
+MotionVerdict judge_motion(const std::vector<Estimated>& exponents, std::span<const double> energies,
+                           const BaseFrequencies& base)
+{
+  const std::string more = "more periods would decide (-settled_periods)";
+  if (!is_stationary(energies))
+    return {MotionKind::undecided, "a motion that still changes and one that wanders slowly", more};
+  if (exponents.empty()) return {MotionKind::undecided, "all kinds, without Lyapunov exponents", more};
+  // Bars of 95 % each: 1.4 times as wide they hold for four exponents at once.
+  constexpr double together = 1.4;
+  const auto positive = std::count_if(exponents.begin(), exponents.end(),
+                                      [](const Estimated& one) { return one.value > together * one.error; });
+  const auto zero = std::count_if(exponents.begin(), exponents.end(),
+                                  [](const Estimated& one) { return std::abs(one.value) <= together * one.error; });
+  if (positive > 0) return {MotionKind::irregular, "", ""};
+  if (zero == 1) return {MotionKind::periodic, "", ""};
+  if (zero == 2) return judge_torus(energies, base);
+  if (zero == 0) return {MotionKind::undecided, "a cycle and rest: no exponent is zero within its bar", more};
+  return {MotionKind::undecided, "quasi-periodic with more than two frequencies and weakly irregular",
+          format("%ld exponents are zero within their bars: ", static_cast<long>(zero)) + more};
+}
+
+ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, Vec state, double period,
+                              const SettledOptions& options)
+{
+  ExaminedMotion motion;
+  TangentBundle bundle = make_bundle(flow, state, static_cast<int>(options.exponents));
+  Progress progress(comm_of(displacement(state)), "settled", static_cast<double>(options.periods));
+  const auto most = static_cast<std::size_t>(options.periods);
+  std::size_t samples = 0; // a period
+  for (std::size_t target = std::min<std::size_t>(128, most);; target = std::min(2 * target, most))
+  {
+    while (motion.periods() < target)
+    {
+      const PeriodSample sample = sampler(state);
+      motion.channels.resize(sample.means.size());
+      for (std::size_t i = 0; i < sample.means.size(); ++i) motion.channels[i].push_back(sample.means[i]);
+      motion.coordinate.insert(motion.coordinate.end(), sample.coordinate.begin(), sample.coordinate.end());
+      motion.beside.insert(motion.beside.end(), sample.beside.begin(), sample.beside.end());
+      samples = sample.coordinate.size();
+      follow_period(flow, bundle);
+      progress.update(static_cast<double>(motion.periods()), format("energy %.4g", sample.means.front()));
+    }
+    motion.discarded = values_before_stationary(motion.channels.front());
+    const std::size_t first = motion.discarded < target ? motion.discarded : target / 2;
+    motion.means.clear();
+    for (const auto& channel : motion.channels) motion.means.push_back(batch_mean(std::span(channel).subspan(first)));
+    motion.exponents = exponents_of(bundle, std::max(first, target / 4));
+    const double step = period / static_cast<double>(std::max<std::size_t>(samples, 1));
+    motion.spectrum = spectrum_of(std::span(motion.coordinate).subspan(first * samples), step);
+    motion.base = base_frequencies(motion.spectrum);
+    if (motion.base.second == 0 && !motion.beside.empty())
+      motion.base =
+          base_frequencies(spectrum_of(std::span(motion.beside).subspan(first * samples), step), motion.base.first);
+    motion.verdict = judge_motion(motion.exponents, std::span(motion.channels.front()).subspan(first), motion.base);
+    if (motion.verdict.kind != MotionKind::undecided || target >= most) return motion;
+  }
+}
+
+} // namespace squeal

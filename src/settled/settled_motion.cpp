@@ -1,0 +1,142 @@
+#include "squeal/settled/settled_motion.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace squeal
+{
+
+namespace
+{
+
+enum Channel : std::size_t
+{
+  fluctuating_energy,
+  energy,
+  damping_power,
+  contact_power,
+  load_power,
+  open_pairs,
+  stick_pairs,
+  slip_pairs,
+  probes, // and those after it
+};
+
+template <class Value> double mean(const std::vector<Value>& values)
+{
+  return std::accumulate(values.begin(), values.end(), 0.) / static_cast<double>(values.size());
+}
+
+/// Appends a history to another.
+void append(const History& from, History& to)
+{
+  const auto join = [](const auto& tail, auto& all) { all.insert(all.end(), tail.begin(), tail.end()); };
+  join(from.time, to.time);
+  join(from.energy, to.energy);
+  join(from.fluctuating_energy, to.fluctuating_energy);
+  join(from.damping_power, to.damping_power);
+  join(from.contact_power, to.contact_power);
+  join(from.load_power, to.load_power);
+  join(from.normal_force, to.normal_force);
+  join(from.open, to.open);
+  join(from.stick, to.stick);
+  join(from.slip, to.slip);
+  to.probes.resize(from.probes.size());
+  for (std::size_t i = 0; i < from.probes.size(); ++i) join(from.probes[i], to.probes[i]);
+}
+
+double swing(const std::vector<double>& probe)
+{
+  const auto [least, greatest] = std::minmax_element(probe.begin(), probe.end());
+  return *greatest - *least;
+}
+
+/// The probe that swings most in a period; -1 without probes.
+int largest_probe(const History& history)
+{
+  const auto largest = std::max_element(history.probes.begin(), history.probes.end(),
+                                        [](const auto& a, const auto& b) { return swing(a) < swing(b); });
+  return history.probes.empty() ? -1 : static_cast<int>(largest - history.probes.begin());
+}
+
+PeriodSample sample_of(const History& history, int probe)
+{
+  PeriodSample sample{{mean(history.fluctuating_energy), mean(history.energy), mean(history.damping_power),
+                       mean(history.contact_power), mean(history.load_power), mean(history.open), mean(history.stick),
+                       mean(history.slip)},
+                      probe < 0 ? history.normal_force : history.probes[static_cast<std::size_t>(probe)],
+                      probe < 0 ? std::vector<double>() : history.normal_force};
+  for (const auto& one : history.probes) sample.means.push_back(swing(one));
+  return sample;
+}
+
+/// Integrates one period of the brake, recorded for its tangent, and appends its history to the motion's.
+PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, SettledMotion& motion)
+{
+  History& all = motion.history;
+  const bool first = all.time.empty();
+  const double begun = first ? 0 : all.time.back();
+  State now{copy_of(displacement(state)), copy_of(velocity(state)), begun, map.reactions};
+  map.records.clear();
+  map.records.resize(static_cast<std::size_t>(map.steps));
+  map.recorded_start = {};
+  History history;
+  const MarchSummary summary =
+      march(map.step, map.sliding, map.steps, now, {probe_rows, history, nullptr, map.records});
+  map.unconverged += summary.unconverged;
+  map.reactions = now.reactions;
+  check(VecCopy(now.u, displacement(state)));
+  check(VecCopy(now.v, velocity(state)));
+  append(history, all);
+  if (first) motion.spectrum_probe = largest_probe(history);
+  return sample_of(history, motion.spectrum_probe);
+}
+
+/// Names the parts of what was examined.
+void name_means(SettledMotion& motion, int pairs)
+{
+  const std::vector<Estimated>& means = motion.examined.means;
+  const auto fraction = [&](Channel channel) {
+    return Estimated{means[channel].value / pairs, means[channel].error / pairs};
+  };
+  motion.fluctuating_energy = means[fluctuating_energy];
+  motion.energy = means[energy];
+  motion.damping_power = means[damping_power];
+  motion.contact_power = means[contact_power];
+  motion.load_power = means[load_power];
+  motion.open_fraction = fraction(open_pairs);
+  motion.stick_fraction = fraction(stick_pairs);
+  motion.slip_fraction = fraction(slip_pairs);
+  motion.peak_to_peak.assign(means.begin() + probes, means.end());
+  const auto kept = std::span(motion.examined.channels[fluctuating_energy])
+                        .subspan(motion.examined.discarded % motion.examined.periods());
+  const auto [least, greatest] = std::minmax_element(kept.begin(), kept.end());
+  motion.least_energy = *least;
+  motion.greatest_energy = *greatest;
+}
+
+} // namespace
+
+SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, const SettledOptions& options)
+{
+  SettledMotion motion;
+  PeriodMap map{problem.sliding, problem.step, cycle.steps_per_period, cycle.theta};
+  map.reactions = problem.sliding.equilibrium.reactions;
+  Flow flow = flow_of(map);
+  set_period(map, cycle.free.period);
+  motion.steps_per_period = cycle.steps_per_period;
+  motion.period = cycle.free.period;
+  Owned<Vec> state = copy_of(cycle.free.state.get());
+  const auto sampler = [&](Vec now) { return integrate_period(map, problem.probes, now, motion); };
+  motion.examined = examine_motion(flow, sampler, state, motion.period, options);
+  name_means(motion, problem.sliding.interface.pairs);
+  const MotionVerdict& verdict = motion.examined.verdict;
+  const bool stationary = motion.examined.discarded < motion.examined.periods();
+  motion.outcome = {OutcomeKind::settled, "", static_cast<int>(motion.examined.periods()), 0};
+  if (!stationary) motion.outcome.kind = OutcomeKind::not_converged;
+  if (verdict.kind == MotionKind::undecided)
+    motion.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
+  return motion;
+}
+
+} // namespace squeal

@@ -1,0 +1,54 @@
+#include "whole_matrix.hpp"
+
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+void add_entry(Vec part, PetscInt row, double value)
+{
+  PetscInt first = 0, last = 0;
+  check(VecGetOwnershipRange(part, &first, &last));
+  if (row >= first && row < last) check(VecSetValue(part, row, value, INSERT_VALUES));
+  check(VecAssemblyBegin(part));
+  check(VecAssemblyEnd(part));
+}
+
+} // namespace
+
+Eigen::VectorXd coordinates_of(Vec state, double period)
+{
+  const std::vector<double> u = all_entries(displacement(state)), v = all_entries(velocity(state));
+  Eigen::VectorXd all(static_cast<Eigen::Index>(u.size() + v.size()));
+  all << Eigen::VectorXd::Map(u.data(), static_cast<Eigen::Index>(u.size())),
+      Eigen::VectorXd::Map(v.data(), static_cast<Eigen::Index>(v.size())) * (period / (2 * std::numbers::pi));
+  return all;
+}
+
+Owned<Vec> state_at(const Eigen::VectorXd& coordinates, const Orbit& orbit)
+{
+  Owned<Vec> state = zeros_like(orbit.state);
+  const auto dofs = static_cast<PetscInt>(coordinates.size() / 2);
+  for (PetscInt i = 0; i < 2 * dofs; ++i)
+    if (coordinates(i) != 0)
+      add_entry(i < dofs ? displacement(state) : velocity(state), i % dofs,
+                coordinates(i) * (i < dofs ? 1 : 2 * std::numbers::pi / orbit.period));
+  return state;
+}
+
+Eigen::MatrixXd whole_matrix(const Orbit& orbit, const std::function<void(std::span<const Owned<Vec>>)>& multiply)
+{
+  PetscInt dofs = 0;
+  check(VecGetSize(displacement(orbit.state), &dofs));
+  Eigen::MatrixXd M(2 * dofs, 2 * dofs);
+  std::vector<Owned<Vec>> columns;
+  for (PetscInt k = 0; k < 2 * dofs; ++k) columns.push_back(state_at(Eigen::VectorXd::Unit(2 * dofs, k), orbit));
+  multiply(columns);
+  for (PetscInt k = 0; k < 2 * dofs; ++k) M.col(k) = coordinates_of(columns[static_cast<std::size_t>(k)], orbit.period);
+  return M;
+}
+
+} // namespace squeal

@@ -1,0 +1,139 @@
+"""The way to the cycle from any start, and what a motion settles on where no cycle attracts."""
+
+import h5py
+import numpy as np
+import pytest
+from conftest import INPUTS
+from models import write_scene
+
+OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false"]
+PERIOD, ENERGY = 5.954461004653, 1.77650678461  # exact, at V = 0.6
+
+
+@pytest.mark.parametrize("steps", [50, 100, 200, 400, 800, 1600])
+@pytest.mark.parametrize("mu, speed", [(0.3, 0.3), (0.3, 0.6), (0.3, 1), (0.3, 2), (0.25, 10), (0.9, 1)])
+def test_every_oscillator_reaches_its_cycle_from_the_default_start(converged, steps, mu, speed):
+    cycle = converged(*OSCILLATOR, "--set", f"cycle.steps_per_period={steps}", "--set", f"friction.coefficient={mu}", "--set",
+                      f"contact.0.velocity=[{float(speed)},0,0]", ranks=1).report["cycle"]
+    assert cycle["outcome"] == "converged" and cycle["multipliers"]["stability"] == "stable"
+    assert cycle["residual_full"] <= 1e-8 and cycle["periods_integrated"] <= 60
+
+
+def with_foot(folder, mass, stiffness):
+    """The oscillator on a small foot of its own, which impacts: a spring and a dashpot in either direction below the pad."""
+    text = (INPUTS / "oscillator" / "scene.toml").read_text()
+    foot = f"""[[point]]
+name = "foot"
+at = [0, 0, 0]
+mass = {mass}
+free = "x y"
+"""
+    for direction, factor in (("y", 1), ("x", 2)):
+        foot += f"""
+[[spring]]
+from = "pad"
+to = "foot"
+direction = "{direction}"
+stiffness = {factor * stiffness}
+damping = 0.02
+"""
+    text = text.replace("[[spring]]", foot + "\n[[spring]]", 1).replace('stator = "pad"', 'stator = "foot"')
+    (folder / "scene.toml").write_text(text.replace("band = 1 ", "band = 10 "))
+    return [folder / "scene.toml", "--set", "transient.enabled=false"]
+
+
+@pytest.mark.parametrize("steps", [50, 200, 400, 1600])
+@pytest.mark.parametrize("mass", [0.01, 0.05])
+def test_an_impacting_foot_keeps_no_oscillator_from_its_cycle(squeal, tmp_path, mass, steps):
+    run = squeal(*with_foot(tmp_path, mass, 3), "--set", f"cycle.steps_per_period={steps}", ranks=1)
+    cycle = run.report["cycle"]
+    assert run.code == 0 and cycle["outcome"] == "converged"
+    assert cycle["residual_full"] <= 1e-8 and cycle["periods_integrated"] <= 60
+
+
+def drum_brake(folder, stiffness):
+    """A shoe on three massless feet against a drum; a spring across each foot, so that the friction of one loads others."""
+    points, springs, forces, contacts = [{"name": "shoe", "at": [0, 0, 0], "mass": 1.0, "free": "x y"}], [], [], []
+    for axis in ("x", "y"):
+        springs.append({"from": "shoe", "direction": axis, "stiffness": 1.0, "damping": 0.02})
+    for i, angle in enumerate(np.radians([0, 120, 240])):
+        normal, tangent = [np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0]
+        points += [{"name": f"foot{i}", "at": [0, 0, 0], "free": "x y"}, {"name": f"drum{i}", "at": [0, 0, 0], "free": "none"}]
+        springs += [{"from": "shoe", "to": f"foot{i}", "direction": direction, "stiffness": k, "damping": 0.02}
+                    for direction, k in ((normal, stiffness), (tangent, 2 * stiffness))]
+        forces.append({"on": f"foot{i}", "vector": normal})
+        contacts.append({"rotor": f"drum{i}", "stator": f"foot{i}", "normal": [-x for x in normal], "tangents": [tangent],
+                         "velocity": tangent})
+    return write_scene(folder, title="drum", point=points, spring=springs, force=forces, contact=contacts,
+                       friction={"coefficient": 0.3}, modes={"band": 3.0}, cycle={"steps_per_period": 800, "tolerance": 1e-6})
+
+
+@pytest.mark.parametrize("stiffness, ratio", [(0.3, 0.026), (1.0, 0.073), (3.0, 0.110)])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_massless_feet_and_strong_growth_lead_to_a_cycle(converged, tmp_path, stiffness, ratio, ranks):
+    """8 degrees of freedom, six of them without mass; the equilibrium grows by up to 11 % of the frequency a radian."""
+    report = converged(drum_brake(tmp_path, stiffness), ranks=ranks).report
+    mode, cycle = report["modes"]["modes"][0], report["cycle"]
+    assert mode["growth_rate"] / (2 * np.pi * mode["frequency_hz"]) == pytest.approx(ratio, rel=0.02)
+    assert cycle["outcome"] == "converged" and cycle["periods_integrated"] <= 60
+
+
+def test_the_cycle_starts_from_a_mode_a_transient_or_a_file(converged, squeal, tmp_path):
+    base = [INPUTS / "oscillator" / "scene.toml", "--set", "cycle.steps_per_period=100", "--set", "cycle.tolerance=1e-8"]
+    state = tmp_path / "end.state"
+    after = converged(*base, "--set", "transient.start=estimate", "--set", "transient.periods=40", "--set",
+                      "transient.steps_per_period=100", "--set", f"transient.save_state={state}", "--set",
+                      "cycle.start=transient", "--set", "cycle.free_periods=0").report["cycle"]
+    filed = converged(*base, "--set", "transient.enabled=false", "--set", f"cycle.start={state}", "--set",
+                      "cycle.free_periods=0").report["cycle"]
+    small = converged(*base, "--set", "transient.enabled=false", "--set", "cycle.start=mode", "--set",
+                      "cycle.amplitude=0.2").report["cycle"]
+    for cycle in (after, filed, small):
+        assert cycle["period"] == pytest.approx(PERIOD, rel=1e-3) and cycle["mean_energy"] == pytest.approx(ENERGY, rel=0.01)
+    # the same state, once in memory and once from the file
+    assert filed["period"] == pytest.approx(after["period"], rel=1e-9)
+    assert filed["newton"][0]["residual_full"] < 0.05  # 40 periods have settled
+
+    refused = squeal(INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
+                     f"cycle.start={state}")
+    assert refused.code == 1 and len(refused.messages) == 1
+    assert "end.state" in refused.messages[0] and "degrees of freedom" in refused.messages[0]
+    assert "equilibrium" not in refused.printed  # found before the first stage
+
+
+def test_a_skipped_transient_is_no_start(squeal):
+    run = squeal(INPUTS / "oscillator" / "scene.toml", "--set", "transient.theta=0.6", "--set", "transient.steps_per_period=20",
+                 "--set", "cycle.start=transient", ranks=1)
+    assert run.code == 2 and run.report["transient"]["outcome"] == "refused"
+    assert run.report["cycle"]["outcome"] == "skipped" and "transient" in run.report["cycle"]["reason"]
+
+
+def test_where_no_cycle_of_the_pin_attracts_the_settled_motion_answers(converged):
+    """At mu = 0.4 direct integration settles on no cycle: its energy wanders by factors. The means of another window, from
+    another start, agree within both bars."""
+    pin = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "modes.method=full", "--set", "friction.coefficient=0.4", "--set",
+           "fidelity=full"]
+    run = converged(*pin, "-cycle_free_periods", "80", "-settled_periods", "128")
+    report = run.report
+    settled = report["settled"]
+    assert report["cycle"]["outcome"] == settled["outcome"] == "settled"
+    assert settled["kind"] in ("irregular", "quasi-periodic", "undecided")
+    if settled["kind"] == "undecided":
+        assert settled["between"] and settled["would_decide"]
+    assert f"  heard        {report['heard']}" in run.printed and "no cycle attracts" in report["heard"]
+    assert f"{settled['base_frequencies_hz']['first']:.5g}" in report["heard"]
+    energy = settled["mean_fluctuating_energy"]
+    assert 0 < energy["error"] < energy["mean"]
+    for part in ("open", "stick", "slip"):
+        assert 0 <= settled[f"{part}_fraction"]["mean"] <= 1
+    assert sum(settled[f"{part}_fraction"]["mean"] for part in ("open", "stick", "slip")) == pytest.approx(1, rel=1e-12)
+    # what friction gives damping takes, over a motion that is stationary: within the bars and the energy stored
+    balance = sum(settled[f"{part}_power"]["mean"] * sign for part, sign in (("contact", 1), ("load", 1), ("damping", -1)))
+    bars = sum(settled[f"{part}_power"]["error"] for part in ("contact", "load", "damping"))
+    assert abs(balance) <= bars
+    with h5py.File(run.output / "history.h5") as file:
+        group = file["settled"]
+        assert len(group["energy"]) == settled["periods"] * settled["steps_per_period"]
+        assert (np.diff(group["time"][:]) > 0).all()
+        lines = group["spectrum/line_frequency"][:]
+        assert lines[0] == settled["lines"][0]["frequency_hz"]

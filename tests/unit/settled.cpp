@@ -1,0 +1,274 @@
+// What a motion settles on: means with their bars, spectra, Lyapunov exponents and kinds, on series and smooth flows.
+#include "../support/smooth_flows.hpp"
+#include "squeal/settled/motion.hpp"
+
+#include <cmath>
+#include <doctest/doctest.h>
+#include <numbers>
+#include <random>
+
+using namespace squeal;
+using namespace squeal::test;
+
+namespace
+{
+
+std::vector<double> sampled(std::size_t count, const std::function<double(double)>& of)
+{
+  std::vector<double> series;
+  for (std::size_t i = 0; i < count; ++i) series.push_back(of(static_cast<double>(i)));
+  return series;
+}
+
+/// x_(n+1) = memory x_n + noise about a mean of 1.
+std::vector<double> noise_with_memory(std::mt19937& random, double memory)
+{
+  std::normal_distribution<double> normal;
+  std::vector<double> series;
+  double x = normal(random) / std::sqrt(1 - memory * memory);
+  for (int i = 0; i < 512; ++i)
+  {
+    series.push_back(1 + x);
+    x = memory * x + normal(random);
+  }
+  return series;
+}
+
+constexpr int pieces = 40; // of a period, for means and spectra
+
+/// A smooth model whose tangent is a central difference, sampled in pieces of a period.
+struct Motion
+{
+  SmoothModel model;
+  Flow piece;                  // over a part of a period
+  double period;               // [s]
+  Owned<Vec> from;             // of the period recorded last
+  std::vector<double> weights; // of the displacements in the coordinate
+
+  Motion(const Rate& rate, const std::vector<double>& weights_, double period_)
+      : model(make_smooth_model(rate, std::vector<double>(weights_.size(), 1.))), period(period_), weights(weights_)
+  {
+    piece = runge_kutta_in(20, rate, model.M, model.K);
+    model.flow = runge_kutta_in(20 * pieces, rate, model.M, model.K);
+    model.flow.apply_tangent = [this](std::span<const Vec> states)
+    {
+      for (const Vec state : states) differentiate(state);
+    };
+  }
+
+  void differentiate(Vec state) const
+  {
+    const double step = 1e-5;
+    const Owned<Vec> ahead = copy_of(from.get()), behind = copy_of(from.get()), end = zeros_like(from);
+    check(VecAXPY(ahead, step, state));
+    check(VecAXPY(behind, -step, state));
+    model.flow.integrate(period, ahead, state, nullptr);
+    model.flow.integrate(period, behind, end, nullptr);
+    check(VecAXPY(state, -1, end));
+    check(VecScale(state, 1 / (2 * step)));
+  }
+
+  PeriodSample sample(Vec state)
+  {
+    from = copy_of(state);
+    PeriodSample seen{{0}, {}, {}};
+    const Owned<Vec> next = zeros_like(from);
+    for (int i = 0; i < pieces; ++i)
+    {
+      piece.integrate(period / pieces, state, next, nullptr);
+      check(VecCopy(next, state));
+      const double norm = energy_norm(model.flow, state);
+      seen.means[0] += norm * norm / 2 / pieces;
+      const std::vector<double> u = all_entries(displacement(state));
+      double value = 0;
+      for (std::size_t k = 0; k < u.size(); ++k) value += weights[k] * u[k];
+      seen.coordinate.push_back(value);
+    }
+    return seen;
+  }
+
+  ExaminedMotion examine(const std::vector<double>& u, int before, int periods)
+  {
+    const Owned<Vec> displaced = on_first_rank(u);
+    const Owned<Vec> state = state_of(displaced, model.zero), end = zeros_like(state);
+    for (int i = 0; i < before; ++i)
+    {
+      model.flow.integrate(period, state, end, nullptr);
+      check(VecCopy(end, state));
+    }
+    SettledOptions options;
+    options.periods = periods;
+    options.exponents = std::min<PetscInt>(4, 2 * static_cast<PetscInt>(u.size()));
+    return examine_motion(
+        model.flow, [this](Vec now) { return sample(now); }, state, period, options);
+  }
+};
+
+/// Van der Pol's oscillator beside its copy, `factor` times as fast.
+Rate two_apart(double factor)
+{
+  return [factor](const std::vector<double>& x, std::vector<double>& rate) {
+    rate = {x[2], x[3], (1 - x[0] * x[0]) * x[2] - x[0], factor * (1 - x[1] * x[1]) * x[3] - factor * factor * x[1]};
+  };
+}
+
+/// x'' + 0.3 x' - x + x^3 = drive cos(1.2 t); the cosine is the cycle of a second oscillator, which nothing drives.
+void duffing(double drive, const std::vector<double>& x, std::vector<double>& rate)
+{
+  const double w = 1.2, q = x[3] / w;
+  rate = {x[2], x[3], -0.3 * x[2] + x[0] - x[0] * x[0] * x[0] + drive * x[1],
+          -w * w * x[1] + (1 - x[1] * x[1] - q * q) * x[3]};
+}
+
+/// The largest exponent of the driven oscillator a period, from the growth of a difference of 1e-8 in (x, x') alone.
+double growth_of_a_difference(double drive, int periods)
+{
+  const double w = 1.2, h = 2 * std::numbers::pi / w / 400, apart = 1e-8;
+  const auto rate = [&](double t, std::array<double, 2> x) {
+    return std::array{x[1], -0.3 * x[1] + x[0] - x[0] * x[0] * x[0] + drive * std::cos(w * t)};
+  };
+  const auto advance = [&](double t, std::array<double, 2> x)
+  {
+    const auto at = [&](const std::array<double, 2>& k, double ahead) {
+      return std::array{x[0] + ahead * k[0], x[1] + ahead * k[1]};
+    };
+    const auto a = rate(t, x), b = rate(t + h / 2, at(a, h / 2)), c = rate(t + h / 2, at(b, h / 2)),
+               d = rate(t + h, at(c, h));
+    for (int i = 0; i < 2; ++i) x[i] += h / 6 * (a[i] + 2 * b[i] + 2 * c[i] + d[i]);
+    return x;
+  };
+  std::array<double, 2> x{1, 0}, y{1 + apart, 0};
+  double sum = 0, t = 0;
+  for (int period = -100; period < periods; ++period)
+  {
+    for (int i = 0; i < 400; ++i, t += h)
+    {
+      x = advance(t, x);
+      y = advance(t, y);
+    }
+    const double now = std::hypot(y[0] - x[0], y[1] - x[1]);
+    if (period >= 0) sum += std::log(now / apart);
+    for (int i = 0; i < 2; ++i) y[i] = x[i] + apart / now * (y[i] - x[i]);
+  }
+  return sum / periods;
+}
+
+} // namespace
+
+TEST_CASE("bars of batch means hold the true mean in nine series of ten or more")
+{
+  std::mt19937 random(7);
+  for (const double memory : {0., 0.7, 0.9})
+  {
+    int held = 0;
+    for (int i = 0; i < 400; ++i)
+    {
+      const Estimated mean = batch_mean(noise_with_memory(random, memory));
+      held += std::abs(mean.value - 1) <= mean.error;
+    }
+    CAPTURE(memory);
+    // 95 % by construction without memory; the widest of three bars holds a little more
+    CHECK(held >= 360);
+  }
+}
+
+TEST_CASE("a drift is not stationary, a beat is; what comes before the motion has settled is left out")
+{
+  std::mt19937 random(3);
+  CHECK(is_stationary(sampled(256, [](double i) { return 2 + std::sin(0.37 * i); })));
+  CHECK_FALSE(is_stationary(sampled(256, [](double i) { return 2 + 0.01 * i + std::sin(0.37 * i); })));
+  const auto settles = sampled(512, [](double i) { return 2 + 3 * std::exp(-i / 20) + std::sin(0.37 * i); });
+  CHECK_FALSE(is_stationary(settles));
+  CHECK(values_before_stationary(settles) == 64); // an eighth: e^-3.2 of the decay is left there
+}
+
+TEST_CASE("the spread of a beat that dies decays at its rate")
+{
+  const auto dying = sampled(512, [](double i) { return 1 + std::exp(-0.01 * i) * std::sin(0.8 * i); });
+  const Estimated decay = decay_of_spread(dying);
+  CHECK(std::abs(decay.value - 0.01) <= decay.error);
+  const Estimated none = decay_of_spread(sampled(512, [](double i) { return 1 + std::sin(0.8 * i); }));
+  CHECK(std::abs(none.value) <= none.error);
+}
+
+TEST_CASE("lines between the points of the transform are found, with their amplitudes and base frequencies")
+{
+  const double h = 1e-3, pi = std::numbers::pi;
+  const std::vector<std::pair<double, double>> parts = {{50.31, 1}, {61.77, 0.3}, {38.85, 0.1}, {100.62, 0.05}};
+  const auto signal = sampled(4096,
+                              [&](double i)
+                              {
+                                double sum = 3;
+                                for (const auto& [frequency, amplitude] : parts)
+                                  sum += amplitude * std::cos(2 * pi * frequency * i * h + frequency);
+                                return sum;
+                              });
+  const Spectrum spectrum = spectrum_of(signal, h);
+  REQUIRE(spectrum.lines.size() >= parts.size());
+  for (std::size_t i = 0; i < parts.size(); ++i)
+  {
+    // neighbours forty points away leak about 1e-4 of themselves
+    CHECK(spectrum.lines[i].frequency_hz == doctest::Approx(parts[i].first).epsilon(1e-3));
+    CHECK(spectrum.lines[i].amplitude == doctest::Approx(parts[i].second).epsilon(0.01));
+  }
+  const BaseFrequencies base = base_frequencies(spectrum);
+  CHECK(base.first == doctest::Approx(50.31).epsilon(1e-4));
+  CHECK(base.second == doctest::Approx(61.77).epsilon(1e-4));
+  CHECK(base.closes_after == 0);
+  CHECK(base.explained > 0.98); // 38.85 = 2 f_1 - f_2
+}
+
+TEST_CASE("the exponents of the van der Pol cycle are zero and the logarithm of its multiplier")
+{
+  Motion motion(van_der_pol, {1}, vdp_period);
+  const ExaminedMotion seen = motion.examine({2}, 5, 64);
+  REQUIRE(seen.exponents.size() == 2);
+  CHECK(std::abs(seen.exponents[0].value) < 1e-6);
+  CHECK(seen.exponents[1].value == doctest::Approx(std::log(vdp_multiplier)).epsilon(1e-4));
+  CHECK(seen.verdict.kind == MotionKind::periodic);
+  CHECK(seen.base.first == doctest::Approx(1 / vdp_period).epsilon(1e-4));
+  CHECK(seen.base.second == 0);
+}
+
+TEST_CASE("two oscillators that do not know of each other move on a torus, whose base frequencies are theirs")
+{
+  const double factor = 1.2720196495; // no common period within any number of turns that matters
+  Motion motion(two_apart(factor), {1, 0.7}, vdp_period);
+  const ExaminedMotion seen = motion.examine({2, 2}, 10, 256);
+  CHECK(seen.verdict.kind == MotionKind::quasi_periodic);
+  CHECK(std::abs(seen.exponents[0].value) <= seen.exponents[0].error);
+  CHECK(std::abs(seen.exponents[1].value) <= seen.exponents[1].error);
+  CHECK(seen.exponents[2].value < -1);
+  CHECK(seen.base.first == doctest::Approx(1 / vdp_period).epsilon(1e-3));
+  CHECK(seen.base.second == doctest::Approx(factor / vdp_period).epsilon(1e-3));
+}
+
+TEST_CASE("a motion that winds down to a cycle is never called quasi-periodic")
+{
+  for (const double damping : {0.001, 0.003, 0.01})
+  {
+    const auto decaying = [damping](const std::vector<double>& x, std::vector<double>& rate) {
+      rate = {x[2], x[3], (1 - x[0] * x[0]) * x[2] - x[0], -2 * damping * x[3] - 2.3 * x[1]};
+    };
+    Motion motion(decaying, {1, 1}, vdp_period);
+    const ExaminedMotion seen = motion.examine({2, 1}, 0, 128);
+    CAPTURE(damping);
+    CHECK(seen.verdict.kind != MotionKind::quasi_periodic);
+    CHECK(seen.verdict.kind != MotionKind::irregular);
+  }
+}
+
+TEST_CASE("the driven double well: closing after two periods at one drive, irregular at another")
+{
+  const double period = 2 * std::numbers::pi / 1.2;
+  Motion doubled([](const auto& x, auto& rate) { duffing(0.28, x, rate); }, {1, 0}, period);
+  const ExaminedMotion two = doubled.examine({1, 1}, 60, 128);
+  CHECK(two.verdict.kind == MotionKind::periodic);
+  CHECK(two.base.closes_after == 2);
+
+  Motion wild([](const auto& x, auto& rate) { duffing(0.5, x, rate); }, {1, 0}, period);
+  const ExaminedMotion seen = wild.examine({1, 1}, 60, 256);
+  CHECK(seen.verdict.kind == MotionKind::irregular);
+  // the difference's own mean over 2000 periods is good to a tenth of the bar of 192
+  CHECK(std::abs(seen.exponents[0].value - growth_of_a_difference(0.5, 2000)) <= 1.2 * seen.exponents[0].error);
+}
