@@ -6,13 +6,6 @@
 namespace squeal
 {
 
-double ContactWork::force_scale(std::size_t pair, double largest) const
-{
-  const NaturalScale& rho = W.scale(pair);
-  const double own = speed * std::min(rho.normal, rho.tangential);
-  return own == 0 ? largest : largest == 0 ? own : std::min(own, largest);
-}
-
 double largest_reaction(const std::vector<double>& r)
 {
   double largest = 0;
@@ -30,7 +23,7 @@ double residual_of(const ContactWork& work)
     const PairVector w = work.velocity(pair);
     const double defect = natural_map(work.reaction(pair), w, work.friction, work.W.scale(pair));
     if (!std::isfinite(defect + w[0] + w[1] + w[2])) return std::numeric_limits<double>::infinity();
-    if (defect > 0) residual = std::max(residual, defect / work.force_scale(pair, largest));
+    if (defect > 0) residual = std::max(residual, defect / work.scale_of(pair, largest));
   }
   return residual;
 }

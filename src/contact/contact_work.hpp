@@ -1,5 +1,6 @@
 #pragma once
 /// What the contact solvers share: one problem while it is being solved.
+#include "squeal/contact/force_scale.hpp"
 #include "squeal/contact/solver.hpp"
 
 #include <limits>
@@ -18,9 +19,7 @@ struct ContactWork
   int reads = 0;          // products with W
   ContactResult result{};
 
-  /// What a pair's error is compared with, where `largest` is the largest reaction: also the force that would give the
-  /// pair the largest free velocity, so that a light pair beside heavy ones is not passed over.
-  double force_scale(std::size_t pair, double largest) const;
+  double scale_of(std::size_t pair, double largest) const { return force_scale(W.scale(pair), speed, largest); }
 
   PairVector reaction(std::size_t pair) const { return PairView(r, W.directions()).vector(pair); }
 

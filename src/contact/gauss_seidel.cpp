@@ -78,7 +78,7 @@ template <class Entry> bool visit(SweptProblem<Entry>& problem, std::size_t pair
   if (!work.takes_part(pair)) return false;
   const PairVector w = velocity_of(problem, pair), last = work.reaction(pair);
   const double defect = natural_map(last, w, work.friction, W.scale(pair));
-  if (defect <= limit * work.force_scale(pair, largest)) return false;
+  if (defect <= limit * work.scale_of(pair, largest)) return false;
   const PairBlock& A = W.diagonal(pair);
   PairVector next = solve_pair(A, velocity_without(A, last, w), W.directions(), work.friction, last);
   if (problem.relaxation < 1) // stays admissible: the cone is convex

@@ -5,6 +5,7 @@
 /// slides at the time: a row of W a pair, in single precision, since it acts on changes only. One product with W then
 /// gives the rates, and pairs that still miss the law - those that stick or turn - are solved one by one.
 #include "reduced_contact.hpp"
+#include "squeal/contact/force_scale.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -25,7 +26,8 @@ struct Iterate
 {
   const ReducedMap& map;
   VectorXd& r;
-  VectorXd& w; // W r + b
+  VectorXd& w;      // W r + b
+  double speed = 0; // [m/s] the largest of b
   int directions = map.model.directions;
   const FrictionLaw& friction = map.model.friction;
   PairRows<Index> rows{directions};
@@ -34,9 +36,12 @@ struct Iterate
   PairVector reaction(std::size_t pair) const { return PairView<const double>(r, directions).vector(pair); }
   PairVector velocity(std::size_t pair) const { return PairView<const double>(w, directions).vector(pair); }
 
-  double defect(std::size_t pair) const
+  /// The natural map over the pair's force scale.
+  double defect(std::size_t pair, double largest) const
   {
-    return natural_map(reaction(pair), velocity(pair), friction, natural_scale(map.own[pair], 0));
+    const NaturalScale rho = natural_scale(map.own[pair], 0);
+    const double error = natural_map(reaction(pair), velocity(pair), friction, rho);
+    return error > 0 ? error / force_scale(rho, speed, largest) : 0;
   }
 };
 
@@ -121,13 +126,14 @@ void sweep_normals(Iterate& iterate, const Eigen::MatrixXf& responses, double en
   }
 }
 
-/// One sweep over the pairs that miss their law by more than `limit`, each solved whole; the local solves see the
+/// One sweep over the pairs whose defect exceeds `limit`, each solved whole; the local solves see the
 /// symmetric part of W's own blocks, which leaves the fixed point what it is.
 void sweep_pairs(Iterate& iterate, double limit)
 {
+  const double largest = iterate.r.cwiseAbs().maxCoeff();
   for (std::size_t pair = 0; pair < iterate.pairs(); ++pair)
   {
-    if (iterate.defect(pair) <= limit) continue;
+    if (iterate.defect(pair, largest) <= limit) continue;
     const PairBlock& A = iterate.map.own[pair];
     const PairVector last = iterate.reaction(pair), q = velocity_without(A, last, iterate.velocity(pair));
     change_reaction(iterate, pair, solve_pair(A, q, iterate.directions, iterate.friction, last));
@@ -136,9 +142,20 @@ void sweep_pairs(Iterate& iterate, double limit)
 
 double largest_defect(const Iterate& iterate)
 {
+  const double largest = iterate.r.cwiseAbs().maxCoeff();
   double worst = 0;
-  for (std::size_t pair = 0; pair < iterate.pairs(); ++pair) worst = std::max(worst, iterate.defect(pair));
+  for (std::size_t pair = 0; pair < iterate.pairs(); ++pair) worst = std::max(worst, iterate.defect(pair, largest));
   return worst;
+}
+
+/// The largest force scale of a pair [N].
+double largest_scale(const Iterate& iterate)
+{
+  const double largest = iterate.r.cwiseAbs().maxCoeff();
+  double scale = 0;
+  for (const PairBlock& own : iterate.map.own)
+    scale = std::max(scale, force_scale(natural_scale(own, 0), iterate.speed, largest));
+  return scale;
 }
 
 /// W x in single precision.
@@ -180,21 +197,21 @@ bool solve_contact(const ReducedMap& map, const VectorXd& b, ReducedContact& con
   extrapolate(map, contact);
   contact.w = b + contact.Wr;
   VectorXd& r = contact.r;
-  Iterate iterate{map, r, contact.w};
+  Iterate iterate{map, r, contact.w, b.cwiseAbs().maxCoeff()};
   admit(iterate);
   if (contact.unread++ == 0) contact.normal_responses = normal_responses(iterate);
   double worst = HUGE_VAL;
   bool converged = false;
   for (int pass = 0; pass < map.contact.max_iterations; ++pass)
   {
-    const double tolerance = map.contact.tolerance * r.cwiseAbs().maxCoeff(), last = worst;
+    const double tolerance = map.contact.tolerance, last = worst;
     worst = largest_defect(iterate);
     converged = worst <= tolerance;
     if (converged) break;
     if (worst < last / 2)
     {
       const VectorXd before = r;
-      sweep_normals(iterate, contact.normal_responses, std::max(tolerance / 4, 1e-6 * worst));
+      sweep_normals(iterate, contact.normal_responses, std::max(tolerance / 4, 1e-6 * worst) * largest_scale(iterate));
       contact.w += product_single(map, r - before);
     }
     else // friction that the normal sweeps do not see

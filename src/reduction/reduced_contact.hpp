@@ -5,8 +5,8 @@
 namespace squeal
 {
 
-/// The reactions after a step whose contact velocities are b without them; `contact` is of the step before. Residual:
-/// the natural map over the largest reaction. Returns whether it converged.
+/// The reactions after a step whose contact velocities are b without them; `contact` is of the step before. The
+/// residual is that of section 4.6. Returns whether it converged.
 bool solve_contact(const ReducedMap& map, const Eigen::VectorXd& b, ReducedContact& contact);
 
 } // namespace squeal
