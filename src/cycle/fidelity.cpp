@@ -115,7 +115,15 @@ void find_on_model(const CycleProblem& problem, const CycleOptions& options, boo
     ReducedSearch search{problem, options, fidelity, problem.settings.steps_per_period};
     // a start need not be better; slow motions multiply its error
     search.tolerance = fidelity.asked == CycleModel::automatic ? 1e-3 : 3e-4 * fidelity.accuracy;
-    fidelity.reason = find_by_reduced_model(search, steps_open, result.cycle);
+    try
+    {
+      fidelity.reason = find_by_reduced_model(search, steps_open, result.cycle);
+    }
+    catch (const Error& error) // on every rank alike: the reduced model is the same on all
+    {
+      if (fidelity.asked == CycleModel::reduced) throw;
+      fidelity.reason = error.what();
+    }
     if (fidelity.reason.empty()) return;
   }
   if (fidelity.asked == CycleModel::reduced)
