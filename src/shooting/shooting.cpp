@@ -253,9 +253,7 @@ void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable
   outcome.kind = other_unstable == 0 ? OutcomeKind::unstable_cycle : OutcomeKind::not_periodic;
   outcome.reason = format("the cycle found repels: a small motion beside it grows %.4g times a period (%s)",
                           std::abs(multipliers.values.front()), word(multipliers.crossing));
-  outcome.reason += other_unstable == 0 ? "; try another start or more free periods"
-                                        : "; " + std::to_string(other_unstable + 1) +
-                                              " modes are unstable and the motion may be quasi-periodic: integrate it";
+  if (other_unstable > 0) outcome.reason += format("; %zu modes are unstable", other_unstable + 1);
 }
 
 void declare_solver_options()
