@@ -147,7 +147,7 @@ BranchVector zero_like(const BranchVector& z)
 /// step the newer ones hold is left out: what is new in its change is no change of the Jacobian but its error.
 BranchVector step_by_secants(const BranchCorrector& corrector, const BranchBorder& border, BranchVector wanted)
 {
-  constexpr double new_step = 1e-2; // smallest part of a step that must be new
+  constexpr double new_step = 1e-4; // smallest part of a step that must be new
   std::vector<Direction> directions, steps;
   BranchVector step = zero_like(wanted);
   for (const BranchSecant& secant : corrector.secants)
@@ -187,14 +187,14 @@ BranchVector step_by_columns(BranchCorrector& corrector, const Orbit& orbit, con
 {
   constexpr double rounding = 1e-12; // of a column that adds nothing
   corrector.secants.clear();
-  std::vector<Direction> directions;
+  std::vector<Direction> directions, steps;
   BranchVector step = zero_like(wanted);
   const double whole = std::sqrt(scaled_product(corrector, wanted, wanted));
   for (int k = 0; k < most_columns && std::sqrt(scaled_product(corrector, wanted, wanted)) > accuracy * whole; ++k)
   {
-    BranchVector next = copy_of(wanted);
-    scale(1 / std::sqrt(scaled_product(corrector, next, next)), next);
-    BranchSecant secant = exact_secant(corrector, orbit, std::move(next));
+    // square to the earlier steps: successive residuals may be nearly parallel
+    if (!append(corrector, rounding, steps, {copy_of(wanted), copy_of(wanted)})) break;
+    BranchSecant secant = exact_secant(corrector, orbit, copy_of(steps.back().step));
     if (!append(corrector, rounding, directions, direction_of(border, secant))) break;
     take_part(directions.back(), wanted, step);
     keep(corrector, std::move(secant));

@@ -155,6 +155,9 @@ std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::arr
 {
   std::array<const ExaminedOrbit*, 3> now = points;
   const auto parameter = [&](std::size_t i) { return now[i]->corrected.parameter; };
+  // where the branch stands upright the parameter turns by the tolerance alone
+  const double least = 1e-6 * corrector.scales.parameter;
+  if (std::min(std::abs(parameter(1) - parameter(0)), std::abs(parameter(2) - parameter(1))) < least) return {};
   if (!((parameter(1) - parameter(0)) * (parameter(2) - parameter(1)) < 0)) return {};
   std::array<ExaminedOrbit, 2> found;
   BranchEvent event = event_at(BranchEventKind::fold, *points[1], 0.5 * std::abs(parameter(2) - parameter(0)));
