@@ -166,6 +166,14 @@ RealModes modes_beyond_band(const CycleProblem& problem)
   return find_real_modes_below(problem.linearised, far * frequency, problem.modes_options);
 }
 
+/// The number of pairs that slide throughout.
+int eliminated_pairs(const CycleProblem& problem, const RecordedPeriods& periods)
+{
+  const Interface& interface = problem.sliding.interface;
+  const PairRoles roles = roles_of(histories(interface, periods.records), interface, 1);
+  return static_cast<int>(std::count(roles.sliding.begin(), roles.sliding.end(), 1));
+}
+
 /// The reduced model for the recorded periods.
 ReducedModel model_for(const CycleProblem& problem, const RecordedPeriods& periods)
 {
@@ -199,6 +207,26 @@ std::vector<double> grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map
   return errors;
 }
 
+/// Whether the model has as many shapes as the structure has motions.
+bool holds_every_motion(const ReducedModel& model, int eliminated, Vec state)
+{
+  PetscInt dofs = 0;
+  check(VecGetSize(displacement(state), &dofs));
+  return model.size() + eliminated == dofs;
+}
+
+constexpr LargeValues wanted{0.85, 4, 48};
+
+/// Whether three quarters of the shapes give as many multipliers above 0.95.
+bool confirmed_by_fewer_shapes(const ReducedModel& model, const ReducedMap& map, double period,
+                               std::span<const RecordedContact> contacts, const std::vector<Complex>& values,
+                               MPI_Comm comm)
+{
+  const ReducedModel smaller = truncated(model, (3 * model.size() + 3) / 4);
+  ReducedMap few{smaller, map.steps, map.theta};
+  return as_many_above(0.95, values, large_multipliers(few, period, contacts, wanted, comm).values);
+}
+
 SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int other_steps, double period, Vec start)
 {
   const MPI_Comm comm = comm_of(problem.sliding.structure.load);
@@ -213,7 +241,6 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
   };
   ReducedMap own{model, map.steps, map.theta};
   const auto recorded = contacts(RecordedPeriods::own);
-  constexpr LargeValues wanted{0.85, 4, 48};
   const ReducedSpectrum spectrum = large_multipliers(own, period, recorded, wanted, comm);
   slow.values = spectrum.values;
   // no motion beside a cycle that shooting finds doubles in a period: shapes that do not fit friction do
@@ -223,9 +250,8 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
     return slow;
   }
   slow.errors = grid_errors(spectrum, own, other_steps, period, contacts, comm);
-  const ReducedModel smaller = truncated(model, (3 * model.size() + 3) / 4);
-  ReducedMap few{smaller, map.steps, map.theta};
-  slow.confirmed = as_many_above(0.95, spectrum.values, large_multipliers(few, period, recorded, wanted, comm).values);
+  slow.confirmed = holds_every_motion(model, eliminated_pairs(problem, periods), start) ||
+                   confirmed_by_fewer_shapes(model, own, period, recorded, spectrum.values, comm);
   slow.right = lifted(model, spectrum.right, start);
   slow.left = lifted(model, energy_representatives(model, spectrum.left), start);
   slow.others = slow_sliding_motions(problem.modes, start);

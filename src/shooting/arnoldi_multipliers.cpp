@@ -138,7 +138,7 @@ FloquetAnalysis multipliers_by_arnoldi(Monodromy& monodromy, Owned<Vec> start, P
   for (const DenseEigenpair& pair : pairs)
   {
     multipliers.values.push_back(pair.lambda);
-    multipliers.errors.push_back(2 * residual_of(krylov, pair));
+    multipliers.errors.push_back(std::max(2 * residual_of(krylov, pair), 1e-9)); // rounding
   }
   decide(multipliers,
          {leading_converged(krylov, pairs),

@@ -60,7 +60,7 @@ MatrixXd inner_products(const StateBlock& X, const StateBlock& Y)
 
 StateBlock orthonormal(const Flow& flow, StateBlock X, double least)
 {
-  for (int pass = 0; pass < 2; ++pass) // the second removes what rounding left
+  for (int pass = 0; pass < 2 && X.columns() > 0; ++pass) // the second removes what rounding left
   {
     const MatrixXd gram = inner_products(X, energy_images(flow, X));
     const Eigen::VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();

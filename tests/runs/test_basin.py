@@ -86,12 +86,12 @@ def test_of_two_cycles_of_the_pin_the_start_decides(squeal):
 
 
 def test_the_projection_finds_the_multiplier_of_arnoldi(squeal):
-    """0.00012 above 1 beside a bar of the grid: 2e-5, which 112 columns of Arnoldi show for their own error."""
+    """1.000122 by Arnoldi and by direct integration. 1e-4: what the bar holds beside the 4.3e-4 of the grid of time."""
     cycle = squeal(INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=3", "--set",
                    "modes.method=full", "--set", "modes.band=6000", "--set", "transient.enabled=false",
                    "--set", "fidelity=full", ranks=1).report["cycle"]
     found = cycle["multipliers"]
     assert found["method"] == "oblique" and found["stability"] == "undecided"
     largest = found["values"][0]
-    assert abs(abs(complex(largest["real"], largest["imaginary"])) - 1.000122) < 2e-5
+    assert abs(abs(complex(largest["real"], largest["imaginary"])) - 1.000122) < 1e-4
     assert largest["error"] > 1.2e-4 and "reaches across 1" in found["would_decide"]

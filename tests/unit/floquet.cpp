@@ -1,0 +1,87 @@
+// Multipliers by oblique projection against the whole monodromy matrix, on random frictional oscillators.
+// ranks: 1 2 3
+#include "../support/cycle_of.hpp"
+
+#include <algorithm>
+#include <doctest/doctest.h>
+#include <random>
+
+using namespace squeal;
+using namespace squeal::test;
+
+namespace
+{
+
+/// The unilateral oscillator with random springs, friction and belt, and masses that hang on its pad.
+SmallModel random_oscillator(std::mt19937& random, std::size_t more)
+{
+  const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+  const std::size_t n = 3 + more;
+  Rows K = zeros(n, n), C = zeros(n, n);
+  std::vector<double> masses(n, 1), load(n, 0);
+  const double across = between(0.08, 0.12);
+  K[0][0] = between(0.95, 1.05) + across;
+  K[1][1] = between(0.38, 0.42) + across;
+  K[0][1] = K[1][0] = -across;
+  K[2][2] = between(1.1, 1.3);
+  masses[2] = 0.5;
+  load[1] = -1;
+  for (std::size_t i = 0; i < 3; ++i) C[i][i] = between(0.01, 0.02);
+  for (std::size_t i = 3; i < n; ++i)
+  {
+    const std::size_t on = i % 2; // the direction of the pad that it moves in
+    masses[i] = between(0.02, 0.1);
+    const double stiffness = masses[i] * between(2, 4), damping = masses[i] * between(0.005, 0.05);
+    for (const auto& [matrix, value] : {std::pair{&K, stiffness}, std::pair{&C, damping}})
+    {
+      (*matrix)[i][i] += value;
+      (*matrix)[on][on] += value;
+      (*matrix)[i][on] -= value;
+      (*matrix)[on][i] -= value;
+    }
+  }
+  Rows B = zeros(2, n);
+  B[0][1] = B[1][0] = 1;
+  B[0][2] = -1;
+  SmallModel model;
+  model.structure = make_structure(diagonal(masses), C, K, load);
+  model.interface = make_interface(B, 1, {0}, {between(0.5, 1)}, between(0.25, 0.35), model.structure.K);
+  return model;
+}
+
+LimitCycle examined(const SmallModel& model, MultiplierMethod method)
+{
+  CycleOptions options;
+  options.shooting.multiplier_method = method;
+  return cycle_of(model, 100, 10, 1e-10, options);
+}
+
+} // namespace
+
+TEST_CASE("the oblique projection's verdict and bars hold against the whole monodromy matrix")
+{
+  std::mt19937 random(5);
+  int compared = 0, decided = 0, projected = 0;
+  for (std::size_t sample = 0; sample < 12; ++sample)
+  {
+    CAPTURE(sample);
+    const SmallModel model = random_oscillator(random, sample % 6);
+    const LimitCycle whole = examined(model, MultiplierMethod::whole);
+    const LimitCycle oblique = examined(model, MultiplierMethod::oblique);
+    if (whole.outcome.kind != OutcomeKind::converged) continue;
+    REQUIRE(!oblique.multipliers.values.empty());
+    const double truth = std::abs(whole.multipliers.values.front()),
+                 found = std::abs(oblique.multipliers.values.front());
+    CHECK(std::abs(found - truth) <= oblique.multipliers.errors.front());
+    // the stage's own agreement is far better than its bars, which hold the grid of time: the model keeps all motions
+    CHECK(std::abs(found - truth) < 1e-6);
+    CHECK((oblique.multipliers.stability == Stability::stable) <= (truth < 1));
+    CHECK((oblique.multipliers.stability == Stability::unstable) <= (truth > 1));
+    ++compared;
+    projected += oblique.multipliers.method == MultiplierMethod::oblique;
+    decided += oblique.multipliers.stability != Stability::undecided;
+  }
+  CHECK(compared >= 4);
+  CHECK(projected >= compared - 1); // nearly equal multipliers may leave no left vectors that fit
+  CHECK(decided >= compared - 1);
+}
