@@ -270,7 +270,8 @@ Orbit shoot_on_subspace(const OrbitProblem& problem, const ShootingOptions& opti
   check(MatCreateSeqDense(PETSC_COMM_SELF, system.size(), system.size(), nullptr, J.put()));
   check(MatCreateVecs(J, y.put(), R.put()));
   check(VecSet(y, 0));
-  const Owned<SNES> snes = make_solver(options.subspace_newtons, problem.tolerance);
+  const Owned<SNES> snes =
+      make_solver((options.subspace_newtons < 0 ? 10 : options.subspace_newtons), problem.tolerance);
   set_callbacks(snes, system, J, R);
   check_after_callbacks(SNESSolve(snes, nullptr, y), system.failure);
   evaluate_at(system, entries_of(system, y));
