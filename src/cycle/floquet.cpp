@@ -192,19 +192,26 @@ ReducedModel model_for(const CycleProblem& problem, const RecordedPeriods& perio
 
 /// What the grid of time changes the modulus of each value of the spectrum by. A step of order 2 on grids of n and 2 n
 /// steps has 4/3 of the difference as its error; events of contact, of order 1, show in the moved grid, too.
-std::vector<double> grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, int other_steps, double period,
-                                const std::function<std::vector<RecordedContact>(int)>& contacts, MPI_Comm comm)
+void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, int other_steps, double period,
+                     const std::function<std::vector<RecordedContact>(int)>& contacts, SlowMotions& slow)
 {
-  std::vector<double> errors;
+  const MPI_Comm comm = map.model.shapes.comm;
   const auto change = [&](const std::vector<Complex>& values, std::size_t i)
-  { return std::abs(std::abs(values[i]) - std::abs(spectrum.values[i])); };
+  { return std::abs(values[i]) - std::abs(spectrum.values[i]); };
   const auto moved = multipliers_along(spectrum, map, period, contacts(RecordedPeriods::moved), comm);
-  for (std::size_t i = 0; i < moved.size(); ++i) errors.push_back(change(moved, i));
-  if (other_steps == 0) return errors;
+  for (std::size_t i = 0; i < moved.size(); ++i)
+  {
+    slow.errors.push_back(std::abs(change(moved, i)));
+    slow.rises.push_back(std::max(0., change(moved, i)));
+  }
+  if (other_steps == 0) return;
   ReducedMap other{map.model, other_steps, map.theta};
   const auto compared = multipliers_along(spectrum, other, period, contacts(RecordedPeriods::other), comm);
-  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] += 4. / 3 * change(compared, i);
-  return errors;
+  for (std::size_t i = 0; i < slow.errors.size(); ++i)
+  {
+    slow.errors[i] += 4. / 3 * std::abs(change(compared, i));
+    slow.rises[i] += 4. / 3 * std::max(0., change(compared, i));
+  }
 }
 
 /// Whether the model has as many shapes as the structure has motions.
@@ -249,7 +256,7 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
     slow.missing = "the reduced model on the recorded contact has motions that the full one lacks";
     return slow;
   }
-  slow.errors = grid_errors(spectrum, own, other_steps, period, contacts, comm);
+  set_grid_errors(spectrum, own, other_steps, period, contacts, slow);
   slow.confirmed = holds_every_motion(model, eliminated_pairs(problem, periods), start) ||
                    confirmed_by_fewer_shapes(model, own, period, recorded, spectrum.values, comm);
   slow.right = lifted(model, spectrum.right, start);

@@ -65,7 +65,8 @@ void decide(Multipliers& multipliers, const Coverage& coverage, std::size_t conv
       multipliers.would_decide.clear();
       return;
     }
-    if (i >= converged || size + error < 1 || multipliers.stability == Stability::undecided) continue;
+    const double upper = multipliers.upper.empty() ? size + error : multipliers.upper[i];
+    if (i >= converged || upper < 1 || multipliers.stability == Stability::undecided) continue;
     multipliers.stability = Stability::undecided;
     multipliers.would_decide =
         format("a multiplier of %.6f with an error of %.1e reaches across 1: a smaller tolerance "

@@ -77,16 +77,19 @@ struct Passes
 {
   Projector projector;
   std::vector<DenseEigenpair> pairs{};
-  std::vector<double> bars{};
-  std::vector<Complex> values{}; // with that of the shift in time
-  double shift_distance = 0;     // of that one from 1
+  std::vector<double> bars{}, rises{}; // rises: the bars upwards
+  std::vector<Complex> values{};       // with that of the shift in time
+  double shift_distance = 0;           // of that one from 1
   long columns = 0;
 };
 
 bool reaches_across(const Passes& passes)
 {
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
-    if (std::abs(std::abs(passes.pairs[i].lambda) - 1) <= passes.bars[i]) return true;
+  {
+    const double size = std::abs(passes.pairs[i].lambda);
+    if (size - passes.bars[i] <= 1 && size + passes.rises[i] >= 1) return true;
+  }
   return false;
 }
 
@@ -106,9 +109,11 @@ double take_out_shift(const Monodromy& monodromy, Passes& passes)
       {
         passes.pairs[i].lambda = 2 * value.real() - 1;
         passes.bars[i] += distance;
+        passes.rises[i] += distance;
       }
   passes.pairs.erase(passes.pairs.begin() + static_cast<std::ptrdiff_t>(shift));
-  passes.bars.erase(passes.bars.begin() + static_cast<std::ptrdiff_t>(shift));
+  for (std::vector<double>* bars : {&passes.bars, &passes.rises})
+    bars->erase(bars->begin() + static_cast<std::ptrdiff_t>(shift));
   return distance;
 }
 
@@ -184,8 +189,12 @@ std::string project(const Monodromy& monodromy, const SlowMotions& slow, const K
   if (passes.columns > static_cast<long>(slow.right.size()) && meaningless(passes.values, passes.bars))
     return "the reduced model's multipliers differ too much from the full model's";
   const std::vector<std::size_t> own = nearest_places(passes.values, slow.values);
+  passes.rises = passes.bars;
   for (std::size_t i = 0; i < own.size(); ++i)
+  {
     passes.bars[i] = std::max(2 * passes.bars[i] + slow.errors[own[i]], 1e-9);
+    passes.rises[i] = std::max(2 * passes.rises[i] + slow.rises[own[i]], 1e-9);
+  }
   passes.shift_distance = take_out_shift(monodromy, passes);
   return {};
 }
@@ -313,6 +322,7 @@ void add_value(Multipliers& multipliers, Complex value, double error)
                      multipliers.values.begin();
   multipliers.values.insert(multipliers.values.begin() + place, value);
   multipliers.errors.insert(multipliers.errors.begin() + place, error);
+  multipliers.upper.insert(multipliers.upper.begin() + place, std::abs(value) + error);
 }
 
 } // namespace
@@ -335,6 +345,8 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
   const Search search = search_beside(monodromy, passes.projector, slow.others, limit);
   multipliers.values = values_of(passes.pairs);
   multipliers.errors = passes.bars;
+  for (std::size_t i = 0; i < passes.rises.size(); ++i)
+    multipliers.upper.push_back(std::abs(multipliers.values[i]) + passes.rises[i]);
   if (std::abs(search.largest) - 2 * search.residual > 1) add_value(multipliers, search.largest, 2 * search.residual);
   multipliers.periods = slow.periods + passes.columns + search.columns;
   decide(multipliers, coverage_of(slow, search), multipliers.values.size());

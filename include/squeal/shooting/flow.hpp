@@ -19,6 +19,7 @@ struct SlowMotions
 {
   std::vector<std::complex<double>> values; // largest first
   std::vector<double> errors;               // what a modulus changes by with the grid of time
+  std::vector<double> rises;                // what it rises by at most
   std::vector<Owned<Vec>> right, left;      // of the spans; left ones act by the energy product
   std::vector<Owned<Vec>> others;           // more motions that decay slowly, the slowest first
   bool confirmed = false;                   // another approximation has as many large values

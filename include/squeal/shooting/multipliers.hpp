@@ -55,6 +55,7 @@ struct Multipliers
 {
   std::vector<std::complex<double>> values; // without that of a shift in time, largest first; empty: not examined
   std::vector<double> errors;               // error bar of each
+  std::vector<double> upper;                // bounds of the moduli, where a grid of time only lowers some; or empty
   Stability stability = Stability::not_examined;
   Crossing crossing = Crossing::none; // of an unstable orbit
   std::string would_decide;           // of an undecided one, in a sentence
