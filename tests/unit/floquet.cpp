@@ -62,7 +62,7 @@ TEST_CASE("the oblique projection's verdict and bars hold against the whole mono
 {
   std::mt19937 random(5);
   int compared = 0, decided = 0, projected = 0;
-  for (std::size_t sample = 0; sample < 12; ++sample)
+  for (std::size_t sample = 0; sample < 8; ++sample)
   {
     CAPTURE(sample);
     const SmallModel model = random_oscillator(random, sample % 6);
@@ -81,7 +81,7 @@ TEST_CASE("the oblique projection's verdict and bars hold against the whole mono
     projected += oblique.multipliers.method == MultiplierMethod::oblique;
     decided += oblique.multipliers.stability != Stability::undecided;
   }
-  CHECK(compared >= 4);
+  CHECK(compared >= 3);
   CHECK(projected >= compared - 1); // nearly equal multipliers may leave no left vectors that fit
   CHECK(decided >= compared - 1);
 }
