@@ -42,21 +42,30 @@ Outcome outcome_of(const BrakeBranchProblem& problem, const Branch& branch)
   return outcome;
 }
 
-/// Where a stable cycle stands beside a stable equilibrium: ranges of successive points.
+void widen(ParameterRange& range, double parameter)
+{
+  range.from = std::min(range.from, parameter);
+  range.to = std::max(range.to, parameter);
+}
+
+/// Where a stable cycle stands beside a stable equilibrium: ranges of successive points, up to the Hopf point between
+/// stable cycles.
 std::vector<ParameterRange> coexistence_of(const BrakeBranch& found, const std::vector<BranchEvent>& hopf)
 {
   std::vector<ParameterRange> ranges;
+  const BranchPoint* before = nullptr; // a stable cycle
   bool open = false;
   for (const BranchPoint& point : found.branch.points)
   {
-    const bool both = point.multipliers.stability == Stability::stable &&
-                      unstable_modes_at(point.parameter, found.equilibria, hopf) == 0;
+    const bool stable = point.multipliers.stability == Stability::stable;
+    const bool both = stable && unstable_modes_at(point.parameter, found.equilibria, hopf) == 0;
     if (both && !open) ranges.push_back({point.parameter, point.parameter});
-    if (both)
-    {
-      ranges.back().from = std::min(ranges.back().from, point.parameter);
-      ranges.back().to = std::max(ranges.back().to, point.parameter);
-    }
+    if (both) widen(ranges.back(), point.parameter);
+    if (both != open && stable && before)
+      for (const BranchEvent& event : hopf)
+        if ((event.parameter - before->parameter) * (event.parameter - point.parameter) < 0)
+          widen(ranges.back(), event.parameter);
+    before = stable ? &point : nullptr;
     open = both;
   }
   return ranges;
