@@ -36,7 +36,9 @@ Correction newton_step(const OrbitProblem& problem, double clamp, const Orbit& o
   energy_image(flow, orbit.rate, image);
   MatrixXd J = MatrixXd::Zero(n + 1, n + 1);
   J.topLeftCorner(n, n) = M - MatrixXd::Identity(n, n);
-  J.col(n).head(n) = coordinates_of(orbit.rate, orbit.period) * scale; // T is counted in radians
+  const VectorXd rate = coordinates_of(orbit.rate, orbit.period);
+  const double rate_norm = std::max(rate.norm(), 1e-300); // a motion of any size has a column of size 1
+  J.col(n).head(n) = rate / rate_norm;
   J.row(n).head(n / 2) = coordinates_of(image, orbit.period).head(n / 2).transpose() / speed;
   // the image's velocities are forces: their coordinates are over the scale once more
   J.row(n).segment(n / 2, n / 2) =
@@ -45,7 +47,7 @@ Correction newton_step(const OrbitProblem& problem, double clamp, const Orbit& o
   rhs.head(n) = -coordinates_of(orbit.defect, orbit.period);
   J.row(n) /= std::max(J.row(n).norm(), 1e-300);
   const VectorXd step = J.completeOrthogonalDecomposition().solve(rhs);
-  Correction correction{state_at(step.head(n), orbit), step(n) * scale};
+  Correction correction{state_at(step.head(n), orbit), step(n) / rate_norm};
   const double length = std::max(energy_norm(flow, correction.state), std::abs(correction.period) * speed);
   const double factor = std::min(1., clamp * orbit.fluctuation / length);
   check(VecScale(correction.state, factor));
