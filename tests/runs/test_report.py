@@ -25,10 +25,11 @@ KEYS = {
 SCENES = {
     "oscillator": ["--set", "cycle.steps_per_period=100", "--set", "transient.periods=20", "--set",
                    "transient.steps_per_period=50", "-cycle_snes_monitor"],
-    # coarse, and damped like this, it has a cycle that is found in a second; only the full model is shot on a subspace
+    # coarse, and damped like this, it has a cycle that is found in a second; the subspace is asked for
     "pin_on_disc": ["--set", "mesh.parameters.divisions=2", "--set", "damping.beta=6e-7", "--set", "fidelity=full", "--set",
                     "cycle.steps_per_period=40", "--set", "transient.enabled=true", "--set",
-                    "transient.periods=20", "--set", "transient.steps_per_period=40", "-cycle_snes_monitor"],
+                    "transient.periods=20", "--set", "transient.steps_per_period=40", "-cycle_subspace_newtons", "10",
+                    "-cycle_snes_monitor"],
 }
 
 
