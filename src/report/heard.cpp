@@ -32,11 +32,17 @@ std::string largest_swing(const Scene& scene, const Swings& swings, const Size& 
          length_text(size_of(*largest)) + " peak to peak";
 }
 
-/// Where the frequency is 2 % or more off the unstable mode's, that too: a shift that a listener hears.
+/// Where the frequency is 2 % or more off the nearest unstable mode's, that too: a shift that a listener hears.
 std::string beside_mode(const Report& report, double frequency_hz)
 {
-  if (report.modes.modes.empty()) return {};
-  const double mode = report.modes.modes.front().frequency_hz(), away = frequency_hz / mode - 1;
+  const auto unstable = report.modes.unstable();
+  if (unstable.empty()) return {};
+  const auto nearest =
+      std::min_element(unstable.begin(), unstable.end(),
+                       [&](const ComplexMode& a, const ComplexMode& b) {
+                         return std::abs(a.frequency_hz() - frequency_hz) < std::abs(b.frequency_hz() - frequency_hz);
+                       });
+  const double mode = nearest->frequency_hz(), away = frequency_hz / mode - 1;
   if (!(std::abs(away) >= 0.02)) return {};
   return format(", %.2g %% %s the unstable mode at %.5g Hz", 100 * std::abs(away), away < 0 ? "below" : "above", mode);
 }
