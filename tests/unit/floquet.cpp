@@ -1,5 +1,5 @@
 // Multipliers by oblique projection against the whole monodromy matrix, on random frictional oscillators.
-// ranks: 1 2 3
+// ranks: 1 2
 #include "../support/cycle_of.hpp"
 
 #include <algorithm>
