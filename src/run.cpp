@@ -178,7 +178,8 @@ Attractors run_attractors(const Chain& chain)
   const std::string reason = no_mode_to_follow(chain.report);
   if (!reason.empty()) return not_run<Attractors>(OutcomeKind::skipped, reason);
   CycleSettings used = settings;
-  if (used.steps_per_period == 0) used.steps_per_period = 64; // the step's error of the energy is then about a percent
+  if (used.steps_per_period == 0)
+    used.steps_per_period = first_steps; // the step's error of the energy is then about a percent
   return find_attractors({chain.sliding(), chain.report.modes.modes, chain.unstable(), used, chain.options.step},
                          chain.options.attractors);
 }
@@ -198,7 +199,7 @@ BrakeBranch run_branch(const Chain& chain)
   const Scene& scene = chain.scene;
   const Report& report = chain.report;
   if (!scene.branch) return not_run<BrakeBranch>(OutcomeKind::off, "the scene has no [branch]");
-  const double tolerance = scene.cycle.tolerance > 0 ? scene.cycle.tolerance : 1e-5;
+  const double tolerance = scene.cycle.tolerance > 0 ? scene.cycle.tolerance : plain_tolerance;
   const int steps = scene.cycle.steps_per_period;
   const std::string reason = no_cycle_to_follow(report.cycle, tolerance);
   if (!reason.empty()) return not_run<BrakeBranch>(OutcomeKind::skipped, reason);

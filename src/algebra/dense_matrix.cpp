@@ -3,6 +3,7 @@
 #include "squeal/base/integers.hpp"
 
 #include <Eigen/LU>
+#include <Eigen/QR>
 
 namespace squeal
 {
@@ -53,6 +54,12 @@ MatrixXd solve_dense(MatrixXd A, const MatrixXd& B, const char* singular)
   const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> factor(A);
   if ((factor.matrixLU().diagonal().array() == 0).any()) throw Error(singular);
   return factor.solve(B);
+}
+
+MatrixXd orthonormal_columns(const MatrixXd& A)
+{
+  const Eigen::HouseholderQR<MatrixXd> qr(A);
+  return qr.householderQ() * MatrixXd::Identity(A.rows(), A.cols());
 }
 
 } // namespace squeal

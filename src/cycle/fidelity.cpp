@@ -13,10 +13,8 @@ namespace squeal
 namespace
 {
 
-constexpr int first_steps = 64;          // a period, where the scene leaves them open
-constexpr int most_steps = 4096;         // tried, until the growth at these is not misleading
-constexpr int plain_steps = 100;         // a period of a model that the scene names
-constexpr double plain_tolerance = 1e-5; // on the full-space residual
+constexpr int most_steps = 4096; // tried, until the growth at these is not misleading
+constexpr int plain_steps = 100; // a period of a model that the scene names
 
 /// Why theta and the steps a period would give misleading growth; empty if they would not.
 std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
@@ -47,16 +45,12 @@ CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& set
           problem.step,    problem.modes_options, problem.probes, problem.given};
 }
 
-/// The full model's cycle from the reduced model's, its derivative for a preconditioner, and the finer steps that the
-/// accuracy needs. Returns why there is none, or nothing.
-std::string find_by_reduced_model(ReducedSearch& search, bool steps_open, LimitCycle& cycle)
+/// The full model's cycle from the reduced model's, whose derivative is the preconditioner, and the finer steps that
+/// the accuracy needs. Returns why there is none, or nothing.
+std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& reduced, bool steps_open,
+                                  LimitCycle& cycle)
 {
   const CycleProblem& problem = search.problem;
-  if (problem.unstable.modes.size() > 1)
-    return "several modes are unstable: only the full model's shooting excites them all";
-  ReducedCycle reduced;
-  if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
-  const double clock = MPI_Wtime();
   const Preconditioner preconditioner = preconditioner_of(search.correction, search.model, problem.sliding.structure);
   const Owned<Vec> state = full_motion(search, reduced.state);
   check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
@@ -64,26 +58,34 @@ std::string find_by_reduced_model(ReducedSearch& search, bool steps_open, LimitC
   const CycleCorrection correction{problem, search.options, preconditioner, search.fidelity};
   if (search.fidelity.asked == CycleModel::reduced)
   {
-    estimate_reduced_step_errors(search, reduced);
     cycle = measure_reduced_cycle(correction, start);
+    return {};
   }
+  cycle = find_cycle_from(problem, search.options, start, preconditioner, 0);
+  search.fidelity.full_periods = cycle.convergence.periods;
+  if (cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium || cycle.outcome.kind == OutcomeKind::not_periodic)
+    return "the full model's shooting from the reduced model's cycle left it";
+  if (cycle.outcome.kind != OutcomeKind::converged) return {}; // the free motion went on from there
+  if (steps_open)
+    refine_steps(correction, cycle);
   else
-  {
-    cycle = find_cycle_from(problem, search.options, start, preconditioner, 0);
-    search.fidelity.full_periods = cycle.convergence.periods;
-    if (cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium || cycle.outcome.kind == OutcomeKind::not_periodic)
-      return "the full model's shooting from the reduced model's cycle left it";
-    if (cycle.outcome.kind != OutcomeKind::converged) return {}; // the free motion went on from there
-    if (steps_open)
-      refine_steps(correction, cycle);
-    else
-    {
-      estimate_model_errors(correction, cycle);
-      estimate_reduced_step_errors(search, reduced);
-    }
-  }
-  search.fidelity.full_seconds += MPI_Wtime() - clock;
+    estimate_model_errors(correction, cycle);
   return {};
+}
+
+/// The cycle by way of the reduced model's. Returns why there is none, or nothing.
+std::string find_by_reduced_model(ReducedSearch& search, bool steps_open, LimitCycle& cycle)
+{
+  if (search.problem.unstable.modes.size() > 1)
+    return "several modes are unstable: only the full model's shooting excites them all";
+  ReducedCycle reduced;
+  if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
+  const double clock = MPI_Wtime();
+  const std::string reason = correct_on_full_model(search, reduced, steps_open, cycle);
+  search.fidelity.full_seconds += MPI_Wtime() - clock;
+  const bool converged = search.fidelity.asked == CycleModel::reduced || cycle.outcome.kind == OutcomeKind::converged;
+  if (converged && !steps_open) estimate_reduced_step_errors(search, reduced);
+  return reason;
 }
 
 /// The cycle of the full model, from the estimate.

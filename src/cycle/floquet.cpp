@@ -294,10 +294,7 @@ FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& opti
   const OrbitProblem found = problem_of(
       flow, none, {u0, displacement(orbit.state), velocity(orbit.state), orbit.period}, problem.settings.tolerance);
   std::vector<Owned<Vec>> other_unstable;
-  for (std::size_t i = 1; i < problem.unstable.modes.size(); ++i)
-    if (const auto motion =
-            estimated_motion(problem.sliding.equilibrium, problem.unstable.modes[i], problem.unstable.estimates[i]))
-      other_unstable.push_back(state_of(motion->u, motion->v));
+  for (const State& motion : other_unstable_motions(problem)) other_unstable.push_back(state_of(motion.u, motion.v));
   return find_multipliers(found, options, orbit, other_unstable);
 }
 

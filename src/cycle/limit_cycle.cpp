@@ -69,6 +69,16 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   return cycle;
 }
 
+std::vector<State> other_unstable_motions(const CycleProblem& problem)
+{
+  const UnstableModes& unstable = problem.unstable;
+  std::vector<State> motions;
+  for (std::size_t i = 1; i < unstable.modes.size(); ++i)
+    if (auto motion = estimated_motion(problem.sliding.equilibrium, unstable.modes[i], unstable.estimates[i]))
+      motions.push_back(std::move(*motion));
+  return motions;
+}
+
 std::optional<State> cycle_start(const CycleProblem& problem)
 {
   const CycleStartKind kind = problem.settings.start.kind;
@@ -81,10 +91,7 @@ std::optional<State> cycle_start(const CycleProblem& problem)
   if (!(amplitude > 0) || !std::isfinite(amplitude)) return {};
   State start = mode_state(problem.sliding.equilibrium, mode, amplitude, estimate.phase);
   if (kind == CycleStartKind::mode) return start;
-  for (std::size_t i = 1; i < problem.unstable.modes.size(); ++i)
-    if (const auto motion =
-            estimated_motion(problem.sliding.equilibrium, problem.unstable.modes[i], problem.unstable.estimates[i]))
-      add_motion(*motion, 1, start);
+  for (const State& motion : other_unstable_motions(problem)) add_motion(motion, 1, start);
   return start;
 }
 
@@ -111,9 +118,8 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
   ShootingStart start{
       equilibrium.u, first->u, first->v, 1 / mode.frequency_hz(), {mode.real, mode.imaginary, equilibrium.u}, {},
       first_event};
-  for (std::size_t i = 1; i < problem.unstable.modes.size(); ++i)
-    if (const auto motion = estimated_motion(equilibrium, problem.unstable.modes[i], problem.unstable.estimates[i]))
-      start.other_unstable.push_back(state_of(motion->u, motion->v));
+  for (const State& motion : other_unstable_motions(problem))
+    start.other_unstable.push_back(state_of(motion.u, motion.v));
   return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),
                          problem.settings.free_periods);
 }

@@ -1,6 +1,7 @@
 #include "reduced_spectrum.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 
 #include <Eigen/QR>
 
@@ -72,13 +73,6 @@ MatrixXd with_fast_rows(const MatrixXd& X, Index size, Index slow)
   result.topRows(slow) = X.topRows(slow);
   result.middleRows(size, slow) = X.bottomRows(slow);
   return result;
-}
-
-/// An orthonormal basis of the span of independent columns.
-MatrixXd orthonormal_columns(const MatrixXd& A)
-{
-  const Eigen::HouseholderQR<MatrixXd> qr(A);
-  return qr.householderQ() * MatrixXd::Identity(A.rows(), A.cols());
 }
 
 } // namespace

@@ -135,11 +135,11 @@ void make_flow(const CycleCorrection& correction, MeasuredFlow& result)
   result.flow = {integrate, problem.sliding.structure.M, problem.sliding.structure.K};
 }
 
-OrbitProblem orbit_problem(const CycleCorrection& correction, const Flow& flow, double period, double tolerance)
+/// Of no tolerance: the accuracy ends the iteration.
+OrbitProblem orbit_problem(const CycleCorrection& correction, const Flow& flow, double period)
 {
-  const Owned<Vec> rest = zeros_like(correction.problem.sliding.equilibrium.u);
-  return {flow, correction.preconditioner, state_of(correction.problem.sliding.equilibrium.u, rest), period, tolerance,
-          0};
+  const Vec u0 = correction.problem.sliding.equilibrium.u;
+  return problem_of(flow, correction.preconditioner, {u0, nullptr, nullptr, period}, 0);
 }
 
 void note_model_errors(Fidelity& fidelity, const Multisecant& multisecant)
@@ -150,7 +150,6 @@ void note_model_errors(Fidelity& fidelity, const Multisecant& multisecant)
 
 } // namespace
 
-/// Errors of a cycle from another with more or fewer steps.
 void estimate_step_errors(Fidelity& fidelity, const CycleAtSteps& other, const CycleAtSteps& cycle, double order)
 {
   const double fraction = std::abs(error_fraction(other.steps, cycle.steps, cycle.steps, order));
@@ -167,7 +166,7 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
   make_flow(correction, flow);
   Progress progress(comm_of(problem.sliding.structure.load), "cycle, finer steps", 20);
   ConvergenceLog log{progress, std::move(cycle.convergence)};
-  const OrbitProblem orbit = orbit_problem(correction, flow.flow, cycle.orbit.period, 0);
+  const OrbitProblem orbit = orbit_problem(correction, flow.flow, cycle.orbit.period);
   FullShooting shooting{correction, orbit, log, flow.map, flow.measured, correction.options.shooting};
   shooting.options.max_periods = log.convergence.periods + correction.options.reduced.corrections;
   shooting.orbit = copy_of(cycle.orbit);
@@ -188,7 +187,7 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
 void estimate_model_errors(const CycleCorrection& correction, const LimitCycle& cycle)
 {
   const Flow flow{{}, correction.problem.sliding.structure.M, correction.problem.sliding.structure.K};
-  const OrbitProblem orbit = orbit_problem(correction, flow, cycle.orbit.period, 0);
+  const OrbitProblem orbit = orbit_problem(correction, flow, cycle.orbit.period);
   Multisecant multisecant;
   estimate_remaining_change(orbit, correction.options.shooting, multisecant, cycle.orbit);
   note_model_errors(correction.fidelity, multisecant);
@@ -201,14 +200,12 @@ LimitCycle measure_reduced_cycle(const CycleCorrection& correction, const Shooti
   make_flow(correction, flow);
   Progress progress(comm_of(start.u), "cycle", 1);
   ConvergenceLog log{progress};
-  const OrbitProblem orbit = orbit_problem(correction, flow.flow, start.period, 0);
+  const OrbitProblem orbit = orbit_problem(correction, flow.flow, start.period);
   const Owned<Vec> first = state_of(start.u, start.v);
   LimitCycle cycle;
   cycle.orbit = evaluate(orbit, log, first, start.period);
   record_full(log, ShootingStage::full_period, cycle.orbit);
-  Multisecant multisecant;
-  estimate_remaining_change(orbit, correction.options.shooting, multisecant, cycle.orbit);
-  note_model_errors(correction.fidelity, multisecant);
+  estimate_model_errors(correction, cycle);
   cycle.outcome = {OutcomeKind::converged, "", 0, cycle.orbit.residual};
   cycle.multipliers = examine(problem, correction.options.shooting, flow.map, cycle.orbit).multipliers;
   refuse_repelling(cycle.multipliers, problem.unstable.modes.size() - 1, cycle.outcome);

@@ -179,6 +179,17 @@ MatrixXd gathered(const MatrixXd& own, Index columns, MPI_Comm comm)
   return result;
 }
 
+/// The columns (q, v) after work(rates, X) on this rank's share of them, X with rows (v, q).
+template <class Work>
+MatrixXd through_period(ReducedMap& map, double period, const MatrixXd& columns, MPI_Comm comm, Work work)
+{
+  prepare(map, period);
+  const Share share = share_of(columns.cols(), comm);
+  MatrixXd X = halves_exchanged(columns.middleCols(share.first, share.last - share.first));
+  work(free_rates(map), X);
+  return gathered(halves_exchanged(X), columns.cols(), comm);
+}
+
 } // namespace
 
 std::vector<RecordedContact> record_contacts(ReducedMap& map, double period, ReducedState state)
@@ -219,23 +230,23 @@ std::vector<RecordedContact> recorded_contacts(const ReducedModel& model, int di
 MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
                        const MatrixXd& columns, MPI_Comm comm)
 {
-  prepare(map, period);
-  const MatrixXd rates = free_rates(map);
-  const Share share = share_of(columns.cols(), comm);
-  MatrixXd X = halves_exchanged(columns.middleCols(share.first, share.last - share.first));
-  for (const RecordedContact& contact : contacts) advance_columns(map, linear_step(map, rates, contact), X);
-  return gathered(halves_exchanged(X), columns.cols(), comm);
+  return through_period(map, period, columns, comm,
+                        [&](const MatrixXd& rates, MatrixXd& X)
+                        {
+                          for (const RecordedContact& contact : contacts)
+                            advance_columns(map, linear_step(map, rates, contact), X);
+                        });
 }
 
 MatrixXd apply_adjoint(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
                        const MatrixXd& columns, MPI_Comm comm)
 {
-  prepare(map, period);
-  const MatrixXd rates = free_rates(map);
-  const Share share = share_of(columns.cols(), comm);
-  MatrixXd X = halves_exchanged(columns.middleCols(share.first, share.last - share.first));
-  for (std::size_t i = contacts.size(); i-- > 0;) go_back(map, linear_step(map, rates, contacts[i]), X);
-  return gathered(halves_exchanged(X), columns.cols(), comm);
+  return through_period(map, period, columns, comm,
+                        [&](const MatrixXd& rates, MatrixXd& X)
+                        {
+                          for (std::size_t i = contacts.size(); i-- > 0;)
+                            go_back(map, linear_step(map, rates, contacts[i]), X);
+                        });
 }
 
 MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedContact> contacts, MPI_Comm comm)

@@ -5,6 +5,7 @@
 /// Beside V the largest Ritz values of (1 - V (W'V)^-1 W') dPhi_T/dx are sought in a block Arnoldi space: where they
 /// lie below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not proven.
 #include "monodromy.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 #include "state_block.hpp"
 
 #include <algorithm>
@@ -165,13 +166,6 @@ MatrixXd nearest_ritz_vectors(const MatrixXd& H, const std::vector<Complex>& val
     result.col(column++) =
         ritz[place].lambda.imag() < 0 ? Eigen::VectorXd(-ritz[place].y.imag()) : Eigen::VectorXd(ritz[place].y.real());
   return result;
-}
-
-/// An orthonormal basis of the span of independent columns.
-MatrixXd orthonormal_columns(const MatrixXd& A)
-{
-  const Eigen::HouseholderQR<MatrixXd> qr(A);
-  return qr.householderQ() * MatrixXd::Identity(A.rows(), A.cols());
 }
 
 /// Values, bars and pairs of the projection on V, the columns U of the space.

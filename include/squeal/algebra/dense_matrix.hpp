@@ -17,4 +17,7 @@ void broadcast(Eigen::VectorXd& x, MPI_Comm comm);
 /// A^-1 B by LU with row interchanges. Throws Error with the text `singular` if a pivot is zero.
 Eigen::MatrixXd solve_dense(Eigen::MatrixXd A, const Eigen::MatrixXd& B, const char* singular);
 
+/// An orthonormal basis of the span of independent columns.
+Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& A);
+
 } // namespace squeal

@@ -2,7 +2,7 @@
 /// The motions that many starts lead to (src/README.md, section 9.4): all unstable modes, their pairs, and random sums
 /// of modes, integrated together until their energies have settled.
 ///
-/// Caveat: motions are told apart by mean energy and frequency alone, and one that few starts lead to may be missed.
+/// Caveat: motions are distinguished by mean energy and frequency alone, and one that few starts lead to may be missed.
 #include "squeal/base/options.hpp"
 #include "squeal/transient/transient.hpp"
 

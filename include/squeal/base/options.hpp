@@ -34,7 +34,7 @@ struct Option
 
 using OptionList = std::vector<Option>;
 
-/// Fills the members of the options that the database holds. Error: a value that cannot be read, or that lies outside
+/// Fills the members of the options that the database holds. Error: a value that cannot be read, or that is outside
 /// its range, with the option, the value and what it may be.
 void read_options(const OptionList& options);
 

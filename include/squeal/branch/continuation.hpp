@@ -79,7 +79,7 @@ struct BranchEvent
 /// Why a side of a branch ended.
 enum class BranchEnding
 {
-  not_followed,     // the start lies on this bound
+  not_followed,     // the start is at this bound
   bound,            // the parameter reached its bound
   linear_motion,    // no pair opens or sticks any more: the family is vertical from there to its Hopf point
   small_amplitude,  // the orbit shrank to a point: Hopf

@@ -15,6 +15,11 @@
 namespace squeal
 {
 
+/// Where the scene leaves them open: the steps a period at which "auto" begins, the tolerance on the full-space
+/// residual.
+inline constexpr int first_steps = 64;
+inline constexpr double plain_tolerance = 1e-5;
+
 /// The model asked for, and how accurate its cycle shall be.
 struct FidelityRequest
 {

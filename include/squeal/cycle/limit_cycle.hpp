@@ -43,6 +43,9 @@ struct CycleProblem
   const State* given = nullptr; // where CycleStartKind::transient and ::file start
 };
 
+/// Those of the unstable modes that are not followed, at their estimated amplitudes, about the equilibrium.
+std::vector<State> other_unstable_motions(const CycleProblem& problem);
+
 /// The state that the scene asks the search to start from: the modes at their estimated amplitudes, the followed one at
 /// an amplitude, or the state given. Nothing where there is no amplitude to start from.
 std::optional<State> cycle_start(const CycleProblem& problem);

@@ -3,7 +3,7 @@
 ///
 /// A slice starts from the undamped problem with friction, K x = theta M x, real and unsymmetric. One real factor of
 /// K - sigma M gives the invariant subspace V of all theta about the slice's middle sigma (shift_invert.hpp). Under
-/// Rayleigh damping, C = alpha M + beta K, the pairs of the quadratic problem lie in V: theta (1 + beta lambda) =
+/// Rayleigh damping, C = alpha M + beta K, the pairs of the quadratic problem are in V: theta (1 + beta lambda) =
 /// -lambda (lambda + alpha). Under other damping the pairs on V leave residuals r, and (K - sigma M)^-1 r is appended
 /// to V until all pairs are exact (projection.hpp).
 ///
