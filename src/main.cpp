@@ -1,8 +1,8 @@
 #include "squeal/report/report.hpp"
+#include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"
 
 #include <cstdio>
-#include <cstring>
 #include <thread>
 
 namespace
@@ -100,24 +100,6 @@ void check_leftover_words(int argc, char** argv)
                 "': a scene is one file that ends in .toml, or a folder that holds a scene.toml");
 }
 
-void make_writable(const std::filesystem::path& folder, MPI_Comm comm)
-{
-  on_rank_zero(comm,
-               [&]
-               {
-                 std::error_code code;
-                 std::filesystem::create_directories(folder, code);
-                 const auto probe = folder / ".squeal-write-test";
-                 std::FILE* file = code ? nullptr : std::fopen(probe.c_str(), "w");
-                 if (!file)
-                   throw Error("cannot write results to " + folder.string() + " (" +
-                               (code ? code.message() : std::strerror(errno)) +
-                               "); name a folder you may write to with --output DIR");
-                 std::fclose(file);
-                 std::filesystem::remove(probe, code);
-               });
-}
-
 int run_program(const Arguments& arguments, int argc, char** argv)
 {
   const MPI_Comm comm = PETSC_COMM_WORLD;
@@ -133,8 +115,12 @@ int run_program(const Arguments& arguments, int argc, char** argv)
     return 0;
   }
   const auto output = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;
-  make_writable(output, comm);
-  return static_cast<int>(run(scene, options, output, comm));
+  on_rank_zero(comm, [&] { check_outputs(scene, output); });
+  ResultsFolder results(output, comm);
+  write_request(scene, results.run(), results.partial(), comm);
+  scene.transient.save_state = results.meanwhile(scene.transient.save_state);
+  scene.cycle.save_state = results.meanwhile(scene.cycle.save_state);
+  return static_cast<int>(run(scene, options, results, comm));
 }
 
 } // namespace

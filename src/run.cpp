@@ -238,9 +238,10 @@ void print_model(const ModelSummary& model, MPI_Comm comm)
 
 } // namespace
 
-ExitCode run(const Scene& scene, const ProgramOptions& options, const std::filesystem::path& output, MPI_Comm comm)
+ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& results, MPI_Comm comm)
 {
   Report report;
+  report.run = results.run();
   const Model model = timed(report, "model", comm, [&] { return build_model(scene, comm); });
   report.model = summary_of(model, comm);
   print_model(report.model, comm);
@@ -268,11 +269,15 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, const std::files
   report.branch = timed(report, "branch", comm, [&] { return run_branch(chain); });
 
   report.model.memory_bytes = peak_memory(comm);
-  write_results(report, scene, {model.mesh, model.dofs, model.structure, model.interface.nodes}, output, comm);
+  const ExitCode code = exit_code_of(report);
+  report.exit_code = static_cast<int>(code);
+  write_results(report, scene, {model.mesh, model.dofs, model.structure, model.interface.nodes}, results.partial(),
+                comm);
+  results.publish();
   print_table(report, scene, comm);
-  if (rank_of(comm) == 0) std::printf("results are in %s\n", output.c_str());
+  if (rank_of(comm) == 0) std::printf("results are in %s\n", results.place().c_str());
   check_options_used(stages_run(report), comm);
-  return exit_code_of(report);
+  return code;
 }
 
 void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)

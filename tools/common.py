@@ -60,13 +60,27 @@ FORMAT_VERSION = 1  # of report.json and the HDF5 files, the latest these tools 
 
 
 def read_report(folder):
-    """report.json of a results folder; stops with a sentence where its keys are of a later version."""
-    file = Path(folder) / "report.json"
+    """report.json of a results folder; stops with a sentence where these tools cannot read it, or other files are of
+    another run."""
+    folder = Path(folder)
+    file = folder / "report.json"
+    if not file.exists():
+        sys.exit(f"{TOOL}: {folder} has no report.json: the run goes on, or was killed; what it has is in {folder}.partial")
     report = json.loads(file.read_text())
     if report.get("format_version", 0) > FORMAT_VERSION:
         sys.exit(f"{TOOL}: {file} has format_version {report['format_version']}, these tools read up to {FORMAT_VERSION}: "
                  "take the tools of the squeal that wrote it")
+    for name in ("history.h5", "fields.h5", "fields.xdmf", "resolved.toml", "options.txt"):
+        if (folder / name).exists() and "run" in report and report["run"].encode() not in head_of(folder / name):
+            sys.exit(f"{TOOL}: {file} is of the run {report['run']}, and {name} beside it is of another one: "
+                     "run squeal again, or copy all files of one run")
     return report
+
+
+def head_of(file):
+    """The first bytes of a file, where the identity of its run stands."""
+    with open(file, "rb") as content:
+        return content.read(65536)
 
 
 def run_squeal(scene, output, values, words=(), ranks=1, limit=None):

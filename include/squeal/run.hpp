@@ -1,8 +1,7 @@
 #pragma once
 /// The whole method, once: mesh -> structure -> equilibrium -> modes -> estimate -> transient -> cycle -> report.
 #include "squeal/options.hpp"
-
-#include <filesystem>
+#include "squeal/report/results_folder.hpp"
 
 namespace squeal
 {
@@ -14,8 +13,8 @@ enum class ExitCode : int
   not_converged = 2, // one did not, and the report says which
 };
 
-/// Runs the chain and writes the results into `output`, which exists.
-ExitCode run(const Scene& scene, const ProgramOptions& options, const std::filesystem::path& output, MPI_Comm comm);
+/// Runs the chain, writes the results of each stage when it ends, and publishes the whole.
+ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& results, MPI_Comm comm);
 
 /// Checks scene and mesh and prints what the model would be; computes and writes nothing.
 void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm);

@@ -1,6 +1,7 @@
 #include "squeal/base/petsc.hpp"
 
 #include <algorithm>
+#include <csignal>
 #include <ctime>
 #include <fstream>
 #include <string>
@@ -48,6 +49,7 @@ Session::Session(int& argc, char**& argv, const char* help)
 {
   if (SlepcInitialize(&argc, &argv, nullptr, help)) throw Error("PETSc and SLEPc could not be initialised");
   check(PetscPushErrorHandler(keep_failure, nullptr));
+  std::signal(SIGXFSZ, SIG_IGN); // a file beyond ulimit -f is an error of the writing call
 }
 
 Session::~Session()

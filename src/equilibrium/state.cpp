@@ -1,11 +1,15 @@
 /// States: energies, copies, and files. A file is two PETSc binary vectors: class id, length, entries, all big-endian.
 #include "squeal/equilibrium/state.hpp"
 
+#include "file_order.hpp"
+#include "squeal/base/whole_file.hpp"
+
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <fstream>
-#include <numeric>
-#include <system_error>
 
 namespace squeal
 {
@@ -59,35 +63,36 @@ void check_state_file(const std::filesystem::path& file, PetscInt size)
   }
 }
 
-/// Between a vector and the same one in the order of a file; the partition numbers the degrees of freedom of a mesh.
-Owned<VecScatter> to_file_order(const Structure& structure, Vec x, Vec in_file)
+/// The order of bytes of a big-endian machine.
+template <class Number> void append_big_endian(Number number, std::string& bytes)
 {
-  PetscInt first = 0, last = 0, size = 0;
-  check(VecGetOwnershipRange(x, &first, &last));
-  check(VecGetSize(x, &size));
-  std::vector<PetscInt> order(static_cast<std::size_t>(size));
-  std::iota(order.begin(), order.end(), 0);
-  const std::vector<PetscInt>& nodal_dof = structure.names.nodal_dof;
-  if (!nodal_dof.empty())
-    std::sort(order.begin(), order.end(), [&](PetscInt a, PetscInt b) { return nodal_dof[a] < nodal_dof[b]; });
-  Owned<IS> from, to;
-  const MPI_Comm comm = comm_of(x);
-  check(ISCreateGeneral(comm, last - first, order.data() + first, PETSC_COPY_VALUES, from.put()));
-  check(ISCreateStride(comm, last - first, first, 1, to.put()));
-  Owned<VecScatter> scatter;
-  check(VecScatterCreate(x, from, in_file, to, scatter.put()));
-  return scatter;
+  std::array<char, sizeof number> own{};
+  std::memcpy(own.data(), &number, sizeof number);
+  if constexpr (std::endian::native == std::endian::little) std::reverse(own.begin(), own.end());
+  bytes.append(own.data(), own.size());
 }
 
-Owned<PetscViewer> open_binary(MPI_Comm comm, const std::filesystem::path& file, PetscFileMode mode)
+/// As a PETSc binary vector.
+void append_vector(const std::vector<double>& entries, std::string& bytes)
 {
-  Owned<PetscViewer> viewer;
-  check(PetscViewerCreate(comm, viewer.put()));
-  check(PetscViewerSetType(viewer, PETSCVIEWERBINARY));
-  check(PetscViewerBinarySetSkipInfo(viewer, PETSC_TRUE)); // no .info file beside it
-  check(PetscViewerFileSetMode(viewer, mode));
-  check(PetscViewerFileSetName(viewer, file.c_str()));
-  return viewer;
+  append_big_endian(static_cast<int>(VEC_FILE_CLASSID), bytes);
+  append_big_endian(static_cast<PetscInt>(entries.size()), bytes);
+  for (const double entry : entries) append_big_endian(entry, bytes);
+}
+
+/// The entries of the next vector of a file that was checked.
+std::vector<double> read_entries(std::istream& stream, PetscInt size)
+{
+  stream.seekg(static_cast<std::streamoff>(sizeof(int) + sizeof(PetscInt)), std::ios::cur);
+  std::vector<double> entries(static_cast<std::size_t>(size));
+  for (double& entry : entries)
+  {
+    std::array<char, sizeof entry> bytes{};
+    stream.read(bytes.data(), bytes.size());
+    if constexpr (std::endian::native == std::endian::little) std::reverse(bytes.begin(), bytes.end());
+    std::memcpy(&entry, bytes.data(), sizeof entry);
+  }
+  return entries;
 }
 
 void require_finite(Vec x, const std::string& what)
@@ -116,35 +121,15 @@ double potential_energy(const Structure& structure, Vec u)
 
 void write_state(const State& state, const Structure& structure, const std::filesystem::path& file)
 {
-  const MPI_Comm comm = comm_of(state.u);
-  std::filesystem::path draft = file;
-  draft += ".part";
-  // PETSc opens on one rank: find out there first that it can.
-  on_rank_zero(comm,
+  const FileOrder order(structure);
+  const std::vector<double> u = order.gather(state.u), v = order.gather(state.v);
+  on_rank_zero(comm_of(state.u),
                [&]
                {
-                 if (!std::ofstream(draft, std::ios::binary))
-                   throw Error("state file " + draft.string() + " cannot be written: check its folder and rights");
-               });
-  {
-    const Owned<PetscViewer> viewer = open_binary(comm, draft, FILE_MODE_WRITE);
-    const Owned<Vec> in_file = zeros_like(state.u);
-    const Owned<VecScatter> scatter = to_file_order(structure, state.u, in_file);
-    for (Vec x : {state.u.get(), state.v.get()})
-    {
-      check(VecScatterBegin(scatter, x, in_file, INSERT_VALUES, SCATTER_FORWARD));
-      check(VecScatterEnd(scatter, x, in_file, INSERT_VALUES, SCATTER_FORWARD));
-      check(VecView(in_file, viewer));
-    }
-  }
-  on_rank_zero(comm,
-               [&]
-               {
-                 std::error_code failure;
-                 std::filesystem::rename(draft, file, failure);
-                 if (!failure) return;
-                 std::filesystem::remove(draft);
-                 throw Error("state file " + file.string() + " cannot be written: " + failure.message());
+                 std::string bytes;
+                 append_vector(u, bytes);
+                 append_vector(v, bytes);
+                 write_whole_file(file, bytes);
                });
 }
 
@@ -153,18 +138,19 @@ State read_state(const std::filesystem::path& file, const Structure& structure)
   const MPI_Comm comm = comm_of(structure.load);
   PetscInt size = 0;
   check(VecGetSize(structure.load, &size));
-  on_rank_zero(comm, [&] { check_state_file(file, size); });
-
+  std::vector<double> u, v; // on rank 0
+  on_rank_zero(comm,
+               [&]
+               {
+                 check_state_file(file, size);
+                 std::ifstream stream(file, std::ios::binary);
+                 u = read_entries(stream, size);
+                 v = read_entries(stream, size);
+               });
+  const FileOrder order(structure);
   State state{zeros_like(structure.load), zeros_like(structure.load), 0, {}};
-  const Owned<PetscViewer> viewer = open_binary(comm, file, FILE_MODE_READ);
-  const Owned<Vec> in_file = zeros_like(state.u);
-  const Owned<VecScatter> scatter = to_file_order(structure, state.u, in_file);
-  for (Vec x : {state.u.get(), state.v.get()})
-  {
-    check(VecLoad(in_file, viewer));
-    check(VecScatterBegin(scatter, in_file, x, INSERT_VALUES, SCATTER_REVERSE));
-    check(VecScatterEnd(scatter, in_file, x, INSERT_VALUES, SCATTER_REVERSE));
-  }
+  order.scatter(u, state.u);
+  order.scatter(v, state.v);
   require_finite(state.u, "state file " + file.string() + ": the displacement");
   require_finite(state.v, "state file " + file.string() + ": the velocity");
   return state;

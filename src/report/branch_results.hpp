@@ -1,6 +1,6 @@
 #pragma once
 /// The branch, and the motions that many starts lead to, in report.json, in history.h5 and in the printed table.
-#include "squeal/report/files.hpp"
+#include "files.hpp"
 #include "squeal/report/report.hpp"
 
 #include <nlohmann/json_fwd.hpp>

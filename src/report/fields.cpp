@@ -4,7 +4,8 @@
 /// Without a cycle it has one grid. XDMF lists an element as its code and then its nodes, in VTK's order.
 #include "squeal/report/fields.hpp"
 
-#include "squeal/report/files.hpp"
+#include "files.hpp"
+#include "squeal/base/whole_file.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -165,11 +166,12 @@ std::string cycle_data(std::size_t sample)
   return "cycle/displacement_" + std::to_string(sample);
 }
 
-std::string xdmf_text(const Layout& layout)
+std::string xdmf_text(const Layout& layout, const std::string& run)
 {
   std::ostringstream text;
   text.precision(17);
   text << "<?xml version=\"1.0\"?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" []>\n<Xdmf Version=\"2.0\">\n  <Domain>\n"
+       << "    <Information Name=\"run\" Value=\"" << run << "\"/>\n"
        << "    <Grid Name=\"squeal\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
   const std::size_t samples = std::max<std::size_t>(layout.time.size(), 1);
   for (std::size_t i = 0; i < samples; ++i)
@@ -226,19 +228,10 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
                   const std::filesystem::path& output, MPI_Comm comm)
 {
   const auto place = output / "fields.h5", xdmf = output / "fields.xdmf";
-  if (scene.matrices)
-  {
-    on_rank_zero(comm,
-                 [&]
-                 {
-                   std::filesystem::remove(place); // of an earlier run: they would be taken for this one's
-                   std::filesystem::remove(xdmf);
-                 });
-    return;
-  }
+  if (scene.matrices) return;
   Layout layout;
   std::optional<Hdf5File> file; // on rank 0
-  on_rank_zero(comm, [&] { write_mesh(file.emplace(place), nodes.mesh, layout); });
+  on_rank_zero(comm, [&] { write_mesh(file.emplace(place, report.run), nodes.mesh, layout); });
   const Gather gather(nodes);
   if (report.equilibrium.u.get())
   {
@@ -257,7 +250,7 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
                [&]
                {
                  file->keep();
-                 write_text(xdmf, xdmf_text(layout));
+                 write_whole_file(xdmf, xdmf_text(layout, report.run));
                });
 }
 

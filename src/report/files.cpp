@@ -1,8 +1,9 @@
-#include "squeal/report/files.hpp"
+#include "files.hpp"
 
 #include "squeal/base/error.hpp"
+#include "squeal/base/whole_file.hpp"
 
-#include <fstream>
+#include <algorithm>
 #include <functional>
 #include <numeric>
 #include <utility>
@@ -11,34 +12,6 @@ namespace squeal
 {
 
 namespace fs = std::filesystem;
-
-NewFile::NewFile(fs::path place) : place_(std::move(place)), part_(place_)
-{
-  part_ += ".part";
-}
-
-NewFile::~NewFile()
-{
-  std::error_code ignored;
-  fs::remove(part_, ignored);
-}
-
-void NewFile::keep()
-{
-  std::error_code failed;
-  fs::rename(part_, place_, failed);
-  if (failed) throw Error("cannot write " + place_.string() + ": " + failed.message());
-}
-
-void write_text(const fs::path& place, const std::string& text)
-{
-  NewFile file(place);
-  std::ofstream stream(file.path());
-  stream << text;
-  stream.close();
-  if (!stream) throw Error("cannot write " + place.string() + ": is the folder writable, is the disk full?");
-  file.keep();
-}
 
 namespace
 {
@@ -49,7 +22,7 @@ class Handle
 public:
   Handle(hid_t id, herr_t (*close)(hid_t), const std::string& what) : id_(id), close_(close)
   {
-    if (id < 0) throw Error("cannot write " + what + ": HDF5 refused it; is the disk full?");
+    if (id < 0) throw Error("cannot write " + what + ": HDF5 refused it; is there memory for the file?");
   }
   ~Handle() { close_(id_); }
   Handle(const Handle&) = delete;
@@ -72,12 +45,16 @@ void write_attribute(hid_t object, const std::string& name, const std::string& t
 
 } // namespace
 
-Hdf5File::Hdf5File(fs::path place) : file_(std::move(place))
+Hdf5File::Hdf5File(fs::path place, const std::string& run) : place_(std::move(place))
 {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); // failures become our errors instead of a printed stack
-  id_ = H5Fcreate(file_.path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-  if (id_ < 0) throw Error("cannot write " + file_.path().string() + ": is the folder writable?");
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, place_.string());
+  constexpr std::size_t growth = 1 << 20; // bytes that the memory grows by at a time
+  H5Pset_fapl_core(access, growth, 0);    // 0: nothing on the disk
+  id_ = H5Fcreate(place_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  if (id_ < 0) throw Error("cannot write " + place_.string() + ": HDF5 cannot make a file in memory");
   write_attribute(id_, "format_version", std::to_string(format_version));
+  write_attribute(id_, "run", run);
 }
 
 Hdf5File::~Hdf5File()
@@ -85,22 +62,21 @@ Hdf5File::~Hdf5File()
   if (id_ >= 0) H5Fclose(id_);
 }
 
-void Hdf5File::close()
-{
-  if (H5Fclose(std::exchange(id_, -1)) < 0)
-    throw Error("cannot write " + file_.path().string() + ": is the disk full?");
-}
-
 void Hdf5File::keep()
 {
-  close();
-  file_.keep();
+  H5Fflush(id_, H5F_SCOPE_GLOBAL);
+  const ssize_t size = H5Fget_file_image(id_, nullptr, 0);
+  std::string image(static_cast<std::size_t>(std::max<ssize_t>(size, 0)), ' ');
+  if (size <= 0 || H5Fget_file_image(id_, image.data(), image.size()) != size)
+    throw Error("cannot write " + place_.string() + ": HDF5 does not hand out the file that it made in memory");
+  H5Fclose(std::exchange(id_, -1));
+  write_whole_file(place_, image);
 }
 
 void Hdf5File::write_data(const std::string& name, const std::vector<hsize_t>& shape, hid_t type, std::size_t size,
                           const void* data, const std::string& unit)
 {
-  const std::string what = file_.path().string() + ":" + name;
+  const std::string what = place_.string() + ":" + name;
   if (std::accumulate(shape.begin(), shape.end(), hsize_t{1}, std::multiplies<>()) != size)
     throw Error("cannot write " + what + ": shape and data disagree");
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, what);
@@ -108,7 +84,7 @@ void Hdf5File::write_data(const std::string& name, const std::vector<hsize_t>& s
   const Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose, what);
   const Handle set(H5Dcreate2(id_, name.c_str(), type, space, links, H5P_DEFAULT, H5P_DEFAULT), H5Dclose, what);
   if (size > 0 && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
-    throw Error("cannot write " + what + ": is the disk full?");
+    throw Error("cannot write " + what + ": HDF5 refused it; is there memory for the file?");
   write_attribute(set, "unit", unit);
 }
 

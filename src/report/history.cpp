@@ -2,7 +2,7 @@
 
 #include "branch_results.hpp"
 #include "derived.hpp"
-#include "squeal/report/files.hpp"
+#include "files.hpp"
 
 #include <algorithm>
 
@@ -62,7 +62,7 @@ void write_statuses(Hdf5File& file, const std::vector<std::vector<ContactStatus>
 
 void write_history(const Report& report, const Scene& scene, const std::filesystem::path& place)
 {
-  Hdf5File file(place);
+  Hdf5File file(place, report.run);
   if (has_run(report.transient.outcome)) write_group(file, "transient", report.transient.history, scene);
   if (has_run(report.cycle.outcome))
   {

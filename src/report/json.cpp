@@ -2,8 +2,8 @@
 
 #include "branch_results.hpp"
 #include "derived.hpp"
+#include "files.hpp"
 #include "heard.hpp"
-#include "squeal/report/files.hpp"
 #include "warnings.hpp"
 
 #include <algorithm>
@@ -282,6 +282,8 @@ std::string report_json(const Report& report, const Scene& scene)
 {
   Json json;
   json["format_version"] = format_version;
+  json["run"] = report.run;
+  json["exit_code"] = report.exit_code < 0 ? Json(nullptr) : Json(report.exit_code);
   json["title"] = scene.title;
   json["scene"] = scene.file.string();
   json["heard"] = heard(report, scene);

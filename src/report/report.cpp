@@ -1,5 +1,6 @@
+#include "files.hpp"
+#include "squeal/base/whole_file.hpp"
 #include "squeal/report/fields.hpp"
-#include "squeal/report/files.hpp"
 #include "squeal/report/history.hpp"
 #include "squeal/report/json.hpp"
 
@@ -30,9 +31,9 @@ std::string option_text()
   return text + "\n";
 }
 
-std::string provenance()
+std::string provenance(const std::string& run)
 {
-  std::string text = "# as run by";
+  std::string text = "# run " + run + ", by";
   for (const auto& [name, version] : versions()) text += " " + name + " " + version + ",";
   text.back() = '\n';
   return text;
@@ -78,20 +79,23 @@ std::vector<std::pair<std::string, std::string>> versions()
   return list;
 }
 
-void write_results(const Report& report, const Scene& scene, const FieldNodes& nodes,
-                   const std::filesystem::path& output, MPI_Comm comm)
+void write_request(const Scene& scene, const std::string& run, const std::filesystem::path& output, MPI_Comm comm)
 {
   on_rank_zero(comm,
                [&]
                {
-                 std::filesystem::create_directories(output);
-                 write_text(output / "scene.toml", provenance() + resolved_scene(scene));
-                 write_text(output / "options.txt", provenance() + option_text());
-                 write_history(report, scene, output / "history.h5");
+                 write_whole_file(output / "resolved.toml", provenance(run) + resolved_scene(scene));
+                 write_whole_file(output / "options.txt", provenance(run) + option_text());
                });
+}
+
+void write_results(const Report& report, const Scene& scene, const FieldNodes& nodes,
+                   const std::filesystem::path& output, MPI_Comm comm)
+{
+  on_rank_zero(comm, [&] { write_history(report, scene, output / "history.h5"); });
   write_fields(report, scene, nodes, output, comm);
   // Last: where there is a report, the rest is there too.
-  on_rank_zero(comm, [&] { write_text(output / "report.json", report_json(report, scene)); });
+  on_rank_zero(comm, [&] { write_whole_file(output / "report.json", report_json(report, scene)); });
 }
 
 } // namespace squeal

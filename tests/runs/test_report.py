@@ -44,7 +44,7 @@ def test_every_file_is_whole(converged, scene):
     assert growth == sorted(growth, reverse=True)
     for mode in report["modes"]["modes"]:
         assert {"frequency_hz", "growth_rate", "damping_ratio", "backward_error"} <= set(mode)
-    assert (run.output / "scene.toml").exists() and (run.output / "options.txt").exists()
+    assert (run.output / "resolved.toml").exists() and (run.output / "options.txt").exists()
 
     # Two ranks solve the reduced system alike: each of its norms is printed once.
     norms = re.findall(r"SNES Function norm (\S+)", run.printed)

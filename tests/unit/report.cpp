@@ -2,8 +2,6 @@
 #include "../support/temporary_folder.hpp"
 #include "squeal/model.hpp"
 #include "squeal/report/fields.hpp"
-#include "squeal/report/files.hpp"
-#include "squeal/report/history.hpp"
 #include "squeal/report/json.hpp"
 #include "squeal/report/table.hpp"
 
@@ -285,7 +283,7 @@ TEST_CASE("a folder that cannot be written is an error on every rank, and nothin
 {
   const TemporaryFolder folder;
   const Model model = one_of_each();
-  on_rank_zero(PETSC_COMM_WORLD, [&] { write_text(folder.path / "taken", "a file where the folder should be"); });
+  folder.write("taken", "a file where the folder should be");
   CHECK_THROWS_AS(
       write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path / "taken", PETSC_COMM_WORLD),
       Error);
@@ -299,12 +297,11 @@ TEST_CASE("a folder that cannot be written is an error on every rank, and nothin
   CHECK_FALSE(fs::exists(folder.path / "out" / "report.json"));
 }
 
-TEST_CASE("a matrix scene has no mesh to draw: fields of an earlier run are removed")
+TEST_CASE("a matrix scene has no mesh to draw and writes no fields")
 {
   const TemporaryFolder folder;
   const Model model = one_of_each();
   Scene scene = scene_of_test();
-  write_results(full_report(model), scene, nodes_of(model), folder.path, PETSC_COMM_WORLD);
   scene.matrices = folder.path;
   write_results(full_report(model), scene, nodes_of(model), folder.path, PETSC_COMM_WORLD);
   CHECK_FALSE(fs::exists(folder.path / "fields.h5"));

@@ -21,9 +21,7 @@ State copy_of(const State& state);
 double kinetic_energy(const Structure& structure, Vec v);   // v'Mv/2 [J]
 double potential_energy(const Structure& structure, Vec u); // u'Ku/2 [J]
 
-/// Vec u, then Vec v, PETSc binary. Collective; written beside and renamed, so that the file is whole or absent.
-/// Entries are in an order that does not depend on the number of ranks: as the matrices of a matrix scene, else by node
-/// of the mesh and direction (x y z rx ry rz), free ones only.
+/// Vec u, then Vec v, PETSc binary, in the order of files (file_order.hpp). Collective; the file is whole or absent.
 void write_state(const State& state, const Structure& structure, const std::filesystem::path& file);
 
 /// Error: the file is missing, is not two PETSc vectors, is cut short, has another size than the structure, or holds

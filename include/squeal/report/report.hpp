@@ -1,7 +1,7 @@
 #pragma once
-/// All results of a run, and what it leaves behind: report.json, fields.h5 + fields.xdmf, history.h5, scene.toml
-/// (resolved), options.txt, and the printed table. Every number comes with its unit and with what it is worth
-/// (residual, backward error, defect).
+/// All results of a run, and what it leaves behind: report.json, fields.h5 + fields.xdmf, history.h5, resolved.toml
+/// (the scene with every default), options.txt, and the printed table. Every number comes with its unit and with what
+/// it is worth (residual, backward error, defect).
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/contact/resultants.hpp"
@@ -36,6 +36,8 @@ struct Timing
 /// A stage that did not run has the outcome "off" (by the scene) or "skipped", with the reason.
 struct Report
 {
+  std::string run;    // the identity that every file of the run carries
+  int exit_code = -1; // -1: the run goes on
   ModelSummary model;
   Equilibrium equilibrium;
   std::vector<ContactResultant> contacts; // of the equilibrium, one a contact of the scene; empty on a matrix scene
@@ -69,7 +71,10 @@ struct FieldNodes
 /// Rank 0 prints the table a person reads.
 void print_table(const Report& report, const Scene& scene, MPI_Comm comm);
 
-/// Collective. Writes everything into `output`, each file whole or not at all. Error: what could not be written.
+/// Collective. Writes what was asked for into `output`: the scene with every default, and the options.
+void write_request(const Scene& scene, const std::string& run, const std::filesystem::path& output, MPI_Comm comm);
+
+/// Collective. Writes all results into `output`, each file whole or not at all. Error: what could not be written.
 void write_results(const Report& report, const Scene& scene, const FieldNodes& nodes,
                    const std::filesystem::path& output, MPI_Comm comm);
 

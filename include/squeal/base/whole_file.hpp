@@ -1,0 +1,14 @@
+#pragma once
+/// Files that exist whole or not at all: written beside their place under another name, flushed to the disk, then
+/// moved.
+#include <filesystem>
+#include <string_view>
+
+namespace squeal
+{
+
+/// Writes a file; one that was there stays until the new one is whole. Error: the file, the system's reason, the space
+/// that it needs and the space that is free.
+void write_whole_file(const std::filesystem::path& place, std::string_view bytes);
+
+} // namespace squeal

@@ -1,0 +1,69 @@
+#pragma once
+/// The results of a run as one whole: stages write into a folder beside the results' place, PLACE.partial, which takes
+/// that place in one move when the run ends. Earlier results stay until then.
+///
+/// Where PLACE cannot be moved (the working folder, a mount point, a folder whose parent is read-only) or holds other
+/// files than results, the files themselves are moved: report.json goes first and comes last.
+#include "squeal/scene/scene.hpp"
+
+#include <mpi.h>
+
+namespace squeal
+{
+
+/// The file that holds a lock on a folder as long as its process lives; the system frees the lock of one that died.
+class FolderLock
+{
+public:
+  FolderLock() = default;
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+  /// Locks a folder for the run. Returns who holds it; empty: it is this process now.
+  std::string take(const std::filesystem::path& folder, const std::string& run);
+
+private:
+  int file_ = -1;
+};
+
+class ResultsFolder
+{
+public:
+  /// Makes and locks the partial folder; what a run that was killed left there is removed. Collective.
+  /// Error: the folder cannot be written, or another run is at work in it.
+  ResultsFolder(const std::filesystem::path& place, MPI_Comm comm);
+
+  /// Without publish, leaves everything as it was before.
+  ~ResultsFolder();
+  ResultsFolder(const ResultsFolder&) = delete;
+  ResultsFolder& operator=(const ResultsFolder&) = delete;
+
+  const std::filesystem::path& place() const { return place_; }
+  const std::filesystem::path& partial() const { return partial_; } // to write to
+  const std::string& run() const { return run_; }                   // the identity that every file of the run carries
+
+  /// Where a file of the user's own name is written meanwhile: in the partial folder if it belongs into the place.
+  std::filesystem::path meanwhile(const std::filesystem::path& file) const;
+
+  /// Moves the results to their place. Collective.
+  void publish();
+
+private:
+  void make();         // on rank 0
+  void move_whole();   // on rank 0
+  void move_by_file(); // on rank 0
+  void undo();
+
+  MPI_Comm comm_;
+  std::filesystem::path place_, partial_;
+  std::string run_;
+  std::vector<std::filesystem::path> made_; // folders above the partial one, outermost first
+  FolderLock lock_;
+  bool published_ = false;
+};
+
+/// Error: an output of the scene, or a result in this place, would fall on a file that the run reads.
+void check_outputs(const Scene& scene, const std::filesystem::path& place);
+
+} // namespace squeal

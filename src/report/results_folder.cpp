@@ -1,0 +1,293 @@
+#include "squeal/report/results_folder.hpp"
+
+#include "squeal/base/broadcast.hpp"
+#include "squeal/base/error.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <utility>
+
+namespace squeal
+{
+
+namespace fs = std::filesystem;
+
+namespace
+{
+
+constexpr std::array result_files = {"report.json", "history.h5",    "fields.h5",
+                                     "fields.xdmf", "resolved.toml", "options.txt"};
+constexpr const char* lock_file = "running";
+
+bool is_result(const fs::path& name)
+{
+  return std::find(result_files.begin(), result_files.end(), name) != result_files.end();
+}
+
+/// "2026-01-31T12:00:00.123456Z HOST 4711": time, machine and process tell any two runs apart.
+std::string new_identity()
+{
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const auto micros = std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+  const auto seconds = static_cast<std::time_t>(micros / 1000000);
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  std::array<char, 256> host{};
+  gethostname(host.data(), host.size() - 1);
+  return format("%04d-%02d-%02dT%02d:%02d:%02d.%06dZ %s %d", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday,
+                utc.tm_hour, utc.tm_min, utc.tm_sec, static_cast<int>(micros % 1000000), host.data(),
+                static_cast<int>(getpid()));
+}
+
+/// Copies the text of rank 0 to every rank.
+void share(std::string& text, MPI_Comm comm)
+{
+  std::vector<char> bytes(text.begin(), text.end());
+  broadcast(bytes, comm);
+  text.assign(bytes.begin(), bytes.end());
+}
+
+[[noreturn]] void refuse_folder(const fs::path& folder, const std::string& reason)
+{
+  throw Error("cannot write results to " + folder.string() + " (" + reason +
+              "); name a folder you may write to with --output DIR");
+}
+
+/// Whether the folder itself can be replaced by another one beside it.
+bool can_be_replaced(const fs::path& folder)
+{
+  struct stat own = {}, parent = {};
+  if (stat(folder.parent_path().c_str(), &parent) != 0) return true; // it will be made
+  if (access(folder.parent_path().c_str(), W_OK) != 0) return false;
+  if (stat(folder.c_str(), &own) != 0) return true;
+  std::error_code none;
+  return own.st_dev == parent.st_dev && !fs::equivalent(folder, fs::current_path(), none);
+}
+
+bool holds_only_results(const fs::path& folder)
+{
+  const fs::directory_iterator entries(folder);
+  return std::all_of(begin(entries), end(entries),
+                     [](const fs::directory_entry& entry) { return is_result(entry.path().filename()); });
+}
+
+/// The absolute path without links, dots and a slash at its end.
+fs::path resolved(const fs::path& path)
+{
+  const fs::path whole = fs::weakly_canonical(fs::absolute(path));
+  return whole.has_filename() ? whole : whole.parent_path();
+}
+
+void rename_or_throw(const fs::path& from, const fs::path& to)
+{
+  if (std::rename(from.c_str(), to.c_str()) != 0)
+    throw Error("cannot move " + from.string() + " to " + to.string() + ": " + std::strerror(errno) +
+                "; the results stay where they are");
+}
+
+} // namespace
+
+FolderLock::~FolderLock()
+{
+  if (file_ >= 0) close(file_);
+}
+
+std::string FolderLock::take(const fs::path& folder, const std::string& run)
+{
+  const fs::path path = folder / lock_file;
+  struct flock whole = {};
+  whole.l_type = F_WRLCK;
+  whole.l_whence = SEEK_SET;
+  for (int attempt = 0; attempt < 100; ++attempt)
+  {
+    file_ = open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+    if (file_ < 0) refuse_folder(folder, std::strerror(errno));
+    // a file system without locks refuses otherwise: there two runs into one folder go unseen
+    if (fcntl(file_, F_OFD_SETLK, &whole) != 0 && (errno == EAGAIN || errno == EACCES))
+    {
+      std::array<char, 512> holder{};
+      const ssize_t size = read(file_, holder.data(), holder.size() - 1);
+      return size > 0 ? holder.data() : "unknown";
+    }
+    // a run that ended meanwhile has moved its folder away: the file locked is then another one's
+    struct stat locked = {}, there = {};
+    if (fstat(file_, &locked) == 0 && stat(path.c_str(), &there) == 0 && locked.st_ino == there.st_ino)
+    {
+      if (ftruncate(file_, 0) != 0 || write(file_, run.data(), run.size()) < 0)
+        refuse_folder(folder, std::strerror(errno));
+      return {};
+    }
+    close(std::exchange(file_, -1));
+    fs::create_directory(folder);
+  }
+  return "several runs that end and begin";
+}
+
+ResultsFolder::ResultsFolder(const fs::path& place, MPI_Comm comm) : comm_(comm)
+{
+  on_rank_zero(comm,
+               [&]
+               {
+                 try
+                 {
+                   place_ = resolved(place);
+                   make();
+                 }
+                 catch (const fs::filesystem_error& error)
+                 {
+                   undo();
+                   refuse_folder(place, error.code().message());
+                 }
+                 catch (...)
+                 {
+                   undo();
+                   throw;
+                 }
+               });
+  std::string place_text = place_.string(), partial_text = partial_.string();
+  share(place_text, comm);
+  share(partial_text, comm);
+  share(run_, comm);
+  place_ = place_text;
+  partial_ = partial_text;
+}
+
+void ResultsFolder::make()
+{
+  run_ = new_identity();
+  if (fs::exists(place_) && (!fs::is_directory(place_) || access(place_.c_str(), W_OK) != 0))
+    refuse_folder(place_, fs::is_directory(place_) ? std::strerror(EACCES) : std::strerror(ENOTDIR));
+  const fs::path partial = can_be_replaced(place_) ? fs::path(place_.string() + ".partial") : place_ / "partial";
+  for (fs::path above = partial.parent_path(); !fs::exists(above); above = above.parent_path())
+    made_.insert(made_.begin(), above);
+  for (const fs::path& folder : made_) fs::create_directory(folder);
+  fs::create_directory(partial);
+  if (const std::string holder = lock_.take(partial, run_); !holder.empty())
+    throw Error("another run writes into " + place_.string() + " (" + holder +
+                ": its start, machine and process); wait for its end, or name another folder with --output DIR");
+  partial_ = partial; // from here on it is ours to remove
+  for (const auto& entry : fs::directory_iterator(partial_))
+    if (entry.path().filename() != lock_file) fs::remove_all(entry.path());
+}
+
+ResultsFolder::~ResultsFolder()
+{
+  if (!published_) undo();
+}
+
+void ResultsFolder::undo()
+{
+  std::error_code ignored;
+  if (!partial_.empty()) fs::remove_all(partial_, ignored);
+  for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder) fs::remove(*folder, ignored);
+}
+
+fs::path ResultsFolder::meanwhile(const fs::path& file) const
+{
+  if (file.empty()) return file;
+  const fs::path inside = resolved(file).lexically_relative(place_);
+  return inside.empty() || *inside.begin() == ".." || inside.has_parent_path() ? file : partial_ / inside;
+}
+
+void ResultsFolder::move_whole()
+{
+  const fs::path old = place_.string() + ".old";
+  if (renameat2(AT_FDCWD, partial_.c_str(), AT_FDCWD, place_.c_str(), RENAME_EXCHANGE) == 0)
+  {
+    std::error_code ignored;
+    fs::remove_all(partial_, ignored); // now the earlier results
+    return;
+  }
+  if (errno != ENOENT && errno != EINVAL && errno != ENOSYS && errno != ENOTSUP)
+    throw Error("cannot move " + partial_.string() + " to " + place_.string() + ": " + std::strerror(errno) +
+                "; the results stay where they are");
+  if (fs::exists(place_)) rename_or_throw(place_, old); // a file system that cannot exchange
+  rename_or_throw(partial_, place_);
+  std::error_code ignored;
+  fs::remove_all(old, ignored);
+}
+
+void ResultsFolder::move_by_file()
+{
+  fs::create_directories(place_);
+  fs::remove(place_ / "report.json");
+  for (const char* name : result_files) fs::remove_all(place_ / name);
+  for (const auto& entry : fs::directory_iterator(partial_))
+    if (const fs::path name = entry.path().filename(); name != "report.json" && name != lock_file)
+      rename_or_throw(entry.path(), place_ / name);
+  rename_or_throw(partial_ / "report.json", place_ / "report.json");
+  fs::remove_all(partial_);
+}
+
+void ResultsFolder::publish()
+{
+  on_rank_zero(comm_,
+               [&]
+               {
+                 published_ = true; // whatever happens: the results are whole
+                 if (partial_.parent_path() != place_ && (!fs::exists(place_) || holds_only_results(place_)))
+                   move_whole();
+                 else
+                   move_by_file();
+                 std::error_code ignored;
+                 fs::remove(place_ / lock_file, ignored);
+               });
+  published_ = true;
+}
+
+namespace
+{
+
+bool same_file(const fs::path& a, const fs::path& b)
+{
+  std::error_code none;
+  return fs::equivalent(a, b, none) || resolved(a) == resolved(b);
+}
+
+/// The files that the scene names as input.
+std::vector<fs::path> inputs_of(const Scene& scene)
+{
+  std::vector<fs::path> inputs = {scene.file};
+  if (scene.mesh) inputs.push_back(scene.mesh->file);
+  if (scene.matrices)
+    for (const auto& entry : fs::directory_iterator(*scene.matrices)) inputs.push_back(entry.path());
+  if (scene.transient.start.kind == StartKind::file) inputs.push_back(scene.transient.start.file);
+  if (scene.cycle.start.kind == CycleStartKind::file) inputs.push_back(scene.cycle.start.file);
+  return inputs;
+}
+
+} // namespace
+
+void check_outputs(const Scene& scene, const fs::path& place)
+{
+  std::vector<fs::path> results;
+  for (const char* name : result_files) results.push_back(place / name);
+  const std::vector<fs::path> inputs = inputs_of(scene);
+  const auto refuse_on = [](const fs::path& output, const std::vector<fs::path>& others, const std::string& remedy)
+  {
+    for (const fs::path& other : others)
+      if (same_file(output, other))
+        throw Error("the output " + output.string() + " would fall on " + other.string() + ": " + remedy);
+  };
+  for (const fs::path& result : results)
+    refuse_on(result, inputs, "the run reads that file; name another folder with --output DIR");
+  for (const auto& [key, file] : {std::pair("[transient] save_state", scene.transient.save_state),
+                                  std::pair("[cycle] save_state", scene.cycle.save_state)})
+  {
+    if (file.empty()) continue;
+    refuse_on(file, inputs, std::string("the run reads that file; give ") + key + " another name");
+    refuse_on(file, results, std::string("a result has that name; give ") + key + " another one");
+  }
+  const fs::path &one = scene.transient.save_state, &other = scene.cycle.save_state;
+  if (!one.empty() && !other.empty())
+    refuse_on(one, {other}, "[transient] save_state and [cycle] save_state must be two files");
+}
+
+} // namespace squeal

@@ -1,0 +1,160 @@
+"""Results are one whole: a folder holds the files of one run, whatever happens to the runs that write into it."""
+
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+from conftest import INPUTS, ROOT
+
+SCENE = INPUTS / "oscillator" / "scene.toml"
+SHORT = ["--set", "transient.periods=5", "--set", "cycle.enabled=false"]
+ENDLESS = ["--set", "transient.periods=1e6"]
+
+
+def start(output, *arguments, scene=SCENE):
+    command = [os.environ["SQUEAL"], scene, "--output", output, *arguments]
+    return subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(condition, seconds=60):
+    end = time.time() + seconds
+    while not condition():
+        assert time.time() < end, "it never came true"
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def endless(tmp_path):
+    """A run that goes on until the test ends, in the midst of its transient."""
+    runs = []
+
+    def begin(output, *arguments):
+        runs.append(start(output, *ENDLESS, *arguments))
+        wait_for(lambda: (output.parent / (output.name + ".partial") / "options.txt").exists())
+        return runs[-1]
+
+    yield begin
+    for run in runs:
+        run.kill()
+        run.wait()
+
+
+def contents(folder):
+    return {file.name: file.read_bytes() for file in folder.iterdir() if file.is_file()}
+
+
+def test_earlier_results_stay_when_a_run_is_killed(converged, endless, tmp_path):
+    output = converged(SCENE, *SHORT, ranks=1).output
+    before = contents(output)
+    run = endless(output)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    assert contents(output) == before
+    assert converged(SCENE, *SHORT, "--output", output, ranks=1).code == 0  # the lock of the dead one is no obstacle
+    after = contents(output)
+    assert set(after) == set(before) and after["report.json"] != before["report.json"]
+    assert not list(tmp_path.glob("*.partial"))
+
+
+def test_a_second_run_into_the_same_folder_is_refused(squeal, endless, tmp_path):
+    endless(tmp_path / "results")
+    second = squeal(SCENE, *SHORT, "--output", tmp_path / "results")
+    assert second.code == 1 and len(second.messages) == 1 and "another run" in second.messages[0]
+    assert (tmp_path / "results.partial" / "options.txt").exists()
+
+
+def test_every_file_names_its_run_and_tools_refuse_a_mixture(converged):
+    first, second = (converged(SCENE, *SHORT, ranks=1) for _ in range(2))
+    names = {"report.json", "history.h5", "fields.h5", "fields.xdmf", "resolved.toml", "options.txt"}
+    assert set(contents(first.output)) == names
+    run = first.report["run"].encode()
+    assert all(run in content for content in contents(first.output).values())
+    assert run != second.report["run"].encode()
+    plot = [ROOT / "tools" / "plot", first.output]
+    for name in names - {"report.json"}:
+        kept = (first.output / name).read_bytes()
+        shutil.copy(second.output / name, first.output / name)
+        done = subprocess.run(plot, capture_output=True, text=True)
+        assert done.returncode == 1 and name in done.stderr and "another" in done.stderr
+        (first.output / name).write_bytes(kept)
+    assert subprocess.run(plot, capture_output=True).returncode == 0
+
+
+def test_the_working_folder_keeps_the_users_files(tmp_path):
+    shutil.copy(SCENE, tmp_path)
+    (tmp_path / "notes.txt").write_text("mine")
+    for _ in range(2):
+        done = subprocess.run([os.environ["SQUEAL"], "scene.toml", "--output", ".", *SHORT], cwd=tmp_path, capture_output=True)
+        assert done.returncode == 0
+    assert (tmp_path / "scene.toml").read_text() == SCENE.read_text() and (tmp_path / "notes.txt").read_text() == "mine"
+    assert (tmp_path / "report.json").exists() and not (tmp_path / "partial").exists()
+    assert not list(tmp_path.parent.glob(tmp_path.name + "?*"))
+
+
+def test_a_state_inside_the_results_comes_with_them(converged, tmp_path):
+    output = tmp_path / "results"
+    for _ in range(2):
+        converged(SCENE, *SHORT, "--set", f"transient.save_state={output}/end.state", "--output", output, ranks=1)
+        assert (output / "end.state").stat().st_size == 2 * (8 + 8 * 3)
+    assert str(output / "end.state") in (output / "resolved.toml").read_text()
+
+
+@pytest.mark.parametrize("output", ["resolved.toml", "report.json", "same.state"])
+def test_no_output_falls_on_an_input(squeal, tmp_path, output):
+    """The scene file has the name of a result, or one state would be written over another."""
+    scene = tmp_path / (output if output.endswith(".toml") else "scene.toml")
+    shutil.copy(SCENE, scene)
+    arguments = ["--output", tmp_path] if output == "resolved.toml" else []
+    if output == "report.json":
+        arguments = ["--set", f"transient.save_state={tmp_path}/report.json", "--output", tmp_path]
+    if output == "same.state":
+        arguments = ["--set", f"transient.save_state={tmp_path}/a.state", "--set", f"cycle.save_state={tmp_path}/a.state"]
+    run = squeal(scene, *arguments, ranks=1)
+    assert run.code == 1 and len(run.messages) == 1, run.errors
+    assert {file.name for file in tmp_path.iterdir()} == {scene.name}
+
+
+def files_below(folder):
+    return {file.relative_to(folder): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+@pytest.mark.parametrize("size", [1000, 30000, 1000000])
+def test_no_room_for_a_file_is_one_message_and_leaves_the_folder_as_it_was(converged, tmp_path, size):
+    """By the limit on the size of a file, set once MPI has made its own."""
+    output = tmp_path / "results"
+    converged(SCENE, *SHORT, "--output", output, ranks=1)
+    before = files_below(tmp_path)
+    run = start(output, "--set", "transient.periods=200", "--set", "cycle.enabled=false")  # a history of 6 MB
+    wait_for(lambda: (tmp_path / "results.partial" / "options.txt").exists())
+    resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (size, size))
+    errors = run.communicate()[1]
+    assert run.returncode == 1, errors
+    lines = errors.strip().splitlines()
+    assert len(lines) == 1 and lines[0].startswith("squeal: error: cannot write") and "MB" in lines[0], errors
+    assert files_below(tmp_path) == before
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
+@pytest.mark.parametrize("kilobytes", [4, 32, 64])
+def test_a_full_file_system_too(tmp_path, kilobytes):
+    """HDF5 fails neither when it closes its file nor when MPI ends."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", disk], capture_output=True)
+    if mounted.returncode != 0:
+        pytest.skip("no right to mount here")
+    try:
+        done = subprocess.run(["mpirun", "-n", "2", os.environ["SQUEAL"], SCENE, "--set", "cycle.enabled=false", "--output",
+                               disk / "results"], capture_output=True, text=True)
+        messages = [line for line in done.stderr.splitlines() if line.startswith("squeal: ")]
+        assert done.returncode == 1 and len(messages) == 1, done.stderr
+        assert "No space left" in messages[0] and "MB are free" in messages[0] and "--output" in messages[0]
+        assert not list(disk.iterdir())
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
