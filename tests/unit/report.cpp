@@ -2,6 +2,7 @@
 #include "../support/temporary_folder.hpp"
 #include "squeal/model.hpp"
 #include "squeal/report/fields.hpp"
+#include "squeal/report/history.hpp"
 #include "squeal/report/json.hpp"
 #include "squeal/report/table.hpp"
 
@@ -9,6 +10,7 @@
 #include <cstdlib>
 #include <doctest/doctest.h>
 #include <fstream>
+#include <hdf5.h>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <regex>
