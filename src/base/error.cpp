@@ -26,6 +26,25 @@ void agree(MPI_Comm comm, const std::string& problem)
   throw Error(text);
 }
 
+std::string shortened(const std::string& text)
+{
+  constexpr std::size_t longest = 300;
+  return text.size() <= longest ? text
+                                : text.substr(0, longest) + "... (" + std::to_string(text.size()) + " characters)";
+}
+
+bool is_file(const std::filesystem::path& name)
+{
+  std::error_code failed;
+  return std::filesystem::is_regular_file(name, failed);
+}
+
+bool is_folder(const std::filesystem::path& name)
+{
+  std::error_code failed;
+  return std::filesystem::is_directory(name, failed);
+}
+
 std::string format(const char* pattern, ...)
 {
   std::va_list arguments, again;

@@ -4,6 +4,7 @@
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/node_pairs.hpp"
 #include "squeal/mesh/partition.hpp"
+#include "squeal/mesh/script.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <doctest/doctest.h>
@@ -270,7 +271,7 @@ TEST_CASE("a wrong name is answered with the nearest right one")
 
 TEST_CASE("gmsh's own words reach the message")
 {
-  const TemporaryFile file("Point(1) = {0, 0;\n", ".geo");
+  const TemporaryFile file("Point(1) = {0, 0} 1;\n", ".geo");
   CHECK(has(problem_of([&] { read_mesh(block_scene(file.path()), comm); }), "syntax error"));
 }
 
@@ -292,7 +293,7 @@ TEST_CASE("parameters are found in lists, with braces, comments and includes")
                                 std::string(1000000, 'x') + "*/",
                             ".geo");
   if (rank_of(comm) != 0) return; // the file is rank 0's
-  CHECK(geometry_parameters(outer.path()) == std::vector<std::string>{"deep", "a", "d", "e"});
+  CHECK(read_script(outer.path(), Statements::listed).parameters == std::vector<std::string>{"deep", "a", "d", "e"});
 }
 
 TEST_CASE("a scene of points needs no mesh, and its pair is the two points")
@@ -345,7 +346,6 @@ TEST_CASE("few points go to ranks without leaving one empty, and too few are ref
   if (ranks_of(comm) > 1) CHECK_THROWS_AS(partition_mesh(mesh, {}, comm), Error);
 }
 
-// Last, because libgmsh keeps parameters as long as the process lives.
 TEST_CASE("a geometry is meshed with its parameters, and every rank has the same mesh")
 {
   const TemporaryFile file(blocks, ".geo");

@@ -4,6 +4,7 @@
 /// Bad input and failed calls are exceptions whose text names the place, the value and the remedy. What may fail on one
 /// rank only (reading a file on rank 0, say) is agreed by all ranks before anyone throws, so that no rank is left
 /// waiting in a collective call. A stage that does not converge is a result, never an exception.
+#include <filesystem>
 #include <mpi.h>
 #include <stdexcept>
 #include <string>
@@ -60,6 +61,13 @@ template <class Work> void on_rank_zero(MPI_Comm comm, Work work)
                   if (rank == 0) work();
                 });
 }
+
+/// Returns the text, or its beginning if it has more than 300 characters, for messages.
+std::string shortened(const std::string& text);
+
+/// Whether there is a plain file, or a folder, of this name; no name is too long to ask for.
+bool is_file(const std::filesystem::path& name);
+bool is_folder(const std::filesystem::path& name);
 
 /// printf into text, for messages and tables.
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);

@@ -121,11 +121,19 @@ struct FrictionLaw
   bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3)
 };
 
+/// The statements that a geometry may hold.
+enum class Statements
+{
+  listed, // geometry, sizes, physical groups, constants, loops
+  any,    // whatever gmsh runs: commands of the shell among them
+};
+
 struct MeshSource
 {
   std::filesystem::path file;               // mesh or geometry that libgmsh reads; absolute
   std::map<std::string, double> parameters; // values for the DefineConstant of a .geo, in its own units
   double scale = 1;                         // [m] length unit of the file
+  Statements statements{};                  // not of the scene file, but of the command line
 };
 
 /// Route by which the complex modes are computed.

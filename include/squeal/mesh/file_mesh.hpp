@@ -1,0 +1,45 @@
+#pragma once
+/// The content of a mesh file, before the scene's parts and surfaces are extracted from it, and its form on the way
+/// from the mesher to the program. This header knows no MPI, because the mesher knows none.
+#include "squeal/base/vec3.hpp"
+
+#include <string>
+#include <vector>
+
+namespace squeal
+{
+
+/// The elements of one type on one geometrical entity of the file.
+struct ElementBlock
+{
+  int dimension = 0; // 0 to 3
+  int type = 0;      // gmsh's number of the element type
+  std::string type_name;
+  int nodes_per_element = 0;
+  std::vector<int> nodes;          // indices in FileMesh::nodes, element by element
+  std::vector<std::string> groups; // physical groups of the entity; a group without a name is named by its number
+};
+
+struct FileMesh
+{
+  std::vector<Vec3> nodes; // in the unit of the file
+  std::vector<ElementBlock> blocks;
+};
+
+/// What the mesher sends: a mesh, or why there is none.
+struct MesherAnswer
+{
+  FileMesh mesh;
+  std::string problem; // empty if there is a mesh
+};
+
+/// Returns an answer as bytes.
+std::string packed(const MesherAnswer& answer);
+
+/// Returns the answer that was packed. Throws std::runtime_error if the bytes are not a whole one.
+MesherAnswer unpacked(const std::string& bytes);
+
+/// Descriptors of the mesher: it writes its answer to one, and reads a checked script from the other.
+inline constexpr int answer_descriptor = 3, script_descriptor = 4;
+
+} // namespace squeal

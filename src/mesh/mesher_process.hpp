@@ -1,0 +1,22 @@
+#pragma once
+/// The mesher: gmsh in a process of its own, so that its crash is a message.
+#include "squeal/mesh/file_mesh.hpp"
+
+#include <map>
+
+namespace squeal
+{
+
+/// What the mesher is to read: a file, or a checked script of this text.
+struct MesherTask
+{
+  std::string file;                         // also the name in messages
+  std::string script;                       // empty: the file itself
+  std::map<std::string, double> parameters; // values for DefineConstant
+};
+
+/// Runs the mesher and returns its answer. To be called on one rank. Throws Error if it cannot be started, if it is
+/// killed by a signal, or if it takes longer than an hour.
+MesherAnswer run_mesher(const MesherTask& task);
+
+} // namespace squeal

@@ -1,0 +1,149 @@
+/// squeal_mesher: reads a mesh, or meshes a geometry, with libgmsh. squeal starts it; see src/mesh/mesher_process.cpp.
+///
+///   squeal_mesher file NAME [parameter value]…     reads the file of this name
+///   squeal_mesher script NAME [parameter value]…   reads a checked script from its descriptor
+///
+/// The answer goes to a descriptor of its own. This program knows no MPI.
+#include "squeal/mesh/file_mesh.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <gmsh.h>
+#include <stdexcept>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+namespace
+{
+
+using namespace squeal;
+
+/// Initialises libgmsh without output; it then defines the given parameters.
+void initialise(int argc, char** argv)
+{
+  std::vector<std::string> arguments = {"squeal_mesher"};
+  for (int i = 3; i + 1 < argc; i += 2) arguments.insert(arguments.end(), {"-setnumber", argv[i], argv[i + 1]});
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  gmsh::initialize(static_cast<int>(pointers.size()), pointers.data(), false);
+  gmsh::option::setNumber("General.Terminal", 0);
+}
+
+/// Reads all nodes. Returns the index of each gmsh node tag; -1 for tags that are not used.
+std::vector<int> read_nodes(FileMesh& mesh)
+{
+  std::vector<std::size_t> tags;
+  std::vector<double> coordinates, parametric;
+  gmsh::model::mesh::getNodes(tags, coordinates, parametric);
+  std::vector<int> index_of(tags.empty() ? 0 : *std::max_element(tags.begin(), tags.end()) + 1, -1);
+  for (std::size_t i = 0; i < tags.size(); ++i)
+  {
+    index_of[tags[i]] = static_cast<int>(i);
+    mesh.nodes.push_back({coordinates[3 * i], coordinates[3 * i + 1], coordinates[3 * i + 2]});
+  }
+  return index_of;
+}
+
+/// Names of the physical groups that an entity belongs to.
+std::vector<std::string> groups_of(int dimension, int entity)
+{
+  std::vector<int> tags;
+  gmsh::model::getPhysicalGroupsForEntity(dimension, entity, tags);
+  std::vector<std::string> names;
+  for (const int tag : tags)
+  {
+    std::string name;
+    gmsh::model::getPhysicalName(dimension, std::abs(tag), name);
+    names.push_back(name.empty() ? std::to_string(std::abs(tag)) : name);
+  }
+  return names;
+}
+
+void read_blocks(const std::vector<int>& index_of, FileMesh& mesh)
+{
+  gmsh::vectorpair entities;
+  gmsh::model::getEntities(entities);
+  for (const auto& [dimension, entity] : entities)
+  {
+    std::vector<int> types;
+    std::vector<std::vector<std::size_t>> elements, nodes;
+    gmsh::model::mesh::getElements(types, elements, nodes, dimension, entity);
+    for (std::size_t k = 0; k < types.size(); ++k)
+    {
+      ElementBlock block{dimension, types[k], {}, 0, {}, groups_of(dimension, entity)};
+      int order = 0, primary = 0, d = 0;
+      std::vector<double> local;
+      gmsh::model::mesh::getElementProperties(types[k], block.type_name, d, order, block.nodes_per_element, local,
+                                              primary);
+      for (const std::size_t tag : nodes[k])
+      {
+        if (tag >= index_of.size() || index_of[tag] < 0)
+          throw std::runtime_error("an element has node " + std::to_string(tag) + ", which the file does not define");
+        block.nodes.push_back(index_of[tag]);
+      }
+      mesh.blocks.push_back(std::move(block));
+    }
+  }
+}
+
+/// Whether the file brought elements of surfaces or volumes.
+bool has_elements()
+{
+  for (const int dimension : {2, 3})
+  {
+    std::vector<int> types;
+    std::vector<std::vector<std::size_t>> elements, nodes;
+    gmsh::model::mesh::getElements(types, elements, nodes, dimension);
+    if (!types.empty()) return true;
+  }
+  return false;
+}
+
+FileMesh read_or_generate(const std::string& file)
+{
+  gmsh::open(file);
+  if (!has_elements()) gmsh::model::mesh::generate(3);
+  std::string problem;
+  gmsh::logger::getLastError(problem);
+  if (!problem.empty()) throw std::runtime_error(problem);
+  FileMesh mesh;
+  read_blocks(read_nodes(mesh), mesh);
+  return mesh;
+}
+
+MesherAnswer answer_of(int argc, char** argv)
+{
+  MesherAnswer answer;
+  try
+  {
+    initialise(argc, argv);
+    const bool script = std::string(argv[1]) == "script";
+    answer.mesh = read_or_generate(script ? "/proc/self/fd/" + std::to_string(script_descriptor) : argv[2]);
+  }
+  catch (const std::string& text) // libgmsh before 4.9 throws strings
+  {
+    answer = {{}, text};
+  }
+  catch (const std::exception& error)
+  {
+    answer = {{}, error.what()};
+  }
+  return answer;
+}
+
+} // namespace
+
+int main(int argc, char** argv)
+{
+  if (argc < 3) return 2;
+  prctl(PR_SET_PDEATHSIG, SIGKILL); // with squeal it ends too
+  for (int inherited = script_descriptor + 1; inherited < 1024; ++inherited) close(inherited); // MPI's
+  const std::string bytes = packed(answer_of(argc, argv));
+  for (std::size_t sent = 0; sent < bytes.size();)
+  {
+    const ssize_t size = write(answer_descriptor, bytes.data() + sent, bytes.size() - sent);
+    if (size < 0) return 3;
+    sent += static_cast<std::size_t>(size);
+  }
+  _exit(0); // libgmsh's own clean-up has crashed after good meshes
+}
