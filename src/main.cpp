@@ -1,8 +1,12 @@
+#include "squeal/forecast.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"
+#include "squeal/session_options.hpp"
 
 #include <cstdio>
+#include <cstdlib>
+#include <new>
 #include <thread>
 
 namespace
@@ -14,13 +18,14 @@ struct Arguments
 {
   std::filesystem::path scene, output;
   std::vector<std::string> overrides;
-  bool dry_run = false, help = false, version = false;
-  std::string problem; // said after MPI is up, once
+  bool dry_run = false, help = false, version = false, allow_scripts = false, force = false;
+  std::string problem;                     // said after MPI is up, once
+  std::vector<std::string> option_sources; // beside the command line
 };
 
 bool is_scene_folder(const std::string& word)
 {
-  return std::filesystem::is_regular_file(std::filesystem::path(word) / "scene.toml");
+  return is_file(std::filesystem::path(word) / "scene.toml");
 }
 
 /// Takes squeal's own arguments out of argv; what stays is PETSc's.
@@ -38,6 +43,10 @@ Arguments take_arguments(int& argc, char** argv)
       arguments.version = true;
     else if (word == "--dry-run")
       arguments.dry_run = true;
+    else if (word == "--allow-scripts")
+      arguments.allow_scripts = true;
+    else if (word == "--force")
+      arguments.force = true;
     else if (word == "--set" || word == "--output")
     {
       if (!has_value)
@@ -49,8 +58,10 @@ Arguments take_arguments(int& argc, char** argv)
     }
     else if (word.rfind("--", 0) == 0)
       arguments.problem =
-          "unknown argument " + word + "; did you mean " +
-          nearest_word(word, std::vector<std::string>{"--set", "--output", "--dry-run", "--help", "--version"}) + "?";
+          "unknown argument " + shortened(word) + "; did you mean " +
+          nearest_word(word.substr(0, 40), std::vector<std::string>{"--set", "--output", "--dry-run", "--help",
+                                                                    "--version", "--allow-scripts", "--force"}) +
+          "?";
     else if (arguments.scene.empty() && word[0] != '-' && (word.ends_with(".toml") || is_scene_folder(word)))
       arguments.scene =
           word.ends_with(".toml") ? std::filesystem::path(word) : std::filesystem::path(word) / "scene.toml";
@@ -62,6 +73,18 @@ Arguments take_arguments(int& argc, char** argv)
   return arguments;
 }
 
+/// Checks what PETSc obeys while it starts. Where something is wrong, PETSc starts without any option.
+void examine_options(Arguments& arguments, std::vector<char*>& words)
+{
+  static char skip[] = "-skip_petscrc";
+  GivenOptions given = given_options(static_cast<int>(words.size()), words.data());
+  arguments.option_sources = std::move(given.sources);
+  if (given.problem.empty()) return;
+  if (arguments.problem.empty()) arguments.problem = given.problem;
+  unsetenv("PETSC_OPTIONS");
+  words = {words.front(), skip};
+}
+
 void print_help()
 {
   std::printf(
@@ -71,14 +94,19 @@ void print_help()
       "  --set key=value   overrides a key of the scene, e.g. --set friction.coefficient=0.25\n"
       "  --output DIR      where results go (results/<scene>)\n"
       "  --version         versions of squeal and of the libraries it runs on\n"
-      "  --dry-run         checks scene and mesh, prints the resolved scene and the model's size, and stops\n"
+      "  --allow-scripts   lets the scene's geometry hold any statement of gmsh, which may run commands and write "
+      "files\n"
+      "  --force           runs even where the forecast says more than a day, or more memory than is free\n"
+      "  --dry-run         checks scene and mesh, prints the resolved scene, the model's size and the forecast, and "
+      "stops\n"
       "  exit code: 0 all converged, 2 a stage did not (the report says which), 1 an error\n\n"
       "%s\n"
       "Algorithm options (PETSc options database) [default]\n%s\n"
       "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes -modes_pep_ -modes_st_\n"
       "-cycle_snes_ -cycle_full_snes_ -cycle_full_ksp_: e.g. -cycle_snes_monitor, -modes_pep_monitor,\n"
-      "-cycle_full_ksp_rtol 1e-3. Of the whole run: -log_view (one stage per step of the chain), -options_file FILE.\n",
-      SQUEAL_VERSION, scene_reference().c_str(), option_reference().c_str());
+      "-cycle_full_ksp_rtol 1e-3.\n\n"
+      "Options of the whole run, PETSc's:\n%s",
+      SQUEAL_VERSION, scene_reference().c_str(), option_reference().c_str(), session_option_reference().c_str());
 }
 
 /// The default place of the results: named after the scene's folder when the file is called scene.toml.
@@ -96,19 +124,32 @@ void print_versions()
 void check_leftover_words(int argc, char** argv)
 {
   if (argc > 1 && argv[1][0] != '-')
-    throw Error(std::string("unexpected argument '") + argv[1] +
+    throw Error("unexpected argument '" + shortened(argv[1]) +
                 "': a scene is one file that ends in .toml, or a folder that holds a scene.toml");
+}
+
+/// Says which options are obeyed that the command line does not show.
+void print_sources(const std::vector<std::string>& sources, MPI_Comm comm)
+{
+  if (rank_of(comm) != 0 || sources.empty()) return;
+  std::string text;
+  for (const std::string& source : sources) text += (text.empty() ? "" : ", ") + source;
+  std::printf("options come from the command line and from %s\n", text.c_str());
 }
 
 int run_program(const Arguments& arguments, int argc, char** argv)
 {
   const MPI_Comm comm = PETSC_COMM_WORLD;
-  if (!arguments.problem.empty()) throw Error(arguments.problem);
+  agree(comm, arguments.problem);
   check_leftover_words(argc, argv);
   if (arguments.scene.empty()) throw Error("no scene given; usage: squeal SCENE [options], squeal -help explains them");
-  const ProgramOptions options = read_program_options(comm);
+  print_sources(arguments.option_sources, comm);
+  ProgramOptions options = read_program_options(comm);
+  options.force = arguments.force;
+  check_address_space(comm);
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
+  if (scene.mesh && arguments.allow_scripts) scene.mesh->statements = Statements::any;
   if (arguments.dry_run)
   {
     dry_run(scene, options, comm);
@@ -127,7 +168,12 @@ int run_program(const Arguments& arguments, int argc, char** argv)
 
 int main(int argc, char** argv)
 {
-  const Arguments arguments = take_arguments(argc, argv);
+  Arguments arguments = take_arguments(argc, argv);
+  std::vector<char*> words(argv, argv + argc);
+  examine_options(arguments, words);
+  argc = static_cast<int>(words.size());
+  words.push_back(nullptr);
+  argv = words.data();
   Session session(argc, argv, nullptr);
   const int rank = rank_of(PETSC_COMM_WORLD);
   if (arguments.help || arguments.version)
@@ -148,7 +194,14 @@ int main(int argc, char** argv)
   }
   catch (const Error& error)
   {
-    if (rank == 0) std::fprintf(stderr, "squeal: error: %s\n", error.what());
+    // a name of any length may be in it
+    if (rank == 0) std::fprintf(stderr, "squeal: error: %.3000s\n", error.what());
+  }
+  catch (const std::bad_alloc&)
+  {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300 * rank));
+    std::fprintf(stderr, "squeal: error on rank %d: memory ran out; --dry-run prints a forecast\n", rank);
+    MPI_Abort(PETSC_COMM_WORLD, 1);
   }
   catch (const std::exception& error)
   {

@@ -1,8 +1,8 @@
 #include "squeal/model.hpp"
 
-#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/solid/probes.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -38,7 +38,13 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
 
 Model build_model(const Scene& scene, MPI_Comm comm)
 {
-  return scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh(scene, comm), comm);
+  Model model = scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh(scene, comm), comm);
+  double mass = 0;
+  check(MatNorm(model.structure.M, NORM_1, &mass));
+  if (mass == 0 && (scene.modes.enabled || scene.transient.enabled || scene.cycle.enabled))
+    throw Error("the structure has no mass, so it has no modes and no motion: give its points masses, or M.petsc "
+                "entries; or turn the modes off for the equilibrium alone");
+  return model;
 }
 
 Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm)
@@ -53,6 +59,12 @@ ModelSummary summary_of(const Model& model, MPI_Comm comm)
   summary.elements = model.structure.elements;
   summary.pairs = model.interface.pairs;
   summary.ranks = ranks_of(comm);
+  for (int c = 0; c < 3 && !model.mesh.nodes.empty(); ++c)
+  {
+    const auto below = [c](const Vec3& a, const Vec3& b) { return a[c] < b[c]; };
+    const auto [low, high] = std::minmax_element(model.mesh.nodes.begin(), model.mesh.nodes.end(), below);
+    summary.length = std::max(summary.length, (*high)[c] - (*low)[c]);
+  }
   double stiffness = 0, mass = 0;
   check(MatNorm(model.structure.K, NORM_1, &stiffness));
   check(MatNorm(model.structure.M, NORM_1, &mass));
@@ -66,22 +78,6 @@ std::vector<double> probe_values(Mat probes, Vec u)
   check(MatCreateVecs(probes, nullptr, values.put()));
   check(MatMult(probes, u, values));
   return all_entries(values);
-}
-
-MemoryForecast forecast_memory(const Model& model, const FactorOptions& options)
-{
-  MemoryForecast forecast;
-  const Structure& structure = model.structure;
-  for (Mat matrix : {structure.M.get(), structure.C.get(), structure.K.get()})
-  {
-    MatInfo info;
-    check(MatGetInfo(matrix, MAT_GLOBAL_SUM, &info));
-    forecast.matrices += info.nz_used * (sizeof(PetscScalar) + sizeof(PetscInt)); // info.memory is 0 in most builds
-  }
-  forecast.factor = factor_memory(structure.K, model.interface.pairs > 0 ? model.interface.B.get() : nullptr, options);
-  const double contact_size = static_cast<double>(model.interface.size());
-  forecast.condensed_operator = 8 * contact_size * contact_size;
-  return forecast;
 }
 
 } // namespace squeal

@@ -1,10 +1,10 @@
 #include "squeal/options.hpp"
 
 #include "squeal/base/petsc.hpp"
+#include "squeal/session_options.hpp"
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <sstream>
 
 namespace squeal
@@ -19,16 +19,6 @@ constexpr std::array stages = {"equilibrium_", "modes_",   "transient_",  "cycle
 // What a stage hands on to a solver object, which checks the rest itself.
 constexpr std::array solver_parts = {"snes_", "ksp_", "pc_", "pep_", "eps_", "st_",
                                      "mat_",  "bv_",  "ds_", "rg_",  "vec_"};
-
-// PETSc's and SLEPc's own, about the session rather than a solver.
-constexpr std::array session_options = {
-    "log_",         "info",     "options_", "malloc",       "memory_",   "mat_",
-    "vec_",         "is_",      "blas_",    "sf_",          "fp_trap",   "on_error",
-    "no_signal",    "debugger", "start_in", "error_output", "get_total", "version",
-    "citations",    "history",  "mpi",      "saws",         "device_",   "checkstack",
-    "objects_",     "petsc",    "slepc",    "matmatmult",   "matptap",   "mattransposematmult",
-    "vecscatter",   "viewer_",  "test",     "nox",          "display",   "use_gpu",
-    "check_pointer"};
 
 bool begins(const std::string& name, const char* prefix)
 {
@@ -51,34 +41,19 @@ std::string nearest_option(const std::string& option)
   return nearest.empty() ? "squeal -help lists the options" : "did you mean " + nearest + "?";
 }
 
-/// Empty if the option may exist. `name` without its dash.
-std::string problem_with(const std::string& name)
+} // namespace
+
+std::string problem_of_option_name(const std::string& name)
 {
   const std::string option = "-" + name;
   ProgramOptions unused;
   const OptionList own = options_of(unused);
   if (std::any_of(own.begin(), own.end(), [&](const Option& known) { return option == known.name; })) return {};
-  if (begins_with_one_of(name, session_options)) return {};
+  if (is_session_option(name)) return {};
   for (const char* stage : stages)
     if (begins(name, stage) && begins_with_one_of(name.substr(std::string(stage).size()), solver_parts)) return {};
-  return "unknown option " + option + "; " + nearest_option(option);
+  return "unknown option " + shortened(option) + "; " + nearest_option(option.substr(0, 60));
 }
-
-/// Collective. Error for an option that neither squeal nor a solver of its stages could know.
-void check_option_names(MPI_Comm comm)
-{
-  char* all = nullptr;
-  check(PetscOptionsGetAll(nullptr, &all));
-  std::istringstream words(all ? all : "");
-  check(PetscFree(all));
-  std::string problem;
-  for (std::string word; problem.empty() && words >> word;)
-    if (word.size() > 1 && word[0] == '-' && std::isalpha(static_cast<unsigned char>(word[1])))
-      problem = problem_with(word.substr(1));
-  agree(comm, problem);
-}
-
-} // namespace
 
 OptionList options_of(ProgramOptions& options)
 {
@@ -105,7 +80,6 @@ std::string option_reference()
 
 ProgramOptions read_program_options(MPI_Comm comm)
 {
-  check_option_names(comm);
   ProgramOptions options;
   on_every_rank(comm, [&] { read_options(options_of(options)); });
   options.equilibrium.factor = options.step.factor = options.factor;
@@ -122,7 +96,7 @@ void check_options_used(const std::vector<std::string>& stages_run, MPI_Comm com
   for (PetscInt i = 0; i < count; ++i)
   {
     const std::string name = names[i];
-    if (begins_with_one_of(name, session_options)) continue;
+    if (is_session_option(name)) continue;
     const auto stage =
         std::find_if(stages.begin(), stages.end(), [&](const char* prefix) { return begins(name, prefix); });
     const bool ran = stage == stages.end() || std::any_of(stages_run.begin(), stages_run.end(),

@@ -3,8 +3,9 @@
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/cycle/fidelity.hpp"
-#include "squeal/model.hpp"
+#include "squeal/forecast.hpp"
 #include "squeal/report/report.hpp"
+#include "squeal/scene/doubts.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -234,6 +235,8 @@ void print_model(const ModelSummary& model, MPI_Comm comm)
   if (rank_of(comm) == 0)
     std::printf("  %lld degrees of freedom, %d contact pairs, %ld elements, %d ranks\n",
                 static_cast<long long>(model.dofs), model.pairs, model.elements, model.ranks);
+  for (const std::string& warning : model.warnings)
+    if (rank_of(comm) == 0) std::printf("  WARNING: %s\n", warning.c_str());
 }
 
 } // namespace
@@ -244,7 +247,9 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   report.run = results.run();
   const Model model = timed(report, "model", comm, [&] { return build_model(scene, comm); });
   report.model = summary_of(model, comm);
+  report.model.warnings = doubts_about(scene);
   print_model(report.model, comm);
+  if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options), comm));
 
   Chain chain{scene, options, model, report, {}};
   if (scene.cycle.enabled && scene.cycle.start.kind == CycleStartKind::file)
@@ -285,12 +290,13 @@ void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
   const Model model = build_model(scene, comm);
   if (rank_of(comm) == 0)
     std::printf("# the scene, every default written out\n%s\n# the model\n", resolved_scene(scene).c_str());
-  print_model(summary_of(model, comm), comm);
-  const MemoryForecast memory = forecast_memory(model, options.factor);
-  if (rank_of(comm) == 0)
-    std::printf("  memory forecast, all ranks together: matrices %.3g MB, one factorisation %.3g MB, condensed contact "
-                "operator %.3g MB\n",
-                1e-6 * memory.matrices, 1e-6 * memory.factor, 1e-6 * memory.condensed_operator);
+  ModelSummary summary = summary_of(model, comm);
+  summary.warnings = doubts_about(scene);
+  print_model(summary, comm);
+  const Forecast forecast = forecast_of(model, scene, options);
+  if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());
+  const std::string problem = problem_of(forecast, comm);
+  if (rank_of(comm) == 0 && !problem.empty()) std::printf("  WARNING: here %s\n", problem.c_str());
 }
 
 } // namespace squeal

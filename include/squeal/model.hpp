@@ -27,12 +27,4 @@ ModelSummary summary_of(const Model& model, MPI_Comm comm);
 /// What the probes read of a displacement [m], whole on every rank.
 std::vector<double> probe_values(Mat probes, Vec u);
 
-/// What the run would hold in memory, from the analysis of K bordered by B and the size of W. [bytes], all ranks.
-struct MemoryForecast
-{
-  double matrices = 0, factor = 0, condensed_operator = 0;
-};
-
-MemoryForecast forecast_memory(const Model& model, const FactorOptions& options);
-
 } // namespace squeal

@@ -22,15 +22,20 @@ struct ProgramOptions
   CycleOptions cycle;
   SettledOptions settled;
   AttractorOptions attractors;
+  bool force = false; // --force: run whatever the forecast says
 };
 
 OptionList options_of(ProgramOptions& options);
 
+/// What is wrong with the name of an option, which stands without its dash; empty if squeal, a solver of its stages or
+/// PETSc's session may know it. Needs no PETSc.
+std::string problem_of_option_name(const std::string& name);
+
 /// A line for each option: name, meaning, default.
 std::string option_reference();
 
-/// The options of PETSc's database. Collective. Error: an option that neither squeal nor a solver of its stages knows
-/// (with the nearest name that is known), or a value that an option does not take.
+/// The options of PETSc's database. Collective. Error: a value that an option does not take. Names are checked before
+/// PETSc starts (squeal/session_options.hpp).
 ProgramOptions read_program_options(MPI_Comm comm);
 
 /// After the run, collective. Error for options that nobody asked for, with the nearest known ones. Options of a stage

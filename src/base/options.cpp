@@ -1,5 +1,6 @@
 #include "squeal/base/options.hpp"
 
+#include <charconv>
 #include <cmath>
 
 namespace squeal
@@ -14,6 +15,7 @@ struct Bounds
   const char* text;
 };
 
+/// What the range holds; every number must be finite as well.
 Bounds bounds_of(Range range)
 {
   switch (range)
@@ -33,7 +35,7 @@ Bounds bounds_of(Range range)
   case Range::any:
     break;
   }
-  return {[](double x) { return std::isfinite(x); }, "a finite number"};
+  return {[](double) { return true; }, "a finite number"};
 }
 
 /// The option's text in the database; empty if it is not there.
@@ -60,19 +62,30 @@ template <class Convert> void convert(const Option& option, const char* kind, Co
   if (code != PETSC_SUCCESS) refuse(option, kind);
 }
 
-void read(const Option& option, PetscInt* member)
+/// Reads a number; PETSc's own reading lets whole numbers overflow. Leaves the member where the option is not given.
+template <class Number> void read_number(const Option& option, Number* member, const char* kind)
 {
-  const char* name = option.name.c_str();
-  convert(option, "a whole number", [&] { return PetscOptionsGetInt(nullptr, nullptr, name, member, nullptr); });
+  PetscBool given = PETSC_FALSE;
+  check(PetscOptionsHasName(nullptr, nullptr, option.name.c_str(), &given));
+  if (!given) return;
+  const std::string text = text_of(option);
+  const char* const first = text.data() + (text.starts_with('+') ? 1 : 0);
+  const char* const last = text.data() + text.size();
+  const auto [end, problem] = std::from_chars(first, last, *member);
+  const bool fits = problem == std::errc() && end == last && std::isfinite(static_cast<double>(*member));
+  if (!fits) refuse(option, kind);
   if (const Bounds bounds = bounds_of(option.range); !bounds.hold(static_cast<double>(*member)))
     refuse(option, bounds.text);
 }
 
+void read(const Option& option, PetscInt* member)
+{
+  read_number(option, member, sizeof(PetscInt) == 8 ? "a whole number" : "a whole number of at most 2147483647");
+}
+
 void read(const Option& option, double* member)
 {
-  const char* name = option.name.c_str();
-  convert(option, "a number", [&] { return PetscOptionsGetReal(nullptr, nullptr, name, member, nullptr); });
-  if (const Bounds bounds = bounds_of(option.range); !bounds.hold(*member)) refuse(option, bounds.text);
+  read_number(option, member, "a finite number");
 }
 
 void read(const Option& option, bool* member)

@@ -39,7 +39,7 @@ void check_state_file(const std::filesystem::path& file, PetscInt size)
 {
   const std::string name = "state file " + file.string();
   std::ifstream stream(file, std::ios::binary);
-  if (!std::filesystem::is_regular_file(file) || !stream)
+  if (!is_file(file) || !stream)
     throw Error(name + " cannot be read: write one with save_state, or correct the path of transient.start");
 
   const auto header = static_cast<std::streamoff>(sizeof(int) + sizeof(PetscInt));

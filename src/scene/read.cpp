@@ -262,7 +262,7 @@ private:
       return;
     }
     target = {Kind::file, absolute(given)};
-    if (!std::filesystem::is_regular_file(target.file))
+    if (!is_file(target.file))
       throw Error(place_of(node) + ": " + label_ + key_->name + " = '" + given + "' is none of " + joined(words) +
                   ", and there is no file " + target.file.string());
   }
@@ -271,8 +271,8 @@ private:
   {
     target = absolute(text(node));
     const std::string what = key_->rule == Rule::folder ? "folder" : "file";
-    const bool exists = key_->rule == Rule::folder ? std::filesystem::is_directory(target)
-                        : key_->rule == Rule::file ? std::filesystem::is_regular_file(target)
+    const bool exists = key_->rule == Rule::folder ? is_folder(target)
+                        : key_->rule == Rule::file ? is_file(target)
                                                    : true;
     if (!exists)
       throw Error(place_of(node) + ": " + label_ + key_->name + " = " + text_of(node) + ": there is no " + what + " " +

@@ -10,7 +10,7 @@ namespace
 
 toml::table parse_file(const std::filesystem::path& file)
 {
-  if (!std::filesystem::is_regular_file(file)) throw Error("there is no scene file " + file.string());
+  if (!is_file(file)) throw Error("there is no scene file " + shortened(file));
   try
   {
     return toml::parse_file(file.string());

@@ -33,7 +33,7 @@ template <class Number> std::vector<Number> read_big_endian(std::istream& stream
 /// Opens a file. Throws Error if it is missing or unreadable.
 std::ifstream open_file(const std::filesystem::path& file)
 {
-  if (!std::filesystem::is_regular_file(file)) throw Error(file.string() + ": no such file");
+  if (!is_file(file)) throw Error(file.string() + ": no such file");
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw Error(file.string() + ": cannot be read");
   return stream;

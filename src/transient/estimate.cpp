@@ -62,18 +62,43 @@ double power_at(const ShakenPair& pair, double q, double angle)
   return power;
 }
 
-// Integral to an absolute tolerance, by 7-15 points of Gauss and Kronrod; Boost's tolerance is relative to the value of
-// the plain rule.
+// What rounding leaves of the integral: the differences in power_at are of terms of this size.
+double rounding(const ShakenPair& pair, double q, double length)
+{
+  const double force = std::abs(pair.reaction) + pair.reaction0 / q;
+  const double velocity = std::hypot(std::abs(pair.velocity[0]), std::abs(pair.velocity[1]));
+  return 100 * std::numeric_limits<double>::epsilon() * pair.law.coefficient * force * velocity * length;
+}
+
+using Rule = boost::math::quadrature::gauss_kronrod<double, 15>;
+
+// An interval of the integral and the plain rule's value on it.
+struct Piece
+{
+  double from, to, value;
+};
+
+// Halves the interval until both halves together agree with the whole. Boost's own bisection does not scale its error
+// by the length of an interval, and bisects short ones everywhere.
+template <class Power> double bisected(const Power& power, const Piece& whole, double tolerance, int depth)
+{
+  const double middle = (whole.from + whole.to) / 2;
+  const Piece left{whole.from, middle, Rule::integrate(power, whole.from, middle, 0, 0)};
+  const Piece right{middle, whole.to, Rule::integrate(power, middle, whole.to, 0, 0)};
+  const double sum = left.value + right.value;
+  if (depth == 0 || std::abs(sum - whole.value) <= tolerance) return sum;
+  return bisected(power, left, tolerance / 2, depth - 1) + bisected(power, right, tolerance / 2, depth - 1);
+}
+
+// Integral to an absolute tolerance, but not below rounding, by 7-15 points of Gauss and Kronrod.
 double integrate_between(const ShakenPair& pair, double q, double from, double to, double tolerance)
 {
-  using Rule = boost::math::quadrature::gauss_kronrod<double, 15>;
-  constexpr unsigned bisections = 20;
+  constexpr int bisections = 20;
   const auto power = [&](double angle) { return power_at(pair, q, angle); };
   double error = 0;
   const double plain = Rule::integrate(power, from, to, 0, 0, &error);
   if (error <= tolerance) return plain;
-  const double size = std::max(std::abs(plain), std::numeric_limits<double>::min());
-  return Rule::integrate(power, from, to, bisections, tolerance / size);
+  return bisected(power, {from, to, plain}, std::max(tolerance, rounding(pair, q, to - from)), bisections);
 }
 
 // Angles in (0, 2 pi) where level + q Re(amplitude e^{i angle}) changes sign.

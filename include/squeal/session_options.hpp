@@ -1,0 +1,28 @@
+#pragma once
+/// Options of PETSc's session, which PETSc obeys while it starts, and the places that options come from. They are
+/// checked before PETSc starts, because it ends the process at the first value that it does not take.
+#include <string>
+#include <vector>
+
+namespace squeal
+{
+
+/// Whether this is an option of the session that squeal passes on; `name` without its dash.
+bool is_session_option(const std::string& name);
+
+/// What is wrong with the value of a session option; empty if nothing is.
+std::string problem_of_session_option(const std::string& name, const std::string& value);
+
+/// A line for each session option: name and value.
+std::string session_option_reference();
+
+struct GivenOptions
+{
+  std::vector<std::string> sources; // other than the command line: "PETSC_OPTIONS", "file .petscrc"
+  std::string problem;              // empty, or why PETSc must not see them
+};
+
+/// Looks through the command line, PETSC_OPTIONS, the files .petscrc and those of -options_file. Needs no PETSc.
+GivenOptions given_options(int argc, char** argv);
+
+} // namespace squeal

@@ -1,0 +1,122 @@
+/// The places that PETSc takes options from: files .petscrc of the home and the working folder, petscrc, PETSC_OPTIONS,
+/// and the command line, each with the files of its -options_file.
+#include "squeal/base/error.hpp"
+#include "squeal/options.hpp"
+#include "squeal/session_options.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Strings = std::vector<std::string>;
+
+constexpr std::size_t largest_file = 1 << 20; // [byte] of options
+constexpr std::size_t most_files = 20;        // of options, so that files that name each other come to an end
+
+bool is_letter(const std::string& word, std::size_t place)
+{
+  return place < word.size() && std::isalpha(static_cast<unsigned char>(word[place]));
+}
+
+/// PETSc takes -name and --name for options, and -3 for a value.
+bool is_option(const std::string& word)
+{
+  return word.size() > 1 && word[0] == '-' && (is_letter(word, 1) || (word[1] == '-' && is_letter(word, 2)));
+}
+
+Strings words_in(const std::string& text)
+{
+  Strings words;
+  std::istringstream lines(text);
+  for (std::string line, word; std::getline(lines, line);)
+  {
+    std::istringstream stream(line);
+    for (bool first = true; stream >> word; first = false)
+    {
+      if (word[0] == '#' || (first && (word[0] == '!' || word[0] == '%'))) break;
+      words.push_back(word);
+    }
+  }
+  return words;
+}
+
+class Examiner
+{
+public:
+  void examine(const Strings& words, const std::string& source)
+  {
+    for (std::size_t i = 0; i < words.size() && given.problem.empty(); ++i)
+    {
+      if (!is_option(words[i])) continue;
+      const bool has_value = i + 1 < words.size() && !is_option(words[i + 1]);
+      examine_option(words[i].substr(1), has_value ? words[i + 1] : "", source);
+    }
+  }
+
+  /// Passes a file that does not exist.
+  void examine_file(const std::string& name)
+  {
+    if (!given.problem.empty() || !is_file(name)) return;
+    std::ifstream stream(name, std::ios::binary);
+    std::string text(largest_file + 1, '\0');
+    stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+    text.resize(static_cast<std::size_t>(stream.gcount()));
+    const Strings words = words_in(text);
+    if (text.size() > largest_file || text.find('\0') != std::string::npos)
+      given.problem = "file " + shortened(name) + ": it holds no options";
+    else if (++files_ > most_files)
+      given.problem = "option -options_file " + shortened(name) + ": more than 20 files name one another";
+    else if (!words.empty() && !is_option(words[0]) && words[0] != "alias")
+      given.problem = "file " + shortened(name) + ": '" + shortened(words[0]) + "' is no option";
+    if (!given.problem.empty() || words.empty()) return;
+    given.sources.push_back("file " + shortened(name));
+    examine(words, " (in " + shortened(name) + ")");
+  }
+
+  GivenOptions given;
+
+private:
+  void examine_option(const std::string& name, const std::string& value, const std::string& source)
+  {
+    std::string problem = problem_of_option_name(name);
+    if (problem.empty()) problem = problem_of_session_option(name, value);
+    if (!problem.empty())
+      given.problem = problem + source;
+    else if (name == "options_file")
+      examine_file(value);
+  }
+
+  std::size_t files_ = 0;
+};
+
+} // namespace
+
+GivenOptions given_options(int argc, char** argv)
+{
+  Examiner examiner;
+  const Strings line(argv + std::min(argc, 1), argv + argc);
+  const char *home = std::getenv("HOME"), *variable = std::getenv("PETSC_OPTIONS");
+  const Strings from_variable = words_in(variable ? variable : "");
+  const auto skips = [](const Strings& words)
+  { return std::find(words.begin(), words.end(), "-skip_petscrc") != words.end(); };
+  if (!skips(line) && !skips(from_variable))
+  {
+    if (home) examiner.examine_file(std::string(home) + "/.petscrc");
+    std::error_code none;
+    if (!home || !std::filesystem::equivalent(home, ".", none)) examiner.examine_file(".petscrc");
+    examiner.examine_file("petscrc");
+  }
+  if (!from_variable.empty()) examiner.given.sources.push_back("the variable PETSC_OPTIONS");
+  examiner.examine(from_variable, " (in PETSC_OPTIONS)");
+  examiner.examine(line, "");
+  return std::move(examiner.given);
+}
+
+} // namespace squeal

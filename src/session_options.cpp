@@ -1,0 +1,140 @@
+#include "squeal/session_options.hpp"
+
+#include "squeal/base/error.hpp"
+
+#include <algorithm>
+#include <array>
+#include <sstream>
+#include <unistd.h>
+
+namespace squeal
+{
+
+namespace fs = std::filesystem;
+
+namespace
+{
+
+/// What an option of the session takes.
+enum class Value
+{
+  flag,       // nothing, or true or false
+  read_file,  // a file that exists
+  write_file, // nothing, or a file that can be written
+  viewer,     // [ascii][:file[:format]]
+  info,       // nothing, or file[:classes]
+  text,
+};
+
+struct SessionOption
+{
+  const char* name;
+  Value value;
+  const char* meaning;
+};
+
+constexpr std::array session_options = {
+    SessionOption{"log_view", Value::viewer, "[:FILE[:FORMAT]]  where the time went, one stage per step of the chain"},
+    SessionOption{"log_view_memory", Value::flag, "  adds memory to -log_view"},
+    SessionOption{"log_all", Value::flag, "  keeps every event"},
+    SessionOption{"log_trace", Value::write_file, "[FILE]  writes every event as it happens"},
+    SessionOption{"log_exclude", Value::text, "CLASSES  leaves events out"},
+    SessionOption{"info", Value::info, "[FILE[:CLASSES]]  PETSc's own messages"},
+    SessionOption{"history", Value::write_file, "[FILE]  keeps what PETSc prints"},
+    SessionOption{"options_file", Value::read_file, "FILE  more options"},
+    SessionOption{"options_left", Value::flag, "  lists options that were not used"},
+    SessionOption{"options_view", Value::flag, "  lists options"},
+    SessionOption{"skip_petscrc", Value::flag, "  leaves files .petscrc out"},
+    SessionOption{"malloc", Value::flag, "  PETSc's own allocator"},
+    SessionOption{"malloc_debug", Value::flag, "  checks memory"},
+    SessionOption{"malloc_dump", Value::flag, "  lists memory that was not freed"},
+    SessionOption{"malloc_view", Value::write_file, "[FILE]  lists all memory"},
+    SessionOption{"memory_view", Value::flag, "  memory at the end"},
+    SessionOption{"no_signal_handler", Value::flag, "  leaves signals to the system"},
+    SessionOption{"on_error_abort", Value::flag, "  aborts where PETSc fails"},
+    SessionOption{"get_total_flops", Value::flag, "  counts operations"},
+    SessionOption{"citations", Value::write_file, "[FILE]  what to cite of PETSc"},
+    SessionOption{"fp_trap", Value::text, "WORD  stops at floating-point exceptions"},
+};
+
+const SessionOption* find_option(const std::string& name)
+{
+  const auto found = std::find_if(session_options.begin(), session_options.end(),
+                                  [&](const auto& option) { return name == option.name; });
+  return found == session_options.end() ? nullptr : &*found;
+}
+
+bool is_one_of(const std::string& word, std::initializer_list<const char*> words)
+{
+  return std::any_of(words.begin(), words.end(), [&](const char* known) { return word == known; });
+}
+
+std::string problem_of_new_file(const std::string& name)
+{
+  const fs::path file(name), folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  if (is_folder(file)) return shortened(name) + " is a folder";
+  if (!is_folder(folder)) return "there is no folder " + shortened(folder);
+  if (access((is_file(file) ? file : folder).c_str(), W_OK) != 0) return shortened(name) + " cannot be written";
+  return {};
+}
+
+/// [ascii][:file[:format[:append]]]
+std::string problem_of_viewer(const std::string& value)
+{
+  std::vector<std::string> parts;
+  std::istringstream stream(value);
+  for (std::string part; std::getline(stream, part, ':');) parts.push_back(part);
+  if (!parts.empty() && !is_one_of(parts[0], {"", "ascii"}))
+    return "no viewer is called '" + shortened(parts[0]) + "'; write :FILE, :FILE:FORMAT or nothing";
+  if (parts.size() > 2 && !is_one_of(parts[2], {"", "default", "ascii_info", "ascii_info_detail", "ascii_xml",
+                                                "ascii_csv", "ascii_flamegraph"}))
+    return "no format is called '" + shortened(parts[2]) +
+           "'; known: ascii_info, ascii_info_detail, ascii_xml, ascii_csv, ascii_flamegraph";
+  if (parts.size() > 4 || (parts.size() > 3 && parts[3] != "append")) return "it has too many parts";
+  return parts.size() > 1 && !parts[1].empty() ? problem_of_new_file(parts[1]) : "";
+}
+
+std::string problem_of_value(const SessionOption& option, const std::string& value)
+{
+  if (value.empty()) return option.value == Value::read_file ? "it needs the name of a file" : "";
+  switch (option.value)
+  {
+  case Value::flag:
+    return is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"}) ? "" : "it is true or false";
+  case Value::read_file:
+    return is_file(value) && access(value.c_str(), R_OK) == 0 ? "" : "there is no such file, or it cannot be read";
+  case Value::write_file:
+    return problem_of_new_file(value);
+  case Value::viewer:
+    return problem_of_viewer(value);
+  case Value::info:
+    return value.front() == ':' ? "" : problem_of_new_file(value.substr(0, value.find(':')));
+  case Value::text:
+    break;
+  }
+  return {};
+}
+
+} // namespace
+
+bool is_session_option(const std::string& name)
+{
+  return find_option(name) != nullptr;
+}
+
+std::string problem_of_session_option(const std::string& name, const std::string& value)
+{
+  const SessionOption* option = find_option(name);
+  const std::string problem = option ? problem_of_value(*option, value) : "";
+  return problem.empty() ? "" : "option -" + name + " " + shortened(value) + ": " + problem;
+}
+
+std::string session_option_reference()
+{
+  std::string text;
+  for (const SessionOption& option : session_options)
+    text += std::string("  -") + option.name + " " + option.meaning + "\n";
+  return text;
+}
+
+} // namespace squeal

@@ -1,0 +1,98 @@
+"""What can be refused is refused before the first stage: by one message, with exit code 1, in a second."""
+
+import os
+import resource
+import subprocess
+
+import pytest
+from conftest import INPUTS
+
+OSCILLATOR = INPUTS / "oscillator" / "scene.toml"
+STAGES = ("equilibrium …", "modes …")
+
+
+def refused(run, *words):
+    assert run.code == 1, run.printed + run.errors
+    assert len(run.messages) == 1, run.errors
+    for word in words:
+        assert word in run.messages[0], run.messages
+    assert "PETSC ERROR" not in run.errors and "MPI_ABORT" not in run.errors and ".cpp" not in run.errors
+    assert not [stage for stage in STAGES if stage in run.printed]
+    assert not list(run.output.glob("*"))
+
+
+# what is given, and words of the message
+OPTIONS = {
+    "no such word": (["-cycle_finish", "magic"], ["-cycle_finish", "newton_krylov"]),
+    "zero": (["-cycle_clamp", "0"], ["-cycle_clamp", "above 0"]),
+    "text for a number": (["-cycle_max_periods", "many"], ["-cycle_max_periods", "many"]),
+    "infinite": (["-cycle_difference", "inf"], ["-cycle_difference", "finite"]),
+    "a number that overflows": (["-cycle_samples", "4294967297"], ["-cycle_samples", "2147483647"]),
+    "an object of PETSc's that squeal has not": (["-mat_type", "magic"], ["-mat_type"]),
+    "no file of options": (["-options_file", "missing"], ["-options_file", "missing"]),
+    "a log of no format": (["-log_view", "foo:bar:baz"], ["-log_view", "foo"]),
+    "a log of no known format": (["-log_view", ":log.txt:magic"], ["-log_view", "ascii_xml"]),
+    "a log where there is no folder": (["-log_view", ":/no/such/x"], ["-log_view", "/no/such"]),
+    "a history where there is no folder": (["-history", "/no/such/h"], ["-history", "/no/such"]),
+    "no truth value": (["-malloc_debug", "many"], ["-malloc_debug", "true or false"]),
+    "a state where there is no folder": (["--set", "transient.save_state=no/such/x"], ["save_state", "no/such"]),
+    "a state that is a folder": (["--set", "transient.save_state=matrices"], ["save_state", "folder"]),
+    "a probe without a name": (["--set", "probe.0.name=."], ["probe", "name"]),
+    "more steps than a day holds": (["--set", "transient.steps=1000000000000000", "--set", "transient.step_size=1e-3",
+                                     "--set", "cycle.enabled=false"], ["--force"]),
+}
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_one_message_before_the_first_stage(squeal, name):
+    given, words = OPTIONS[name]
+    refused(squeal(OSCILLATOR, *given, ranks=1), *words)
+
+
+def run_here(folder, *arguments, **environment):
+    return subprocess.run([os.environ["SQUEAL"], OSCILLATOR, "--dry-run", *arguments], cwd=folder, capture_output=True,
+                          text=True, timeout=100, env=os.environ | environment)
+
+
+def test_options_say_where_they_come_from(tmp_path):
+    (tmp_path / ".petscrc").write_text("# ours\n-cycle_clamp 0.25\n")
+    assert "file .petscrc" in run_here(tmp_path).stdout
+    assert "file .petscrc" not in run_here(tmp_path, "-skip_petscrc").stdout
+    assert "PETSC_OPTIONS" in run_here(tmp_path, PETSC_OPTIONS="-cycle_clamp 0.2").stdout
+    (tmp_path / ".petscrc").write_text("-history /no/such/h\n")
+    done = run_here(tmp_path)
+    assert done.returncode == 1 and ".petscrc" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+    done = run_here(tmp_path, "-skip_petscrc", PETSC_OPTIONS="-options_file /no/such/file")
+    assert done.returncode == 1 and "PETSC_OPTIONS" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+
+
+def test_the_forecast_is_printed_and_forced(squeal):
+    steps = ["--set", "transient.steps=1000000000000", "--set", "transient.step_size=1e-3"]
+    run = squeal(OSCILLATOR, "--dry-run", *steps, ranks=1)
+    assert run.code == 0 and "time forecast: about 1e+12 time steps" in run.printed and "--force" in run.printed
+    run = squeal(OSCILLATOR, "--force", "--set", "cycle.enabled=false", "--set", "transient.steps=10", "--set",
+                 "transient.step_size=1e-3", ranks=1)
+    assert run.code == 0, run.errors
+
+
+@pytest.mark.parametrize("megabytes", [900, 1000, 1200, 1500, 2000, 4000])
+def test_a_limit_of_memory_ends_the_run_or_leaves_it_alone(tmp_path, megabytes):
+    """OpenBLAS tries for ever to allocate its buffer."""
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_AS, (megabytes << 20, megabytes << 20))
+
+    done = subprocess.run([os.environ["SQUEAL"], OSCILLATOR, "--set", "cycle.enabled=false", "--output", tmp_path / "out"],
+                          capture_output=True, text=True, timeout=60, preexec_fn=limit)
+    assert done.returncode in (0, 1)
+    if done.returncode == 1:
+        assert "memory" in done.stderr and "ulimit -v" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+
+
+@pytest.mark.parametrize("force", [1e11, 1e14])
+def test_large_reactions_do_not_hold_up_the_estimate(squeal, force):
+    """The tolerance of its quadrature is never below the rounding of what it adds."""
+    run = squeal(OSCILLATOR, "--set", f"force.0.vector=[0,{-force},0]", "--set", "transient.enabled=false", "--set",
+                 "cycle.enabled=false", ranks=1)
+    assert run.code in (0, 2), run.errors
+    assert run.report["timings"]["estimate"] < 5
