@@ -6,6 +6,7 @@
 /// needed so that it is counter-clockwise seen from outside the solid that has the same corners.
 #include "squeal/mesh/build.hpp"
 
+#include "conformity.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/shapes.hpp"
 
@@ -294,6 +295,7 @@ Mesh build_mesh(const FileMesh& file, const Scene& scene)
   read_elements(file, scene, mesh);
   read_surfaces(file, scene, mesh);
   const std::vector<int> number = drop_unused_nodes(mesh);
+  check_conformity(mesh, scene);
   std::map<std::string, std::set<int>> groups;
   for (const ElementBlock& block : file.blocks)
     for (const std::string& name : block.groups)

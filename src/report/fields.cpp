@@ -170,7 +170,7 @@ std::string xdmf_text(const Layout& layout, const std::string& run)
 {
   std::ostringstream text;
   text.precision(17);
-  text << "<?xml version=\"1.0\"?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" []>\n<Xdmf Version=\"2.0\">\n  <Domain>\n"
+  text << "<?xml version=\"1.0\"?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" []>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
        << "    <Information Name=\"run\" Value=\"" << run << "\"/>\n"
        << "    <Grid Name=\"squeal\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
   const std::size_t samples = std::max<std::size_t>(layout.time.size(), 1);

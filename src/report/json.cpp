@@ -314,6 +314,7 @@ std::string report_json(const Report& report, const Scene& scene)
   {
     if (!sentences.empty()) json[stage]["warnings"] = sentences;
   };
+  warn("model", report.model.warnings);
   warn("equilibrium", warnings.equilibrium);
   warn("modes", warnings.modes);
   warn("estimate", warnings.estimate);

@@ -229,7 +229,8 @@ std::string table(const Report& report, const Scene& scene)
   text += row("heard", heard(report, scene));
   text += row("model", format("%lld degrees of freedom, %ld elements, %d contact pairs, %d rank%s",
                               static_cast<long long>(model.dofs), model.elements, model.pairs, model.ranks,
-                              model.ranks == 1 ? "" : "s"));
+                              model.ranks == 1 ? "" : "s")) +
+          warning_rows(model.warnings);
   const Warnings warnings = warnings_of(report);
   text += equilibrium_text(report.equilibrium, model.pairs) + warning_rows(warnings.equilibrium);
   text += modes_text(report.modes) + warning_rows(warnings.modes);

@@ -18,6 +18,12 @@ Sentences of_equilibrium(const Report& report)
   Sentences sentences;
   if (report.equilibrium.uniqueness == Uniqueness::not_assured)
     sentences.push_back("with this much friction other equilibria may exist beside this one");
+  const Equilibrium& equilibrium = report.equilibrium;
+  if (report.model.pairs > 0 && equilibrium.outcome.kind == OutcomeKind::converged &&
+      std::none_of(equilibrium.closed.begin(), equilibrium.closed.end(), [](char closed) { return closed; }))
+    sentences.push_back(
+        "no contact pair is closed: nothing touches, and friction does nothing. Is the gap too large, or "
+        "does a load pull the bodies apart?");
   return sentences;
 }
 
@@ -25,6 +31,12 @@ Sentences of_modes(const Report& report)
 {
   Sentences sentences;
   const Modes& modes = report.modes;
+  if (modes.modes.empty() && modes.outcome.kind == OutcomeKind::converged)
+    sentences.push_back(format("no mode lies below %g Hz", modes.band) +
+                        (report.model.length > 0
+                             ? format(": is mesh.scale right (the model is %.3g m long), and are moduli and densities?",
+                                      report.model.length)
+                             : ": is modes.band right, and are the units of M and K?"));
   if (report.model.rounding_hz > 0.001 * modes.band)
     sentences.push_back(
         format("modes below %.3g Hz are lost in rounding beside the stiffest entry of K: make what is rigid "

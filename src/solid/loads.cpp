@@ -27,6 +27,18 @@ void add_pressure(Vec load, const DofMap& dofs, const Mesh& mesh, const Face& fa
   for (std::size_t i = 0; i < weights.size(); ++i) add_force(load, dofs, face.nodes[i], -pressure * weights[i]);
 }
 
+/// Throws Error for a force of which every part acts on a motion that is held.
+void check_acts(const DofMap& dofs, const std::vector<int>& nodes, const Force& force)
+{
+  if (force.vector == Vec3{}) return;
+  for (const int node : nodes)
+    for (int c = 0; c < 3; ++c)
+      if (force.vector[c] != 0 && !dofs.terms_of(6 * PetscInt{node} + c).empty()) return;
+  throw Error("force on " + force.on +
+              format(": the vector (%g, %g, %g) N", force.vector[0], force.vector[1], force.vector[2]) +
+              " acts on motions only that are held, so it would do nothing: free one of them, or remove the force");
+}
+
 } // namespace
 
 Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const Partition& partition, const DofMap& dofs,
@@ -40,6 +52,7 @@ Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const Partition& 
   for (const Force& force : scene.forces)
   {
     const auto nodes = named_nodes(mesh, force.on, "force");
+    check_acts(dofs, nodes, force);
     if (rank != 0) continue;
     for (const int node : nodes) add_force(load, dofs, node, (1. / static_cast<double>(nodes.size())) * force.vector);
   }

@@ -1,6 +1,7 @@
 /// Structures given as matrices: M C K F of a folder, in PETSc's binary format.
 #include "matrices.hpp"
 
+#include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/solid/binary.hpp"
 
 #include <cmath>
@@ -88,7 +89,7 @@ Owned<Mat> load_square(const std::filesystem::path& file, PetscInt& size, MPI_Co
 }
 
 /// Throws Error if M has a negative diagonal entry.
-void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
+void check_mass_diagonal(Mat M, const std::filesystem::path& file, MPI_Comm comm)
 {
   Owned<Vec> diagonal;
   check(MatCreateVecs(M, nullptr, diagonal.put()));
@@ -99,6 +100,33 @@ void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
   if (least < 0)
     agree(comm, file.string() + ": diagonal entry " + std::to_string(place) + " is " + std::to_string(least) +
                     "; a mass matrix has none below zero");
+}
+
+/// Throws Error if M has a negative eigenvalue. They are counted for D^-1 M, D the diagonal of M, so that units of
+/// rotations do not matter; rounding of an exported M moves them by about symmetry_tolerance.
+void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
+{
+  Owned<Mat> D;
+  Owned<Vec> diagonal;
+  PetscReal largest = 0;
+  check(MatCreateVecs(M, nullptr, diagonal.put()));
+  check(MatGetDiagonal(M, diagonal));
+  check(VecMax(diagonal, nullptr, &largest));
+  if (largest == 0) largest = 1;
+  PetscScalar* entries = nullptr;
+  PetscInt own = 0;
+  check(VecGetLocalSize(diagonal, &own));
+  check(VecGetArray(diagonal, &entries));
+  for (PetscInt i = 0; i < own; ++i)
+    if (entries[i] == 0) entries[i] = largest; // a motion without mass
+  check(VecRestoreArray(diagonal, &entries));
+  check(MatDuplicate(M, MAT_DO_NOT_COPY_VALUES, D.put()));
+  check(MatDiagonalSet(D, diagonal, INSERT_VALUES));
+  PencilFactor factor(M, D, Symmetry::symmetric, {});
+  if (factor.factorise(-10 * symmetry_tolerance) && factor.negative_pivots() > 0)
+    agree(comm, file.string() + format(": %d of its eigenvalues are negative, so some motion would have a negative "
+                                       "kinetic energy; a mass matrix has none below zero",
+                                       factor.negative_pivots()));
 }
 
 } // namespace
@@ -130,8 +158,9 @@ Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
   structure.M = load_square(folder / "M.petsc", size, comm);
   structure.C = load_square(folder / "C.petsc", size, comm);
   structure.K = load_square(folder / "K.petsc", size, comm);
-  check_mass(structure.M, folder / "M.petsc", comm);
+  check_mass_diagonal(structure.M, folder / "M.petsc", comm);
   share_pattern(structure);
+  check_mass(structure.M, folder / "M.petsc", comm);
   const auto force = read_vector(folder / "F.petsc", comm);
   if (static_cast<PetscInt>(force.size()) != size)
     throw Error((folder / "F.petsc").string() + ": length " + std::to_string(force.size()) + ", but M.petsc is " +

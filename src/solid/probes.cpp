@@ -13,6 +13,19 @@ namespace squeal
 namespace
 {
 
+/// Returns the diagonal of the box around the nodes [m].
+double diagonal(const std::vector<Vec3>& nodes)
+{
+  Vec3 low = nodes.front(), high = nodes.front();
+  for (const Vec3& node : nodes)
+    for (int c = 0; c < 3; ++c)
+    {
+      low[c] = std::min(low[c], node[c]);
+      high[c] = std::max(high[c], node[c]);
+    }
+  return norm(high - low);
+}
+
 /// Returns the node of a probe: of its point or group, the one nearest to its position.
 int probed_node(const Probe& probe, const Mesh& mesh)
 {
@@ -23,7 +36,13 @@ int probed_node(const Probe& probe, const Mesh& mesh)
     throw Error(user + ": group \"" + probe.on + "\" has " + std::to_string(nodes.size()) +
                 " nodes; 'at' says which one is meant");
   const auto distance = [&](int node) { return probe.at ? norm(mesh.nodes[node] - *probe.at) : 0; };
-  return *std::min_element(nodes.begin(), nodes.end(), [&](int a, int b) { return distance(a) < distance(b); });
+  const int nearest =
+      *std::min_element(nodes.begin(), nodes.end(), [&](int a, int b) { return distance(a) < distance(b); });
+  // farther from its group than the structure is long: a slip of units, or of the origin
+  if (const double size = diagonal(mesh.nodes); size > 0 && distance(nearest) > size)
+    throw Error(user + format(": 'at' lies %g m from the nearest node of the group, where the whole mesh measures %g m",
+                              distance(nearest), size));
+  return nearest;
 }
 
 /// Returns N of a probe on "dof:N".
@@ -63,6 +82,9 @@ Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const 
   {
     SparseRow row;
     add_displacement(dofs, probed_node(probe, mesh), probe.direction, row);
+    if (std::all_of(row.begin(), row.end(), [](const auto& entry) { return entry.second == 0; }))
+      throw Error("probe " + probe.name + ": the motion of " + probe.on +
+                  " in its direction is held, so it would read 0");
     return row;
   };
   return matrix_of_probes(probes, row_of, dofs.last - dofs.first, comm);

@@ -22,8 +22,10 @@ struct ModelSummary
   PetscInt dofs = 0;
   long elements = 0;
   int pairs = 0, ranks = 1;
-  double memory_bytes = 0; // largest resident size so far, all ranks together
-  double rounding_hz = 0;  // 1e-6 sqrt(|K|/|M|) / 2 pi: slower modes are lost in rounding
+  double memory_bytes = 0;           // largest resident size so far, all ranks together
+  double length = 0;                 // [m] of the longest side of the box around the mesh; 0 on a matrix scene
+  double rounding_hz = 0;            // 1e-6 sqrt(|K|/|M|) / 2 pi: slower modes are lost in rounding
+  std::vector<std::string> warnings; // of values that are hardly meant
 };
 
 struct Timing

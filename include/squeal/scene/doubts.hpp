@@ -1,0 +1,11 @@
+#pragma once
+/// Values of a scene that are possible but hardly meant.
+#include "squeal/scene/scene.hpp"
+
+namespace squeal
+{
+
+/// A sentence for each material that no solid has, which a slip of units explains.
+std::vector<std::string> doubts_about(const Scene& scene);
+
+} // namespace squeal

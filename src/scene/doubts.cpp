@@ -1,0 +1,45 @@
+/// Bounds of solids (Ashby, Materials Selection in Mechanical Design, charts of moduli and densities): densities from
+/// 20 kg/m3 (foams) to 22 590 (osmium), Young's moduli from 1e4 Pa (gels) to 1.3e12 (diamond), and speeds of sound
+/// sqrt(E/rho) from 10 m/s (soft rubber has 30) to 20 000 (diamond has 18 000).
+#include "squeal/scene/doubts.hpp"
+
+#include "squeal/base/error.hpp"
+
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+bool is_outside(double value, double least, double greatest)
+{
+  return value < least || value > greatest;
+}
+
+/// What is implausible about a material; empty if nothing is.
+std::string doubt_about(const Material& material)
+{
+  const double speed = std::sqrt(material.young / material.density);
+  if (is_outside(material.density, 20, 23000))
+    return format("a density of %g kg/m3 is that of no solid; steel has 7850", material.density);
+  if (is_outside(material.young, 1e4, 1.3e12))
+    return format("a Young's modulus of %g Pa is that of no solid; steel has 2.1e11", material.young);
+  if (is_outside(speed, 10, 20000))
+    return format("sound would travel at %.3g m/s by its modulus and density; in steel it does at 5200", speed);
+  return {};
+}
+
+} // namespace
+
+std::vector<std::string> doubts_about(const Scene& scene)
+{
+  std::vector<std::string> doubts;
+  for (const Part& part : scene.parts)
+    if (const std::string doubt = doubt_about(part.material); !doubt.empty())
+      doubts.push_back("part '" + part.name + "': " + doubt + ". Are its units Pa and kg/m3?");
+  return doubts;
+}
+
+} // namespace squeal
