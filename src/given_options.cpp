@@ -34,16 +34,8 @@ bool is_option(const std::string& word)
 Strings words_in(const std::string& text)
 {
   Strings words;
-  std::istringstream lines(text);
-  for (std::string line, word; std::getline(lines, line);)
-  {
-    std::istringstream stream(line);
-    for (bool first = true; stream >> word; first = false)
-    {
-      if (word[0] == '#' || (first && (word[0] == '!' || word[0] == '%'))) break;
-      words.push_back(word);
-    }
-  }
+  std::istringstream stream(text);
+  for (std::string word; stream >> word;) words.push_back(word);
   return words;
 }
 
@@ -68,21 +60,36 @@ public:
     std::string text(largest_file + 1, '\0');
     stream.read(text.data(), static_cast<std::streamsize>(text.size()));
     text.resize(static_cast<std::size_t>(stream.gcount()));
-    const Strings words = words_in(text);
     if (text.size() > largest_file || text.find('\0') != std::string::npos)
       given.problem = "file " + shortened(name) + ": it holds no options";
     else if (++files_ > most_files)
       given.problem = "option -options_file " + shortened(name) + ": more than 20 files name one another";
-    else if (!words.empty() && !is_option(words[0]) && words[0] != "alias")
-      given.problem = "file " + shortened(name) + ": '" + shortened(words[0]) + "' is no option";
-    if (!given.problem.empty() || words.empty()) return;
-    given.sources.push_back("file " + shortened(name));
-    examine(words, " (in " + shortened(name) + ")");
+    else if (!words_in(text).empty())
+      given.sources.push_back("file " + shortened(name));
+    std::istringstream lines(text);
+    int number = 0;
+    for (std::string line; given.problem.empty() && std::getline(lines, line);)
+      examine_line(words_in(line), "file " + shortened(name) + ", line " + std::to_string(++number));
   }
 
   GivenOptions given;
 
 private:
+  /// An option and its value, or an alias, and then perhaps a comment.
+  void examine_line(const Strings& words, const std::string& place)
+  {
+    const auto end = std::find_if(words.begin(), words.end(), [](const std::string& word) { return word[0] == '#'; });
+    const Strings line(words.begin(), end);
+    if (line.empty() || line[0][0] == '!' || line[0][0] == '%') return;
+    if (line[0] == "alias" && line.size() == 3) return;
+    if (!is_option(line[0]))
+      given.problem = place + ": '" + shortened(line[0]) + "' is no option";
+    else if (line.size() > 2 || (line.size() == 2 && is_option(line[1])))
+      given.problem = place + ": it must hold one option and its value, but goes on with " + shortened(line.back());
+    else
+      examine_option(line[0].substr(1), line.size() > 1 ? line[1] : "", " (" + place + ")");
+  }
+
   void examine_option(const std::string& name, const std::string& value, const std::string& source)
   {
     std::string problem = problem_of_option_name(name);

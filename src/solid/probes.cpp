@@ -38,8 +38,8 @@ int probed_node(const Probe& probe, const Mesh& mesh)
   const auto distance = [&](int node) { return probe.at ? norm(mesh.nodes[node] - *probe.at) : 0; };
   const int nearest =
       *std::min_element(nodes.begin(), nodes.end(), [&](int a, int b) { return distance(a) < distance(b); });
-  // farther from its group than the structure is long: a slip of units, or of the origin
-  if (const double size = diagonal(mesh.nodes); size > 0 && distance(nearest) > size)
+  // A position outside may be meant, to name an end; one beyond 100 lengths of the mesh is a slip, of units say.
+  if (const double size = diagonal(mesh.nodes); size > 0 && distance(nearest) > 100 * size)
     throw Error(user + format(": 'at' lies %g m from the nearest node of the group, where the whole mesh measures %g m",
                               distance(nearest), size));
   return nearest;

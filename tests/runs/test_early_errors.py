@@ -59,6 +59,9 @@ def test_options_say_where_they_come_from(tmp_path):
     assert "file .petscrc" in run_here(tmp_path).stdout
     assert "file .petscrc" not in run_here(tmp_path, "-skip_petscrc").stdout
     assert "PETSC_OPTIONS" in run_here(tmp_path, PETSC_OPTIONS="-cycle_clamp 0.2").stdout
+    (tmp_path / ".petscrc").write_text("-cycle_clamp 0.2 -cycle_stall 3\n")
+    done = run_here(tmp_path)
+    assert done.returncode == 1 and "one option" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
     (tmp_path / ".petscrc").write_text("-history /no/such/h\n")
     done = run_here(tmp_path)
     assert done.returncode == 1 and ".petscrc" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
