@@ -12,6 +12,26 @@ namespace squeal
 namespace
 {
 
+/// Sentences about elements that are too stiff and slave surfaces that face nothing.
+std::vector<std::string> warnings_of(const Model& model)
+{
+  std::vector<std::string> sentences;
+  if (const long count = std::ranges::count(model.mesh.elements, Shape::tet4, &Element::shape); count > 0)
+    sentences.push_back(
+        format("%ld 4-node tetrahedra are too stiff: set Mesh.ElementOrder = 2 for 10-node ones", count));
+  for (std::size_t i = 0; i < model.coverage.size(); ++i)
+  {
+    const Coverage& c = model.coverage[i];
+    const Vec3& at = c.uncovered_at;
+    constexpr double rounding = 1e-6; // the tolerance of coincident surfaces
+    if (c.covered < (1 - rounding) * c.area)
+      sentences.push_back(format("%.3g %% of the slave surface of contact %zu face nothing, most of it around (%g, %g, "
+                                 "%g): no force passes there",
+                                 100 * (1 - c.covered / c.area), i, at[0], at[1], at[2]));
+  }
+  return sentences;
+}
+
 Model model_of_matrices(const Scene& scene, MPI_Comm comm)
 {
   Model model;
@@ -25,11 +45,12 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
 {
   Model model;
   model.mesh = std::move(mesh);
-  const std::vector<NodePair> pairs = match_pairs(model.mesh, scene.contacts);
-  const Partition partition = partition_mesh(model.mesh, pairs, comm);
+  const ContactPairs contact = make_pairs(model.mesh, scene);
+  const Partition partition = partition_mesh(model.mesh, contact.pairs, comm);
   model.dofs = number_dofs(model.mesh, scene, partition, comm);
   model.structure = assemble(model.mesh, scene, partition, model.dofs, comm);
-  model.interface = make_interface(model.mesh, pairs, scene, model.dofs, comm);
+  model.interface = make_interface(contact.pairs, scene, model.dofs, comm);
+  model.coverage = contact.coverage;
   model.probes = probe_rows(scene.probes, model.mesh, model.dofs, comm);
   return model;
 }
@@ -58,6 +79,8 @@ ModelSummary summary_of(const Model& model, MPI_Comm comm)
   check(MatGetSize(model.structure.K, &summary.dofs, nullptr));
   summary.elements = model.structure.elements;
   summary.pairs = model.interface.pairs;
+  summary.coverage = model.coverage;
+  summary.warnings = warnings_of(model);
   summary.ranks = ranks_of(comm);
   for (int c = 0; c < 3 && !model.mesh.nodes.empty(); ++c)
   {

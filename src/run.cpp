@@ -230,6 +230,14 @@ ExitCode exit_code_of(const Report& report)
   return ExitCode::converged;
 }
 
+/// The summary with the warnings that follow from the scene.
+ModelSummary summary_with_doubts(const Model& model, const Scene& scene, MPI_Comm comm)
+{
+  ModelSummary summary = summary_of(model, comm);
+  for (const std::string& doubt : doubts_about(scene)) summary.warnings.push_back(doubt);
+  return summary;
+}
+
 void print_model(const ModelSummary& model, MPI_Comm comm)
 {
   if (rank_of(comm) == 0)
@@ -246,8 +254,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   Report report;
   report.run = results.run();
   const Model model = timed(report, "model", comm, [&] { return build_model(scene, comm); });
-  report.model = summary_of(model, comm);
-  report.model.warnings = doubts_about(scene);
+  report.model = summary_with_doubts(model, scene, comm);
   print_model(report.model, comm);
   if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options), comm));
 
@@ -276,8 +283,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   report.model.memory_bytes = peak_memory(comm);
   const ExitCode code = exit_code_of(report);
   report.exit_code = static_cast<int>(code);
-  write_results(report, scene, {model.mesh, model.dofs, model.structure, model.interface.nodes}, results.partial(),
-                comm);
+  write_results(report, scene, {model.mesh, model.dofs, model.structure, model.interface}, results.partial(), comm);
   results.publish();
   print_table(report, scene, comm);
   if (rank_of(comm) == 0) std::printf("results are in %s\n", results.place().c_str());
@@ -290,9 +296,7 @@ void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
   const Model model = build_model(scene, comm);
   if (rank_of(comm) == 0)
     std::printf("# the scene, every default written out\n%s\n# the model\n", resolved_scene(scene).c_str());
-  ModelSummary summary = summary_of(model, comm);
-  summary.warnings = doubts_about(scene);
-  print_model(summary, comm);
+  print_model(summary_with_doubts(model, scene, comm), comm);
   const Forecast forecast = forecast_of(model, scene, options);
   if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());
   const std::string problem = problem_of(forecast, comm);

@@ -12,6 +12,7 @@ struct Model
   DofMap dofs; // empty on a matrix scene
   Structure structure;
   Interface interface;
+  std::vector<Coverage> coverage; // one a contact; empty on a matrix scene
   Owned<Mat> probes; // a row per probe of the scene
 };
 

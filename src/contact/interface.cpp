@@ -55,8 +55,8 @@ std::vector<Vec3> tangent_axes(const Contact& contact, const Vec3& normal, const
 std::string where(const Interface& interface, int pair)
 {
   std::string text = "pair " + std::to_string(pair);
-  if (interface.position.empty()) return text;
-  const Vec3& at = interface.position[static_cast<std::size_t>(pair)];
+  if (interface.geometry.empty()) return text;
+  const Vec3& at = interface.geometry[static_cast<std::size_t>(pair)].position;
   return text + " at (" + std::to_string(at[0]) + ", " + std::to_string(at[1]) + ", " + std::to_string(at[2]) + ")";
 }
 
@@ -88,8 +88,7 @@ void check_interface(const Interface& interface, const std::string& source, MPI_
 
 } // namespace
 
-Interface make_interface(const Mesh& mesh, const std::vector<NodePair>& pairs, const Scene& scene, const DofMap& dofs,
-                         MPI_Comm comm)
+Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm)
 {
   Interface interface;
   interface.pairs = static_cast<int>(pairs.size());
@@ -101,24 +100,22 @@ Interface make_interface(const Mesh& mesh, const std::vector<NodePair>& pairs, c
   const auto [first, last] = local_range(interface.pairs, comm);
   for (PetscInt i = 0; i < interface.pairs; ++i)
   {
-    const NodePair& pair = pairs[static_cast<std::size_t>(i)];
+    const ContactPair& pair = pairs[static_cast<std::size_t>(i)];
     const Contact& contact = scene.contacts[static_cast<std::size_t>(pair.contact)];
-    const Vec3& at = mesh.nodes[static_cast<std::size_t>(pair.a)];
+    const Vec3& at = pair.position;
     const Vec3 velocity = tangential(drive_velocity(contact, at), pair.normal);
     std::vector<Vec3> axes = tangent_axes(contact, pair.normal, velocity);
     axes.resize(static_cast<std::size_t>(interface.directions)); // a plane contact beside spatial ones: no second row
     for (const Vec3& axis : axes) interface.drive.push_back(dot(velocity, axis));
-    interface.position.push_back(at);
-    interface.contact.push_back(pair.contact);
-    interface.nodes.push_back({{pair.b, 1}, {pair.a, -1}});
+    interface.geometry.push_back(pair);
+    interface.tangents.push_back({axes[0], axes.size() > 1 ? axes[1] : Vec3{}});
     interface.gap.push_back(contact.gap + pair.gap);
     if (i < first || i >= last) continue;
     axes.insert(axes.begin(), pair.normal);
     for (const Vec3& axis : axes)
     {
       rows.emplace_back();
-      for (const auto& [node, weight] : interface.nodes.back())
-        add_displacement(dofs, node, weight * axis, rows.back());
+      for (const auto& [node, weight] : pair.nodes) add_displacement(dofs, node, weight * axis, rows.back());
     }
   }
   interface.B = matrix_of_rows(rows, dofs.last - dofs.first, comm);

@@ -25,8 +25,6 @@ std::string remedy(int gmsh_type)
 {
   switch (gmsh_type)
   {
-  case 4:
-    return "4-node tetrahedra lock: set Mesh.ElementOrder = 2 for 10-node ones";
   case 12:
     return "set Mesh.SecondOrderIncomplete = 1 for 20-node bricks";
   case 9:
@@ -34,7 +32,7 @@ std::string remedy(int gmsh_type)
   case 16:
     return "shells are 4- and 3-node: set Mesh.ElementOrder = 1";
   default:
-    return "squeal has 8- and 20-node bricks, 6-node wedges, 10-node tetrahedra, 4- and 3-node shells";
+    return "squeal has 8- and 20-node bricks, 6-node wedges, 4- and 10-node tetrahedra, 4- and 3-node shells";
   }
 }
 
@@ -226,7 +224,7 @@ void add_faces(const ElementBlock& block, const std::string& name, const UsedSur
   std::vector<Face>& faces = mesh.surfaces[name];
   for (std::size_t first = 0; first < block.nodes.size(); first += n)
   {
-    Face face{*shape, {}};
+    Face face{*shape, {}, false};
     std::copy_n(block.nodes.begin() + first, n, face.nodes.begin());
     const auto side = sides.find(sorted_corners({face.nodes.begin(), face.nodes.begin() + corners}));
     if (side == sides.end())
@@ -236,6 +234,7 @@ void add_faces(const ElementBlock& block, const std::string& name, const UsedSur
     }
     between_solids += side->second.solids > 1;
     orient_outward(face, side->second);
+    face.of_shell = side->second.solids == 0;
     faces.push_back(face);
   }
   if (without_element && used.all.count(name))

@@ -1,7 +1,8 @@
 /// Partition of the mesh by METIS (Karypis and Kumar 1998).
 ///
-/// Graph: two nodes are neighbours when an element has both. The nodes of a contact pair are merged into one vertex, so
-/// that both have the same owner. The weight of a vertex is the number of its nodal degrees of freedom.
+/// Graph: two nodes are neighbours when an element has both. The slave node of a contact pair and the master node of
+/// largest weight are merged into one vertex, so that both have the same owner. The weight of a vertex is the number of
+/// its nodal degrees of freedom.
 #include "squeal/mesh/partition.hpp"
 
 #include "squeal/base/error.hpp"
@@ -23,8 +24,8 @@ struct Vertices
   int count = 0;
 };
 
-/// Merges the nodes of each pair, and of pairs that share a node, into one vertex by union-find.
-Vertices merge_pairs(std::size_t nodes, const std::vector<NodePair>& pairs)
+/// Merges the two heaviest nodes of each pair, and of pairs that share one, into one vertex by union-find.
+Vertices merge_pairs(std::size_t nodes, const std::vector<ContactPair>& pairs)
 {
   std::vector<int> parent(nodes);
   std::iota(parent.begin(), parent.end(), 0);
@@ -33,9 +34,9 @@ Vertices merge_pairs(std::size_t nodes, const std::vector<NodePair>& pairs)
     while (parent[node] != node) node = parent[node] = parent[parent[node]];
     return node;
   };
-  for (const NodePair& pair : pairs)
+  for (const ContactPair& pair : pairs)
   {
-    const int a = root(pair.a), b = root(pair.b);
+    const int a = root(pair.rotor_node), b = root(pair.stator_node);
     parent[std::max(a, b)] = std::min(a, b);
   }
   Vertices vertices{std::vector<int>(nodes), 0};
@@ -118,7 +119,7 @@ int most_frequent(std::vector<int> values)
 
 } // namespace
 
-Partition partition_mesh(const Mesh& mesh, const std::vector<NodePair>& pairs, MPI_Comm comm)
+Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs, MPI_Comm comm)
 {
   int ranks = 1;
   MPI_Comm_size(comm, &ranks);

@@ -121,6 +121,7 @@ const Quadrature& stiffness_rule(Shape shape)
                                                          {Shape::hex20, cube(3)},
                                                          {Shape::wedge6, extruded(inner_triangle(), 2)},
                                                          {Shape::tet10, four_point_tetrahedron()},
+                                                         {Shape::tet4, {{{0.25, 0.25, 0.25}, 1. / 6}}},
                                                          {Shape::shell4, square(2)},
                                                          {Shape::shell3, mid_side_triangle()}});
   return rules.at(shape);
@@ -132,9 +133,23 @@ const Quadrature& mass_rule(Shape shape)
                                                          {Shape::hex20, cube(3)},
                                                          {Shape::wedge6, extruded(collapsed_triangle(3), 3)},
                                                          {Shape::tet10, collapsed_tetrahedron(4)},
+                                                         {Shape::tet4, four_point_tetrahedron()},
                                                          {Shape::shell4, square(3)},
                                                          {Shape::shell3, collapsed_triangle(3)}});
   return rules.at(shape);
+}
+
+const Quadrature& triangle_rule(int n)
+{
+  static const std::array<Quadrature, 2> rules = []
+  {
+    std::array<Quadrature, 2> result;
+    for (const int points : {3, 4})
+      for (const auto& [xi, weight] : collapsed_triangle(points))
+        result[points - 3].push_back({xi, weight, shape_functions(FaceShape::triangle3, xi)});
+    return result;
+  }();
+  return rules.at(n - 3);
 }
 
 const Quadrature& area_rule(FaceShape shape)

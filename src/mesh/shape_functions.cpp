@@ -174,6 +174,8 @@ ShapeFunctions shape_functions(Shape shape, const Eigen::Vector3d& xi)
     return linear_wedge(xi);
   case Shape::tet10:
     return quadratic_simplex(mid_sides(Shape::tet10), 3, xi);
+  case Shape::tet4:
+    return linear_simplex(3, xi);
   case Shape::shell4:
     return shape_functions(FaceShape::quad4, xi);
   default:

@@ -36,7 +36,8 @@ struct Topology
 constexpr Topology topologies[] = {
     {Shape::hex8, 5, 8, hex_mirror, {}, hex_faces},       {Shape::hex20, 17, 8, hex_mirror, hex_sides, hex_faces},
     {Shape::wedge6, 6, 6, wedge_mirror, {}, wedge_faces}, {Shape::tet10, 11, 4, tet_mirror, tet_sides, tet_faces},
-    {Shape::shell4, 3, 4, quad_mirror, {}, {}},           {Shape::shell3, 2, 3, triangle_mirror, {}, {}},
+    {Shape::tet4, 4, 4, tet_mirror, {}, tet_faces},       {Shape::shell4, 3, 4, quad_mirror, {}, {}},
+    {Shape::shell3, 2, 3, triangle_mirror, {}, {}},
 };
 
 struct FaceTopology

@@ -34,6 +34,8 @@ XdmfShape xdmf_shape(Shape shape)
     return {8, {0, 1, 2, 3, 4, 5}};
   case Shape::hex20:
     return {48, {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15}};
+  case Shape::tet4:
+    return {6, {0, 1, 2, 3}};
   case Shape::tet10:
     return {38, {0, 1, 2, 3, 4, 5, 6, 7, 9, 8}};
   case Shape::shell4:
@@ -125,22 +127,77 @@ private:
   Owned<Vec> whole_;
 };
 
-/// Reactions of the equilibrium at the nodes of the pairs; a node of several pairs has their sum.
+/// Reactions of the equilibrium at the nodes of the pairs: those of a pair at its own node, and by their weights at the
+/// nodes of the other side. Either side has the sum of all.
 void write_contact(Hdf5File& file, const Equilibrium& equilibrium, const FieldNodes& nodes, Layout& layout)
 {
   const PairView reactions(equilibrium.reactions, equilibrium.directions);
-  if (nodes.pairs.empty() || reactions.pairs() != nodes.pairs.size()) return;
-  std::vector<double> normal(nodes.mesh.nodes.size(), 0), friction(nodes.mesh.nodes.size(), 0);
-  for (std::size_t i = 0; i < nodes.pairs.size(); ++i)
-    for (const auto& [node, weight] : nodes.pairs[i])
-    {
-      normal[static_cast<std::size_t>(node)] += std::abs(weight) * reactions.normal(i);
-      friction[static_cast<std::size_t>(node)] += std::abs(weight) * length(reactions.tangential(i));
-    }
+  const std::vector<ContactPair>& pairs = nodes.interface.geometry;
+  if (pairs.empty() || reactions.pairs() != pairs.size()) return;
+  std::vector<double> normal(nodes.mesh.nodes.size(), 0), friction = normal, area = normal, pressure = normal;
+  const auto add = [&](std::size_t i, int number, double share)
+  {
+    const auto node = static_cast<std::size_t>(number);
+    normal[node] += share * reactions.normal(i);
+    friction[node] += share * length(reactions.tangential(i));
+    pressure[node] += std::abs(share) * reactions.normal(i);
+    area[node] += std::abs(share) * pairs[i].area;
+  };
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+  {
+    const auto own = static_cast<std::size_t>(pairs[i].slave_nodes);
+    const double sign = pairs[i].node == pairs[i].stator_node ? -1 : 1; // of the other side's weights
+    add(i, pairs[i].node, 1);
+    for (std::size_t k = own; k < pairs[i].nodes.size(); ++k)
+      add(i, pairs[i].nodes[k].node, sign * pairs[i].nodes[k].weight);
+  }
+  for (std::size_t node = 0; node < area.size(); ++node)
+    pressure[node] = area[node] > 0 ? pressure[node] / area[node] : 0;
   file.write("equilibrium/normal_reaction", {normal.size()}, normal, "N");
   file.write("equilibrium/friction_reaction", {friction.size()}, friction, "N");
+  file.write("equilibrium/pressure", {pressure.size()}, pressure, "Pa");
+  layout.still.push_back({"contact pressure at equilibrium [Pa]", "equilibrium/pressure", "Node", 1});
   layout.still.push_back({"normal reaction at equilibrium [N]", "equilibrium/normal_reaction", "Node", 1});
   layout.still.push_back({"friction at equilibrium [N]", "equilibrium/friction_reaction", "Node", 1});
+}
+
+/// The pairs, one a row, with the reactions and pressures of the equilibrium where there is one.
+void write_pairs(Hdf5File& file, const Equilibrium& equilibrium, const Interface& interface)
+{
+  const std::vector<ContactPair>& pairs = interface.geometry;
+  const std::size_t n = pairs.size();
+  if (n == 0) return;
+  std::vector<int> node, contact;
+  std::vector<double> position, normal, first, second, area, reaction, pressure;
+  const auto add = [](std::vector<double>& rows, const auto& entries)
+  { rows.insert(rows.end(), entries.begin(), entries.end()); };
+  const bool is_solved = equilibrium.reactions.size() == interface.size();
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    const ContactPair& pair = pairs[i];
+    node.push_back(pair.node);
+    contact.push_back(pair.contact);
+    add(position, pair.position);
+    add(normal, pair.normal);
+    add(first, interface.tangents[i][0]);
+    add(second, interface.tangents[i][1]);
+    area.push_back(pair.area);
+    if (!is_solved) continue;
+    const PairVector r = PairView(equilibrium.reactions, equilibrium.directions).vector(i);
+    add(reaction, r);
+    pressure.push_back(pair.area > 0 ? r[0] / pair.area : 0);
+  }
+  file.write("pairs/node", {n}, node, "index in mesh/nodes, of the slave side");
+  file.write("pairs/contact", {n}, contact, "index of the scene's contact");
+  file.write("pairs/position", {n, 3}, position, "m");
+  file.write("pairs/normal", {n, 3}, normal, "-");
+  file.write("pairs/tangent_1", {n, 3}, first, "-");
+  file.write("pairs/tangent_2", {n, 3}, second, "-");
+  file.write("pairs/area", {n}, area, "m2");
+  file.write("pairs/gap", {n}, interface.gap, "m");
+  if (!is_solved) return;
+  file.write("pairs/reaction", {n, 3}, reaction, "N");
+  file.write("pairs/pressure", {n}, pressure, "Pa");
 }
 
 std::string data_item(const std::string& data, const std::string& dimensions, const char* type)
@@ -231,7 +288,12 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
   if (scene.matrices) return;
   Layout layout;
   std::optional<Hdf5File> file; // on rank 0
-  on_rank_zero(comm, [&] { write_mesh(file.emplace(place, report.run), nodes.mesh, layout); });
+  on_rank_zero(comm,
+               [&]
+               {
+                 write_mesh(file.emplace(place, report.run), nodes.mesh, layout);
+                 write_pairs(*file, report.equilibrium, nodes.interface);
+               });
   const Gather gather(nodes);
   if (report.equilibrium.u.get())
   {

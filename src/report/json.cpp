@@ -269,6 +269,18 @@ Json branch_entry(const Report& report, const Scene& scene)
   return entry;
 }
 
+/// What of each contact's slave surface faces the other one.
+void add_coverage(const std::vector<Coverage>& coverage, const Scene& scene, Json& model)
+{
+  for (std::size_t i = 0; i < coverage.size(); ++i)
+    model["contacts"].push_back({{"rotor", scene.contacts[i].rotor},
+                                 {"stator", scene.contacts[i].stator},
+                                 {"slave_area", coverage[i].area},
+                                 {"covered_area", coverage[i].covered},
+                                 {"closed_mismatch", coverage[i].closed},
+                                 {"offset", coverage[i].offset}});
+}
+
 Json attractors_entry(const Report& report)
 {
   Json entry = entry_of(report.attractors.outcome);
@@ -293,6 +305,7 @@ std::string report_json(const Report& report, const Scene& scene)
                    {"ranks", report.model.ranks},
                    {"memory_bytes", report.model.memory_bytes},
                    {"rounding_hz", report.model.rounding_hz}};
+  add_coverage(report.model.coverage, scene, json["model"]);
   const double factor = std::max(report.transient.factor_seconds, report.cycle.costs.factor_seconds);
   if (factor > 0) // A was factored: what one step size costs before the first step
   {

@@ -146,8 +146,6 @@ private:
     }
     if (is_point(contact.rotor) && !contact.normal)
       fail(&contact.rotor, "[[contact]] between points needs the key 'normal', out of the rotor into the stator");
-    if (contact.reach > 0 && !contact.normal)
-      fail(&contact.reach, "[[contact]] with a reach needs the key 'normal', along which partners face each other");
     if (contact.rotation && contact.velocity != Vec3{})
       fail(&contact.velocity, "[[contact]] rotation and velocity exclude each other: keep one");
     if (!contact.rotation && contact.velocity == Vec3{} && scene_.friction.coefficient > 0)

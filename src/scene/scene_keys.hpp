@@ -92,7 +92,7 @@ template <class Visit> void for_each_table(Scene& scene, Visit visit)
   visit("support", scene.supports, "fixed motions of a named group or point");
   visit("force", scene.forces, "force on a point, a rigid body or a named group");
   visit("pressure", scene.pressures, "pressure on a named surface");
-  visit("contact", scene.contacts, "two named surfaces of matching meshes, or two points, in contact with friction");
+  visit("contact", scene.contacts, "two named surfaces or two points in contact with friction");
   visit("friction", scene.friction, "Coulomb's law at every contact");
   visit("damping", scene.damping, "Rayleigh damping C = alpha M + beta K of parts that give none of their own");
   visit("modes", scene.modes, "stability of the sliding equilibrium");

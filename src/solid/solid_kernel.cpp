@@ -11,7 +11,7 @@
 /// motion the frequency of a bent element is wrong by (k L)^2 / 12.
 ///
 /// Caveats: wedge6 is stiff in bending within the plane of its triangles, as the constant-strain triangle is; it is for
-/// filling, not for beams. hex8 is exact in bending as a parallelepiped and stiffer when tapered (MacNeal 1987), as all
+/// filling, not for beams. tet4 has constant strains and is stiff in all bending. hex8 is exact in bending as a parallelepiped and stiffer when tapered (MacNeal 1987), as all
 /// 8-node bricks are.
 #include "solid_kernel.hpp"
 
@@ -152,6 +152,8 @@ template <class Visit> auto visit_solid(Shape shape, Visit visit)
     return visit.template operator()<6, 4>();
   case Shape::hex20:
     return visit.template operator()<20, 0>();
+  case Shape::tet4:
+    return visit.template operator()<4, 0>();
   default:
     return visit.template operator()<10, 0>();
   }

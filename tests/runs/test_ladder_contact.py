@@ -73,7 +73,8 @@ def test_a_uniform_pressure_passes_through_a_skew_interface(converged, tmp_path,
 
 
 @both
-def test_faces_with_negative_nodal_weights_are_refused(squeal, tmp_path, ranks):
+def test_quadratic_faces_carry_a_uniform_pressure(converged, tmp_path, ranks):
+    """One 20-node brick on another: pressure over area of every pair is what presses on top, 1e-10."""
     mesh = Mesh()
     for name, low in (("base", 0), ("block", 1)):
         nodes = mesh.add_nodes(lattice((2, 2, 2), lambda x, y, z: (x, y, low + z)))
@@ -81,10 +82,20 @@ def test_faces_with_negative_nodal_weights_are_refused(squeal, tmp_path, ranks):
         face = nodes[:, :, 0 if low else 2]
         mesh.add(name + ":face", "quad8", [[face[i, j] for i, j in ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2),
                                                                     (0, 1))]])
-    run = at_rest(squeal, tmp_path, ranks, mesh, part=[{"name": name, **STEEL} for name in ("base", "block")],
-                  contact=[{"rotor": "base:face", "stator": "block:face"}])
-    assert run.code == 1 and len(run.messages) == 1
-    assert "8-node faces, whose consistent nodal forces are not all positive" in run.messages[0]
+        end = nodes[:, :, 2 if low else 0]
+        mesh.add(name + ":end", "quad8", [[end[i, j] for i, j in ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2),
+                                                                  (0, 1))]])
+    run = at_rest(converged, tmp_path, ranks, mesh,
+                  part=[{"name": name, "young": 1e9, "poisson": 0.0, "density": 1} for name in ("base", "block")],
+                  contact=[{"rotor": "base:face", "stator": "block:face"}], pressure=[{"on": "block:end", "value": 3e6}],
+                  support=[{"on": "base:end", "fixed": "x y z"}, {"on": "block:end", "fixed": "x y"}])
+    with h5py.File(run.output / "fields.h5") as fields:
+        pairs = fields["pairs"]
+        assert len(pairs["area"]) == 8 and pairs["area"][:].sum() == pytest.approx(1, rel=1e-12)
+        assert pairs["pressure"][:] == pytest.approx(3e6, rel=1e-10)
+        assert pairs["reaction"][:, 0] == pytest.approx(3e6 * pairs["area"][:], rel=1e-10)
+        pressure = fields["equilibrium/pressure"][:]
+        assert sorted(pressure[pressure != 0]) == pytest.approx([3e6] * 16, rel=1e-10)
 
 
 @both

@@ -21,7 +21,7 @@ struct Stack
 {
   Scene scene;
   Mesh mesh;
-  std::vector<NodePair> pairs;
+  std::vector<ContactPair> pairs;
 };
 
 Stack stack()
@@ -51,7 +51,7 @@ Stack stack()
       for (int& node : face.nodes) node += shift;
     s.mesh.surfaces[name] = faces;
   }
-  s.pairs = match_pairs(s.mesh, s.scene.contacts);
+  s.pairs = make_pairs(s.mesh, s.scene).pairs;
   return s;
 }
 
@@ -66,7 +66,7 @@ Joined join(const Stack& s)
   const Partition partition = partition_mesh(s.mesh, s.pairs, world);
   const DofMap dofs = number_dofs(s.mesh, s.scene, partition, world);
   Joined joined{assemble(s.mesh, s.scene, partition, dofs, world), {}};
-  joined.interface = make_interface(s.mesh, s.pairs, s.scene, dofs, world);
+  joined.interface = make_interface(s.pairs, s.scene, dofs, world);
   return joined;
 }
 
@@ -138,7 +138,7 @@ TEST_CASE("a disc that turns drags along rate axis x arm: its own motion slides 
   }
   s.scene.contacts[0].tangents = {{3, 0, 1}, {0, -2, 0}}; // made unit and tangential, kept in sense
   const auto given = check_drive();
-  const Vec3 at = join(s).interface.position[4], v = cross(Vec3{0, 0, 1}, at);
+  const Vec3 at = join(s).interface.geometry[4].position, v = cross(Vec3{0, 0, 1}, at);
   CHECK(given[8] == doctest::Approx(v[0] / norm(v)).epsilon(round_off));
   CHECK(given[9] == doctest::Approx(-v[1] / norm(v)).epsilon(round_off));
 }

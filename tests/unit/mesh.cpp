@@ -1,8 +1,8 @@
 // ranks: 1 2 3
 #include "../support/temporary_folder.hpp"
 #include "squeal/mesh/build.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
 #include "squeal/mesh/mesh_file.hpp"
-#include "squeal/mesh/node_pairs.hpp"
 #include "squeal/mesh/partition.hpp"
 #include "squeal/mesh/script.hpp"
 #include "squeal/mesh/shapes.hpp"
@@ -114,6 +114,8 @@ int gmsh_type(Shape shape)
     return 6;
   case Shape::hex20:
     return 17;
+  case Shape::tet4:
+    return 4;
   default:
     return 11;
   }
@@ -124,7 +126,7 @@ int gmsh_type(Shape shape)
 TEST_CASE("corner faces enclose the reference cell, outward")
 {
   const std::map<Shape, double> volume = {
-      {Shape::hex8, 1}, {Shape::wedge6, 1. / 2}, {Shape::hex20, 1}, {Shape::tet10, 1. / 6}};
+      {Shape::hex8, 1}, {Shape::wedge6, 1. / 2}, {Shape::hex20, 1}, {Shape::tet10, 1. / 6}, {Shape::tet4, 1. / 6}};
   for (const auto& [shape, expected] : volume)
   {
     const std::vector<Vec3> x = reference(shape);
@@ -137,7 +139,7 @@ TEST_CASE("corner faces enclose the reference cell, outward")
 
 TEST_CASE("a solid numbered inside out is mended, mid-sides too")
 {
-  for (const Shape shape : {Shape::hex8, Shape::wedge6, Shape::hex20, Shape::tet10})
+  for (const Shape shape : {Shape::hex8, Shape::wedge6, Shape::hex20, Shape::tet10, Shape::tet4})
   {
     FileMesh file;
     file.nodes = reference(shape);
@@ -177,29 +179,43 @@ TEST_CASE("matching blocks pair node by node: coincident, normal upward, areas t
   const TemporaryFile file(blocks, ".geo");
   const Scene scene = block_scene(file.path());
   const Mesh mesh = read_mesh(scene, comm);
-  const std::vector<NodePair> pairs = match_pairs(mesh, scene.contacts);
+  const std::vector<ContactPair> pairs = make_pairs(mesh, scene).pairs;
   CHECK(pairs.size() == 16);
   double area = 0;
   std::set<int> used;
-  for (const NodePair& pair : pairs)
+  for (const ContactPair& pair : pairs)
   {
-    CHECK(norm(mesh.nodes[pair.a] - mesh.nodes[pair.b]) < 1e-12);
+    CHECK(norm(mesh.nodes[pair.rotor_node] - mesh.nodes[pair.stator_node]) < 1e-12);
     CHECK(norm(pair.normal - Vec3{0, 0, 1}) < 1e-12);
     area += pair.area;
-    used.insert({pair.a, pair.b});
+    used.insert({pair.rotor_node, pair.stator_node});
   }
   CHECK(area == doctest::Approx(1).epsilon(1e-12));
   CHECK(used.size() == 2 * pairs.size());
 }
 
-TEST_CASE("surfaces that do not match say how many nodes, how far and where")
+TEST_CASE("surfaces that face each other on a part of them touch there, and the rest is told")
 {
   const TemporaryFile file(std::string("shift = 0.25;\n") + blocks, ".geo");
   const Scene scene = block_scene(file.path());
-  const Mesh mesh = read_mesh(scene, comm);
-  const std::string text = problem_of([&] { match_pairs(mesh, scene.contacts); });
-  CHECK(has(text, "do not match"));
-  CHECK(has(text, "0.25 m away, from (0, "));
+  const ContactPairs contact = make_pairs(read_mesh(scene, comm), scene);
+  double area = 0;
+  for (const ContactPair& pair : contact.pairs) area += pair.area;
+  CHECK(area == doctest::Approx(0.75).epsilon(1e-12));
+  CHECK(contact.coverage[0].covered == doctest::Approx(0.75).epsilon(1e-12));
+  CHECK(contact.coverage[0].area == doctest::Approx(1).epsilon(1e-12));
+  CHECK(contact.coverage[0].uncovered_at[0] > 1); // the stator hangs over at x = 1
+}
+
+TEST_CASE("surfaces that do not meet say how far they are apart and where, or that they look elsewhere")
+{
+  const TemporaryFile file(std::string("shift = 1.25;\n") + blocks, ".geo");
+  Scene scene = block_scene(file.path());
+  Mesh mesh = read_mesh(scene, comm);
+  CHECK(has(problem_of([&] { make_pairs(mesh, scene); }), "no face of one lies opposite a face of the other"));
+  scene.contacts[0].stator = "base"; // below the low block, which looks down as the high one's face does
+  scene.contacts[0].rotor = "roof";
+  CHECK(has(problem_of([&] { make_pairs(mesh, scene); }), "no face of one"));
 }
 
 TEST_CASE("with a reach, partners face each other along the normal, and their distance is the pair's gap")
@@ -208,37 +224,34 @@ TEST_CASE("with a reach, partners face each other along the normal, and their di
   Scene scene = block_scene(file.path());
   Mesh mesh = read_mesh(scene, comm);
   Contact& contact = scene.contacts[0];
-  const Vec3 up = match_pairs(mesh, scene.contacts).front().normal;
+  const Vec3 up = make_pairs(mesh, scene).pairs.front().normal;
   for (const int node : mesh.node_groups.at(contact.stator)) mesh.nodes[node] = mesh.nodes[node] + 0.01 * up;
-  CHECK(has(problem_of([&] { match_pairs(mesh, scene.contacts); }), "do not match"));
+  const std::string apart = problem_of([&] { make_pairs(mesh, scene); });
+  CHECK(has(apart, "at least 0.01 m apart"));
+  CHECK(has(apart, "give the contact a reach"));
   contact.normal = up;
   contact.reach = 0.02;
-  for (const NodePair& pair : match_pairs(mesh, scene.contacts))
-    CHECK(pair.gap == doctest::Approx(0.01).epsilon(1e-12));
+  for (const ContactPair& pair : make_pairs(mesh, scene).pairs) CHECK(pair.gap == doctest::Approx(0.01).epsilon(1e-12));
   contact.reach = 0.005;
-  CHECK(has(problem_of([&] { match_pairs(mesh, scene.contacts); }), "farther than the contact's reach"));
+  CHECK(has(problem_of([&] { make_pairs(mesh, scene); }), "give the contact a reach"));
   contact.normal = -1 * up;
-  CHECK(has(problem_of([&] { match_pairs(mesh, scene.contacts); }), "the stator inside the rotor"));
+  CHECK(has(problem_of([&] { make_pairs(mesh, scene); }), "turn it"));
+  contact.normal.reset();
+  contact.reach = 0.02;
+  CHECK(make_pairs(mesh, scene).pairs.front().gap == doctest::Approx(0.01).epsilon(1e-12));
+  for (const int node : mesh.node_groups.at(contact.stator)) mesh.nodes[node] = mesh.nodes[node] - 0.015 * up;
+  const std::string inside = problem_of([&] { make_pairs(mesh, scene); });
+  CHECK(has(inside, "0.005 m inside the rotor"));
 }
 
-TEST_CASE("a finer stator is refused even where every rotor node has a partner")
+TEST_CASE("a finer stator has a pair a node, a finer rotor too where it is the slave")
 {
   const TemporaryFile file(std::string("n = 2; top_n = 4;\n") + blocks, ".geo");
-  const Scene scene = block_scene(file.path());
+  Scene scene = block_scene(file.path());
   const Mesh mesh = read_mesh(scene, comm);
-  CHECK(has(problem_of([&] { match_pairs(mesh, scene.contacts); }), "16 of the 25 nodes of 'high_face'"));
-}
-
-TEST_CASE("contact on 8-node faces is refused, on the same mesh that is accepted without it")
-{
-  std::string text = blocks;
-  text.replace(text.find("Mesh.ElementOrder = 1;"), 22, "Mesh.ElementOrder = 2; Mesh.SecondOrderIncomplete = 1;");
-  const TemporaryFile file(text, ".geo");
-  const Scene scene = block_scene(file.path());
-  const Mesh mesh = read_mesh(scene, comm);
-  CHECK(mesh.elements.front().shape == Shape::hex20);
-  CHECK(mesh.surfaces.at("low_face").front().shape == FaceShape::quad8);
-  CHECK(has(problem_of([&] { match_pairs(mesh, scene.contacts); }), "8-node faces"));
+  CHECK(make_pairs(mesh, scene).pairs.size() == 25);
+  scene.contacts[0].slave = SlaveSide::rotor;
+  CHECK(make_pairs(mesh, scene).pairs.size() == 9);
 }
 
 TEST_CASE("a surface with a solid on both sides cannot be in contact")
@@ -275,14 +288,25 @@ TEST_CASE("gmsh's own words reach the message")
   CHECK(has(problem_of([&] { read_mesh(block_scene(file.path()), comm); }), "syntax error"));
 }
 
-TEST_CASE("an empty mesh is an error, and so are tetrahedra that lock")
+TEST_CASE("an empty mesh is an error, and 4-node tetrahedra are read")
 {
   const TemporaryFile empty("Point(1) = {0, 0, 0};\n", ".geo");
   CHECK(has(problem_of([&] { read_mesh(block_scene(empty.path()), comm); }), "no elements"));
   const TemporaryFile tets("SetFactory(\"OpenCASCADE\"); Box(1) = {0, 0, 0, 1, 1, 1};\n"
                            "Physical Volume(\"low\") = {1}; Mesh.MeshSizeMin = 1;\n",
                            ".geo");
-  CHECK(has(problem_of([&] { read_mesh(block_scene(tets.path()), comm); }), "Mesh.ElementOrder = 2"));
+  Scene scene = block_scene(tets.path());
+  scene.parts.pop_back();
+  scene.contacts.clear();
+  const Mesh mesh = read_mesh(scene, comm);
+  double volume = 0;
+  for (const Element& element : mesh.elements)
+  {
+    REQUIRE(element.shape == Shape::tet4);
+    const auto x = [&](int i) { return mesh.nodes[element.nodes[i]]; };
+    volume += dot(x(3) - x(0), cross(x(1) - x(0), x(2) - x(0))) / 6;
+  }
+  CHECK(volume == doctest::Approx(1).epsilon(1e-12));
 }
 
 TEST_CASE("parameters are found in lists, with braces, comments and includes")
@@ -305,10 +329,10 @@ TEST_CASE("a scene of points needs no mesh, and its pair is the two points")
   contact.stator = "pad";
   contact.normal = Vec3{0, 0, 2};
   scene.contacts = {contact};
-  const std::vector<NodePair> pairs = match_pairs(read_mesh(scene, comm), scene.contacts);
+  const std::vector<ContactPair> pairs = make_pairs(read_mesh(scene, comm), scene).pairs;
   CHECK(pairs.size() == 1);
-  CHECK(pairs[0].a == 0);
-  CHECK(pairs[0].b == 1);
+  CHECK(pairs[0].rotor_node == 0);
+  CHECK(pairs[0].stator_node == 1);
   CHECK(pairs[0].normal == Vec3{0, 0, 1});
 }
 
@@ -317,9 +341,10 @@ TEST_CASE("the partition keeps pairs together, is balanced, and the same on ever
   const TemporaryFile file(std::string("n = 12;\n") + blocks, ".geo");
   const Scene scene = block_scene(file.path());
   const Mesh mesh = read_mesh(scene, comm);
-  const std::vector<NodePair> pairs = match_pairs(mesh, scene.contacts);
+  const std::vector<ContactPair> pairs = make_pairs(mesh, scene).pairs;
   const Partition partition = partition_mesh(mesh, pairs, comm);
-  for (const NodePair& pair : pairs) CHECK(partition.node_rank[pair.a] == partition.node_rank[pair.b]);
+  for (const ContactPair& pair : pairs)
+    CHECK(partition.node_rank[pair.rotor_node] == partition.node_rank[pair.stator_node]);
   std::vector<double> share(ranks_of(comm));
   for (const int rank : partition.node_rank) share[rank] += 1. * ranks_of(comm) / mesh.nodes.size();
   for (const double s : share) CHECK(s == doctest::Approx(1).epsilon(0.1)); // METIS allows 3 % and pairs are coarse

@@ -109,7 +109,7 @@ History history_of(std::size_t steps)
 /// Every stage ran.
 FieldNodes nodes_of(const Model& model)
 {
-  return {model.mesh, model.dofs, model.structure, model.interface.nodes};
+  return {model.mesh, model.dofs, model.structure, model.interface};
 }
 
 Report full_report(const Model& model)

@@ -13,8 +13,11 @@ using namespace small_fem;
 namespace
 {
 
-const std::vector<std::pair<std::string, Shape>> solids = {
-    {"hex8", Shape::hex8}, {"wedge6", Shape::wedge6}, {"hex20", Shape::hex20}, {"tet10", Shape::tet10}};
+const std::vector<std::pair<std::string, Shape>> solids = {{"hex8", Shape::hex8},
+                                                           {"wedge6", Shape::wedge6},
+                                                           {"hex20", Shape::hex20},
+                                                           {"tet10", Shape::tet10},
+                                                           {"tet4", Shape::tet4}};
 
 /// Unit cube of 7 bricks, the inner one skew (MacNeal and Harder 1985).
 small_fem::Mesh patch_of_bricks()

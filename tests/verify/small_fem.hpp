@@ -136,10 +136,10 @@ inline Mesh in_shape(const Mesh& bricks, Shape shape)
     return with_middles(
         bricks, shape,
         {{0, 1}, {0, 3}, {0, 4}, {1, 2}, {1, 5}, {2, 3}, {2, 6}, {3, 7}, {4, 5}, {4, 7}, {5, 6}, {6, 7}});
+  case Shape::tet4:
+    return recut(bricks, shape, {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6}, {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}});
   case Shape::tet10:
-    return with_middles(
-        recut(bricks, shape, {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6}, {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}}),
-        shape, {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {2, 3}, {1, 3}});
+    return with_middles(in_shape(bricks, Shape::tet4), shape, {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {2, 3}, {1, 3}});
   default:
     return bricks;
   }

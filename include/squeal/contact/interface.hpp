@@ -11,33 +11,24 @@
 namespace squeal
 {
 
-/// A node that a pair reads.
-struct PairNode
-{
-  int node;
-  double weight; // in the pair's gap; the rotor's nodes have negative ones
-};
-
 struct Interface
 {
   int pairs = 0;
-  int directions = 2;                       // tangential rows a pair: 1 or 2
-  Owned<Mat> B;                             // a row for every entry of a contact vector, by columns of u; AIJ
-  std::vector<double> gap;                  // [m] per pair
-  std::vector<double> drive;                // [m/s] per pair and direction, as TangentView reads it: v_d
-  std::vector<int> contact;                 // per pair, index in Scene::contacts; empty on a matrix scene
-  std::vector<Vec3> position;               // [m] per pair; empty on a matrix scene
-  std::vector<std::vector<PairNode>> nodes; // per pair; empty on a matrix scene
+  int directions = 2;                        // tangential rows a pair: 1 or 2
+  Owned<Mat> B;                              // a row for every entry of a contact vector, by columns of u; AIJ
+  std::vector<double> gap;                   // [m] per pair
+  std::vector<double> drive;                 // [m/s] per pair and direction, as TangentView reads it: v_d
+  std::vector<ContactPair> geometry;         // per pair; empty on a matrix scene
+  std::vector<std::array<Vec3, 2>> tangents; // [-] t1 and t2 per pair; t2 is zero where there is one direction
   FrictionLaw friction;
 
   /// Of a contact vector.
   std::size_t size() const { return static_cast<std::size_t>(pairs) * static_cast<std::size_t>(1 + directions); }
 };
 
-/// Rows n, t1, t2 of every pair: n.(u_b - u_a), t.(u_b - u_a). Tangents: the scene's, else t1 along the drive.
-/// Error: zero drive velocity at a pair where mu > 0.
-Interface make_interface(const Mesh& mesh, const std::vector<NodePair>& pairs, const Scene& scene, const DofMap& dofs,
-                         MPI_Comm comm);
+/// Rows n, t1, t2 of every pair: n.w and t.w, with w the weighted sum of its nodes' displacements. Tangents: the
+/// scene's, else t1 along the drive. Error: zero drive velocity at a pair where mu > 0.
+Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm);
 
 /// B.petsc gap.petsc drive.petsc of a folder; directions = (rows of B) / pairs - 1.
 Interface read_interface(const std::filesystem::path& folder, const Structure& structure, const FrictionLaw& friction,

@@ -18,6 +18,7 @@ enum class Shape
   wedge6,
   hex20,
   tet10,
+  tet4,
   shell4,
   shell3,
 };
@@ -44,6 +45,7 @@ struct Face
 {
   FaceShape shape{};
   std::array<int, 9> nodes{}; // indices in Mesh::nodes; the first node_count(shape) are used
+  bool of_shell = false;      // counter-clockwise as the shell's nodes are, which may be seen from either side
 };
 
 /// Nodes, elements and named sets of them. Nodes of the file come first, then the scene's points, then the reference

@@ -1,6 +1,6 @@
 #pragma once
 /// Distribution of nodes and elements over the ranks.
-#include "squeal/mesh/node_pairs.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
 
 namespace squeal
 {
@@ -12,8 +12,9 @@ struct Partition
   std::vector<int> element_rank; // the rank that owns most of the element's nodes
 };
 
-/// Returns a partition by METIS, the same on every rank. Both nodes of a pair have the same owner. Collective.
+/// Returns a partition by METIS, the same on every rank. The two heaviest nodes of a pair, one of
+/// each side, have the same owner. Collective.
 /// Throws Error if there are more ranks than nodes.
-Partition partition_mesh(const Mesh& mesh, const std::vector<NodePair>& pairs, MPI_Comm comm);
+Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs, MPI_Comm comm);
 
 } // namespace squeal

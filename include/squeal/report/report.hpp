@@ -26,6 +26,7 @@ struct ModelSummary
   double length = 0;                 // [m] of the longest side of the box around the mesh; 0 on a matrix scene
   double rounding_hz = 0;            // 1e-6 sqrt(|K|/|M|) / 2 pi: slower modes are lost in rounding
   std::vector<std::string> warnings; // of values that are hardly meant
+  std::vector<Coverage> coverage;    // one a contact; empty on a matrix scene
 };
 
 struct Timing
@@ -67,7 +68,7 @@ struct FieldNodes
   const Mesh& mesh;
   const DofMap& dofs;
   const Structure& structure;
-  const std::vector<std::vector<PairNode>>& pairs; // Interface::nodes
+  const Interface& interface;
 };
 
 /// Rank 0 prints the table a person reads.

@@ -99,19 +99,34 @@ struct Rotation
   double rate = 0; // [rad/s]
 };
 
-/// Contact of two named surfaces with matching meshes, whose coincident nodes are pairs, or of two named points.
-/// With a reach, the nodes of a pair may be at a distance along the normal, which is added to the gap.
+/// The side of a contact whose nodes have the pairs.
+enum class SlaveSide
+{
+  stator,
+  rotor,
+};
+
+inline constexpr std::array slave_side_words = {"stator", "rotor"};
+
+inline Words words_of(SlaveSide)
+{
+  return slave_side_words;
+}
+
+/// Contact of two named surfaces, whose meshes need not match, or of two named points. Without a reach the surfaces
+/// coincide; with one their distance along the normal is added to the gap.
 /// The sliding velocity of a pair is s = B_t v - v_d (src/README.md, section 1).
 struct Contact
 {
   std::string rotor;                // surface or point that the drive moves
   std::string stator;               // surface or point that slides on it
   double gap = 0;                   // [m] initial gap, positive if open
-  std::optional<Vec3> normal;       // [-] unit, out of the rotor; required for points and a reach, else the surface's
+  std::optional<Vec3> normal;       // [-] unit, out of the rotor; required for points, else the slave surface's
   std::vector<Vec3> tangents;       // [-] one: plane friction along it; two; empty: two chosen from the normal
   std::optional<Rotation> rotation; // of the rotor: v_d is the tangential part of rate axis x (x - centre)
   Vec3 velocity{};                  // [m/s] of the rotor's surface if there is no rotation
-  double reach = 0;                 // [m] largest distance of the nodes of a pair along the normal
+  double reach = 0;                 // [m] largest distance of the surfaces along the normal
+  SlaveSide slave{};                // has one pair a node
 };
 
 /// Coulomb's law.

@@ -1,0 +1,49 @@
+#pragma once
+/// Contact pairs of two surfaces whose meshes need not match (src/README.md, section 1.9).
+#include "squeal/mesh/mesh.hpp"
+
+namespace squeal
+{
+
+/// A node that a pair reads.
+struct PairNode
+{
+  int node;
+  double weight; // in the pair's gap: those of the stator's nodes add up to 1, those of the rotor's to -1
+};
+
+/// A contact pair: its gap opens with the weighted sum of the nodes' displacements, along the normal.
+struct ContactPair
+{
+  int rotor_node = 0, stator_node = 0; // those of largest weight
+  int node = 0;                        // the one of the slave side, to which the pair belongs
+  Vec3 position{};                     // [m] mean of the rotor's nodes with their weights: where the reactions act
+  Vec3 normal{};                       // [-] unit, out of the rotor into the stator
+  double area = 0;                     // [m2] reaction over pressure; 0 for points
+  int contact = 0;                     // index in Scene::contacts
+  double gap = 0;                      // [m] initial distance of the surfaces; 0 for a contact without a reach
+  std::vector<PairNode> nodes;         // the slave side's first
+  int slave_nodes = 1;                 // number of the slave side's
+};
+
+/// What part of a contact's slave surface faces the master surface, and what the curvature of both leaves.
+struct Coverage
+{
+  double area = 0, covered = 0; // [m2] of the slave surface
+  Vec3 uncovered_at{};          // [m] centre of the slave face with the largest uncovered area
+  double closed = 0;            // [m] largest mismatch of the surfaces that a contact without a reach ignores
+  double offset = 0;            // [m] largest tangential distance of the points where a pair's two forces act
+};
+
+struct ContactPairs
+{
+  std::vector<ContactPair> pairs;
+  std::vector<Coverage> coverage; // one a contact; zeros for points
+};
+
+/// Returns the pairs in the order of the contacts, in each by the rotor's nodes.
+/// Throws Error for: a missing surface or point; surfaces that share nodes, lie nowhere within reach of each other,
+/// look the same way or lie inside each other; a slave surface that supports or rigid bodies hold.
+ContactPairs make_pairs(const Mesh& mesh, const Scene& scene);
+
+} // namespace squeal

@@ -1,0 +1,273 @@
+#include "dual_rows.hpp"
+
+#include "squeal/base/error.hpp"
+#include "squeal/mesh/names.hpp"
+#include "squeal/mesh/shapes.hpp"
+
+#include <algorithm>
+#include <boost/geometry.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+namespace geometry = boost::geometry;
+using Corner = geometry::model::point<double, 3, geometry::cs::cartesian>;
+using Box = geometry::model::box<Corner>;
+
+Vec3 vec3(const Eigen::Vector3d& v)
+{
+  return {v(0), v(1), v(2)};
+}
+
+std::vector<int> nodes_of_faces(const std::vector<Face>& faces)
+{
+  std::vector<int> nodes;
+  for (const Face& face : faces) nodes.insert(nodes.end(), nodes_of(face).begin(), nodes_of(face).end());
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  return nodes;
+}
+
+/// int chi_i n dA of each node of a face [m2].
+Eigen::Matrix<double, 3, Eigen::Dynamic> multiplier_vectors(const Face& face, std::span<const Vec3> x)
+{
+  const std::vector<Vec3> weights = face_weights(face.shape, x);
+  const NodePositions phi = position_matrix(weights);
+  Eigen::Matrix<double, 3, Eigen::Dynamic> chi(3, phi.cols());
+  for (int k = 0; k < 3; ++k) chi.row(k) = multiplier_functions(face.shape, phi.row(k).transpose()).transpose();
+  return chi;
+}
+
+/// Sets the nodes' normals, and how far the chords of linear faces may stand off the surface: an arc that turns by
+/// angle between the middle and the end of a chord h stands h angle/4 above it. Twice that is allowed.
+void set_normals(ContactSurface& surface)
+{
+  std::vector<Vec3> sum(surface.nodes.size(), Vec3{});
+  for (std::size_t f = 0; f < surface.faces.size(); ++f)
+  {
+    const auto nodes = nodes_of(surface.faces[f]);
+    std::vector<Vec3> x;
+    for (Eigen::Index i = 0; i < surface.placed[f].x.cols(); ++i) x.push_back(vec3(surface.placed[f].x.col(i)));
+    const auto vectors = multiplier_vectors(surface.faces[f], x);
+    surface.placed[f].normal = vectors.rowwise().sum().normalized();
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+    {
+      Vec3& s = sum[surface.place_of(nodes[i])];
+      s = s + vec3(vectors.col(static_cast<Eigen::Index>(i)));
+    }
+  }
+  for (const Vec3& s : sum) surface.normals.push_back((1 / norm(s)) * s);
+  for (std::size_t f = 0; f < surface.faces.size(); ++f)
+  {
+    PlacedFace& face = surface.placed[f];
+    double angle = 0, size = 0;
+    for (const int node : nodes_of(surface.faces[f]))
+      angle = std::max(angle, norm(surface.normals[surface.place_of(node)] - vec3(face.normal)));
+    for (Eigen::Index i = 0; i < face.x.cols(); ++i)
+      size = std::max(size, (face.x.colwise() - face.x.col(i)).colwise().norm().maxCoeff());
+    face.slack = 0.5 * size * angle;
+  }
+}
+
+Box box_of(const PlacedFace& face, double margin)
+{
+  const Eigen::Vector3d low = face.x.rowwise().minCoeff().array() - margin;
+  const Eigen::Vector3d high = face.x.rowwise().maxCoeff().array() + margin;
+  return {Corner(low(0), low(1), low(2)), Corner(high(0), high(1), high(2))};
+}
+
+/// Faces by their boxes.
+class FaceTree
+{
+public:
+  explicit FaceTree(const std::vector<PlacedFace>& faces)
+  {
+    std::vector<std::pair<Box, int>> boxes;
+    for (std::size_t f = 0; f < faces.size(); ++f)
+    {
+      boxes.emplace_back(box_of(faces[f], 0), static_cast<int>(f));
+      slack_ = std::max(slack_, faces[f].slack);
+    }
+    tree_ = {boxes.begin(), boxes.end()};
+  }
+
+  /// The faces whose boxes come within the limits of this face's, ascending.
+  std::vector<int> near(const PlacedFace& face, const OverlapLimits& limits) const
+  {
+    const double margin =
+        std::max(limits.search, limits.closes ? limits.rounding + face.slack + slack_ : limits.distance);
+    std::vector<int> found;
+    for (auto it = tree_.qbegin(geometry::index::intersects(box_of(face, margin))); it != tree_.qend(); ++it)
+      found.push_back(it->second);
+    std::sort(found.begin(), found.end());
+    return found;
+  }
+
+private:
+  double slack_ = 0; // largest of all faces
+  geometry::index::rtree<std::pair<Box, int>, geometry::index::quadratic<16>> tree_;
+};
+
+/// Adds up the weights of each node.
+void merge(std::vector<PairNode>& nodes)
+{
+  std::stable_sort(nodes.begin(), nodes.end(), [](const PairNode& a, const PairNode& b) { return a.node < b.node; });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    if (kept > 0 && nodes[kept - 1].node == nodes[i].node)
+      nodes[kept - 1].weight += nodes[i].weight;
+    else
+      nodes[kept++] = nodes[i];
+  nodes.resize(kept);
+}
+
+/// Adds what a covered face gives to the rows of its nodes: area, and D_e M_e^-1 int chi N_j for the master nodes.
+void add_face(const CoveredFace& covered, std::span<SlaveRow* const> rows, const ContactSurface& master)
+{
+  const Eigen::LDLT<FaceMatrix> gram(covered.gram);
+  for (const auto& [face, coupling] : covered.masters)
+  {
+    const FaceMatrix weights = covered.area.asDiagonal() * gram.solve(coupling);
+    const auto nodes = nodes_of(master.faces[static_cast<std::size_t>(face)]);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      for (std::size_t j = 0; j < nodes.size(); ++j)
+        rows[i]->master.push_back({nodes[j], weights(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))});
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i]->area += covered.area(static_cast<Eigen::Index>(i));
+}
+
+/// Sets the slave part: of a row the node itself, of a mid-side twice the node less half of each end of its side.
+void set_slave_parts(const ContactSurface& slave, std::vector<SlaveRow>& rows)
+{
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].slave = {{slave.nodes[i], rows[i].area}};
+  for (const Face& face : slave.faces)
+  {
+    auto mid = static_cast<std::size_t>(corner_count(face.shape));
+    for (const auto& [a, b] : side_ends(face.shape))
+    {
+      const int node = face.nodes[mid++];
+      SlaveRow& row = rows[slave.place_of(node)];
+      row.slave = {{node, 2 * row.area}, {face.nodes[a], -0.5 * row.area}, {face.nodes[b], -0.5 * row.area}};
+    }
+  }
+}
+
+void check_single_cover(const CoveredFace& covered, const Face& face, const ContactSurface& slave,
+                        const ContactSurface& master)
+{
+  if (covered.area.sum() <= (1 + 1e-6) * covered.whole.sum()) return;
+  const std::size_t f = &face - slave.faces.data();
+  throw Error("contact surface '" + master.name + "' has faces above each other at " +
+              node_text(face.nodes[0], vec3(slave.placed[f].x.col(0))) +
+              ": name only the faces that the other surface touches, or lower the contact's reach");
+}
+
+} // namespace
+
+std::size_t ContactSurface::place_of(int node) const
+{
+  return static_cast<std::size_t>(std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin());
+}
+
+ContactSurface contact_surface(const Mesh& mesh, const std::string& name)
+{
+  ContactSurface surface{name, named_faces(mesh, name, "contact"), {}, {}, {}, 0};
+  surface.nodes = nodes_of_faces(surface.faces);
+  for (const Face& face : surface.faces)
+  {
+    if (face.shape == FaceShape::quad9)
+      throw Error("contact surface '" + name +
+                  "' has 9-node faces, which no element of squeal has: set "
+                  "Mesh.SecondOrderIncomplete = 1 for 8-node ones");
+    std::vector<Vec3> x;
+    for (const int node : nodes_of(face)) x.push_back(mesh.nodes[node]);
+    surface.placed.push_back({face.shape, position_matrix(x), {}, 0, face.of_shell});
+  }
+  set_normals(surface);
+  Eigen::Vector3d low = surface.placed.front().x.col(0), high = low;
+  for (const PlacedFace& face : surface.placed)
+  {
+    low = low.cwiseMin(face.x.rowwise().minCoeff());
+    high = high.cwiseMax(face.x.rowwise().maxCoeff());
+  }
+  surface.size = (high - low).norm();
+  return surface;
+}
+
+SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits)
+{
+  constexpr double sliver = 1e-8; // share of a face: the rounding of its inverse Gram matrix is 1e-16 over this share
+  const FaceTree tree(master.placed);
+  SlaveRows result{std::vector<SlaveRow>(slave.nodes.size()), std::vector<char>(slave.faces.size(), 0), {}, {}};
+  double most_uncovered = 0;
+  for (std::size_t f = 0; f < slave.faces.size(); ++f)
+  {
+    const PlacedFace& face = slave.placed[f];
+    const CoveredFace covered = cover_face(face, master.placed, tree.near(face, limits), limits, result.findings);
+    check_single_cover(covered, slave.faces[f], slave, master);
+    std::vector<SlaveRow*> rows;
+    for (const int node : nodes_of(slave.faces[f])) rows.push_back(&result.rows[slave.place_of(node)]);
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i]->whole += covered.whole(static_cast<Eigen::Index>(i));
+    const double area = covered.area.sum(), whole = covered.whole.sum();
+    result.coverage.area += whole;
+    result.coverage.covered += area;
+    if (whole - area > most_uncovered)
+      most_uncovered = whole - area, result.coverage.uncovered_at = vec3(face.x.rowwise().mean());
+    if (area < sliver * whole) continue;
+    result.covered[f] = 1;
+    add_face(covered, rows, master);
+  }
+  set_slave_parts(slave, result.rows);
+  for (SlaveRow& row : result.rows) merge(row.master);
+  return result;
+}
+
+std::vector<std::size_t> hand_over(const ContactSurface& slave, const std::vector<Vec3>& x,
+                                   const std::vector<RowFate>& fate, SlaveRows& rows)
+{
+  std::vector<std::vector<std::size_t>> takers(slave.nodes.size());
+  for (std::size_t f = 0; f < slave.faces.size(); ++f)
+    for (const int giver : nodes_of(slave.faces[f]))
+      if (const std::size_t d = slave.place_of(giver); rows.covered[f] && fate[d] == RowFate::given_up)
+        for (const int taker : nodes_of(slave.faces[f]))
+          if (const std::size_t k = slave.place_of(taker); fate[k] == RowFate::kept && rows.rows[k].is_covered())
+            takers[d].push_back(k);
+  std::vector<std::size_t> alone;
+  for (std::size_t d = 0; d < takers.size(); ++d)
+  {
+    if (fate[d] != RowFate::given_up || !rows.rows[d].is_covered()) continue;
+    std::vector<std::size_t>& near = takers[d];
+    if (near.empty())
+    {
+      alone.push_back(d);
+      continue;
+    }
+    std::sort(near.begin(), near.end());
+    near.erase(std::unique(near.begin(), near.end()), near.end());
+    const auto distance = [&](std::size_t k) { return norm(x[slave.nodes[k]] - x[slave.nodes[d]]); };
+    double least = distance(near.front());
+    for (const std::size_t k : near) least = std::min(least, distance(k));
+    std::erase_if(near, [&](std::size_t k) { return distance(k) > 1.01 * least; });
+    const double share = 1 / static_cast<double>(near.size());
+    const SlaveRow& given = rows.rows[d];
+    for (const std::size_t k : near)
+    {
+      SlaveRow& row = rows.rows[k];
+      row.area += share * given.area;
+      for (const auto& [node, weight] : given.slave) row.slave.push_back({node, share * weight});
+      for (const auto& [node, weight] : given.master) row.master.push_back({node, share * weight});
+      merge(row.slave);
+      merge(row.master);
+    }
+  }
+  for (std::size_t d = 0; d < fate.size(); ++d)
+    if (fate[d] == RowFate::given_up && !std::binary_search(alone.begin(), alone.end(), d)) rows.rows[d].area = 0;
+  return alone;
+}
+
+} // namespace squeal

@@ -1,0 +1,62 @@
+#pragma once
+/// Rows of the gap operator by dual multipliers on the covered part of the slave surface (src/README.md, section 1.9).
+#include "face_overlap.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
+
+namespace squeal
+{
+
+/// A named surface in contact.
+struct ContactSurface
+{
+  const std::string& name;
+  const std::vector<Face>& faces;
+  std::vector<int> nodes;         // ascending
+  std::vector<PlacedFace> placed; // one a face
+  std::vector<Vec3> normals;      // [-] of each node, outward, unit
+  double size = 0;                // [m] diagonal of the bounding box
+
+  /// Place of a node in `nodes`.
+  std::size_t place_of(int node) const;
+};
+
+/// Throws Error for a missing surface and for 9-node faces.
+ContactSurface contact_surface(const Mesh& mesh, const std::string& name);
+
+/// A row of the gap operator: weights are multiplied by the area.
+struct SlaveRow
+{
+  double area = 0, whole = 0;          // [m2] D of the pair, and its value were the slave surface covered
+  std::vector<PairNode> slave, master; // each node once; both lists add up to the area
+
+  /// Whether a face of the node is covered. The area of such a row may be negative where an 8-node face is covered in
+  /// part.
+  bool is_covered() const { return !master.empty(); }
+};
+
+struct SlaveRows
+{
+  std::vector<SlaveRow> rows; // one a node of the slave surface
+  std::vector<char> covered;  // of each slave face: whether it has an overlap
+  Coverage coverage;
+  OverlapFindings findings;
+};
+
+/// Returns the rows of all slave nodes, light ones included.
+/// Throws Error where master faces lie above each other.
+SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits);
+
+/// What becomes of a slave node's row.
+enum class RowFate
+{
+  kept,     // and may take others
+  kept_own, // but takes no other
+  given_up,
+};
+
+/// Gives the rows that are given up to the nearest nodes that share a covered face and may take others.
+/// Returns the nodes that found nobody, as places in slave.nodes.
+std::vector<std::size_t> hand_over(const ContactSurface& slave, const std::vector<Vec3>& x,
+                                   const std::vector<RowFate>& fate, SlaveRows& rows);
+
+} // namespace squeal
