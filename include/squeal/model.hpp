@@ -13,7 +13,7 @@ struct Model
   Structure structure;
   Interface interface;
   std::vector<Coverage> coverage; // one a contact; empty on a matrix scene
-  Owned<Mat> probes; // a row per probe of the scene
+  Owned<Mat> probes;              // a row per probe of the scene
 };
 
 /// Collective.
