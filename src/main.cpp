@@ -147,6 +147,7 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   ProgramOptions options = read_program_options(comm);
   options.force = arguments.force;
   check_address_space(comm);
+  check_solver_options(comm);
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
   if (scene.mesh && arguments.allow_scripts) scene.mesh->statements = Statements::any;

@@ -38,6 +38,9 @@ std::string option_reference();
 /// PETSc starts (squeal/session_options.hpp).
 ProgramOptions read_program_options(MPI_Comm comm);
 
+/// Collective. Throws Error for options of the stages' solver objects that PETSc or SLEPc does not take.
+void check_solver_options(MPI_Comm comm);
+
 /// After the run, collective. Error for options that nobody asked for, with the nearest known ones. Options of a stage
 /// that did not run are let pass, since whether it runs is found out on the way. `stages`: those that ran ("modes", …).
 void check_options_used(const std::vector<std::string>& stages, MPI_Comm comm);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdarg>
 #include <cstdio>
+#include <new>
 #include <numeric>
 #include <vector>
 
@@ -18,9 +19,10 @@ void agree(MPI_Comm comm, const std::string& problem)
   int first = ranks;
   MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm);
   if (first == ranks) return;
-  int length = static_cast<int>(problem.size());
+  const bool no_memory = problem == std::bad_alloc().what();
+  std::string text = no_memory ? "memory ran out; --dry-run prints a forecast of what a run takes" : problem;
+  int length = static_cast<int>(text.size());
   MPI_Bcast(&length, 1, MPI_INT, first, comm);
-  std::string text = problem;
   text.resize(static_cast<std::size_t>(length));
   MPI_Bcast(text.data(), length, MPI_CHAR, first, comm);
   throw Error(text);

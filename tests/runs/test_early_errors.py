@@ -29,6 +29,8 @@ OPTIONS = {
     "infinite": (["-cycle_difference", "inf"], ["-cycle_difference", "finite"]),
     "a number that overflows": (["-cycle_samples", "4294967297"], ["-cycle_samples", "2147483647"]),
     "an object of PETSc's that squeal has not": (["-mat_type", "magic"], ["-mat_type"]),
+    "no type of solver": (["-cycle_snes_type", "magic"], ["-cycle_", "magic"]),
+    "no number for a solver": (["-modes_pep_tol", "magic"], ["-modes_", "magic"]),
     "no file of options": (["-options_file", "missing"], ["-options_file", "missing"]),
     "a log of no format": (["-log_view", "foo:bar:baz"], ["-log_view", "foo"]),
     "a log of no known format": (["-log_view", ":log.txt:magic"], ["-log_view", "ascii_xml"]),
