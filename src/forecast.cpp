@@ -152,12 +152,10 @@ std::string problem_of(const Forecast& forecast, MPI_Comm comm)
   return problem;
 }
 
-void check_address_space(MPI_Comm comm)
+std::string problem_of_address_space()
 {
-  agree(comm, can_take(start_of_libraries) ? ""
-                                           : "memory: " + limit_text(start_of_libraries) +
-                                                 " to start: raise the "
-                                                 "limit");
+  if (can_take(start_of_libraries)) return {};
+  return "memory: " + limit_text(start_of_libraries) + " to start: raise the limit";
 }
 
 } // namespace squeal

@@ -137,6 +137,14 @@ void print_sources(const std::vector<std::string>& sources, MPI_Comm comm)
   std::printf("options come from the command line and from %s\n", text.c_str());
 }
 
+/// Whether a launcher says that this is another rank than the first; known before MPI is up.
+bool is_other_rank()
+{
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
+    if (const char* rank = std::getenv(name)) return std::string(rank) != "0";
+  return false;
+}
+
 int run_program(const Arguments& arguments, int argc, char** argv)
 {
   const MPI_Comm comm = PETSC_COMM_WORLD;
@@ -146,7 +154,6 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   print_sources(arguments.option_sources, comm);
   ProgramOptions options = read_program_options(comm);
   options.force = arguments.force;
-  check_address_space(comm);
   check_solver_options(comm);
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
@@ -169,6 +176,11 @@ int run_program(const Arguments& arguments, int argc, char** argv)
 
 int main(int argc, char** argv)
 {
+  if (const std::string problem = problem_of_address_space(); !problem.empty())
+  {
+    if (!is_other_rank()) std::fprintf(stderr, "squeal: error: %s\n", problem.c_str());
+    return 1;
+  }
   Arguments arguments = take_arguments(argc, argv);
   std::vector<char*> words(argv, argv + argc);
   examine_options(arguments, words);

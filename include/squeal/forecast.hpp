@@ -29,8 +29,8 @@ std::string text_of(const Forecast& forecast);
 /// process's limits leave, or more than a day. Empty if it is.
 std::string problem_of(const Forecast& forecast, MPI_Comm comm);
 
-/// Collective. Throws Error if this process may not even take what the libraries need to start: OpenBLAS tries for ever
-/// to allocate its buffer.
-void check_address_space(MPI_Comm comm);
+/// Why this process may not even take what the libraries need to start; empty if it may. Needs no MPI. Below it, MPI
+/// fails in texts of its own, and OpenBLAS tries for ever to allocate its buffer.
+std::string problem_of_address_space();
 
 } // namespace squeal

@@ -1,6 +1,7 @@
 #include "squeal/cycle/measured_period.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <numeric>
 
 namespace squeal
@@ -45,7 +46,7 @@ MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double
   };
   if (rate) keep_for_rate(measured.start);
   set_period(map, period);
-  const int samples = recording.samples;
+  const std::int64_t samples = recording.samples; // done * samples may not fit an int
   int done = 0;
   const auto watch = [&](const State& now, const StepReport&, const StepWork&)
   {
