@@ -109,14 +109,22 @@ private:
     return starts_statement(i) && is_assigned(i);
   }
 
+  /// Whether the word is in Mesh.Color.Lines = Red; or Color Red {...}: any name, but nothing that is called.
+  bool names_colour(std::size_t i) const
+  {
+    const Token &owner = at(statement_), &next = at(i + 1);
+    if (next.is("(") || next.is("[") || next.kind == Token::Kind::text) return false;
+    const bool options = owner.is("Mesh") || owner.is("Geometry") || owner.is("General");
+    return at(i - 1).is("Color") || (options && i > statement_ && at(statement_ + 2).is("Color"));
+  }
+
   void check_word(std::size_t i) const
   {
     const Token& word = list_[i];
-    const bool after_dot = at(i - 1).is("."), after_color = at(i - 1).is("Color");
-    if (after_dot)
+    if (names_colour(i))
+      return;
+    else if (at(i - 1).is("."))
       check_member(i);
-    else if (after_color && !at(i + 1).is("(") && at(i + 1).kind != Token::Kind::text)
-      return; // the name of a colour
     else if (is_allowed_word(word.text))
       check_allowed_word(i);
     else if (at(i - 1).is("(") && at(i - 2).is("Exists") && at(i + 1).is(")"))

@@ -51,6 +51,12 @@ TEST_CASE("statements of geometry, sizes, groups, constants and loops may be run
       "Transfinite Curve{1, 2} = 5 Using Progression 1.1; Transfinite Surface{:} Left; Recombine Surface{:};",
       "out[] = Extrude {0, 0, 1} { Surface{1}; Layers{ {2, 3}, {0.5, 1} }; Recombine; }; Coherence;",
       "Periodic Surface {2} = {1} Translate {0, 0, 1}; Characteristic Length { 1 } = 0.1; Color Red { Surface{1}; }",
+      "General.Color.Text = White; Mesh.Color.Points = {255, 0, 0}; Geometry.Color.Surfaces = Geometry.Color.Points;",
+      "Characteristic Length { PointsOf{ Volume{:}; } } = 1; p() = Point In BoundingBox{0, 0, 0, 1, 1, 1};",
+      "bb() = BoundingBox Surface { 1 }; Extrude { Surface{1}; } Using Wire {1}; Rotate {{0, 0, 1}, {0, 0, 0}, -Pi/4} "
+      "{ Point{3}; }",
+      "Function Hole x[t] = newreg; Surface Loop(x[t]) = {1}; Return t = 1; Call Hole; Physical Volume (t) = x[0];",
+      "OptimizeMesh \"Gmsh\"; SetOrder 2; Coherence Mesh; Show {Volume{1};} Hide {:}; Recursive Delete { Volume{2}; }",
       "Error(\"n is %g\", 3); Printf(\"a > b\"); // SystemCall \"x\"\n/* Save \"y\"; */",
   };
   for (const char* text : allowed)
@@ -82,6 +88,7 @@ TEST_CASE("a statement that reaches a file, a process or the environment is name
       "Field[1] = Structured;",
       "Solver.Executable0 = \"id\";",
       "General.ErrorFileName = \"out\";",
+      "General.Color.Text = GetEnv(\"HOME\");",
       "Geometry.DoubleClickedPointCommand = \"SystemCall 'id';\";",
       "View \"v\" { };",
       "Exit;",
