@@ -8,9 +8,12 @@
 
 #include <algorithm>
 #include <csignal>
+#include <fstream>
 #include <gmsh.h>
+#include <new>
 #include <stdexcept>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 namespace
@@ -124,11 +127,28 @@ MesherAnswer answer_of(int argc, char** argv)
   {
     answer = {{}, text};
   }
+  catch (const std::bad_alloc&)
+  {
+    answer = {{}, "memory ran out: make the mesh coarser"};
+  }
   catch (const std::exception& error)
   {
     answer = {{}, error.what()};
   }
   return answer;
+}
+
+/// Leaves a fifth of the free memory to the others, so that a mesh that is too fine ends the mesher alone.
+[[maybe_unused]] void limit_memory()
+{
+  std::ifstream info("/proc/meminfo");
+  double kilobytes = 0;
+  for (std::string word; info >> word;)
+    if (word == "MemAvailable:" && info >> kilobytes) break;
+  rlimit limit{};
+  if (kilobytes == 0 || getrlimit(RLIMIT_AS, &limit) != 0) return;
+  limit.rlim_cur = std::min(limit.rlim_cur, static_cast<rlim_t>(0.8 * 1024 * kilobytes));
+  (void)setrlimit(RLIMIT_AS, &limit);
 }
 
 } // namespace
@@ -137,6 +157,9 @@ int main(int argc, char** argv)
 {
   if (argc < 3) return 2;
   prctl(PR_SET_PDEATHSIG, SIGKILL); // with squeal it ends too
+#ifndef __SANITIZE_ADDRESS__        // it reserves more addresses than there are bytes
+  limit_memory();
+#endif
   for (int inherited = script_descriptor + 1; inherited < 1024; ++inherited) close(inherited); // MPI's
   const std::string bytes = packed(answer_of(argc, argv));
   for (std::size_t sent = 0; sent < bytes.size();)

@@ -51,10 +51,8 @@ constexpr std::array session_options = {
     SessionOption{"malloc_view", Value::write_file, "[FILE]  lists all memory"},
     SessionOption{"memory_view", Value::flag, "  memory at the end"},
     SessionOption{"no_signal_handler", Value::flag, "  leaves signals to the system"},
-    SessionOption{"on_error_abort", Value::flag, "  aborts where PETSc fails"},
     SessionOption{"get_total_flops", Value::flag, "  counts operations"},
     SessionOption{"citations", Value::write_file, "[FILE]  what to cite of PETSc"},
-    SessionOption{"fp_trap", Value::text, "WORD  stops at floating-point exceptions"},
 };
 
 const SessionOption* find_option(const std::string& name)

@@ -1,6 +1,7 @@
 """Meshes and geometries that would run commands, or that gmsh dies of: one message, and nothing is touched."""
 
 import os
+import resource
 import shutil
 import subprocess
 
@@ -79,6 +80,18 @@ def test_a_signal_that_ends_the_mesher_is_named(tmp_path):
     assert "gave no mesh" in run()
     names = [line.split("=")[0] for line in (tmp_path / "environment").read_text().splitlines()]
     assert names and not [name for name in names if name.startswith(("OMPI_", "PMIX_", "ORTE_"))]
+
+
+def test_a_mesh_beyond_the_memory_ends_the_mesher_alone(tmp_path):
+    scene = write_blocks(tmp_path, BLOCKS_GEO.replace("Curve{:} = 3", "Curve{:} = 400"))
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_AS, (1000 << 20, 1000 << 20))
+
+    done = subprocess.run([os.environ["SQUEAL"], scene, "--dry-run"], capture_output=True, text=True, timeout=200,
+                          preexec_fn=limit)
+    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done.stderr
+    assert "blocks.geo" in done.stderr and "gmsh" in done.stderr and "bad_alloc" not in done.stderr
 
 
 @pytest.mark.parametrize("name", ["a" * 200 + "/" + "b" * 30000, "/dev/zero", "."])
