@@ -161,9 +161,9 @@ RealModes modes_beyond_band(const CycleProblem& problem)
 {
   constexpr double near = 2, far = 3; // times the followed mode's frequency
   const double frequency = problem.unstable.modes.front().frequency_hz();
-  for (const ComplexMode& mode : problem.modes)
-    if (mode.frequency_hz() > near * frequency) return {};
-  return find_real_modes_below(problem.linearised, far * frequency, problem.modes_options);
+  if (highest_frequency(problem.modes) > near * frequency) return {};
+  return find_real_modes_between(problem.linearised, highest_frequency(problem.modes), far * frequency,
+                                 problem.modes_options);
 }
 
 /// The number of pairs that slide throughout.
@@ -234,13 +234,41 @@ bool confirmed_by_fewer_shapes(const ReducedModel& model, const ReducedMap& map,
   return as_many_above(0.95, values, large_multipliers(few, period, contacts, wanted, comm).values);
 }
 
+/// x = (A_r - m)^-1 x: the reduced resolvent on the state's coordinates, -1/m on what those miss.
+void correct(const ReducedModel& model, const Structure& structure, const MatrixXd& columns, Complex m, Vec real,
+             Vec imaginary)
+{
+  const auto seen = [&](Vec x)
+  {
+    const ReducedState state = coordinates(model, structure, displacement(x), velocity(x));
+    VectorXd both(2 * model.size());
+    both << state.q, state.v;
+    return both;
+  };
+  Eigen::VectorXcd x(2 * model.size());
+  x.real() = seen(real);
+  x.imag() = seen(imaginary);
+  const Eigen::VectorXcd y = resolvent(columns, m, x);
+  const Complex factor = -1. / m; // of x itself
+  const Owned<Vec> old = copy_of(real);
+  check(VecAXPBY(real, -factor.imag(), factor.real(), imaginary));
+  check(VecAXPBY(imaginary, factor.imag(), factor.real(), old));
+  const auto add = [&](const VectorXd& part, Vec to)
+  {
+    add_motion(model, 1, part.head(model.size()), displacement(to));
+    add_motion(model, 1, part.tail(model.size()), velocity(to));
+  };
+  add(y.real(), real);
+  add(y.imag(), imaginary);
+}
+
 SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int other_steps, double period, Vec start)
 {
   const MPI_Comm comm = comm_of(problem.sliding.structure.load);
   const RecordedPeriods periods = record_periods(map, other_steps, period, start);
   SlowMotions slow;
   slow.periods = other_steps > 0 ? 3 : 2;
-  const ReducedModel model = model_for(problem, periods);
+  ReducedModel model = model_for(problem, periods);
   const auto contacts = [&](int which)
   {
     return recorded_contacts(model, problem.sliding.interface.directions,
@@ -248,7 +276,7 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
   };
   ReducedMap own{model, map.steps, map.theta};
   const auto recorded = contacts(RecordedPeriods::own);
-  const ReducedSpectrum spectrum = large_multipliers(own, period, recorded, wanted, comm);
+  ReducedSpectrum spectrum = large_multipliers(own, period, recorded, wanted, comm);
   slow.values = spectrum.values;
   // no motion beside a cycle that shooting finds doubles in a period: shapes that do not fit friction do
   if (!slow.values.empty() && std::abs(slow.values.front()) > 2)
@@ -262,6 +290,9 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
   slow.right = lifted(model, spectrum.right, start);
   slow.left = lifted(model, energy_representatives(model, spectrum.left), start);
   slow.others = slow_sliding_motions(problem.modes, start);
+  slow.correct = [model = std::move(model), columns = std::move(spectrum.columns),
+                  &structure = problem.sliding.structure](Complex m, Vec real, Vec imaginary)
+  { correct(model, structure, columns, m, real, imaginary); };
   return slow;
 }
 

@@ -239,8 +239,9 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
   double amplitude = equivalent_amplitude(problem, *start);
   const Owned<Vec> estimated = fluctuation_of(problem, *start);
   Owned<Vec> motion = copy_of(estimated.get());
-  search.real = find_real_modes_below(problem.linearised, search.options.reduced.band_factor * mode.frequency_hz(),
-                                      problem.modes_options);
+  search.real =
+      find_real_modes_between(problem.linearised, highest_frequency(problem.modes),
+                              search.options.reduced.band_factor * mode.frequency_hz(), problem.modes_options);
   FreeMotion free{{}, 1 / mode.frequency_hz(), 0};
   double unit = 0; // [J] energy at amplitude 1
   const auto on_model = [&](Vec x)

@@ -3,6 +3,7 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 
 namespace squeal
@@ -60,9 +61,9 @@ void broadcast_values(std::vector<Complex>& values, MPI_Comm comm)
 }
 
 /// Coordinates of the slow shapes for all of them, and back.
-MatrixXd slow_rows(const MatrixXd& X, Index size, Index slow)
+template <class Matrix> Matrix slow_rows(const Matrix& X, Index size, Index slow)
 {
-  MatrixXd result(2 * slow, X.cols());
+  Matrix result(2 * slow, X.cols());
   result << X.topRows(slow), X.middleRows(size, slow);
   return result;
 }
@@ -104,7 +105,18 @@ ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<cons
   result.right = columns * right;
   result.left = apply_adjoint(map, period, contacts, with_fast_rows(left, size, slow), comm);
   for (MatrixXd* vectors : {&result.right, &result.left}) *vectors = orthonormal_columns(*vectors);
+  result.columns = columns;
   return result;
+}
+
+/// With C the columns and S the slow coordinates Phi = C S':  (Phi - m)^-1 = -1/m + C (S'C - m)^-1 S'/m
+Eigen::VectorXcd resolvent(const MatrixXd& columns, Complex m, const Eigen::VectorXcd& x)
+{
+  const Index size = columns.rows() / 2, slow = columns.cols() / 2;
+  Eigen::MatrixXcd square = slow_rows(columns, size, slow).cast<Complex>();
+  square.diagonal().array() -= m;
+  const Eigen::VectorXcd z = square.partialPivLu().solve(slow_rows<Eigen::MatrixXcd>(x, size, slow));
+  return columns.cast<Complex>() * z / m;
 }
 
 std::vector<Complex> multipliers_along(const ReducedSpectrum& spectrum, ReducedMap& map, double period,

@@ -12,7 +12,11 @@ struct ReducedSpectrum
 {
   std::vector<std::complex<double>> values; // largest first, complex pairs whole
   Eigen::MatrixXd right, left;              // orthonormal bases of the right and left vectors' spans, (q, v)
+  Eigen::MatrixXd columns;                  // of the monodromy matrix, along the slow coordinates of q and of v
 };
+
+/// (Phi - m)^-1 x + x/m of the reduced monodromy matrix with these columns; x: (q, v) of a model of `size` shapes.
+Eigen::VectorXcd resolvent(const Eigen::MatrixXd& columns, std::complex<double> m, const Eigen::VectorXcd& x);
 
 /// Which multipliers are wanted.
 struct LargeValues

@@ -209,6 +209,28 @@ RealModes search_from_below_zero(Mat M, Mat K, double limit, int count, const Pe
   return modes;
 }
 
+/// The modes with low <= theta < high, found from the middle by what the counts at both ends leave. A basis can do
+/// without one that is missed.
+RealModes search_between(Mat M, Mat K, double low, double high, const PencilOptions& options)
+{
+  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
+  const Inertia first = inertia_at(low, pencil), last = inertia_at(high, pencil);
+  RealPairs found{.x = empty_multivector(K)};
+  RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
+  if (last.below <= first.below) return modes;
+  move_to(pencil, (low + high) / 2);
+  modes.outcome.iterations = append_nearest(found.x, pencil, last.below - first.below);
+  found = ritz_pairs(found.x, M, K);
+  for (Index k = 0; k < found.theta.size(); ++k)
+  {
+    if (!(found.theta[k] >= low && found.theta[k] < high)) continue;
+    modes.omega.push_back(std::sqrt(found.theta[k]));
+    check(MatCreateVecs(K, modes.shapes.emplace_back().put(), nullptr));
+    copy_column(found.x, k, modes.shapes.back());
+  }
+  return modes;
+}
+
 void to_structure(RealModes& modes, Mat Z)
 {
   for (Owned<Vec>& shape : modes.shapes)
@@ -294,6 +316,19 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& 
 RealModes find_real_modes_below(const LinearisedSliding& linearised, double band, const ModesOptions& options)
 {
   RealModes modes = solve_real_modes_below(linearised.M_z, linearised.K_z, band, options);
+  to_structure(modes, linearised.contact.Z);
+  return modes;
+}
+
+RealModes find_real_modes_between(const LinearisedSliding& linearised, double low, double high,
+                                  const ModesOptions& options)
+{
+  PetscInt n = 0;
+  check(MatGetSize(linearised.K_z, &n, nullptr));
+  if (!(low < high)) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
+  if (low <= 0 || n <= options.dense_limit) return find_real_modes_below(linearised, high, options);
+  const auto theta = [](double frequency_hz) { return std::pow(2 * std::numbers::pi * frequency_hz, 2); };
+  RealModes modes = search_between(linearised.M_z, linearised.K_z, theta(low), theta(high), options.pencil);
   to_structure(modes, linearised.contact.Z);
   return modes;
 }

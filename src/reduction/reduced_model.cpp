@@ -48,8 +48,7 @@ Owned<VecScatter> to_kept(Mat Z, Vec u, Vec y)
 std::vector<Vec> shapes_above(const RealModes* real, const std::vector<ComplexMode>& modes)
 {
   std::vector<Vec> shapes;
-  double highest = 0;
-  for (const ComplexMode& mode : modes) highest = std::max(highest, mode.lambda.imag());
+  const double highest = 2 * std::numbers::pi * highest_frequency(modes);
   for (std::size_t i = 0; real && i < real->shapes.size(); ++i)
     if (real->omega[i] > highest) shapes.push_back(real->shapes[i]);
   return shapes;
@@ -243,6 +242,13 @@ void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, Ind
 }
 
 } // namespace
+
+double highest_frequency(const std::vector<ComplexMode>& modes)
+{
+  double highest = 0;
+  for (const ComplexMode& mode : modes) highest = std::max(highest, mode.frequency_hz());
+  return highest;
+}
 
 std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
                                        const ComplexMode& mode, double amplitude)

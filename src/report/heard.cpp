@@ -126,6 +126,10 @@ std::string heard(const Report& report, const Scene& scene)
   const Outcome& outcome = report.cycle.outcome;
   if (outcome.kind == OutcomeKind::converged) return cycle_text(report, scene);
   if (!has_run(outcome)) return linear_text(report);
+  if (outcome.kind == OutcomeKind::unstable_cycle && !report.cycle.multipliers.values.empty())
+    return format("passes by a cycle at %.5g Hz", 1 / report.cycle.orbit.period) +
+           beside_mode(report, 1 / report.cycle.orbit.period) + stability_text(report.cycle.multipliers) +
+           "; what it leads to was not found";
   return linear_text(report) + "; what is heard was not found: the search for a cycle ended with " +
          std::string(word(outcome.kind));
 }

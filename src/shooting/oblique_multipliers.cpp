@@ -1,17 +1,19 @@
-/// Multipliers by oblique projection (src/README.md, section 6.9). V and W are energy-orthonormal bases of approximate
-/// right and left vectors. A pass takes Z = (dPhi_T/dx) V, all columns at once, and
-///     mu = eig((W'V)^-1 W'Z),     bar_i = 2 |mu_i - its last value| + errors_i.
-/// Blocks of passes make a Krylov space: V becomes those of its Ritz vectors whose values are nearest to mu.
-/// Beside V the largest Ritz values of (1 - V (W'V)^-1 W') dPhi_T/dx are sought in a block Arnoldi space: where they
-/// lie below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not proven.
+/// Multipliers by oblique projection (src/README.md, section 6.9). Q is an energy-orthonormal basis, of approximate
+/// right vectors and the flow at first; W holds as many energy images, of approximate left vectors and of what else Q
+/// has:
+///     A = dPhi_T/dx,     (W'Q)^-1 W'A Q y = m y,     bar_i = 2 |m_i - its last value| + errors_i.
+/// Where a bar reaches across 1, Q takes in (A_r - m)^-1 (A - m) Q y, A_r the reduced model's matrix: Davidson's
+/// method. Beside the vectors V = Q y the largest Ritz values of (1 - V (W'V)^-1 W') A are sought in a block Arnoldi
+/// space: where they are below 1 by more than their residuals, no larger multiplier is to be expected. That is likely,
+/// not proven.
 #include "monodromy.hpp"
-#include "squeal/algebra/dense_matrix.hpp"
 #include "state_block.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <numeric>
 
 namespace squeal
 {
@@ -25,7 +27,7 @@ using Complex = std::complex<double>;
 
 constexpr double least_part = 1e-10;      // of a direction, or it is dropped: rounding of the energy product's squares
 constexpr double largest_condition = 1e6; // of W'V: beyond, an error of 1e-10 in Z is one of 1e-4 in mu
-constexpr int passes_at_most = 4;
+constexpr int passes_at_most = 8;
 constexpr Index block_size = 6; // of the search beside V
 
 /// X -> dPhi_T/dx X
@@ -64,154 +66,198 @@ std::vector<Complex> values_of(const std::vector<DenseEigenpair>& pairs)
   return values;
 }
 
-/// |a - b| of values and their nearest references.
-std::vector<double> distances(const std::vector<Complex>& values, const std::vector<Complex>& references)
+/// The passes: what the last one found of each wanted value, in the order of the reduced model's.
+struct Passes
 {
-  std::vector<double> result(values.size());
-  const std::vector<std::size_t> places = nearest_places(values, references);
-  for (std::size_t i = 0; i < values.size(); ++i) result[i] = std::abs(values[i] - references[places[i]]);
+  Projector space{};                   // its V is Q
+  StateBlock image{};                  // A Q
+  Projector wanted{};                  // on the wanted vectors alone
+  StateBlock W{};                      // energy images of the left vectors alone
+  std::vector<DenseEigenpair> pairs{}; // vectors in the coordinates of Q
+  std::vector<double> changes{};       // when a pair was refined last
+  std::vector<double> bars{}, rises{}; // rises: the bars upwards
+  std::size_t shift = 0;               // the place of the shift in time; the number of pairs: it is not there
+  double shift_distance = 0;           // of its multiplier from 1
+};
+
+/// Whether a bar, or what a modulus may rise by, reaches across 1.
+bool reaches_across(const Passes& passes, std::size_t i)
+{
+  const double size = std::abs(passes.pairs[i].lambda);
+  return i != passes.shift && size - passes.bars[i] <= 1 && size + passes.rises[i] >= 1;
+}
+
+/// Takes in a block and its image, and tests by its energy image. Returns the number of columns that are new.
+Index extend(const Monodromy& monodromy, StateBlock block, Passes& passes)
+{
+  const Flow& flow = monodromy.flow;
+  StateBlock& Q = passes.space.V;
+  for (int pass = 0; pass < 2; ++pass) // the second removes what rounding left
+    subtract(block, Q, inner_products(energy_images(flow, Q), block));
+  block = orthonormal(flow, std::move(block), 1e-8);
+  if (block.columns() == 0) return 0;
+  append(Q, block);
+  append(passes.space.W, energy_images(flow, block));
+  append(passes.image, image_of(monodromy, block));
+  return block.columns();
+}
+
+/// Q and W of the reduced model's vectors and of the flow. Returns why they do not serve, or nothing.
+std::string begin_passes(const Monodromy& monodromy, const SlowMotions& slow, Passes& passes)
+{
+  const Flow& flow = monodromy.flow;
+  Projector& space = passes.space;
+  space.V = orthonormal(flow, block_of(slow.right), least_part);
+  passes.W = energy_images(flow, orthonormal(flow, block_of(slow.left), least_part));
+  space.W = passes.W;
+  if (const double condition = fit(space); !(condition <= largest_condition))
+    return format("right and left vectors of the reduced model do not fit together: condition %.0e", condition);
+  passes.image = image_of(monodromy, space.V);
+  const Owned<Vec> rate = copy_of(monodromy.orbit.rate.get());
+  extend(monodromy, block_of(std::span(&rate, 1)), passes);
+  return {};
+}
+
+/// The wanted pairs and their bars. `refined`: those that the last block was made for; empty: all.
+void project(const Monodromy& monodromy, const SlowMotions& slow, const std::vector<std::size_t>& refined,
+             Passes& passes)
+{
+  Projector& space = passes.space;
+  fit(space);
+  const std::vector<DenseEigenpair> all = solve_dense_unsymmetric(coefficients(space, passes.image));
+  const std::vector<Complex> last = passes.pairs.empty() ? slow.values : values_of(passes.pairs);
+  const std::vector<std::size_t> places = nearest_places(last, values_of(all));
+  const Owned<Vec> rate = copy_of(monodromy.orbit.rate.get());
+  const StateBlock flow = block_of(std::span(&rate, 1));
+  const std::size_t shift = find_shift(all, inner_products(space.V, energy_images(monodromy.flow, flow)).col(0));
+  passes.shift_distance = std::abs(all[shift].lambda - 1.);
+  passes.shift = last.size();
+  passes.pairs.clear();
+  passes.changes.resize(last.size(), 0);
+  for (std::size_t i = 0; i < last.size(); ++i)
+  {
+    passes.pairs.push_back(all[places[i]]);
+    if (places[i] == shift) passes.shift = i;
+    const double change = std::abs(all[places[i]].lambda - last[i]);
+    const bool own = refined.empty() || std::find(refined.begin(), refined.end(), i) != refined.end();
+    passes.changes[i] = own ? change : std::max(passes.changes[i], change);
+  }
+  passes.bars.assign(last.size(), 0);
+  passes.rises = passes.bars;
+  for (std::size_t i = 0; i < last.size(); ++i)
+  {
+    passes.bars[i] = std::max(2 * passes.changes[i] + slow.errors[i], 1e-9);
+    passes.rises[i] = std::max(2 * passes.changes[i] + slow.rises[i], 1e-9);
+  }
+}
+
+/// The pairs that need another pass: those whose bars reach across 1; after the first pass the largest at least, since
+/// what the reduced model had wrong says little of what the projection has.
+std::vector<std::size_t> pairs_to_refine(const Passes& passes, bool first)
+{
+  std::vector<std::size_t> refined;
+  for (std::size_t i = 0; i < passes.pairs.size(); ++i)
+    if (reaches_across(passes, i)) refined.push_back(i);
+  if (!first || !refined.empty()) return refined;
+  double largest = 0;
+  for (std::size_t i = 0; i < passes.pairs.size(); ++i)
+    if (i != passes.shift) largest = std::max(largest, std::abs(passes.pairs[i].lambda));
+  for (std::size_t i = 0; i < passes.pairs.size(); ++i)
+    if (i != passes.shift && std::abs(passes.pairs[i].lambda) > largest - 1e-9) refined.push_back(i);
+  return refined;
+}
+
+/// (A_r - m)^-1 (A - m) Q y of the pairs, real and imaginary parts.
+StateBlock corrections(const Monodromy& monodromy, const SlowMotions& slow, const std::vector<std::size_t>& refined,
+                       const Passes& passes)
+{
+  MatrixXd of_image(passes.image.columns(), 0), of_Q = of_image;
+  std::vector<Complex> values;
+  for (const std::size_t i : refined)
+  {
+    const DenseEigenpair& pair = passes.pairs[i];
+    if (std::find(values.begin(), values.end(), std::conj(pair.lambda)) != values.end()) continue; // the same parts
+    values.push_back(pair.lambda);
+    const Eigen::VectorXcd turned = pair.lambda * pair.y;
+    of_image.conservativeResize(Eigen::NoChange, of_image.cols() + 2);
+    of_Q.conservativeResize(Eigen::NoChange, of_Q.cols() + 2);
+    of_image.rightCols(2) << pair.y.real(), pair.y.imag();
+    of_Q.rightCols(2) << turned.real(), turned.imag();
+  }
+  StateBlock residuals = combination(passes.image, of_image);
+  subtract(residuals, passes.space.V, of_Q);
+  const std::vector<Owned<Vec>> states = states_of(residuals, monodromy.orbit.state);
+  for (std::size_t k = 0; k < values.size(); ++k) slow.correct(values[k], states[2 * k], states[2 * k + 1]);
+  return block_of(states);
+}
+
+/// Real columns that span the pairs' vectors.
+MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Index size)
+{
+  MatrixXd result(size, static_cast<Index>(pairs.size()));
+  for (Index i = 0; i < result.cols(); ++i)
+  {
+    const DenseEigenpair& pair = pairs[static_cast<std::size_t>(i)];
+    result.col(i) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.y.imag()) : Eigen::VectorXd(pair.y.real());
+  }
   return result;
 }
 
-/// The passes: pairs of the last one, in the coordinates of V, and their bars.
-struct Passes
-{
-  Projector projector;
-  std::vector<DenseEigenpair> pairs{};
-  std::vector<double> bars{}, rises{}; // rises: the bars upwards
-  std::vector<Complex> values{};       // with that of the shift in time
-  double shift_distance = 0;           // of that one from 1
-  long columns = 0;
-};
-
-bool reaches_across(const Passes& passes)
+/// Whether some value is above 1 by more than its bar.
+bool repels(const Passes& passes)
 {
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
-  {
-    const double size = std::abs(passes.pairs[i].lambda);
-    if (size - passes.bars[i] <= 1 && size + passes.rises[i] >= 1) return true;
-  }
+    if (i != passes.shift && std::abs(passes.pairs[i].lambda) - passes.bars[i] > 1) return true;
   return false;
-}
-
-/// Removes the shift in time from the pairs. Where it has met another real multiplier in a complex pair, the sum of
-/// both is the pair's: the other one stays. Returns the distance of the shift's multiplier from 1.
-double take_out_shift(const Monodromy& monodromy, Passes& passes)
-{
-  const Owned<Vec> rate = copy_of(monodromy.orbit.rate.get());
-  const StateBlock flow = block_of(std::span(&rate, 1));
-  const Eigen::VectorXd along = inner_products(passes.projector.V, energy_images(monodromy.flow, flow)).col(0);
-  const std::size_t shift = find_shift(passes.pairs, along);
-  const Complex value = passes.pairs[shift].lambda;
-  const double distance = std::abs(value - 1.);
-  if (value.imag() != 0)
-    for (std::size_t i = 0; i < passes.pairs.size(); ++i)
-      if (passes.pairs[i].lambda == std::conj(value))
-      {
-        passes.pairs[i].lambda = 2 * value.real() - 1;
-        passes.bars[i] += distance;
-        passes.rises[i] += distance;
-      }
-  passes.pairs.erase(passes.pairs.begin() + static_cast<std::ptrdiff_t>(shift));
-  for (std::vector<double>* bars : {&passes.bars, &passes.rises})
-    bars->erase(bars->begin() + static_cast<std::ptrdiff_t>(shift));
-  return distance;
 }
 
 /// Whether values that matter still change so much that they cannot be taken for multipliers.
-bool meaningless(const std::vector<Complex>& values, const std::vector<double>& changes)
+bool meaningless(const Passes& passes)
 {
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (std::abs(values[i]) > 0.95 && changes[i] > 0.05) return true; // as far as 1 is from there
+  for (std::size_t i = 0; i < passes.pairs.size(); ++i)
+    if (i != passes.shift && std::abs(passes.pairs[i].lambda) > 0.95 && passes.changes[i] > 0.05)
+      return true; // as far as 1 is from there
   return false;
-}
-
-/// An energy-orthonormal basis, its image and the monodromy matrix on it.
-struct KrylovSpace
-{
-  StateBlock Q, image;
-  MatrixXd H;
-};
-
-/// Takes in a block and applies the monodromy matrix to what is new of it.
-void extend(const Monodromy& monodromy, StateBlock block, KrylovSpace& space)
-{
-  const Flow& flow = monodromy.flow;
-  if (space.H.rows() > 0)
-    for (int pass = 0; pass < 2; ++pass) // the second removes what rounding left
-      subtract(block, space.Q, inner_products(energy_images(flow, space.Q), block));
-  block = orthonormal(flow, std::move(block), 1e-8);
-  if (block.columns() == 0) return;
-  StateBlock image = image_of(monodromy, block);
-  if (space.H.rows() == 0)
-  {
-    space.Q = std::move(block);
-    space.image = std::move(image);
-  }
-  else
-  {
-    append(space.Q, block);
-    append(space.image, image);
-  }
-  space.H = inner_products(energy_images(flow, space.Q), space.image);
-}
-
-/// Real columns that span the Ritz vectors of the values nearest to these.
-MatrixXd nearest_ritz_vectors(const MatrixXd& H, const std::vector<Complex>& values)
-{
-  const std::vector<DenseEigenpair> ritz = solve_dense_unsymmetric(H);
-  MatrixXd result(H.rows(), static_cast<Index>(values.size()));
-  Index column = 0;
-  for (const std::size_t place : nearest_places(values, values_of(ritz)))
-    result.col(column++) =
-        ritz[place].lambda.imag() < 0 ? Eigen::VectorXd(-ritz[place].y.imag()) : Eigen::VectorXd(ritz[place].y.real());
-  return result;
-}
-
-/// Values, bars and pairs of the projection on V, the columns U of the space.
-std::string project(const Monodromy& monodromy, const SlowMotions& slow, const KrylovSpace& space, const MatrixXd& U,
-                    const std::vector<Complex>& last, Passes& passes)
-{
-  Projector& projector = passes.projector;
-  projector.V = combination(space.Q, U);
-  const double condition = fit(projector);
-  if (!(condition <= largest_condition))
-    return format("right and left vectors of the reduced model do not fit together: condition %.0e", condition);
-  passes.pairs = solve_dense_unsymmetric(coefficients(projector, combination(space.image, U)));
-  passes.values = values_of(passes.pairs);
-  passes.bars = distances(passes.values, last);
-  if (passes.columns > static_cast<long>(slow.right.size()) && meaningless(passes.values, passes.bars))
-    return "the reduced model's multipliers differ too much from the full model's";
-  const std::vector<std::size_t> own = nearest_places(passes.values, slow.values);
-  passes.rises = passes.bars;
-  for (std::size_t i = 0; i < own.size(); ++i)
-  {
-    passes.bars[i] = std::max(2 * passes.bars[i] + slow.errors[own[i]], 1e-9);
-    passes.rises[i] = std::max(2 * passes.rises[i] + slow.rises[own[i]], 1e-9);
-  }
-  passes.shift_distance = take_out_shift(monodromy, passes);
-  return {};
 }
 
 /// Two passes or more, until no bar reaches across 1. Returns why the vectors do not serve, or nothing.
 std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Passes& passes)
 {
-  passes.projector.W = energy_images(monodromy.flow, orthonormal(monodromy.flow, block_of(slow.left), least_part));
-  KrylovSpace space;
-  StateBlock block = block_of(slow.right);
-  std::vector<Complex> last = slow.values;
+  if (std::string refusal = begin_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
+  std::vector<std::size_t> refined;
   for (int pass = 1;; ++pass)
   {
-    const Index before = space.H.rows();
-    extend(monodromy, std::move(block), space);
-    passes.columns = static_cast<long>(space.H.rows());
-    const MatrixXd U = pass == 1 ? MatrixXd::Identity(space.H.rows(), space.H.cols()).eval()
-                                 : orthonormal_columns(nearest_ritz_vectors(space.H, last));
-    if (std::string refusal = project(monodromy, slow, space, U, last, passes); !refusal.empty()) return refusal;
-    if (pass == passes_at_most || space.H.rows() == before || (pass > 1 && !reaches_across(passes))) return {};
-    last = passes.values;
-    block = {columns_from(space.image.u, before), columns_from(space.image.v, before)};
+    project(monodromy, slow, refined, passes);
+    refined = pairs_to_refine(passes, pass == 1);
+    if (refined.empty() || pass == passes_at_most) break;
+    if (extend(monodromy, corrections(monodromy, slow, refined, passes), passes) == 0) break;
   }
+  if (meaningless(passes) && !repels(passes))
+    return "the reduced model's multipliers differ too much from the full model's";
+  passes.wanted.V = orthonormal(
+      monodromy.flow, combination(passes.space.V, real_columns(passes.pairs, passes.space.V.columns())), least_part);
+  passes.wanted.W = passes.W;
+  fit(passes.wanted);
+  return {};
+}
+
+/// Removes the shift in time from the pairs. Where it has met another real multiplier in a complex pair, the sum of
+/// both is the pair's: the other one stays.
+void take_out_shift(Passes& passes)
+{
+  if (passes.shift == passes.pairs.size()) return;
+  const Complex value = passes.pairs[passes.shift].lambda;
+  if (value.imag() != 0)
+    for (std::size_t i = 0; i < passes.pairs.size(); ++i)
+      if (passes.pairs[i].lambda == std::conj(value))
+      {
+        passes.pairs[i].lambda = 2 * value.real() - 1;
+        passes.bars[i] += passes.shift_distance;
+        passes.rises[i] += passes.shift_distance;
+      }
+  passes.pairs.erase(passes.pairs.begin() + static_cast<std::ptrdiff_t>(passes.shift));
+  for (std::vector<double>* bars : {&passes.bars, &passes.rises})
+    bars->erase(bars->begin() + static_cast<std::ptrdiff_t>(passes.shift));
 }
 
 /// What the search beside V found.
@@ -334,19 +380,27 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
   Passes passes;
   refusal = make_passes(monodromy, slow, passes);
   if (!refusal.empty()) return std::nullopt;
+  take_out_shift(passes);
   multipliers.trivial_error = passes.shift_distance;
-  const Index limit = columns > 0 ? columns : 96;
-  const Search search = search_beside(monodromy, passes.projector, slow.others, limit);
-  multipliers.values = values_of(passes.pairs);
-  multipliers.errors = passes.bars;
-  for (std::size_t i = 0; i < passes.rises.size(); ++i)
-    multipliers.upper.push_back(std::abs(multipliers.values[i]) + passes.rises[i]);
+  Search search;
+  if (!repels(passes)) search = search_beside(monodromy, passes.wanted, slow.others, columns > 0 ? columns : 96);
+  multipliers.periods = slow.periods + static_cast<long>(passes.image.columns()) + search.columns;
+  std::vector<std::size_t> order(passes.pairs.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b)
+                   { return std::abs(passes.pairs[a].lambda) > std::abs(passes.pairs[b].lambda); });
+  for (const std::size_t i : order)
+  {
+    multipliers.values.push_back(passes.pairs[i].lambda);
+    multipliers.errors.push_back(passes.bars[i]);
+    multipliers.upper.push_back(std::abs(passes.pairs[i].lambda) + passes.rises[i]);
+  }
   if (std::abs(search.largest) - 2 * search.residual > 1) add_value(multipliers, search.largest, 2 * search.residual);
-  multipliers.periods = slow.periods + passes.columns + search.columns;
   decide(multipliers, coverage_of(slow, search), multipliers.values.size());
   if (passes.pairs.empty()) return result;
-  const MatrixXd fastest = real_part(passes.pairs.front().y);
-  result.fastest = std::move(states_of(combination(passes.projector.V, fastest), orbit.state).front());
+  const MatrixXd fastest = real_part(passes.pairs[order.front()].y);
+  result.fastest = std::move(states_of(combination(passes.space.V, fastest), orbit.state).front());
   normalise(monodromy.flow, result.fastest);
   return result;
 }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace squeal
 {
@@ -92,6 +93,28 @@ Owned<Vec> state_beside(const OrbitProblem& problem, const Attempt& attempt, dou
   return state;
 }
 
+/// The slope of a line through all but the first quarter of the logarithms, and twice its standard error as if eight
+/// values in a row were one: neighbours hang together.
+SeenGrowth fit_growth(const std::vector<double>& logarithms)
+{
+  const std::size_t first = logarithms.size() / 4, count = logarithms.size() - first;
+  if (count < 16) return {};
+  const double middle = static_cast<double>(count - 1) / 2;
+  double sum = 0, moment = 0, squares = 0, weight = 0;
+  for (std::size_t k = 0; k < count; ++k)
+  {
+    const double x = static_cast<double>(k) - middle;
+    sum += logarithms[first + k];
+    moment += x * logarithms[first + k];
+    weight += x * x;
+  }
+  const double slope = moment / weight, mean = sum / static_cast<double>(count);
+  for (std::size_t k = 0; k < count; ++k)
+    squares += std::pow(logarithms[first + k] - mean - slope * (static_cast<double>(k) - middle), 2);
+  const double error = 2 * std::sqrt(8 * squares / static_cast<double>(count) / weight);
+  return {static_cast<long>(logarithms.size()), std::exp(slope), error * std::exp(slope)};
+}
+
 /// Whether a motion beside an orbit is seen to leave it: the return residual, which is in proportion to the distance,
 /// doubles over as many periods as should make it four times as large. Where the largest multiplier itself is below 1,
 /// its bar alone reaching across, that many periods do not exist.
@@ -136,6 +159,18 @@ bool better(const Attempt& first, const Attempt& second)
   return second.answers() || (!first.converged() && second.found.orbit.residual < first.found.orbit.residual);
 }
 
+/// Whether a motion beside an orbit that repels takes so long to leave it that the search cannot see where it goes:
+/// from a tenth of the fluctuation to all of it. A small model is searched all the same: its periods cost little.
+bool leaves_too_slowly(const Search& search, const Attempt& attempt, int done)
+{
+  constexpr PetscInt small = 10000; // degrees of freedom
+  PetscInt dofs = 0;
+  check(VecGetSize(displacement(attempt.found.orbit.state), &dofs));
+  if (dofs <= small || !attempt.repels() || attempt.floquet.multipliers.values.empty()) return false;
+  const double largest = std::abs(attempt.floquet.multipliers.values.front());
+  return std::log(10) > (search.options.free_periods - done) * std::log(std::max(largest, 1.));
+}
+
 /// Goes on integrating for 20, 40, 80 … periods, and shoots again after each or as soon as the motion returns three
 /// times better than where the last attempt started. The motion goes on by itself; once, from beside an orbit that
 /// repels. Sets `free` to where it ends.
@@ -176,6 +211,43 @@ Attempt search_on(const Search& search, Attempt best, int done, Orbit& free)
     if (better(best, next)) best = std::move(next);
   }
   return best;
+}
+
+/// How long the motion takes to leave, in a sentence that follows the reason.
+std::string leaving_time(const Multipliers& multipliers, double period)
+{
+  const std::complex<double> fastest = multipliers.values.front();
+  const double periods = 1 / std::log(std::abs(fastest));
+  return format("; at %.4g Hz it grows e-fold in %.3g periods (%.2g s): a larger -cycle_free_periods follows it",
+                std::abs(std::arg(fastest)) / (2 * std::numbers::pi * period), periods, periods * period);
+}
+
+/// Integrates beside the orbit and fits the growth of the distance from it, without its part along the flow. The first
+/// quarter is left out, where other motions decay, and what comes after the distance exceeds a third of the
+/// fluctuation or falls to a tenth of its start: the shift in time that a motion ends with leaves the flow's direction
+/// by its square.
+SeenGrowth watch(const Search& search, const Attempt& attempt)
+{
+  constexpr double first = 0.03; // of the fluctuation
+  const auto& [problem, options, log, start] = search;
+  const Orbit& orbit = attempt.found.orbit;
+  SeenGrowth seen;
+  if (!attempt.converged() || !attempt.floquet.fastest.get()) return seen;
+  const Owned<Vec> state = state_beside(problem, attempt, first), flow = copy_of(orbit.rate.get());
+  normalise(problem.flow, flow);
+  std::vector<double> distances;
+  for (PetscInt k = 0; k < options.watched_periods; ++k)
+  {
+    const Orbit now = evaluate(problem, log, state, orbit.period);
+    check(VecAXPY(state, 1, now.defect));
+    const Owned<Vec> away = copy_of(state.get());
+    check(VecAXPY(away, -1, orbit.state));
+    check(VecAXPY(away, -energy_product(problem.flow, flow, away), flow));
+    const double distance = energy_norm(problem.flow, away) / orbit.fluctuation;
+    if (!(distance < 1. / 3) || distance < 0.1 * first) break;
+    distances.push_back(std::log(distance));
+  }
+  return fit_growth(distances);
 }
 
 /// How the search for an orbit ended. `rests`: the free motion decays to the equilibrium.
@@ -229,8 +301,9 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   problem.least_fluctuation = std::min(free.fluctuation, start.first_event) * std::sqrt(0.1);
   const Search search{problem, options, log, start};
   Attempt found = attempt_from(search, free);
-  if (options.finish != Finish::none) found = search_on(search, std::move(found), settings.free_periods, free);
-  const bool goes_on = std::isfinite(free.residual);
+  const bool slow = leaves_too_slowly(search, found, settings.free_periods);
+  if (options.finish != Finish::none && !slow) found = search_on(search, std::move(found), settings.free_periods, free);
+  const bool goes_on = !slow && std::isfinite(free.residual);
 
   ShootingResult result;
   result.outcome = outcome_of(log.convergence, found.found, goes_on && collapsing(problem, free));
@@ -241,6 +314,8 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
     result.outcome.kind = OutcomeKind::unstable_cycle;
     result.outcome.reason = "the cycle found repels: integrated beside it, a motion leaves it";
   }
+  if (slow) result.outcome.reason += leaving_time(result.multipliers, found.found.orbit.period);
+  if (options.watched_periods > 0) result.multipliers.seen = watch(search, found);
   result.orbit = std::move(found.found.orbit);
   if (goes_on) result.free = std::move(free);
   result.convergence = std::move(log.convergence);

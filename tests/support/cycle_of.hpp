@@ -8,7 +8,8 @@
 namespace squeal::test
 {
 
-inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance, const CycleOptions& options)
+inline LimitCycle cycle_of(const SmallModel& model, const CycleSettings& settings, const CycleOptions& options,
+                           const State* given)
 {
   const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
   REQUIRE(equilibrium.outcome.kind == OutcomeKind::converged);
@@ -20,15 +21,20 @@ inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double 
   REQUIRE(!modes.modes.empty());
   const ComplexMode& mode = modes.modes.front();
   const Estimate estimate = estimate_amplitude(sliding, linearised, mode, {});
+  const StepOptions step;
+  const ModesOptions modes_options;
+  const CycleProblem problem{sliding,       linearised, modes.modes, {{&mode, 1}, {&estimate, 1}}, settings, step,
+                             modes_options, nullptr,    given};
+  return find_cycle_from_start(problem, options);
+}
+
+inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance, const CycleOptions& options)
+{
   CycleSettings settings;
   settings.steps_per_period = steps;
   settings.free_periods = free;
   settings.tolerance = tolerance;
-  const StepOptions step;
-  const ModesOptions modes_options;
-  const CycleProblem problem{sliding,  linearised, modes.modes,   {{&mode, 1}, {&estimate, 1}},
-                             settings, step,       modes_options, nullptr};
-  return find_cycle_from_start(problem, options);
+  return cycle_of(model, settings, options, nullptr);
 }
 
 inline LimitCycle cycle_of(const SmallModel& model, int steps, int free, double tolerance)

@@ -85,3 +85,45 @@ TEST_CASE("the oblique projection's verdict and bars hold against the whole mono
   CHECK(projected >= compared - 1); // nearly equal multipliers may leave no left vectors that fit
   CHECK(decided >= compared - 1);
 }
+
+TEST_CASE("a motion beside a cycle grows or decays as the largest multiplier says")
+{
+  std::mt19937 random(11);
+  int watched = 0;
+  for (std::size_t sample = 0; sample < 6; ++sample)
+  {
+    CAPTURE(sample);
+    CycleOptions options;
+    options.shooting.watched_periods = 200;
+    const SmallModel model = random_oscillator(random, sample);
+    check(MatScale(model.structure.C, 0.15)); // so that small motions take tens of periods to decay
+    const LimitCycle cycle = cycle_of(model, 100, 10, 1e-10, options);
+    if (cycle.outcome.kind != OutcomeKind::converged) continue;
+    const SeenGrowth& seen = cycle.multipliers.seen;
+    if (seen.periods < 40) continue; // it vanished too soon for a line
+    const double truth = std::abs(cycle.multipliers.values.front());
+    // 3 % of the fluctuation is no small motion: what its square changes a decay rate by is a few percent of the rate
+    CHECK(std::abs(seen.growth - truth) <= seen.error + 0.05 * std::abs(truth - 1));
+    ++watched;
+  }
+  CHECK(watched >= 3);
+}
+
+TEST_CASE("a state of the cycle is a start from which its own period is found at once")
+{
+  std::mt19937 random(5);
+  const SmallModel model = random_oscillator(random, 0);
+  const LimitCycle cycle = cycle_of(model, 100, 10, 1e-10);
+  REQUIRE(cycle.outcome.kind == OutcomeKind::converged);
+  const State given{copy_of(displacement(cycle.orbit.state)), copy_of(velocity(cycle.orbit.state)), 0, {}};
+  CycleSettings settings;
+  settings.start.kind = CycleStartKind::file;
+  settings.free_periods = 0;
+  settings.steps_per_period = 100;
+  settings.tolerance = 1e-8;
+  const LimitCycle again = cycle_of(model, settings, {}, &given);
+  CHECK(again.outcome.kind == OutcomeKind::converged);
+  // at most three corrections of the mode's period, Newton's steps for the rest, and the test of the half period
+  CHECK(again.convergence.periods <= 8);
+  CHECK(again.orbit.period == doctest::Approx(cycle.orbit.period).epsilon(1e-6));
+}

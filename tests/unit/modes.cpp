@@ -7,8 +7,10 @@
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <doctest/doctest.h>
+#include <numbers>
 #include <random>
 
 using namespace squeal;
@@ -230,4 +232,23 @@ TEST_CASE("a free body moves at no cost: its real mode is 0, and no complex mode
     CHECK(modes.unstable_count == 0);
     CHECK(modes.count_check.starts_with("confirmed"));
   }
+}
+
+TEST_CASE("real modes between two frequencies are those of all below the higher one")
+{
+  const SmallModel model = crowded_model(60, 3);
+  const Equilibrium equilibrium = all_closed(model);
+  const LinearisedSliding linearised = linearise({model.structure, model.interface, equilibrium});
+  ModesOptions sparse;
+  sparse.dense_limit = 10;          // below the model's size
+  const double low = 2, high = 3.5; // [Hz]
+  const RealModes all = find_real_modes_below(linearised, high, {}),
+                  between = find_real_modes_between(linearised, low, high, sparse);
+  const double least = 2 * std::numbers::pi * low;
+  const auto first = std::lower_bound(all.omega.begin(), all.omega.end(), least);
+  REQUIRE(all.omega.end() - first > 5);
+  REQUIRE(static_cast<std::ptrdiff_t>(between.omega.size()) == all.omega.end() - first);
+  for (std::size_t k = 0; k < between.omega.size(); ++k)
+    CHECK(between.omega[k] == doctest::Approx(first[static_cast<std::ptrdiff_t>(k)]).epsilon(1e-8));
+  CHECK(find_real_modes_between(linearised, high, low, sparse).shapes.empty());
 }

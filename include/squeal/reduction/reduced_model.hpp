@@ -48,6 +48,9 @@ struct ReducedModel
   int size() const { return static_cast<int>(M.rows()); }
 };
 
+/// The highest of the modes' frequencies [Hz]; 0 without modes.
+double highest_frequency(const std::vector<ComplexMode>& modes);
+
 /// Pairs whose normal reaction in u0 + amplitude Re(phi e^{iwt}) falls below zero, or whose gap does.
 std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
                                        const ComplexMode& mode, double amplitude);

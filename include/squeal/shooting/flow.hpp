@@ -22,9 +22,11 @@ struct SlowMotions
   std::vector<double> rises;                // what it rises by at most
   std::vector<Owned<Vec>> right, left;      // of the spans; left ones act by the energy product
   std::vector<Owned<Vec>> others;           // more motions that decay slowly, the slowest first
-  bool confirmed = false;                   // another approximation has as many large values
-  std::string missing;                      // why there are none
-  long periods = 0;                         // integrated to find them
+  /// x = (A - m)^-1 x of a complex x, A that approximation of dPhi_T/dx.
+  std::function<void(std::complex<double> m, Vec real, Vec imaginary)> correct;
+  bool confirmed = false; // another approximation has as many large values
+  std::string missing;    // why there are none
+  long periods = 0;       // integrated to find them
 };
 
 /// The period map Phi_T: the state a time T after a start.

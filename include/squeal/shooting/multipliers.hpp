@@ -51,6 +51,13 @@ inline Words words_of(Crossing)
   return crossing_words;
 }
 
+/// What a motion beside an orbit was seen to do: it began at 3 % of the fluctuation along the fastest motion.
+struct SeenGrowth
+{
+  long periods = 0; // integrated until the distance became large or vanished; 0: not watched
+  double growth = std::numeric_limits<double>::quiet_NaN(), error = growth; // of the distance, a period
+};
+
 struct Multipliers
 {
   std::vector<std::complex<double>> values; // without that of a shift in time, largest first; empty: not examined
@@ -63,6 +70,7 @@ struct Multipliers
   long periods = 0;                   // columns of the tangent, or difference quotients, over one period each
   MultiplierMethod method = MultiplierMethod::automatic; // that was used
   std::string refusal;                                   // why the oblique projection did not serve
+  SeenGrowth seen{};
 };
 
 struct FloquetAnalysis
