@@ -17,7 +17,8 @@ DefineConstant[
   pin_columns = {3, Min 1, Step 1, Name "Pins/columns a side"},
   pin_first_radius = {0.19, Name "Pins/radius of the innermost ring [m]"},
   pin_pitch = {0.045, Name "Pins/distance of rings [m]"},
-  pin_angle = {14, Name "Pins/angle between columns [degree]"}
+  pin_angle = {14, Name "Pins/angle between columns [degree]"},
+  pin_refinement = {1, Name "Mesh/elements of a pin's face along a side over those of the disc below it"}
 ];
 
 first_edge = pin_first_radius - pin_pitch / 2;
@@ -105,6 +106,10 @@ For i In {2:bands-2}
     r = (radius[i] + radius[i + 1]) / 2; a = angle[j] + pin_angle * Pi / 360;
     For side In {-1:1}
       z = side * (thickness / 2 + away);
+      n_arc = n; n_spoke = n_ring;
+      If (side != 0)
+        n_arc = Round(n * pin_refinement); n_spoke = Round(n_ring * pin_refinement);
+      EndIf
       o = newp; Point(o) = {r * Cos(a), r * Sin(a), z};
       For q In {0:3} // corners, in the order of the cell's: inner, outer, outer next column, inner next column
         turn = a + (5 + 2 * q) * Pi / 4;
@@ -112,9 +117,9 @@ For i In {2:bands-2}
         p = newp; Point(p) = {r * Cos(a) + 0.5 * pin_radius * Cos(turn), r * Sin(a) + 0.5 * pin_radius * Sin(turn), z}; in[q] = p;
       EndFor
       For q In {0:3}
-        c = newc; Circle(c) = {on[q], o, on[(q + 1) % 4]}; Transfinite Curve{c} = n + 1; arc[q] = c;
-        c = newc; Line(c) = {in[q], in[(q + 1) % 4]}; Transfinite Curve{c} = n + 1; edge[q] = c;
-        c = newc; Line(c) = {in[q], on[q]}; Transfinite Curve{c} = n_ring + 1; spoke[q] = c;
+        c = newc; Circle(c) = {on[q], o, on[(q + 1) % 4]}; Transfinite Curve{c} = n_arc + 1; arc[q] = c;
+        c = newc; Line(c) = {in[q], in[(q + 1) % 4]}; Transfinite Curve{c} = n_arc + 1; edge[q] = c;
+        c = newc; Line(c) = {in[q], on[q]}; Transfinite Curve{c} = n_spoke + 1; spoke[q] = c;
       EndFor
       section[] = {};
       s = news; Curve Loop(s) = {edge[]}; Plane Surface(s) = {s}; section[] += s;
@@ -151,9 +156,9 @@ top[] = Extrude {0, 0, pin_height} { Surface{face_top[]}; Layers{n_pin}; Recombi
 bottom[] = Extrude {0, 0, -pin_height} { Surface{face_bottom[]}; Layers{n_pin}; Recombine; };
 For s In {0:#footprint[]+#plain[]-1}
   disc[] += {up[6 * s + 1], down[6 * s + 1]};
+  disc_top[] += up[6 * s]; disc_bottom[] += down[6 * s];
 EndFor
 For s In {0:#footprint[]-1}
-  disc_top[] += up[6 * s]; disc_bottom[] += down[6 * s];
   pads_top[] += top[6 * s + 1]; pads_top_back[] += top[6 * s];
   pads_bottom[] += bottom[6 * s + 1]; pads_bottom_back[] += bottom[6 * s];
 EndFor

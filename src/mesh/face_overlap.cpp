@@ -125,6 +125,12 @@ SlaveInPlane in_plane(const PlacedFace& face, const Eigen::Vector3d& along)
   return slave;
 }
 
+/// The point of a triangle with these barycentric coordinates.
+Point point_of(const Polygon& triangle, const NodeValues& weights)
+{
+  return weights(0) * triangle[0] + weights(1) * triangle[1] + weights(2) * triangle[2];
+}
+
 /// Integrals over one overlap.
 struct Overlap
 {
@@ -145,7 +151,7 @@ Overlap integrate(const SlaveInPlane& slave, const PlacedFace& master, const Nod
     const double jacobian = slave.stretch * twice_area(triangle);
     for (const auto& [xi, weight, corner] : triangle_rule(triangles ? 3 : 4))
     {
-      const Point point = corner.N(0) * triangle[0] + corner.N(1) * triangle[1] + corner.N(2) * triangle[2];
+      const Point point = point_of(triangle, corner.N);
       const FaceValues phi = functions_at(slave.face.shape, slave.x, point, slave.size).N;
       const FaceValues N = functions_at(master.shape, x, point, slave.size).N;
       const FaceValues chi = multiplier_functions(slave.face.shape, phi);
@@ -160,12 +166,19 @@ Overlap integrate(const SlaveInPlane& slave, const PlacedFace& master, const Nod
   return overlap;
 }
 
-/// int chi over the whole face, projected and stretched back.
+/// int chi over the polygon of the slave's corners.
 FaceValues whole_area(const SlaveInPlane& slave)
 {
   FaceValues phi = FaceValues::Zero(slave.x.cols());
-  for (const auto& [xi, weight, at] : area_rule(slave.face.shape))
-    phi += weight * std::abs((slave.x.topRows<2>() * at.dN.topRows<2>().transpose()).determinant()) * at.N;
+  for (std::size_t k = 1; k + 1 < slave.corners.size(); ++k)
+  {
+    const Polygon triangle{slave.corners[0], slave.corners[k], slave.corners[k + 1]};
+    for (const auto& [xi, weight, corner] : triangle_rule(3))
+    {
+      const Point point = point_of(triangle, corner.N);
+      phi += weight * twice_area(triangle) * functions_at(slave.face.shape, slave.x, point, slave.size).N;
+    }
+  }
   return slave.stretch * multiplier_functions(slave.face.shape, phi);
 }
 

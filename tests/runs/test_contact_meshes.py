@@ -1,0 +1,112 @@
+"""Contact of meshes that do not match: Hertz's line contact, the disc brake meshed apart, pads finer than the disc."""
+
+import h5py
+import numpy as np
+import pytest
+from conftest import INPUTS
+from models import Mesh, bricks, bricks20, lattice, quads, write_scene
+
+OFF = {"enabled": False}
+
+
+def quads8(nodes):
+    """8-node cells, gmsh's order, of a lattice (2n+1, 2m+1) of node numbers."""
+    places = ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1))
+    n = [size - 2 for size in nodes.shape]
+    return np.stack([nodes[i:n[0] + i:2, j:n[1] + j:2].ravel() for i, j in places], axis=-1)
+
+
+def graded(first, fine, ratio, end):
+    """Places from 0 in steps of `first` up to `fine`, then in growing steps to `end`."""
+    places = list(np.linspace(0, fine, round(fine / first) + 1))
+    step = first
+    while places[-1] < end:
+        step *= ratio
+        places.append(places[-1] + step)
+    return np.array(places)
+
+
+def with_middles(places):
+    return np.interp(np.arange(2 * len(places) - 1) / 2, np.arange(len(places)), places)
+
+
+def body(mesh, name, x, z, width, height, quadratic):
+    """A slab of one element across y; its surface is z = height(x), z grows away from it."""
+    y = np.array([0, width])
+    if quadratic:
+        x, y, z = map(with_middles, (x, y, z))
+    grid = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
+    grid[..., 2] += height(grid[..., 0]) * np.clip(1 - np.abs(grid[..., 2]) / np.abs(z).max(), 0, 1)
+    nodes = mesh.add_nodes(grid)
+    mesh.add(name, "brick20" if quadratic else "brick", bricks20(nodes) if quadratic else bricks(nodes))
+    for face, k in (("face", 0), ("end", -1)):
+        mesh.add(f"{name}:{face}", "quad8" if quadratic else "quad", (quads8 if quadratic else quads)(nodes[:, :, k]))
+    mesh.add_points("x=0", nodes[0])
+    mesh.add_points("sides", nodes.reshape(-1))
+    return nodes
+
+
+def line_contact(converged, folder, per_radius, quadratic, ratio):
+    """Errors of radius (from the second moment, a^2/4) and peak pressure; spacing of nodes a/per_radius on the slave."""
+    radius, a, young, poisson, width = 1.0, 0.02, 1e9, 0.3, 0.01
+    stiffness = young / (2 * (1 - poisson**2))
+    load = np.pi * a**2 * stiffness / (4 * radius)  # a metre of length
+    peak = 2 * load / (np.pi * a)
+    step = a / per_radius * (2 if quadratic else 1)
+    mesh = Mesh()
+    for name, h, sign in (("plane", ratio * step, -1), ("cylinder", step, 1)):
+        x, z = graded(h, 1.5 * a, 1.3, 40 * a), sign * graded(h, 0.6 * a, 1.3, 40 * a)
+        body(mesh, name, x, z, width, (lambda s: np.minimum(s, 3 * a)**2 / (2 * radius)) if sign > 0 else (lambda s: 0 * s),
+             quadratic)
+    mesh.write(folder / "bodies.msh")
+    end = graded(step, 1.5 * a, 1.3, 40 * a)[-1]
+    scene = write_scene(folder, title="line contact", mesh={"file": "bodies.msh"}, modes=OFF, estimate=OFF,
+                        friction={"coefficient": 0.0},
+                        part=[{"name": name, "young": young, "poisson": poisson, "density": 1} for name in ("plane", "cylinder")],
+                        contact=[{"rotor": "plane:face", "stator": "cylinder:face", "normal": "z", "reach": 1e-3}],
+                        pressure=[{"on": "cylinder:end", "value": load / 2 / end}],
+                        support=[{"on": "plane:end", "fixed": "z"}, {"on": "x=0", "fixed": "x"}, {"on": "sides", "fixed": "y"}])
+    run = converged(scene)
+    with h5py.File(run.output / "fields.h5") as fields:
+        x, force = fields["pairs/position"][:, 0], fields["pairs/reaction"][:, 0]
+        pressure = fields["pairs/pressure"][:]
+    assert force.sum() == pytest.approx(load / 2 * width, rel=1e-9)
+    found = 2 * np.sqrt((force * x**2).sum() / force.sum())
+    return found / a - 1, pressure.max() / peak - 1, run.report["equilibrium"]["iterations"]
+
+
+@pytest.mark.parametrize("quadratic", [False, True])
+def test_a_cylinder_presses_as_hertz_says(converged, tmp_path, quadratic):
+    """Bricks of 8 and 20 nodes; the plane's elements are 1.5 times as long as the cylinder's. With 6, 12 and 24 nodes a
+    contact radius the radius is off by 0.38, 0.11, 0.016 % (8 nodes) and by 1.09, 0.34, 0.10 % (20 nodes): second order.
+    Matching meshes give 0.75, 0.15, 0.026 % and 1.12, 0.41, 0.10 %. The status iterations differ by one at most."""
+    found = {}
+    for n in (6, 12, 24):
+        for ratio in (1.5, 1.0):
+            folder = tmp_path / f"{n} {ratio}"
+            folder.mkdir()
+            found[n, ratio] = line_contact(converged, folder, n, quadratic, ratio)
+        radius, peak, iterations = found[n, 1.5]
+        assert abs(radius) < 0.013 * (6 / n)**1.6
+        assert abs(peak) < 0.01
+        assert abs(iterations - found[n, 1.0][2]) <= 1
+    assert abs(found[6, 1.5][0]) > 8 * abs(found[24, 1.5][0])  # 16 at second order
+
+
+def test_the_disc_brake_meshed_apart(converged):
+    """10-node tetrahedra: 1 and 3 ranks agree, all of the pistons' force passes through the pads, moments balance."""
+    one, three = (converged(INPUTS / "disc_brake" / "scene.toml", "--set", "transient.periods=1", ranks=ranks).report
+                  for ranks in (1, 3))
+    for a, b in zip(one["modes"]["modes"], three["modes"]["modes"]):
+        assert b["frequency_hz"] == pytest.approx(a["frequency_hz"], rel=1e-9)
+        assert b["growth_rate"] == pytest.approx(a["growth_rate"], rel=1e-6, abs=1e-6)
+    assert one["modes"]["unstable_count"] == 3
+    # Each pad is a sector of 50 degrees between 85 and 135 mm under 1 MPa; its sides' chords take 1e-4 of it.
+    force = 1e6 * np.radians(50) / 2 * (0.135**2 - 0.085**2)
+    for contact in one["equilibrium"]["contacts"]:
+        assert contact["normal_force_sum"] == pytest.approx(force, rel=2e-4)
+        assert 0.5 * 0.085 * force < contact["torque"] < 0.5 * 0.135 * force
+    for contact in one["model"]["contacts"]:
+        assert contact["covered_area"] == pytest.approx(contact["slave_area"], rel=1e-12)
+        assert contact["offset"] < 1e-12
+    assert one["transient"]["energy_defect_max"] < 1e-10
