@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <new>
 #include <thread>
+#include <unistd.h>
 
 namespace
 {
@@ -137,6 +138,19 @@ void print_sources(const std::vector<std::string>& sources, MPI_Comm comm)
   std::printf("options come from the command line and from %s\n", text.c_str());
 }
 
+/// Throws Error if a state file could not be written after the work. The results' folder will be made.
+void check_state_file(const std::string& key, const std::filesystem::path& file, const std::filesystem::path& output)
+{
+  if (file.empty()) return;
+  const auto folder = file.parent_path(), results = std::filesystem::absolute(output).lexically_normal();
+  const std::string label = key + " = " + shortened(file) + ": ";
+  if (is_folder(file)) throw Error(label + "it is a folder; name a file");
+  if (folder == results || folder / "" == results) return;
+  if (!is_folder(folder)) throw Error(label + "there is no folder " + shortened(folder) + "; make it first");
+  if (access((is_file(file) ? file : folder).c_str(), W_OK) != 0 || access(folder.c_str(), W_OK) != 0)
+    throw Error(label + "it cannot be written; name a file where you may write");
+}
+
 /// Whether a launcher says that this is another rank than the first; known before MPI is up.
 bool is_other_rank()
 {
@@ -158,12 +172,18 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
   if (scene.mesh && arguments.allow_scripts) scene.mesh->statements = Statements::any;
+  const auto output = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;
+  on_rank_zero(comm,
+               [&]
+               {
+                 check_state_file("[transient] save_state", scene.transient.save_state, output);
+                 check_state_file("[cycle] save_state", scene.cycle.save_state, output);
+               });
   if (arguments.dry_run)
   {
     dry_run(scene, options, comm);
     return 0;
   }
-  const auto output = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;
   on_rank_zero(comm, [&] { check_outputs(scene, output); });
   ResultsFolder results(output, comm);
   write_request(scene, results.run(), results.partial(), comm);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <unistd.h>
 
 namespace squeal
 {
@@ -40,8 +39,6 @@ public:
     for (const Probe& probe : scene_.probes) check_probe(probe);
     check_transient();
     check_cycle();
-    check_new_file(scene_.transient.save_state, "[transient] save_state");
-    check_new_file(scene_.cycle.save_state, "[cycle] save_state");
   }
 
 private:
@@ -188,18 +185,6 @@ private:
     if ((t.steps > 0) != (t.step_size > 0))
       fail(t.steps > 0 ? static_cast<const void*>(&t.steps) : &t.step_size,
            "[transient] steps and step_size go together: give both, or periods and steps_per_period");
-  }
-
-  /// Throws Error if a state file could not be written after the work.
-  void check_new_file(const std::filesystem::path& file, const std::string& key) const
-  {
-    if (file.empty()) return;
-    const std::filesystem::path folder = file.parent_path();
-    const std::string label = key + " = " + shortened(file) + ": ";
-    if (is_folder(file)) fail(&file, label + "it is a folder; name a file");
-    if (!is_folder(folder)) fail(&file, label + "there is no folder " + shortened(folder) + "; make it first");
-    if (access((is_file(file) ? file : folder).c_str(), W_OK) != 0 || access(folder.c_str(), W_OK) != 0)
-      fail(&file, label + "it cannot be written; name a file where you may write");
   }
 
   void check_cycle() const

@@ -12,7 +12,7 @@ from conftest import INPUTS, ROOT
 
 SCENE = INPUTS / "oscillator" / "scene.toml"
 SHORT = ["--set", "transient.periods=5", "--set", "cycle.enabled=false"]
-ENDLESS = ["--set", "transient.periods=1e6"]
+ENDLESS = ["--set", "transient.periods=1e5"]
 
 
 def start(output, *arguments, scene=SCENE):
