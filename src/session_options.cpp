@@ -70,6 +70,8 @@ bool is_one_of(const std::string& word, std::initializer_list<const char*> words
 std::string problem_of_new_file(const std::string& name)
 {
   const fs::path file(name), folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  constexpr std::size_t longest = 250, longest_path = 4000; // of names on Linux, with what PETSc appends
+  if (file.filename().string().size() > longest || name.size() > longest_path) return "the name is too long";
   if (is_folder(file)) return shortened(name) + " is a folder";
   if (!is_folder(folder)) return "there is no folder " + shortened(folder);
   if (access((is_file(file) ? file : folder).c_str(), W_OK) != 0) return shortened(name) + " cannot be written";

@@ -36,6 +36,7 @@ OPTIONS = {
     "a log of no known format": (["-log_view", ":log.txt:magic"], ["-log_view", "ascii_xml"]),
     "a log where there is no folder": (["-log_view", ":/no/such/x"], ["-log_view", "/no/such"]),
     "a history where there is no folder": (["-history", "/no/such/h"], ["-history", "/no/such"]),
+    "a trace whose name is too long": (["-log_trace", "x" * 3000], ["-log_trace", "too long"]),
     "no truth value": (["-malloc_debug", "many"], ["-malloc_debug", "true or false"]),
     "a state where there is no folder": (["--set", "transient.save_state=no/such/x"], ["save_state", "no/such"]),
     "a state that is a folder": (["--set", "transient.save_state=matrices"], ["save_state", "folder"]),
