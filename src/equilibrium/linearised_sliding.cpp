@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 namespace squeal
 {
@@ -20,6 +21,9 @@ struct Coefficients
 
 // Columns from `dofs` on record the elimination itself: they start as the identity and end as its inverse.
 using Row = std::map<PetscInt, Coefficients>;
+
+// The rows that hold a column. A row loses none but its pivots' columns, which no row takes again.
+using Holders = std::map<PetscInt, std::vector<std::size_t>>;
 
 // The rows of B of the closed pairs, whole on every rank: they are few, and the elimination is the same everywhere.
 std::vector<Row> read_rows(const Interface& interface, const std::vector<int>& pairs)
@@ -60,7 +64,7 @@ std::vector<Row> read_rows(const Interface& interface, const std::vector<int>& p
 }
 
 // The degree of freedom large in both rows; one that no other row holds is preferred, since nothing then fills in.
-PetscInt choose_pivot(const Row& row, const std::map<PetscInt, int>& holders, PetscInt dofs, double vanishing)
+PetscInt choose_pivot(const Row& row, const Holders& holders, PetscInt dofs, double vanishing)
 {
   double largest_normal = 0, largest_sliding = 0;
   for (const auto& [column, value] : row)
@@ -76,7 +80,7 @@ PetscInt choose_pivot(const Row& row, const std::map<PetscInt, int>& holders, Pe
   {
     if (column >= dofs) continue;
     const double score = std::min(std::abs(value.normal) / largest_normal, std::abs(value.sliding) / largest_sliding) *
-                         (holders.at(column) == 1 ? 1 : 0.1);
+                         (holders.at(column).size() == 1 ? 1 : 0.1);
     if (score < best_score * (1 - 1e-9)) continue; // of equals the last, whatever the rounding
     best = column;
     best_score = score;
@@ -84,19 +88,19 @@ PetscInt choose_pivot(const Row& row, const std::map<PetscInt, int>& holders, Pe
   return best;
 }
 
-// row -= row[pivot] * pivot_row, which holds 1 at the pivot
-void subtract(Row& row, const Row& pivot_row, PetscInt pivot, std::map<PetscInt, int>& holders)
+// rows[j] -= rows[j][pivot] * pivot_row, which holds 1 at the pivot
+void subtract(std::vector<Row>& rows, std::size_t j, const Row& pivot_row, PetscInt pivot, Holders& holders)
 {
+  Row& row = rows[j];
   const Coefficients factor = row.at(pivot);
   for (const auto& [column, value] : pivot_row)
   {
     const auto [entry, is_new] = row.try_emplace(column);
-    if (is_new) ++holders[column];
+    if (is_new) holders[column].push_back(j);
     entry->second.normal -= factor.normal * value.normal;
     entry->second.sliding -= factor.sliding * value.sliding;
   }
   row.erase(pivot);
-  --holders[pivot];
 }
 
 double size_of(const Row& row)
@@ -109,13 +113,13 @@ double size_of(const Row& row)
 // Gauss-Jordan: on return row i holds 1 at pivots[i], and no other row holds that column.
 std::vector<PetscInt> eliminate(std::vector<Row>& rows, const std::vector<int>& pairs, PetscInt dofs)
 {
-  std::map<PetscInt, int> holders;
+  Holders holders;
   std::vector<double> size(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i)
   {
     size[i] = size_of(rows[i]);
     rows[i][dofs + static_cast<PetscInt>(i)] = {1, 1};
-    for (const auto& [column, value] : rows[i]) ++holders[column];
+    for (const auto& [column, value] : rows[i]) holders[column].push_back(i);
   }
   std::vector<PetscInt> pivots;
   for (std::size_t i = 0; i < rows.size(); ++i)
@@ -128,9 +132,9 @@ std::vector<PetscInt> eliminate(std::vector<Row>& rows, const std::vector<int>& 
     const Coefficients scale = rows[i].at(pivot);
     for (auto& [column, value] : rows[i]) value = {value.normal / scale.normal, value.sliding / scale.sliding};
     pivots.push_back(pivot);
-    if (holders.at(pivot) == 1) continue;
-    for (std::size_t j = 0; j < rows.size(); ++j)
-      if (j != i && rows[j].count(pivot)) subtract(rows[j], rows[i], pivot, holders);
+    const std::vector<std::size_t> others = std::exchange(holders.at(pivot), {i});
+    for (const std::size_t j : others)
+      if (j != i) subtract(rows, j, rows[i], pivot, holders);
   }
   return pivots;
 }
