@@ -13,7 +13,7 @@ namespace
 {
 
 /// Sentences about elements that are too stiff and slave surfaces that face nothing.
-std::vector<std::string> warnings_of(const Model& model)
+std::vector<std::string> warnings_of(const Model& model, const Scene& scene)
 {
   std::vector<std::string> sentences;
   if (const long count = std::ranges::count(model.mesh.elements, Shape::tet4, &Element::shape); count > 0)
@@ -22,12 +22,16 @@ std::vector<std::string> warnings_of(const Model& model)
   for (std::size_t i = 0; i < model.coverage.size(); ++i)
   {
     const Coverage& c = model.coverage[i];
+    const Contact& contact = scene.contacts[i];
+    const bool stator_is_slave = contact.slave == SlaveSide::stator;
+    const std::string& slave = stator_is_slave ? contact.stator : contact.rotor;
+    const std::string& master = stator_is_slave ? contact.rotor : contact.stator;
     const Vec3& at = c.uncovered_at;
     constexpr double rounding = 1e-6; // the tolerance of coincident surfaces
     if (c.covered < (1 - rounding) * c.area)
-      sentences.push_back(format("%.3g %% of the slave surface of contact %zu face nothing, most of it around (%g, %g, "
-                                 "%g): no force passes there",
-                                 100 * (1 - c.covered / c.area), i, at[0], at[1], at[2]));
+      sentences.push_back(format("%.3g %% of the area of '%s' does not face '%s', most of it around (%g, %g, %g): no "
+                                 "contact force acts there",
+                                 100 * (1 - c.covered / c.area), slave.c_str(), master.c_str(), at[0], at[1], at[2]));
   }
   return sentences;
 }
@@ -73,14 +77,14 @@ Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm)
   return scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, model.mesh, comm);
 }
 
-ModelSummary summary_of(const Model& model, MPI_Comm comm)
+ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)
 {
   ModelSummary summary;
   check(MatGetSize(model.structure.K, &summary.dofs, nullptr));
   summary.elements = model.structure.elements;
   summary.pairs = model.interface.pairs;
   summary.coverage = model.coverage;
-  summary.warnings = warnings_of(model);
+  summary.warnings = warnings_of(model, scene);
   summary.ranks = ranks_of(comm);
   for (int c = 0; c < 3 && !model.mesh.nodes.empty(); ++c)
   {

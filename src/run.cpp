@@ -233,7 +233,7 @@ ExitCode exit_code_of(const Report& report)
 /// The summary with the warnings that follow from the scene.
 ModelSummary summary_with_doubts(const Model& model, const Scene& scene, MPI_Comm comm)
 {
-  ModelSummary summary = summary_of(model, comm);
+  ModelSummary summary = summary_of(model, scene, comm);
   for (const std::string& doubt : doubts_about(scene)) summary.warnings.push_back(doubt);
   return summary;
 }

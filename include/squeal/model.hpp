@@ -23,7 +23,7 @@ Model build_model(const Scene& scene, MPI_Comm comm);
 Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm);
 
 /// What the model is, as far as it is known before anything is solved. Collective.
-ModelSummary summary_of(const Model& model, MPI_Comm comm);
+ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm);
 
 /// What the probes read of a displacement [m], whole on every rank.
 std::vector<double> probe_values(Mat probes, Vec u);

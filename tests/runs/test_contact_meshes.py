@@ -110,3 +110,28 @@ def test_the_disc_brake_meshed_apart(converged):
         assert contact["covered_area"] == pytest.approx(contact["slave_area"], rel=1e-12)
         assert contact["offset"] < 1e-12
     assert one["transient"]["energy_defect_max"] < 1e-10
+
+
+def test_what_faces_nothing_is_told(converged, tmp_path):
+    """The upper block hangs over by a quarter, in linear tetrahedra: two warnings, and the force balances."""
+    mesh = Mesh()
+    cut = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
+    for name, n, low, shift in (("lower", 4, 0, 0), ("upper", 3, 1, 0.25)):
+        nodes = mesh.add_nodes(lattice((n, n, 2), lambda x, y, z: (x + shift, y, z + low)))
+        mesh.add(name, "tetrahedron", np.concatenate([bricks(nodes)[:, c] for c in cut]))
+        for face, k in (("bottom", 0), ("top", -1)):
+            cells = quads(nodes[:, :, k])
+            mesh.add(f"{name}:{face}", "triangle", np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]]))
+    mesh.write(tmp_path / "bodies.msh")
+    scene = write_scene(tmp_path, title="overhang", mesh={"file": "bodies.msh"}, modes=OFF, estimate=OFF,
+                        friction={"coefficient": 0.0},
+                        part=[{"name": name, "young": 1e9, "poisson": 0.3, "density": 1} for name in ("lower", "upper")],
+                        contact=[{"rotor": "lower:top", "stator": "upper:bottom"}],
+                        pressure=[{"on": "upper:top", "value": 1e6}],
+                        support=[{"on": "lower:bottom", "fixed": "all"}, {"on": "upper:top", "fixed": "x y"}])
+    report = converged(scene).report
+    stiff, uncovered, *_ = report["model"]["warnings"]  # the density of 1 is warned of too
+    assert stiff.startswith("300 4-node tetrahedra") and "Mesh.ElementOrder = 2" in stiff
+    assert uncovered.startswith("25 % of the area of 'upper:bottom' does not face 'lower:top'")
+    assert report["model"]["contacts"][0]["covered_area"] == pytest.approx(0.75, rel=1e-12)
+    assert report["equilibrium"]["normal_force_sum"] == pytest.approx(1e6, rel=1e-9)
