@@ -1,9 +1,12 @@
+#include "squeal/base/checkpoint.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/forecast.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"
 #include "squeal/session_options.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <new>
@@ -19,6 +22,8 @@ struct Arguments
 {
   std::filesystem::path scene, output;
   std::vector<std::string> overrides;
+  RunLimits limits;
+  Beginning beginning = Beginning::afresh;
   bool dry_run = false, help = false, version = false, allow_scripts = false, force = false;
   std::string problem;                     // said after MPI is up, once
   std::vector<std::string> option_sources; // beside the command line
@@ -27,6 +32,25 @@ struct Arguments
 bool is_scene_folder(const std::string& word)
 {
   return is_file(std::filesystem::path(word) / "scene.toml");
+}
+
+constexpr std::array with_values = {"--set", "--output", "--time-limit", "--checkpoint"};
+
+/// A number of seconds above 0; otherwise sets the problem.
+void read_seconds(const std::string& word, const std::string& value, double& seconds, std::string& problem)
+{
+  char* end = nullptr;
+  seconds = std::strtod(value.c_str(), &end);
+  if (*end != 0 || !(seconds > 0)) problem = word + " " + value + ": it needs a number of seconds above 0";
+}
+
+/// Takes an argument that has a value.
+void take_value(const std::string& word, const std::string& value, Arguments& arguments)
+{
+  if (word == "--set") arguments.overrides.push_back(value);
+  if (word == "--output") arguments.output = value;
+  if (word == "--time-limit") read_seconds(word, value, arguments.limits.time_limit, arguments.problem);
+  if (word == "--checkpoint") read_seconds(word, value, arguments.limits.checkpoint_interval, arguments.problem);
 }
 
 /// Takes squeal's own arguments out of argv; what stays is PETSc's.
@@ -42,26 +66,27 @@ Arguments take_arguments(int& argc, char** argv)
       arguments.help = true;
     else if (word == "--version")
       arguments.version = true;
+    else if (word == "--restart")
+      arguments.beginning = Beginning::from_checkpoints;
     else if (word == "--dry-run")
       arguments.dry_run = true;
     else if (word == "--allow-scripts")
       arguments.allow_scripts = true;
     else if (word == "--force")
       arguments.force = true;
-    else if (word == "--set" || word == "--output")
+    else if (std::find(with_values.begin(), with_values.end(), word) != with_values.end())
     {
-      if (!has_value)
-        arguments.problem = word + " needs a value: " + (word == "--set" ? "--set key=value" : "--output DIR");
-      else if (word == "--set")
-        arguments.overrides.push_back(argv[++i]);
+      if (has_value)
+        take_value(word, argv[++i], arguments);
       else
-        arguments.output = argv[++i];
+        arguments.problem = word + " needs a value: squeal -help lists the arguments";
     }
     else if (word.rfind("--", 0) == 0)
       arguments.problem =
           "unknown argument " + shortened(word) + "; did you mean " +
-          nearest_word(word.substr(0, 40), std::vector<std::string>{"--set", "--output", "--dry-run", "--help",
-                                                                    "--version", "--allow-scripts", "--force"}) +
+          nearest_word(word.substr(0, 40),
+                       std::vector<std::string>{"--set", "--output", "--time-limit", "--checkpoint", "--restart",
+                                                "--dry-run", "--help", "--version", "--allow-scripts", "--force"}) +
           "?";
     else if (arguments.scene.empty() && word[0] != '-' && (word.ends_with(".toml") || is_scene_folder(word)))
       arguments.scene =
@@ -94,13 +119,16 @@ void print_help()
       "  SCENE             a scene file (.toml), or a folder that holds a scene.toml\n"
       "  --set key=value   overrides a key of the scene, e.g. --set friction.coefficient=0.25\n"
       "  --output DIR      where results go (results/<scene>)\n"
+      "  --time-limit S    ends the run in order after S seconds, as SIGTERM, SIGINT and SIGUSR1 do\n"
+      "  --checkpoint S    seconds between checkpoints [600]\n"
+      "  --restart         goes on from the checkpoints of a run that ended early or was killed, if there are any\n"
       "  --version         versions of squeal and of the libraries it runs on\n"
       "  --allow-scripts   lets the scene's geometry hold any statement of gmsh, which may run commands and write "
       "files\n"
       "  --force           runs even where the forecast says more than a day, or more memory than is free\n"
       "  --dry-run         checks scene and mesh, prints the resolved scene, the model's size and the forecast, and "
       "stops\n"
-      "  exit code: 0 all converged, 2 a stage did not (the report says which), 1 an error\n\n"
+      "  exit code: 0 all converged, 2 a stage did not (the report says which), 3 asked to end, 1 an error\n\n"
       "%s\n"
       "Algorithm options (PETSc options database) [default]\n%s\n"
       "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes -modes_pep_ -modes_st_\n"
@@ -159,6 +187,15 @@ bool is_other_rank()
   return false;
 }
 
+/// The scene and the options by which checkpoints are told from those of another run; options of the session, about
+/// logs and memory, do not matter.
+std::string request_text(const Scene& scene, ProgramOptions options)
+{
+  std::string text = resolved_scene(scene);
+  for (const Option& option : options_of(options)) text += option.name + " " + value_of(option) + "\n";
+  return text;
+}
+
 int run_program(const Arguments& arguments, int argc, char** argv)
 {
   const MPI_Comm comm = PETSC_COMM_WORLD;
@@ -184,8 +221,11 @@ int run_program(const Arguments& arguments, int argc, char** argv)
     dry_run(scene, options, comm);
     return 0;
   }
+  begin_run_control(arguments.limits);
   on_rank_zero(comm, [&] { check_outputs(scene, output); });
-  ResultsFolder results(output, comm);
+  ResultsFolder results(output, arguments.beginning, comm);
+  const bool restart = arguments.beginning == Beginning::from_checkpoints;
+  on_every_rank(comm, [&] { open_checkpoints({results.checkpoints(), request_text(scene, options), restart}); });
   write_request(scene, results.run(), results.partial(), comm);
   scene.transient.save_state = results.meanwhile(scene.transient.save_state);
   scene.cycle.save_state = results.meanwhile(scene.cycle.save_state);
@@ -216,7 +256,16 @@ int main(int argc, char** argv)
   }
   try
   {
-    return run_program(arguments, argc, argv);
+    const int code = run_program(arguments, argc, argv);
+    end_run_control();
+    return code;
+  }
+  catch (const Interrupted&)
+  {
+    if (rank == 0)
+      std::printf("ended %s before the first stage: the same command begins again\n", who_asked_to_end().c_str());
+    end_run_control();
+    return static_cast<int>(ExitCode::interrupted);
   }
   catch (const LibraryError& error)
   {

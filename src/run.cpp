@@ -1,8 +1,10 @@
 #include "squeal/run.hpp"
 
 #include "squeal/attractors/attractors.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/cycle/fidelity.hpp"
+#include "squeal/cycle/period_log.hpp"
 #include "squeal/forecast.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/scene/doubts.hpp"
@@ -39,6 +41,49 @@ template <class Work> auto timed(Report& report, const char* name, MPI_Comm comm
   const double start = MPI_Wtime(), processor_start = processor_time();
   auto result = work();
   report.timings.push_back({name, MPI_Wtime() - start, processor_time() - processor_start});
+  return result;
+}
+
+template <class Result> Outcome& outcome_of(Result& result)
+{
+  return result.outcome;
+}
+
+Outcome& outcome_of(FittedCycle& fitted)
+{
+  return fitted.cycle.outcome;
+}
+
+Outcome& outcome_of(std::vector<Estimate>& estimates)
+{
+  return estimates.empty() ? estimates.emplace_back().outcome : estimates.front().outcome;
+}
+
+/// Runs one stage of the chain. Where the run is asked to end, the stage is left out or ends, and the later ones are
+/// left out.
+template <class Work> auto stage(Report& report, const char* name, MPI_Comm comm, Work work)
+{
+  decltype(work()) result;
+  const auto leave_out = [&](const std::string& when) {
+    outcome_of(result) = {OutcomeKind::skipped, "the run was ended " + report.ended_by + when, 0, 0};
+  };
+  if (!report.ended_by.empty())
+  {
+    leave_out(" before");
+    return result;
+  }
+  try
+  {
+    result = timed(report, name, comm, work);
+    if (outcome_of(result).kind == OutcomeKind::interrupted) report.ended_by = who_asked_to_end();
+  }
+  catch (const Interrupted&)
+  {
+    if (rank_of(comm) == 0) keep_period_log();
+    result = {};
+    report.ended_by = who_asked_to_end();
+    leave_out(" in this stage");
+  }
   return result;
 }
 
@@ -225,6 +270,7 @@ std::vector<std::string> stages_run(const Report& report)
 
 ExitCode exit_code_of(const Report& report)
 {
+  if (!report.ended_by.empty()) return ExitCode::interrupted;
   for (const auto& [name, outcome] : outcomes_of(report))
     if (!succeeded(outcome)) return ExitCode::not_converged;
   return ExitCode::converged;
@@ -236,6 +282,16 @@ ModelSummary summary_with_doubts(const Model& model, const Scene& scene, MPI_Com
   ModelSummary summary = summary_of(model, scene, comm);
   for (const std::string& doubt : doubts_about(scene)) summary.warnings.push_back(doubt);
   return summary;
+}
+
+void print_end(const Report& report, const ResultsFolder& results, MPI_Comm comm)
+{
+  if (rank_of(comm) != 0) return;
+  if (report.ended_by.empty())
+    std::printf("results are in %s\n", results.place().c_str());
+  else
+    std::printf("ended %s: results so far are in %s; the same command with --restart goes on from there\n",
+                report.ended_by.c_str(), results.place().c_str());
 }
 
 void print_model(const ModelSummary& model, MPI_Comm comm)
@@ -257,37 +313,46 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   report.model = summary_with_doubts(model, scene, comm);
   print_model(report.model, comm);
   if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options), comm));
+  end_if_asked(comm);
 
   Chain chain{scene, options, model, report, {}};
   if (scene.cycle.enabled && scene.cycle.start.kind == CycleStartKind::file)
     chain.cycle_file = read_state(scene.cycle.start.file, model.structure);
-  report.equilibrium = timed(report, "equilibrium", comm,
+  const FieldNodes nodes{model.mesh, model.dofs, model.structure, model.interface};
+  const auto save = [&] { write_results(report, scene, nodes, results.partial(), comm); };
+  report.equilibrium = stage(report, "equilibrium", comm,
                              [&] { return find_equilibrium(model.structure, model.interface, options.equilibrium); });
   if (report.equilibrium.outcome.kind == OutcomeKind::converged)
   {
     report.contacts = contact_resultants(model.interface, report.equilibrium.reactions, scene.contacts);
     report.equilibrium_probes = probe_values(model.probes, report.equilibrium.u);
   }
-  report.modes = timed(report, "modes", comm, [&] { return run_modes(chain); });
-  report.estimates = timed(report, "estimate", comm, [&] { return run_estimates(chain); });
-  report.transient = timed(report, "transient", comm, [&] { return run_transient(chain); });
-  FittedCycle fitted = timed(report, "cycle", comm, [&] { return run_cycle(chain); });
+  save();
+  report.modes = stage(report, "modes", comm, [&] { return run_modes(chain); });
+  report.estimates = stage(report, "estimate", comm, [&] { return run_estimates(chain); });
+  if (has_run(report.modes.outcome)) save();
+  report.transient = stage(report, "transient", comm, [&] { return run_transient(chain); });
+  if (has_run(report.transient.outcome)) save();
+  FittedCycle fitted = stage(report, "cycle", comm, [&] { return run_cycle(chain); });
   report.cycle = std::move(fitted.cycle);
   report.fidelity = std::move(fitted.fidelity);
-  report.settled = timed(report, "settled", comm, [&] { return run_settled(chain); });
+  if (has_run(report.cycle.outcome)) save();
+  report.settled = stage(report, "settled", comm, [&] { return run_settled(chain); });
   accept_settled_motion(report);
+  if (has_run(report.settled.outcome)) save();
+  report.attractors = stage(report, "attractors", comm, [&] { return run_attractors(chain); });
+  if (has_run(report.attractors.outcome)) save();
+  if (checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
+  report.branch = stage(report, "branch", comm, [&] { return run_branch(chain); });
 
-  report.attractors = timed(report, "attractors", comm, [&] { return run_attractors(chain); });
-  report.branch = timed(report, "branch", comm, [&] { return run_branch(chain); });
-
-  report.model.memory_bytes = peak_memory(comm);
   const ExitCode code = exit_code_of(report);
   report.exit_code = static_cast<int>(code);
-  write_results(report, scene, {model.mesh, model.dofs, model.structure, model.interface}, results.partial(), comm);
-  results.publish();
+  report.model.memory_bytes = peak_memory(comm);
+  save();
+  results.publish(code == ExitCode::interrupted ? Checkpoints::published : Checkpoints::removed);
   print_table(report, scene, comm);
-  if (rank_of(comm) == 0) std::printf("results are in %s\n", results.place().c_str());
-  check_options_used(stages_run(report), comm);
+  print_end(report, results, comm);
+  if (code != ExitCode::interrupted) check_options_used(stages_run(report), comm);
   return code;
 }
 

@@ -11,6 +11,7 @@ enum class ExitCode : int
 {
   converged = 0,     // every stage that ran gave what it promises
   not_converged = 2, // one did not, and the report says which
+  interrupted = 3,   // the run was asked to end, and --restart goes on
 };
 
 /// Runs the chain, writes the results of each stage when it ends, and publishes the whole.

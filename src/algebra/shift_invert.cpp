@@ -1,5 +1,7 @@
 #include "squeal/algebra/shift_invert.hpp"
 
+#include "squeal/base/run_control.hpp"
+
 #include "squeal/algebra/dense_eigenproblems.hpp"
 
 #include <algorithm>
@@ -33,6 +35,7 @@ void grow(Krylov& krylov, const ShiftInvert& pencil)
 {
   MultiVector& V = krylov.V;
   const Index size = V.columns(), order = krylov.order();
+  end_if_asked(comm_of(pencil.M));
   const MultiVector S = pencil.factor->solve(product(pencil.M, columns_from(V, order)));
   const MatrixXd inside = inner_products(V, S);
   const Index gained = extend_orthonormal(V, S);

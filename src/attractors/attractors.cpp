@@ -1,6 +1,7 @@
 #include "squeal/attractors/attractors.hpp"
 
 #include "squeal/base/progress.hpp"
+#include "squeal/base/run_control.hpp"
 #include "starts.hpp"
 
 #include <algorithm>
@@ -54,6 +55,7 @@ public:
       const std::vector<StepReport> reports =
           advance(step_, problem_.sliding.structure, problem_.sliding.interface, works_, states_);
       for (std::size_t k = 0; k < states_.size(); ++k) watch(reports[k], k);
+      end_if_asked(comm_of(problem_.sliding.structure.load));
     }
     for (Watched& watched : watched_) watched.energies.push_back(watched.sum / problem_.settings.steps_per_period);
   }

@@ -58,7 +58,7 @@ public:
 
   /// Each returns false where the system refuses, with the reason in errno.
   bool is_open() const { return file_ >= 0; }
-  bool write(std::string_view bytes)
+  bool write(std::string_view bytes, Flush flush)
   {
     while (!bytes.empty())
     {
@@ -66,7 +66,7 @@ public:
       if (written < 0 && errno != EINTR) return false;
       if (written > 0) bytes.remove_prefix(static_cast<std::size_t>(written));
     }
-    return fsync(file_) == 0 || errno == EINVAL; // pipes and devices know no fsync
+    return flush == Flush::by_system || fsync(file_) == 0 || errno == EINVAL; // pipes and devices know no fsync
   }
   bool close() { return ::close(std::exchange(file_, -1)) == 0; }
   bool move_to(const fs::path& place)
@@ -83,10 +83,10 @@ private:
 
 } // namespace
 
-void write_whole_file(const fs::path& place, std::string_view bytes)
+void write_whole_file(const fs::path& place, std::string_view bytes, Flush flush)
 {
   Draft draft(place);
-  if (!draft.is_open() || !draft.write(bytes) || !draft.close() || !draft.move_to(place))
+  if (!draft.is_open() || !draft.write(bytes, flush) || !draft.close() || !draft.move_to(place))
     refuse(place, bytes.size(), errno);
 }
 

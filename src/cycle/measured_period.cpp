@@ -1,5 +1,7 @@
 #include "squeal/cycle/measured_period.hpp"
 
+#include "squeal/base/run_control.hpp"
+
 #include <algorithm>
 #include <cstdint>
 #include <numeric>
@@ -57,6 +59,7 @@ MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double
   };
   const MarchSummary summary =
       march(map.step, map.sliding, map.steps, measured.end, {recording.probes, measured.history, watch});
+  if (summary.interrupted) throw Interrupted{};
   map.unconverged += summary.unconverged;
   if (rate)
   {

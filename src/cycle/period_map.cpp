@@ -1,6 +1,10 @@
 #include "squeal/cycle/period_map.hpp"
 
+#include "squeal/base/run_control.hpp"
+#include "squeal/cycle/period_log.hpp"
+
 #include <algorithm>
+#include <utility>
 
 namespace squeal
 {
@@ -60,11 +64,39 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
       check(VecCopy(state.v, velocity(rate)));
     }
     if (!advance(map.step, structure, interface, work, state).contact_converged) ++map.unconverged;
+    end_if_asked(comm_of(structure.load));
   }
   work.record = nullptr;
   check(VecCopy(state.u, displacement(end)));
   check(VecCopy(state.v, velocity(end)));
   if (rate) complete_rate(map, work, state, rate);
+}
+
+/// Integrates a period that was only taken from the log: what follows needs its records.
+void integrate_replayed(PeriodMap& map)
+{
+  if (!map.replayed.start.get()) return;
+  const ReplayedPeriod replayed = std::exchange(map.replayed, {});
+  const Owned<Vec> end = zeros_like(replayed.start), rate = zeros_like(replayed.start);
+  const long unconverged = map.unconverged;
+  map.reactions = replayed.reactions;
+  integrate_period(map, replayed.period, replayed.start, end, rate);
+  map.unconverged = unconverged;
+}
+
+/// Takes a period with its rate from the log, or integrates and logs it.
+void integrate_logged_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
+{
+  std::vector<double> before = map.reactions;
+  map.replayed = {};
+  if (replay_period(map, period, start, end, rate))
+  {
+    map.replayed = {period, copy_of(start), std::move(before)};
+    map.recorded_start = {};
+    return;
+  }
+  integrate_period(map, period, start, end, rate);
+  log_period(map, period, start, end, rate);
 }
 
 /// Several trajectories over one period, together as far as their memory allows.
@@ -84,8 +116,11 @@ void integrate_periods(PeriodMap& map, double period, std::span<const Vec> start
       works.push_back(begin_steps(map.step, structure, interface, states.back()));
     }
     for (int i = 0; i < map.steps; ++i)
+    {
       for (const StepReport& report : advance(map.step, structure, interface, works, states))
         if (!report.contact_converged) ++map.unconverged;
+      end_if_asked(comm_of(structure.load));
+    }
     for (std::size_t k = 0; k < count; ++k)
     {
       check(VecCopy(states[k].u, displacement(ends[first + k])));
@@ -112,6 +147,7 @@ void move_by_part(const PeriodMap& map, double part, State& state)
 
 void record_period(PeriodMap& map, double period, Vec start, double shift)
 {
+  integrate_replayed(map);
   set_period(map, period);
   if (shift == 0 && is_recorded(map, start)) return;
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
@@ -147,7 +183,7 @@ void add_tangent(PeriodMap& map, Flow& flow)
 Flow flow_of(PeriodMap& map)
 {
   const auto integrate = [&map](double period, Vec start, Vec end, Vec rate)
-  { integrate_period(map, period, start, end, rate); };
+  { (rate ? integrate_logged_period : integrate_period)(map, period, start, end, rate); };
   const auto integrate_many = [&map](double period, std::span<const Vec> starts, std::span<const Vec> ends)
   { integrate_periods(map, period, starts, ends); };
   Flow flow{integrate, map.sliding.structure.M, map.sliding.structure.K, integrate_many};

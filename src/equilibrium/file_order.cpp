@@ -1,4 +1,4 @@
-#include "file_order.hpp"
+#include "squeal/equilibrium/file_order.hpp"
 
 #include <algorithm>
 #include <numeric>

@@ -1,8 +1,8 @@
 /// States: energies, copies, and files. A file is two PETSc binary vectors: class id, length, entries, all big-endian.
 #include "squeal/equilibrium/state.hpp"
 
-#include "file_order.hpp"
 #include "squeal/base/whole_file.hpp"
+#include "squeal/equilibrium/file_order.hpp"
 
 #include <algorithm>
 #include <array>
@@ -129,7 +129,7 @@ void write_state(const State& state, const Structure& structure, const std::file
                  std::string bytes;
                  append_vector(u, bytes);
                  append_vector(v, bytes);
-                 write_whole_file(file, bytes);
+                 write_whole_file(file, bytes, Flush::now);
                });
 }
 

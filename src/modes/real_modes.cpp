@@ -4,6 +4,7 @@
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/callback.hpp"
 #include "squeal/base/integers.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
 
@@ -70,7 +71,11 @@ PetscErrorCode apply_inverse(PC preconditioner, Vec b, Vec x)
   Inverse* inverse = nullptr;
   PetscCall(PCShellGetContext(preconditioner, &inverse));
   return guarded(inverse->failure,
-                 [&] { copy_column(inverse->factor.solve(columns_of(std::span<const Vec>(&b, 1))), 0, x); });
+                 [&]
+                 {
+                   end_if_asked(comm_of(b));
+                   copy_column(inverse->factor.solve(columns_of(std::span<const Vec>(&b, 1))), 0, x);
+                 });
 }
 
 /// Krylov-Schur for the `count` theta nearest the pencil's shift.

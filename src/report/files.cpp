@@ -70,7 +70,7 @@ void Hdf5File::keep()
   if (size <= 0 || H5Fget_file_image(id_, image.data(), image.size()) != size)
     throw Error("cannot write " + place_.string() + ": HDF5 does not hand out the file that it made in memory");
   H5Fclose(std::exchange(id_, -1));
-  write_whole_file(place_, image);
+  write_whole_file(place_, image, Flush::by_system);
 }
 
 void Hdf5File::write_data(const std::string& name, const std::vector<hsize_t>& shape, hid_t type, std::size_t size,

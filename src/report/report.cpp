@@ -84,8 +84,8 @@ void write_request(const Scene& scene, const std::string& run, const std::filesy
   on_rank_zero(comm,
                [&]
                {
-                 write_whole_file(output / "resolved.toml", provenance(run) + resolved_scene(scene));
-                 write_whole_file(output / "options.txt", provenance(run) + option_text());
+                 write_whole_file(output / "resolved.toml", provenance(run) + resolved_scene(scene), Flush::by_system);
+                 write_whole_file(output / "options.txt", provenance(run) + option_text(), Flush::by_system);
                });
 }
 
@@ -95,7 +95,7 @@ void write_results(const Report& report, const Scene& scene, const FieldNodes& n
   on_rank_zero(comm, [&] { write_history(report, scene, output / "history.h5"); });
   write_fields(report, scene, nodes, output, comm);
   // Last: where there is a report, the rest is there too.
-  on_rank_zero(comm, [&] { write_whole_file(output / "report.json", report_json(report, scene)); });
+  on_rank_zero(comm, [&] { write_whole_file(output / "report.json", report_json(report, scene), Flush::by_system); });
 }
 
 } // namespace squeal

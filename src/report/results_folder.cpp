@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 namespace
 {
 
-constexpr std::array result_files = {"report.json", "history.h5",    "fields.h5",
-                                     "fields.xdmf", "resolved.toml", "options.txt"};
+constexpr std::array result_files = {"report.json",   "history.h5",  "fields.h5", "fields.xdmf",
+                                     "resolved.toml", "options.txt", "checkpoint"};
 constexpr const char* lock_file = "running";
 
 bool is_result(const fs::path& name)
@@ -130,7 +130,7 @@ std::string FolderLock::take(const fs::path& folder, const std::string& run)
   return "several runs that end and begin";
 }
 
-ResultsFolder::ResultsFolder(const fs::path& place, MPI_Comm comm) : comm_(comm)
+ResultsFolder::ResultsFolder(const fs::path& place, Beginning beginning, MPI_Comm comm) : comm_(comm)
 {
   on_rank_zero(comm,
                [&]
@@ -138,7 +138,7 @@ ResultsFolder::ResultsFolder(const fs::path& place, MPI_Comm comm) : comm_(comm)
                  try
                  {
                    place_ = resolved(place);
-                   make();
+                   make(beginning);
                  }
                  catch (const fs::filesystem_error& error)
                  {
@@ -159,7 +159,7 @@ ResultsFolder::ResultsFolder(const fs::path& place, MPI_Comm comm) : comm_(comm)
   partial_ = partial_text;
 }
 
-void ResultsFolder::make()
+void ResultsFolder::make(Beginning beginning)
 {
   run_ = new_identity();
   if (fs::exists(place_) && (!fs::is_directory(place_) || access(place_.c_str(), W_OK) != 0))
@@ -173,8 +173,12 @@ void ResultsFolder::make()
     throw Error("another run writes into " + place_.string() + " (" + holder +
                 ": its start, machine and process); wait for its end, or name another folder with --output DIR");
   partial_ = partial; // from here on it is ours to remove
+  const bool goes_on = beginning == Beginning::from_checkpoints;
   for (const auto& entry : fs::directory_iterator(partial_))
-    if (entry.path().filename() != lock_file) fs::remove_all(entry.path());
+    if (entry.path().filename() != lock_file && !(goes_on && entry.path() == checkpoints()))
+      fs::remove_all(entry.path());
+  if (goes_on && !fs::exists(checkpoints()) && fs::exists(place_ / "checkpoint"))
+    fs::copy(place_ / "checkpoint", checkpoints(), fs::copy_options::recursive);
 }
 
 ResultsFolder::~ResultsFolder()
@@ -185,6 +189,7 @@ ResultsFolder::~ResultsFolder()
 void ResultsFolder::undo()
 {
   std::error_code ignored;
+  if (!partial_.empty() && fs::exists(checkpoints(), ignored)) return; // --restart goes on from them
   if (!partial_.empty()) fs::remove_all(partial_, ignored);
   for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder) fs::remove(*folder, ignored);
 }
@@ -226,12 +231,13 @@ void ResultsFolder::move_by_file()
   fs::remove_all(partial_);
 }
 
-void ResultsFolder::publish()
+void ResultsFolder::publish(Checkpoints checkpoints)
 {
   on_rank_zero(comm_,
                [&]
                {
                  published_ = true; // whatever happens: the results are whole
+                 if (checkpoints == Checkpoints::removed) fs::remove_all(this->checkpoints());
                  if (partial_.parent_path() != place_ && (!fs::exists(place_) || holds_only_results(place_)))
                    move_whole();
                  else

@@ -1,5 +1,7 @@
 #include "squeal/settled/settled_motion.hpp"
 
+#include "squeal/base/run_control.hpp"
+
 #include <algorithm>
 #include <numeric>
 
@@ -83,6 +85,7 @@ PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, Settled
   History history;
   const MarchSummary summary =
       march(map.step, map.sliding, map.steps, now, {probe_rows, history, nullptr, map.records});
+  if (summary.interrupted) throw Interrupted{};
   map.unconverged += summary.unconverged;
   map.reactions = now.reactions;
   check(VecCopy(now.u, displacement(state)));

@@ -5,6 +5,7 @@
 
 #include "linear_contact.hpp"
 #include "squeal/algebra/multivector.hpp"
+#include "squeal/base/run_control.hpp"
 
 #include <algorithm>
 
@@ -148,6 +149,7 @@ std::vector<StepRecord> record_steps(const ThetaStep& step, const Structure& str
     record.wanted = wanted;
     work.record = &record;
     (void)advance(step, structure, interface, work, state);
+    end_if_asked(comm_of(structure.load));
   }
   return records;
 }
@@ -159,7 +161,11 @@ void advance_tangents(const ThetaStep& step, const Structure& structure, const I
   {
     const auto batch = columns.subspan(first, std::min(at_once, columns.size() - first));
     TangentWork work = begin_tangents(step, structure, batch);
-    for (const StepRecord& record : records) one_step(step, structure, interface, record, batch, work);
+    for (const StepRecord& record : records)
+    {
+      one_step(step, structure, interface, record, batch, work);
+      end_if_asked(comm_of(structure.load));
+    }
   }
 }
 

@@ -1,7 +1,9 @@
 /// The time loop: marching with a history, and the run that follows one mode (headers: the equations).
 #include "squeal/transient/transient.hpp"
 
+#include "march_checkpoint.hpp"
 #include "squeal/base/progress.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/transient/growth.hpp"
 
 #include <algorithm>
@@ -119,7 +121,12 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
                "raise -transient_contact_max_it or shorten the step",
                summary.unconverged, summary.steps, summary.first_unconverged, summary.contact_residual_max);
   }
-  if (summary.steps < asked)
+  if (summary.interrupted)
+  {
+    outcome.kind = OutcomeKind::interrupted;
+    outcome.reason = format("ended %s after %ld of %ld steps", who_asked_to_end().c_str(), summary.steps, asked);
+  }
+  else if (summary.steps < asked)
   {
     outcome.kind = OutcomeKind::not_converged;
     outcome.reason = format("the energy is no longer finite at t = %.4g s", trajectory.end.time);
@@ -134,7 +141,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
                    const Recorder& recorder)
 {
   const auto& [structure, interface, equilibrium] = sliding;
-  const auto& [probes, history, monitor, records] = recorder;
+  const auto& [probes, history, monitor, records, checkpoint] = recorder;
   MarchSummary summary;
   Fluctuation fluctuation = about(structure, equilibrium);
   Owned<Vec> probe_values;
@@ -147,6 +154,8 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
   }
   StepWork work = begin_steps(step, structure, interface, state);
   double iterations = 0;
+  const MarchProgress progress{summary, iterations, state, work, history};
+  if (checkpoint) checkpoint->restore(progress);
   while (summary.steps < steps)
   {
     const auto next = static_cast<std::size_t>(summary.steps);
@@ -164,7 +173,13 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     history.fluctuating_energy.push_back(energy(fluctuation, state, work));
     if (monitor) monitor(state, report, work);
     if (!std::isfinite(report.energy)) break;
+    const Request asked = request(comm_of(structure.load));
+    if (checkpoint && asked == Request::checkpoint) checkpoint->keep(progress);
+    summary.interrupted = asked == Request::end && summary.steps < steps;
+    if (summary.interrupted) break;
   }
+  if (checkpoint && (summary.interrupted || checkpoint_is_worth_it(comm_of(structure.load))))
+    checkpoint->keep(progress);
   summary.contact_iterations_mean = iterations / static_cast<double>(std::max(summary.steps, 1L));
   return summary;
 }
@@ -217,8 +232,10 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
     progress.update(static_cast<double>(trajectory.history.time.size()),
                     format("energy %.4g J, open %d, stick %d", report.energy, report.open, report.stick));
   };
+  const MarchCheckpoint checkpoint(structure, {steps, step.h, step.theta}, amplitude, slides);
   const double wall = MPI_Wtime();
-  const MarchSummary summary = march(step, sliding, steps, trajectory.end, {probes, trajectory.history, watch});
+  const MarchSummary summary =
+      march(step, sliding, steps, trajectory.end, {probes, trajectory.history, watch, {}, &checkpoint});
   trajectory.seconds_per_step = (MPI_Wtime() - wall) / static_cast<double>(std::max(summary.steps, 1L));
   trajectory.factor_seconds = step.factor_seconds;
   trajectory.condensed_seconds = step.condensed_seconds;

@@ -22,7 +22,8 @@ enum class OutcomeKind
   collapsed_to_equilibrium,
   not_periodic,
   unstable_cycle,
-  settled, // no cycle attracts: the settled motion is the answer
+  settled,     // no cycle attracts: the settled motion is the answer
+  interrupted, // asked to end: its results so far
 };
 
 inline constexpr std::array outcome_words = {"skipped",        "off",
@@ -31,7 +32,7 @@ inline constexpr std::array outcome_words = {"skipped",        "off",
                                              "no balance",     "not converged",
                                              "no equilibrium", "collapsed to equilibrium",
                                              "not periodic",   "unstable cycle",
-                                             "settled"};
+                                             "settled",        "interrupted"};
 
 inline Words words_of(OutcomeKind)
 {

@@ -1,14 +1,19 @@
 #pragma once
-/// Files that exist whole or not at all: written beside their place under another name, flushed to the disk, then
-/// moved.
+/// Files that exist whole or not at all: written beside their place under another name, then moved.
 #include <filesystem>
 #include <string_view>
 
 namespace squeal
 {
 
+enum class Flush
+{
+  by_system, // the file survives the end of the process
+  now,       // and the end of the machine
+};
+
 /// Writes a file; one that was there stays until the new one is whole. Error: the file, the system's reason, the space
 /// that it needs and the space that is free.
-void write_whole_file(const std::filesystem::path& place, std::string_view bytes);
+void write_whole_file(const std::filesystem::path& place, std::string_view bytes, Flush flush);
 
 } // namespace squeal

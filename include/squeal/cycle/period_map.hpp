@@ -10,6 +10,14 @@
 namespace squeal
 {
 
+/// A period whose end was taken from the log of an earlier run.
+struct ReplayedPeriod
+{
+  double period = 0; // [s]
+  Owned<Vec> start{};
+  std::vector<double> reactions{}; // warm start
+};
+
 /// Keeps A and W of the last period length: one factorisation for each, none for difference quotients.
 struct PeriodMap
 {
@@ -23,6 +31,7 @@ struct PeriodMap
   std::vector<StepRecord> records{}; // of the period recorded last, with the step at hand
   Owned<Vec> recorded_start{};       // of that period, if it was one that the flow integrated with its rate
   double recorded_step = 0;          // [s]
+  ReplayedPeriod replayed{};         // the last one integrated with its rate, if it is still to be recorded
 };
 
 /// Makes A and W those of this period, unless they are already.

@@ -39,8 +39,9 @@ struct Timing
 /// A stage that did not run has the outcome "off" (by the scene) or "skipped", with the reason.
 struct Report
 {
-  std::string run;    // the identity that every file of the run carries
-  int exit_code = -1; // -1: the run goes on
+  std::string run;      // the identity that every file of the run carries
+  std::string ended_by; // "by SIGTERM" where the run was asked to end; empty: it was not
+  int exit_code = -1;   // -1: the run goes on
   ModelSummary model;
   Equilibrium equilibrium;
   std::vector<ContactResultant> contacts; // of the equilibrium, one a contact of the scene; empty on a matrix scene

@@ -27,14 +27,27 @@ private:
   int file_ = -1;
 };
 
+enum class Checkpoints
+{
+  removed,
+  published,
+};
+
+enum class Beginning
+{
+  afresh,
+  from_checkpoints,
+};
+
 class ResultsFolder
 {
 public:
-  /// Makes and locks the partial folder; what a run that was killed left there is removed. Collective.
-  /// Error: the folder cannot be written, or another run is at work in it.
-  ResultsFolder(const std::filesystem::path& place, MPI_Comm comm);
+  /// Makes and locks the partial folder; what a run that was killed left there is removed, but for the checkpoints to
+  /// go on from. Where it left none, those of the results in the place are taken. Collective. Error: the folder cannot
+  /// be written, or another run is at work in it.
+  ResultsFolder(const std::filesystem::path& place, Beginning beginning, MPI_Comm comm);
 
-  /// Without publish, leaves everything as it was before.
+  /// Without publish, leaves everything as it was before, but for checkpoints.
   ~ResultsFolder();
   ResultsFolder(const ResultsFolder&) = delete;
   ResultsFolder& operator=(const ResultsFolder&) = delete;
@@ -46,13 +59,15 @@ public:
   /// Where a file of the user's own name is written meanwhile: in the partial folder if it belongs into the place.
   std::filesystem::path meanwhile(const std::filesystem::path& file) const;
 
-  /// Moves the results to their place. Collective.
-  void publish();
+  std::filesystem::path checkpoints() const { return partial_ / "checkpoint"; }
+
+  /// Moves the results to their place, with their checkpoints if the run can go on. Collective.
+  void publish(Checkpoints checkpoints);
 
 private:
-  void make();         // on rank 0
-  void move_whole();   // on rank 0
-  void move_by_file(); // on rank 0
+  void make(Beginning beginning); // on rank 0
+  void move_whole();              // on rank 0
+  void move_by_file();            // on rank 0
   void undo();
 
   MPI_Comm comm_;

@@ -26,7 +26,8 @@ struct History
 /// What `march` counted.
 struct MarchSummary
 {
-  long steps = 0; // fewer than asked when the energy stopped being finite
+  long steps = 0; // fewer than asked when the energy stopped being finite, or the run is asked to end
+  bool interrupted = false;
   long unconverged = 0;
   double first_unconverged = 0; // [s]
   double contact_residual_max = 0;
@@ -34,23 +35,26 @@ struct MarchSummary
   double contact_iterations_mean = 0;
 };
 
+class MarchCheckpoint;
+
 /// What is kept of a march: `history` gains energies, powers, counts and the rows of `probes` (null: none) of each
 /// step.
 struct Recorder
 {
   Mat probes = nullptr;
   History& history;
-  Monitor monitor;                 // may be empty
-  std::span<StepRecord> records{}; // of each step, for its tangent; may be empty
+  Monitor monitor;                             // may be empty
+  std::span<StepRecord> records{};             // of each step, for its tangent; may be empty
+  const MarchCheckpoint* checkpoint = nullptr; // null: none is kept
 };
 
 /// `steps` steps in place, recorded.
 MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, long steps, State& state,
                    const Recorder& recorder);
 
-/// outcome: "completed", "refused" (step_guards.hpp: theta and h would show a wrong growth), "not converged" (contact,
-/// or an energy that is no longer finite). residual: the largest contact residual; iterations: contact iterations in
-/// all.
+/// outcome: "completed", "interrupted", "refused" (step_guards.hpp: theta and h would show a wrong growth), "not
+/// converged" (contact, or an energy that is no longer finite). residual: the largest contact residual; iterations:
+/// contact iterations in all.
 struct Trajectory
 {
   Outcome outcome;

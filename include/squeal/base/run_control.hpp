@@ -1,0 +1,55 @@
+#pragma once
+/// Requests that reach a run from outside while it computes: to end in order, by a signal or the time limit, and to
+/// make a checkpoint. One process is one run, as for signals: its control is the process's own.
+#include <mpi.h>
+#include <string>
+
+namespace squeal
+{
+
+/// Thrown by all ranks together where a stage that cannot end halfway is asked to. It is no Error: the run's results so
+/// far stand.
+struct Interrupted
+{
+};
+
+struct RunLimits
+{
+  double time_limit = 0;            // [s] from the start of the process; 0: none
+  double checkpoint_interval = 600; // [s]
+};
+
+/// From here on SIGTERM, SIGINT and SIGUSR1 are requests to end, and a rank whose launcher dies ends with it. A rank
+/// that is asked to end while another rank of its machine is gone ends at once: it would wait for that one for ever.
+/// Collective.
+void begin_run_control(const RunLimits& limits);
+
+/// From here on signals end the process as usual.
+void end_run_control();
+
+enum class Request
+{
+  none,
+  checkpoint,
+  end,
+};
+
+/// What is asked of the run, agreed by all ranks. Collective, and cheap enough to be asked after every time step: ranks
+/// talk after each step where steps take longer than a millisecond, else after every sixteenth.
+Request request(MPI_Comm comm);
+
+/// Throws Interrupted if the run is asked to end. Collective.
+void end_if_asked(MPI_Comm comm);
+
+/// Whether a checkpoint has been due since the last call of checkpoint_made. The same on all ranks.
+bool checkpoint_is_due();
+
+/// Whether a tenth of the time between checkpoints has passed since the last one: what ends now is then worth one.
+/// Of rank 0's clock; collective.
+bool checkpoint_is_worth_it(MPI_Comm comm);
+void checkpoint_made();
+
+/// "by SIGTERM" or "by the time limit"; empty while nobody asked. The same on all ranks once request() has said so.
+std::string who_asked_to_end();
+
+} // namespace squeal

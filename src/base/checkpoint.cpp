@@ -1,0 +1,202 @@
+#include "squeal/base/checkpoint.hpp"
+
+#include "squeal/base/broadcast.hpp"
+#include "squeal/base/error.hpp"
+#include "squeal/base/whole_file.hpp"
+
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <utility>
+
+namespace squeal
+{
+
+namespace fs = std::filesystem;
+
+namespace
+{
+
+constexpr std::string_view head = "squeal checkpoint 1\n";
+
+constexpr const char* request_file = "request.txt";
+
+/// The run's place for checkpoints, as its control the process's own (run_control.hpp).
+CheckpointPlace& place()
+{
+  static CheckpointPlace one;
+  return one;
+}
+
+/// Says once that there is no room for checkpoints.
+void warn(const std::string& reason)
+{
+  static bool warned = false;
+  if (!std::exchange(warned, true))
+    std::fprintf(stderr, "squeal: warning: no checkpoint is kept: %s\n", reason.c_str());
+}
+
+/// FNV-1a, 64 bits.
+std::uint64_t check_sum(std::string_view bytes)
+{
+  std::uint64_t sum = 14695981039346656037ull;
+  for (const char byte : bytes) sum = (sum ^ static_cast<unsigned char>(byte)) * 1099511628211ull;
+  return sum;
+}
+
+void append(std::uint64_t number, std::string& bytes)
+{
+  bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
+}
+
+/// Takes bytes from the front of a text, as far as it reaches.
+class Taker
+{
+public:
+  explicit Taker(std::string_view rest) : rest_(rest) {}
+  bool take(void* target, std::size_t size)
+  {
+    if (size > rest_.size()) return false;
+    std::memcpy(target, rest_.data(), size);
+    rest_.remove_prefix(size);
+    return true;
+  }
+  std::size_t left() const { return rest_.size(); }
+
+private:
+  std::string_view rest_;
+};
+
+} // namespace
+
+const std::vector<double>& Checkpoint::list(const std::string& name) const
+{
+  const auto found = lists_.find(name);
+  if (found == lists_.end()) throw Error("the checkpoint has no " + name + ": run again without --restart");
+  return found->second;
+}
+
+double Checkpoint::number(const std::string& name) const
+{
+  const std::vector<double>& values = list(name);
+  if (values.size() != 1) throw Error("the checkpoint's " + name + " is no number: run again without --restart");
+  return values.front();
+}
+
+std::vector<int> Checkpoint::integers(const std::string& name) const
+{
+  const std::vector<double>& values = list(name);
+  return {values.begin(), values.end()};
+}
+
+std::string Checkpoint::bytes() const
+{
+  std::string bytes(head);
+  append(lists_.size(), bytes);
+  for (const auto& [name, values] : lists_)
+  {
+    append(name.size(), bytes);
+    bytes += name;
+    append(values.size(), bytes);
+    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double));
+  }
+  append(check_sum(bytes), bytes);
+  return bytes;
+}
+
+std::optional<Checkpoint> Checkpoint::from(const std::string& bytes)
+{
+  std::uint64_t sum = 0, count = 0, size = 0;
+  if (bytes.size() < head.size() + sizeof sum || bytes.compare(0, head.size(), head) != 0) return {};
+  const std::string_view content = std::string_view(bytes).substr(0, bytes.size() - sizeof sum);
+  std::memcpy(&sum, bytes.data() + content.size(), sizeof sum);
+  if (sum != check_sum(content)) return {};
+  Checkpoint checkpoint;
+  Taker rest(content.substr(head.size()));
+  rest.take(&count, sizeof count);
+  for (std::uint64_t i = 0; i < count; ++i)
+  {
+    if (!rest.take(&size, sizeof size) || size > rest.left()) return {};
+    std::string name(size, ' ');
+    rest.take(name.data(), size);
+    if (!rest.take(&size, sizeof size) || size > rest.left() / sizeof(double)) return {};
+    std::vector<double> values(size);
+    rest.take(values.data(), size * sizeof(double));
+    checkpoint.set(name, std::move(values));
+  }
+  return checkpoint;
+}
+
+void open_checkpoints(const CheckpointPlace& given)
+{
+  place() = given;
+  const fs::path file = given.folder / request_file;
+  std::ifstream stream(file);
+  if (!given.restart || !stream) return;
+  const std::string theirs{std::istreambuf_iterator<char>(stream), {}};
+  if (theirs != given.request)
+    throw Error("the checkpoints in " + given.folder.string() + " are of another scene or of other options (" +
+                file.string() + "): give those, or begin again without --restart");
+}
+
+bool checkpoints_are_kept()
+{
+  return !place().folder.empty();
+}
+
+void keep(const Checkpoint& checkpoint, const std::string& name)
+{
+  if (!checkpoints_are_kept()) return;
+  try
+  {
+    fs::create_directories(place().folder);
+    if (!fs::exists(place().folder / request_file))
+      write_whole_file(place().folder / request_file, place().request, Flush::now);
+    write_whole_file(place().folder / name, checkpoint.bytes(), Flush::now);
+  }
+  catch (const std::exception& error)
+  {
+    warn(error.what());
+  }
+}
+
+namespace
+{
+
+std::string bytes_kept(const std::string& name)
+{
+  if (!place().restart) return {};
+  std::ifstream stream(place().folder / name, std::ios::binary);
+  std::ostringstream bytes;
+  if (stream) bytes << stream.rdbuf();
+  return bytes.str();
+}
+
+} // namespace
+
+std::optional<Checkpoint> kept(const std::string& name)
+{
+  return Checkpoint::from(bytes_kept(name));
+}
+
+void forget(const std::string& name)
+{
+  std::error_code ignored;
+  fs::remove(place().folder / name, ignored);
+}
+
+std::optional<Checkpoint> kept_everywhere(const std::string& name, MPI_Comm comm)
+{
+  if (!place().restart) return {};
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  const std::string own = rank == 0 ? bytes_kept(name) : std::string();
+  std::vector<char> bytes(own.begin(), own.end());
+  broadcast(bytes, comm);
+  return Checkpoint::from({bytes.begin(), bytes.end()});
+}
+
+} // namespace squeal

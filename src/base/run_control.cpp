@@ -1,0 +1,185 @@
+#include "squeal/base/run_control.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <sys/prctl.h>
+#include <unistd.h>
+#include <vector>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int by_time_limit = 1000; // beside the numbers of signals
+
+/// The control of this process; a signal handler can be given nothing.
+struct Control
+{
+  RunLimits limits;
+  Clock::time_point begun = Clock::now(), last_checkpoint = begun, last_agreed = begun;
+  int every = 1, since = 0; // calls of request() between two agreements
+  int ended_by = 0;         // agreed: a signal's number, or by_time_limit
+  bool checkpoint_due = false;
+  std::vector<pid_t> peers; // ranks of this machine
+};
+
+Control& control()
+{
+  static Control one;
+  return one;
+}
+
+volatile std::sig_atomic_t signal_received = 0;
+
+void note_signal(int number)
+{
+  signal_received = number;
+  alarm(1);
+}
+
+/// A peer that is gone will never answer: the launcher is ending what an abort left.
+void look_for_peers(int)
+{
+  for (const pid_t peer : control().peers)
+    if (kill(peer, 0) != 0 && errno == ESRCH) _exit(1);
+  alarm(1);
+}
+
+void handle(int number, void (*handler)(int))
+{
+  struct sigaction action = {};
+  action.sa_handler = handler;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  sigaction(number, &action, nullptr);
+}
+
+/// The ranks of this machine whose numbers of processes mean the same to all of them.
+std::vector<pid_t> peers_of_this_machine()
+{
+  MPI_Comm machine = MPI_COMM_NULL;
+  MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
+  int ranks = 1;
+  MPI_Comm_size(machine, &ranks);
+  std::vector<int> all(static_cast<std::size_t>(ranks));
+  const int own = static_cast<int>(getpid());
+  MPI_Allgather(&own, 1, MPI_INT, all.data(), 1, MPI_INT, machine);
+  MPI_Comm_free(&machine);
+  std::vector<pid_t> peers;
+  for (const int peer : all)
+    if (peer != own && kill(peer, 0) == 0) peers.push_back(peer);
+  return peers;
+}
+
+/// A rank is started by mpirun or srun and has no business without it.
+void end_with_launcher()
+{
+  constexpr std::array launched = {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"};
+  if (std::none_of(launched.begin(), launched.end(), [](const char* name) { return std::getenv(name) != nullptr; }))
+    return;
+  const pid_t launcher = getppid();
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != launcher) _exit(1); // it died in between
+}
+
+double seconds_since(Clock::time_point time)
+{
+  return std::chrono::duration<double>(Clock::now() - time).count();
+}
+
+/// All ranks take what any of them knows, and rank 0's clock.
+void agree_on_requests(MPI_Comm comm)
+{
+  Control& own = control();
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  std::array<int, 3> known = {signal_received, 0, 1};
+  if (rank == 0)
+  {
+    const double limit = own.limits.time_limit;
+    if (known[0] == 0 && limit > 0 && seconds_since(own.begun) > limit) known[0] = by_time_limit;
+    known[1] = seconds_since(own.last_checkpoint) >= own.limits.checkpoint_interval;
+    known[2] = seconds_since(own.last_agreed) < 1e-3 * std::max(own.since, 1) ? 16 : 1;
+    own.last_agreed = Clock::now();
+  }
+  MPI_Allreduce(MPI_IN_PLACE, known.data(), 3, MPI_INT, MPI_MAX, comm);
+  own.ended_by = std::max(own.ended_by, known[0]);
+  own.checkpoint_due = own.checkpoint_due || known[1] != 0;
+  own.every = known[2];
+  own.since = 0;
+}
+
+} // namespace
+
+void begin_run_control(const RunLimits& limits)
+{
+  control().limits = limits;
+  control().peers = peers_of_this_machine();
+  end_with_launcher();
+  handle(SIGALRM, look_for_peers);
+  for (const int number : {SIGTERM, SIGINT, SIGUSR1}) handle(number, note_signal);
+}
+
+void end_run_control()
+{
+  alarm(0);
+  for (const int number : {SIGALRM, SIGTERM, SIGINT, SIGUSR1}) std::signal(number, SIG_DFL);
+}
+
+Request request(MPI_Comm comm)
+{
+  Control& own = control();
+  if (++own.since >= own.every) agree_on_requests(comm);
+  if (own.ended_by != 0) return Request::end;
+  return own.checkpoint_due ? Request::checkpoint : Request::none;
+}
+
+void end_if_asked(MPI_Comm comm)
+{
+  if (request(comm) == Request::end) throw Interrupted{};
+}
+
+bool checkpoint_is_due()
+{
+  return control().checkpoint_due;
+}
+
+bool checkpoint_is_worth_it(MPI_Comm comm)
+{
+  int worth = seconds_since(control().last_checkpoint) > 0.1 * control().limits.checkpoint_interval;
+  MPI_Bcast(&worth, 1, MPI_INT, 0, comm);
+  return worth != 0;
+}
+
+void checkpoint_made()
+{
+  control().checkpoint_due = false;
+  control().last_checkpoint = Clock::now();
+}
+
+std::string who_asked_to_end()
+{
+  switch (control().ended_by)
+  {
+  case 0:
+    return {};
+  case by_time_limit:
+    return "by the time limit";
+  case SIGTERM:
+    return "by SIGTERM";
+  case SIGINT:
+    return "by SIGINT";
+  default:
+    return "by SIGUSR1";
+  }
+}
+
+} // namespace squeal
