@@ -248,6 +248,7 @@ int main(int argc, char** argv)
   words.push_back(nullptr);
   argv = words.data();
   Session session(argc, argv, nullptr);
+  note_ranks();
   const int rank = rank_of(PETSC_COMM_WORLD);
   if (arguments.help || arguments.version)
   {

@@ -119,11 +119,15 @@ void agree_on_requests(MPI_Comm comm)
 
 } // namespace
 
+void note_ranks()
+{
+  control().peers = peers_of_this_machine();
+  end_with_launcher();
+}
+
 void begin_run_control(const RunLimits& limits)
 {
   control().limits = limits;
-  control().peers = peers_of_this_machine();
-  end_with_launcher();
   handle(SIGALRM, look_for_peers);
   for (const int number : {SIGTERM, SIGINT, SIGUSR1}) handle(number, note_signal);
 }

@@ -20,7 +20,7 @@ def start(output, *arguments, scene=SCENE):
     return subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
 
-def wait_for(condition, seconds=60):
+def wait_for(condition, seconds=20):
     end = time.time() + seconds
     while not condition():
         assert time.time() < end, "it never came true"

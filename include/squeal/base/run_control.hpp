@@ -19,9 +19,11 @@ struct RunLimits
   double checkpoint_interval = 600; // [s]
 };
 
-/// From here on SIGTERM, SIGINT and SIGUSR1 are requests to end, and a rank whose launcher dies ends with it. A rank
+/// Notes the ranks of this machine; from here on a rank whose launcher dies ends with it. Collective, before all else.
+void note_ranks();
+
+/// From here on SIGTERM, SIGINT and SIGUSR1 are requests to end. A rank
 /// that is asked to end while another rank of its machine is gone ends at once: it would wait for that one for ever.
-/// Collective.
 void begin_run_control(const RunLimits& limits);
 
 /// From here on signals end the process as usual.

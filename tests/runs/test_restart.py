@@ -1,0 +1,165 @@
+"""A run that is asked to end does so in order, and one that was killed goes on to the numbers of the straight run."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy as np
+import pytest
+from conftest import INPUTS, ROOT
+
+OSCILLATOR = INPUTS / "oscillator" / "scene.toml"
+ENDLESS = ["--set", "transient.periods=1e5"]
+# a transient and the free periods and Newton steps of a cycle, about a second each
+TRANSIENT_AND_CYCLE = ["--set", "transient.periods=100", "--set", "fidelity=full", "--set", "cycle.steps_per_period=2000"]
+OF_THE_CLOCK = {"run", "timings", "processor_seconds", "exit_code", "memory_bytes"}
+
+
+def start(output, *arguments, ranks=1, scene=OSCILLATOR):
+    launcher = [os.environ.get("MPIEXEC", "mpirun"), "-n", ranks] if ranks > 1 else []
+    command = [*launcher, os.environ["SQUEAL"], scene, "--output", output, *arguments]
+    return subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                            env=os.environ)
+
+
+def wait_for(condition, seconds=20):
+    end = time.time() + seconds
+    while not condition():
+        assert time.time() < end, "it never came true"
+        time.sleep(0.02)
+
+
+def partial(output):
+    return output.parent / (output.name + ".partial")
+
+
+def numbers(value):
+    """A report without what the clock decides."""
+    if isinstance(value, dict):
+        return {key: numbers(entry) for key, entry in value.items() if key not in OF_THE_CLOCK and "seconds" not in key}
+    return [numbers(entry) for entry in value] if isinstance(value, list) else value
+
+
+def data_of(file):
+    found = {}
+    with h5py.File(file) as content:
+        content.visititems(lambda name, item: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
+    return found
+
+
+def assert_same_results(one, other):
+    """To the last bit, but for times."""
+    reports = [numbers(json.loads((folder / "report.json").read_text())) for folder in (one, other)]
+    assert reports[0] == reports[1]
+    for name in ("history.h5", "fields.h5"):
+        a, b = data_of(one / name), data_of(other / name)
+        assert a.keys() == b.keys()
+        for key in a:
+            assert np.array_equal(a[key], b[key]), key
+
+
+def test_repeats_are_bitwise_equal(converged):
+    pin = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "damping.beta=6e-7"]
+    one, other = (converged(*pin, ranks=1).output for _ in range(2))
+    assert_same_results(one, other)
+
+
+@pytest.mark.parametrize("ranks,number", [(1, signal.SIGTERM), (1, signal.SIGINT), (2, signal.SIGUSR1)])
+def test_a_signal_ends_the_run_in_order(tmp_path, ranks, number):
+    output = tmp_path / "results"
+    run = start(output, *ENDLESS, "--set", f"transient.save_state={output}/end.state", ranks=ranks)
+    wait_for(lambda: (partial(output) / "history.h5").exists())  # of the first stage
+    time.sleep(0.5)
+    run.send_signal(number)
+    printed, errors = run.communicate(timeout=60)
+    assert run.returncode == 3, errors
+    report = json.loads((output / "report.json").read_text())
+    assert report["exit_code"] == 3 and report["transient"]["outcome"] == "interrupted"
+    assert signal.Signals(number).name in report["transient"]["reason"]
+    assert report["cycle"]["outcome"] == "skipped" and signal.Signals(number).name in report["cycle"]["reason"]
+    steps = report["transient"]["steps"]
+    assert len(data_of(output / "history.h5")["transient/time"]) == steps > 0
+    assert (output / "end.state").exists() and "--restart" in printed.splitlines()[-1]
+    assert not partial(output).exists()
+
+
+def test_the_wrapper_passes_signals_on(tmp_path):
+    """mpirun itself kills its ranks soon after a TERM; launch of tools/environment makes it a USR1."""
+    output = tmp_path / "results"
+    command = f". {ROOT}/tools/environment; launch mpirun -n 2 $SQUEAL {OSCILLATOR} --output {output} {' '.join(ENDLESS)}"
+    wrapper = subprocess.Popen(["bash", "-c", command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    wait_for(lambda: (partial(output) / "history.h5").exists())
+    time.sleep(0.5)
+    wrapper.terminate()
+    assert wrapper.wait(timeout=60) == 3
+    assert json.loads((output / "report.json").read_text())["exit_code"] == 3
+
+
+def test_the_time_limit_ends_a_cycle_and_restart_ends_it(converged, tmp_path):
+    """Whatever it had reached by then."""
+    straight = converged(OSCILLATOR, *TRANSIENT_AND_CYCLE, ranks=1).output
+    output = tmp_path / "ended"
+    limits = iter([0.3, 0.6, 0.9, 1.5, 3, 6, 12])
+    codes = []
+    while not codes or codes[-1] == 3:
+        run = start(output, *TRANSIENT_AND_CYCLE, "--restart", "--time-limit", next(limits))
+        run.communicate(timeout=100)
+        codes.append(run.returncode)
+    assert codes[-1] == 0 and codes[0] == 3, codes
+    assert_same_results(straight, output)
+    assert not (output / "checkpoint").exists()
+
+
+@pytest.mark.parametrize("seconds", [0.2, 0.5, 0.9])
+def test_a_killed_run_goes_on_to_the_straight_runs_numbers(converged, tmp_path, seconds):
+    straight = converged(OSCILLATOR, *TRANSIENT_AND_CYCLE, ranks=1).output
+    output = tmp_path / "killed"
+    run = start(output, *TRANSIENT_AND_CYCLE, "--checkpoint", "0.1")
+    wait_for(lambda: (partial(output) / "checkpoint").exists())
+    time.sleep(seconds)
+    run.kill()
+    run.wait()
+    assert partial(output).exists() or run.returncode == 0
+    again = start(output, *TRANSIENT_AND_CYCLE, "--restart")
+    printed, errors = again.communicate(timeout=100)
+    assert again.returncode == 0, errors
+    assert "goes on from the checkpoint" in printed or run.returncode == 0
+    assert_same_results(straight, output)
+
+
+def test_checkpoints_of_another_scene_are_refused_and_kept(tmp_path):
+    output = tmp_path / "results"
+    run = start(output, *ENDLESS, "--checkpoint", "0.1")
+    wait_for(lambda: (partial(output) / "checkpoint" / "transient").exists())
+    run.kill()
+    run.wait()
+    other = start(output, *ENDLESS, "--restart", "--set", "friction.coefficient=0.31")
+    errors = other.communicate(timeout=60)[1]
+    assert other.returncode == 1 and "another scene" in errors and len(errors.strip().splitlines()) == 1
+    assert (partial(output) / "checkpoint" / "transient").exists()
+
+
+def test_ranks_end_with_their_launcher(tmp_path):
+    run = start(tmp_path / "results", *ENDLESS, ranks=2)
+    wait_for(lambda: (partial(tmp_path / "results") / "history.h5").exists())
+    mine = lambda: [pid for pid in os.listdir("/proc") if pid.isdigit() and str(tmp_path).encode() in command_of(pid)]
+    assert len(mine()) == 3
+    run.kill()
+    wait_for(lambda: not mine(), 10)
+
+
+def command_of(pid):
+    try:
+        with open(f"/proc/{pid}/cmdline", "rb") as file:
+            return file.read()
+    except OSError:
+        return b""
+
+
+@pytest.mark.parametrize("argument", [["--time-limit", "soon"], ["--checkpoint", "0"], ["--time-limit"]])
+def test_limits_are_numbers_of_seconds(squeal, argument):
+    run = squeal(OSCILLATOR, *argument, ranks=1)
+    assert run.code == 1 and len(run.messages) == 1 and argument[0] in run.messages[0]
