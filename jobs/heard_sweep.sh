@@ -1,6 +1,9 @@
 #!/usr/bin/env bash
 #SBATCH --job-name=squeal-heard
+#SBATCH --nodes=1
 #SBATCH --ntasks=1
+#SBATCH --mem-per-cpu=3G
+#SBATCH --output=%x-%j.txt
 #SBATCH --time=08:00:00
 # What squeal says is heard against the friction coefficient, beside an independent direct integration from another start:
 # the unstable mode at AMPLITUDE times the estimate's. Its kind and means are found here, by the table's own script.
@@ -9,8 +12,11 @@
 # any further arguments for squeal. The small brake: SCENE=inputs/tgv/scene.toml MU="$(seq 0.2 0.02 0.4)" STEPS=64 with
 # the arguments of src/README.md, section 1.7.
 set -eu
-cd "${SLURM_SUBMIT_DIR:-$(dirname "$0")/..}"
-. tools/environment
+# Where squeal is: SQUEAL_ROOT, or the folder above this script, of which Slurm runs a copy.
+script=$0
+[ -z "${SLURM_JOB_ID:-}" ] || script=$(scontrol show job "$SLURM_JOB_ID" | sed -n 's/^ *Command=\([^ ]*\).*/\1/p' | head -1)
+root=${SQUEAL_ROOT:-$(dirname "$(realpath "$script")")/..}
+. "$root/jobs/common"
 scene=${SCENE:-inputs/pin_on_disc/scene.toml}
 output=${OUTPUT:-results/heard_sweep}
 steps=${STEPS:-60}
