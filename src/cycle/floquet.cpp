@@ -99,10 +99,16 @@ RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, V
   return result;
 }
 
-/// Of as many large multipliers both ways; a value within `margin` of the limit may fall on either side.
+constexpr LargeValues wanted{0.85, 4, 48};
+
+/// Of as many large multipliers both ways; a value within `margin` of the limit may fall on either side. Lists that are
+/// cut off are compared above their smallest values.
 bool as_many_above(double limit, const std::vector<Complex>& a, const std::vector<Complex>& b)
 {
   constexpr double margin = 5e-3;
+  for (const std::vector<Complex>* values : {&a, &b}) // a pair that would exceed the number is left out whole
+    if (static_cast<int>(values->size()) >= wanted.at_most - 1)
+      limit = std::max(limit, std::abs(values->back()) + 2 * margin);
   const auto above = [](double least, const std::vector<Complex>& values)
   { return std::count_if(values.begin(), values.end(), [&](Complex value) { return std::abs(value) > least; }); };
   return above(limit + margin, a) <= above(limit - margin, b) && above(limit + margin, b) <= above(limit - margin, a);
@@ -221,8 +227,6 @@ bool holds_every_motion(const ReducedModel& model, int eliminated, Vec state)
   check(VecGetSize(displacement(state), &dofs));
   return model.size() + eliminated == dofs;
 }
-
-constexpr LargeValues wanted{0.85, 4, 48};
 
 /// Whether three quarters of the shapes give as many multipliers above 0.95.
 bool confirmed_by_fewer_shapes(const ReducedModel& model, const ReducedMap& map, double period,

@@ -343,8 +343,13 @@ Search search_beside(const Monodromy& monodromy, const Projector& projector, con
   return search;
 }
 
-Coverage coverage_of(const SlowMotions& slow, const Search& search)
+/// `shift_distance`: of the shift's own multiplier from 1.
+Coverage coverage_of(const SlowMotions& slow, const Search& search, double shift_distance)
 {
+  constexpr double far = 0.05; // a real multiplier may hide in what the grid of time does to the shift
+  if (shift_distance > far)
+    return {false, format("the multiplier of a shift in time is %.2g away from 1: more steps a period would decide",
+                          shift_distance)};
   if (!slow.confirmed)
     return {false, "the reduced model has another number of large multipliers with fewer shapes: more modes "
                    "(modes.band) would decide"};
@@ -397,7 +402,7 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
     multipliers.upper.push_back(std::abs(passes.pairs[i].lambda) + passes.rises[i]);
   }
   if (std::abs(search.largest) - 2 * search.residual > 1) add_value(multipliers, search.largest, 2 * search.residual);
-  decide(multipliers, coverage_of(slow, search), multipliers.values.size());
+  decide(multipliers, coverage_of(slow, search, passes.shift_distance), multipliers.values.size());
   if (passes.pairs.empty()) return result;
   const MatrixXd fastest = real_part(passes.pairs[order.front()].y);
   result.fastest = std::move(states_of(combination(passes.space.V, fastest), orbit.state).front());

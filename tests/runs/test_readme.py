@@ -115,7 +115,8 @@ RUNS = {
                    "--set", "branch.points=4", "--set", "cycle.starts=2"],
     # the reduced model, a rotation, a mesh; coarse, and damped like this, its cycle is found in a second
     "pin_on_disc": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
-                    "damping.beta=6e-7", "--set", "cycle.steps_per_period=40", "--set", "fidelity=auto"],
+                    "damping.beta=6e-7", "--set", "cycle.steps_per_period=40", "--set", "fidelity=auto",
+                    "-cycle_watched_periods", "40"],
     # no cycle attracts: a settled motion, whose kind stays undecided over so few periods
     "settled": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
                 "friction.coefficient=0.4", "--set", "modes.method=full", "-cycle_free_periods", "10",
