@@ -39,9 +39,11 @@ std::vector<double> FileOrder::gather(Vec x) const
 
 void FileOrder::scatter(std::span<const double> entries, Vec x) const
 {
+  PetscInt size = 0; // 0 but on rank 0
   PetscScalar* values = nullptr;
+  check(VecGetLocalSize(whole_, &size));
   check(VecGetArrayWrite(whole_, &values));
-  std::copy(entries.begin(), entries.end(), values);
+  std::copy_n(entries.begin(), size, values);
   check(VecRestoreArrayWrite(whole_, &values));
   check(VecScatterBegin(scatter_, whole_, x, INSERT_VALUES, SCATTER_REVERSE));
   check(VecScatterEnd(scatter_, whole_, x, INSERT_VALUES, SCATTER_REVERSE));

@@ -49,6 +49,17 @@ std::vector<double> marks_of(const Structure& structure, const MarchPlan& plan)
   return {static_cast<double>(plan.steps), plan.step_size, plan.theta, stiffness, mass};
 }
 
+/// Of the reactions, on rank 0.
+void read_memory(const Checkpoint& checkpoint, ContactMemory& memory)
+{
+  memory.unread = static_cast<int>(checkpoint.number("work unread"));
+  for (std::size_t i = 0; checkpoint.has("memory r " + std::to_string(i)); ++i)
+  {
+    memory.r.push_back(checkpoint.list("memory r " + std::to_string(i)));
+    memory.Wr.push_back(checkpoint.list("memory Wr " + std::to_string(i)));
+  }
+}
+
 /// To the rounding of another number of ranks.
 bool agree(const std::vector<double>& a, const std::vector<double>& b)
 {
@@ -122,14 +133,8 @@ void MarchCheckpoint::read(const Checkpoint& checkpoint, const MarchProgress& pr
   if (static_cast<int>(checkpoint.number("ranks")) == ranks_of(comm_of(structure_.load)))
   {
     progress.state.reactions = checkpoint.list("reactions");
-    ContactMemory& memory = progress.work.memory;
-    memory = {};
-    memory.unread = static_cast<int>(checkpoint.number("work unread"));
-    for (std::size_t i = 0; checkpoint.has("memory r " + std::to_string(i)); ++i)
-    {
-      memory.r.push_back(checkpoint.list("memory r " + std::to_string(i)));
-      memory.Wr.push_back(checkpoint.list("memory Wr " + std::to_string(i)));
-    }
+    progress.work.memory = {};
+    if (rank_of(comm_of(structure_.load)) == 0) read_memory(checkpoint, progress.work.memory);
   }
   const std::vector<double>& summary = checkpoint.list("summary");
   progress.summary.steps = static_cast<long>(summary.at(0));

@@ -130,6 +130,22 @@ def test_a_killed_run_goes_on_to_the_straight_runs_numbers(converged, tmp_path, 
     assert_same_results(straight, output)
 
 
+def test_two_ranks_go_on_too(converged, tmp_path):
+    """The transient to the last bit; the modes of two ranks differ from run to run by rounding."""
+    arguments = ["--set", "transient.periods=20", "--set", "cycle.enabled=false"]
+    straight = converged(OSCILLATOR, *arguments, ranks=2).output
+    output = tmp_path / "ended"
+    run = start(output, *arguments, "--time-limit", "0.3", ranks=2)
+    run.communicate(timeout=100)
+    assert run.returncode == 3 and (output / "checkpoint" / "transient").exists()
+    again = start(output, *arguments, "--restart", ranks=2)
+    printed, errors = again.communicate(timeout=100)
+    assert again.returncode == 0 and "goes on from the checkpoint" in printed, errors
+    ends = [data_of(folder / "history.h5") for folder in (straight, output)]
+    for name in ends[0]:
+        assert np.allclose(ends[0][name], ends[1][name], rtol=1e-12, atol=1e-12 * abs(ends[0][name]).max()), name
+
+
 def test_checkpoints_of_another_scene_are_refused_and_kept(tmp_path):
     output = tmp_path / "results"
     run = start(output, *ENDLESS, "--checkpoint", "0.1")

@@ -15,7 +15,7 @@ public:
   /// Returns all entries on rank 0, and nothing elsewhere.
   std::vector<double> gather(Vec x) const;
 
-  /// Sets the vector from the list on rank 0, which has its size.
+  /// Sets the vector from the list on rank 0, which has its size; the lists of other ranks are not read.
   void scatter(std::span<const double> entries, Vec x) const;
 
 private:
