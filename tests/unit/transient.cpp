@@ -86,7 +86,7 @@ TEST_CASE("a state file that cannot be used says why on every rank")
   check_error(read, "not a PETSc binary vector");
   check_error([&] { (void)read_state(folder.path / "absent.petsc", model.structure); }, "cannot be read");
   check_error([&] { write_state(state, model.structure, folder.path / "no such folder" / "state.petsc"); },
-              "cannot be written");
+              "No such file or directory");
 
   write_state(state_of(model.structure, {1, std::nan(""), 3}, {4, 5, 6}), model.structure, file);
   check_error(read, "not finite");
