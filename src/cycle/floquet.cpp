@@ -310,10 +310,9 @@ void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_ste
 
 int steps_to_compare(const Structure& structure, int steps)
 {
-  constexpr PetscInt large = 10000; // degrees of freedom: a smaller model can afford more steps a period instead
   PetscInt dofs = 0;
   check(VecGetSize(structure.load, &dofs));
-  return dofs > large && steps <= enough_steps ? 2 * steps : 0;
+  return dofs > large_model && steps <= enough_steps ? 2 * steps : 0;
 }
 
 FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, const PeriodMap& map,

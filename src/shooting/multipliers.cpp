@@ -88,7 +88,7 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
   std::string refusal;
   if (method == MultiplierMethod::oblique && problem.flow.slow_motions)
     if (auto found = multipliers_by_projection(monodromy, options.multipliers, refusal)) return std::move(*found);
-  const PetscInt steps = options.multipliers > 0 ? options.multipliers : dofs <= 10000 ? -96 : -24;
+  const PetscInt steps = options.multipliers > 0 ? options.multipliers : dofs <= large_model ? -96 : -24;
   FloquetAnalysis result =
       multipliers_by_arnoldi(monodromy, motions_that_may_grow(problem, orbit, other_unstable), steps);
   result.multipliers.refusal = std::move(refusal);

@@ -163,10 +163,9 @@ bool better(const Attempt& first, const Attempt& second)
 /// from a tenth of the fluctuation to all of it. A small model is searched all the same: its periods cost little.
 bool leaves_too_slowly(const Search& search, const Attempt& attempt, int done)
 {
-  constexpr PetscInt small = 10000; // degrees of freedom
   PetscInt dofs = 0;
   check(VecGetSize(displacement(attempt.found.orbit.state), &dofs));
-  if (dofs <= small || !attempt.repels() || attempt.floquet.multipliers.values.empty()) return false;
+  if (dofs <= large_model || !attempt.repels() || attempt.floquet.multipliers.values.empty()) return false;
   const double largest = std::abs(attempt.floquet.multipliers.values.front());
   return std::log(10) > (search.options.free_periods - done) * std::log(std::max(largest, 1.));
 }

@@ -42,8 +42,8 @@ struct ContactPairs
 };
 
 /// Returns the pairs in the order of the contacts, in each by the rotor's nodes.
-/// Throws Error for: a missing surface or point; surfaces that share nodes, lie nowhere within reach of each other,
-/// look the same way or lie inside each other; a slave surface that supports or rigid bodies hold.
+/// Throws Error for: a missing surface or point; surfaces that share nodes, are nowhere within reach of each other,
+/// look the same way or are inside each other; a slave surface that supports or rigid bodies hold.
 ContactPairs make_pairs(const Mesh& mesh, const Scene& scene);
 
 } // namespace squeal

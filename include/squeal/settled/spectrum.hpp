@@ -29,7 +29,7 @@ struct BaseFrequencies
 {
   double first = 0, second = 0; // [Hz] of the strongest line, and of the strongest that is no multiple of it
   int closes_after = 0; // periods of the first after which a motion closes whose second is a fraction of it; 0: never
-  double explained = 0; // part of the power beside the first's multiples that lies in lines n f_1 + m f_2
+  double explained = 0; // part of the power beside the first's multiples that is in lines n f_1 + m f_2
 };
 
 BaseFrequencies base_frequencies(const Spectrum& spectrum);
