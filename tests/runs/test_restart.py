@@ -132,10 +132,12 @@ def test_a_killed_run_goes_on_to_the_straight_runs_numbers(converged, tmp_path, 
 
 def test_two_ranks_go_on_too(converged, tmp_path):
     """The transient to the last bit; the modes of two ranks differ from run to run by rounding."""
-    arguments = ["--set", "transient.periods=20", "--set", "cycle.enabled=false"]
+    arguments = ["--set", "transient.periods=400", "--set", "cycle.enabled=false"]
     straight = converged(OSCILLATOR, *arguments, ranks=2).output
     output = tmp_path / "ended"
-    run = start(output, *arguments, "--time-limit", "0.3", ranks=2)
+    run = start(output, *arguments, "--checkpoint", "0.1", ranks=2)
+    wait_for(lambda: (partial(output) / "checkpoint" / "transient").exists())  # in the transient, however fast the machine
+    run.send_signal(signal.SIGUSR1)
     run.communicate(timeout=100)
     assert run.returncode == 3 and (output / "checkpoint" / "transient").exists()
     again = start(output, *arguments, "--restart", ranks=2)
