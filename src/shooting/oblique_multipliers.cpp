@@ -151,19 +151,21 @@ void project(const Monodromy& monodromy, const SlowMotions& slow, const std::vec
   }
 }
 
-/// The pairs that need another pass: those whose bars reach across 1; after the first pass the largest at least, since
-/// what the reduced model had wrong says little of what the projection has.
+/// The pairs that need another pass: the largest and those whose bars reach across 1, while they change. The first
+/// change is the reduced model's error, and says little of what the projection has.
 std::vector<std::size_t> pairs_to_refine(const Passes& passes, bool first)
 {
-  std::vector<std::size_t> refined;
-  for (std::size_t i = 0; i < passes.pairs.size(); ++i)
-    if (reaches_across(passes, i)) refined.push_back(i);
-  if (!first || !refined.empty()) return refined;
+  constexpr double settled = 2.5e-7; // what other ranks or starts may add up to: below 1e-6
   double largest = 0;
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
     if (i != passes.shift) largest = std::max(largest, std::abs(passes.pairs[i].lambda));
+  std::vector<std::size_t> refined;
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
-    if (i != passes.shift && std::abs(passes.pairs[i].lambda) > largest - 1e-9) refined.push_back(i);
+  {
+    const bool matters =
+        i != passes.shift && (reaches_across(passes, i) || std::abs(passes.pairs[i].lambda) > largest - 1e-9);
+    if (matters && (first || passes.changes[i] > settled)) refined.push_back(i);
+  }
   return refined;
 }
 
@@ -220,7 +222,7 @@ bool meaningless(const Passes& passes)
   return false;
 }
 
-/// Two passes or more, until no bar reaches across 1. Returns why the vectors do not serve, or nothing.
+/// Two passes or more, until what decides has settled. Returns why the vectors do not serve, or nothing.
 std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Passes& passes)
 {
   if (std::string refusal = begin_passes(monodromy, slow, passes); !refusal.empty()) return refusal;

@@ -63,3 +63,20 @@ def test_brake_carries_its_clamp_force(brakes):
     for run in brakes:
         for contact in run["equilibrium"]["contacts"]:
             assert contact["normal_force_sum"] == pytest.approx(1000, rel=1e-9)
+
+
+def largest_of(cycle):
+    return max(abs(complex(value["real"], value["imaginary"])) for value in cycle["multipliers"]["values"])
+
+
+@pytest.mark.parametrize("scene", [
+    (["pin_on_disc/scene.toml", "--set", "mesh.parameters.divisions=3", "--set", "modes.band=6000", "--set",
+      "modes.method=full", "--set", "fidelity=full", "--set", "cycle.tolerance=1e-10"],
+    (["oscillator/scene.toml", "--set", "cycle.tolerance=1e-10"],
+], ids=["oblique", "whole"])
+def test_multipliers(scene, converged):
+    """1e-6: two cycles found to 1e-10 differ by less, and the passes end when the largest has settled to 2.5e-7."""
+    arguments = [INPUTS / scene[0], *scene[1:], "--set", "transient.enabled=false"]
+    first, second = (converged(*arguments, ranks=ranks).report["cycle"] for ranks in (1, 2))
+    assert second["multipliers"]["method"] == first["multipliers"]["method"]
+    assert largest_of(second) == pytest.approx(largest_of(first), abs=1e-6)
