@@ -1,0 +1,422 @@
+"""tools/matrices: every format of other codes gives the eigenvalues of dense algebra, and bad files are refused with file,
+line and what was expected."""
+
+import importlib.machinery
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+import scipy.linalg
+import scipy.sparse as sparse
+
+TOOLS = Path(__file__).resolve().parents[2] / "tools"
+sys.path.insert(0, str(TOOLS))
+
+
+def tool():
+    loader = importlib.machinery.SourceFileLoader("matrices_tool", str(TOOLS / "matrices"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("matrices_tool", loader))
+    loader.exec_module(module)
+    return module
+
+
+MATRICES = tool()
+NODES = np.array([7, 11, 12, 40, 41, 1000])
+LABELS = np.array([(node, dof) for node in NODES for dof in (1, 2, 3)])
+N = len(LABELS)
+POSITIONS = np.array([[0, 0, 0.0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0.02], [0, 1, 0]])
+
+
+def spring_model():
+    """A positive definite K with thirds, so that every digit is needed, and an M that is not diagonal."""
+    half = sparse.random(N, N, 0.3, random_state=5).toarray()
+    K = 1e7 * (half @ half.T + np.eye(N)) / 3
+    quarter = sparse.random(N, N, 0.1, random_state=6).toarray()
+    return {"K": K, "M": 0.1 * (quarter @ quarter.T + np.eye(N))}
+
+
+def eigenvalues(model):
+    dense = {name: A.toarray() if sparse.issparse(A) else A for name, A in model.items()}
+    return scipy.linalg.eigh(dense["K"], dense["M"], eigvals_only=True)
+
+
+def lower(A):
+    return [(i, j, A[i, j]) for j in range(N) for i in range(j, N) if A[i, j] != 0]
+
+
+# ---- writers, each as its code writes
+
+
+def abaqus(folder, model):
+    for name, A in model.items():
+        lines = [f"{LABELS[i][0]},{LABELS[i][1]}, {LABELS[j][0]},{LABELS[j][1]}, {v:.16e}" for i, j, v in lower(A)]
+        (folder / f"{name}.mtx").write_text("** MATRIX INPUT\n" + "\n".join(lines) + "\n")
+    return {}
+
+
+def abaqus_coordinate(folder, model):
+    for name, A in model.items():
+        (folder / f"{name}.mtx").write_text("".join(f"{i + 1:8d} {j + 1:8d} {v:25.16e}\n" for i, j, v in lower(A)))
+    return {"dofs": listed(folder)}
+
+
+def listed(folder):
+    (folder / "dofs.csv").write_text("".join(f"{node}, {'xyz'[dof - 1]}\n" for node, dof in LABELS))
+    return "dofs.csv"
+
+
+def calculix(folder, model):
+    """*FREQUENCY, SOLVER=MATRIXSTORAGE: the upper triangle with numbers from 1, and node.dof of each row."""
+    for name, ending in (("K", "sti"), ("M", "mas")):
+        (folder / f"job.{ending}").write_text("".join(f"{j + 1} {i + 1} {v:.20e}\n" for i, j, v in lower(model[name])))
+    (folder / "job.dof").write_text("".join(f"{node}.{dof}\n" for node, dof in LABELS))
+    return {"K": "job.sti", "M": "job.mas", "dofs": "job.dof"}
+
+
+def dmig(folder, model):
+    """Columns of the lower triangle in Nastran's large fields; their values have Fortran's exponents."""
+    text = ""
+    for name, A in model.items():
+        text += f"{'DMIG':8}{name + 'AAX':8}{0:8d}{6:8d}{2:8d}{0:8d}{'':8}{'':8}{N:8d}\n"
+        for j in range(N):
+            text += f"{'DMIG*':8}{name + 'AAX':16}{LABELS[j][0]:16d}{LABELS[j][1]:16d}\n"
+            for i in range(j, N):
+                if A[i, j] != 0:
+                    value = f"{A[i, j]:.9E}".replace("E", "D")
+                    text += f"{'*':8}{LABELS[i][0]:16d}{LABELS[i][1]:16d}{value:>16}\n"
+                    A[i, j] = A[j, i] = float(f"{A[i, j]:.9E}")  # ten digits are all that a field holds
+    (folder / "both.pch").write_text("$ punched\n" + text)
+    return {"K": "both.pch:KAAX", "M": "both.pch:MAAX"}
+
+
+def harwell_boeing(folder, model):
+    """As HBMAT: pointers, rows and values of the lower triangle in fixed fields, and a mapping."""
+    for name, A in model.items():
+        entries = lower(A)
+        starts = np.concatenate([[1], 1 + np.cumsum([sum(j == k for _, j, _ in entries) for k in range(N)])])
+        blocks = [(starts, 8, "{:10d}"), ([i + 1 for i, _, _ in entries], 8, "{:10d}"), ([v for *_, v in entries], 3, "{:25.16E}"),
+                  (np.arange(N) / 7, 3, "{:25.16E}")]
+        texts = ["".join(form.format(v) + ("\n" if (k + 1) % per == 0 or k + 1 == len(values) else "")
+                         for k, v in enumerate(values)) for values, per, form in blocks]
+        counts = [text.count("\n") for text in texts]
+        head = f"{name:72}KEY\n" + "".join(f"{c:14d}" for c in [sum(counts), *counts]) + "\n"
+        head += f"{'RSA':14}{N:14d}{N:14d}{len(entries):14d}{0:14d}\n"
+        head += f"{'(8I10)':16}{'(8I10)':16}{'(3E25.16)':20}{'(3E25.16)':20}\n" + f"{'F':14}{1:14d}{0:14d}\n"
+        (folder / f"{name}.hb").write_text(head + "".join(texts))
+    rows = "".join(f"{i + 1:12d}{node:12d}   {'UX UY UZ'.split()[dof - 1]}\n" for i, (node, dof) in enumerate(LABELS))
+    (folder / "model.mapping").write_text("   Matrix Eqn        Node   DOF\n" + rows)
+    return {"K": "K.hb", "M": "M.hb", "F": "K.hb:RHS", "dofs": "model.mapping"}
+
+
+def op4(folder, model):
+    """Binary, dense, double precision, both matrices in one file."""
+    data = b""
+    for name, A in model.items():
+        def record(*parts):
+            body = b"".join(np.array(part, "<i4").tobytes() if kind == "i" else np.array(part, "<f8").tobytes()
+                            for kind, part in parts)
+            return np.array([len(body)], "<i4").tobytes() + body + np.array([len(body)], "<i4").tobytes()
+        head = np.array([N, N, 6, 2], "<i4").tobytes() + f"{name}GG".ljust(8).encode()
+        data += np.array([24], "<i4").tobytes() + head + np.array([24], "<i4").tobytes()
+        for j in range(N):
+            data += record(("i", [j + 1, 1, 2 * N]), ("f", A[:, j]))
+        data += record(("i", [N + 1, 1, 2]), ("f", [1.0]))
+    (folder / "both.op4").write_bytes(data)
+    return {"K": "both.op4:KGG", "M": "both.op4:MGG", "dofs": listed(folder)}
+
+
+def code_aster(folder, model):
+    """numpy.savez of EXTR_MATR(sparse=True): values, rows, columns, size; the lower triangle."""
+    for name, A in model.items():
+        i, j, v = zip(*lower(A))
+        np.savez(folder / f"{name}.npz", np.array(v), np.array(i), np.array(j), N)
+    (folder / "dofs.txt").write_text("".join(f"N{node} {'DX DY DZ'.split()[dof - 1]}\n" for node, dof in LABELS))
+    return {"K": "K.npz", "M": "M.npz", "dofs": "dofs.txt"}
+
+
+def code_aster_dense(folder, model):
+    for name, A in model.items():
+        np.save(folder / f"{name}.npy", A)
+    return {"K": "K.npy", "M": "M.npy"}
+
+
+def matlab(folder, model):
+    scipy.io.savemat(folder / "model.mat", {name: sparse.csc_matrix(A) for name, A in model.items()})
+    return {"K": "model.mat:K", "M": "model.mat:M"}
+
+
+def matlab_73(folder, model):
+    """HDF5: a sparse matrix is a group of columns, a dense one is transposed."""
+    with h5py.File(folder / "model.mat", "w") as file:
+        K = sparse.csc_matrix(model["K"])
+        group = file.create_group("K")
+        group.attrs["MATLAB_sparse"] = np.uint64(N)
+        for key, value in (("data", K.data), ("ir", K.indices.astype(np.uint64)), ("jc", K.indptr.astype(np.uint64))):
+            group[key] = value
+        file["M"] = model["M"].T
+    return {"K": "model.mat:K", "M": "model.mat:M"}
+
+
+def matrix_market(folder, model):
+    for name, A in model.items():
+        scipy.io.mmwrite(folder / f"{name}.mtx", sparse.coo_matrix(A), precision=17, symmetry="symmetric")
+    return {}
+
+
+def npz(folder, model):
+    for name, A in model.items():
+        sparse.save_npz(folder / f"{name}.npz", sparse.csr_matrix(A))
+    return {"K": "K.npz", "M": "M.npz"}
+
+
+def describe(folder, keys, extra=""):
+    keys = {"K": "K.mtx", "M": "M.mtx", **keys}
+    file = folder / "model.toml"
+    file.write_text("".join(f'{key} = "{value}"\n' for key, value in keys.items()) + extra)
+    return file
+
+
+FORMATS = [abaqus, abaqus_coordinate, calculix, dmig, harwell_boeing, op4, code_aster, code_aster_dense, matlab, matlab_73,
+           matrix_market, npz]
+NAMED = (abaqus, abaqus_coordinate, calculix, dmig, harwell_boeing, op4, code_aster)
+
+
+@pytest.mark.parametrize("write", FORMATS, ids=lambda f: f.__name__)
+def test_every_format_gives_the_eigenvalues_of_dense_algebra(tmp_path, write):
+    model = spring_model()
+    keys = write(tmp_path, model)  # DMIG rounds the model to its digits
+    found, labels, _ = MATRICES.read_model(describe(tmp_path, keys))
+    for name in "MK":
+        np.testing.assert_allclose(found[name].toarray(), model[name], rtol=1e-15, atol=0)
+    np.testing.assert_allclose(eigenvalues({k: found[k] for k in "MK"}), eigenvalues(model), rtol=1e-10)
+    assert (labels is not None) == (write in NAMED)
+    if labels is not None:
+        assert (labels == LABELS).all()
+    if "F" in keys:
+        np.testing.assert_allclose(found["F"], np.arange(N) / 7, rtol=1e-15)
+    MATRICES.write_files(tmp_path / "out", "petsc", found, labels)
+    again, again_labels, _ = MATRICES.read_model(tmp_path / "out")
+    assert all((again[name] != found[name]).nnz == 0 for name in "MK")
+    assert labels is None or (again_labels == labels).all()
+
+
+# What pyyeti's op4.write made of [[4, -1, 0], [-1, 3, 1/3], [0, 1/3, 2]]: an independent writer.
+OP4_TEXT = """       3{rows:8d}       6       2KAA     1P,3E23.16
+       1{first}
+ 4.0000000000000000E+00-1.0000000000000000E+00
+       2{second}
+-1.0000000000000000E+00 3.0000000000000000E+00 3.3333333333333331E-01
+       3{third}
+ 3.3333333333333331E-01 2.0000000000000000E+00
+       4       1       1
+ 1.4142135623730951E+00
+"""
+OP4_FILES = {
+    "text dense": OP4_TEXT.format(rows=3, first="       1       2", second="       1       3", third="       2       2"),
+    "text sparse": OP4_TEXT.format(rows=3, first="       0       5\n     327681", second="       0       7\n     458753",
+                                   third="       0       5\n     327682"),
+    "text sparse, many rows": OP4_TEXT.format(rows=-3, first="       0       6\n       5       1",
+                                              second="       0       8\n       7       1",
+                                              third="       0       6\n       5       2"),
+    "binary sparse": bytes.fromhex(
+        "18000000030000000300000006000000020000004b414120202020201800000020000000010000000000000005000000010005000000000000001040"
+        "000000000000f0bf200000002800000002000000000000000700000001000700000000000000f0bf0000000000000840555555555555d53f28000000"
+        "2000000003000000000000000500000002000500555555555555d53f00000000000000402000000014000000040000000100000002000000cd3b7f66"
+        "9ea0f63f14000000"),
+    "binary sparse, many rows": bytes.fromhex(
+        "1800000003000000fdffffff06000000020000004b414120202020201800000024000000010000000000000006000000050000000100000000000000"
+        "00001040000000000000f0bf240000002c0000000200000000000000080000000700000001000000000000000000f0bf000000000000084055555555"
+        "5555d53f2c000000240000000300000000000000060000000500000002000000555555555555d53f0000000000000040240000001400000004000000"
+        "0100000002000000cd3b7f669ea0f63f14000000"),
+}
+
+
+@pytest.mark.parametrize("kind", OP4_FILES)
+def test_output4_in_all_its_forms(tmp_path, kind):
+    content = OP4_FILES[kind]
+    file = tmp_path / "k.op4"
+    file.write_bytes(content if isinstance(content, bytes) else content.encode())
+    found = MATRICES.matrix_files.read_array(file, None, False).toarray()
+    assert (found == [[4, -1, 0], [-1, 3, 1 / 3], [0, 1 / 3, 2]]).all()
+    if isinstance(content, bytes):
+        file.write_bytes(content[:-9])
+        with pytest.raises(MATRICES.Problem, match="k.op4: truncated"):
+            MATRICES.matrix_files.read_array(file, None, False)
+
+
+# ---- pairs, supports, units
+
+
+PAIRS = "rotor, stator, gap\n7, 40, 0\n11, 41, 0.5\n12, 1000, 0\n"
+CONTACT = '''
+[[contact]]
+pairs = "pairs.csv"
+normal = "z"
+rotation = { axis = "z", centre = [0, 0, 0], rate = 2 }
+'''
+
+
+def nodes_file(folder, scale=1.0):
+    lines = [f"{node}, {x}, {y}, {z}\n" for node, (x, y, z) in zip(NODES, scale * POSITIONS)]
+    (folder / "nodes.inp").write_text("*HEADING\nx\n*NODE, NSET=ALL\n" + "".join(lines))
+
+
+def contact_model(tmp_path, pairs, extra=CONTACT, **keys):
+    model = spring_model()
+    given = abaqus(tmp_path, model)
+    nodes_file(tmp_path)
+    (tmp_path / "pairs.csv").write_text(pairs)
+    return MATRICES.read_model(describe(tmp_path, {**given, "nodes": "nodes.inp", **keys}, extra))
+
+
+def row_of(node, dof):
+    return int(np.flatnonzero((LABELS == (node, dof)).all(axis=1))[0])
+
+
+def test_pairs_of_nodes_become_the_rows_of_contact(tmp_path):
+    """Rotors 7, 11, 12 at (0,0), (1,0), (0,1) turn about z: velocities 0, 2 y, -2 x; tangents follow, then n x t."""
+    found, labels, _ = contact_model(tmp_path, PAIRS.replace("11, 41, 0.5", "11, 41, 0.25"))
+    B = found["B"].toarray()
+    expected = np.zeros((9, N))
+    tangents = [(1, 0, 0), (0, 1, 0)], [(0, 1, 0), (-1, 0, 0)], [(-1, 0, 0), (0, -1, 0)]
+    for pair, (rotor, stator, axes) in enumerate(zip((7, 11, 12), (40, 41, 1000), tangents)):
+        for k, axis in enumerate([(0, 0, 1), *axes]):
+            for c in range(3):
+                expected[3 * pair + k, row_of(stator, c + 1)] += axis[c]
+                expected[3 * pair + k, row_of(rotor, c + 1)] -= axis[c]
+    assert (B == expected).all()
+    assert (found["gap"] == [0, 0.25, 0]).all()
+    assert (found["drive"] == [0, 0, 2, 0, 2, 0]).all()
+
+
+def test_gap_and_normal_come_from_positions_and_lists(tmp_path):
+    found, *_ = contact_model(tmp_path, "7 40\n11 41\n12 1000\n")
+    np.testing.assert_allclose(found["gap"], [0, 0.02, 0], rtol=1e-14)
+    plane = CONTACT.replace('normal = "z"\n', 'tangents = ["x"]\n')
+    found, *_ = contact_model(tmp_path, "7 40 0 0.6 0.8 1e-4 1e-3\n", plane)
+    assert found["B"].shape == (2, N) and (found["gap"] == [1e-3]).all()
+    np.testing.assert_allclose(found["B"].toarray()[0, [row_of(40, 2), row_of(40, 3), row_of(7, 3)]], [0.6, 0.8, -0.8])
+
+
+def test_penalties_are_supports(tmp_path):
+    """Abaqus adds 1e36 to held motions: the eigenvalues are those of the matrices without these rows."""
+    model = spring_model()
+    held = [row_of(1000, dof) for dof in (1, 2, 3)] + [row_of(7, 2)]
+    free = np.setdiff1d(np.arange(N), held)
+    expected = eigenvalues({name: A[np.ix_(free, free)] for name, A in model.items()})
+    model["K"][held, held] += 1e36
+    found, labels, notes = MATRICES.read_model(describe(tmp_path, abaqus(tmp_path, model)))
+    np.testing.assert_allclose(eigenvalues({k: found[k] for k in "MK"}), expected, rtol=1e-10)
+    assert (labels == LABELS[free]).all() and "4 rows held" in notes[0]
+
+
+def test_lagrange_multipliers_that_hold_one_motion_are_supports(tmp_path):
+    model = spring_model()
+    held, factor = row_of(40, 3), 2.5e6
+    free = np.setdiff1d(np.arange(N), [held])
+    expected = eigenvalues({name: A[np.ix_(free, free)] for name, A in model.items()})
+    big = {name: np.zeros((N + 2, N + 2)) for name in "MK"}  # Code_Aster has two multipliers a condition
+    for name in "MK":
+        big[name][:N, :N] = model[name]
+    big["K"][held, N:] = big["K"][N:, held] = factor
+    big["K"][N:, N:] = [[-factor, factor], [factor, -factor]]
+    for name in "MK":
+        np.save(tmp_path / f"{name}.npy", big[name])
+    (tmp_path / "dofs.txt").write_text("".join(f"{n} {d}\n" for n, d in LABELS) + "40 LAGR1\n40 LAGR2\n")
+    found, labels, _ = MATRICES.read_model(describe(tmp_path, {"K": "K.npy", "M": "M.npy", "dofs": "dofs.txt"}))
+    np.testing.assert_allclose(eigenvalues({k: found[k] for k in "MK"}), expected, rtol=1e-10)
+
+
+def test_units_of_the_files(tmp_path):
+    """N, mm, s, t: K in N/mm and M in t are 1e-3 of N/m and kg; of rotations (here the third dof) N mm and t mm2."""
+    model = spring_model()
+    scale = np.array([1e-3 if dof < 3 else 1 for _, dof in LABELS])  # q in mm and rad = q in m and rad over this
+    foreign = {name: 1e3 * A * np.outer(scale, scale) for name, A in model.items()}
+    for name in "MK":
+        np.save(tmp_path / f"{name}.npy", foreign[name])
+    np.savetxt(tmp_path / "F.txt", [(node, dof if dof < 3 else 4, 5.0) for node, dof in LABELS], fmt="%d %d %g")
+    (tmp_path / "dofs.txt").write_text("".join(f"{n} {d if d < 3 else 'rx'}\n" for n, d in LABELS))
+    keys = {"K": "K.npy", "M": "M.npy", "F": "F.txt", "dofs": "dofs.txt"}
+    found, labels, _ = MATRICES.read_model(describe(tmp_path, keys, "length = 0.001\n"))
+    for name in "MK":
+        np.testing.assert_allclose(found[name].toarray(), model[name], rtol=1e-14)
+    np.testing.assert_allclose(found["F"], [5.0 if dof < 3 else 5e-3 for _, dof in LABELS], rtol=1e-14)
+
+
+# ---- bad files
+
+
+def changed(file, old, new):
+    def change(folder):
+        text = (folder / file).read_text()
+        assert old in text
+        (folder / file).write_text(text.replace(old, new, 1))
+    return change
+
+
+BAD = {
+    "a word among numbers": (abaqus, changed("K.mtx", "7,3, 7,1,", "7,y, 7,1,"), ["K.mtx, line 3", "'y'", "node, dof, node, dof, value"]),
+    "a value missing": (abaqus, changed("K.mtx", "7,3, 7,1,", "7,3, 7,"), ["K.mtx, line 3", "4 values"]),
+    "map of another model": (abaqus_coordinate, changed("dofs.csv", "1000, z\n", ""), ["dofs.csv has 17 rows", "18"]),
+    "a motion twice": (abaqus_coordinate, changed("dofs.csv", "7, y", "7, x"), ["dofs.csv", "twice"]),
+    "an unknown motion": (abaqus_coordinate, changed("dofs.csv", "7, y", "7, w"), ["dofs.csv, line 2", "'w'", "UX"]),
+    "a row missing in the mapping": (harwell_boeing, changed("model.mapping", "           2           7", "          19           7"), ["row 2"]),
+    "lines cut off": (harwell_boeing, lambda folder: (folder / "K.hb").write_text("\n".join((folder / "K.hb").read_text().split("\n")[:12])),
+                      ["K.hb", "truncated", "12 lines", "for the rows"]),
+    "unassembled elements": (harwell_boeing, changed("K.hb", "RSA", "RSE"), ["K.hb, line 3", "RSE", "RSA"]),
+    "a complex matrix": (dmig, changed("both.pch", "       6       2       0", "       6       4       0"), ["both.pch, line 2", "complex", "real"]),
+    "a name that is not there": (dmig, changed("model.toml", "KAAX", "KGG"), ["no matrix KGG", "KAAX, MAAX"]),
+    "no name for several": (dmig, changed("model.toml", ":KAAX", ""), ["both.pch", "KAAX, MAAX", "say which"]),
+    "bad number in a field": (dmig, changed("both.pch", "D+0", "Q+0"), ["both.pch", "Q+0", "a value"]),
+    "an unknown key": (npz, changed("model.toml", "K = ", "KK = "), ["model.toml", "KK"]),
+    "no such file": (npz, changed("model.toml", "K.npz", "L.npz"), ["L.npz"]),
+    "an unknown ending": (npz, changed("model.toml", "K.npz", "K.xls"), ["K.xls", ".op4"]),
+    "an array of objects": (code_aster_dense, lambda folder: np.save(folder / "K.npy", np.array([{}, None], object), allow_pickle=True),
+                            ["K.npy", "Python objects", "arrays of numbers"]),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_files_are_refused_with_file_line_and_what_was_expected(tmp_path, case):
+    write, change, words = BAD[case]
+    describe(tmp_path, write(tmp_path, spring_model()))
+    change(tmp_path)
+    with pytest.raises(MATRICES.Problem) as refused:
+        MATRICES.read_model(tmp_path / "model.toml")
+    for word in words:
+        assert word in str(refused.value), refused.value
+    assert "pickle" not in str(refused.value) and "\n" not in str(refused.value)
+
+
+BAD_PAIRS = {
+    "unknown node": ("7 40\n11 99\n", CONTACT, ["pairs.csv, line 2", "99", "no position"]),
+    "itself": ("7 7\n", CONTACT, ["line 1", "itself"]),
+    "columns": ("rotor, stator, area, nx\n", CONTACT, ["line 1", "expected rotor, stator"]),
+    "values": ("7 40 0 0\n", CONTACT, ["line 1", "expected"]),
+    "normal the wrong way": ("11 41\n", CONTACT.replace('"z"', "[0, 0, -1]"), ["line 1", "inside the rotor", "turn the normal"]),
+    "no normal": ("7 40\n", CONTACT.replace('normal = "z"\n', ""), ["line 1", "coincide", "nx, ny, nz"]),
+    "bad axis": ("7 40\n", CONTACT.replace('axis = "z"', 'axis = "w"'), ["rotation.axis", "three numbers"]),
+    "unknown key": ("7 40\n", CONTACT.replace("normal", "normale"), ["[[contact]]", "normale"]),
+}
+
+
+@pytest.mark.parametrize("case", BAD_PAIRS)
+def test_bad_pairs_are_refused(tmp_path, case):
+    pairs, extra, words = BAD_PAIRS[case]
+    with pytest.raises(MATRICES.Problem) as refused:
+        contact_model(tmp_path, pairs, extra)
+    for word in words:
+        assert word in str(refused.value), refused.value
+
+
+def test_the_command_says_one_sentence_and_no_hint_at_pickle(tmp_path):
+    np.save(tmp_path / "K.npy", np.array([{}], object), allow_pickle=True)
+    np.save(tmp_path / "M.npy", np.eye(1))
+    done = subprocess.run([sys.executable, TOOLS / "matrices", tmp_path, tmp_path / "out"], capture_output=True, text=True)
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert "K.npy" in done.stderr and "pickle" not in done.stderr

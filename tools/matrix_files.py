@@ -1,0 +1,179 @@
+"""Files that hold one matrix or vector, or several by name: PETSc, numpy, Matrix Market, MATLAB, Code_Aster, and those of
+tools/vendor_matrices.py."""
+
+import re
+
+import numpy as np
+import scipy.io
+import scipy.sparse as sparse
+import vendor_matrices as vendor
+from common import MATRIX_ID, VECTOR_ID
+from deck_files import Problem
+
+
+def read_petsc(file, name):
+    """A matrix is id, rows, columns, entries, entries of each row, columns, values; a vector id, size, values."""
+    data = file.read_bytes()
+
+    def take(kind, count, at):
+        size = np.dtype(kind).itemsize * count
+        if count < 0 or at + size > len(data):
+            raise Problem(f"{file} is truncated: {len(data)} bytes, at least {at + max(size, 0)} expected")
+        return np.frombuffer(data, kind, count, at), at + size
+
+    (kind, first), at = take(">i4", 2, 0)
+    if kind == VECTOR_ID:
+        values, at = take(">f8", int(first), at)
+        result = values.astype(float)
+    elif kind == MATRIX_ID:
+        (columns, entries), at = take(">i4", 2, at)
+        lengths, at = take(">i4", int(first), at)
+        indices, at = take(">i4", int(entries), at)
+        values, at = take(">f8", int(entries), at)
+        if lengths.sum() != entries:
+            raise Problem(f"{file}: the rows hold {lengths.sum()} entries, the head says {entries}")
+        pointers = np.concatenate([[0], np.cumsum(lengths)])
+        result = sparse.csr_matrix((values.astype(float), indices.astype(np.int32), pointers), (int(first), int(columns)))
+    else:
+        raise Problem(f"{file} is not a PETSc binary file: it starts with {kind}, not {MATRIX_ID} or {VECTOR_ID}")
+    if at != len(data):
+        raise Problem(f"{file}: {len(data) - at} bytes follow the end of the data; were PETSc's indices 64-bit?")
+    return result
+
+
+def load_numpy(file):
+    """What numpy.save or numpy.savez wrote. Files that hold Python objects may run code: they are refused."""
+    try:
+        return np.load(file, allow_pickle=False)
+    except ValueError:
+        raise Problem(f"{file}: holds Python objects, or is no file of numpy; expected arrays of numbers, as numpy.save, "
+                      "numpy.savez and scipy.sparse.save_npz write them") from None
+
+
+def read_npz(file, name):
+    """scipy.sparse.save_npz; one array; arrays of several names; or the (values, rows, columns, size) that Code_Aster's
+    EXTR_MATR(sparse=True) gives, saved by numpy.savez(FILE, *K)."""
+    with load_numpy(file) as data:
+        names = list(data.files)
+        if "format" in names:
+            return sparse.load_npz(file)
+        key = name or (names[0] if len(names) == 1 else None)
+        if names == ["arr_0", "arr_1", "arr_2", "arr_3"] and not name:
+            values, rows, columns, size = (array_of(data, key, file) for key in names)
+            return coordinates(file, values, rows, columns, int(size.reshape(-1)[0]))
+        if key is None or key not in names:
+            raise Problem(f"{file}: holds {', '.join(names)}: say which by \"{file.name}:NAME\"")
+        return array_of(data, key, file)
+
+
+def names_of(file):
+    """Names of the arrays of a bundle, .npz or .mat."""
+    if file.suffix == ".npz":
+        with load_numpy(file) as data:
+            return list(data.files)
+    if file.suffix == ".mat":
+        return matlab_content(file)[0]
+    raise Problem(f"{file}: expected a folder, a bundle .npz or .mat, or a .toml that says where the matrices are")
+
+
+def array_of(data, key, file):
+    try:
+        return data[key]
+    except ValueError:
+        raise Problem(f"{file}: {key} holds Python objects; expected an array of numbers") from None
+
+
+def coordinates(file, values, rows, columns, n):
+    """Code_Aster counts from 0, and keeps one triangle of a symmetric matrix."""
+    if not len(values) == len(rows) == len(columns):
+        raise Problem(f"{file}: {len(values)} values, {len(rows)} rows, {len(columns)} columns; expected as many of each")
+    places = np.concatenate([rows, columns])
+    if len(places) and (places.min() < 0 or places.max() >= n):
+        raise Problem(f"{file}: rows and columns from {places.min()} to {places.max()}; expected 0 to {n - 1}")
+    return vendor.both_triangles(sparse.coo_matrix((values, (rows, columns)), (n, n)))
+
+
+def read_matlab(file, name):
+    names, content = matlab_content(file)
+    return content(pick(file, names, name))
+
+
+def matlab_content(file):
+    """Names of the variables, and a function that reads one. Versions 4 to 7 by scipy; 7.3 is HDF5."""
+    import h5py
+
+    if h5py.is_hdf5(file):
+        with h5py.File(file) as data:
+            names = [key for key in data if not key.startswith("#")]
+
+        def read(name):
+            with h5py.File(file) as data:
+                return read_hdf5(data[name], file)
+
+        return names, read
+    try:
+        content = scipy.io.loadmat(file)
+    except (ValueError, TypeError, NotImplementedError, KeyError) as error:
+        raise Problem(f"{file}: not a file of MATLAB ({error})") from None
+    return [key for key in content if not key.startswith("__")], content.__getitem__
+
+
+def pick(file, names, name):
+    if name is None and len(names) == 1:
+        return names[0]
+    if name not in names:
+        raise Problem(f"{file}: holds {', '.join(names)}: say which by \"{file.name}:NAME\"")
+    return name
+
+
+def read_hdf5(item, file):
+    """A sparse matrix is a group of columns; a dense one is stored by columns."""
+    import h5py
+
+    if isinstance(item, h5py.Dataset):
+        return item[()].T
+    if "ir" not in item or "jc" not in item:
+        raise Problem(f"{file}: {item.name} is a structure; expected a matrix")
+    rows = int(item.attrs["MATLAB_sparse"])
+    starts = item["jc"][()].astype(np.int64)
+    values = item["data"][()] if "data" in item else np.zeros(0)
+    indices = item["ir"][()].astype(np.int64) if "ir" in item else np.zeros(0, np.int64)
+    return sparse.csc_matrix((values, indices, starts), (rows, len(starts) - 1))
+
+
+def read_mtx(file, name):
+    """Matrix Market says so in its first line; else it is Abaqus's."""
+    with open(file, "rb") as stream:
+        if stream.read(14).lower() == b"%%matrixmarket":
+            return scipy.io.mmread(str(file))
+    return vendor.read_abaqus(file)
+
+
+READERS = {".petsc": read_petsc, ".npz": read_npz, ".npy": lambda file, name: load_numpy(file), ".mtx": read_mtx,
+           ".mat": read_matlab, ".op4": vendor.read_op4, ".pch": vendor.read_dmig, ".dmig": vendor.read_dmig,
+           ".bdf": vendor.read_dmig, ".sti": lambda file, name: vendor.read_abaqus(file), ".mas": lambda file, name: vendor.read_abaqus(file), ".hb": vendor.read_harwell_boeing, ".rsa": vendor.read_harwell_boeing,
+           ".rua": vendor.read_harwell_boeing, ".matrix": vendor.read_harwell_boeing}
+LOADS = {".mtx": lambda file, name: load_of_mtx(file), ".txt": lambda file, name: vendor.read_node_values(file),
+         ".csv": lambda file, name: vendor.read_node_values(file)}
+
+
+def load_of_mtx(file):
+    with open(file, "rb") as stream:
+        market = stream.read(14).lower() == b"%%matrixmarket"
+    return scipy.io.mmread(str(file)) if market else vendor.read_node_values(file)
+
+
+def read_array(file, name, is_load):
+    """What the file holds, by its ending: a Labelled, a sparse matrix or an array. Whatever fails names the file."""
+    readers = {**READERS, **LOADS} if is_load else READERS
+    if file.suffix.lower() not in readers:
+        raise Problem(f"{file}: unknown ending; expected one of {', '.join(sorted(readers))}")
+    if not file.is_file():
+        raise Problem(f"there is no file {file}")
+    try:
+        return readers[file.suffix.lower()](file, name)
+    except Problem:
+        raise
+    except Exception as error:  # the readers of numpy and scipy raise of every kind
+        text = re.sub(r"\s+", " ", str(error))
+        raise Problem(f"{file}: cannot be read: {'it holds Python objects' if 'pickle' in text else text}") from None

@@ -1,0 +1,188 @@
+"""Contact pairs of two nodes each: from a list, positions and a motion of the rotor to B, gap and drive.
+
+The rules are those of a scene's [[contact]]: the normal points out of the rotor, and without tangents the first one is along
+the rotor's velocity.
+"""
+
+import csv
+import re
+
+import numpy as np
+import scipy.sparse as sparse
+from deck_files import Problem, abaqus_nodes, blocks_of, cards_of, nastran_nodes, number, whole
+
+COLUMNS = ("rotor", "stator", "nx", "ny", "nz", "area", "gap")
+AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
+ROUNDING = 1e-6  # of the model's size: positions in decks have as many digits
+
+
+def read_nodes(file):
+    """Numbers and positions of nodes: of an Abaqus or Nastran deck, or `node, x, y, z` a line."""
+    ending = file.suffix.lower()
+    if ending == ".inp":
+        labels, positions = abaqus_nodes(blocks_of(file))
+    elif ending in (".bdf", ".nas", ".dat"):
+        labels, positions = nastran_nodes(cards_of(file))
+    else:
+        rows = [(place, fields) for place, fields in rows_of(file) if fields[0].lstrip("-").isdigit()]
+        for place, fields in rows:
+            if len(fields) != 4:
+                raise Problem(f"{place}: {len(fields)} values; expected a node's number and its x, y, z")
+        labels = np.array([whole(fields[0], place) for place, fields in rows], np.int64)
+        positions = np.array([[number(text, place) for text in fields[1:]] for place, fields in rows]).reshape(-1, 3)
+    if not len(labels):
+        raise Problem(f"{file}: no nodes; expected *NODE, GRID, or lines 'node, x, y, z'")
+    known = dict(zip(labels.tolist(), positions))
+    if len(known) < len(labels):
+        raise Problem(f"{file}: {len(labels) - len(known)} node(s) are there twice")
+    return known
+
+
+def rows_of(file):
+    """(place, fields) of the lines of a text with commas or blanks; what follows a # is left out."""
+    with open(file, encoding="utf-8", errors="replace", newline="") as stream:
+        for n, line in enumerate(stream, 1):
+            line = line.split("#")[0].strip()
+            fields = next(csv.reader([line])) if "," in line else line.split()
+            if fields:
+                yield f"{file}, line {n}", [field.strip() for field in fields]
+
+
+def read_pairs(file):
+    """(place, values by the names of COLUMNS) of every pair. A first line of names says which columns there are; without it
+    they are rotor, stator, then the normal, then the area, then the gap."""
+    pairs, columns = [], None
+    for place, fields in rows_of(file):
+        if columns is None:
+            named = not re.fullmatch(r"[-+]?\d+", fields[0])
+            columns = [name.lower() for name in fields] if named else list(COLUMNS[: len(fields)])
+            normals = {"nx", "ny", "nz"} & set(columns)
+            if set(columns) - set(COLUMNS) or columns[:2] != ["rotor", "stator"] or len(normals) not in (0, 3):
+                raise Problem(f"{place}: columns {', '.join(columns)}: expected rotor, stator[, nx, ny, nz][, area][, gap]")
+            if named:
+                continue
+        if len(fields) != len(columns):
+            raise Problem(f"{place}: {len(fields)} values; expected {len(columns)}: {', '.join(columns)}")
+        pair = {name: whole(text, place, "a node's number") if name in COLUMNS[:2] else number(text, place)
+                for name, text in zip(columns, fields)}
+        if pair["rotor"] == pair["stator"]:
+            raise Problem(f"{place}: node {pair['rotor']} is in contact with itself")
+        if pair.get("area", 1) <= 0:
+            raise Problem(f"{place}: area {pair['area']}: expected a positive number")
+        pairs.append((place, pair))
+    if not pairs:
+        raise Problem(f"{file}: no pairs; expected lines 'rotor node, stator node'")
+    return pairs
+
+
+def direction_of(value, place):
+    """Unit vector of "x", "y", "z" or three numbers."""
+    vector = np.array(AXES.get(value, value) if isinstance(value, str) else value, float) \
+        if not isinstance(value, str) or value in AXES else None
+    if vector is None or vector.shape != (3,) or not np.linalg.norm(vector) > 0:
+        raise Problem(f"{place} = {value}: expected \"x\", \"y\", \"z\" or a vector of three numbers")
+    return vector / np.linalg.norm(vector)
+
+
+def velocity_at(contact, position, place):
+    """Velocity of the rotor's surface [m/s]."""
+    if "rotation" in contact:
+        rotation = contact["rotation"]
+        axis = direction_of(rotation.get("axis"), f"{place} rotation.axis")
+        return float(rotation.get("rate", 0)) * np.cross(axis, position - np.array(rotation.get("centre", (0, 0, 0)), float))
+    return np.array(contact.get("velocity", (0, 0, 0)), float)
+
+
+def tangents_at(contact, normal, velocity, place):
+    """One or two unit vectors square to the normal."""
+    wanted = contact.get("tangents", [])
+    wanted = [direction_of(t, f"{place} tangents") for t in ([wanted] if isinstance(wanted, str) else wanted)]
+    given = len(wanted)
+    if not wanted:
+        axis = np.eye(3)[np.argmin(abs(normal))]
+        wanted = [velocity if np.linalg.norm(square(velocity, normal)) > 0 else axis]
+    first = square(wanted[0], normal)
+    if not np.linalg.norm(first) > 0:
+        raise Problem(f"{place}: the first tangent is along the normal")
+    first /= np.linalg.norm(first)
+    second = np.cross(normal, first)
+    if given == 2 and wanted[1] @ second < 0:
+        second = -second
+    return [first] if given == 1 else [first, second]
+
+
+def square(vector, normal):
+    """The part square to the normal; zero when only rounding is left."""
+    part = vector - (vector @ normal) * normal
+    return part if np.linalg.norm(part) > 1e-12 * np.linalg.norm(vector) else np.zeros(3)
+
+
+class Side:
+    """What a node's displacement is on the rows of the matrices."""
+
+    def __init__(self, labels, nodes):
+        self.rows = {(int(node), int(dof)): row for row, (node, dof) in enumerate(labels)}
+        self.known = {int(node) for node in labels[:, 0]}
+        self.nodes = nodes
+
+    def position(self, node, place):
+        if node not in self.nodes:
+            raise Problem(f"{place}: node {node} has no position")
+        return self.nodes[node]
+
+    def entries(self, node, direction, place):
+        """(row, coefficient) of direction . u(node); what supports hold has none."""
+        if node not in self.known and node not in self.nodes:
+            raise Problem(f"{place}: node {node} is neither in the matrices nor among the nodes")
+        found = [(self.rows.get((node, dof + 1)), direction[dof]) for dof in range(3)]
+        return [(row, factor) for row, factor in found if row is not None and factor != 0]
+
+
+def normal_of(contact, pair, arm, size, place):
+    if "nx" in pair:
+        return direction_of([pair["nx"], pair["ny"], pair["nz"]], f"{place}: the normal")
+    if "normal" in contact:
+        return direction_of(contact["normal"], "[[contact]] normal")
+    if np.linalg.norm(arm) <= ROUNDING * size:
+        raise Problem(f"{place}: nodes {pair['rotor']} and {pair['stator']} coincide: expected a normal, out of the rotor, as "
+                      "columns nx, ny, nz or as the contact's key 'normal'")
+    return arm / np.linalg.norm(arm)
+
+
+def make_pairs(contacts, labels, nodes, unit):
+    """B, gap and drive of the contacts; nodes: positions [m] by number; unit: of the gaps in the lists [m]."""
+    rows, columns, values, gaps, drive, count = [], [], [], [], [], None
+    side = Side(labels, nodes)
+    positions = np.array(list(nodes.values()))
+    size = np.linalg.norm(np.ptp(positions, axis=0))
+    row = 0
+    for contact, pairs in contacts:
+        for place, pair in pairs:
+            ends = [side.position(pair[name], place) for name in ("rotor", "stator")]
+            arm = ends[1] - ends[0]
+            normal = normal_of(contact, pair, arm, size, place)
+            gap = pair["gap"] * unit if "gap" in pair else arm @ normal
+            if "gap" not in pair and abs(gap) <= ROUNDING * size:
+                gap = 0.0
+            if gap < 0 and "gap" not in pair:
+                raise Problem(f"{place}: node {pair['stator']} is {-gap:.3g} m inside the rotor: turn the normal, which points "
+                              "out of the rotor, or give the column gap")
+            velocity = square(velocity_at(contact, ends[0], "[[contact]]"), normal)
+            tangents = tangents_at(contact, normal, velocity, "[[contact]]")
+            if count is None:
+                count = len(tangents)
+            if len(tangents) != count:
+                raise Problem("[[contact]] tangents: one contact has one, another two; give all as many")
+            for axis in [normal, *tangents]:
+                for node, sign in ((pair["stator"], 1), (pair["rotor"], -1)):
+                    for column, factor in side.entries(node, axis, place):
+                        rows.append(row)
+                        columns.append(column)
+                        values.append(sign * factor)
+                if axis is normal and (not rows or rows[-1] != row):
+                    raise Problem(f"{place}: neither node can move along the normal: take the pair out of the list")
+                row += 1
+            gaps.append(gap)
+            drive += [velocity @ axis for axis in tangents]
+    B = sparse.csr_matrix((values, (rows, columns)), (row, len(labels)))
+    return {"B": B, "gap": np.array(gaps), "drive": np.array(drive)}
