@@ -7,7 +7,7 @@ import common
 
 common.needs("h5py", "matplotlib", "numpy")
 import h5py
-from common import read_report
+import squeal
 
 ROOT = common.ROOT
 OSCILLATOR = ROOT / "inputs" / "oscillator" / "scene.toml"
@@ -20,7 +20,7 @@ class Run:
 
     def __init__(self, folder, code):
         self.folder, self.code = folder, code
-        self.report = read_report(folder)
+        self.report = squeal.read_report(folder)
 
     def __getitem__(self, stage):
         return self.report[stage]
@@ -38,7 +38,7 @@ def run(results, scene, *arguments, **values):
     code = folder / "exit_code"
     if not code.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        code.write_text(str(common.run_squeal(scene, folder, values, arguments)[0]))
+        code.write_text(str(squeal.run(scene, values, options=arguments, output=folder).exit_code))
     return Run(folder, int(code.read_text()))
 
 

@@ -3,8 +3,8 @@
 import json
 import sys
 
-import common
-from common import read_report
+import squeal
+from squeal import read_report
 
 CYCLES = ("converged", "not converged")  # outcomes that have a cycle
 
@@ -104,12 +104,15 @@ class Runs:
         place.mkdir(parents=True, exist_ok=True)
         note.write_text(command)
         print(f"chart: {name}", end=" ", flush=True)
-        done = common.run_squeal(self.a.scene, place, settings, [*self.a.options, *words], self.a.ranks, self.a.limit)
+        try:
+            done = squeal.run(self.a.scene, settings, self.a.ranks, [*self.a.options, *words], place, self.a.limit)
+        except squeal.TookTooLong:
+            done = None
         for file in place.glob("fields.*"):
             file.unlink()  # large, and not drawn
         if done is None:
             (place / "stopped_after").write_text(str(self.a.limit))
-        stages = done[1]["processor_seconds"] if done else {}
+        stages = done.report["processor_seconds"] if done else {}
         print(", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in stages.items() if seconds > 0.05)
               if done else f"stopped after {self.a.limit:g} s", flush=True)
 

@@ -1,10 +1,8 @@
-"""What the Python tools share: a python that has their modules, runs of squeal, the style of the pictures, files in
-PETSc's binary format."""
+"""What the Python tools share: a python that has their modules, the style of the pictures, errors, files in PETSc's
+binary format."""
 
 import importlib.util
-import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,8 +11,16 @@ ROOT = Path(__file__).resolve().parent.parent
 BUILT, INSTALLED = ROOT / "build" / "squeal", ROOT.parent.parent / "bin" / "squeal"
 PROGRAM = Path(os.environ.get("SQUEAL", BUILT if (ROOT / "CMakeLists.txt").exists() else INSTALLED)).resolve()
 DEBIAN = "/usr/bin/python3"
+ENVIRONMENT = Path(os.environ.get("SQUEAL_PYTHON", ROOT / "build" / "python"))  # made by tools/setup
 MATRIX_ID, VECTOR_ID = 1211216, 1211214  # PETSc's class numbers, MAT_FILE_CLASSID and VEC_FILE_CLASSID
 BLUE, RED, ORANGE, GREEN, GREY = "#1b6ca8", "#c0272d", "#d95f02", "#2e8b57", "#8a8a8a"
+
+
+def use_environment():
+    """Starts the tool again in the python of the build folder, which has PyVista beside Debian's modules, if it is there."""
+    python = ENVIRONMENT / "bin" / "python"
+    if python.exists() and Path(sys.prefix).resolve() != ENVIRONMENT.resolve():
+        os.execv(python, [str(python), *sys.argv])
 
 
 def needs(*modules):
@@ -43,10 +49,16 @@ def pyplot(dpi=110, font_size=10):
 
 def save_small(figure, file):
     """As a PNG of 256 colours: a third of the size."""
+    save_picture(figure, file, figure.dpi)
+
+
+def save_picture(figure, file, dpi):
+    """In the format of the file's ending; a PNG has 256 colours: a third of the size."""
     from PIL import Image  # matplotlib's own dependency
 
-    figure.savefig(file)
-    Image.open(file).convert("RGB").quantize(256).save(file, optimize=True)
+    figure.savefig(file, dpi=dpi)
+    if Path(file).suffix == ".png":
+        Image.open(file).convert("RGB").quantize(256).save(file, optimize=True)
 
 
 def arguments_and_options():
@@ -56,51 +68,16 @@ def arguments_and_options():
     return words[:cut], words[cut + 1 :]
 
 
-FORMAT_VERSION = 1  # of report.json and the HDF5 files, the latest these tools read
+class SquealError(Exception):
+    """What went wrong, in a sentence."""
 
 
-def read_report(folder):
-    """report.json of a results folder; stops with a sentence where these tools cannot read it, or other files are of
-    another run."""
-    folder = Path(folder)
-    file = folder / "report.json"
-    if not file.exists():
-        sys.exit(f"{TOOL}: {folder} has no report.json: the run goes on, or was killed; what it has is in {folder}.partial")
-    report = json.loads(file.read_text())
-    if report.get("format_version", 0) > FORMAT_VERSION:
-        sys.exit(f"{TOOL}: {file} has format_version {report['format_version']}, these tools read up to {FORMAT_VERSION}: "
-                 "take the tools of the squeal that wrote it")
-    for name in ("history.h5", "fields.h5", "fields.xdmf", "resolved.toml", "options.txt"):
-        if (folder / name).exists() and "run" in report and report["run"].encode() not in head_of(folder / name):
-            sys.exit(f"{TOOL}: {file} is of the run {report['run']}, and {name} beside it is of another one: "
-                     "run squeal again, or copy all files of one run")
-    return report
-
-
-def head_of(file):
-    """The first bytes of a file, where the identity of its run stands."""
-    with open(file, "rb") as content:
-        return content.read(65536)
-
-
-def run_squeal(scene, output, values, words=(), ranks=1, limit=None):
-    """Exit code and report of a run; values: of the scene's keys. None: it took more than `limit` seconds.
-
-    Bad input ends the tool with squeal's own words.
-    """
-    if not PROGRAM.exists():
-        sys.exit(f"{TOOL}: {PROGRAM} is missing: tools/build makes it, or say where it is by SQUEAL=FILE")
-    command = [*(["mpirun", "-n", ranks] if ranks > 1 else []), PROGRAM, scene, *words, "--output", output]
-    for key, value in values.items():
-        command += ["--set", f"{key}={value}"]
-    command = [str(word) for word in command]
+def tool(main):
+    """Runs a tool's main function; a SquealError ends it with that sentence."""
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=limit)
-    except subprocess.TimeoutExpired:
-        return None
-    if done.returncode not in (0, 2):
-        sys.exit(f"{TOOL}: {' '.join(command)}\n{done.stderr.strip()}")
-    return done.returncode, read_report(output)
+        main()
+    except SquealError as error:
+        sys.exit(f"{TOOL}: {error}")
 
 
 def petsc_bytes(array):

@@ -200,6 +200,8 @@ OptionList options_of(ModesOptions& options)
        "of larger problems: slices of frequency, or TOAR around zero (toar)"},
       {"-modes_candidates", &options.candidates, Range::not_negative,
        "pairs that each residual pass of the projection corrects"},
+      {"-modes_shapes", choice_of(options.shapes), Range::any,
+       "modes whose shapes the fields file holds: the unstable ones or all"},
   };
 }
 
@@ -214,6 +216,7 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
   Modes modes;
   modes.method = settings.method;
   modes.band = settings.band;
+  modes.shapes = options.shapes;
   PetscInt free = 0;
   check(MatGetSize(linearised.K_z, &free, nullptr));
   if (free == 0)

@@ -261,10 +261,11 @@ void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Mode
   int number = 0;
   for (const ComplexMode& mode : modes.modes)
   {
-    if (!is_unstable(mode.lambda)) continue;
+    const bool grows = is_unstable(mode.lambda);
+    if (!grows && modes.shapes == ModeShapes::unstable) continue;
     const std::string data = "modes/" + std::to_string(++number) + "/";
     std::ostringstream name;
-    name << "unstable mode " << number << ", " << std::lround(mode.frequency_hz()) << " Hz, ";
+    name << (grows ? "unstable mode " : "mode ") << number << ", " << std::lround(mode.frequency_hz()) << " Hz, ";
     write_displacement(file, gather, mode.real, data + "real", comm);
     write_displacement(file, gather, mode.imaginary, data + "imaginary", comm);
     layout.still.push_back({name.str() + "real part", data + "real", "Node", 3});

@@ -44,3 +44,10 @@ def test_a_signal_ends_a_job_and_the_next_start_goes_on(tmp_path):
     report = json.loads((tmp_path / "estimate" / "report.json").read_text())
     assert report["exit_code"] == 3 and (tmp_path / "estimate" / "checkpoint").exists()
     assert not (tmp_path / "mode").exists()
+
+
+def test_the_study_in_python_runs(tmp_path):
+    run = subprocess.run([ROOT / "jobs" / "study.py"], cwd=tmp_path, capture_output=True, text=True, timeout=200)
+    assert run.returncode == 0, run.stderr
+    assert "friction 0.3: mode 1" in run.stdout and "1.000 alike" in run.stdout  # of the mode with itself
+    assert (tmp_path / "results" / "study" / "study.png").stat().st_size > 10000

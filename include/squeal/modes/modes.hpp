@@ -44,12 +44,27 @@ struct ModeCount
   int expected = 0, found = 0; // pairs below it
 };
 
+/// Modes whose shapes the fields file holds.
+enum class ModeShapes
+{
+  unstable,
+  all,
+};
+
+inline constexpr std::array mode_shapes_words = {"unstable", "all"};
+
+inline Words words_of(ModeShapes)
+{
+  return mode_shapes_words;
+}
+
 /// outcome: "converged", "not converged" (fewer than expected, or backward errors above 1e-8), "skipped".
 /// residual: the largest backward error reported.
 struct Modes
 {
   Outcome outcome;
   ModesMethod method = ModesMethod::both;
+  ModeShapes shapes = ModeShapes::unstable;
   double band = 0;                    // [Hz] covered: every mode below is here
   std::vector<ComplexMode> modes;     // Im(lambda) >= 0, unstable ones first, then by growth
   std::vector<ComplexMode> projected; // the other route's, when both ran
@@ -84,7 +99,8 @@ struct ModesOptions
   PetscInt dense_limit = 400; // up to this size eigenproblems are solved whole by LAPACK
   ModesSolver solver = ModesSolver::slices;
   PetscInt candidates = 20; // pairs that each residual pass of the projection corrects
-  PencilOptions pencil{};   // listed by itself
+  ModeShapes shapes = ModeShapes::unstable;
+  PencilOptions pencil{}; // listed by itself
 };
 
 OptionList options_of(ModesOptions& options);

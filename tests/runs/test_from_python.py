@@ -1,0 +1,86 @@
+"""tools/squeal.py: runs started from Python, and what their results hand over as arrays and tables."""
+
+import os
+import sys
+
+import numpy as np
+import pytest
+from conftest import INPUTS, ROOT
+
+sys.path.insert(0, str(ROOT / "tools"))
+import squeal  # noqa: E402
+
+COARSE = {"mesh.parameters.divisions": 2, "damping.beta": 6e-7, "cycle.steps_per_period": 40, "modes.method": "full"}
+
+
+@pytest.fixture(scope="module")
+def pin(tmp_path_factory):
+    return squeal.run(INPUTS / "pin_on_disc", COARSE | {"force.0.vector": [0, 0, -120], "cycle.enabled": True}, ranks=2,
+                      options=["-modes_shapes", "all", "-cycle_multipliers", "0", "-cycle_samples", "8"],
+                      output=tmp_path_factory.mktemp("pin"))
+
+
+def test_overrides_reach_the_run(pin):
+    assert pin.exit_code == 0 and pin.report["model"]["ranks"] == 2
+    assert pin.report["cycle"]["steps_per_period"] == 40
+    # the holder's spring takes none of the load while it does not move, and little of it then
+    assert 110 < pin.report["equilibrium"]["normal_force_sum"] <= 120
+
+
+def test_shapes_of_all_modes(pin):
+    modes = pin.modes()
+    assert pin.mode_numbers() == list(range(1, len(modes) + 1)) and len(modes) > 20
+    assert sum(modes["unstable"]) == pin.report["modes"]["unstable_count"] < len(modes)
+    for number in pin.mode_numbers():
+        shape = pin.shape(number)
+        assert shape.shape == pin.nodes.shape
+        # The largest entry of a mode is 1; of several within 1e-6 of the largest it is the first that is 1.
+        assert np.abs(shape).max() == pytest.approx(1, abs=1.1e-6)
+    with pytest.raises(squeal.Missing):
+        pin.shape(len(modes) + 1)
+
+
+def test_the_pairs_carry_the_load(pin):
+    pairs, equilibrium = pin.pairs(), pin.report["equilibrium"]
+    assert len(pairs) == pin.report["model"]["pairs"]
+    total = equilibrium["normal_force_sum"]
+    assert sum(pairs["normal_reaction"]) == pytest.approx(total, rel=1e-12)
+    assert np.dot(pairs["pressure"], pairs["area"]) == pytest.approx(total, rel=1e-12)
+    friction = np.hypot(pairs["friction_1"], pairs["friction_2"])
+    assert friction == pytest.approx(0.3 * np.array(pairs["normal_reaction"]), rel=1e-9)  # all slide
+
+
+def test_the_motion_is_that_of_the_probes(pin):
+    time, motion = pin.motion()
+    assert motion.shape == (8, len(pin.nodes), 3)
+    probe, steps = pin.probes("cycle")["pin"], pin.series("cycle", "time")
+    at = [int(np.abs(steps - t).argmin()) for t in time]
+    assert steps[at] == pytest.approx(time, rel=1e-12)
+    face = {node for node in pin.pairs()["node"]}
+    node = min(face, key=lambda k: np.linalg.norm(pin.nodes[k] - (0.09, 0, 0)))
+    assert motion[:, node, 1] == pytest.approx(probe[at], rel=1e-12)
+    assert len(pin.iterations()) == len(pin.report["cycle"]["newton"])
+
+
+def test_errors_are_sentences(tmp_path):
+    with pytest.raises(squeal.SquealError, match="coeficient.*did you mean"):
+        squeal.run(INPUTS / "oscillator", {"friction.coeficient": 0.3}, output=tmp_path / "a")
+    with pytest.raises(squeal.TookTooLong):
+        squeal.run(INPUTS / "pin_on_disc", limit=0.01, output=tmp_path / "b")
+    with pytest.raises(squeal.SquealError, match="no report.json"):
+        squeal.Results(tmp_path)
+    stable = squeal.run(INPUTS / "oscillator", {"friction.coefficient": 0}, output=tmp_path / "c")
+    with pytest.raises(squeal.Missing, match="cycle skipped"):
+        stable.iterations()
+
+
+def test_tables_without_pandas(tmp_path):
+    table = squeal.Table({"a": [1, 2], "b": ["x", "y"]})
+    table.to_csv(tmp_path / "t.csv", index=False)
+    assert (tmp_path / "t.csv").read_text() == "a,b\n1,x\n2,y\n"
+    assert len(table) == 2 and list(table["a"]) == [1, 2] and str(table).split() == ["a", "b", "1", "x", "2", "y"]
+
+
+def test_settings_of_the_environment_are_those_of_the_tools():
+    settings = squeal.environment()
+    assert settings["OMPI_ALLOW_RUN_AS_ROOT"] == "1" and settings["PATH"] == os.environ["PATH"]

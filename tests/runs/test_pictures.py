@@ -1,0 +1,152 @@
+"""tools/plot: its measures on motions known in closed form, its maps and labels, its formats, several runs at once."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import INPUTS, ROOT
+
+sys.path.insert(0, str(ROOT / "tools"))
+import plot_basis  # noqa: E402
+import plot_spectra  # noqa: E402
+import surface  # noqa: E402
+from matplotlib.text import Text  # noqa: E402
+
+
+def plot(*words):
+    done = subprocess.run([sys.executable, ROOT / "tools" / "plot", *map(str, words)], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_levels_of_a_sampled_cycle():
+    """An amplitude of 1 mm/s is 117.0 dB re 1 nm/s; the mean and the phase do not count."""
+    period, n = 0.4e-3, 64
+    time = np.arange(n) * period / n
+    speeds = {1: 1e-3, 3: 2e-5}
+    values = 5e-6 + sum(v * period / (2 * np.pi * k) * np.cos(2 * np.pi * k * time / period + k) for k, v in speeds.items())
+    frequency, amplitude = plot_spectra.harmonics(values, period)
+    assert frequency[:3] == pytest.approx([2500, 5000, 7500], rel=1e-12)
+    for k, v in speeds.items():
+        assert abs(amplitude[k - 1]) == pytest.approx(v, rel=1e-9)
+    assert plot_spectra.decibel(amplitude[0]) == pytest.approx(20 * np.log10(1e-3 / np.sqrt(2) / 1e-9), abs=1e-6)
+    assert np.abs(amplitude[[1, *range(3, len(amplitude))]]).max() < 1e-12
+
+
+def test_a_windowed_spectrum_and_a_spectrogram_find_the_line():
+    step, f = 1e-5, 3150.0
+    time = step * np.arange(8000)
+    values = 3 + 1e-6 * np.sin(2 * np.pi * f * time)
+    frequency, amplitude = plot_spectra.windowed(values, step)
+    at = amplitude.argmax()
+    assert frequency[at] == pytest.approx(f, abs=1 / (8000 * step))
+    # f lies on a point of the spectrum, so that the Hann window keeps the amplitude
+    assert amplitude[at] == pytest.approx(2 * np.pi * f * 1e-6, rel=1e-3)
+    _, frequency, power = plot_spectra.framed(values, step, 1 / f)
+    assert frequency[power.argmax(axis=1)] == pytest.approx(f, rel=0.03)  # ten periods resolve a tenth; padded four times
+
+
+def test_labels_keep_apart():
+    """Places at least a gap apart, in order, within the axes while there is room; far ones stay where they are."""
+    random = np.random.default_rng(1)
+    for _ in range(200):
+        places = np.sort(random.uniform(0.4, 0.6, random.integers(1, 13)))
+        spread = plot_basis.spread(places, 0.06)
+        assert (np.diff(spread) >= 0.06 - 1e-12).all()
+        assert spread[0] >= 0 and spread[-1] <= 1 + 1e-12
+    assert plot_basis.spread([0.1, 0.5, 0.9], 0.06) == pytest.approx([0.1, 0.5, 0.9])
+
+
+def test_labels_of_many_modes_do_not_overlap():
+    """Twelve modes nearly on one point: no two texts share a pixel."""
+    figure, axes = plot_basis.plt.subplots(figsize=(9, 4.8))
+    axes.plot([0, 10], [-5, 5])
+    plot_basis.label_column(axes, [(4 + 0.01 * k, 2 + 0.001 * k) for k in range(12)], [f"{k}: 3197.8 Hz, +12.6 1/s" for k in range(12)])
+    figure.canvas.draw()
+    boxes = sorted((Text.get_window_extent(text) for text in axes.texts), key=lambda box: box.y0)
+    assert len(boxes) == 12
+    assert all(below.y1 <= above.y0 for below, above in zip(boxes, boxes[1:]))
+
+
+# One element of each kind, its nodes in VTK's order: corners of the unit cube, wedge and tetrahedron, then middles.
+CUBE = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)], float)
+WEDGE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)], float)
+TETRA = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
+
+
+def with_middles(corners, edges):
+    return np.concatenate([corners, [(corners[a] + corners[b]) / 2 for a, b in edges]])
+
+
+@pytest.mark.parametrize("code, nodes, faces, volume, area", [
+    (9, CUBE, 6, 1, 6), (48, with_middles(CUBE, surface.HEX_EDGES), 6, 1, 6), (8, WEDGE, 5, 0.5, 3 + np.sqrt(2)),
+    (6, TETRA, 4, 1 / 6, 1.5 + np.sqrt(3) / 2), (38, with_middles(TETRA, surface.TETRA_EDGES), 4, 1 / 6, 1.5 + np.sqrt(3) / 2)])
+def test_the_surface_of_one_element(code, nodes, faces, volume, area):
+    """Outward faces enclose its volume (Gauss), and the parts of its nodes are its area."""
+    solid, shells = surface.faces(np.array([code, *range(len(nodes))]))
+    assert len(solid) == faces and not shells
+    parts = [triangle for rim in solid for triangle in surface.triangles(nodes[rim])]
+    normals = np.array([np.cross(b - a, c - a) / 2 for a, b, c in parts])
+    assert sum((np.mean(part, axis=0) @ normal) / 3 for part, normal in zip(parts, normals)) == pytest.approx(volume)
+    cells = [triangle for rim in solid for cell in surface.node_cells(rim, nodes) for triangle in surface.triangles(cell)]
+    assert sum(np.linalg.norm(np.cross(b - a, c - a)) / 2 for a, b, c in cells) == pytest.approx(area)
+
+
+def test_elements_that_touch_share_no_outer_face():
+    shifted = list(range(4, 8)) + list(range(8, 12))
+    solid, _ = surface.faces(np.array([9, *range(8), 9, *shifted, 1, 1, 3]))  # two cubes and a point
+    assert len(solid) == 10
+
+
+@pytest.fixture(scope="module")
+def pins(tmp_path_factory):
+    import squeal
+
+    coarse = {"mesh.parameters.divisions": 2, "damping.beta": 6e-7, "cycle.steps_per_period": 40, "modes.method": "full"}
+    return [squeal.run(INPUTS / "pin_on_disc", coarse | {"friction.coefficient": mu}, options=["-cycle_multipliers", "0"],
+                       output=tmp_path_factory.mktemp(f"mu{mu}")).folder for mu in (0.3, 0.32)]
+
+
+def test_formats_and_dots(pins, tmp_path):
+    plot(pins[0], "--output", tmp_path, "--format", "pdf", "svg", "png", "--dpi", "50", "--only", "modes", "contact", "pressure")
+    for name in ("modes", "contact", "pressure"):
+        assert (tmp_path / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+        assert b"<svg" in (tmp_path / f"{name}.svg").read_bytes()[:2000]
+        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    from PIL import Image
+
+    assert Image.open(tmp_path / "modes.png").width == 50 * 9  # inches
+
+
+def test_several_runs_are_compared(pins, tmp_path):
+    printed = plot(*pins, "--output", tmp_path, "--only", "modes", "estimate", "spectrum", "cycle", "powers", "pressure",
+                   "liftoff", "newton")
+    names = {file.name for file in tmp_path.iterdir()}
+    assert names == {f"compare_{name}.png" for name in ("modes", "estimate", "spectrum", "cycle", "powers", "pressure", "liftoff",
+                                                        "newton")}, printed
+
+
+def test_3d_pictures_or_a_word(pins, tmp_path):
+    printed = plot(pins[0], "--output", tmp_path, "--only", "shape", "animation")
+    if "need PyVista" in printed:
+        assert not list(tmp_path.iterdir())
+        return
+    from PIL import Image
+
+    animation = Image.open(tmp_path / "animation.gif")
+    assert animation.n_frames == 24
+    frames = []
+    for k in (0, 6, 12):
+        animation.seek(k)
+        frames.append(np.asarray(animation.convert("RGB"), float))
+    assert np.abs(frames[0] - frames[2]).max() > 50  # it moves
+    shape = np.asarray(Image.open(tmp_path / "shape.png").convert("RGB"), float)
+    red = (shape[:, :, 0] > 1.8 * shape[:, :, 1]) & (shape[:, :, 0] > 100)
+    assert red.mean() > 0.005  # something is drawn as moving
+
+
+def test_without_pyvista_a_word_says_so(pins, tmp_path, monkeypatch):
+    monkeypatch.setenv("SQUEAL_PYTHON", str(tmp_path / "none"))
+    printed = plot(pins[0], "--output", tmp_path, "--only", "shape", "modes")
+    assert "shape left out: 3D pictures need PyVista" in printed and (tmp_path / "modes.png").exists()

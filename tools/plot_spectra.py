@@ -1,0 +1,143 @@
+"""Spectra of the probes' velocities, and spectrograms of one of them or of the energy."""
+
+import numpy as np
+from plot_basis import colour, frequency_unit, heading, label_of, plt, strongest, those_with
+from squeal import Missing
+
+REFERENCE = 1e-9  # [m/s], of velocity levels by ISO 1683
+FLOOR = 90  # [dB] below the largest
+
+
+def decibel(amplitude):
+    """Level of an amplitude of velocity, by its root mean square."""
+    return 20 * np.log10(np.maximum(np.abs(amplitude) / np.sqrt(2), 1e-300) / REFERENCE)
+
+
+def harmonics(values, period):
+    """Frequencies [Hz] and complex amplitudes of velocity of a displacement over one period; the mean is left out."""
+    count = (len(values) - 1) // 2
+    frequency = np.arange(1, count + 1) / period
+    amplitude = 2 * np.fft.rfft(values)[1 : count + 1] / len(values)
+    return frequency, 2j * np.pi * frequency * amplitude
+
+
+def windowed(values, step):
+    """Frequencies [Hz] and amplitudes of velocity of a displacement under a Hann window."""
+    window = np.hanning(len(values))
+    amplitude = 2 * np.abs(np.fft.rfft((values - values.mean()) * window)) / window.sum()
+    frequency = np.fft.rfftfreq(len(values), step)
+    return frequency, 2 * np.pi * frequency * amplitude
+
+
+def record_of(run, name):
+    """Displacements of the probes in time and the step [s] of a run's transient or settled motion."""
+    time = run.series(name, "time")
+    if len(time) < 32:
+        raise Missing(f"the {name} is too short for a spectrum")
+    probes = run.probes(name)
+    if not probes:
+        raise Missing("the scene has no probes")
+    return probes, (time[-1] - time[0]) / (len(time) - 1)
+
+
+def spectra_of(run):
+    """What is drawn of a run: a title, and of each probe its frequencies, amplitudes and whether these are lines."""
+    try:
+        cycle = run.stage("cycle")
+        probes = run.probes("cycle")
+        if not probes:
+            raise Missing("the scene has no probes")
+        run.series("cycle", "time")
+        return (f"limit cycle, harmonics of {cycle['frequency_hz']:.6g} Hz",
+                {name: (*harmonics(values, cycle["period"]), True) for name, values in probes.items()})
+    except Missing:
+        pass
+    for name in ("settled", "transient"):
+        try:
+            run.stage(name)
+            probes, step = record_of(run, name)
+        except Missing:
+            continue
+        half = len(next(iter(probes.values()))) // 2
+        words = "settled motion" if name == "settled" else "second half of the transient"
+        return words, {probe: (*windowed(values[-half:], step), False) for probe, values in probes.items()}
+    raise Missing("the run has no motion with probes in time")
+
+
+def draw_spectrum(runs):
+    found = those_with(runs, spectra_of)
+    figure, axes = plt.subplots(figsize=(8.5, 4.8))
+    lines = [(run, name, *of) for run, (_, probes) in found for name, of in list(probes.items())[:6]]
+    top = max(decibel(amplitude).max() for _, _, _, amplitude, _ in lines)
+    last = max(frequency[decibel(amplitude) > top - FLOOR].max(initial=0) for _, _, frequency, amplitude, _ in lines)
+    last = min(last, 25 * min(run.followed_frequency() for run, _ in found))
+    last = max(last, 1.5 * min(frequency[frequency > 0].min() for _, _, frequency, _, _ in lines))
+    size, unit = frequency_unit(last)
+    for k, (run, name, frequency, amplitude, is_lines) in enumerate(lines):
+        shown = (frequency <= 1.02 * last) & (frequency > 0)
+        level = decibel(amplitude[shown])
+        if is_lines:  # probes side by side at each harmonic
+            beside = frequency[shown] / size + (k - (len(lines) - 1) / 2) * 0.09 / max(len(lines) - 1, 1) * frequency[0] / size * 2
+            axes.vlines(beside, top - FLOOR, np.maximum(level, top - FLOOR), color=colour(k), lw=1.6, alpha=0.7)
+            seen = level > top - FLOOR
+            axes.plot(beside[seen], level[seen], "o", ms=4, color=colour(k), label=label_of(run, runs, name))
+        else:
+            axes.plot(frequency[shown] / size, level, color=colour(k), lw=1, label=label_of(run, runs, name))
+    axes.set(xlabel=f"frequency [{unit}]", ylabel="level of velocity [dB re 1 nm/s]", ylim=(top - FLOOR, top + 5),
+             title=heading(runs, found[0][1][0] if len(found) == 1 else "spectra of the probes' velocities"))
+    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+    return figure
+
+
+def framed(values, step, period):
+    """Times [s], frequencies [Hz] and power of frames of ten periods at most, as (time, frequency)."""
+    length = len(values) * step / period
+    if length < 8:
+        raise Missing(f"a record of {length:.1f} periods is too short for a spectrogram")
+    window = round(min(10, length / 4) * period / step)  # resolves a tenth of the frequency at best
+    hop = max(1, (len(values) - window) // 400)
+    starts = np.arange(0, len(values) - window + 1, hop)
+    frames = np.stack([values[k : k + window] for k in starts])
+    frames = (frames - frames.mean(axis=1, keepdims=True)) * np.hanning(window)
+    power = np.abs(np.fft.rfft(frames, 4 * window, axis=1)) ** 2  # padded: a smooth picture
+    return starts * step + window * step / 2, np.fft.rfftfreq(4 * window, step), power
+
+
+def spectrogram_of(run, of):
+    """Times, frequencies, powers and what they are of. of: "probe" (that which swings most), "energy" or a probe's name."""
+    period = run.followed_period()
+    for name in ("transient", "settled"):
+        try:
+            run.stage(name)
+            time = run.series(name, "time")
+            break
+        except Missing as reason:
+            last = reason
+    else:
+        raise last
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    if of == "energy":
+        values, words = run.series(name, "energy"), "mechanical energy (quadratic: twice the motion's frequencies)"
+    else:
+        probes = run.probes(name)
+        if of != "probe" and of not in probes:
+            raise Missing(f"there is no probe {of}: {', '.join(probes) or 'the scene has none'}")
+        probe, values = strongest(probes) if of == "probe" else (of, probes[of])
+        values, words = np.gradient(values, step), f"velocity of {probe}"
+    return *framed(values, step, period), period, words
+
+
+def draw_spectrogram(runs, of):
+    found = those_with(runs, lambda run: spectrogram_of(run, of))
+    figure, panels = plt.subplots(len(found), 1, figsize=(8, 0.8 + 4 * len(found)), squeeze=False)
+    for axes, (run, (time, frequency, power, period, words)) in zip(panels.flat, found):
+        shown = frequency <= min(10 / period, frequency[-1])
+        level = 10 * np.log10(np.maximum(power[:, shown] / power[:, shown].max(), 1e-30))
+        size, unit = frequency_unit(frequency[shown].max())
+        image = axes.pcolormesh(time, frequency[shown] / size, level.T, vmin=-FLOOR, vmax=0, shading="auto", cmap="magma",
+                                rasterized=True)
+        axes.grid(False)
+        figure.colorbar(image, ax=axes, label="dB of the largest")
+        axes.set(xlabel="time [s]", ylabel=f"frequency [{unit}]", title=label_of(run, runs, words) if len(found) > 1 else
+                 heading([run], f"spectrogram, {words}"))
+    return figure
