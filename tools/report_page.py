@@ -1,0 +1,204 @@
+"""The page of tools/report, put together from what runs found: text, tables and pictures as one HTML document."""
+
+import base64
+import html
+import io
+import tempfile
+from pathlib import Path
+
+import common
+import numpy as np
+from PIL import Image
+from plot_all import ANIMATION, FIGURES, figures
+from plot_basis import length_unit
+from plot_shape import animate
+from report_style import STYLE
+from squeal import Missing
+
+STAGES = ("equilibrium", "modes", "estimate", "transient", "cycle", "settled", "attractors", "branch")
+ROWS = 12  # of a table that stand open; the rest is folded away
+
+
+def text(value):
+    return html.escape(str(value))
+
+
+def number(value, digits=5):
+    """A number as people write it, a word as it is."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.{digits}g}"
+    return text(value)
+
+
+def table(head, rows, summary=""):
+    """Rows beyond some are folded away."""
+    def body(part):
+        lines = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in part)
+        heads = "".join(f"<th>{cell}</th>" for cell in head)
+        return f'<div class="wide"><table><thead><tr>{heads}</tr></thead><tbody>{lines}</tbody></table></div>'
+
+    rows = list(rows)
+    folded = f"<details><summary>{summary or 'the rest'}, {len(rows) - ROWS} more</summary>{body(rows[ROWS:])}</details>"
+    return body(rows[:ROWS]) + (folded if len(rows) > ROWS else "")
+
+
+def data(content, kind):
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
+
+
+def picture(content, kind, name, caption):
+    """Broad ones take the width of two."""
+    width, height = Image.open(io.BytesIO(content)).size
+    style = ' class="broad"' if width > 2 * height else ""
+    return (f'<figure{style}><img src="{data(content, kind)}" alt="{text(name)}: {text(caption)}">'
+            f"<figcaption>{text(caption)}</figcaption></figure>")
+
+
+def pictures(runs):
+    """All pictures of these runs, and why the others are left out."""
+    found, left_out = [], []
+    for name, figure in figures(runs):
+        if isinstance(figure, Missing):
+            left_out.append(f"{name}: {figure}")
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "picture.png"
+            common.save_picture(figure, file, 110)
+            found.append(picture(file.read_bytes(), "image/png", name, FIGURES[name][2]))
+    if len(runs) == 1:
+        content = io.BytesIO()
+        try:
+            animate(runs[0], content)
+            found.insert(1, picture(content.getvalue(), "image/gif", "animation", ANIMATION))
+        except Missing:
+            pass
+    words = f'<details><summary>pictures that are left out</summary><ul>{"".join(f"<li>{text(w)}</li>" for w in left_out)}</ul></details>'
+    return "".join(found) + (words if left_out else "")
+
+
+def facts(run):
+    """Name and value of what is asked first."""
+    report = run.report
+    modes, cycle = report.get("modes", {}), report.get("cycle", {})
+    found = {}
+    if modes.get("modes"):
+        first = modes["modes"][0]
+        found["unstable modes"] = f"{modes['unstable_count']} of {len(modes['modes'])} below {modes['band_hz'] / 1000:g} kHz"
+        if first["unstable"]:
+            found["fastest growing mode"] = f"{first['frequency_hz']:.5g} Hz, {first['growth_rate']:+.3g} 1/s"
+    if cycle.get("outcome") == "converged":
+        found["frequency of the squeal"] = f"{cycle['frequency_hz']:.6g} Hz"
+        swings = cycle.get("peak_to_peak", {})
+        if swings:
+            name, swing = max(swings.items(), key=lambda item: item[1])
+            size, unit = length_unit(np.array([swing]))
+            found[f"swing of {name}"] = f"{swing / size:.3g} {unit} peak to peak"
+        if report["model"]["pairs"]:
+            found["contact lost"] = f"{100 * cycle['open_pairs_max'] / report['model']['pairs']:.3g} % of the pairs at most"
+        stability = cycle.get("multipliers", {}).get("stability")
+        found["does it last"] = {"stable": "yes, it attracts", "unstable": "no, it repels"}.get(stability, "not decided")
+    return found
+
+
+def answers(runs):
+    if len(runs) == 1:
+        run = runs[0]
+        heard = run.report.get("heard") or f"the run ended with exit code {run.exit_code}"
+        cards = "".join(f"<div><dt>{text(name)}</dt><dd>{text(value)}</dd></div>" for name, value in facts(run).items())
+        return f'<p class="heard">{text(heard[0].upper() + heard[1:])}.</p><dl class="cards">{cards}</dl>'
+    names = list(dict.fromkeys(name for run in runs for name in facts(run)))
+    rows = [[f"<b>{text(run.folder.name)}</b>", text(run.report.get("heard", "")), *(text(facts(run).get(name, "–")) for name in names)]
+            for run in runs]
+    return table(["run", "heard", *map(text, names)], rows)
+
+
+def warnings(run):
+    found = [(stage, words) for stage in ("model", *STAGES) for words in run.report.get(stage, {}).get("warnings", [])]
+    failed = [(stage, run.report[stage].get("reason") or run.report[stage]["outcome"]) for stage in STAGES
+              if run.report.get(stage, {}).get("outcome") in ("not converged", "no equilibrium", "refused", "not periodic", "interrupted")]
+    items = "".join(f"<li><b>{stage}</b>: {text(words)}</li>" for stage, words in failed + found)
+    return f'<section class="warnings"><h2>Warnings</h2><ul>{items}</ul></section>' if items else ""
+
+
+def stages(run):
+    rows = [[stage, text(entry.get("outcome", "–")), text(entry.get("reason", "")), number(run.report["timings"].get(stage), 3)]
+            for stage, entry in ((stage, run.report.get(stage, {})) for stage in STAGES) if entry]
+    return "<h3>Stages</h3>" + table(["stage", "outcome", "why", "time [s]"], rows)
+
+
+def numbers(run):
+    """Tables of modes, contacts, probes and multipliers."""
+    report, parts = run.report, []
+    if report.get("modes", {}).get("modes"):
+        rows = [[k, number(m["frequency_hz"], 7), number(m["growth_rate"]), number(-100 * m["damping_ratio"], 3),
+                 number(m["backward_error"], 2), "<b>unstable</b>" if m["unstable"] else ""]
+                for k, m in enumerate(report["modes"]["modes"], 1)]
+        head = ["mode", "frequency [Hz]", "growth rate [1/s]", "minus damping [%]", "backward error", ""]
+        parts.append("<h3>Modes</h3>" + table(head, rows, "less unstable modes"))
+    contacts = report.get("equilibrium", {}).get("contacts", [])
+    if contacts:
+        rows = [[text(c["stator"]), text(c["rotor"]), number(c["normal_force_sum"]), number(c.get("torque"))] for c in contacts]
+        parts.append("<h3>Contacts at rest</h3>" + table(["stator", "rotor", "normal force [N]", "braking torque [N m]"], rows))
+    cycle = report.get("cycle", {})
+    if cycle.get("peak_to_peak"):
+        rows = [[text(name), number(1e6 * swing)] for name, swing in cycle["peak_to_peak"].items()]
+        parts.append("<h3>Swings in the cycle</h3>" + table(["probe", "peak to peak [µm]"], rows))
+    if cycle.get("period"):
+        rows = [["full residual", number(cycle["residual_full"], 2)], ["steps a period", cycle["steps_per_period"]],
+                ["periods integrated", cycle["periods_integrated"]]]
+        rows += [[f"error of the {name.replace('_', ' ')}", number(value, 2)]
+                 for name, value in report.get("fidelity", {}).get("error_estimates", {}).items()]
+        parts.append("<h3>Accuracy of the cycle</h3>" + table(["measure", "value"], rows))
+    multipliers = cycle.get("multipliers", {}).get("values", [])
+    if multipliers:
+        rows = [[number(float(np.hypot(m["real"], m["imaginary"])), 6), number(m["real"], 6), number(m["imaginary"], 6),
+                 number(m["error"], 2)] for m in multipliers]
+        parts.append("<h3>Floquet multipliers</h3>" + table(["modulus", "real", "imaginary", "error bar"], rows, "smaller ones"))
+    return "".join(parts)
+
+
+def sound(run):
+    file = run.folder / "sound.wav"
+    if not file.exists():
+        return ""
+    levels = run.folder / "sound.txt"
+    words = f"<pre>{text(levels.read_text())}</pre>" if levels.exists() else ""
+    return f'<h3>Sound</h3><audio controls src="{data(file.read_bytes(), "audio/wav")}"></audio>{words}'
+
+
+def again(run):
+    """The command and the files that run it again."""
+    read = lambda name: (run.folder / name).read_text() if (run.folder / name).exists() else ""
+    ranks, versions = run.report["model"]["ranks"], run.report.get("versions", {})
+    command = f"mpirun -n {ranks} build/squeal {run.folder / 'resolved.toml'} -options_file {run.folder / 'options.txt'}"
+    rows = [["scene", text(run.report.get("scene", ""))], ["run", text(run.report.get("run", ""))],
+            ["size", f"{run.report['model']['dofs']} degrees of freedom, {run.report['model']['elements']} elements, "
+                     f"{run.report['model']['pairs']} contact pairs, {ranks} ranks"],
+            ["memory", f"{run.report['model']['memory_bytes'] / 1e9:.2f} GB"],
+            ["versions", text(", ".join(f"{name} {version}" for name, version in versions.items()))]]
+    return (f"<h3>How to run it again</h3><pre>{text(command)}</pre>" + table(["", ""], rows)
+            + f"<details><summary>options.txt</summary><pre>{text(read('options.txt'))}</pre></details>"
+            + f"<details><summary>resolved.toml, the scene with every default</summary><pre>{text(read('resolved.toml'))}</pre></details>")
+
+
+def page(runs):
+    title = runs[0].title if len(runs) == 1 else f"{runs[0].title}: {len(runs)} runs"
+    parts = [f"<header><p>squeal</p><h1>{text(title)}</h1></header>", f'<section class="answers">{answers(runs)}</section>']
+    if len(runs) > 1:
+        parts.append(f'<section><h2>Side by side</h2><div class="pictures">{pictures(runs)}</div></section>')
+    for run in runs:
+        if len(runs) > 1:
+            parts.append(f"<h2 class='run'>{text(run.folder.name)}: {text(run.report.get('heard', ''))}</h2>")
+        parts += [warnings(run), f'<section><h2>Pictures</h2>{sound(run)}<div class="pictures">{pictures([run])}</div></section>',
+                  f"<section><h2>Numbers</h2>{numbers(run)}{stages(run)}{again(run)}</section>"]
+    # The policy keeps a browser from asking the network for anything.
+    policy = "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+    script = "addEventListener('beforeprint', () => document.querySelectorAll('details').forEach(d => d.open = true))"
+    return (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{text(title)}</title>'
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+            f'<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
+            f"<style>{STYLE}</style></head><body><main>{''.join(parts)}</main><script>{script}</script></body></html>\n")
