@@ -1,0 +1,286 @@
+"""tools/mesh: decks of other codes give the eigenvalues of the same mesh in gmsh's format, and skeletons that squeal reads."""
+
+import importlib.machinery
+import importlib.util
+import itertools
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from models import KINDS, STEEL, Mesh, bricks, bricks20, lattice, write_scene
+
+TOOLS = Path(__file__).resolve().parents[2] / "tools"
+sys.path.insert(0, str(TOOLS))
+KINDS.setdefault("tet10", (11, 3))
+KINDS.setdefault("triangle6", (9, 2))
+LINING = {"young": 5e9, "poisson": 0.25, "density": 2500}
+# Where the other code's nodes stand in gmsh's order, as these codes' manuals draw them.
+ORDERS = {
+    "abaqus": {"brick20": [*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15], "tet10": [*range(8), 9, 8]},
+    "nastran": {"brick20": [*range(8), 8, 11, 13, 9, 10, 12, 14, 15, 16, 18, 19, 17], "tet10": [*range(8), 9, 8]},
+}
+
+
+def tool():
+    loader = importlib.machinery.SourceFileLoader("mesh_tool", str(TOOLS / "mesh"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("mesh_tool", loader))
+    loader.exec_module(module)
+    return module
+
+
+TOOL = tool()
+
+
+def tetrahedra10(nodes):
+    """Six 10-node tetrahedra a cell, gmsh's order, of a lattice of twice as many divisions: their mid-sides lie on it."""
+    cells = []
+    for i, j, k in itertools.product(*(range(0, size - 2, 2) for size in nodes.shape)):
+        for path in itertools.permutations(np.eye(3, dtype=int) * 2):
+            corners = np.cumsum([(i, j, k), *path], axis=0)
+            places = [*corners, *((corners[a] + corners[b]) // 2 for a, b in [(0, 1), (1, 2), (2, 0), (3, 0), (3, 2), (3, 1)])]
+            cells.append([nodes[tuple(place)] for place in places])
+    return np.array(cells)
+
+
+class TwoBlocks:
+    """A plate with a pad on it: nodes, solids of each part in gmsh's order, and sets of nodes. The pad's side is bent, so that
+    a wrong order of nodes is another body."""
+
+    def __init__(self, kind):
+        self.kind, self.mesh = kind, Mesh()
+        double = 1 if kind == "brick" else 2
+        size = {"plate": ((3, 1, 1), (0.06, 0.04, 0.01), 0.0), "pad": ((2, 1, 1), (0.04, 0.04, 0.012), 0.01)}
+        self.cells, self.sets = {}, {}
+        make = {"brick": bricks, "brick20": bricks20, "tet10": tetrahedra10}[kind]
+        for name, (divisions, (a, b, c), z) in size.items():
+            nodes = self.mesh.add_nodes(lattice([double * n for n in divisions],
+                                                lambda x, y, t: (a * x + 0.004 * t * y, b * y, z + c * t)))
+            self.cells[name] = make(nodes)
+            used = set(np.ravel(self.cells[name]).tolist())
+            for side, part in (("clamp", nodes[0]), ("bottom", nodes[:, :, 0]), ("top", nodes[:, :, -1])):
+                self.sets[f"{name}_{side}"] = sorted(used & set(part.ravel().tolist()))
+
+    def faces(self, name):
+        """Corner and mid-side nodes of the element faces in a set, gmsh's order."""
+        wanted, found = set(self.sets[name]), []
+        corners = {"brick": 8, "brick20": 8, "tet10": 4}[self.kind]
+        for cell in self.cells[name.split("_")[0]]:
+            inside = [n for n in cell[:corners] if n in wanted]
+            if len(inside) == corners // 2 + (corners == 4):
+                found.append((cell, inside))
+        return found
+
+    def write_gmsh(self, file):
+        """Faces are found by their places, not by the tool."""
+        at = np.array(self.mesh.nodes)
+        for name, cells in self.cells.items():
+            self.mesh.add(name, self.kind, cells)
+        for name in ("plate_top", "pad_bottom", "pad_top"):
+            for cell, inside in self.faces(name):
+                centre = at[inside].mean(axis=0)
+                around = sorted(inside, key=lambda n: np.arctan2(*(at[n] - centre)[[1, 0]]))
+                middle = []
+                if self.kind != "brick":
+                    for a, b in zip(around, around[1:] + around[:1]):
+                        middle.append(min(cell, key=lambda n: np.linalg.norm(at[n] - (at[a] + at[b]) / 2)))
+                self.mesh.add(name, {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}[len(around + middle)], [around + middle])
+        self.mesh.add_points("plate_clamp", self.sets["plate_clamp"])
+        self.mesh.write(file)
+
+    def write_inp(self, file):
+        """Two sections, sets over several lines and generated, a surface by faces, one by a set of nodes."""
+        kind = {"brick": "C3D8", "brick20": "C3D20R", "tet10": "C3D10M"}[self.kind]
+        order = ORDERS["abaqus"].get(self.kind, list(range(8)))
+        text = "*HEADING\n two blocks\n*NODE\n"
+        text += "".join(f"{i + 1}, {x:.17g}, {y:.17g}, {z:.17g}\n" for i, (x, y, z) in enumerate(self.mesh.nodes))
+        number = 0
+        for name, cells in self.cells.items():
+            text += f"*Element, type={kind}, elset={name}\n"
+            for cell in cells:
+                number += 1
+                fields = [number, *(cell[order] + 1)]
+                text += ", ".join(map(str, fields[:14])) + (",\n" + ", ".join(map(str, fields[14:])) if fields[14:] else "") + "\n"
+        for name, nodes in self.sets.items():
+            rows = [nodes[i : i + 9] for i in range(0, len(nodes), 9)]
+            text += f"*NSET, NSET={name}\n" + "\n".join(", ".join(str(n + 1) for n in row) + "," for row in rows) + "\n"
+        text += f"*ELSET, ELSET=everything, GENERATE\n1, {number}, 1\n"
+        for name, stuff in (("plate", STEEL), ("pad", LINING)):
+            text += f"*MATERIAL, NAME=of_{name}\n*ELASTIC\n{stuff['young']:g}, {stuff['poisson']}\n*DENSITY\n{stuff['density']}\n"
+            text += f"*SOLID SECTION, ELSET={name.upper()}, MATERIAL=OF_{name.upper()}\n"
+        if self.kind != "tet10":
+            text += "*SURFACE, NAME=upper\nplate, S2\n"
+        text += "*BOUNDARY\nplate_clamp, ENCASTRE\npad_top, 1, 2\n*CONTACT PAIR, INTERACTION=i\npad_bottom, upper\n"
+        file.write_text(text)
+
+    def write_bdf(self, file):
+        """Small, large and free fields, continuations, lists with THRU."""
+        name_of = {"brick": "CHEXA", "brick20": "CHEXA", "tet10": "CTETRA"}[self.kind]
+        order = ORDERS["nastran"].get(self.kind, list(range(8)))
+        lines = ["SOL 103", "CEND", "BEGIN BULK", "$HMNAME PROP           1\"plate\" 4", "$HMNAME PROP           2\"pad\" 4"]
+        for i, (x, y, z) in enumerate(self.mesh.nodes, 1):
+            lines += [f"{'GRID*':8}{i:16d}{'':16}{x:16.10f}{y:16.10f}", f"{'*':8}{z:16.10f}"]
+        number = 0
+        for pid, cells in enumerate(self.cells.values(), 1):
+            for cell in cells:
+                number += 1
+                fields = [number, pid, *(cell[order] + 1)]
+                if pid == 1:
+                    for i in range(0, len(fields), 8):
+                        lines.append((f"{name_of:8}" if i == 0 else f"{'+':8}") + "".join(f"{f:8d}" for f in fields[i : i + 8]))
+                else:
+                    rows = [fields[i : i + 8] for i in range(0, len(fields), 8)]
+                    lines.append(f"{name_of}," + ",\n,".join(",".join(map(str, row)) for row in rows))
+        for pid, stuff in enumerate((STEEL, LINING), 1):
+            young = f"{stuff['young']:.4e}".replace("e+0", "+").replace("e+", "+")  # Nastran's exponents have no letter
+            lines += [f"PSOLID,{pid},{pid}", f"MAT1,{pid},{young},,{stuff['poisson']},{stuff['density']:.1f}"]
+        for number, name in enumerate(("plate_top", "pad_bottom", "pad_top"), 11):
+            nodes = [n + 1 for n in self.sets[name]]
+            rows = [["SET1", str(number), *map(str, nodes[:7])]] + [["", *map(str, nodes[i : i + 8])] for i in range(7, len(nodes), 8)]
+            lines += [",".join(row) for row in rows]
+        lines += [",".join(["SPC1", "5", "123456", *(str(n + 1) for n in row)]) for row in np.array_split(self.sets["plate_clamp"], 5)]
+        lines += [",".join(["SPC1", "5", "12", *(str(n + 1) for n in row)]) for row in np.array_split(self.sets["pad_top"], 6)]
+        file.write_text("\n".join([*lines, "ENDDATA", ""]))
+
+
+PHYSICS = {"friction": {"coefficient": 0.4}, "modes": {"method": "full", "band": 20000}, "estimate": {"enabled": False}}
+
+
+def contact(rotor, stator, top):
+    return {"pressure": [{"on": top, "value": 1e6}], "contact": [{"rotor": rotor, "stator": stator, "velocity": [1, 0, 0]}]}
+
+
+def eigenvalues(report):
+    assert report["model"]["pairs"] > 0 and len(report["modes"]["modes"]) > 3
+    found = [complex(m["growth_rate"], 2 * np.pi * m["frequency_hz"]) for m in report["modes"]["modes"]]
+    return np.array(sorted(found, key=lambda value: value.imag))
+
+
+@pytest.fixture(scope="module")
+def expected(module_run, tmp_path_factory):
+    """Eigenvalues of the two blocks as gmsh reads them."""
+    known = {}
+
+    def of(kind):
+        if kind not in known:
+            folder = tmp_path_factory.mktemp(kind)
+            TwoBlocks(kind).write_gmsh(folder / "mesh.msh")
+            parts = [{"name": "plate", **STEEL}, {"name": "pad", **LINING}]
+            support = [{"on": "plate_clamp", "fixed": "all"}, {"on": "pad_top", "fixed": "x y"}]
+            scene = write_scene(folder, mesh={"file": "mesh.msh"}, part=parts, support=support, **PHYSICS,
+                                **contact("plate_top", "pad_bottom", "pad_top"))
+            known[kind] = eigenvalues(module_run(scene, ranks=1))
+        return known[kind]
+
+    return of
+
+
+def convert(deck, folder, *words):
+    old = sys.argv
+    sys.argv = ["mesh", str(deck), str(folder), *words]
+    try:
+        TOOL.main()
+    finally:
+        sys.argv = old
+    return folder / "scene.toml"
+
+
+def completed(scene, names):
+    """The skeleton with what its comments ask for."""
+    text = scene.read_text()
+    assert "FILL IN" in text
+    extra = write_scene(scene.parent.parent, **contact(*names)).read_text()
+    scene.write_text(text.replace("# coefficient = 0.3", "coefficient = 0.4") + extra + '\n[modes]\nmethod = "full"\nband = 20000\n\n[estimate]\nenabled = false\n')
+    return scene
+
+
+@pytest.mark.parametrize("kind", ["brick", "brick20", "tet10"])
+@pytest.mark.parametrize("code", ["abaqus", "nastran"])
+def test_decks_have_the_eigenvalues_of_the_mesh(module_run, expected, tmp_path, kind, code):
+    """Orders of nodes, sets, sections, materials and supports: any slip gives other eigenvalues. Nastran's fields have ten
+    decimals, which hold these positions."""
+    blocks = TwoBlocks(kind)
+    deck = tmp_path / ("two.inp" if code == "abaqus" else "two.bdf")
+    blocks.write_inp(deck) if code == "abaqus" else blocks.write_bdf(deck)
+    scene = convert(deck, tmp_path / "out")
+    upper = "plate_top" if kind == "tet10" else "upper"
+    names = (upper, "pad_bottom", "pad_top") if code == "abaqus" else ("set_11", "set_12", "set_13")
+    found = eigenvalues(module_run(completed(scene, names), ranks=1))
+    np.testing.assert_allclose(found, expected(kind), rtol=1e-10)
+
+
+@pytest.mark.parametrize("ending", ["vtu", "vtk", "med", "xdmf"])
+def test_meshio_formats_keep_volumes_and_groups(tmp_path, ending):
+    """Volumes by the divergence theorem, to rounding, of every element in gmsh's order; groups as far as a format has them."""
+    meshio = pytest.importorskip("meshio")
+    blocks = TwoBlocks("brick20")
+    order = ORDERS["abaqus"]["brick20"]  # VTK's too
+    cells = [("hexahedron20", np.concatenate([blocks.cells[name][:, order] for name in ("plate", "pad")]))]
+    tags = np.repeat([1, 2], [len(blocks.cells[name]) for name in ("plate", "pad")])
+    mesh = meshio.Mesh(np.array(blocks.mesh.nodes), cells, cell_data={"part": [tags]})
+    if ending == "med":
+        mesh = meshio.Mesh(mesh.points, cells, cell_data={"cell_tags": [-tags]})
+        mesh.cell_tags = {-1: ["plate"], -2: ["pad"]}
+    meshio.write(tmp_path / f"two.{ending}", mesh)
+    scene = tomllib.loads(convert(tmp_path / f"two.{ending}", tmp_path / "out").read_text())
+    names = sorted(part["name"] for part in scene["part"])
+    assert names == (["pad", "plate"] if ending == "med" else ["part_1", "part_2"])
+    model = TOOL.read_deck(tmp_path / f"two.{ending}")
+    gmsh = {frozenset(cell): cell for part in blocks.cells.values() for cell in (part + 1).tolist()}
+    ours = [nodes for _, nodes in model.elements.values()]
+    assert len(ours) == 5 and all(list(nodes) == gmsh[frozenset(nodes)] for nodes in ours)
+    assert np.allclose([model.nodes[n] for n in ours[0]], np.array(blocks.mesh.nodes)[[n - 1 for n in ours[0]]], rtol=1e-15)
+
+
+def test_shells_units_and_what_is_missing(squeal, tmp_path):
+    """A deck in mm, N and t: SI in the scene. What the deck lacks is a comment, and squeal names it."""
+    text = "*NODE\n1,0,0,0\n2,10,0,0\n3,10,10,0\n4,0,10,0\n*ELEMENT, TYPE=S4R, ELSET=skin\n5,1,2,3,4\n*NSET, NSET=edge\n1,4\n"
+    text += "*MATERIAL, NAME=steel\n*ELASTIC\n210000., 0.3\n*DENSITY\n7.85e-9\n*SHELL SECTION, ELSET=skin, MATERIAL=steel\n2.,5\n"
+    (tmp_path / "shell.inp").write_text(text + "*BOUNDARY\nedge, 1, 6\n*CLOAD\n2, 3, 1.\n")
+    scene = convert(tmp_path / "shell.inp", tmp_path / "out", "--length", "0.001")
+    content = tomllib.loads(scene.read_text())
+    assert content["part"] == [{"name": "skin", "young": 210e9, "poisson": 0.3, "density": 7850, "thickness": 0.002}]
+    assert content["support"] == [{"on": "edge", "fixed": "all"}] and content["mesh"]["scale"] == 0.001
+    assert "*CLOAD (line 19)" in scene.read_text()
+    (tmp_path / "shell.inp").write_text(text.replace("210000., 0.3\n*DENSITY", "210000., 0.3\n*EXPANSION").replace("7.85e-9", "1e-5"))
+    scene = convert(tmp_path / "shell.inp", tmp_path / "lacks")
+    assert "# density =    # FILL IN [kg/m3]" in scene.read_text()
+    assert "density" in squeal(scene, "--dry-run", ranks=1).messages[0]
+
+
+BAD = {
+    "no such node": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n9,1,2,3,4\n", ["two.inp, line 4", "node 2"]),
+    "an element too short": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n9,1,1,1\n", ["line 4", "3 nodes of C3D4", "expected 4"]),
+    "a kind without a kernel": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D15\n", ["line 3", "C3D15", "4, 6, 8, 10 or 20"]),
+    "a set that is missing": ("*NODE\n1,0,0,0\n*NSET, NSET=a\nb\n", ["line 4", "'b'"]),
+    "a word for a number": ("*NODE\n1,0,zero,0\n", ["line 2", "'zero'", "a number"]),
+    "parts and assemblies": ("*NODE\n1,0,0,0\n*ASSEMBLY, NAME=a\n", ["line 3", "flat deck"]),
+    "nothing": ("*HEADING\nx\n", ["two.inp", "*NODE"]),
+    "a face that is not there": ("*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT, TYPE=C3D4, ELSET=e\n9,1,2,3,4\n*SURFACE, NAME=s\ne, S5\n",
+                                 ["line 9", "'S5'", "S1 to S4"]),
+}
+BAD_BULK = {
+    "mid-side nodes missing": ("GRID,1\nCTETRA,1,1,1,1,1,1,1,\n,1\n", ["two.bdf, line 2", "mid-side"]),
+    "another coordinate system": ("GRID,1,7,0.,0.,0.\n", ["line 1", "system 7"]),
+    "a word for a number": ("GRID,1,,x,0.,0.\n", ["line 1", "GRID, field 4", "'x'"]),
+    "an element twice": ("GRID,1\nCTRIA3,1,1,1,1,1\nCTRIA3,1,1,1,1,1\n", ["line 3", "element 1", "twice"]),
+}
+
+
+@pytest.mark.parametrize("case", [*BAD, *(f"bulk: {name}" for name in BAD_BULK)])
+def test_bad_decks_are_refused(tmp_path, case):
+    text, words = BAD_BULK[case[6:]] if case.startswith("bulk") else BAD[case]
+    deck = tmp_path / ("two.bdf" if case.startswith("bulk") else "two.inp")
+    deck.write_text(text)
+    with pytest.raises(TOOL.Problem) as refused:
+        TOOL.read_deck(deck)
+    for word in words:
+        assert word in str(refused.value), refused.value
+
+
+def test_what_meshio_cannot_read_is_one_sentence(tmp_path):
+    pytest.importorskip("meshio")
+    (tmp_path / "two.vtu").write_text("no mesh")
+    with pytest.raises(TOOL.Problem, match="two.vtu: meshio cannot read it"):
+        TOOL.read_deck(tmp_path / "two.vtu")
