@@ -134,9 +134,9 @@ def draw_spectrogram(runs, of):
         shown = frequency <= min(10 / period, frequency[-1])
         level = 10 * np.log10(np.maximum(power[:, shown] / power[:, shown].max(), 1e-30))
         size, unit = frequency_unit(frequency[shown].max())
+        axes.grid(False)
         image = axes.pcolormesh(time, frequency[shown] / size, level.T, vmin=-FLOOR, vmax=0, shading="auto", cmap="magma",
                                 rasterized=True)
-        axes.grid(False)
         figure.colorbar(image, ax=axes, label="dB of the largest")
         axes.set(xlabel="time [s]", ylabel=f"frequency [{unit}]", title=label_of(run, runs, words) if len(found) > 1 else
                  heading([run], f"spectrogram, {words}"))
