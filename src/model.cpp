@@ -1,5 +1,6 @@
 #include "squeal/model.hpp"
 
+#include "squeal/solid/matrix_rows.hpp"
 #include "squeal/solid/probes.hpp"
 
 #include <algorithm>
@@ -36,12 +37,45 @@ std::vector<std::string> warnings_of(const Model& model, const Scene& scene)
   return sentences;
 }
 
+/// C += alpha M + beta K.
+void add_damping(Structure& structure, const RayleighDamping& damping)
+{
+  check(MatAXPY(structure.C, damping.alpha, structure.M, SAME_NONZERO_PATTERN));
+  check(MatAXPY(structure.C, damping.beta, structure.K, SAME_NONZERO_PATTERN));
+}
+
+/// Takes what supports hold out of the model of a matrix scene.
+void hold(Model& model, const Elimination& elimination)
+{
+  Structure& structure = model.structure;
+  for (Owned<Mat>* A : {&structure.M, &structure.C, &structure.K})
+  {
+    *A = elimination.square(*A);
+    mark_symmetric(*A);
+  }
+  structure.load = elimination.entries(structure.load);
+  model.interface.B = elimination.columns(model.interface.B);
+  model.probes = elimination.columns(model.probes);
+}
+
 Model model_of_matrices(const Scene& scene, MPI_Comm comm)
 {
   Model model;
-  model.structure = read_structure(*scene.matrices, comm);
-  model.interface = read_interface(*scene.matrices, model.structure, scene.friction, comm);
-  model.probes = probe_rows(scene.probes, model.structure, comm);
+  Structure& structure = model.structure;
+  structure = read_structure(*scene.matrices, comm);
+  model.interface = read_interface(*scene.matrices, structure, scene.friction, comm);
+  PetscInt size = 0, local_size = 0;
+  check(VecGetSize(structure.load, &size));
+  check(VecGetLocalSize(structure.load, &local_size));
+  const MatrixRows rows = read_matrix_rows(*scene.matrices, size, comm);
+  add_damping(structure, scene.damping);
+  add_forces(rows, scene.forces, structure.load);
+  model.probes = probe_rows(scene.probes, rows, local_size, comm);
+  const auto held = held_rows(rows, scene.supports);
+  name_rows(rows, held, structure.names);
+  if (held.empty()) return model;
+  hold(model, Elimination(held, structure.load));
+  check_interface(model.interface, scene.matrices->string(), comm);
   return model;
 }
 

@@ -60,7 +60,8 @@ std::string where(const Interface& interface, int pair)
   return text + " at (" + std::to_string(at[0]) + ", " + std::to_string(at[1]) + ", " + std::to_string(at[2]) + ")";
 }
 
-/// Every pair must be able to feel a normal reaction, and must know where friction pulls it.
+} // namespace
+
 void check_interface(const Interface& interface, const std::string& source, MPI_Comm comm)
 {
   std::string problem;
@@ -85,8 +86,6 @@ void check_interface(const Interface& interface, const std::string& source, MPI_
                   "axis of rotation, or set friction.coefficient = 0");
   }
 }
-
-} // namespace
 
 Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm)
 {

@@ -1,6 +1,7 @@
 /// Checks of a scene that involve several keys: tables that exclude each other, undefined or repeated names, numbers
 /// that contradict each other.
 #include "squeal/base/error.hpp"
+#include "squeal/scene/row_names.hpp"
 #include "toml_values.hpp"
 
 #include <algorithm>
@@ -30,7 +31,7 @@ public:
     check_names();
     check_motions();
     for (const Spring& spring : scene_.springs) check_spring(spring);
-    if (!scene_.mesh)
+    if (!scene_.mesh && !scene_.matrices)
     {
       for (const Support& support : scene_.supports) need_known(support.on, points_, &support.on, "[[support]] on");
       for (const Force& force : scene_.forces) need_known(force.on, points_, &force.on, "[[force]] on");
@@ -76,11 +77,31 @@ private:
     refuse(s.points, "point", why);
     refuse(s.rigid_bodies, "rigid_body", why);
     refuse(s.springs, "spring", why);
-    refuse(s.supports, "support", why);
-    refuse(s.forces, "force", why);
     refuse(s.pressures, "pressure", why);
     refuse(s.contacts, "contact", why);
-    if (places_.given.count(&s.damping)) fail(&s.damping, "[damping] " + why);
+    for (const Support& support : s.supports)
+    {
+      const bool row = !need_rows(support.on, "[[support]] on").nodes;
+      if (row && std::ranges::count(support.fixed, true) < 6)
+        fail(&support.fixed, "[[support]] " + support.on + ": a row is one motion; write fixed = \"all\"");
+    }
+    for (const Force& force : s.forces)
+    {
+      const bool row = !need_rows(force.on, "[[force]] on").nodes;
+      if (row && (force.vector[1] != 0 || force.vector[2] != 0))
+        fail(&force.vector, "[[force]] " + force.on + ": a row is one motion; write vector = [value, 0, 0]");
+    }
+  }
+
+  /// Returns the rows of a matrix scene that a text names. Throws Error if it is of another form.
+  RowNames need_rows(const std::string& on, const std::string& key) const
+  {
+    const auto names = row_names(on);
+    if (!names)
+      fail(&on, key + " = \"" + on +
+                    "\": a matrix scene knows rows, dof:N, and nodes, node:N, of its matrices; lists " +
+                    "and ranges are written node:3,8,20-40");
+    return *names;
   }
 
   /// Throws Error if a name was seen before.
@@ -169,13 +190,15 @@ private:
       fail(&probe.name, "[[probe]] name = \"" + probe.name +
                             "\": results are stored under the name; give another one, "
                             "without /");
-    const bool number = probe.on.rfind("dof:", 0) == 0 && probe.on.size() > 4 && probe.on.size() < 14 &&
-                        probe.on.find_first_not_of("0123456789", 4) == std::string::npos;
-    if (scene_.matrices && !number)
-      fail(&probe.on, label + "on = \"" + probe.on + "\": a matrix scene knows degrees of freedom only; write dof:N");
-    if (scene_.matrices) return;
-    if (number) fail(&probe.on, label + "on = \"" + probe.on + "\": dof:N is for matrix scenes; name a point or group");
-    if (!scene_.mesh) need_known(probe.on, points_, &probe.on, label + "on");
+    if (scene_.matrices)
+    {
+      const RowNames names = need_rows(probe.on, label + "on");
+      if (!names.is_single()) fail(&probe.on, label + "on = \"" + probe.on + "\": a probe reads one row or node");
+      if (!names.nodes) return;
+    }
+    else if (row_names(probe.on))
+      fail(&probe.on, label + "on = \"" + probe.on + "\": rows and nodes are for matrix scenes; name a point or group");
+    if (!scene_.mesh && !scene_.matrices) need_known(probe.on, points_, &probe.on, label + "on");
     if (probe.direction == Vec3{}) fail(&probe.name, label + "needs the key 'direction': x, y, z or a vector");
   }
 

@@ -39,7 +39,8 @@ SceneKeys keys_of(MeshSource& m)
 
 SceneKeys keys_of(std::filesystem::path& matrices)
 {
-  return {{"folder", &matrices, required, Rule::folder, "path", "folder of M C K B F gap drive .petsc"}};
+  return {{"folder", &matrices, required, Rule::folder, "path",
+           "folder of M K B gap drive .petsc; of C F .petsc, dofs.txt"}};
 }
 
 SceneKeys keys_of(Part& p)
@@ -93,7 +94,7 @@ SceneKeys keys_of(Spring& s)
 SceneKeys keys_of(Support& s)
 {
   return {
-      {"on", &s.on, required, Rule::any, "text", "named group or point"},
+      {"on", &s.on, required, Rule::any, "text", "named group or point; rows or nodes of a matrix scene"},
       {"fixed", &s.fixed, required, Rule::any, "motions", "fixed motions: any of x y z rx ry rz, all"},
   };
 }
@@ -101,7 +102,8 @@ SceneKeys keys_of(Support& s)
 SceneKeys keys_of(Force& f)
 {
   return {
-      {"on", &f.on, required, Rule::any, "text", "point, rigid body, or named group (force shared by its nodes)"},
+      {"on", &f.on, required, Rule::any, "text",
+       "point, rigid body, or named group (force shared by its nodes); rows or nodes of a matrix scene"},
       {"vector", &f.vector, required, Rule::any, "N", "total force"},
   };
 }
@@ -222,7 +224,7 @@ SceneKeys keys_of(Probe& p)
 {
   return {
       {"name", &p.name, required, Rule::any, "text", "name in the results"},
-      {"on", &p.on, required, Rule::any, "text", "point, rigid body or named group; dof:N on a matrix scene"},
+      {"on", &p.on, required, Rule::any, "text", "point, rigid body or named group; a row or node of a matrix scene"},
       {"at", &p.at, optional, Rule::any, "m", "the group's node nearest to this position"},
       {"direction", &p.direction, optional, Rule::direction, "-", "x, y, z or a vector; not for dof:N"},
   };

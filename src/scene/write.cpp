@@ -214,13 +214,7 @@ std::string resolved_scene(const Scene& scene)
 {
   Scene copy = scene; // keys_of binds members that can be written
   std::string text = table_text(keys_of(copy));
-  // The damping of a matrix scene is in C; the table would be refused there.
-  for_each_table(copy,
-                 [&](const std::string& key, auto& table, const char* meaning)
-                 {
-                   if (key == "damping" && copy.matrices) return;
-                   TextWriter{text}(key, table, meaning);
-                 });
+  for_each_table(copy, TextWriter{text});
   return text;
 }
 

@@ -24,7 +24,13 @@ void name_nodes(const Mesh& mesh, const Scene& scene, DofNames& names)
 
 std::string describe(const DofNames& names, PetscInt dof)
 {
-  if (names.nodal_dof.empty()) return "dof " + std::to_string(dof);
+  if (names.nodal_dof.empty())
+  {
+    const std::string row = "dof " + std::to_string(names.file_rows.empty() ? dof : names.file_rows.at(dof));
+    if (names.file_motions.empty() || names.file_motions.at(dof).motion < 0) return row;
+    const auto [node, motion] = names.file_motions[dof];
+    return row + " (node " + std::to_string(node) + ", " + motion_words[motion] + ")";
+  }
   const PetscInt nodal_dof = names.nodal_dof.at(dof);
   const int node = static_cast<int>(nodal_dof / 6);
   return names.bodies[names.body[node]] + ", " + node_text(node, names.at[node]) + ", direction " +

@@ -88,6 +88,23 @@ Owned<Mat> load_square(const std::filesystem::path& file, PetscInt& size, MPI_Co
   return A;
 }
 
+/// Whether rank 0 has the file.
+bool is_there(const std::filesystem::path& file, MPI_Comm comm)
+{
+  int found = 0;
+  on_rank_zero(comm, [&] { found = is_file(file) ? 1 : 0; });
+  MPI_Bcast(&found, 1, MPI_INT, 0, comm);
+  return found != 0;
+}
+
+/// Returns a matrix of zeros with the pattern of another.
+Owned<Mat> zero_of(Mat pattern)
+{
+  Owned<Mat> zero;
+  check(MatDuplicate(pattern, MAT_DO_NOT_COPY_VALUES, zero.put()));
+  return zero;
+}
+
 /// Throws Error if M has a negative diagonal entry.
 void check_mass_diagonal(Mat M, const std::filesystem::path& file, MPI_Comm comm)
 {
@@ -156,16 +173,21 @@ Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
   Structure structure;
   PetscInt size = -1;
   structure.M = load_square(folder / "M.petsc", size, comm);
-  structure.C = load_square(folder / "C.petsc", size, comm);
   structure.K = load_square(folder / "K.petsc", size, comm);
+  structure.C = is_there(folder / "C.petsc", comm) ? load_square(folder / "C.petsc", size, comm) : zero_of(structure.M);
   check_mass_diagonal(structure.M, folder / "M.petsc", comm);
   share_pattern(structure);
   check_mass(structure.M, folder / "M.petsc", comm);
+  check(MatCreateVecs(structure.K, nullptr, structure.load.put()));
+  if (!is_there(folder / "F.petsc", comm))
+  {
+    check(VecSet(structure.load, 0));
+    return structure;
+  }
   const auto force = read_vector(folder / "F.petsc", comm);
   if (static_cast<PetscInt>(force.size()) != size)
     throw Error((folder / "F.petsc").string() + ": length " + std::to_string(force.size()) + ", but M.petsc is " +
                 std::to_string(size) + " x " + std::to_string(size));
-  check(MatCreateVecs(structure.K, nullptr, structure.load.put()));
   set_all_entries(structure.load, force);
   return structure;
 }

@@ -9,7 +9,4 @@ namespace squeal
 /// A sum M + a C + b K then needs additions of values only.
 void share_pattern(Structure& structure);
 
-/// Declares to PETSc that A stays symmetric and that its pattern is complete.
-void mark_symmetric(Mat A);
-
 } // namespace squeal

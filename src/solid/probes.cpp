@@ -5,7 +5,6 @@
 #include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
-#include <charconv>
 
 namespace squeal
 {
@@ -45,58 +44,23 @@ int probed_node(const Probe& probe, const Mesh& mesh)
   return nearest;
 }
 
-/// Returns N of a probe on "dof:N".
-PetscInt probed_dof(const Probe& probe, PetscInt dofs)
-{
-  PetscInt dof = -1;
-  const std::string prefix = "dof:";
-  const char* const end = probe.on.data() + probe.on.size();
-  const bool prefixed = probe.on.compare(0, prefix.size(), prefix) == 0;
-  const auto [stop, error] = std::from_chars(probe.on.data() + (prefixed ? prefix.size() : 0), end, dof);
-  if (!prefixed || error != std::errc() || stop != end || dof < 0 || dof >= dofs)
-    throw Error("probe " + probe.name + ": on = \"" + probe.on +
-                "\"; on a matrix scene it is \"dof:N\" with N from 0 to " + std::to_string(dofs - 1));
-  return dof;
-}
-
-/// Returns the matrix of the rows that row_of gives. All probes are visited on every rank, so that errors are thrown by
-/// all of them.
-template <class RowOf>
-Owned<Mat> matrix_of_probes(const std::vector<Probe>& probes, RowOf row_of, PetscInt local_columns, MPI_Comm comm)
-{
-  std::vector<SparseRow> rows;
-  const auto [first, last] = local_range(static_cast<PetscInt>(probes.size()), comm);
-  for (PetscInt i = 0; i < static_cast<PetscInt>(probes.size()); ++i)
-  {
-    SparseRow row = row_of(probes[i]);
-    if (i >= first && i < last) rows.push_back(std::move(row));
-  }
-  return matrix_of_rows(rows, local_columns, comm);
-}
-
 } // namespace
 
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const DofMap& dofs, MPI_Comm comm)
 {
-  const auto row_of = [&](const Probe& probe)
+  std::vector<SparseRow> rows;
+  const auto [first, last] = local_range(static_cast<PetscInt>(probes.size()), comm);
+  for (PetscInt i = 0; i < static_cast<PetscInt>(probes.size()); ++i) // all on every rank, so that all throw errors
   {
+    const Probe& probe = probes[static_cast<std::size_t>(i)];
     SparseRow row;
     add_displacement(dofs, probed_node(probe, mesh), probe.direction, row);
     if (std::all_of(row.begin(), row.end(), [](const auto& entry) { return entry.second == 0; }))
       throw Error("probe " + probe.name + ": the motion of " + probe.on +
                   " in its direction is held, so it would read 0");
-    return row;
-  };
-  return matrix_of_probes(probes, row_of, dofs.last - dofs.first, comm);
-}
-
-Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Structure& structure, MPI_Comm comm)
-{
-  PetscInt dofs = 0, local_dofs = 0;
-  check(MatGetSize(structure.M, &dofs, nullptr));
-  check(MatGetLocalSize(structure.M, &local_dofs, nullptr));
-  const auto row_of = [&](const Probe& probe) { return SparseRow{{probed_dof(probe, dofs), 1.}}; };
-  return matrix_of_probes(probes, row_of, local_dofs, comm);
+    if (i >= first && i < last) rows.push_back(std::move(row));
+  }
+  return matrix_of_rows(rows, dofs.last - dofs.first, comm);
 }
 
 } // namespace squeal

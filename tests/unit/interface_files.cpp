@@ -180,11 +180,19 @@ TEST_CASE("a damaged folder is one message on every rank")
     CHECK(found.find(text) != std::string::npos);
     write_scene(path);
   };
+  SUBCASE("missing damping and load, which are zero")
+  {
+    if (rank_of(world) == 0)
+      for (const char* name : {"C.petsc", "F.petsc"}) std::filesystem::remove(path / name);
+    const auto structure = read_structure(path, world);
+    CHECK(form(structure.C, {1, 0, 0, 1}, {1, 0, 0, 1}) == 0);
+    CHECK(all_entries(structure.load) == std::vector<double>(4, 0.));
+  }
   SUBCASE("missing")
   {
-    if (rank_of(world) == 0) std::filesystem::remove(path / "C.petsc");
+    if (rank_of(world) == 0) std::filesystem::remove(path / "K.petsc");
     MPI_Barrier(world);
-    says("C.petsc: no such file");
+    says("K.petsc: no such file");
   }
   SUBCASE("truncated")
   {

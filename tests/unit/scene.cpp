@@ -327,7 +327,11 @@ TEST_CASE("a scene has one structure: a mesh, matrices or points")
   check_message(error_of(brake + "[matrices]\nfolder = \"matrices\"\n", {}), {"exclude each other"});
   check_message(error_of("[matrices]\nfolder = \"none\"\n", {}), {"line 2", "there is no folder"});
   check_message(error_of("[matrices]\nfolder = \"matrices\"\n" + points, {}), {"[[point]]", "matrix scene"});
-  check_message(error_of("[matrices]\nfolder = \"matrices\"\n[damping]\n", {}), {"[damping]", "matrix scene"});
+  const std::string matrices = "[matrices]\nfolder = \"matrices\"\n";
+  check_message(error_of(matrices + "[[support]]\non = \"bore\"\nfixed = \"all\"\n", {}), {"bore", "node:N"});
+  check_message(error_of(matrices + "[[support]]\non = \"dof:1\"\nfixed = \"x\"\n", {}), {"dof:1", "fixed = \"all\""});
+  check_message(error_of(matrices + "[[force]]\non = \"dof:1\"\nvector = [0, 1, 0]\n", {}), {"[value, 0, 0]"});
+  check_message(error_of(matrices + "[[probe]]\nname = \"p\"\non = \"node:1-2\"\n", {}), {"one row or node"});
   check_message(error_of("[mesh]\nfile = \"brake.geo\"\n", {}), {"[[part]]"});
   check_message(error_of(points + "[[pressure]]\non = \"a\"\nvalue = 1\n", {}), {"[[pressure]]", "[mesh]"});
 }
@@ -355,7 +359,7 @@ TEST_CASE("contradictions between keys are refused")
   check_message(error_of(replaced(brake, "stiffness = 1e6\ndamping = 3", ""), {}), {"neither"});
   check_message(error_of(replaced(brake, "fixed = \"all\"", "fixed = \"none\""), {}), {"nothing"});
   check_message(error_of(replaced(brake, "direction = \"-y\"\n", ""), {}), {"'direction'"});
-  check_message(error_of(replaced(brake, "on = \"disc\"\nat", "on = \"dof:3\"\nat"), {}), {"dof:N"});
+  check_message(error_of(replaced(brake, "on = \"disc\"\nat", "on = \"dof:3\"\nat"), {}), {"dof:3", "matrix scenes"});
 }
 
 TEST_CASE("the reference lists every key of the resolved scene")

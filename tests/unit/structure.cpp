@@ -3,6 +3,7 @@
 // Tolerances are round-off of sums of some thousand terms unless said otherwise.
 #include "../support/approx.hpp"
 #include "../support/bricks.hpp"
+#include "squeal/solid/matrix_rows.hpp"
 #include "squeal/solid/probes.hpp"
 
 #include <algorithm>
@@ -256,15 +257,30 @@ TEST_CASE("a probe reads the node it names")
   check(VecSum(values, &read));
   const auto expected = wavy({0.3, 0.2, 0.1});
   CHECK(read == approx(0.6 * expected[1] + 0.8 * expected[2], round_off));
-  const auto D = probe_rows({{"d", "dof:7", {}, {}}}, built.structure, world);
-  PetscInt rows = 0;
-  check(MatGetSize(D, &rows, nullptr));
-  CHECK(rows == 1);
-  for (const char* wrong : {"dof:108", "dof:-1", "dof:x", "7", "dof:", "dof:7b"})
-    CHECK_THROWS_WITH_AS(probe_rows({{"d", wrong, {}, {}}}, built.structure, world),
-                         doctest::Contains("\"dof:N\" with N from 0 to 107"), Error);
   CHECK_THROWS_WITH_AS(probe_rows({{"tip", "block:x+", {}, {}}}, mesh, built.dofs, world),
                        doctest::Contains("9 nodes; 'at'"), Error);
+}
+
+TEST_CASE("rows of a matrix scene are read, pushed and held by row and by node")
+{
+  const MatrixRows rows{4, {{12, 0}, {12, 2}, {7, 0}, {-1, -1}}};
+  const std::vector<Probe> probes{{"row", "dof:3", {}, {}}, {"node", "node:12", {}, {0.6, 0, 0.8}}};
+  const auto P = probe_rows(probes, rows, rank_of(world) == 0 ? 4 : 0, world);
+  Owned<Vec> u, read;
+  check(MatCreateVecs(P, u.put(), read.put()));
+  set_all_entries(u, std::vector<double>{1, 10, 100, 1000});
+  check(MatMult(P, u, read));
+  CHECK(all_entries(read) == std::vector<double>{1000, 8.6});
+  check(VecSet(u, 0));
+  add_forces(rows, {{"node:7,12", {3, 0, 1}}, {"dof:3", {5, 0, 0}}}, u);
+  CHECK(all_entries(u) == std::vector<double>{1.5, 1, 1.5, 5});
+  CHECK(held_rows(rows, {{"node:1-9", {true}}, {"dof:1", {true, true, true, true, true, true}}}) ==
+        std::vector<PetscInt>{1, 2});
+  for (const char* wrong : {"dof:4", "dof:-1", "dof:x", "7", "dof:", "dof:7b", "node:8", "dof:2-9"})
+    CHECK_THROWS_AS(held_rows(rows, {{wrong, {true}}}), Error);
+  CHECK_THROWS_WITH_AS(held_rows(rows, {{"node:7", {false, true}}}), doctest::Contains("no row for the motions"),
+                       Error);
+  CHECK_THROWS_WITH_AS(add_forces({4, {}}, {{"node:7", {1, 0, 0}}}, u), doctest::Contains("no dofs.txt"), Error);
 }
 
 TEST_CASE("contradictions name the node and both sides")

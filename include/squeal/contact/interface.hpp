@@ -34,6 +34,9 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
 Interface read_interface(const std::filesystem::path& folder, const Structure& structure, const FrictionLaw& friction,
                          MPI_Comm comm);
 
+/// Throws Error for a pair that cannot move along its normal, or whose friction has no direction. Collective.
+void check_interface(const Interface& interface, const std::string& source, MPI_Comm comm);
+
 /// B x, whole on every rank. Collective.
 std::vector<double> relative(const Interface& interface, Vec x);
 

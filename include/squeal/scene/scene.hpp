@@ -76,7 +76,7 @@ struct Spring
 /// Fixed motions of the nodes of a group.
 struct Support
 {
-  std::string on; // named group or point
+  std::string on; // named group or point; rows of a matrix scene (squeal/scene/row_names.hpp), also below
   Motions fixed{};
 };
 
@@ -278,7 +278,7 @@ struct BranchSettings
 struct Probe
 {
   std::string name;
-  std::string on;         // point, rigid body or group; "dof:N" on a matrix scene
+  std::string on;         // point, rigid body or group; a row or node of a matrix scene
   std::optional<Vec3> at; // [m] the group's node nearest to this position is meant
   Vec3 direction{};       // [-] unit vector
 };

@@ -11,6 +11,13 @@
 namespace squeal
 {
 
+/// A motion of a node of another code's model.
+struct NodeMotion
+{
+  PetscInt node = -1; // its number there
+  int motion = -1;    // of motion_words; -1: not the motion of a node
+};
+
 /// What each free degree of freedom is. Texts are made on demand only, since a model has many degrees of freedom.
 struct DofNames
 {
@@ -18,9 +25,12 @@ struct DofNames
   std::vector<int> body;           // index in `bodies` of each node
   std::vector<Vec3> at;            // [m] position of each node
   std::vector<PetscInt> nodal_dof; // of each free degree of freedom; empty on a matrix scene
+  // On a matrix scene, of each free degree of freedom:
+  std::vector<PetscInt> file_rows;      // row of the files
+  std::vector<NodeMotion> file_motions; // empty without dofs.txt
 };
 
-/// Returns "part disc, node 12 at (x, y, z), direction ry", or "dof 12" on a matrix scene.
+/// Returns "part disc, node 12 at (x, y, z), direction ry", or "dof 12 (node 1017, x)" on a matrix scene.
 std::string describe(const DofNames& names, PetscInt dof);
 
 struct DofTerm

@@ -8,7 +8,4 @@ namespace squeal
 /// Returns the matrix P with a row for each probe: the values of the probes are P q.
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const DofMap& dofs, MPI_Comm comm);
 
-/// The same for a matrix scene, where a probe is "dof:N".
-Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Structure& structure, MPI_Comm comm);
-
 } // namespace squeal

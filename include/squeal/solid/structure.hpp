@@ -24,9 +24,13 @@ struct Structure
 /// Throws Error for an element whose Jacobian is not positive, with its part and place.
 Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partition, const DofMap& dofs, MPI_Comm comm);
 
-/// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder. Collective.
+/// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder; C and F are zero without their
+/// files. Collective.
 /// Throws Error for a file that is missing, truncated or not PETSc binary, sizes that disagree, entries that are not
 /// finite, and an M, C or K that is not symmetric.
 Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm);
+
+/// Declares to PETSc that A stays symmetric and that its pattern is complete.
+void mark_symmetric(Mat A);
 
 } // namespace squeal
