@@ -8,7 +8,7 @@ from plot_basis import (RED, SLIP, STICK, heading, length_unit, mode_words, plt,
 from squeal import Missing
 from surface import amplitude, faces, widest_phase
 
-SWING = 0.12  # what moves most is drawn moving by this part of the size of the moving region
+SWING, WHOLE = 0.12, 0.05  # what moves most is drawn moving by these parts of the size of the moving region and of all
 FRAMES = 24  # at most, of an animation
 MODES = 6  # at most so many shapes side by side
 
@@ -29,8 +29,8 @@ def pyvista():
 class Stage:
     """A run's surface in a PyVista window, seen from one place however it is deformed."""
 
-    def __init__(self, run, size, height):
-        """size: how much each node moves, to choose the view; height: of the pictures [pixels]."""
+    def __init__(self, run, size, height, edges=True):
+        """size: how much each node moves, to choose the view; height: of the pictures [pixels]; edges: of the elements."""
         self.nodes = run.nodes
         solid, shells = faces(run.field("mesh/topology"))
         rims = solid + shells
@@ -39,15 +39,16 @@ class Stage:
         self.size = size / size.max()
         moving = np.flatnonzero(self.size > 0.25)
         self.moving = self.nodes[moving]
-        self.reach = np.linalg.norm(np.ptp(self.moving, axis=0)) or np.linalg.norm(np.ptp(self.nodes, axis=0))
+        whole = np.linalg.norm(np.ptp(self.nodes, axis=0))
+        self.swing = min(SWING * np.linalg.norm(np.ptp(self.moving, axis=0)) or whole, WHOLE * whole)  # [m]
         pv = pyvista()
         self.mesh = pv.PolyData(self.nodes, faces=np.concatenate([[len(rim), *rim] for rim in rims]))
         self.mesh["value"] = self.size
         self.plotter = pv.Plotter(off_screen=True, window_size=(round(1.25 * height), height))
         self.plotter.set_background("white")
         self.plotter.enable_anti_aliasing("ssaa")
-        self.plotter.add_mesh(self.mesh, scalars="value", cmap=squeal_colours(), clim=(0, 1), show_edges=True,
-                              edge_color="#808890", line_width=0.6, show_scalar_bar=False, ambient=0.25, diffuse=0.8,
+        self.plotter.add_mesh(self.mesh, scalars="value", cmap=squeal_colours(), clim=(0, 1), show_edges=edges,
+                              edge_color="#808890", line_width=0.6, edge_opacity=0.6, show_scalar_bar=False, ambient=0.5, diffuse=0.6,
                               lighting=True, smooth_shading=False)
         self.towards = self._towards()
 
@@ -94,7 +95,7 @@ def mode_pictures(run, number, height, views):
     shape = run.shape(number)
     stage = Stage(run, amplitude(shape), height)
     motion = (shape * np.exp(1j * widest_phase(shape))).real
-    motion *= SWING * stage.reach / np.abs(motion).max()
+    motion *= stage.swing / np.abs(motion).max()
     pictures = [stage.picture(motion, stage.size, near) for near in views]
     stage.close()
     return pictures
@@ -176,14 +177,16 @@ def moving(run):
         return (turns[:, None, None] * run.shape(number)).real, f"mode, {words_of(run, number)}"
 
 
-def animate(run, file, height=380):
+def animate(run, file, height=330):
     """A GIF of one period that repeats, whole and near."""
     from PIL import Image, ImageDraw, ImageFont
 
     motion, words = moving(run)
     lengths = np.linalg.norm(motion, axis=2)
-    stage = Stage(run, lengths.max(axis=0), height)
-    scale = SWING * stage.reach / np.abs(motion).max()
+    stage = Stage(run, lengths.max(axis=0), height, edges=False)  # a third of the bytes
+    scale = stage.swing / np.abs(motion).max()
+    if words.startswith("limit"):
+        words += f", {float(f'{scale:.1g}'):.0f} times exaggerated"
     frames = []
     font = ImageFont.truetype(matplotlib.font_manager.findfont("DejaVu Sans"), 15)
     for frame, length in zip(motion, lengths / lengths.max()):
@@ -192,6 +195,9 @@ def animate(run, file, height=380):
         ImageDraw.Draw(picture).text((10, 8), words, fill="black", font=font)
         frames.append(picture)
     stage.close()
-    palette = frames[len(frames) // 4].quantize(128)  # one for all: colours do not flicker
+    sheet = Image.new("RGB", (frames[0].width, 4 * height))  # one palette for all: colours do not flicker
+    for k in range(4):
+        sheet.paste(frames[k * len(frames) // 4], (0, k * height))
+    palette = sheet.quantize(200)
     frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=60, loop=0, optimize=True)
