@@ -54,7 +54,7 @@ def picture(content, kind, name, caption):
     """Broad ones take the width of two."""
     width, height = Image.open(io.BytesIO(content)).size
     style = ' class="broad"' if width > 2 * height else ""
-    return (f'<figure{style}><img src="{data(content, kind)}" alt="{text(name)}: {text(caption)}">'
+    return (f'<figure{style}><div class="wide"><img src="{data(content, kind)}" alt="{text(name)}: {text(caption)}"></div>'
             f"<figcaption>{text(caption)}</figcaption></figure>")
 
 
@@ -100,6 +100,8 @@ def facts(run):
         if report["model"]["pairs"]:
             found["contact lost"] = f"{100 * cycle['open_pairs_max'] / report['model']['pairs']:.3g} % of the pairs at most"
         stability = cycle.get("multipliers", {}).get("stability")
+        if (run.folder / "sound.txt").exists():
+            found["sound"] = (run.folder / "sound.txt").read_text().partition(",")[0] + " at the microphone"
         found["does it last"] = {"stable": "yes, it attracts", "unstable": "no, it repels"}.get(stability, "not decided")
     return found
 
@@ -134,10 +136,10 @@ def numbers(run):
     """Tables of modes, contacts, probes and multipliers."""
     report, parts = run.report, []
     if report.get("modes", {}).get("modes"):
-        rows = [[k, number(m["frequency_hz"], 7), number(m["growth_rate"]), number(-100 * m["damping_ratio"], 3),
+        rows = [[k, number(m["frequency_hz"], 7), number(m["growth_rate"]), number(100 * m["damping_ratio"], 3),
                  number(m["backward_error"], 2), "<b>unstable</b>" if m["unstable"] else ""]
                 for k, m in enumerate(report["modes"]["modes"], 1)]
-        head = ["mode", "frequency [Hz]", "growth rate [1/s]", "minus damping [%]", "backward error", ""]
+        head = ["mode", "frequency [Hz]", "growth rate [1/s]", "damping [%]", "backward error", ""]
         parts.append("<h3>Modes</h3>" + table(head, rows, "less unstable modes"))
     contacts = report.get("equilibrium", {}).get("contacts", [])
     if contacts:
@@ -166,8 +168,9 @@ def sound(run):
     if not file.exists():
         return ""
     levels = run.folder / "sound.txt"
-    words = f"<pre>{text(levels.read_text())}</pre>" if levels.exists() else ""
-    return f'<h3>Sound</h3><audio controls src="{data(file.read_bytes(), "audio/wav")}"></audio>{words}'
+    said = f"<pre>{text(levels.read_text())}</pre>" if levels.exists() else ""
+    words = f'<details class="print"><summary>levels, and what they assume</summary>{said}</details>' if said else ""
+    return f'<h3>How it sounds</h3><audio controls src="{data(file.read_bytes(), "audio/wav")}"></audio>{words}'
 
 
 def again(run):
@@ -181,8 +184,8 @@ def again(run):
             ["memory", f"{run.report['model']['memory_bytes'] / 1e9:.2f} GB"],
             ["versions", text(", ".join(f"{name} {version}" for name, version in versions.items()))]]
     return (f"<h3>How to run it again</h3><pre>{text(command)}</pre>" + table(["", ""], rows)
-            + f"<details><summary>options.txt</summary><pre>{text(read('options.txt'))}</pre></details>"
-            + f"<details><summary>resolved.toml, the scene with every default</summary><pre>{text(read('resolved.toml'))}</pre></details>")
+            + f"<details class='print'><summary>options.txt</summary><pre>{text(read('options.txt'))}</pre></details>"
+            + f"<details class='print'><summary>resolved.toml, the scene with every default</summary><pre>{text(read('resolved.toml'))}</pre></details>")
 
 
 def page(runs):
@@ -193,11 +196,11 @@ def page(runs):
     for run in runs:
         if len(runs) > 1:
             parts.append(f"<h2 class='run'>{text(run.folder.name)}: {text(run.report.get('heard', ''))}</h2>")
-        parts += [warnings(run), f'<section><h2>Pictures</h2>{sound(run)}<div class="pictures">{pictures([run])}</div></section>',
+        parts += [warnings(run), f'<section><h2>Pictures</h2><div class="pictures">{pictures([run])}</div>{sound(run)}</section>',
                   f"<section><h2>Numbers</h2>{numbers(run)}{stages(run)}{again(run)}</section>"]
     # The policy keeps a browser from asking the network for anything.
     policy = "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-    script = "addEventListener('beforeprint', () => document.querySelectorAll('details').forEach(d => d.open = true))"
+    script = "addEventListener('beforeprint', () => document.querySelectorAll('details.print').forEach(d => d.open = true))"
     return (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{text(title)}</title>'
             f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
             f'<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'

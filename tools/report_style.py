@@ -29,7 +29,7 @@ audio { width: 100%; max-width: 480px; }
 table { border-collapse: collapse; font-size: 0.9rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: 0.25rem 0.9rem 0.25rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
 th { color: var(--soft); font-weight: 600; }
-pre { overflow-x: auto; background: var(--ground); padding: 0.6rem 0.8rem; border-radius: 4px; font-size: 0.85rem; }
+pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--ground); padding: 0.6rem 0.8rem; border-radius: 4px; font-size: 0.85rem; }
 details { margin: 0.5rem 0; }
 summary { cursor: pointer; color: var(--blue); }
 .pictures details { grid-column: 1 / -1; }
@@ -40,6 +40,8 @@ summary { cursor: pointer; color: var(--blue); }
   section { padding: 0.8rem; }
   .pictures { grid-template-columns: minmax(0, 1fr); }
   figure.broad { grid-column: auto; }
+  figure img { max-width: none; width: 520px; }
+  figure.broad img { width: 760px; }
 }
 @media print {
   @page { margin: 14mm; }
@@ -49,7 +51,7 @@ summary { cursor: pointer; color: var(--blue); }
   .warnings { border-left: 1.2mm solid var(--red); padding-left: 3mm; }
   figure, tr { break-inside: avoid; }
   h2, h3 { break-after: avoid; }
-  pre { white-space: pre-wrap; overflow-wrap: anywhere; }
+  img { max-height: 200mm; }
   .wide { overflow: visible; }
   audio { display: none; }
 }
