@@ -100,6 +100,15 @@ class Model:
                 count[key] += 1
         return {key: face for key, face in faces.items() if count[key] == 1}
 
+    def drop_loose_nodes(self):
+        """Nodes of sets that no element has, such as reference nodes."""
+        used = {node for _, nodes in self.elements.values() for node in nodes}
+        self.node_sets = {name: [node for node in nodes if node in used] for name, nodes in self.node_sets.items()}
+        loose = [name for name, nodes in self.node_sets.items() if not nodes]
+        self.notes += [f"the set {name}, whose nodes no element has" for name in loose]
+        self.node_sets = {name: nodes for name, nodes in self.node_sets.items() if nodes}
+        self.supports = [(name, motions) for name, motions in self.supports if name not in loose]
+
     def name_faces_of_node_sets(self):
         """A set of nodes that covers free faces is a surface too, of the same name: contacts and pressures need faces."""
         free = self.free_faces(self.solids())

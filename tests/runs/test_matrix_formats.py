@@ -190,7 +190,7 @@ NAMED = (abaqus, abaqus_coordinate, calculix, dmig, harwell_boeing, op4, code_as
 def test_every_format_gives_the_eigenvalues_of_dense_algebra(tmp_path, write):
     model = spring_model()
     keys = write(tmp_path, model)  # DMIG rounds the model to its digits
-    found, labels, _ = MATRICES.read_model(describe(tmp_path, keys))
+    found, labels, *_ = MATRICES.read_model(describe(tmp_path, keys))
     for name in "MK":
         np.testing.assert_allclose(found[name].toarray(), model[name], rtol=1e-15, atol=0)
     np.testing.assert_allclose(eigenvalues({k: found[k] for k in "MK"}), eigenvalues(model), rtol=1e-10)
@@ -199,8 +199,8 @@ def test_every_format_gives_the_eigenvalues_of_dense_algebra(tmp_path, write):
         assert (labels == LABELS).all()
     if "F" in keys:
         np.testing.assert_allclose(found["F"], np.arange(N) / 7, rtol=1e-15)
-    MATRICES.write_files(tmp_path / "out", "petsc", found, labels)
-    again, again_labels, _ = MATRICES.read_model(tmp_path / "out")
+    MATRICES.write_files(tmp_path / "out", "petsc", found, labels, {})
+    again, again_labels, *_ = MATRICES.read_model(tmp_path / "out")
     assert all((again[name] != found[name]).nnz == 0 for name in "MK")
     assert labels is None or (again_labels == labels).all()
 
@@ -280,7 +280,7 @@ def row_of(node, dof):
 
 def test_pairs_of_nodes_become_the_rows_of_contact(tmp_path):
     """Rotors 7, 11, 12 at (0,0), (1,0), (0,1) turn about z: velocities 0, 2 y, -2 x; tangents follow, then n x t."""
-    found, labels, _ = contact_model(tmp_path, PAIRS.replace("11, 41, 0.5", "11, 41, 0.25"))
+    found, labels, *_ = contact_model(tmp_path, PAIRS.replace("11, 41, 0.5", "11, 41, 0.25"))
     B = found["B"].toarray()
     expected = np.zeros((9, N))
     tangents = [(1, 0, 0), (0, 1, 0)], [(0, 1, 0), (-1, 0, 0)], [(-1, 0, 0), (0, -1, 0)]
@@ -310,7 +310,7 @@ def test_penalties_are_supports(tmp_path):
     free = np.setdiff1d(np.arange(N), held)
     expected = eigenvalues({name: A[np.ix_(free, free)] for name, A in model.items()})
     model["K"][held, held] += 1e36
-    found, labels, notes = MATRICES.read_model(describe(tmp_path, abaqus(tmp_path, model)))
+    found, labels, notes, _ = MATRICES.read_model(describe(tmp_path, abaqus(tmp_path, model)))
     np.testing.assert_allclose(eigenvalues({k: found[k] for k in "MK"}), expected, rtol=1e-10)
     assert (labels == LABELS[free]).all() and "4 rows held" in notes[0]
 
@@ -328,7 +328,7 @@ def test_lagrange_multipliers_that_hold_one_motion_are_supports(tmp_path):
     for name in "MK":
         np.save(tmp_path / f"{name}.npy", big[name])
     (tmp_path / "dofs.txt").write_text("".join(f"{n} {d}\n" for n, d in LABELS) + "40 LAGR1\n40 LAGR2\n")
-    found, labels, _ = MATRICES.read_model(describe(tmp_path, {"K": "K.npy", "M": "M.npy", "dofs": "dofs.txt"}))
+    found, labels, *_ = MATRICES.read_model(describe(tmp_path, {"K": "K.npy", "M": "M.npy", "dofs": "dofs.txt"}))
     np.testing.assert_allclose(eigenvalues({k: found[k] for k in "MK"}), expected, rtol=1e-10)
 
 
@@ -342,7 +342,7 @@ def test_units_of_the_files(tmp_path):
     np.savetxt(tmp_path / "F.txt", [(node, dof if dof < 3 else 4, 5.0) for node, dof in LABELS], fmt="%d %d %g")
     (tmp_path / "dofs.txt").write_text("".join(f"{n} {d if d < 3 else 'rx'}\n" for n, d in LABELS))
     keys = {"K": "K.npy", "M": "M.npy", "F": "F.txt", "dofs": "dofs.txt"}
-    found, labels, _ = MATRICES.read_model(describe(tmp_path, keys, "length = 0.001\n"))
+    found, labels, *_ = MATRICES.read_model(describe(tmp_path, keys, "length = 0.001\n"))
     for name in "MK":
         np.testing.assert_allclose(found[name].toarray(), model[name], rtol=1e-14)
     np.testing.assert_allclose(found["F"], [5.0 if dof < 3 else 5e-3 for _, dof in LABELS], rtol=1e-14)
