@@ -249,6 +249,51 @@ def test_shells_units_and_what_is_missing(squeal, tmp_path):
     assert "density" in squeal(scene, "--dry-run", ranks=1).messages[0]
 
 
+CUBE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+TOP, RIGHT = frozenset((5, 6, 7, 8)), frozenset((2, 3, 7, 6))
+
+
+def test_all_that_an_input_deck_may_name(tmp_path):
+    """A brick of two sets: skins, faces by element and by set, generated sets, a tie, a contact pair, springs, a reference node."""
+    (tmp_path / "nodes.inc").write_text("*NODE, NSET=All\n" + "".join(f"{i}, {x}, {y}, {z}\n" for i, (x, y, z) in enumerate(CUBE, 1)))
+    (tmp_path / "deck.inp").write_text(
+        "** a comment\n*INCLUDE, INPUT=nodes.inc\n*NODE\n99, 5., 5., 5.\n*ELEMENT, TYPE=C3D8R, ELSET=Body\n1, 1,2,3,4,5,6,\n7,8\n"
+        "*ELEMENT, TYPE=SFM3D4, ELSET=Skin\n2, 5,6,7,8\n*ELEMENT, TYPE=SPRINGA, ELSET=wire\n3, 1, 2\n*NSET, NSET=Right, GENERATE\n"
+        "2, 3, 1\n*NSET, NSET=Right\n6, 7\n*NSET, NSET=both\nRIGHT, 1\n*NSET, NSET=of_body, ELSET=BODY\n*NSET, NSET=ref\n99\n"
+        "*SURFACE, NAME=side\nBody, S4\n*SURFACE, NAME=hull, TYPE=ELEMENT\nBODY\n*SURFACE, NAME=dots, TYPE=NODE\nRight\n"
+        "*MATERIAL, NAME=Steel\n*ELASTIC, TYPE=ENGINEERING CONSTANTS\n1,1,1\n*SOLID SECTION, ELSET=Body, MATERIAL=STEEL\n"
+        "*TIE, NAME=t\nside, hull\n*CONTACT PAIR, INTERACTION=i\nSkin, side\n*BOUNDARY\n1, ZSYMM\nref, 1, 6\nRight, 2, 2, 0.1\n")
+    model = TOOL.read_deck(tmp_path / "deck.inp")
+    assert {name: {frozenset(f) for f in faces} for name, faces in model.surfaces.items() if name != "hull" and name != "of_body"} == {
+        "side": {RIGHT}, "Skin": {TOP}, "Right": {RIGHT}, "dots": {RIGHT}, "both": {RIGHT}, "All": {frozenset(f) for f in model.faces(1)}}
+    assert len(model.surfaces["hull"]) == len(model.surfaces["of_body"]) == 6
+    assert model.node_sets == {"both": [2, 3, 6, 7, 1], "node_1": [1]}  # the others are the nodes of their surfaces
+    assert model.supports == [("node_1", ["z", "rx", "ry"]), ("Right", ["y"])]
+    text = convert(tmp_path / "deck.inp", tmp_path / "out").read_text()
+    for words in ("ties side (slave) to hull", "contact of Skin (slave) and side (master)", "1 elements of type SPRINGA", "the set ref",
+                  "prescribed motion 0.1 of Right", "*ELASTIC, TYPE=ENGINEERING CONSTANTS is not isotropic"):
+        assert words in text, words
+
+
+def test_all_that_bulk_data_may_name(tmp_path):
+    """Skins of solids are surfaces, other flat elements are shells; every way to a set and to a support."""
+    grids = "".join(f"GRID,{i},,{x}.,{y}.,{z}.{',,12' if i == 4 else ''}\n" for i, (x, y, z) in enumerate(CUBE, 1))
+    (tmp_path / "more.bdf").write_text("CQUAD4,2,20,5,6,7,8\nCQUAD4,3,30,2,3,11,10\nPSHELL,30,7,0.002\nPSHELL,20,7,0.001\n")
+    (tmp_path / "deck.bdf").write_text(
+        "SET 4 = 2, 3,\n 6 THRU 7\nSET 5 = ALL\nBEGIN BULK\n" + grids + "GRID*                 10                              2.              0.\n"
+        "*                     0.\nGRID,11,,2.,1.,0.\nCHEXA,1,10,1,2,3,4,5,6\n,7,8\n$ANSA_NAME_COMMENT;10;PSOLID;caliper;\nPSOLID,10,7\n"
+        "MAT1,7,2.1+11,8.1-1\nMAT1,7,2.1+11,,.3,7850.\nSPC1,1,3,1,THRU,4\nSPC,2,10,13,0.,11,2,0.\nSET3,6,ELEM,1,2\nRBE2,50,1,123,2\n"
+        "INCLUDE 'more.bdf'\nENDDATA\nnothing more\n")
+    model = TOOL.read_deck(tmp_path / "deck.bdf")
+    assert list(model.parts) == ["caliper", "property_30"] and model.parts["property_30"].thickness == 0.002
+    surfaces = {name: {frozenset(face) for face in faces} for name, faces in model.surfaces.items()}
+    assert surfaces == {"property_20": {TOP}, "set_4": {RIGHT}, "set_6": {TOP}, "spc_1_3": {frozenset((1, 2, 3, 4))}}
+    assert model.element_sets == {"set_6": [1]}
+    assert model.node_sets == {"spc_grid_12": [4], "spc_2_13": [10], "spc_2_2": [11]}
+    assert dict(model.supports) == {"spc_grid_12": ["x", "y"], "spc_1_3": ["z"], "spc_2_13": ["x", "z"], "spc_2_2": ["y"]}
+    assert model.materials["7"] == {"young": 2.1e11, "poisson": 0.3, "density": 7850} and "RBE2" in model.notes[0]
+
+
 BAD = {
     "no such node": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n9,1,2,3,4\n", ["two.inp, line 4", "node 2"]),
     "an element too short": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n9,1,1,1\n", ["line 4", "3 nodes of C3D4", "expected 4"]),
