@@ -1,8 +1,9 @@
 """Files that hold one matrix or vector, or several by name: PETSc, numpy, Matrix Market, MATLAB, Code_Aster, and those of
-tools/vendor_matrices.py."""
+tools/vendor_matrices.py and tools/nastran_matrices.py."""
 
 import re
 
+import nastran_matrices as nastran
 import numpy as np
 import scipy.io
 import scipy.sparse as sparse
@@ -150,8 +151,8 @@ def read_mtx(file, name):
 
 
 READERS = {".petsc": read_petsc, ".npz": read_npz, ".npy": lambda file, name: load_numpy(file), ".mtx": read_mtx,
-           ".mat": read_matlab, ".op4": vendor.read_op4, ".pch": vendor.read_dmig, ".dmig": vendor.read_dmig,
-           ".bdf": vendor.read_dmig, ".sti": lambda file, name: vendor.read_abaqus(file), ".mas": lambda file, name: vendor.read_abaqus(file), ".hb": vendor.read_harwell_boeing, ".rsa": vendor.read_harwell_boeing,
+           ".mat": read_matlab, ".op4": nastran.read_op4, ".pch": nastran.read_dmig, ".dmig": nastran.read_dmig,
+           ".bdf": nastran.read_dmig, ".sti": lambda file, name: vendor.read_abaqus(file), ".mas": lambda file, name: vendor.read_abaqus(file), ".hb": vendor.read_harwell_boeing, ".rsa": vendor.read_harwell_boeing,
            ".rua": vendor.read_harwell_boeing, ".matrix": vendor.read_harwell_boeing}
 LOADS = {".mtx": lambda file, name: load_of_mtx(file), ".txt": lambda file, name: vendor.read_node_values(file),
          ".csv": lambda file, name: vendor.read_node_values(file)}

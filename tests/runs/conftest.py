@@ -1,17 +1,29 @@
 """Runs the squeal program as a user does: mpirun, a scene file, its output folder."""
 
+import importlib.machinery
+import importlib.util
 import json
 import os
 import re
 import shutil
 import struct
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = ROOT / "inputs"
+
+
+def load_tool(name):
+    """A tool of tools/ as a module, so that a test need not start a python for every call."""
+    sys.path.insert(0, str(ROOT / "tools"))
+    loader = importlib.machinery.SourceFileLoader(f"tool_{name}", str(ROOT / "tools" / name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module
 
 
 class Run:

@@ -1,11 +1,8 @@
 """tools/matrices: every format of other codes gives the eigenvalues of dense algebra, and bad files are refused with file,
 line and what was expected."""
 
-import importlib.machinery
-import importlib.util
 import subprocess
 import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -13,19 +10,9 @@ import pytest
 import scipy.io
 import scipy.linalg
 import scipy.sparse as sparse
+from conftest import ROOT, load_tool
 
-TOOLS = Path(__file__).resolve().parents[2] / "tools"
-sys.path.insert(0, str(TOOLS))
-
-
-def tool():
-    loader = importlib.machinery.SourceFileLoader("matrices_tool", str(TOOLS / "matrices"))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("matrices_tool", loader))
-    loader.exec_module(module)
-    return module
-
-
-MATRICES = tool()
+MATRICES = load_tool("matrices")
 NODES = np.array([7, 11, 12, 40, 41, 1000])
 LABELS = np.array([(node, dof) for node in NODES for dof in (1, 2, 3)])
 N = len(LABELS)
@@ -417,6 +404,6 @@ def test_bad_pairs_are_refused(tmp_path, case):
 def test_the_command_says_one_sentence_and_no_hint_at_pickle(tmp_path):
     np.save(tmp_path / "K.npy", np.array([{}], object), allow_pickle=True)
     np.save(tmp_path / "M.npy", np.eye(1))
-    done = subprocess.run([sys.executable, TOOLS / "matrices", tmp_path, tmp_path / "out"], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, ROOT / "tools" / "matrices", tmp_path, tmp_path / "out"], capture_output=True, text=True)
     assert done.returncode == 1 and done.stderr.count("\n") == 1
     assert "K.npy" in done.stderr and "pickle" not in done.stderr

@@ -1,18 +1,14 @@
 """tools/mesh: decks of other codes give the eigenvalues of the same mesh in gmsh's format, and skeletons that squeal reads."""
 
-import importlib.machinery
-import importlib.util
 import itertools
 import sys
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import load_tool
 from models import KINDS, STEEL, Mesh, bricks, bricks20, lattice, write_scene
 
-TOOLS = Path(__file__).resolve().parents[2] / "tools"
-sys.path.insert(0, str(TOOLS))
 KINDS.setdefault("tet10", (11, 3))
 KINDS.setdefault("triangle6", (9, 2))
 LINING = {"young": 5e9, "poisson": 0.25, "density": 2500}
@@ -22,15 +18,7 @@ ORDERS = {
     "nastran": {"brick20": [*range(8), 8, 11, 13, 9, 10, 12, 14, 15, 16, 18, 19, 17], "tet10": [*range(8), 9, 8]},
 }
 
-
-def tool():
-    loader = importlib.machinery.SourceFileLoader("mesh_tool", str(TOOLS / "mesh"))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("mesh_tool", loader))
-    loader.exec_module(module)
-    return module
-
-
-TOOL = tool()
+TOOL = load_tool("mesh")
 
 
 def tetrahedra10(nodes):
