@@ -70,6 +70,12 @@ def those_with(runs, take):
     return found
 
 
+def cycle_words(run):
+    """What the period that was kept is of."""
+    outcome = run.stage("cycle")["outcome"]
+    return {"converged": "limit cycle", "unstable cycle": "limit cycle that repels"}.get(outcome, f"period kept, cycle {outcome}")
+
+
 def strongest(probes):
     """Name and values of the probe that swings most."""
     if not probes:

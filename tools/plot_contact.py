@@ -2,7 +2,7 @@
 
 import numpy as np
 from matplotlib.collections import PolyCollection
-from plot_basis import STATES, heading, plt, state_colours, state_legend, those_with, unit_of
+from plot_basis import STATES, cycle_words, heading, plt, state_colours, state_legend, those_with, unit_of
 from squeal import Missing
 from surface import faces, node_cells
 
@@ -99,5 +99,5 @@ def draw_contact(runs):
         row[0].set_ylabel(f"{name_of(run, number)}\n{row[0].get_ylabel()}", fontsize=9)
     figure.colorbar(image, ax=list(panels[:, INSTANTS:].flat), label="[% of the period]", shrink=0.8)
     state_legend(panels[0, 0], loc="lower left", bbox_to_anchor=(-0.1, 1.13))
-    figure.suptitle(heading([run], f"contact round the cycle, of {status.shape[1]} pairs; t = 0 when most are open"))
+    figure.suptitle(heading([run], f"contact round the {cycle_words(run)}, of {status.shape[1]} pairs; t = 0 when most are open"))
     return figure

@@ -2,7 +2,7 @@
 
 import matplotlib
 import numpy as np
-from plot_basis import (RED, SLIP, STICK, colour, heading, label_of, length_unit, plt, state_colours, state_legend,
+from plot_basis import (RED, SLIP, STICK, colour, cycle_words, heading, label_of, length_unit, plt, state_colours, state_legend,
                         those_with, unit_of, velocity)
 from squeal import Missing
 
@@ -88,9 +88,8 @@ def draw_cycle(runs):
         flat[0].legend(fontsize=8)
     for axes in flat[panels:]:
         axes.remove()
-    cycle = found[0][1][0]
-    head = f"{cycle['frequency_hz']:.7g} Hz" if cycle["outcome"] == "converged" else cycle["outcome"].upper()
-    figure.suptitle(heading(runs, f"limit cycle, {head}" if len(found) == 1 else "limit cycles"))
+    run, (cycle, _) = found[0]
+    figure.suptitle(heading(runs, f"{cycle_words(run)}, {cycle['frequency_hz']:.7g} Hz" if len(found) == 1 else "limit cycles"))
     return figure
 
 
@@ -121,7 +120,7 @@ def draw_powers(runs):
                    label=label_of(run, runs, f"sum, mean {total.mean() / size:+.1g} {unit}"))
         below.plot(phase, powers["fluctuating_energy"] / e_size, color=shade, lw=1.6, label=label_of(run, runs))
     above.axhline(0, color="0.5", lw=0.8)
-    above.set(ylabel=f"power on the structure [{unit}]", title=heading(runs, "powers round the limit cycle"))
+    above.set(ylabel=f"power on the structure [{unit}]", title=heading(runs, f"powers round the {cycle_words(found[0][0])}"))
     above.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
     below.set(xlabel="time over period [-]", ylabel=f"energy of the motion\nabout equilibrium [{e_unit}]", xlim=(0, 1))
     return figure
@@ -176,7 +175,7 @@ def draw_lift_off(runs):
                       label=label_of(run, runs, "sticking"))
         words = "number of pairs" if area == len(run.series("cycle", "status").T) else f"area of {1e4 * area:.4g} cm²"
         axes.set(xlabel="time over period [-]", ylabel=f"part of the contact's {words} [%]", xlim=(0, 1),
-                 title="one period of the limit cycle")
+                 title=f"one period of the {cycle_words(run)}")
         axes.legend(fontsize=8)
     for k, (run, (time, least, most)) in enumerate(transients):
         axes = panels[0, -1]

@@ -4,7 +4,7 @@ import os
 
 import matplotlib
 import numpy as np
-from plot_basis import (RED, SLIP, STICK, heading, length_unit, mode_words, plt, squeal_colours, strongest, those_with)
+from plot_basis import (RED, SLIP, STICK, cycle_words, heading, length_unit, mode_words, plt, squeal_colours, strongest, those_with)
 from squeal import Missing
 from surface import amplitude, faces, widest_phase
 
@@ -170,7 +170,7 @@ def moving(run):
     try:
         time, motion = run.motion()
         frames = motion[np.arange(min(FRAMES, len(motion))) * len(motion) // min(FRAMES, len(motion))]
-        return frames - motion.mean(axis=0), f"limit cycle, {run.stage('cycle')['frequency_hz']:.4g} Hz, very slowly"
+        return frames - motion.mean(axis=0), f"{cycle_words(run)}, {run.stage('cycle')['frequency_hz']:.4g} Hz, very slowly"
     except Missing:
         number = unstable_shapes(run)[0]
         turns = np.exp(2j * np.pi * np.arange(FRAMES) / FRAMES)
@@ -185,7 +185,7 @@ def animate(run, file, height=330):
     lengths = np.linalg.norm(motion, axis=2)
     stage = Stage(run, lengths.max(axis=0), height, edges=False)  # a third of the bytes
     scale = stage.swing / np.abs(motion).max()
-    if words.startswith("limit"):
+    if "very slowly" in words:
         words += f", {float(f'{scale:.1g}'):.0f} times exaggerated"
     frames = []
     font = ImageFont.truetype(matplotlib.font_manager.findfont("DejaVu Sans"), 15)

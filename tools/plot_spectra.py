@@ -43,7 +43,7 @@ def record_of(run, name):
 def spectra_of(run):
     """What is drawn of a run: a title, and of each probe its frequencies, amplitudes and whether these are lines."""
     try:
-        cycle = run.stage("cycle")
+        cycle = run.periodic()
         probes = run.probes("cycle")
         if not probes:
             raise Missing("the scene has no probes")
@@ -117,7 +117,7 @@ def spectrogram_of(run, of):
         raise last
     step = (time[-1] - time[0]) / (len(time) - 1)
     if of == "energy":
-        values, words = run.series(name, "energy"), "mechanical energy (quadratic: twice the motion's frequencies)"
+        values, words = run.series(name, "energy"), "mechanical energy (quadratic: not the motion's own spectrum)"
     else:
         probes = run.probes(name)
         if of != "probe" and of not in probes:

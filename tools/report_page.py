@@ -103,6 +103,11 @@ def facts(run):
         if (run.folder / "sound.txt").exists():
             found["sound"] = (run.folder / "sound.txt").read_text().partition(",")[0] + " at the microphone"
         found["does it last"] = {"stable": "yes, it attracts", "unstable": "no, it repels"}.get(stability, "not decided")
+    settled = report.get("settled", {})
+    if settled.get("kind"):
+        found["motion it settles on"] = settled["kind"]
+        if settled.get("lines"):
+            found["strongest line"] = f"{settled['lines'][0]['frequency_hz']:.5g} Hz"
     return found
 
 

@@ -256,6 +256,13 @@ class Results:
     def followed_frequency(self):
         return 1 / self.followed_period()
 
+    def periodic(self):
+        """The report of a cycle that closes, whether it attracts or repels; Missing where none was found."""
+        cycle = self.stage("cycle")
+        if cycle["outcome"] not in ("converged", "unstable cycle"):
+            raise Missing(f"there is no limit cycle: {cycle['outcome']}")
+        return cycle
+
     def converged_cycle(self):
         cycle = self.report.get("cycle", {})
         return cycle if cycle.get("outcome") == "converged" else {}
