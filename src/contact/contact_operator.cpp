@@ -16,7 +16,6 @@ namespace squeal
 namespace
 {
 
-constexpr double negligible = 1e-7;         // of the largest entry: what the sweeps leave to the product with W
 constexpr std::size_t fits_the_cache = 250; // rows: sweeping over W itself is as quick
 
 /// In the precision of the target.
@@ -52,25 +51,45 @@ SQUEAL_SIMD void add_runs(const NearField& near, std::size_t pair, std::size_t n
   }
 }
 
-bool exceeds(const PairBlock& block, double limit)
+/// The largest entry of each block of a pair's rows.
+std::vector<double> block_sizes(const PairMatrixView& W, std::size_t pair, std::size_t pairs)
 {
-  for (const PairVector& row : block)
-    for (const double entry : row)
-      if (std::abs(entry) > limit) return true;
-  return false;
+  std::vector<double> sizes(pairs, 0.);
+  for (std::size_t j = 0; j < pairs; ++j)
+    for (const PairVector& row : W.block(pair, j))
+      for (const double entry : row) sizes[j] = std::max(sizes[j], std::abs(entry));
+  return sizes;
 }
 
-NearField near_field(const PairMatrixView& W, std::size_t pairs, int directions, double limit)
+/// The size below which the blocks of a pair's rows add up to the share NearField::left_out of its own block.
+double negligible_size(const std::vector<double>& sizes, std::size_t pair)
+{
+  std::vector<double> ascending = sizes;
+  std::sort(ascending.begin(), ascending.end());
+  double sum = 0;
+  for (const double size : ascending)
+  {
+    sum += size;
+    if (sum > NearField::left_out * sizes[pair]) return size;
+  }
+  return ascending.back();
+}
+
+/// Blocks that are negligible in both pairs' rows are left out, so that no row misses more than its share.
+NearField near_field(const PairMatrixView& W, std::size_t pairs, int directions)
 {
   NearField near;
   const PairRows<std::size_t> rows(directions);
+  std::vector<double> limits;
+  for (std::size_t i = 0; i < pairs; ++i) limits.push_back(negligible_size(block_sizes(W, i, pairs), i));
   for (std::size_t i = 0; i < pairs; ++i)
   {
     near.runs_of.push_back(near.runs.size());
     near.values_of.push_back(near.values.size());
+    const std::vector<double> sizes = block_sizes(W, i, pairs);
     for (std::size_t j = 0; j < pairs; ++j)
     {
-      if (!exceeds(W.block(i, j), limit)) continue;
+      if (sizes[j] < std::min(limits[i], limits[j])) continue;
       const bool follows =
           near.runs.size() > near.runs_of.back() && near.runs.back().first + near.runs.back().count == rows.normal(j);
       if (!follows) near.runs.push_back({rows.normal(j), 0});
@@ -152,7 +171,7 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
     for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, op.diagonal_.back()[k][k]);
   }
   for (const PairBlock& A : op.diagonal_) op.scale_.push_back(natural_scale(A, largest));
-  if (n > fits_the_cache) op.near_ = near_field(view, count, directions, negligible * largest);
+  if (n > fits_the_cache) op.near_ = near_field(view, count, directions);
   op.values_ = std::move(W);
   return op;
 }

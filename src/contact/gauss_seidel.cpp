@@ -96,12 +96,13 @@ template <class Entry> double estimated_residual(SweptProblem<Entry>& problem)
   return residual;
 }
 
-/// The sweeps stop below the tolerance, or where rounding of dw, which is as large as the residual at first, hides the
-/// rest.
+/// The sweeps stop below the tolerance, or where rounding of dw, which is as large as the residual at first, or what
+/// the near field leaves out, hides the rest.
 template <class Entry> void set_target(SweptProblem<Entry>& problem, const ContactSettings& settings)
 {
   const double digits = 32 * static_cast<double>(std::numeric_limits<Entry>::epsilon());
-  problem.target = std::max(settings.tolerance / 4, digits * problem.exact_residual);
+  const double hidden = std::is_same_v<Entry, float> ? std::max(digits, NearField::left_out / 4) : digits;
+  problem.target = std::max(settings.tolerance / 4, hidden * problem.exact_residual);
 }
 
 /// After a product with W: sets the result and the next target; returns whether more sweeps may help.
