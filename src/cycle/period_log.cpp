@@ -75,7 +75,7 @@ void stop_reading(PeriodLog& log)
   for (int later = log.chunks; kept(chunk_name(later)); ++later) forget(chunk_name(later));
   Checkpoint taken;
   for (int i = 0; i < log.next; ++i)
-    for (const char* part : {"marks", "end u", "end v", "rate u", "rate v", "reactions", "unconverged"})
+    for (const char* part : {"marks", "end u", "end v", "rate u", "rate v", "reactions", "unconverged", "kept step"})
       taken.set(entry(i, part), log.chunk.list(entry(i, part)));
   log.chunk = std::move(taken);
   if (log.chunks > 0) --log.chunks; // it is written again with what follows
@@ -94,6 +94,8 @@ bool replay_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
   {
     const bool goes_on = has_next(log) && matches(log.chunk.list(entry(log.next, "marks")), marks);
     if (goes_on) carried = log.chunk.list(entry(log.next, "reactions"));
+    if (goes_on)
+      for (const double part : log.chunk.list(entry(log.next, "kept step"))) carried.push_back(part);
     if (goes_on) carried.push_back(log.chunk.number(entry(log.next, "unconverged")));
     carried.push_back(goes_on);
     if (!goes_on) stop_reading(log);
@@ -111,6 +113,11 @@ bool replay_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
   carried.pop_back();
   map.unconverged = static_cast<long>(carried.back());
   carried.pop_back();
+  for (double* kept : {&map.kept.moved, &map.kept.curvature, &map.kept.h})
+  {
+    *kept = carried.back();
+    carried.pop_back();
+  }
   map.reactions = std::move(carried);
   ++log.next;
   return true;
@@ -136,6 +143,7 @@ void log_period(const PeriodMap& map, double period, Vec start, Vec end, Vec rat
   {
     log.chunk.set(entry(log.next, "marks"), std::vector<double>(marks.begin(), marks.end()));
     log.chunk.set(entry(log.next, "reactions"), map.reactions);
+    log.chunk.set(entry(log.next, "kept step"), std::vector<double>{map.kept.h, map.kept.curvature, map.kept.moved});
     log.chunk.set(entry(log.next, "unconverged"), static_cast<double>(map.unconverged));
   }
   ++log.next;

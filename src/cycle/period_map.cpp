@@ -4,16 +4,36 @@
 #include "squeal/cycle/period_log.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace squeal
 {
 
-void set_period(PeriodMap& map, double period)
+namespace
 {
-  const double h = period / map.steps;
+
+void set_step(PeriodMap& map, double h)
+{
+  map.kept.h = h;
   if (h == map.step.h) return;
   map.step = make_theta_step(map.sliding.structure, map.sliding.interface, h, map.theta, map.options);
+}
+
+/// The kept step where the line from N h to T neglects less than a thousandth of what the last period moved its start
+/// by; else T/N.
+double step_for(const PeriodMap& map, double period)
+{
+  const double own = period / map.steps, missing = period - map.steps * map.kept.h;
+  if (!map.keeps_step || map.kept.h == 0 || map.kept.curvature == 0) return own;
+  return map.kept.curvature * missing * missing / 2 <= 1e-3 * map.kept.moved ? map.kept.h : own;
+}
+
+} // namespace
+
+void set_period(PeriodMap& map, double period)
+{
+  set_step(map, period / map.steps);
 }
 
 void complete_rate(PeriodMap& map, StepWork& work, State& end, Vec rate)
@@ -48,10 +68,27 @@ bool is_recorded(const PeriodMap& map, Vec start)
   return same == PETSC_TRUE;
 }
 
+/// From N h to T along the rate; notes how far the step reaches from its `next` velocity, that at (N + 1) h.
+void end_at_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate, Vec next)
+{
+  const double h = map.step.h;
+  const Owned<Vec> difference = copy_of(next);
+  check(VecAXPBYPCZ(difference, -1, -h, 1, velocity(end), velocity(rate)));
+  double bend = 0, speed = 0, moved = 0, first = 0;
+  check(VecNorm(difference, NORM_2, &bend));
+  check(VecNorm(velocity(end), NORM_2, &speed));
+  check(VecAXPY(displacement(end), period - map.steps * h, displacement(rate)));
+  check(VecAXPY(velocity(end), period - map.steps * h, velocity(rate)));
+  check(VecWAXPY(difference, -1, velocity(start), velocity(end)));
+  check(VecNorm(difference, NORM_2, &moved));
+  check(VecNorm(velocity(start), NORM_2, &first));
+  map.kept = {h, 2 * bend / (h * h * speed), moved / first};
+}
+
 void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
 {
   const auto& [structure, interface, equilibrium] = map.sliding;
-  set_period(map, period);
+  set_step(map, rate ? step_for(map, period) : period / map.steps);
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
   StepWork work = begin_steps(map.step, structure, interface, state);
   if (rate) begin_record(map, start);
@@ -69,7 +106,9 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
   work.record = nullptr;
   check(VecCopy(state.u, displacement(end)));
   check(VecCopy(state.v, velocity(end)));
-  if (rate) complete_rate(map, work, state, rate);
+  if (!rate) return;
+  complete_rate(map, work, state, rate);
+  if (map.keeps_step) end_at_period(map, period, start, end, rate, state.v);
 }
 
 /// Integrates a period that was only taken from the log: what follows needs its records.
@@ -79,8 +118,11 @@ void integrate_replayed(PeriodMap& map)
   const ReplayedPeriod replayed = std::exchange(map.replayed, {});
   const Owned<Vec> end = zeros_like(replayed.start), rate = zeros_like(replayed.start);
   const long unconverged = map.unconverged;
+  const KeptStep kept = map.kept;
+  map.kept.moved = std::numeric_limits<double>::infinity(); // it was integrated with that step
   map.reactions = replayed.reactions;
   integrate_period(map, replayed.period, replayed.start, end, rate);
+  map.kept = kept;
   map.unconverged = unconverged;
 }
 

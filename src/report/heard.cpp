@@ -94,7 +94,9 @@ std::string settled_text(const Report& report, const Scene& scene)
            format(", strongest line %.5g Hz", first);
     break;
   }
-  return text + beside_mode(report, first) + energy_text(report.settled.fluctuating_energy) +
+  Estimated energy = report.settled.fluctuating_energy;
+  energy.error += report.settled.step_error;
+  return text + beside_mode(report, first) + energy_text(energy) +
          largest_swing(scene, report.settled.peak_to_peak, [](const Estimated& swing) { return swing.value; });
 }
 

@@ -213,6 +213,7 @@ Json settled_entry(const Report& report, const Scene& scene)
   entry["steps_per_period"] = settled.steps_per_period;
   entry["mean_energy"] = estimated(settled.energy);
   entry["mean_fluctuating_energy"] = estimated(settled.fluctuating_energy);
+  entry["step_error"] = settled.step_error;
   entry["least_energy"] = settled.least_energy;
   entry["greatest_energy"] = settled.greatest_energy;
   entry["damping_power"] = estimated(settled.damping_power);

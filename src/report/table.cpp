@@ -160,6 +160,8 @@ std::string settled_text(const SettledMotion& settled, const Scene& scene)
   text += row("", mean_text("mean energy", settled.energy, "J,") + " " +
                       mean_text("fluctuating", settled.fluctuating_energy, "J") +
                       format(", of single periods %.3g to %.3g J", settled.least_energy, settled.greatest_energy));
+  text +=
+      row("", format("with half as many steps a period the fluctuating energy changes by %.1g J", settled.step_error));
   text += row("", mean_text("power of damping", settled.damping_power, "W,") + " " +
                       mean_text("of contact", settled.contact_power, "W,") + " " +
                       mean_text("of the load", settled.load_power, "W"));

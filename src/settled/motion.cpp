@@ -30,6 +30,18 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
                  decay.value, decay.error, 3 / std::max({decay.value, decay.error, 1e-6}))};
 }
 
+/// Whether the periods' energies are one value within what is asked of a cycle's energy by default (accuracy), and do
+/// not part from it.
+bool steady(std::span<const double> energies)
+{
+  double sum = 0, squares = 0;
+  for (const double energy : energies) sum += energy;
+  const double middle = sum / static_cast<double>(energies.size());
+  for (const double energy : energies) squares += (energy - middle) * (energy - middle);
+  const Estimated decay = decay_of_spread(energies);
+  return std::sqrt(squares / static_cast<double>(energies.size())) < 1e-3 * middle && decay.value + decay.error >= 0;
+}
+
 } // namespace
 
 OptionList options_of(SettledOptions& options)
@@ -56,6 +68,8 @@ MotionVerdict judge_motion(const std::vector<Estimated>& exponents, std::span<co
                                   [](const Estimated& one) { return std::abs(one.value) <= together * one.error; });
   if (positive > 0) return {MotionKind::irregular, "", ""};
   if (zero == 1) return {MotionKind::periodic, "", ""};
+  // slow motions that die out have exponents within their bars of zero, too
+  if (zero > 1 && base.second == 0 && steady(energies)) return {MotionKind::periodic, "", ""};
   if (zero == 2) return judge_torus(energies, base);
   if (zero == 0) return {MotionKind::undecided, "a cycle and rest: no exponent is zero within its bar", more};
   return {MotionKind::undecided, "quasi-periodic with more than two frequencies and weakly irregular",

@@ -118,6 +118,25 @@ void name_means(SettledMotion& motion, int pairs)
   motion.greatest_energy = *greatest;
 }
 
+/// The mean fluctuating energy with half as many steps a period, from where the motion ends: of the second half of as
+/// many periods as cost a quarter of the motion's own.
+Estimated energy_by_half_the_steps(const CycleProblem& problem, const SettledMotion& motion, double theta, Vec end)
+{
+  PeriodMap map{problem.sliding, problem.step, std::max(motion.steps_per_period / 2, 1), theta};
+  set_period(map, motion.period);
+  State now{copy_of(displacement(end)), copy_of(velocity(end)), 0, problem.sliding.equilibrium.reactions};
+  std::vector<double> energies;
+  const std::size_t periods = std::max<std::size_t>(motion.examined.periods() / 2, 1);
+  while (energies.size() < periods)
+  {
+    History history;
+    if (march(map.step, map.sliding, map.steps, now, {problem.probes, history, nullptr}).interrupted)
+      throw Interrupted{};
+    energies.push_back(mean(history.fluctuating_energy));
+  }
+  return batch_mean(std::span(energies).subspan(periods / 2));
+}
+
 } // namespace
 
 SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, const SettledOptions& options)
@@ -133,6 +152,8 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
   const auto sampler = [&](Vec now) { return integrate_period(map, problem.probes, now, motion); };
   motion.examined = examine_motion(flow, sampler, state, motion.period, options);
   name_means(motion, problem.sliding.interface.pairs);
+  motion.step_error =
+      std::abs(energy_by_half_the_steps(problem, motion, cycle.theta, state).value - motion.fluctuating_energy.value);
   const MotionVerdict& verdict = motion.examined.verdict;
   const bool stationary = motion.examined.discarded < motion.examined.periods();
   motion.outcome = {OutcomeKind::settled, "", static_cast<int>(motion.examined.periods()), 0};

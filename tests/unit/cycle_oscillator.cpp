@@ -39,3 +39,36 @@ TEST_CASE("without instability the oscillator falls back to rest: collapsed, not
   const LimitCycle cycle = cycle_of(unilateral_oscillator(0.1, 1), 100, 5, 1e-8);
   CHECK(cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium);
 }
+
+TEST_CASE("a kept step reaches a period nearby within a thousandth of what the last one moved")
+{
+  const SmallModel model = unilateral_oscillator(0.3, 1);
+  const LimitCycle cycle = cycle_of(model, 200, 5, 1e-11);
+  REQUIRE(cycle.outcome.kind == OutcomeKind::converged);
+  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
+  PeriodMap kept{{model.structure, model.interface, equilibrium}, {}, 200, 0.5},
+      exact{{model.structure, model.interface, equilibrium}, {}, 200, 0.5};
+  kept.keeps_step = true;
+  const double period = cycle.orbit.period, first = 1.01 * period; // moves the state by some percent
+  const Owned<Vec> end = zeros_like(cycle.orbit.state), rate = zeros_like(end), reached = zeros_like(end);
+  int steps_kept = 0;
+  for (const double change : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2})
+  {
+    flow_of(kept).integrate(first, cycle.orbit.state, end, rate);
+    const KeptStep before = kept.kept;
+    CHECK(before.h == first / 200);
+    flow_of(kept).integrate(first * (1 + change), cycle.orbit.state, reached, rate);
+    flow_of(exact).integrate(first * (1 + change), cycle.orbit.state, end, rate);
+    const bool keeps = kept.kept.h == before.h;
+    CHECK(keeps == (kept.kept.h != first * (1 + change) / 200));
+    steps_kept += keeps;
+    check(VecAXPY(reached, -1, end));
+    double error = 0, speed = 0;
+    check(VecNorm(velocity(reached), NORM_2, &error));
+    check(VecNorm(velocity(end), NORM_2, &speed));
+    // beside the curvature: the step's own error, which moves by 3 change (omega h)^2/12
+    CHECK(error <= (2e-3 * before.moved + change * 1e-3) * speed);
+  }
+  CHECK(steps_kept >= 2);
+  CHECK(steps_kept < 5);
+}

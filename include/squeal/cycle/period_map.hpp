@@ -3,6 +3,9 @@
 ///
 /// The derivative in the period is (x_(N+1) - x_(N-1))/2h. That is exact for theta = 1/2 and a linear structure, stiff
 /// modes included.
+///
+/// A map that keeps its step integrates a period T near N h with the h at hand, and goes on from N h to T along that
+/// derivative, as long as what this neglects is small (section 6.2). A and W are then those of the period before.
 #include "squeal/shooting/flow.hpp"
 #include "squeal/transient/step_tangent.hpp"
 #include "squeal/transient/transient.hpp"
@@ -18,7 +21,15 @@ struct ReplayedPeriod
   std::vector<double> reactions{}; // warm start
 };
 
-/// Keeps A and W of the last period length: one factorisation for each, none for difference quotients.
+/// The step of the last period that was integrated with its rate, or asked for exactly, and how far it reaches.
+struct KeptStep
+{
+  double h = 0;         // [s]; 0: none
+  double curvature = 0; // [1/s2] |d2v/dT2|/|v| at the end
+  double moved = 0;     // |v(T) - v(0)|/|v(0)|
+};
+
+/// Keeps A and W of the last step size: none is factored for difference quotients.
 struct PeriodMap
 {
   SlidingEquilibrium sliding; // what measurements refer to
@@ -32,9 +43,11 @@ struct PeriodMap
   Owned<Vec> recorded_start{};       // of that period, if it was one that the flow integrated with its rate
   double recorded_step = 0;          // [s]
   ReplayedPeriod replayed{};         // the last one integrated with its rate, if it is still to be recorded
+  bool keeps_step = false;           // where factors cost more than what the line to T neglects
+  KeptStep kept{};
 };
 
-/// Makes A and W those of this period, unless they are already.
+/// Makes A and W those of h = T/N, unless they are already.
 void set_period(PeriodMap& map, double period);
 
 /// Records the contact of each step of a period; `shift`: the part of a step by which the grid of time is moved.

@@ -16,6 +16,7 @@ struct SettledMotion
   ExaminedMotion examined;
   int spectrum_probe = -1;              // whose spectrum it is: the one that swings most [m]; -1: the normal force [N]
   Estimated fluctuating_energy, energy; // [J]
+  double step_error = 0; // [J] what the mean of the fluctuating energy changes by with half as many steps a period
   double least_energy = 0, greatest_energy = 0;       // [J] of the means of the fluctuating energy over single periods
   Estimated damping_power, contact_power, load_power; // [W]
   Estimated open_fraction, stick_fraction, slip_fraction;
