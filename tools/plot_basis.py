@@ -83,6 +83,16 @@ def strongest(probes):
     return max(probes.items(), key=lambda item: np.ptp(item[1]))
 
 
+def start_of(run, runs):
+    """The step of the period at which cycles that are compared start: where the first harmonic of the probe that swings most
+    is largest. One run stays as it is, and so does one without probes."""
+    probes = run.probes("cycle")
+    if len(runs) == 1 or not probes:
+        return 0
+    values = strongest(probes)[1]
+    return round(-np.angle(np.fft.rfft(values)[1]) / (2 * np.pi) * len(values)) % len(values)
+
+
 def velocity(values, step):
     """Of a displacement over one period, by central differences."""
     return (np.roll(values, -1) - np.roll(values, 1)) / (2 * step)

@@ -2,8 +2,8 @@
 
 import matplotlib
 import numpy as np
-from plot_basis import (RED, SLIP, STICK, colour, cycle_words, heading, label_of, length_unit, plt, state_colours, state_legend,
-                        those_with, unit_of, velocity)
+from plot_basis import (RED, SLIP, STICK, colour, cycle_words, heading, label_of, length_unit, plt, start_of, state_colours,
+                        state_legend, those_with, unit_of, velocity)
 from squeal import Missing
 
 
@@ -109,6 +109,7 @@ def draw_powers(runs):
     e_size, e_unit = unit_of(np.concatenate([powers["fluctuating_energy"] for _, powers in found]), "J")
     for k, (run, powers) in enumerate(found):
         phase = powers["time"] / run.report["cycle"]["period"]
+        powers = {name: np.roll(values, -start_of(run, runs)) for name, values in powers.items()}
         total = np.zeros(len(phase))
         for name, (words, shade) in POWERS.items():
             value = -np.abs(powers[name]) if name == "damping_power" else powers[name]
@@ -169,6 +170,7 @@ def draw_lift_off(runs):
     for k, (run, (phase, opened, stuck, area)) in enumerate(cycles):
         axes = panels[0, 0]
         alone = len(cycles) == 1
+        opened, stuck = (np.roll(part, -start_of(run, runs)) for part in (opened, stuck))
         axes.step(phase, 100 * opened, where="mid", color=RED if alone else colour(k), lw=1.6, label=label_of(run, runs, "open"))
         if stuck.any() or alone:
             axes.step(phase, 100 * stuck, where="mid", color=STICK if alone else colour(k), ls="-" if alone else ":", lw=1.6,

@@ -4,7 +4,8 @@ import os
 
 import matplotlib
 import numpy as np
-from plot_basis import (RED, SLIP, STICK, cycle_words, heading, length_unit, mode_words, plt, squeal_colours, strongest, those_with)
+from plot_basis import (RED, SLIP, STICK, cycle_words, heading, length_unit, mode_words, plt, squeal_colours, strongest,
+                        those_with)
 from squeal import Missing
 from surface import amplitude, faces, widest_phase
 

@@ -2,8 +2,8 @@
 
 import matplotlib
 import numpy as np
-from plot_basis import (RED, SLIP, colour, frequency_unit, heading, label_column, label_of, length_unit, mode_words,
-                        plt, those_with)
+from plot_basis import (RED, SLIP, colour, frequency_unit, heading, label_column, label_of, length_unit, mode_words, plt,
+                        those_with)
 from squeal import Missing
 
 LABELS = 12  # at most so many modes have one

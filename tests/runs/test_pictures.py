@@ -47,6 +47,25 @@ def test_a_windowed_spectrum_and_a_spectrogram_find_the_line():
     assert frequency[power.argmax(axis=1)] == pytest.approx(f, rel=0.03)  # ten periods resolve a tenth; padded four times
 
 
+class Shifted:
+    """A run whose probe's first harmonic is largest at a step of 64."""
+
+    def __init__(self, step):
+        turns = 2 * np.pi * (np.arange(64) - step) / 64
+        self.values = 3 + np.cos(turns) + 0.3 * np.sin(2 * turns)
+
+    def probes(self, _):
+        return {"still": np.zeros(64), "pin": self.values}
+
+
+@pytest.mark.parametrize("step", [0, 1, 17, 63])
+def test_cycles_that_are_compared_start_alike(step):
+    runs = [Shifted(0), Shifted(step)]
+    assert [plot_basis.start_of(run, runs) for run in runs] == [0, step]
+    assert np.roll(runs[1].values, -step) == pytest.approx(runs[0].values)
+    assert plot_basis.start_of(runs[1], runs[1:]) == 0  # alone
+
+
 def test_labels_keep_apart():
     """Places at least a gap apart, in order, within the axes while there is room; far ones stay where they are."""
     random = np.random.default_rng(1)
