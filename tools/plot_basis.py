@@ -5,7 +5,7 @@ import common
 common.needs("matplotlib", "numpy")
 import matplotlib
 import numpy as np
-from common import BLUE, ORANGE, RED
+from common import BLUE, ORANGE, RED  # noqa: F401, of the pictures too
 from squeal import Missing
 
 OPEN, STICK, SLIP = "#c9c9c9", ORANGE, BLUE  # of the contact states 0, 1 and 2
