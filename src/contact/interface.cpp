@@ -160,6 +160,22 @@ std::vector<double> relative(const Interface& interface, Vec x)
   return all_entries(rows);
 }
 
+std::vector<double> contact_velocity(const Interface& interface, Vec v)
+{
+  std::vector<double> result = relative(interface, v);
+  const TangentView drive(interface.drive, interface.directions);
+  for (std::size_t pair = 0; pair < interface.gap.size(); ++pair)
+    for (std::size_t k = 0; k < drive.of(pair).size(); ++k)
+      PairView(result, interface.directions).tangential(pair)[k] -= drive.of(pair)[k];
+  return result;
+}
+
+std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions, Vec v)
+{
+  if (interface.friction.decay_speed == 0) return contact_status(interface, reactions, std::vector<double>{});
+  return contact_status(interface, reactions, contact_velocity(interface, v));
+}
+
 void add_reactions(const Interface& interface, const std::vector<double>& r, Vec y)
 {
   Owned<Vec> rows;

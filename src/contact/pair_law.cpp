@@ -164,6 +164,41 @@ PairVector slip_in_space(const PairBlock& A, const PairVector& q, double mu, con
   return last; // the residual says that this pair is not solved
 }
 
+PairVector slip_at(const PairBlock& A, const PairVector& q, int directions, double mu, const PairVector& last)
+{
+  return directions == 1 ? slip_in_plane(A, q, mu, last) : slip_in_space(A, q, mu, last);
+}
+
+/// Slip at the speed v that its own mu(v) leaves, between rest, where mu is too small to stick, and the greatest speed
+/// of constant friction. By false position (Illinois).
+PairVector slip_at_own_speed(const PairBlock& A, const PairVector& q, int directions, const FrictionLaw& law,
+                             const PairVector& last)
+{
+  PairVector r{};
+  const auto speed_of = [&](double mu)
+  {
+    r = slip_at(A, q, directions, mu, last);
+    const PairVector w = pair_velocity(A, r, q);
+    return length(w[1], w[2]);
+  };
+  const auto excess = [&](double v) { return speed_of(friction_coefficient(law, v).value) - v; };
+  double low = 0, at_low = excess(0);
+  if (at_low <= 0) return r;
+  double high = std::max(at_low, speed_of(law.coefficient)), at_high = excess(high);
+  for (int doubling = 0; at_high > 0 && doubling < 60; ++doubling) high *= 2, at_high = excess(high);
+  for (int pass = 0; pass < 100 && at_high != 0 && high - low > 4e-16 * high; ++pass)
+  {
+    const double middle = (low * at_high - high * at_low) / (at_high - at_low), value = excess(middle);
+    if (middle <= low || middle >= high || value == 0) return r;
+    if ((value > 0) == (at_low > 0))
+      low = middle, at_low = value, at_high /= 2;
+    else
+      high = middle, at_high = value, at_low /= 2;
+    if (std::abs(value) <= 1e-15 * middle) return r;
+  }
+  return r;
+}
+
 } // namespace
 
 SlidingFriction sliding_friction(const FrictionLaw& law, double r_n, std::span<const double> s)
@@ -178,7 +213,8 @@ SlidingFriction sliding_friction(const FrictionLaw& law, double r_n, std::span<c
     for (std::size_t l = 0; l < s.size(); ++l)
     {
       const double parallel = s[k] * s[l] / (speed * speed);
-      result.damping[k][l] = r_n * (mu.value / speed * ((k == l ? 1 : 0) - parallel) + mu.derivative * parallel);
+      result.damping_of_speed[k][l] = r_n * mu.derivative * parallel;
+      result.damping[k][l] = r_n * mu.value / speed * ((k == l ? 1 : 0) - parallel) + result.damping_of_speed[k][l];
     }
   }
   return result;
@@ -205,26 +241,30 @@ PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, c
                       const PairVector& last)
 {
   if (q[0] >= 0 || A[0][0] <= 0) return {};
-  const double mu = coefficient_at(law, pair_velocity(A, last, q));
-  if (mu == 0) return {-q[0] / A[0][0], 0, 0};
+  const double mu = friction_coefficient(law, 0).value; // of stick
+  if (mu == 0 && law.coefficient == 0) return {-q[0] / A[0][0], 0, 0};
   if (const auto r = stick(A, q); r && (*r)[0] >= 0 && length((*r)[1], (*r)[2]) <= mu * (*r)[0]) return *r;
-  return directions == 1 ? slip_in_plane(A, q, mu, last) : slip_in_space(A, q, mu, last);
+  return law.decay_speed == 0 ? slip_at(A, q, directions, mu, last) : slip_at_own_speed(A, q, directions, law, last);
 }
 
-ContactStatus contact_status(const PairVector& r, const FrictionLaw& law, double largest)
+ContactStatus contact_status(const PairVector& r, const PairVector& w, const FrictionLaw& law, double largest)
 {
   if (r[0] <= 0) return ContactStatus::open;
   const double limit = friction_coefficient(law, 0).value * r[0];
-  return limit - length(r[1], r[2]) > 1e-8 * largest ? ContactStatus::stick : ContactStatus::slip;
+  if (limit - length(r[1], r[2]) <= 1e-8 * largest) return ContactStatus::slip;
+  if (law.decay_speed == 0) return ContactStatus::stick;
+  return length(w[1], w[2]) < 1e-5 * law.decay_speed ? ContactStatus::stick : ContactStatus::slip;
 }
 
-std::vector<ContactStatus> contact_status(PairView<const double> reactions, const FrictionLaw& law)
+std::vector<ContactStatus> contact_status(PairView<const double> reactions, PairView<const double> w,
+                                          const FrictionLaw& law)
 {
   double largest = 0;
   for (std::size_t pair = 0; pair < reactions.pairs(); ++pair) largest = std::max(largest, reactions.normal(pair));
   std::vector<ContactStatus> status;
   for (std::size_t pair = 0; pair < reactions.pairs(); ++pair)
-    status.push_back(contact_status(reactions.vector(pair), law, largest));
+    status.push_back(
+        contact_status(reactions.vector(pair), law.decay_speed == 0 ? PairVector{} : w.vector(pair), law, largest));
   return status;
 }
 

@@ -20,8 +20,9 @@ constexpr int plain_steps = 100; // a period of a model that the scene names
 std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
 {
   const ComplexMode& mode = problem.unstable.modes.front();
-  return step_refusal(problem.sliding.structure, &mode, problem.settings.theta,
-                      1 / mode.frequency_hz() / steps_per_period, problem.step);
+  const double h = 1 / mode.frequency_hz() / steps_per_period, theta = problem.settings.theta;
+  const std::string reason = step_refusal(problem.sliding.structure, &mode, theta, h, problem.step);
+  return reason.empty() ? friction_refusal(problem.sliding, &mode, theta, h, problem.step) : reason;
 }
 
 /// The settings, with steps and tolerance where the scene leaves them open.

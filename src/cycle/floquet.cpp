@@ -33,7 +33,7 @@ std::vector<PairHistory> histories(const Interface& interface, std::span<const s
   for (const std::vector<StepRecord>& records : periods)
     for (const StepRecord& record : records)
     {
-      const std::vector<ContactStatus> status = contact_status(interface, record.reactions);
+      const std::vector<ContactStatus> status = contact_status(interface, record.reactions, record.contact_velocity);
       const PairView r(record.reactions, interface.directions), w(record.contact_velocity, interface.directions);
       for (std::size_t i = 0; i < pairs.size(); ++i)
       {

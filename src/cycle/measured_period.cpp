@@ -52,7 +52,7 @@ MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double
   int done = 0;
   const auto watch = [&](const State& now, const StepReport&, const StepWork&)
   {
-    measured.statuses.push_back(contact_status(map.sliding.interface, now.reactions));
+    measured.statuses.push_back(contact_status(map.sliding.interface, now.reactions, now.v));
     // evenly spread over the period whatever the two numbers
     if ((done + 1) * samples / map.steps > done * samples / map.steps) measured.displacements.push_back(copy_of(now.u));
     if (++done + 1 == map.steps && rate) keep_for_rate(now);

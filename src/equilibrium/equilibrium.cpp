@@ -229,8 +229,10 @@ void check_solution(const Structure& structure, const Interface& interface, cons
 }
 
 /// The outcome of a search that found nothing.
-Outcome failure(const StatusSolution& solution, double friction)
+Outcome failure(const StatusSolution& solution, const Interface& interface)
 {
+  const std::vector<double> mu = drive_friction(interface);
+  const double friction = mu.empty() ? 0 : *std::max_element(mu.begin(), mu.end());
   Outcome outcome{OutcomeKind::no_equilibrium, "", solution.iterations, 1};
   if (solution.outcome == StatusOutcome::cycles)
     outcome.reason = format("the sets of closed pairs repeat without end at mu = %g: friction is too large", friction);
@@ -316,7 +318,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   equilibrium.closed = search.solution.closed;
   if (search.solution.outcome != StatusOutcome::converged)
   {
-    equilibrium.outcome = failure(search.solution, interface.friction.coefficient);
+    equilibrium.outcome = failure(search.solution, interface);
     equilibrium.reactions.assign(interface.size(), 0.);
     check(VecSet(equilibrium.u, 0));
     return equilibrium;

@@ -265,7 +265,7 @@ namespace
 
 /// damping of sliding_friction at -v_d for the pairs that are closed, on the rows of B; null if it is zero.
 Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>& closed,
-                            const std::vector<double>& reactions)
+                            const std::vector<double>& reactions, FrictionDamping part)
 {
   const PairRows<PetscInt> rows(interface.directions);
   const TangentView drive(interface.drive, interface.directions);
@@ -281,11 +281,12 @@ Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>&
     const double reaction = PairView(reactions, interface.directions).normal(i);
     if (!closed[i] || reaction <= 0) continue;
     const SlidingFriction friction = sliding_friction(interface.friction, reaction, drive.of(i)); // even in s
+    const auto& damping = part == FrictionDamping::whole ? friction.damping : friction.damping_of_speed;
     const PetscInt tangential = rows.tangential(static_cast<PetscInt>(i));
     for (PetscInt k = 0; k < rows.directions; ++k)
       for (PetscInt l = 0; l < rows.directions; ++l)
       {
-        const double value = friction.damping[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)];
+        const double value = damping[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)];
         any = any || value != 0;
         if (tangential + k >= first && tangential + k < last)
           check(MatSetValue(result, tangential + k, tangential + l, value, INSERT_VALUES));
@@ -299,10 +300,10 @@ Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>&
 
 } // namespace
 
-Owned<Mat> direction_damping(const Interface& interface, const std::vector<char>& closed,
-                             const std::vector<double>& reactions)
+Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,
+                            const std::vector<double>& reactions, FrictionDamping part)
 {
-  const Owned<Mat> damping = damping_of_pairs(interface, closed, reactions);
+  const Owned<Mat> damping = damping_of_pairs(interface, closed, reactions, part);
   if (!damping.get()) return {};
   return project(damping, interface.B, interface.B);
 }
@@ -326,9 +327,9 @@ LinearisedSliding linearise(const SlidingEquilibrium& sliding)
   LinearisedSliding result;
   result.contact = eliminate_closed_pairs(structure, interface, equilibrium.closed);
   check(MatDuplicate(structure.C, MAT_COPY_VALUES, result.C.put()));
-  if (interface.friction.direction_damping)
-    if (const Owned<Mat> Cf = direction_damping(interface, equilibrium.closed, equilibrium.reactions); Cf.get())
-      check(MatAXPY(result.C, 1, Cf, UNKNOWN_NONZERO_PATTERN));
+  const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
+  if (const Owned<Mat> Cf = friction_damping(interface, equilibrium.closed, equilibrium.reactions, part); Cf.get())
+    check(MatAXPY(result.C, 1, Cf, UNKNOWN_NONZERO_PATTERN));
   for (const auto& [A, rows] : {std::pair{structure.M.get(), &result.reaction.M},
                                 {result.C.get(), &result.reaction.C},
                                 {structure.K.get(), &result.reaction.K}})

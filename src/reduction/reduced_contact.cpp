@@ -29,7 +29,7 @@ struct Iterate
   VectorXd& w;      // W r + b
   double speed = 0; // [m/s] the largest of b
   int directions = map.model.directions;
-  const FrictionLaw& friction = map.model.friction;
+  FrictionLaw friction = law_of_step(map.model.friction, map.theta);
   PairRows<Index> rows{directions};
 
   std::size_t pairs() const { return map.own.size(); }
@@ -67,7 +67,8 @@ void admit(Iterate& iterate)
 std::vector<PairVector> pushes(const Iterate& iterate)
 {
   const std::vector<ContactStatus> status =
-      contact_status(PairView<const double>(iterate.r, iterate.directions), iterate.friction);
+      contact_status(PairView<const double>(iterate.r, iterate.directions),
+                     PairView<const double>(iterate.w, iterate.directions), iterate.friction);
   std::vector<PairVector> result;
   for (std::size_t pair = 0; pair < iterate.pairs(); ++pair)
   {

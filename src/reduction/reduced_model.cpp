@@ -344,7 +344,8 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
   if (reduction.sliding)
     for (const int pair : active) follows[static_cast<std::size_t>(pair)] = 1; // no reaction while open
-  if (const Owned<Mat> turning = direction_damping(interface, follows, roles.reactions); turning.get())
+  if (const Owned<Mat> turning = friction_damping(interface, follows, roles.reactions, FrictionDamping::whole);
+      turning.get())
   {
     const std::vector<PetscInt> turns = own_rows(turning);
     model.C += inner_products(rows_of(left, turns), rows_of(product(turning, X), turns));

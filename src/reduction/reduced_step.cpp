@@ -84,6 +84,16 @@ VectorXd free_contact_velocity(const ReducedMap& map, const ReducedState& state,
   return b;
 }
 
+/// G v - v_d, whose normal rows are of no use.
+VectorXd contact_velocity(const ReducedModel& model, VectorXd velocity)
+{
+  const PairView<double> result(velocity, model.directions);
+  const TangentView drive(model.drive, model.directions);
+  for (std::size_t i = 0; i < result.pairs(); ++i)
+    for (std::size_t k = 0; k < drive.of(i).size(); ++k) result.tangential(i)[k] -= drive.of(i)[k];
+  return velocity;
+}
+
 /// Solves contact, again as long as a pair is turned by its past sliding. Returns whether it converged.
 bool find_reactions(const ReducedMap& map, const ReducedState& state, const VectorXd& v_free, ReducedContact& contact)
 {
@@ -93,8 +103,11 @@ bool find_reactions(const ReducedMap& map, const ReducedState& state, const Vect
   const MatrixXd rates = model.G * both;
   const VectorXd free = free_contact_velocity(map, state, rates), velocity = rates.col(1);
   const auto reactions = [&] { return PairView<const double>(contact.r, model.directions); };
-  contact.past = past_sliding(PairView(velocity, model.directions), TangentView(model.drive, model.directions),
-                              contact_status(reactions(), model.friction), (1 - map.theta) / map.theta);
+  const VectorXd sliding = contact_velocity(model, velocity);
+  contact.past =
+      past_sliding(PairView(velocity, model.directions), TangentView(model.drive, model.directions),
+                   contact_status(reactions(), PairView<const double>(sliding, model.directions), model.friction),
+                   (1 - map.theta) / map.theta);
   const auto b = [&] { return VectorXd(free + VectorXd::Map(contact.past.data(), free.size())); };
   bool converged = solve_contact(map, b(), contact);
   while (leave_out_where_turned(reactions(), PairView<const double>(contact.w, model.directions),

@@ -38,6 +38,7 @@ public:
     }
     for (const Contact& contact : scene_.contacts) check_contact(contact);
     for (const Probe& probe : scene_.probes) check_probe(probe);
+    check_friction();
     check_transient();
     check_cycle();
   }
@@ -166,9 +167,18 @@ private:
       fail(&contact.rotor, "[[contact]] between points needs the key 'normal', out of the rotor into the stator");
     if (contact.rotation && contact.velocity != Vec3{})
       fail(&contact.velocity, "[[contact]] rotation and velocity exclude each other: keep one");
-    if (!contact.rotation && contact.velocity == Vec3{} && scene_.friction.coefficient > 0)
+    if (!contact.rotation && contact.velocity == Vec3{} &&
+        std::max(scene_.friction.coefficient, scene_.friction.static_coefficient) > 0)
       fail(&contact.rotor, "[[contact]] needs a rotation or a velocity that drives the rotor where there is friction");
     check_frame(contact);
+  }
+
+  void check_friction() const
+  {
+    const FrictionLaw& f = scene_.friction;
+    if ((f.static_coefficient > 0) != (f.decay_speed > 0))
+      fail(f.decay_speed > 0 ? static_cast<const void*>(&f.decay_speed) : &f.static_coefficient,
+           "[friction] static_coefficient and decay_speed go together: give both, or coefficient alone");
   }
 
   void check_frame(const Contact& contact) const

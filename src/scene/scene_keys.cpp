@@ -146,7 +146,11 @@ SceneKeys keys_of(Contact& c)
 SceneKeys keys_of(FrictionLaw& f)
 {
   return {
-      {"coefficient", &f.coefficient, optional, Rule::not_negative, "-", "Coulomb's mu"},
+      {"coefficient", &f.coefficient, optional, Rule::not_negative, "-",
+       "Coulomb's mu; with decay_speed at high speed"},
+      {"static_coefficient", &f.static_coefficient, optional, Rule::not_negative, "-", "mu at rest, with decay_speed"},
+      {"decay_speed", &f.decay_speed, optional, Rule::not_negative, "m/s",
+       "mu goes as exp(-speed/decay_speed) from rest to high speed; 0: constant"},
       {"direction_damping", &f.direction_damping, optional, Rule::any, "switch",
        "keep mu r_n/|v_d| (I - e e') in the modes"},
   };

@@ -204,8 +204,8 @@ Contribution element_contribution(const Mesh& mesh, const Scene& scene, std::siz
   try
   {
     ElementMatrices matrices = element_matrices(element.shape, x, part.material, part.thickness);
-    const auto [alpha, beta] = part.damping.value_or(scene.damping);
-    Eigen::MatrixXd C = alpha * matrices.mass + beta * matrices.stiffness;
+    const RayleighDamping damping = part.damping.value_or(scene.damping);
+    Eigen::MatrixXd C = damping.alpha * matrices.mass + damping.beta * matrices.stiffness;
     return {nodal_dofs_of(element), std::move(matrices.mass), std::move(C), std::move(matrices.stiffness)};
   }
   catch (const std::runtime_error& error)

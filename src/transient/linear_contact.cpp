@@ -1,5 +1,6 @@
 #include "linear_contact.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace squeal
@@ -23,12 +24,6 @@ void regularise(MatrixXd& A, Index rows)
       A(i, i) *= 1 + 1e-10;
 }
 
-/// 1 - e e'
-MatrixXd across(const VectorXd& e)
-{
-  return MatrixXd::Identity(e.size(), e.size()) - e * e.transpose();
-}
-
 } // namespace
 
 LinearContact::LinearContact(const ContactOperator& W, const FrictionLaw& law, const StepRecord& record,
@@ -45,10 +40,14 @@ LinearContact::LinearContact(const ContactOperator& W, const FrictionLaw& law, c
     if (slips)
     {
       const VectorXd s = VectorXd::Map(velocity.tangential(pair).data(), directions_);
-      const double speed = std::max(s.norm(), 1e-300), mu = friction_coefficient(law, speed).value;
-      const double reaction = reactions.normal(pair);
-      slips_.push_back({static_cast<Index>(rows_.size()), static_cast<Index>(following.size()), s / speed, mu,
-                        mu * reaction / speed, reaction});
+      const double speed = std::max(s.norm(), 1e-300), reaction = reactions.normal(pair);
+      const FrictionCoefficient mu = friction_coefficient(law, speed);
+      const VectorXd e = s / speed;
+      const MatrixXd along = e * e.transpose();
+      slips_.push_back({static_cast<Index>(rows_.size()), static_cast<Index>(following.size()), e, mu.value,
+                        mu.value * reaction / speed * (MatrixXd::Identity(directions_, directions_) - along) +
+                            mu.derivative * reaction * along,
+                        reaction * share_of_coefficient(law, speed)});
     }
     const auto own = static_cast<Index>(pair);
     rows_.push_back(rows.normal(own));
@@ -67,8 +66,7 @@ MatrixXd LinearContact::by_whole_system(const MatrixXd& db, const VectorXd& dmu)
     MatrixXd A = W_;
     for (const Slip& slip : slips_)
     {
-      const MatrixXd turn = slip.tau * across(slip.e);
-      A.middleRows(slip.first, directions_) = (turn * W_.middleRows(slip.first, directions_)).eval();
+      A.middleRows(slip.first, directions_) = (slip.S * W_.middleRows(slip.first, directions_)).eval();
       A.block(slip.first, slip.first, directions_, directions_).diagonal().array() += 1;
       A.block(slip.first, slip.normal, directions_, 1) += slip.mu * slip.e;
     }
@@ -77,9 +75,8 @@ MatrixXd LinearContact::by_whole_system(const MatrixXd& db, const VectorXd& dmu)
   }
   MatrixXd right = -db;
   for (const Slip& slip : slips_)
-    right.middleRows(slip.first, directions_) = (slip.tau * across(slip.e) * right.middleRows(slip.first, directions_) -
-                                                 slip.reaction * slip.e * dmu.transpose())
-                                                    .eval();
+    right.middleRows(slip.first, directions_) =
+        (slip.S * right.middleRows(slip.first, directions_) - slip.by_coefficient * slip.e * dmu.transpose()).eval();
   return whole_lu_->solve(right);
 }
 
@@ -94,28 +91,29 @@ bool LinearContact::by_fixed_point(const MatrixXd& db, const VectorXd& dmu, Matr
     regularise(A, leading_);
     leading_lu_.emplace(A);
   }
-  MatrixXd turned = MatrixXd::Zero(following, columns); // tau (1 - e e') dw_t
+  MatrixXd turned = MatrixXd::Zero(following, columns); // S dw_t
+  const bool alone = std::all_of(slips_.begin(), slips_.end(), [](const Slip& slip) { return slip.S.isZero(0); });
   double last = HUGE_VAL;
   for (int pass = 0; pass < 30; ++pass)
   {
     dr.resize(W_.rows(), columns);
     dr.bottomRows(following) = -turned;
-    for (const Slip& slip : slips_) dr.middleRows(slip.first, directions_) -= slip.reaction * slip.e * dmu.transpose();
+    for (const Slip& slip : slips_)
+      dr.middleRows(slip.first, directions_) -= slip.by_coefficient * slip.e * dmu.transpose();
     MatrixXd right = -db.topRows(leading_);
     right.noalias() -= W_.topRightCorner(leading_, following) * dr.bottomRows(following);
     dr.topRows(leading_) = leading_lu_->solve(right);
     for (const Slip& slip : slips_) dr.middleRows(slip.first, directions_) -= slip.mu * slip.e * dr.row(slip.normal);
-    if (directions_ == 1 || slips_.empty()) return true;
+    if (alone) return true;
     MatrixXd dw = db.bottomRows(following);
     dw.noalias() += W_.bottomRows(following) * dr;
     double change = 0;
     for (const Slip& slip : slips_)
     {
       const Index at = slip.first - leading_;
-      const MatrixXd turn = slip.tau * across(slip.e),
-                     own = turn * W_.block(slip.first, slip.first, directions_, directions_);
+      const MatrixXd own = slip.S * W_.block(slip.first, slip.first, directions_, directions_);
       const MatrixXd next = (MatrixXd::Identity(directions_, directions_) + own).inverse() *
-                            (turn * dw.middleRows(at, directions_) + own * turned.middleRows(at, directions_));
+                            (slip.S * dw.middleRows(at, directions_) + own * turned.middleRows(at, directions_));
       change = std::max(change, (next - turned.middleRows(at, directions_)).cwiseAbs().maxCoeff());
       turned.middleRows(at, directions_) = next;
     }

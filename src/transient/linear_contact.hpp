@@ -1,13 +1,13 @@
 #pragma once
 /// Contact of one step, linearised at its solution (src/README.md, section 4.13): dr for changes db of w = W r + b,
 ///     dw = W dr + db;   open: dr = 0;   closed: dw_n = 0
-///     stick: dw_t = 0;  slip: dr_t + mu e dr_n + tau (1 - e e') dw_t = -r_n e dmu,   e = w_t/|w_t|, tau = mu
-///     r_n/|w_t|.
+///     stick: dw_t = 0;  slip: dr_t + mu e dr_n + S dw_t = -r_n e dmu,   e = w_t/|w_t|,
+///     S = mu r_n/|w_t| (1 - e e') + mu' r_n e e'.
 ///
-/// Normal rows and those of stick are the first unknowns; friction of slip follows. With one tangential direction the
-/// term of tau vanishes and one factorisation of the first unknowns' system is exact. With two the term of tau is left
-/// to a fixed point, which contracts fast where w_t is large beside its changes. Where it does not contract, the system
-/// of all rows is factored.
+/// Normal rows and those of stick are the first unknowns; friction of slip follows. Where S is zero, with one
+/// tangential direction and constant mu, one factorisation of the first unknowns' system is exact. Else the term of S
+/// is left to a fixed point, which contracts fast where w_t is large beside its changes. Where it does not contract,
+/// the system of all rows is factored.
 #include "squeal/contact/interface.hpp"
 #include "squeal/contact/solver.hpp"
 #include "squeal/transient/step_record.hpp"
@@ -26,7 +26,7 @@ public:
   LinearContact(const ContactOperator& W, const FrictionLaw& law, const StepRecord& record,
                 std::span<const ContactStatus> statuses);
 
-  /// dr of each column of db, dmu of each; every row of W, zeros on open pairs.
+  /// dr of each column of db, with the change of the law's coefficient of each; every row of W, zeros on open pairs.
   Eigen::MatrixXd response(const Eigen::MatrixXd& db, const Eigen::VectorXd& dmu);
 
 private:
@@ -34,8 +34,9 @@ private:
   {
     Eigen::Index normal = 0, first = 0; // places of its normal and of its first tangential row among the rows
     Eigen::VectorXd e;                  // [-]
-    double mu = 0, tau = 0;             // [-], [N s/m]
-    double reaction = 0;                // [N] r_n
+    double mu = 0;                      // [-]
+    Eigen::MatrixXd S;                  // [N s/m]
+    double by_coefficient = 0;          // [N] r_n dmu/d(coefficient)
   };
 
   Eigen::MatrixXd by_whole_system(const Eigen::MatrixXd& db, const Eigen::VectorXd& dmu);

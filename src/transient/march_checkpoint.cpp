@@ -106,7 +106,7 @@ Checkpoint MarchCheckpoint::made(const MarchProgress& progress) const
   checkpoint.set("summary",
                  std::vector<double>{static_cast<double>(summary.steps), static_cast<double>(summary.unconverged),
                                      summary.first_unconverged, summary.contact_residual_max, summary.energy_defect_max,
-                                     progress.iterations, slides_ ? 1. : 0.});
+                                     progress.iterations, slides_ ? 1. : 0., summary.fall_of_friction_max});
   checkpoint.set("amplitude time", amplitude_.time);
   checkpoint.set("amplitude logarithm", amplitude_.log_modulus);
   for_each_list(progress.history, [&](const std::string& name, const auto& list) { checkpoint.set(name, list); });
@@ -144,6 +144,7 @@ void MarchCheckpoint::read(const Checkpoint& checkpoint, const MarchProgress& pr
   progress.summary.energy_defect_max = summary.at(4);
   progress.iterations = summary.at(5);
   slides_ = summary.at(6) != 0;
+  progress.summary.fall_of_friction_max = summary.at(7);
   amplitude_.time = checkpoint.list("amplitude time");
   amplitude_.log_modulus = checkpoint.list("amplitude logarithm");
   for_each_list(progress.history,

@@ -65,7 +65,7 @@ std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector
     const std::vector<double> velocity = relative(interface, states[k].v);
     problems[k].past =
         past_sliding(PairView(velocity, interface.directions), TangentView(interface.drive, interface.directions),
-                     contact_status(interface, states[k].reactions), weight);
+                     contact_status(interface, states[k].reactions, states[k].v), weight);
   }
   return problems;
 }
@@ -75,6 +75,16 @@ std::vector<double> sum(const std::vector<double>& a, const std::vector<double>&
   std::vector<double> result = a;
   for (std::size_t i = 0; i < result.size(); ++i) result[i] += b[i];
   return result;
+}
+
+/// The largest |mu'| r_n W_t of a pair, with the steepest fall of mu and the pair's own tangential compliance.
+double fall_at_pairs(const ContactOperator& W, const FrictionLaw& law, const std::vector<double>& reactions)
+{
+  const double fall = steepest_fall(law);
+  double largest = 0;
+  for (std::size_t i = 0; fall > 0 && i < W.pairs(); ++i)
+    largest = std::max(largest, fall * PairView(reactions, W.directions()).normal(i) / W.scale(i).tangential);
+  return largest;
 }
 
 /// Solves the problems of these trajectories; returns those that are to be solved again, with less past sliding.
@@ -87,7 +97,8 @@ std::vector<std::size_t> solve_once(const StepBatch& batch, std::vector<StepProb
   std::vector<ContactProblem> unsolved;
   for (std::size_t j = 0; j < trajectories.size(); ++j)
     unsolved.push_back({b[j], states[trajectories[j]].reactions, works[trajectories[j]].memory});
-  const std::vector<ContactResult> results = solve_contacts(step.W, interface.friction, step.contact, unsolved);
+  const FrictionLaw law = law_of_step(step, interface.friction);
+  const std::vector<ContactResult> results = solve_contacts(step.W, law, step.contact, unsolved);
   std::vector<std::size_t> again;
   for (std::size_t j = 0; j < trajectories.size(); ++j)
   {
@@ -96,6 +107,7 @@ std::vector<std::size_t> solve_once(const StepBatch& batch, std::vector<StepProb
     report.contact_iterations += results[j].iterations;
     report.contact_residual = results[j].residual;
     report.contact_converged = results[j].converged;
+    report.fall_of_friction = fall_at_pairs(step.W, law, states[k].reactions);
     const std::vector<double> w = sum(works[k].memory.Wr.front(), b[j]);
     if (works[k].record) works[k].record->contact_velocity = w;
     if (leave_out_where_turned(PairView<const double>(states[k].reactions, interface.directions),
@@ -110,7 +122,7 @@ std::vector<std::size_t> solve_once(const StepBatch& batch, std::vector<StepProb
 void share_from_rank_zero(const StepBatch& batch, const std::string& problem)
 {
   const MPI_Comm comm = comm_of(batch.interface.B);
-  const std::size_t size = batch.interface.size(), length = size + 3;
+  const std::size_t size = batch.interface.size(), length = size + 4;
   std::vector<double> message(1 + length * batch.states.size());
   message[0] = problem.empty() ? 0 : 1;
   for (std::size_t k = 0; k < batch.states.size(); ++k)
@@ -120,7 +132,8 @@ void share_from_rank_zero(const StepBatch& batch, const std::string& problem)
     entries[0] = report.contact_iterations;
     entries[1] = report.contact_residual;
     entries[2] = report.contact_converged ? 1 : 0;
-    std::copy(batch.states[k].reactions.begin(), batch.states[k].reactions.end(), entries + 3);
+    entries[3] = report.fall_of_friction;
+    std::copy(batch.states[k].reactions.begin(), batch.states[k].reactions.end(), entries + 4);
   }
   MPI_Bcast(message.data(), static_cast<int>(message.size()), MPI_DOUBLE, 0, comm);
   if (message[0] != 0) agree(comm, problem);
@@ -131,7 +144,8 @@ void share_from_rank_zero(const StepBatch& batch, const std::string& problem)
     report.contact_iterations = static_cast<int>(entries[0]);
     report.contact_residual = entries[1];
     report.contact_converged = entries[2] != 0;
-    std::copy_n(entries + 3, size, batch.states[k].reactions.begin());
+    report.fall_of_friction = entries[3];
+    std::copy_n(entries + 4, size, batch.states[k].reactions.begin());
   }
 }
 

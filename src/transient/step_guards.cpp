@@ -1,7 +1,5 @@
 #include "squeal/transient/step_guards.hpp"
 
-#include "squeal/transient/theta_step.hpp"
-
 #include <cmath>
 #include <numbers>
 
@@ -60,6 +58,34 @@ struct FreeStep
   }
 };
 
+/// Times sqrt(r_n) of each pair on its tangential rows, and zero on normal ones.
+void scale_by_roots(const std::vector<double>& reactions, int directions, std::vector<double>& x)
+{
+  const PairView<double> scaled(x, directions);
+  const PairView r(reactions, directions);
+  for (std::size_t i = 0; i < scaled.pairs(); ++i)
+  {
+    scaled.normal(i) = 0;
+    for (double& entry : scaled.tangential(i)) entry *= std::sqrt(std::max(0., r.normal(i)));
+  }
+}
+
+/// A step size, below h, with one solution a step; 0 if there is none, as where a pair's nodes have no mass.
+double step_with_one_solution(const SlidingEquilibrium& sliding, double theta, double h, double fall,
+                              const StepOptions& options)
+{
+  constexpr int attempts = 8;
+  for (int attempt = 0; attempt < attempts; ++attempt)
+  {
+    h *= 0.9 / fall; // W grows as h at most while h is large
+    const ThetaStep step = make_theta_step(sliding.structure, sliding.interface, h, theta, options);
+    const double now = fall_of_friction(step, sliding.interface, sliding.equilibrium.reactions);
+    if (now < 1) return h;
+    fall = std::max(now, 1.5);
+  }
+  return 0;
+}
+
 } // namespace
 
 std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h)
@@ -105,6 +131,54 @@ std::string step_refusal(const Structure& structure, const ComplexMode* mode, do
   return format("with theta = %.4g a step of %.4g s multiplies free vibrations by exp(%.4g), more than damping takes: "
                 "theta = 1/2 needs no damping, theta below it a shorter step",
                 theta, h, growth);
+}
+
+double fall_of_friction(const ThetaStep& step, const Interface& interface, const std::vector<double>& reactions)
+{
+  const double fall = steepest_fall(law_of_step(step, interface.friction));
+  if (fall == 0 || interface.pairs == 0) return 0;
+  double largest = 0;
+  on_rank_zero(comm_of(interface.B),
+               [&]
+               {
+                 // power iteration on sqrt(r_n) W_tt sqrt(r_n)
+                 std::vector<double> x(interface.size(), 0.), y = x;
+                 const PairView<double> start(x, interface.directions);
+                 for (std::size_t i = 0; i < start.pairs(); ++i)
+                   for (double& entry : start.tangential(i)) entry = 1 + 0.1 * std::sin(static_cast<double>(i));
+                 for (int pass = 0; pass < 30; ++pass)
+                 {
+                   const double size = std::sqrt(dot(x, x));
+                   if (size == 0) break;
+                   for (double& entry : x) entry /= size;
+                   largest = size;
+                   scale_by_roots(reactions, interface.directions, x);
+                   const std::span<const double> in = x;
+                   const std::span<double> out = y;
+                   step.W.multiply(std::span(&in, 1), std::span(&out, 1));
+                   scale_by_roots(reactions, interface.directions, y);
+                   std::swap(x, y);
+                 }
+               });
+  MPI_Bcast(&largest, 1, MPI_DOUBLE, 0, comm_of(interface.B));
+  return fall * largest;
+}
+
+std::string friction_refusal(const SlidingEquilibrium& sliding, const ComplexMode* mode, double theta, double h,
+                             const StepOptions& options)
+{
+  if (!options.refuse || steepest_fall(sliding.interface.friction) == 0) return {};
+  const ThetaStep step = make_theta_step(sliding.structure, sliding.interface, h, theta, options);
+  const double fall = fall_of_friction(step, sliding.interface, sliding.equilibrium.reactions);
+  if (fall < 1) return {};
+  const std::string reason = format("friction falls so steeply with the speed that a step of %.4g s may have several "
+                                    "solutions, |mu'| r_n W_t = %.4g: ",
+                                    h, fall);
+  const double enough = step_with_one_solution(sliding, theta, h, fall, options);
+  if (enough == 0)
+    return reason + "no shorter step would do, since contact nodes have too little mass; raise friction.decay_speed";
+  if (!mode) return reason + format("a step of %.4g s would do", enough);
+  return reason + format("%.0f steps a period would do", std::ceil(two_pi / (std::abs(mode->lambda.imag()) * enough)));
 }
 
 } // namespace squeal

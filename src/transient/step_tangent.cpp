@@ -92,7 +92,8 @@ MatrixXd reactions(const ThetaStep& step, const Interface& interface, const Step
                  db += MatrixXd::Map(Bv_free.data(), db.rows(), db.cols());
                  VectorXd dmu(db.cols());
                  for (Index k = 0; k < dmu.size(); ++k) dmu(k) = columns[static_cast<std::size_t>(k)].friction;
-                 LinearContact contact(step.W, interface.friction, record, contact_status(interface, record.reactions));
+                 LinearContact contact(step.W, law_of_step(step, interface.friction), record,
+                                       contact_status(interface, record.reactions, record.contact_velocity));
                  dr = contact.response(db, dmu);
                });
   MPI_Bcast(dr.data(), static_cast<int>(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));

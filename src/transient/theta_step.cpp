@@ -216,7 +216,7 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
   for (std::size_t k = 0; k < states.size(); ++k)
   {
     StepWork& work = works[k];
-    for (const ContactStatus status : contact_status(interface, states[k].reactions))
+    for (const ContactStatus status : contact_status(interface, states[k].reactions, work.v_next))
       ++(status == ContactStatus::open    ? reports[k].open
          : status == ContactStatus::stick ? reports[k].stick
                                           : reports[k].slip);

@@ -75,9 +75,10 @@ void record(const StepReport& report, double h, const State& state, int directio
 
 /// Persistent sliding: the pairs closed at equilibrium are closed, none sticks, none slips backwards.
 bool slides_as_at_equilibrium(const Interface& interface, const Equilibrium& equilibrium,
-                              const std::vector<double>& drive, const std::vector<double>& reactions)
+                              const std::vector<double>& drive, const State& state)
 {
-  const std::vector<ContactStatus> status = contact_status(interface, reactions);
+  const std::vector<double>& reactions = state.reactions;
+  const std::vector<ContactStatus> status = contact_status(interface, reactions, state.v);
   for (std::size_t i = 0; i < status.size(); ++i)
   {
     if (equilibrium.closed[i] != (status[i] != ContactStatus::open)) return false;
@@ -120,6 +121,13 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
         format("contact did not converge in %ld of %ld steps, first at t = %.4g s (largest residual %.4g): "
                "raise -transient_contact_max_it or shorten the step",
                summary.unconverged, summary.steps, summary.first_unconverged, summary.contact_residual_max);
+  }
+  if (summary.fall_of_friction_max >= 1)
+  {
+    outcome.kind = OutcomeKind::not_converged;
+    outcome.reason = format("friction falls so steeply that a step may have had several solutions, |mu'| r_n W_t = "
+                            "%.4g: take at least %.3g times as many steps",
+                            summary.fall_of_friction_max, 1.1 * summary.fall_of_friction_max);
   }
   if (summary.interrupted)
   {
@@ -164,6 +172,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     ++summary.steps;
     if (!report.contact_converged && summary.unconverged++ == 0) summary.first_unconverged = state.time;
     summary.contact_residual_max = std::max(summary.contact_residual_max, report.contact_residual);
+    summary.fall_of_friction_max = std::max(summary.fall_of_friction_max, report.fall_of_friction);
     iterations += report.contact_iterations;
     const double defect = std::abs(report.energy_defect);
     const double scale = std::max({report.energy, std::abs(report.contact_work), std::abs(report.load_work)});
@@ -215,6 +224,8 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   Trajectory trajectory;
   const long steps = plan(trajectory, mode, settings);
   trajectory.outcome.reason = step_refusal(structure, mode, trajectory.theta, trajectory.step_size, options);
+  if (trajectory.outcome.reason.empty())
+    trajectory.outcome.reason = friction_refusal(sliding, mode, trajectory.theta, trajectory.step_size, options);
   if (!trajectory.outcome.reason.empty()) trajectory.outcome.kind = OutcomeKind::refused;
   trajectory.end = std::move(start);
   if (trajectory.outcome.kind == OutcomeKind::refused) return trajectory;
@@ -227,7 +238,7 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   Progress progress(comm_of(structure.load), "transient", static_cast<double>(steps));
   const Monitor watch = [&](const State& state, const StepReport& report, const StepWork& work)
   {
-    slides = slides && slides_as_at_equilibrium(interface, equilibrium, drive, state.reactions);
+    slides = slides && slides_as_at_equilibrium(interface, equilibrium, drive, state);
     if (slides) observe(amplitude, state.time, work.Ku, work.Mv);
     progress.update(static_cast<double>(trajectory.history.time.size()),
                     format("energy %.4g J, open %d, stick %d", report.energy, report.open, report.stick));

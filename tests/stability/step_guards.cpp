@@ -136,3 +136,88 @@ TEST_CASE("the refusal is lifted by its option only")
   CHECK(step_refusal(structure, nullptr, 0.4, 1, {.refuse = false}).empty());
   CHECK_FALSE(step_refusal(structure, nullptr, 0.4, 1, {}).empty());
 }
+
+namespace
+{
+
+/// Masses in a row on a belt, each pressed by 1 and tied to the next one.
+test::SmallModel row_on_belt(std::size_t masses, const FrictionLaw& law, double mass)
+{
+  test::SmallModel model;
+  const std::size_t n = 2 * masses;
+  test::Rows K = test::diagonal(std::vector<double>(n, 1.)), B = test::zeros(n, n);
+  std::vector<double> load(n, 0.), all(n, 1.);
+  for (std::size_t i = 0; i < masses; ++i)
+  {
+    B[2 * i][2 * i + 1] = B[2 * i + 1][2 * i] = 1; // x slides, y is pressed
+    load[2 * i + 1] = -1;
+    all[2 * i] = mass;
+    if (i > 0) K[2 * i][2 * i - 2] = K[2 * i - 2][2 * i] = -0.3;
+  }
+  model.structure = test::make_structure(test::diagonal(all), test::zeros(n, n), K, load);
+  model.interface = test::make_interface(B, 1, std::vector<double>(masses, 0.), std::vector<double>(masses, 0.5), 0,
+                                         model.structure.K);
+  model.interface.friction = law;
+  return model;
+}
+
+} // namespace
+
+TEST_CASE("a step that may have several solutions under falling friction is refused, with the steps that have one")
+{
+  const FrictionLaw law{0.2, true, 0.6, 0.01};
+  for (const std::size_t masses : {1, 5})
+  {
+    const test::SmallModel model = row_on_belt(masses, law, 2);
+    const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
+    const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
+    // the softest motion of the row has the stiffness 1 - 0.6 cos(pi/(masses + 1))
+    const double k = masses == 1 ? 1 : 1 - 0.6 * std::cos(std::numbers::pi / static_cast<double>(masses + 1));
+    const auto fall = [&](double h, double theta) { return theta * 0.4 / 0.01 * h / (2 + h * h * theta * theta * k); };
+    for (const double theta : {0.5, 0.8})
+      for (const double h : {0.01, 0.08, 0.3})
+      {
+        const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, {});
+        CHECK(fall_of_friction(step, model.interface, equilibrium.reactions) ==
+              doctest::Approx(fall(h, theta)).epsilon(1e-3)); // thirty passes of power iteration
+        CHECK(friction_refusal(sliding, nullptr, theta, h, {}).empty() == (fall(h, theta) < 1));
+        CHECK(friction_refusal(sliding, nullptr, theta, h, {.refuse = false}).empty());
+      }
+    ComplexMode mode;
+    mode.lambda = {0.1, 1};
+    const std::string reason = friction_refusal(sliding, &mode, 0.5, 0.3, {});
+    const std::size_t end = reason.find(" steps a period would do");
+    REQUIRE(end != std::string::npos);
+    const double steps = std::stod(reason.substr(reason.rfind(' ', end - 1)));
+    const double enough = 2 * std::numbers::pi / steps;
+    CHECK(friction_refusal(sliding, &mode, 0.5, enough, {}).empty());
+    CHECK(fall(enough, 0.5) > 0.5); // not far too many
+  }
+  const test::SmallModel rising = row_on_belt(1, {0.6, true, 0.2, 0.01}, 2);
+  const Equilibrium equilibrium = find_equilibrium(rising.structure, rising.interface, {});
+  CHECK(friction_refusal({rising.structure, rising.interface, equilibrium}, nullptr, 0.5, 1, {}).empty());
+}
+
+TEST_CASE("where contact nodes have no mass, no step has one solution under falling friction, and the refusal says so")
+{
+  const test::SmallModel model = row_on_belt(1, {0.2, true, 0.6, 0.01}, 0);
+  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
+  const std::string reason = friction_refusal({model.structure, model.interface, equilibrium}, nullptr, 0.5, 0.1, {});
+  CHECK(reason.find("no shorter step would do") != std::string::npos);
+}
+
+TEST_CASE("a transient whose reactions outgrow the guard says that steps may have had several solutions")
+{
+  test::SmallModel model = row_on_belt(1, {0.2, true, 0.6, 0.02}, 2); // |mu'| W = 0.9 at rest with the load of 1
+  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
+  TransientSettings settings;
+  settings.steps = 40;
+  settings.step_size = 0.18;
+  State start = test::state_of(model.structure, {0, 0}, {0, 0});
+  const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
+  CHECK(integrate(sliding, nullptr, settings, {}, copy_of(start), nullptr).outcome.kind == OutcomeKind::completed);
+  start = test::state_of(model.structure, {0, 0}, {0, -0.5}); // strikes the belt
+  const Trajectory trajectory = integrate(sliding, nullptr, settings, {}, copy_of(start), nullptr);
+  CHECK(trajectory.outcome.kind == OutcomeKind::not_converged);
+  CHECK(trajectory.outcome.reason.find("several solutions") != std::string::npos);
+}

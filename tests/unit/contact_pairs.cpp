@@ -64,24 +64,30 @@ TEST_CASE("row numbers, the blocks of a dense matrix and tangential vectors foll
 
 TEST_CASE("the derivatives of sliding friction are those of r_t = -mu r_n s/|s|")
 {
-  const FrictionLaw law{0.4};
   const double r_n = 7, d = 1e-6;
   const std::array<double, 2> s = {0.3, -0.2};
-  const SlidingFriction friction = sliding_friction(law, r_n, s);
-  for (std::size_t k = 0; k < 2; ++k)
+  for (const FrictionLaw& law : {FrictionLaw{0.4}, FrictionLaw{0.4, true, 0.7, 0.5}, FrictionLaw{0.4, true, 0.1, 2}})
   {
-    const double by_normal = (friction_force(law, r_n + d, s)[k] - friction_force(law, r_n - d, s)[k]) / (2 * d);
-    CHECK(std::abs(by_normal + friction.along[k]) < 1e-9); // differences of 1e-6: rounding 1e-10, curvature none
-    for (std::size_t l = 0; l < 2; ++l)
+    const SlidingFriction friction = sliding_friction(law, r_n, s);
+    for (std::size_t k = 0; k < 2; ++k)
     {
-      std::array<double, 2> more = s, less = s;
-      more[l] += d, less[l] -= d;
-      const double by_sliding = (friction_force(law, r_n, more)[k] - friction_force(law, r_n, less)[k]) / (2 * d);
-      CHECK(std::abs(by_sliding + friction.damping[k][l]) < 1e-8); // of 10 N s/m: rounding 1e-9, curvature 1e-10
+      const double by_normal = (friction_force(law, r_n + d, s)[k] - friction_force(law, r_n - d, s)[k]) / (2 * d);
+      CHECK(std::abs(by_normal + friction.along[k]) < 1e-9); // differences of 1e-6: rounding 1e-10, curvature none
+      for (std::size_t l = 0; l < 2; ++l)
+      {
+        std::array<double, 2> more = s, less = s;
+        more[l] += d, less[l] -= d;
+        const double by_sliding = (friction_force(law, r_n, more)[k] - friction_force(law, r_n, less)[k]) / (2 * d);
+        CHECK(std::abs(by_sliding + friction.damping[k][l]) < 1e-8); // of 10 N s/m: rounding 1e-9, curvature 1e-10
+      }
     }
+    const std::array<double, 2> rest = {0, 0};
+    CHECK(sliding_friction(law, r_n, rest).damping[0][0] == 0);
+    const double
+        more = friction_coefficient({law.coefficient + d, true, law.static_coefficient, law.decay_speed}, 1).value,
+        less = friction_coefficient({law.coefficient - d, true, law.static_coefficient, law.decay_speed}, 1).value;
+    CHECK(std::abs((more - less) / (2 * d) - share_of_coefficient(law, 1)) < 1e-9);
   }
-  const std::array<double, 2> rest = {0, 0};
-  CHECK(sliding_friction(law, r_n, rest).damping[0][0] == 0);
 }
 
 TEST_CASE("friction opposes s_theta, but s+ where the pair stuck or where its solution turns back")

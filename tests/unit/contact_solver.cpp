@@ -78,6 +78,60 @@ TEST_CASE("one pair: the local solution obeys Signorini's and Coulomb's laws to 
   CHECK(std::min({open, stick, slip}) > 1000); // every status was met
 }
 
+TEST_CASE(
+    "one pair: where friction depends on the speed, the local solution has the law's coefficient at its own speed")
+{
+  std::mt19937 random(5);
+  int stick = 0, slip = 0;
+  for (int trial = 0; trial < 4000; ++trial)
+  {
+    const int directions = 1 + trial % 2;
+    const FrictionLaw law = trial % 3 == 0 ? FrictionLaw{0.5, true, 0.3, 1} : FrictionLaw{0.3, true, 0.6, 1.5};
+    const std::size_t block = static_cast<std::size_t>(1 + directions);
+    const Vector W = random_spd(block, 0.3, random);
+    PairBlock A{};
+    PairVector q{-1, 0, 0}, last{};
+    for (std::size_t i = 0; i < block; ++i)
+    {
+      if (i > 0) q[i] = uniform(random);
+      last[i] = trial % 4 == 0 ? 0 : uniform(random);
+      for (std::size_t j = 0; j < block; ++j) A[i][j] = W[i * block + j];
+    }
+    const PairVector r = solve_pair(A, q, directions, law, last), w = pair_velocity(A, r, q);
+    const double sliding = std::hypot(w[1], w[2]), mu = friction_coefficient(law, sliding).value;
+    if (steepest_fall(law) * r[0] * (A[1][1] + A[2][2]) >= 1) continue; // it may have several solutions
+    CHECK(law_defect(r, w, mu) < 1e-11); // the speed is known to rounding, and mu with it
+    CHECK(natural_map(r, w, law, natural_scale(A, 0)) < 1e-11);
+    const ContactStatus status = contact_status(r, w, law, r[0]);
+    CHECK((status == ContactStatus::stick) == (sliding < 1e-9));
+    ++(status == ContactStatus::stick ? stick : slip);
+  }
+  CHECK(std::min(stick, slip) > 500);
+}
+
+TEST_CASE("Gauss-Seidel and the fixed point agree where friction depends on the speed")
+{
+  std::mt19937 random(19);
+  for (const int directions : {1, 2})
+  {
+    const std::size_t n = static_cast<std::size_t>(12 * (1 + directions));
+    const Vector W = random_spd(n, 0.3, random), b = random_velocity(n, random);
+    const ContactOperator op = make_contact_operator(W, 12, directions);
+    const FrictionLaw law{0.2, true, 0.4, 2};
+    Vector swept, projected;
+    CHECK(solve_contact(op, b, law, {ContactSolver::gauss_seidel, 1e-12, 1000, 0}, swept).converged);
+    CHECK(solve_contact(op, b, law, {ContactSolver::fixed_point, 1e-12, 20000, 0}, projected).converged);
+    CHECK(difference(swept, projected) < 1e-9); // as with constant friction
+    CHECK(difference(swept,
+                     [&]
+                     {
+                       Vector r;
+                       solve_contact(op, b, {0.2}, {}, r);
+                       return r;
+                     }()) > 1e-3);
+  }
+}
+
 TEST_CASE("a pair sticks below the Coulomb limit and slips above it, against the sliding")
 {
   const PairBlock A = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};

@@ -102,7 +102,8 @@ TEST_CASE("the equations of the structure hold with the reactions of each mode, 
   const Modes modes = test::modes_of(model, equilibrium, settings_of(ModesMethod::full), {});
   Owned<Mat> C;
   check(MatDuplicate(model.structure.C, MAT_COPY_VALUES, C.put()));
-  check(MatAXPY(C, 1, direction_damping(model.interface, equilibrium.closed, equilibrium.reactions),
+  check(MatAXPY(C, 1,
+                friction_damping(model.interface, equilibrium.closed, equilibrium.reactions, FrictionDamping::whole),
                 UNKNOWN_NONZERO_PATTERN));
   REQUIRE(modes.modes.size() == 9);
   for (const ComplexMode& mode : modes.modes)
@@ -131,7 +132,8 @@ TEST_CASE("C_f resists turning of the friction force and nothing else")
 {
   const SmallModel model = crowded_model(12, 1);
   const Equilibrium equilibrium = all_closed(model);
-  const Owned<Mat> Cf = direction_damping(model.interface, equilibrium.closed, equilibrium.reactions);
+  const Owned<Mat> Cf =
+      friction_damping(model.interface, equilibrium.closed, equilibrium.reactions, FrictionDamping::whole);
   const Owned<Vec> v = vector_like(model.structure.K, {1, -2, 0.5, 3, 1, 0, 0, 0, 0, 0, 0, 0}), force = zeros_like(v);
   check(MatMult(Cf, v, force));
   double power = 0;

@@ -62,10 +62,19 @@ enum class RowsTaken
 /// The rows of these pairs (ascending), all of each or the normal ones alone, in the same distribution. Collective.
 Owned<Mat> rows_of(const Interface& interface, const std::vector<int>& pairs, RowsTaken taken);
 
-/// Status of every pair at the end of a step, from its reactions.
-inline std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions)
+/// B v - v_d: the contact velocity at v, whole on every rank. Collective.
+std::vector<double> contact_velocity(const Interface& interface, Vec v);
+
+/// Status of every pair at the end of a step, from its reactions and contact velocities (contact_status of
+/// pair_law.hpp).
+inline std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions,
+                                                 const std::vector<double>& velocity)
 {
-  return contact_status(PairView(reactions, interface.directions), interface.friction);
+  return contact_status(PairView(reactions, interface.directions), PairView(velocity, interface.directions),
+                        interface.friction);
 }
+
+/// The same from the velocities v at the end of the step. Collective.
+std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions, Vec v);
 
 } // namespace squeal

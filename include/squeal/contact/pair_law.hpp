@@ -9,9 +9,8 @@
 /// w_t, a trigonometric polynomial of degree two in the angle of d (the quartic of Bonnefon and Daviet, 2011, in angle
 /// form): Newton from the last direction, a scan of the circle when that fails.
 ///
-/// Caveats: mu is constant today. The local problem takes mu at the speed that the last reaction leaves, so that sweeps
-/// would converge to a mu that depends on the speed, too; the natural map takes the speed at hand. The status of a pair
-/// is read off its reaction alone, which a mu that depends on the speed will not allow.
+/// Where mu depends on the speed, stick is judged by mu(0), and slip has the speed v with |w_t| = v at mu(v), which is
+/// unique while |mu'| r_n A_tt < 1. In a step w_t is s_theta/theta: `law_of_step` takes mu at s_theta.
 ///
 /// In a direction in which neither side can move (a zero row of W), r_t opposes the drive while the pair slides along
 /// it although it moves nothing; at rest there, r_t is zero along it.
@@ -40,9 +39,30 @@ inline double length(double x, double y)
 }
 
 /// At a sliding speed [m/s].
-inline FrictionCoefficient friction_coefficient(const FrictionLaw& law, double /*speed*/)
+inline FrictionCoefficient friction_coefficient(const FrictionLaw& law, double speed)
 {
-  return {law.coefficient, 0};
+  if (law.decay_speed == 0) return {law.coefficient, 0};
+  const double excess = (law.static_coefficient - law.coefficient) * std::exp(-speed / law.decay_speed);
+  return {law.coefficient + excess, -excess / law.decay_speed};
+}
+
+/// The derivative of mu(speed) in law.coefficient.
+inline double share_of_coefficient(const FrictionLaw& law, double speed)
+{
+  return law.decay_speed == 0 ? 1 : 1 - std::exp(-speed / law.decay_speed);
+}
+
+/// The steepest fall of mu(speed) [s/m], at rest; 0 where mu does not fall.
+inline double steepest_fall(const FrictionLaw& law)
+{
+  return law.decay_speed == 0 ? 0 : std::max(0., law.static_coefficient - law.coefficient) / law.decay_speed;
+}
+
+/// The law as a function of |w_t| where the sliding speed is `part` |w_t|.
+inline FrictionLaw law_of_step(FrictionLaw law, double part)
+{
+  law.decay_speed /= part;
+  return law;
 }
 
 /// mu at the sliding speed of w.
@@ -55,8 +75,9 @@ inline double coefficient_at(const FrictionLaw& law, const PairVector& w)
 ///     dr_t = -along dr_n - damping ds,   along = mu e,   damping = mu r_n/|s| (I - e e') + mu' r_n e e'.
 struct SlidingFriction
 {
-  std::array<double, 2> along;                  // [-]
-  std::array<std::array<double, 2>, 2> damping; // [N s/m]
+  std::array<double, 2> along;                           // [-]
+  std::array<std::array<double, 2>, 2> damping;          // [N s/m]
+  std::array<std::array<double, 2>, 2> damping_of_speed; // [N s/m] mu' r_n e e' of it
 };
 
 /// Zero where s is.
@@ -125,10 +146,13 @@ enum class ContactStatus : char
   slip,
 };
 
-/// A closed pair sticks where its friction stays inside the Coulomb disc by more than 1e-8 of the largest normal
-/// reaction of all pairs.
-ContactStatus contact_status(const PairVector& r, const FrictionLaw& law, double largest);
+/// A closed pair sticks where its friction stays inside the Coulomb disc of rest by more than 1e-8 of the largest
+/// normal reaction of all pairs. Where mu depends on the speed, friction of slip may lie inside that disc: a pair then
+/// sticks only if its sliding speed w_t is below 1e-5 of the law's decay speed.
+ContactStatus contact_status(const PairVector& r, const PairVector& w, const FrictionLaw& law, double largest);
 
-std::vector<ContactStatus> contact_status(PairView<const double> reactions, const FrictionLaw& law);
+/// `w`: contact velocities, which are read where mu depends on the speed; may be empty elsewhere.
+std::vector<ContactStatus> contact_status(PairView<const double> reactions, PairView<const double> w,
+                                          const FrictionLaw& law);
 
 } // namespace squeal

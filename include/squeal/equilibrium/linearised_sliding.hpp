@@ -33,9 +33,16 @@ Owned<Mat> project_symmetric(Mat A, Mat Z);
 
 /// The derivative of steady friction in the sliding velocity over the closed pairs [N s/m],
 ///     C_f = sum B_t'[mu r_n0/|v_d| (I - e e') + mu' r_n0 e e']B_t.
-/// Null where it is zero: pairs with one tangential row cannot turn, and mu' is 0 today.
-Owned<Mat> direction_damping(const Interface& interface, const std::vector<char>& closed,
-                             const std::vector<double>& reactions);
+/// Null where it is zero: pairs with one tangential row cannot turn, and mu' is 0 where mu is constant. `part`: all of
+/// it, or the term of mu' alone.
+enum class FrictionDamping
+{
+  whole,
+  of_speed,
+};
+
+Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,
+                            const std::vector<double>& reactions, FrictionDamping part);
 
 /// Normal reactions lambda_n per pair that a motion phi e^{s t} takes are (s^2 M + s C + K) phi, from the pivots' rows
 /// of (s^2 M + s C + K) phi = R' lambda_n; 0 on open pairs. Every choice of rows agrees if s and phi are an eigenpair.

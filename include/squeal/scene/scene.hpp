@@ -129,11 +129,14 @@ struct Contact
   SlaveSide slave{};                // has one pair a node
 };
 
-/// Coulomb's law.
+/// Coulomb's law with mu(s) = coefficient + (static_coefficient - coefficient) exp(-s/decay_speed) at the sliding speed
+/// s.
 struct FrictionLaw
 {
   double coefficient = 0;        // [-]
   bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3)
+  double static_coefficient = 0; // [-] mu at rest; of no meaning without a decay_speed
+  double decay_speed = 0;        // [m/s] 0: mu is `coefficient` at every speed
 };
 
 /// The statements that a geometry may hold.

@@ -8,9 +8,11 @@
 /// - theta < 1/2 also amplifies every stable mode with -Re(lambda) < (1/2 - theta) h |lambda|^2, up to the highest one
 ///   of the mesh. With C = beta K that is h > beta/(1 - 2 theta), or h > 2/((1 - 2 theta) |lambda|) where the mode is
 ///   overdamped, lambda its faster root.
+/// - friction that falls with the speed so steeply that a step may have several solutions: the largest eigenvalue of
+///   |mu'| diag(r_n0) W_tt, at rest, is not below 1. W holds h, so that enough steps bring it below.
 /// All refusals are lifted by StepOptions::refuse.
 #include "squeal/modes/modes.hpp"
-#include "squeal/transient/step_options.hpp"
+#include "squeal/transient/theta_step.hpp"
 
 namespace squeal
 {
@@ -26,5 +28,14 @@ double free_growth(const Structure& structure, double theta, double h, const Fac
 /// one, or null.
 std::string step_refusal(const Structure& structure, const ComplexMode* mode, double theta, double h,
                          const StepOptions& options);
+
+/// The largest eigenvalue of |mu'| diag(r_n) W_tt with the steepest fall of mu: a step has one solution while it is
+/// below 1. 0 where mu does not fall. Collective.
+double fall_of_friction(const ThetaStep& step, const Interface& interface, const std::vector<double>& reactions);
+
+/// Why a run is refused whose step may have several solutions, with the steps that have one; empty if it is not.
+/// Factors A where mu falls. Collective.
+std::string friction_refusal(const SlidingEquilibrium& sliding, const ComplexMode* mode, double theta, double h,
+                             const StepOptions& options);
 
 } // namespace squeal

@@ -15,7 +15,7 @@ struct TangentColumn
 {
   Owned<Vec> u, v;      // du [m], dv [m/s]
   double step_size = 0; // [s] dh of every step; the records then need their rates
-  double friction = 0;  // dmu of every step
+  double friction = 0;  // change of the friction law's coefficient in every step
 };
 
 /// The records of `steps` steps made in place.

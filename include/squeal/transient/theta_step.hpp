@@ -35,6 +35,13 @@ struct ThetaStep
   double factor_seconds = 0, condensed_seconds = 0; // to factor A with the corner that W is, to prepare W
 };
 
+/// The law of a pair as a function of the step's w_t, so that mu is taken at the mean sliding speed |s_theta|, and at
+/// |s+| where friction opposes that everywhere.
+inline FrictionLaw law_of_step(const ThetaStep& step, const FrictionLaw& law)
+{
+  return law_of_step(law, step.opposed == Opposed::theta ? step.theta : 1);
+}
+
 /// A
 Owned<Mat> step_matrix(const Structure& structure, double h, double theta);
 
@@ -76,6 +83,7 @@ struct StepReport
   int contact_iterations = 0;
   double contact_residual = 0; // natural map, relative
   bool contact_converged = true;
+  double fall_of_friction = 0; // largest |mu'| r_n W_t of a pair, at rest: at 1 the step may have several solutions
 };
 
 /// One step in place of several trajectories: each reading of the factor and of W serves them all.

@@ -31,7 +31,8 @@ struct MarchSummary
   long unconverged = 0;
   double first_unconverged = 0; // [s]
   double contact_residual_max = 0;
-  double energy_defect_max = 0; // over the energy of its step, or its works where they are larger
+  double fall_of_friction_max = 0; // as of StepReport
+  double energy_defect_max = 0;    // over the energy of its step, or its works where they are larger
   double contact_iterations_mean = 0;
 };
 
