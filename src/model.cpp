@@ -1,5 +1,6 @@
 #include "squeal/model.hpp"
 
+#include "squeal/mesh/ties.hpp"
 #include "squeal/solid/matrix_rows.hpp"
 #include "squeal/solid/probes.hpp"
 
@@ -13,26 +14,37 @@ namespace squeal
 namespace
 {
 
+/// Says how much of a slave surface does not face its master; nothing where all of it does.
+void warn_of_uncovered(const Coverage& c, const std::string& slave, const std::string& master, const char* consequence,
+                       std::vector<std::string>& sentences)
+{
+  constexpr double rounding = 1e-6; // the tolerance of coincident surfaces
+  const Vec3& at = c.uncovered_at;
+  if (c.covered < (1 - rounding) * c.area)
+    sentences.push_back(format("%.3g %% of the area of '%s' does not face '%s', most of it around (%g, %g, %g): %s",
+                               100 * (1 - c.covered / c.area), slave.c_str(), master.c_str(), at[0], at[1], at[2],
+                               consequence));
+}
+
 /// Sentences about elements that are too stiff and slave surfaces that face nothing.
 std::vector<std::string> warnings_of(const Model& model, const Scene& scene)
 {
   std::vector<std::string> sentences;
+  if (!scene.ties.empty())
+  {
+    const TiedNodes tied = tied_nodes(model.mesh, scene);
+    for (std::size_t i = 0; i < scene.ties.size(); ++i)
+      warn_of_uncovered(tied.coverage[i], scene.ties[i].slave, scene.ties[i].master, "it is not tied there", sentences);
+  }
   if (const long count = std::ranges::count(model.mesh.elements, Shape::tet4, &Element::shape); count > 0)
     sentences.push_back(
         format("%ld 4-node tetrahedra are too stiff: set Mesh.ElementOrder = 2 for 10-node ones", count));
   for (std::size_t i = 0; i < model.coverage.size(); ++i)
   {
-    const Coverage& c = model.coverage[i];
     const Contact& contact = scene.contacts[i];
     const bool stator_is_slave = contact.slave == SlaveSide::stator;
-    const std::string& slave = stator_is_slave ? contact.stator : contact.rotor;
-    const std::string& master = stator_is_slave ? contact.rotor : contact.stator;
-    const Vec3& at = c.uncovered_at;
-    constexpr double rounding = 1e-6; // the tolerance of coincident surfaces
-    if (c.covered < (1 - rounding) * c.area)
-      sentences.push_back(format("%.3g %% of the area of '%s' does not face '%s', most of it around (%g, %g, %g): no "
-                                 "contact force acts there",
-                                 100 * (1 - c.covered / c.area), slave.c_str(), master.c_str(), at[0], at[1], at[2]));
+    warn_of_uncovered(model.coverage[i], stator_is_slave ? contact.stator : contact.rotor,
+                      stator_is_slave ? contact.rotor : contact.stator, "no contact force acts there", sentences);
   }
   return sentences;
 }
@@ -53,9 +65,30 @@ void hold(Model& model, const Elimination& elimination)
     *A = elimination.square(*A);
     mark_symmetric(*A);
   }
+  for (Owned<Mat>* A : {&structure.G, &structure.H})
+    if (A->get()) *A = elimination.square(*A);
   structure.load = elimination.entries(structure.load);
   model.interface.B = elimination.columns(model.interface.B);
   model.probes = elimination.columns(model.probes);
+}
+
+/// Throws Error where a stage cannot take the gyroscopic or circulatory part of given matrices.
+void check_skew_parts(const Scene& scene, const Model& model)
+{
+  const Structure& structure = model.structure;
+  if (!structure.G.get() && !structure.H.get()) return;
+  const std::string folder = scene.matrices->string();
+  if (scene.transient.enabled || scene.cycle.enabled)
+    throw Error(folder +
+                ": its gyroscopic or circulatory part (G.petsc, H.petsc, or an unsymmetric C.petsc or K.petsc) "
+                "is for the modes; time steps need symmetric matrices: take [transient] and [cycle] out");
+  if (!structure.H.get()) return;
+  double load = 0;
+  check(VecNorm(structure.load, NORM_INFINITY, &load));
+  if (model.interface.pairs > 0 || load > 0)
+    throw Error(folder +
+                ": a circulatory part (H.petsc, or an unsymmetric K.petsc) is for modes alone, without contact "
+                "pairs and load: take B, gap, drive and F out, or bring friction in by pairs");
 }
 
 Model model_of_matrices(const Scene& scene, MPI_Comm comm)
@@ -73,6 +106,7 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   model.probes = probe_rows(scene.probes, rows, local_size, comm);
   const auto held = held_rows(rows, scene.supports);
   name_rows(rows, held, structure.names);
+  check_skew_parts(scene, model);
   if (held.empty()) return model;
   hold(model, Elimination(held, structure.load));
   check_interface(model.interface, scene.matrices->string(), comm);

@@ -136,6 +136,8 @@ std::vector<Estimate> run_estimates(const Chain& chain)
     estimates.push_back(not_run<Estimate>(OutcomeKind::off, "the scene turns it off"));
   else if (!reason.empty())
     estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, reason));
+  else if (chain.model.interface.pairs == 0)
+    estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, "there is no contact that would limit the growth"));
   else
     for (const ComplexMode& mode : chain.report.modes.unstable())
       estimates.push_back(estimate_amplitude(chain.sliding(), *chain.linearised, mode, chain.options.estimate));

@@ -60,6 +60,19 @@ std::string where(const Interface& interface, int pair)
   return text + " at (" + std::to_string(at[0]) + ", " + std::to_string(at[1]) + ", " + std::to_string(at[2]) + ")";
 }
 
+/// Whether none of the files of contact pairs is there.
+bool has_no_pairs(const std::filesystem::path& folder, MPI_Comm comm)
+{
+  int found = 0;
+  on_rank_zero(comm,
+               [&]
+               {
+                 for (const char* name : {"B.petsc", "gap.petsc", "drive.petsc"}) found += is_file(folder / name);
+               });
+  MPI_Bcast(&found, 1, MPI_INT, 0, comm);
+  return found == 0;
+}
+
 } // namespace
 
 void check_interface(const Interface& interface, const std::string& source, MPI_Comm comm)
@@ -127,6 +140,13 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
 {
   Interface interface;
   interface.friction = friction;
+  if (has_no_pairs(folder, comm))
+  {
+    PetscInt own = 0;
+    check(MatGetLocalSize(structure.M, &own, nullptr));
+    interface.B = matrix_of_rows({}, own, comm);
+    return interface;
+  }
   interface.gap = read_vector(folder / "gap.petsc", comm);
   interface.drive = read_vector(folder / "drive.petsc", comm);
   interface.pairs = static_cast<int>(interface.gap.size());

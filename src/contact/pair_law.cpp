@@ -169,14 +169,26 @@ PairVector slip_at(const PairBlock& A, const PairVector& q, int directions, doub
   return directions == 1 ? slip_in_plane(A, q, mu, last) : slip_in_space(A, q, mu, last);
 }
 
+/// Whether friction suffices for the reaction of stick.
+bool holds(const PairVector& r, double mu)
+{
+  return r[0] >= 0 && length(r[1], r[2]) <= mu * r[0];
+}
+
 /// Slip at the speed v that its own mu(v) leaves, between rest, where mu is too small to stick, and the greatest speed
 /// of constant friction. By false position (Illinois).
 PairVector slip_at_own_speed(const PairBlock& A, const PairVector& q, int directions, const FrictionLaw& law,
                              const PairVector& last)
 {
+  const auto stuck = stick(A, q);
   PairVector r{};
-  const auto speed_of = [&](double mu)
+  const auto speed_of = [&](double mu) // of constant friction, under which the pair may stick
   {
+    if (stuck && holds(*stuck, mu))
+    {
+      r = *stuck;
+      return 0.;
+    }
     r = slip_at(A, q, directions, mu, last);
     const PairVector w = pair_velocity(A, r, q);
     return length(w[1], w[2]);
@@ -243,7 +255,7 @@ PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, c
   if (q[0] >= 0 || A[0][0] <= 0) return {};
   const double mu = friction_coefficient(law, 0).value; // of stick
   if (mu == 0 && law.coefficient == 0) return {-q[0] / A[0][0], 0, 0};
-  if (const auto r = stick(A, q); r && (*r)[0] >= 0 && length((*r)[1], (*r)[2]) <= mu * (*r)[0]) return *r;
+  if (const auto r = stick(A, q); r && holds(*r, mu)) return *r;
   return law.decay_speed == 0 ? slip_at(A, q, directions, mu, last) : slip_at_own_speed(A, q, directions, law, last);
 }
 

@@ -321,6 +321,20 @@ std::vector<std::complex<double>> normal_reactions(const ReactionOperator& react
   return result;
 }
 
+namespace
+{
+
+/// A + B of any symmetry.
+Owned<Mat> sum_of(Mat A, Mat B)
+{
+  Owned<Mat> result;
+  check(MatDuplicate(B, MAT_COPY_VALUES, result.put()));
+  check(MatAXPY(result, 1, A, DIFFERENT_NONZERO_PATTERN));
+  return result;
+}
+
+} // namespace
+
 LinearisedSliding linearise(const SlidingEquilibrium& sliding)
 {
   const auto& [structure, interface, equilibrium] = sliding;
@@ -330,9 +344,11 @@ LinearisedSliding linearise(const SlidingEquilibrium& sliding)
   const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
   if (const Owned<Mat> Cf = friction_damping(interface, equilibrium.closed, equilibrium.reactions, part); Cf.get())
     check(MatAXPY(result.C, 1, Cf, UNKNOWN_NONZERO_PATTERN));
+  if (structure.G.get()) result.C = sum_of(result.C, structure.G);
+  if (structure.H.get()) result.K = sum_of(structure.K, structure.H);
   for (const auto& [A, rows] : {std::pair{structure.M.get(), &result.reaction.M},
                                 {result.C.get(), &result.reaction.C},
-                                {structure.K.get(), &result.reaction.K}})
+                                {result.K.get() ? result.K.get() : structure.K.get(), &result.reaction.K}})
     check(MatMatMult(result.contact.reaction, A, MAT_INITIAL_MATRIX, PETSC_DEFAULT, rows->put()));
   result.M_z = project_symmetric(structure.M, result.contact.Z);
   result.K_z = project_symmetric(structure.K, result.contact.Z);

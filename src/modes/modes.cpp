@@ -1,5 +1,6 @@
 #include "squeal/modes/modes.hpp"
 
+#include "loss.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/projection.hpp"
 #include "squeal/modes/quadratic.hpp"
@@ -15,6 +16,8 @@ namespace squeal
 
 namespace
 {
+
+using Complex = std::complex<double>;
 
 /// The entry of phi with the largest modulus. Of nearly equal ones it is the first, for any number of ranks.
 std::complex<double> largest_entry(Vec real, Vec imaginary)
@@ -57,6 +60,22 @@ void set_shape(ComplexMode& mode, const ClosedContact& contact, const Eigenpair&
   check(VecAXPBY(mode.imaginary, turn.imag(), turn.real(), real));
 }
 
+/// Adds to the reactions those to lambda (1/omega_j - 1/omega) K_loss phi: the mode's own damping of loss factors.
+void add_loss_reactions(const Structure& structure, const ClosedContact& contact, ComplexMode& mode)
+{
+  const Complex factor = mode.lambda * (1 / mode.lambda.imag() - 1 / structure.loss_omega);
+  const Owned<Vec> force = zeros_like(mode.real);
+  Owned<Vec> rows;
+  check(MatCreateVecs(contact.reaction, nullptr, rows.put()));
+  for (const auto& [part, turn] : {std::pair{mode.real.get(), factor}, {mode.imaginary.get(), Complex(0, 1) * factor}})
+  {
+    check(MatMult(structure.K_loss, part, force));
+    check(MatMult(contact.reaction, force, rows));
+    const std::vector<double> reactions = all_entries(rows);
+    for (std::size_t i = 0; i < reactions.size(); ++i) mode.reactions[i] += turn * reactions[i];
+  }
+}
+
 std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const LinearisedSliding& linearised)
 {
   std::vector<ComplexMode> modes;
@@ -79,7 +98,27 @@ struct ModesProblem
   QuadraticProblem reduced; // Y'.Z
   const ModesSettings& settings;
   const ModesOptions& options;
+  const Structure& structure;
+  Owned<Mat> K_loss;   // of loss factors, Y'.Z; null: none
+  bool beyond_inertia; // gyroscopic or circulatory parts may change the number of pairs in a band
 };
+
+/// The modes of a solution, each with the damping of loss factors at its own frequency.
+std::vector<ComplexMode> modes_of(QuadraticSolution& solution, const ModesProblem& problem)
+{
+  if (!problem.K_loss.get()) return modes_of(solution, problem.linearised);
+  const std::vector<double> errors =
+      correct_loss(solution, {problem.reduced, problem.K_loss, problem.structure.loss_omega}, problem.options.pencil);
+  std::vector<ComplexMode> modes = modes_of(solution, problem.linearised);
+  for (std::size_t i = 0; i < modes.size(); ++i)
+  {
+    modes[i].loss_error = errors[i];
+    if (modes[i].lambda.imag() > 0) add_loss_reactions(problem.structure, problem.linearised.contact, modes[i]);
+  }
+  std::stable_sort(modes.begin(), modes.end(),
+                   [](const ComplexMode& a, const ComplexMode& b) { return a.lambda.real() > b.lambda.real(); });
+  return modes;
+}
 
 /// Counts in the band, or up to an edge a little below if friction moves a pair across the end of the band.
 PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution& solution, RealCount& real,
@@ -102,7 +141,7 @@ CountedSolution solve_full(const ModesProblem& problem, RealCount& real)
     result = solve_by_slices(problem.reduced, real, band, problem.options.pencil);
     if (result.count.expected == result.count.found) return result;
     result.count = count_in_band(problem.reduced, result.solution, real, band);
-    if (result.count.found >= result.count.expected) return result;
+    if (result.count.found >= result.count.expected || problem.beyond_inertia) return result;
     result.solution.outcome.kind = OutcomeKind::not_converged;
     result.solution.outcome.reason = "fewer pairs were found than are expected; -modes_solver toar uses another method";
     return result;
@@ -137,6 +176,8 @@ int unstable_in(const std::vector<ComplexMode>& modes)
       std::count_if(modes.begin(), modes.end(), [](const ComplexMode& mode) { return is_unstable(mode.lambda); }));
 }
 
+constexpr const char* all_pairs = "all pairs";
+
 /// The sentence that Modes::count_check holds.
 std::string describe_count(const Modes& modes)
 {
@@ -145,8 +186,11 @@ std::string describe_count(const Modes& modes)
   if (modes.method == ModesMethod::both)
     text += std::to_string(modes.unstable_count) + " unstable by the full problem, " +
             std::to_string(unstable_in(modes.projected)) + " by projection on real modes; ";
-  return text + format("%d pairs below %.6g Hz, %d expected by the inertia of the frictionless structure",
-                       modes.count.found, modes.count.frequency, modes.count.expected);
+  text += format("%d pairs below %.6g Hz, ", modes.count.found, modes.count.frequency);
+  if (modes.count.certified_by == all_pairs) return text + "where the whole problem was solved";
+  text += format("%d expected by the inertia of the ", modes.count.expected);
+  if (!modes.beyond_inertia) return text + "frictionless structure";
+  return text + "symmetric part, which cannot count what gyroscopic or circulatory parts change";
 }
 
 /// Sets what follows from the modes: their order, the numbers of unstable ones, the residual and whether it converged.
@@ -167,6 +211,13 @@ void assess(Modes& modes)
 ModeCount certified(const PairCount& count)
 {
   return {count.expected == count.found ? "inertia" : "", count.frequency, count.expected, count.found};
+}
+
+/// Where inertia does not count, a problem that is solved whole has all its pairs.
+ModeCount certified_whole(const PairCount& count, const ModesProblem& problem, PetscInt size)
+{
+  const bool whole = size <= problem.options.dense_limit && problem.settings.method != ModesMethod::projection;
+  return {whole ? all_pairs : "", count.frequency, whole ? count.found : count.expected, count.found};
 }
 
 /// Keeps of the modes beyond the band, which were found for the count, the frequencies only.
@@ -217,6 +268,7 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
   modes.method = settings.method;
   modes.band = settings.band;
   modes.shapes = options.shapes;
+  modes.beyond_inertia = sliding.structure.G.get() || sliding.structure.H.get();
   PetscInt free = 0;
   check(MatGetSize(linearised.K_z, &free, nullptr));
   if (free == 0)
@@ -226,17 +278,20 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
     return modes;
   }
   const Mat Y = linearised.contact.Y, Z = linearised.contact.Z;
-  const ModesProblem problem{
-      linearised,
-      {project(sliding.structure.M, Y, Z), project(linearised.C, Y, Z), project(sliding.structure.K, Y, Z)},
-      settings,
-      options};
+  const ModesProblem problem{linearised,
+                             {project(sliding.structure.M, Y, Z), project(linearised.C, Y, Z),
+                              project(linearised.K.get() ? linearised.K.get() : sliding.structure.K.get(), Y, Z)},
+                             settings,
+                             options,
+                             sliding.structure,
+                             sliding.structure.K_loss.get() ? project(sliding.structure.K_loss, Y, Z) : Owned<Mat>{},
+                             modes.beyond_inertia};
   RealCount real = make_real_count(linearised.M_z, linearised.K_z, options);
   CountedSolution found;
   if (settings.method != ModesMethod::full)
   {
     found.solution = solve_by_projection(problem);
-    modes.projected = modes_of(found.solution, linearised);
+    modes.projected = modes_of(found.solution, problem);
   }
   if (settings.method == ModesMethod::projection)
   {
@@ -246,10 +301,10 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
   else
   {
     found = solve_full(problem, real);
-    modes.modes = modes_of(found.solution, linearised);
+    modes.modes = modes_of(found.solution, problem);
   }
   modes.outcome = found.solution.outcome;
-  modes.count = certified(found.count);
+  modes.count = modes.beyond_inertia ? certified_whole(found.count, problem, free) : certified(found.count);
   drop_beyond_band(modes);
   assess(modes);
   return modes;

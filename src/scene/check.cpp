@@ -30,6 +30,7 @@ public:
     check_source();
     check_names();
     check_motions();
+    for (const Part& part : scene_.parts) check_material(part);
     for (const Spring& spring : scene_.springs) check_spring(spring);
     if (!scene_.mesh && !scene_.matrices)
     {
@@ -37,8 +38,12 @@ public:
       for (const Force& force : scene_.forces) need_known(force.on, points_, &force.on, "[[force]] on");
     }
     for (const Contact& contact : scene_.contacts) check_contact(contact);
+    for (const Tie& tie : scene_.ties)
+      if (tie.slave == tie.master)
+        fail(&tie.master, "[[tie]] slave and master are both \"" + tie.slave + "\"; name two surfaces");
     for (const Probe& probe : scene_.probes) check_probe(probe);
     check_friction();
+    check_loss();
     check_transient();
     check_cycle();
   }
@@ -68,6 +73,7 @@ private:
     refuse(s.parts, "part", "needs a [mesh]");
     refuse(s.rigid_bodies, "rigid_body", "needs a [mesh] with its surfaces; without one use a [[point]] with a mass");
     refuse(s.pressures, "pressure", "needs a [mesh] with its surface; without one use a [[force]]");
+    refuse(s.ties, "tie", "needs a [mesh] with its surfaces; without one use a [[spring]]");
   }
 
   void check_matrix_scene() const
@@ -80,6 +86,7 @@ private:
     refuse(s.springs, "spring", why);
     refuse(s.pressures, "pressure", why);
     refuse(s.contacts, "contact", why);
+    refuse(s.ties, "tie", why);
     for (const Support& support : s.supports)
     {
       const bool row = !need_rows(support.on, "[[support]] on").nodes;
@@ -137,6 +144,41 @@ private:
       if (support.fixed == Motions{}) fail(&support.fixed, "[[support]] " + support.on + " fixed holds nothing still");
   }
 
+  void check_material(const Part& part) const
+  {
+    const Material& material = part.material;
+    const std::string label = "[[part]] " + part.name + " ";
+    if (!material.orthotropy)
+    {
+      if (!(material.young > 0)) fail(&material.young, label + "needs the key 'young' [Pa] above 0, or 'orthotropic'");
+      if (!places_.given.count(&material.poisson))
+        fail(&part, label + "needs the key 'poisson' [-], or 'orthotropic' instead of it and of 'young'");
+      return;
+    }
+    const Orthotropy& o = *material.orthotropy;
+    if (material.young != 0 || material.poisson != 0)
+      fail(&*material.orthotropy, label + "orthotropic excludes young and poisson: keep one of them");
+    if (part.thickness > 0)
+      fail(&*material.orthotropy, label + "orthotropic is for solids: give a shell young and poisson");
+    for (const Vec3* moduli : {&o.young, &o.shear})
+      if (!(std::min({(*moduli)[0], (*moduli)[1], (*moduli)[2]}) > 0))
+        fail(moduli, label + "orthotropic: all of young and shear must be above 0");
+    if (std::abs(dot(o.axis_1, o.axis_2)) > largest_cosine)
+      fail(&o.axis_2, label + "orthotropic: axis_2 must be square to axis_1");
+    if (!is_stable(o))
+      fail(&o.poisson, label + "orthotropic: with these ratios a load would do negative work; nu12 sqrt(E2/E1) and its "
+                               "like must be below 1, and not all near it");
+  }
+
+  /// Whether the compliance of direct stresses is positive definite: by the ratios b_ij = nu_ij sqrt(E_j/E_i).
+  static bool is_stable(const Orthotropy& o)
+  {
+    const double b12 = o.poisson[0] * std::sqrt(o.young[1] / o.young[0]),
+                 b13 = o.poisson[1] * std::sqrt(o.young[2] / o.young[0]),
+                 b23 = o.poisson[2] * std::sqrt(o.young[2] / o.young[1]);
+    return std::abs(b12) < 1 && 1 - b12 * b12 - b13 * b13 - b23 * b23 - 2 * b12 * b13 * b23 > 0;
+  }
+
   void check_spring(const Spring& spring) const
   {
     std::vector<std::string> ends = nodes_;
@@ -181,9 +223,21 @@ private:
            "[friction] static_coefficient and decay_speed go together: give both, or coefficient alone");
   }
 
+  void check_loss() const
+  {
+    const double frequency = scene_.damping.loss_frequency;
+    const auto lossy = std::ranges::find_if(scene_.parts, [](const Part& part) { return part.loss_factor > 0; });
+    if (lossy != scene_.parts.end() && frequency == 0)
+      fail(&lossy->loss_factor, "[[part]] " + lossy->name +
+                                    " loss_factor needs [damping] loss_frequency, at which time steps and the "
+                                    "estimate take its viscous equivalent: give the squeal's frequency");
+    if (lossy == scene_.parts.end() && frequency > 0)
+      fail(&scene_.damping.loss_frequency, "[damping] loss_frequency belongs to a [[part]] with a loss_factor: give "
+                                           "one, or take it out");
+  }
+
   void check_frame(const Contact& contact) const
   {
-    constexpr double largest_cosine = 1e-6; // unit vectors written by hand have a few digits
     const auto& tangents = contact.tangents;
     if (contact.normal)
       for (const Vec3& tangent : tangents)
@@ -228,6 +282,8 @@ private:
     if (c.amplitude > 0 && c.start.kind != CycleStartKind::mode)
       fail(&c.amplitude, "[cycle] amplitude belongs to start = \"mode\": give that too, or leave it out");
   }
+
+  static constexpr double largest_cosine = 1e-6; // unit vectors written by hand have a few digits
 
   const Scene& scene_;
   const Places& places_;

@@ -5,6 +5,7 @@
 
 #include "squeal/base/error.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace squeal
@@ -19,13 +20,13 @@ bool is_outside(double value, double least, double greatest)
 }
 
 /// What is implausible about a material; empty if nothing is.
-std::string doubt_about(const Material& material)
+std::string doubt_about(const Material& material, double young)
 {
-  const double speed = std::sqrt(material.young / material.density);
+  const double speed = std::sqrt(young / material.density);
   if (is_outside(material.density, 20, 23000))
     return format("a density of %g kg/m3 is that of no solid; steel has 7850", material.density);
-  if (is_outside(material.young, 1e4, 1.3e12))
-    return format("a Young's modulus of %g Pa is that of no solid; steel has 2.1e11", material.young);
+  if (is_outside(young, 1e4, 1.3e12))
+    return format("a Young's modulus of %g Pa is that of no solid; steel has 2.1e11", young);
   if (is_outside(speed, 10, 20000))
     return format("sound would travel at %.3g m/s by its modulus and density; in steel it does at 5200", speed);
   return {};
@@ -37,8 +38,12 @@ std::vector<std::string> doubts_about(const Scene& scene)
 {
   std::vector<std::string> doubts;
   for (const Part& part : scene.parts)
-    if (const std::string doubt = doubt_about(part.material); !doubt.empty())
+  {
+    const Material& material = part.material;
+    const double young = material.orthotropy ? *std::ranges::max_element(material.orthotropy->young) : material.young;
+    if (const std::string doubt = doubt_about(material, young); !doubt.empty())
       doubts.push_back("part '" + part.name + "': " + doubt + ". Are its units Pa and kg/m3?");
+  }
   return doubts;
 }
 

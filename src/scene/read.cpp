@@ -337,7 +337,10 @@ private:
     }
   }
 
-  void read(const toml::node& node, std::optional<Rotation>& target)
+  void read(const toml::node& node, std::optional<Rotation>& target) { read_inline_table(node, target); }
+  void read(const toml::node& node, std::optional<Orthotropy>& target) { read_inline_table(node, target); }
+
+  template <class T> void read_inline_table(const toml::node& node, std::optional<T>& target)
   {
     const std::string label = label_;
     read_table(node, target.emplace(), label + key_->name + " ");

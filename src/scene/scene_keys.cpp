@@ -40,21 +40,36 @@ SceneKeys keys_of(MeshSource& m)
 SceneKeys keys_of(std::filesystem::path& matrices)
 {
   return {{"folder", &matrices, required, Rule::folder, "path",
-           "folder of M K B gap drive .petsc; of C F .petsc, dofs.txt"}};
+           "folder of M K B gap drive .petsc; of C F G H .petsc, dofs.txt"}};
 }
 
 SceneKeys keys_of(Part& p)
 {
   return {
       {"name", &p.name, required, Rule::any, "text", "named group of the mesh"},
-      {"young", &p.material.young, required, Rule::positive, "Pa", "Young's modulus"},
-      {"poisson", &p.material.poisson, required, Rule::poisson, "-", "Poisson's ratio"},
+      {"young", &p.material.young, optional, Rule::not_negative, "Pa", "Young's modulus; required unless orthotropic"},
+      {"poisson", &p.material.poisson, optional, Rule::poisson, "-", "Poisson's ratio"},
+      {"orthotropic", &p.material.orthotropy, optional, Rule::any, "table",
+       "of a solid, instead of young and poisson: {young, poisson, shear, axis_1, axis_2}"},
       {"density", &p.material.density, required, Rule::positive, "kg/m3", "mass density"},
       {"thickness", &p.thickness, optional, Rule::not_negative, "m", "of a shell; 0 is a solid"},
+      {"loss_factor", &p.loss_factor, optional, Rule::not_negative, "-",
+       "eta of the stiffness K (1 + i eta); with damping.loss_frequency"},
       {"alpha", DampingTarget{&p.damping, &RayleighDamping::alpha}, optional, Rule::not_negative, "1/s",
        "own Rayleigh damping, mass part"},
       {"beta", DampingTarget{&p.damping, &RayleighDamping::beta}, optional, Rule::not_negative, "s",
        "own Rayleigh damping, stiffness part"},
+  };
+}
+
+SceneKeys keys_of(Orthotropy& o)
+{
+  return {
+      {"young", &o.young, required, Rule::any, "Pa", "E1, E2, E3 along the axes"},
+      {"poisson", &o.poisson, required, Rule::any, "-", "nu12, nu13, nu23: contraction along 2 under tension along 1"},
+      {"shear", &o.shear, required, Rule::any, "Pa", "G12, G13, G23"},
+      {"axis_1", &o.axis_1, optional, Rule::direction, "-", "x, y, z or a vector"},
+      {"axis_2", &o.axis_2, optional, Rule::direction, "-", "square to axis_1; axis 3 is square to both"},
   };
 }
 
@@ -143,6 +158,16 @@ SceneKeys keys_of(Contact& c)
   };
 }
 
+SceneKeys keys_of(Tie& t)
+{
+  return {
+      {"slave", &t.slave, required, Rule::any, "text", "named surface whose nodes follow: the finer or softer side"},
+      {"master", &t.master, required, Rule::any, "text", "named surface that they follow"},
+      {"reach", &t.reach, optional, Rule::not_negative, "m",
+       "largest distance of the surfaces along the normal; 0: they coincide"},
+  };
+}
+
 SceneKeys keys_of(FrictionLaw& f)
 {
   return {
@@ -161,6 +186,8 @@ SceneKeys keys_of(RayleighDamping& d)
   return {
       {"alpha", &d.alpha, optional, Rule::not_negative, "1/s", "mass part"},
       {"beta", &d.beta, optional, Rule::not_negative, "s", "stiffness part"},
+      {"loss_frequency", &d.loss_frequency, optional, Rule::not_negative, "Hz",
+       "where loss factors have their viscous equivalent in time; modes take it at their own frequency"},
   };
 }
 

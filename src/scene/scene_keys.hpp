@@ -17,10 +17,10 @@ struct DampingTarget
 
 /// The member that a key fills.
 
-using Target =
-    std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*, std::optional<Vec3>*,
-                 std::vector<Vec3>*, std::vector<std::string>*, std::array<double, 6>*, Motions*,
-                 std::map<std::string, double>*, std::optional<Rotation>*, DampingTarget, Start*, CycleStart*, Choice>;
+using Target = std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*,
+                            std::optional<Vec3>*, std::vector<Vec3>*, std::vector<std::string>*, std::array<double, 6>*,
+                            Motions*, std::map<std::string, double>*, std::optional<Rotation>*,
+                            std::optional<Orthotropy>*, DampingTarget, Start*, CycleStart*, Choice>;
 
 /// Whether a key must be given.
 enum class Need
@@ -62,6 +62,7 @@ SceneKeys keys_of(Scene& scene); // the keys outside any table
 SceneKeys keys_of(MeshSource& mesh);
 SceneKeys keys_of(std::filesystem::path& matrices);
 SceneKeys keys_of(Part& part);
+SceneKeys keys_of(Orthotropy& orthotropy);
 SceneKeys keys_of(Point& point);
 SceneKeys keys_of(RigidBody& body);
 SceneKeys keys_of(Spring& spring);
@@ -70,6 +71,7 @@ SceneKeys keys_of(Force& force);
 SceneKeys keys_of(Pressure& pressure);
 SceneKeys keys_of(Rotation& rotation);
 SceneKeys keys_of(Contact& contact);
+SceneKeys keys_of(Tie& tie);
 SceneKeys keys_of(FrictionLaw& friction);
 SceneKeys keys_of(RayleighDamping& damping);
 SceneKeys keys_of(ModesSettings& modes);
@@ -93,6 +95,7 @@ template <class Visit> void for_each_table(Scene& scene, Visit visit)
   visit("force", scene.forces, "force on a point, a rigid body or a named group");
   visit("pressure", scene.pressures, "pressure on a named surface");
   visit("contact", scene.contacts, "two named surfaces or two points in contact with friction");
+  visit("tie", scene.ties, "two named surfaces of parts meshed apart that move as one");
   visit("friction", scene.friction, "Coulomb's law at every contact");
   visit("damping", scene.damping, "Rayleigh damping C = alpha M + beta K of parts that give none of their own");
   visit("modes", scene.modes, "stability of the sliding equilibrium");

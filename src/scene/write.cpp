@@ -103,6 +103,14 @@ std::string print(const std::optional<Rotation>& rotation)
          ", rate = " + print(rotation->rate) + " }";
 }
 
+std::string print(const std::optional<Orthotropy>& material)
+{
+  if (!material) return "";
+  return "{ young = " + print(material->young) + ", poisson = " + print(material->poisson) +
+         ", shear = " + print(material->shear) + ", axis_1 = " + print(material->axis_1) +
+         ", axis_2 = " + print(material->axis_2) + " }";
+}
+
 std::string print(const DampingTarget& target)
 {
   return *target.damping ? print((**target.damping).*target.member) : "";
@@ -224,7 +232,9 @@ std::string scene_reference()
   Rotation rotation;
   std::string text = "Keys of a scene file (TOML, SI units) [unit, default]:\n" + reference_text(keys_of(scene));
   for_each_table(scene, ReferenceWriter{text});
-  return text + "rotation = { ... } of a contact\n" + reference_text(keys_of(rotation));
+  Orthotropy orthotropy;
+  return text + "rotation = { ... } of a contact\n" + reference_text(keys_of(rotation)) +
+         "orthotropic = { ... } of a part\n" + reference_text(keys_of(orthotropy));
 }
 
 } // namespace squeal

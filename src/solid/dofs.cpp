@@ -1,6 +1,7 @@
 /// Free degrees of freedom q and the constraints u = T q on the nodal degrees of freedom u.
 ///
 /// Rigid body:       u = u_ref + theta x (x - x_ref); the rotations of a shell node are theta.
+/// Tie:              a slave node follows nodes of the master (squeal/mesh/ties.hpp).
 /// Shell on a solid: a node of both rotates with the solid nodes around it, those of the solid elements that hold it,
 /// by
 ///                   their least-squares rotation
@@ -12,6 +13,7 @@
 #include "dof_names.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/ties.hpp"
 #include "squeal/solid/element.hpp"
 
 #include <algorithm>
@@ -162,6 +164,24 @@ void add_supports(Constraints& constraints, const Mesh& mesh, const Scene& scene
                      { check_supported_dependent(constraints, mesh, scene, support, nodal_dof); });
 }
 
+/// Makes the translations of tied nodes follow the others. What a support holds stays held.
+void add_ties(Constraints& constraints, const Mesh& mesh, const Scene& scene)
+{
+  for (const TiedNode& tied : tied_nodes(mesh, scene).nodes)
+    for (int c = 0; c < 3; ++c)
+    {
+      const DofKind kind = constraints.kind_of(tied.node, c);
+      if (kind == DofKind::dependent)
+        throw Error("tie of '" + scene.ties[static_cast<std::size_t>(tied.tie)].slave +
+                    "': " + node_text(tied.node, mesh.nodes[tied.node]) +
+                    " belongs to a rigid body, which moves it: exchange slave and master");
+      if (kind != DofKind::free) continue;
+      std::vector<ConstraintTerm> terms;
+      for (const auto& [node, weight] : tied.others) terms.push_back({6 * PetscInt{node} + c, weight});
+      make_dependent(constraints, 6 * PetscInt{tied.node} + c, std::move(terms));
+    }
+}
+
 /// Returns the solid nodes around each joint, a node that shells and solids share and that has a free rotation.
 std::map<int, std::vector<int>> solid_nodes_around_joints(Constraints& constraints, const Mesh& mesh)
 {
@@ -282,6 +302,7 @@ DofMap number_dofs(const Mesh& mesh, const Scene& scene, const Partition& partit
   Constraints constraints = unconstrained(mesh, scene);
   add_rigid_bodies(constraints, mesh, scene.rigid_bodies);
   add_supports(constraints, mesh, scene);
+  add_ties(constraints, mesh, scene);
   join_shells_to_solids(constraints, mesh);
   DofMap dofs;
   const auto number = number_free(constraints, partition.node_rank, dofs, comm);

@@ -1,4 +1,4 @@
-/// Structures given as matrices: M C K F of a folder, in PETSc's binary format.
+/// Structures given as matrices: M C K G H F of a folder, in PETSc's binary format.
 #include "matrices.hpp"
 
 #include "squeal/algebra/pencil_factor.hpp"
@@ -42,23 +42,42 @@ double maximum(double local, MPI_Comm comm)
   return largest;
 }
 
+/// Returns (A + sign A')/2: the symmetric or the skew part.
+Owned<Mat> part_of(Mat A, double sign)
+{
+  Owned<Mat> result;
+  check(MatTranspose(A, MAT_INITIAL_MATRIX, result.put()));
+  check(MatAYPX(result, sign, A, DIFFERENT_NONZERO_PATTERN));
+  check(MatScale(result, 0.5));
+  return result;
+}
+
+/// Returns what is wrong with an A whose part of this sign should vanish; empty if it does.
+std::string nonzero_part(Mat A, double sign, const std::filesystem::path& file, MPI_Comm comm)
+{
+  const Entry worst = largest_entry(part_of(A, sign));
+  const double scale = maximum(largest_entry(A).magnitude, comm);
+  const double overall = maximum(worst.magnitude, comm);
+  if (overall <= symmetry_tolerance * scale || worst.magnitude != overall) return {};
+  const std::string i = std::to_string(worst.row), j = std::to_string(worst.column);
+  return file.string() + (sign < 0 ? ": not symmetric" : ": not skew") + ": entries (" + i + ", " + j + ") and (" + j +
+         ", " + i + ") " + (sign < 0 ? "differ by " : "add up to ") +
+         format("%g, the largest entry is %g", 2 * worst.magnitude, scale);
+}
+
 /// Throws Error if A is not symmetric.
 void check_symmetric(Mat A, const std::filesystem::path& file, MPI_Comm comm)
 {
-  Owned<Mat> difference;
-  check(MatTranspose(A, MAT_INITIAL_MATRIX, difference.put()));
-  check(MatAXPY(difference, -1, A, DIFFERENT_NONZERO_PATTERN));
-  const Entry worst = largest_entry(difference);
-  const double scale = maximum(largest_entry(A).magnitude, comm);
-  const double overall = maximum(worst.magnitude, comm);
-  std::string problem;
-  if (overall > symmetry_tolerance * scale && worst.magnitude == overall)
-  {
-    const std::string i = std::to_string(worst.row), j = std::to_string(worst.column);
-    problem = file.string() + ": not symmetric: entries (" + i + ", " + j + ") and (" + j + ", " + i + ") differ by " +
-              format("%g, the largest entry is %g", worst.magnitude, scale);
-  }
-  agree(comm, problem);
+  agree(comm, nonzero_part(A, -1, file, comm));
+}
+
+/// Whether rank 0 has the file.
+bool is_there(const std::filesystem::path& file, MPI_Comm comm)
+{
+  int found = 0;
+  on_rank_zero(comm, [&] { found = is_file(file) ? 1 : 0; });
+  MPI_Bcast(&found, 1, MPI_INT, 0, comm);
+  return found != 0;
 }
 
 /// Returns A with the pattern of `pattern`, whose entries are zero.
@@ -71,8 +90,8 @@ Owned<Mat> with_pattern(Mat pattern, Mat A)
   return result;
 }
 
-/// Loads a square matrix. `size` is the expected size, or receives it if negative.
-Owned<Mat> load_square(const std::filesystem::path& file, PetscInt& size, MPI_Comm comm)
+/// Loads a square matrix of any symmetry. `size` is the expected size, or receives it if negative.
+Owned<Mat> load_any_square(const std::filesystem::path& file, PetscInt& size, MPI_Comm comm)
 {
   const auto found = check_matrix_file(file, comm);
   std::string problem;
@@ -83,18 +102,15 @@ Owned<Mat> load_square(const std::filesystem::path& file, PetscInt& size, MPI_Co
               std::to_string(size);
   agree(comm, problem);
   size = found.rows;
-  auto A = load_matrix(file, found, {PETSC_DECIDE, PETSC_DECIDE}, comm);
-  check_symmetric(A, file, comm);
-  return A;
+  return load_matrix(file, found, {PETSC_DECIDE, PETSC_DECIDE}, comm);
 }
 
-/// Whether rank 0 has the file.
-bool is_there(const std::filesystem::path& file, MPI_Comm comm)
+/// Loads a symmetric matrix.
+Owned<Mat> load_square(const std::filesystem::path& file, PetscInt& size, MPI_Comm comm)
 {
-  int found = 0;
-  on_rank_zero(comm, [&] { found = is_file(file) ? 1 : 0; });
-  MPI_Bcast(&found, 1, MPI_INT, 0, comm);
-  return found != 0;
+  auto A = load_any_square(file, size, comm);
+  check_symmetric(A, file, comm);
+  return A;
 }
 
 /// Returns a matrix of zeros with the pattern of another.
@@ -103,6 +119,32 @@ Owned<Mat> zero_of(Mat pattern)
   Owned<Mat> zero;
   check(MatDuplicate(pattern, MAT_DO_NOT_COPY_VALUES, zero.put()));
   return zero;
+}
+
+/// Loads the symmetric part of a matrix; the skew part, if there is one, goes to `skew`.
+Owned<Mat> load_parts(const std::filesystem::path& file, PetscInt& size, Owned<Mat>& skew, MPI_Comm comm)
+{
+  auto A = load_any_square(file, size, comm);
+  const std::string unsymmetric = nonzero_part(A, -1, file, comm);
+  int found = unsymmetric.empty() ? 0 : 1;
+  MPI_Allreduce(MPI_IN_PLACE, &found, 1, MPI_INT, MPI_MAX, comm);
+  if (found == 0) return A;
+  skew = part_of(A, -1);
+  return part_of(A, 1);
+}
+
+/// Adds the skew matrix of a file, if it is there.
+void add_skew(const std::filesystem::path& file, PetscInt size, Owned<Mat>& skew, MPI_Comm comm)
+{
+  if (!is_there(file, comm)) return;
+  auto A = load_any_square(file, size, comm);
+  std::string problem = nonzero_part(A, 1, file, comm);
+  if (!problem.empty()) problem += "; its symmetric part belongs into C.petsc or K.petsc";
+  agree(comm, problem);
+  if (skew.get())
+    check(MatAXPY(skew, 1, A, DIFFERENT_NONZERO_PATTERN));
+  else
+    skew = std::move(A);
 }
 
 /// Throws Error if M has a negative diagonal entry.
@@ -173,8 +215,19 @@ Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
   Structure structure;
   PetscInt size = -1;
   structure.M = load_square(folder / "M.petsc", size, comm);
-  structure.K = load_square(folder / "K.petsc", size, comm);
-  structure.C = is_there(folder / "C.petsc", comm) ? load_square(folder / "C.petsc", size, comm) : zero_of(structure.M);
+  const bool has_C = is_there(folder / "C.petsc", comm);
+  if (is_there(folder / "B.petsc", comm))
+  {
+    structure.K = load_square(folder / "K.petsc", size, comm);
+    structure.C = has_C ? load_square(folder / "C.petsc", size, comm) : zero_of(structure.M);
+  }
+  else
+  {
+    structure.K = load_parts(folder / "K.petsc", size, structure.H, comm);
+    structure.C = has_C ? load_parts(folder / "C.petsc", size, structure.G, comm) : zero_of(structure.M);
+  }
+  add_skew(folder / "G.petsc", size, structure.G, comm);
+  add_skew(folder / "H.petsc", size, structure.H, comm);
   check_mass_diagonal(structure.M, folder / "M.petsc", comm);
   share_pattern(structure);
   check_mass(structure.M, folder / "M.petsc", comm);

@@ -19,6 +19,8 @@
 #include "jacobian.hpp"
 #include "squeal/mesh/quadrature.hpp"
 
+#include <Eigen/LU>
+
 namespace squeal
 {
 
@@ -27,8 +29,42 @@ namespace
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+/// Strains xx yy zz xy yz zx along the axes of R's rows, of unit strains along x, y and z.
+Matrix6 strain_rotation(const Eigen::Matrix3d& R)
+{
+  constexpr std::array<std::array<Eigen::Index, 2>, 6> at = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}}};
+  Matrix6 T;
+  for (std::size_t k = 0; k < 6; ++k)
+  {
+    Eigen::Matrix3d strain = Eigen::Matrix3d::Zero();
+    strain(at[k][0], at[k][1]) += 0.5;
+    strain(at[k][1], at[k][0]) += 0.5; // a unit of a shear strain is half a unit of the tensor
+    strain = (R * strain * R.transpose()).eval();
+    for (std::size_t i = 0; i < 6; ++i)
+      T(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = (i < 3 ? 1 : 2) * strain(at[i][0], at[i][1]);
+  }
+  return T;
+}
+
+/// D = T' S^-1 T, S the compliance along the axes of the material.
+Matrix6 elasticity(const Orthotropy& material)
+{
+  const auto& [E, nu, G, axis_1, axis_2] = material;
+  Matrix6 S = Matrix6::Zero();
+  S.diagonal() << 1 / E[0], 1 / E[1], 1 / E[2], 1 / G[0], 1 / G[2], 1 / G[1];
+  S(0, 1) = S(1, 0) = -nu[0] / E[0];
+  S(0, 2) = S(2, 0) = -nu[1] / E[0];
+  S(1, 2) = S(2, 1) = -nu[2] / E[1];
+  const Vec3 axis_3 = cross(axis_1, axis_2);
+  Eigen::Matrix3d R;
+  R << axis_1[0], axis_1[1], axis_1[2], axis_2[0], axis_2[1], axis_2[2], axis_3[0], axis_3[1], axis_3[2];
+  const Matrix6 T = strain_rotation(R);
+  return T.transpose() * S.inverse() * T;
+}
+
 Matrix6 elasticity(const Material& material)
 {
+  if (material.orthotropy) return elasticity(*material.orthotropy);
   const double nu = material.poisson, mu = material.young / (2 * (1 + nu)), lambda = 2 * mu * nu / (1 - 2 * nu);
   Matrix6 D = Matrix6::Zero();
   D.topLeftCorner<3, 3>().setConstant(lambda);

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <Eigen/Dense>
+#include <numbers>
 
 namespace squeal
 {
@@ -26,6 +27,7 @@ struct Contribution
 {
   std::vector<PetscInt> nodal_dofs;
   Eigen::MatrixXd M, C, K; // units as in Structure
+  double loss_factor = 0;  // [-]
 };
 
 /// The first `components` degrees of freedom of each node.
@@ -137,6 +139,7 @@ void add_contribution(const Structure& structure, const DofMap& dofs, const Cont
   add(structure.M, contribution.M);
   add(structure.C, contribution.C);
   add(structure.K, contribution.K);
+  if (structure.K_loss.get()) add(structure.K_loss, contribution.loss_factor * contribution.K);
 }
 
 /// Number of entries of each of this rank's rows, in the columns it owns and in the others.
@@ -193,6 +196,11 @@ Owned<Mat> empty_matrix(const DofMap& dofs, const RowCounts& counts, MPI_Comm co
   return A;
 }
 
+double loss_omega(const Scene& scene)
+{
+  return 2 * std::numbers::pi * scene.damping.loss_frequency;
+}
+
 /// Returns the contribution of an element. Throws std::runtime_error with its part and place if its Jacobian is not
 /// positive.
 Contribution element_contribution(const Mesh& mesh, const Scene& scene, std::size_t index)
@@ -206,7 +214,9 @@ Contribution element_contribution(const Mesh& mesh, const Scene& scene, std::siz
     ElementMatrices matrices = element_matrices(element.shape, x, part.material, part.thickness);
     const RayleighDamping damping = part.damping.value_or(scene.damping);
     Eigen::MatrixXd C = damping.alpha * matrices.mass + damping.beta * matrices.stiffness;
-    return {nodal_dofs_of(element), std::move(matrices.mass), std::move(C), std::move(matrices.stiffness)};
+    if (part.loss_factor > 0) C += part.loss_factor / loss_omega(scene) * matrices.stiffness;
+    return {nodal_dofs_of(element), std::move(matrices.mass), std::move(C), std::move(matrices.stiffness),
+            part.loss_factor};
   }
   catch (const std::runtime_error& error)
   {
@@ -226,6 +236,8 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
   {
     const auto counts = count_entries(mesh, dofs, lumped);
     for (Owned<Mat>* A : {&structure.M, &structure.C, &structure.K}) *A = empty_matrix(dofs, counts, comm);
+    structure.loss_omega = loss_omega(scene);
+    if (structure.loss_omega > 0) structure.K_loss = empty_matrix(dofs, counts, comm);
   }
   const auto add_own_elements = [&]
   {
@@ -236,8 +248,9 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
   on_every_rank(comm, add_own_elements);
   if (rank_of(comm) == 0)
     for (const Contribution& contribution : lumped) add_contribution(structure, dofs, contribution);
-  for (Mat A : {structure.M.get(), structure.C.get(), structure.K.get()})
+  for (Mat A : {structure.M.get(), structure.C.get(), structure.K.get(), structure.K_loss.get()})
   {
+    if (!A) continue;
     check(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
     check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
     mark_symmetric(A);

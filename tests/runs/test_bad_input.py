@@ -109,6 +109,31 @@ def with_negative_stiffness(folder):
     (folder / "K.petsc").write_bytes(data.replace(struct.pack(">d", 1.1), struct.pack(">d", -1.1)))
 
 
+def with_entries(name, *values):
+    """A 3 x 3 matrix file with the entries (0, 1) and (1, 0)."""
+
+    def write(folder):
+        data = struct.pack(">9i", 1211216, 3, 3, 2, 1, 1, 0, 1, 0)
+        (folder / f"{name}.petsc").write_bytes(data + struct.pack(">2d", *values))
+
+    return write
+
+
+def without_pairs(folder):
+    for name in ("B", "gap", "drive"):
+        (folder / f"{name}.petsc").unlink()
+    with_entries("H", 1, -1)(folder)
+
+
+def in_time(write):
+    return lambda folder: [*write(folder), "--set", "transient.steps=10", "--set", "transient.step_size=0.1"]
+
+
+ORTHOTROPIC = """name = "upper"
+orthotropic = { young = [1e9, 2e9, 3e9], poisson = [0.1, 0.1, 0.1], shear = [1e9, 1e9, 1e9] }
+density = 1000"""
+UPPER = 'name = "upper"\nyoung = 1e9\npoisson = 0.3\ndensity = 1000'
+
 # name: how to write it, what the message must speak of
 CASES = {
     "missing scene file": (lambda folder: [folder / "absent.toml"], ["absent.toml"]),
@@ -157,6 +182,23 @@ CASES = {
                                      ["over", 'slave = "rotor"']),
     "singular stiffness": (block_scene('[[support]]\non = "floor"\nfixed = "x y z"\n', "", arguments=["--set", "support.0.fixed=x y z"]),
                            ["part lower"]),
+    "no modulus": (block_scene("young = 1e9\n", ""), ["part]] lower", "'young'", "orthotropic"]),
+    "no Poisson's ratio": (block_scene("poisson = 0.3\n", ""), ["part]] lower", "'poisson'", "orthotropic"]),
+    "two laws of a part": (block_scene(UPPER, ORTHOTROPIC + "\nyoung = 1e9"), ["part]] upper", "orthotropic excludes young", "keep one"]),
+    "a negative shear modulus": (block_scene(UPPER, ORTHOTROPIC.replace("shear = [1e9, 1e9", "shear = [1e9, -1e9")),
+                                 ["scene.toml, line 11", "young and shear must be above 0"]),
+    "axes that are not square": (block_scene(UPPER, ORTHOTROPIC.replace("shear =", 'axis_2 = [1, 1, 0], shear =')),
+                                 ["axis_2 must be square to axis_1"]),
+    "ratios of no material": (block_scene(UPPER, ORTHOTROPIC.replace("poisson = [0.1", "poisson = [0.9")), ["negative work", "nu12"]),
+    "unknown orthotropic key": (block_scene(UPPER, ORTHOTROPIC.replace("shear =", "sheer =")), ["sheer", "shear"]),
+    "loss factor without frequency": (block_scene("density = 1000", "density = 1000\nloss_factor = 0.01"),
+                                      ["part]] lower", "loss_frequency", "give the squeal's frequency"]),
+    "loss frequency without a factor": (block_scene("[modes]", "[damping]\nloss_frequency = 100\n[modes]"),
+                                        ["loss_frequency", "loss_factor"]),
+    "gyroscopic part that is not skew": (matrix_scene(with_entries("G", 1, 1)), ["G.petsc", "not skew", "C.petsc"]),
+    "circulatory part with pairs": (matrix_scene(with_entries("H", 1, -1)), ["H.petsc", "take B, gap, drive and F out"]),
+    "circulatory part with a load": (matrix_scene(without_pairs), ["H.petsc", "take B, gap, drive and F out"]),
+    "gyroscopic part in time": (in_time(matrix_scene(with_entries("G", 1, -1))), ["G.petsc", "take [transient] and [cycle] out"]),
     "truncated matrix": (matrix_scene(truncate), ["K.petsc"]),
     "not a PETSc file": (matrix_scene(not_petsc), ["M.petsc"]),
     "sizes that disagree": (matrix_scene(wrong_size), ["F.petsc", "2", "3"]),

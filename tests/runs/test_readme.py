@@ -86,13 +86,14 @@ def helped(tmp_path_factory):
 def test_every_scene_key_is_explained(helped):
     section, known = "scene", {}
     for line in helped.partition("Keys of a scene file")[2].partition("Algorithm options")[0].splitlines()[1:]:
-        if head := re.match(r"(\[+\w+\]+|rotation = )", line):
+        if head := re.match(r"(\[+\w+\]+|rotation = |orthotropic = )", line):
             section = head[1]
         elif key := re.match(r"  (\w+) .*?\[([^\[\]]*(?:\[.*\])?)\]$", line):
             known[section, key[1]] = split_unit(key[2])
     page = {}
     for heading, cells in tables(INPUTS / "README.md"):
-        section = "rotation = " if heading.startswith("rotation") else heading
+        inline = re.match(r"(rotation|orthotropic) = ", heading)
+        section = inline[0] if inline else heading
         if section in {name for name, _ in known}:
             assert cells[3], f"{section} {cells[0]} has no meaning"
             page[section, cells[0]] = (cells[1], cells[2])

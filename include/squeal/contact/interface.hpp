@@ -30,7 +30,7 @@ struct Interface
 /// scene's, else t1 along the drive. Error: zero drive velocity at a pair where mu > 0.
 Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm);
 
-/// B.petsc gap.petsc drive.petsc of a folder; directions = (rows of B) / pairs - 1.
+/// B.petsc gap.petsc drive.petsc of a folder; directions = (rows of B) / pairs - 1. No pairs where none is there.
 Interface read_interface(const std::filesystem::path& folder, const Structure& structure, const FrictionLaw& friction,
                          MPI_Comm comm);
 

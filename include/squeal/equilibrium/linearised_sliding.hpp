@@ -58,7 +58,8 @@ std::vector<std::complex<double>> normal_reactions(const ReactionOperator& react
 struct LinearisedSliding
 {
   ClosedContact contact;
-  Owned<Mat> C; // with C_f where the interface has it on
+  Owned<Mat> C; // with G, and with C_f where the interface has it on
+  Owned<Mat> K; // with H; null: the structure's
   ReactionOperator reaction;
   Owned<Mat> M_z, K_z; // Z'M Z, Z'K Z, symmetric: the frictionless bilateral problem
 };

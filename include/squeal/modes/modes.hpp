@@ -21,6 +21,7 @@ struct ComplexMode
   Owned<Vec> real, imaginary;                  // in the structure's dofs; largest entry of |phi| is 1
   std::vector<std::complex<double>> reactions; // normal reaction per pair [N per m of the mode]; 0 on open pairs
   double backward_error = 0;
+  double loss_error = 0; // distance of lambda to that of complex stiffness over |lambda|; 0 without loss factors
 
   double frequency_hz() const; // |Im(lambda)| / 2 pi
   double growth_rate() const { return lambda.real(); }
@@ -39,7 +40,7 @@ struct RealModes
 /// The count that shows whether a mode is missing.
 struct ModeCount
 {
-  std::string certified_by;    // "inertia" of the frictionless structure; empty: not certified
+  std::string certified_by;    // "inertia" of the frictionless structure, "all pairs"; empty: not certified
   double frequency = 0;        // [Hz] the end of the band or near it, where friction moved no pair across
   int expected = 0, found = 0; // pairs below it
 };
@@ -71,6 +72,7 @@ struct Modes
   std::vector<double> beyond_band;    // [Hz] pairs between the band and count.frequency
   int unstable_count = 0;             // of is_unstable, the first ones
   bool routes_disagree = false;       // on unstable_count, when both ran
+  bool beyond_inertia = false;        // gyroscopic or circulatory parts: the inertia does not count the pairs
   ModeCount count;
   std::string count_check; // one sentence: unstable modes by either route, all modes by inertia
 

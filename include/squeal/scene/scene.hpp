@@ -19,19 +19,32 @@ using Motions = std::array<bool, 6>;
 
 inline constexpr std::array motion_words = {"x", "y", "z", "rx", "ry", "rz"};
 
-/// Isotropic linear elasticity.
+/// Nine constants of orthotropic elasticity along the axes 1, 2 and 3 = 1 x 2. A stress along i alone strains i by
+/// stress/E_i and j by -nu_ij stress/E_i; nu_ij/E_i = nu_ji/E_j.
+struct Orthotropy
+{
+  Vec3 young{};            // [Pa] E1 E2 E3
+  Vec3 poisson{};          // [-] nu12 nu13 nu23: contraction along the second axis under tension along the first
+  Vec3 shear{};            // [Pa] G12 G13 G23
+  Vec3 axis_1 = {1, 0, 0}; // [-] unit
+  Vec3 axis_2 = {0, 1, 0}; // [-] unit, square to axis_1
+};
+
+/// Linear elasticity.
 struct Material
 {
-  double young = 0;   // [Pa] Young's modulus
-  double poisson = 0; // [-] Poisson's ratio
-  double density = 0; // [kg/m3] mass density
+  double young = 0;                     // [Pa] Young's modulus
+  double poisson = 0;                   // [-] Poisson's ratio
+  double density = 0;                   // [kg/m3] mass density
+  std::optional<Orthotropy> orthotropy; // instead of young and poisson; of solids
 };
 
 /// Rayleigh damping C = alpha M + beta K.
 struct RayleighDamping
 {
-  double alpha = 0; // [1/s]
-  double beta = 0;  // [s]
+  double alpha = 0;          // [1/s]
+  double beta = 0;           // [s]
+  double loss_frequency = 0; // [Hz] at which loss factors have their viscous equivalent in time; of the scene alone
 };
 
 /// A named volume of the mesh, or a named surface if it has a thickness (shell).
@@ -41,6 +54,7 @@ struct Part
   Material material;
   double thickness = 0;                   // [m] of a shell; 0 for a solid
   std::optional<RayleighDamping> damping; // if absent, the scene's
+  double loss_factor = 0;                 // [-] eta of the stiffness K (1 + i eta)
 };
 
 /// A node of its own: a point mass, or an end of springs.
@@ -127,6 +141,14 @@ struct Contact
   Vec3 velocity{};                  // [m/s] of the rotor's surface if there is no rotation
   double reach = 0;                 // [m] largest distance of the surfaces along the normal
   SlaveSide slave{};                // has one pair a node
+};
+
+/// Two surfaces of parts meshed apart that move as one; nodes of the slave follow the master.
+struct Tie
+{
+  std::string slave;  // named surface, the finer or softer one
+  std::string master; // named surface
+  double reach = 0;   // [m] largest distance of the surfaces along the normal
 };
 
 /// Coulomb's law with mu(s) = coefficient + (static_coefficient - coefficient) exp(-s/decay_speed) at the sliding speed
@@ -302,6 +324,7 @@ struct Scene
   std::vector<Force> forces;
   std::vector<Pressure> pressures;
   std::vector<Contact> contacts;
+  std::vector<Tie> ties;
   FrictionLaw friction;
   RayleighDamping damping; // of parts without their own
   ModesSettings modes;

@@ -15,6 +15,10 @@ struct Structure
   Owned<Mat> M;              // [kg, kg m, kg m2]
   Owned<Mat> C;              // [N s/m, N s, N m s]
   Owned<Mat> K;              // [N/m, N, N m]
+  Owned<Mat> G;              // [N s/m] skew, gyroscopic; null: none
+  Owned<Mat> H;              // [N/m] skew, circulatory; null: none
+  Owned<Mat> K_loss;         // [N/m] sum of eta K of the parts with a loss factor eta; null: none
+  double loss_omega = 0;     // [rad/s] C holds K_loss/loss_omega; 0: none of it
   Owned<Vec> load;           // [N, N m]
   std::int64_t elements = 0; // number of elements; 0 on a matrix scene
   DofNames names;
@@ -24,10 +28,11 @@ struct Structure
 /// Throws Error for an element whose Jacobian is not positive, with its part and place.
 Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partition, const DofMap& dofs, MPI_Comm comm);
 
-/// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder; C and F are zero without their
-/// files. Collective.
+/// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder, and of G.petsc and H.petsc where
+/// they are there; C and F are zero without their files. Without a B.petsc C and K may be unsymmetric: their skew parts
+/// join G and H. Collective.
 /// Throws Error for a file that is missing, truncated or not PETSc binary, sizes that disagree, entries that are not
-/// finite, and an M, C or K that is not symmetric.
+/// finite, an M, C or K that is not symmetric, and a G or H that is not skew.
 Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm);
 
 /// Declares to PETSc that A stays symmetric and that its pattern is complete.

@@ -1,0 +1,113 @@
+#include "squeal/mesh/ties.hpp"
+
+#include "dual_rows.hpp"
+#include "squeal/base/error.hpp"
+#include "squeal/mesh/names.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace squeal
+{
+
+namespace
+{
+
+std::string name_of(const Tie& tie)
+{
+  return "tie of '" + tie.slave + "' to '" + tie.master + "': ";
+}
+
+void check_apart(const Tie& tie, const ContactSurface& slave, const ContactSurface& master)
+{
+  std::vector<int> shared;
+  std::set_intersection(slave.nodes.begin(), slave.nodes.end(), master.nodes.begin(), master.nodes.end(),
+                        std::back_inserter(shared));
+  if (!shared.empty())
+    throw Error(name_of(tie) + "the surfaces share " + std::to_string(shared.size()) +
+                " nodes, so that the parts are joined there: take the tie out");
+}
+
+void check_meeting(const Tie& tie, const SlaveRows& rows)
+{
+  if (std::find(rows.covered.begin(), rows.covered.end(), 1) != rows.covered.end()) return;
+  const OverlapFindings& found = rows.findings;
+  const Vec3& at = found.nearest_at;
+  if (found.nearest > 0)
+    throw Error(name_of(tie) + format("the surfaces are at least %.4g m apart along the normal, at (%g, %g, %g): give "
+                                      "the tie a reach above that, or correct the mesh",
+                                      found.nearest, at[0], at[1], at[2]));
+  throw Error(name_of(tie) + "no face of one lies opposite a face of the other: correct the names or the mesh");
+}
+
+/// The row of a slave node solved for its own motion. The weights of the others add up to 1, so that a translation is
+/// kept to rounding.
+TiedNode solved(const SlaveRow& row, int node, int tie)
+{
+  TiedNode result{node, tie, {}};
+  double own = 0, sum = 0;
+  for (const auto& [other, weight] : row.slave)
+    if (other == node)
+      own = weight;
+    else
+      result.others.push_back({other, -weight});
+  for (const auto& [other, weight] : row.master)
+    if (std::abs(weight) > 1e-13 * row.area) result.others.push_back({other, weight});
+  for (PairNode& other : result.others) sum += other.weight /= own;
+  const auto largest =
+      std::max_element(result.others.begin(), result.others.end(),
+                       [](const auto& a, const auto& b) { return std::abs(a.weight) < std::abs(b.weight); });
+  largest->weight += 1 - sum;
+  return result;
+}
+
+void add_tie(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
+{
+  constexpr double light = 0.1, coincident = 1e-6; // as of contact pairs
+  const ContactSurface slave = contact_surface(mesh, tie.slave), master = contact_surface(mesh, tie.master);
+  check_apart(tie, slave, master);
+  const double rounding = coincident * std::max(slave.size, master.size);
+  OverlapLimits limits{tie.reach, tie.reach == 0 ? rounding : std::max(rounding, tie.reach), tie.reach == 0,
+                       Eigen::Vector3d::Zero()};
+  SlaveRows rows = dual_rows(slave, master, limits);
+  if (std::find(rows.covered.begin(), rows.covered.end(), 1) == rows.covered.end())
+  {
+    limits.search = std::max(slave.size, master.size);
+    rows = dual_rows(slave, master, limits);
+  }
+  check_meeting(tie, rows);
+  for (std::size_t i = 0; i < rows.rows.size(); ++i)
+    if (const SlaveRow& row = rows.rows[i]; row.is_covered() && row.area >= light * row.whole)
+      result.nodes.push_back(solved(row, slave.nodes[i], index));
+  result.coverage.push_back(rows.coverage);
+}
+
+/// Throws Error for nodes that several ties move, or that one moves and another follows.
+void check_order(const Mesh& mesh, const Scene& scene, const TiedNodes& tied)
+{
+  std::map<int, int> tie_of;
+  for (const TiedNode& t : tied.nodes)
+    if (const auto [other, is_new] = tie_of.emplace(t.node, t.tie); !is_new)
+      throw Error(name_of(scene.ties[static_cast<std::size_t>(t.tie)]) + node_text(t.node, mesh.nodes[t.node]) +
+                  " is a slave of the " + name_of(scene.ties[static_cast<std::size_t>(other->second)]) +
+                  "too: give each tie a slave surface of its own");
+  for (const TiedNode& t : tied.nodes)
+    for (const PairNode& other : t.others)
+      if (const auto found = tie_of.find(other.node); found != tie_of.end() && found->second != t.tie)
+        throw Error(name_of(scene.ties[static_cast<std::size_t>(t.tie)]) +
+                    node_text(other.node, mesh.nodes[other.node]) + " of its master is a slave of the " +
+                    name_of(scene.ties[static_cast<std::size_t>(found->second)]) + "exchange slave and master of one");
+}
+
+} // namespace
+
+TiedNodes tied_nodes(const Mesh& mesh, const Scene& scene)
+{
+  TiedNodes result;
+  for (std::size_t i = 0; i < scene.ties.size(); ++i) add_tie(mesh, scene.ties[i], static_cast<int>(i), result);
+  check_order(mesh, scene, result);
+  return result;
+}
+
+} // namespace squeal

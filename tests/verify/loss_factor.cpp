@@ -1,0 +1,160 @@
+// ranks: 1 2
+// Modes with loss factors. With one eta everywhere lambda^2 + lambda eta w^2/omega + w^2 = 0 with omega = Im(lambda)
+// has
+//     omega^2 = w^2 (1 + sqrt(1 - eta^2))/2,   Re(lambda) = -eta w^2/(2 omega),
+// beside i w sqrt(1 + i eta) of complex stiffness, w the undamped frequency. With several eta both problems are solved
+// dense, one mode at a time.
+#include "../support/linearised.hpp"
+#include "squeal/solid/sparse_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <doctest/doctest.h>
+#include <Eigen/Eigenvalues>
+#include <numbers>
+
+using namespace squeal;
+using Complex = std::complex<double>;
+
+namespace
+{
+
+/// Unit masses in a row between walls, springs of stiffness s with a loss factor each, C_0 = alpha M.
+struct Row
+{
+  std::vector<double> loss; // of the springs, one more than masses
+  double s = 1, alpha = 0, loss_omega = 1;
+
+  int masses() const { return static_cast<int>(loss.size()) - 1; }
+};
+
+/// Entries (i, j) of the springs' matrix, each spring weighted.
+double stiffness(const Row& row, const std::vector<double>& weight, int i, int j)
+{
+  const auto at = static_cast<std::size_t>(i);
+  if (i == j) return row.s * (weight[at] + weight[at + 1]);
+  return std::abs(i - j) == 1 ? -row.s * weight[static_cast<std::size_t>(std::max(i, j))] : 0;
+}
+
+template <class Entry> Owned<Mat> matrix(int n, Entry entry)
+{
+  Owned<Mat> A;
+  check(MatCreateAIJ(PETSC_COMM_WORLD, PETSC_DECIDE, PETSC_DECIDE, n, n, 3, nullptr, 3, nullptr, A.put()));
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(A, &first, &last));
+  for (PetscInt i = first; i < last; ++i)
+    for (PetscInt j = std::max(PetscInt{0}, i - 1); j < std::min(PetscInt{n}, i + 2); ++j)
+      check(MatSetValue(A, i, j, entry(static_cast<int>(i), static_cast<int>(j)), INSERT_VALUES));
+  check(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
+  return A;
+}
+
+Modes modes_of(const Row& row, double band)
+{
+  test::SmallModel model;
+  Structure& structure = model.structure;
+  const std::vector<double> ones(row.loss.size(), 1);
+  const int n = row.masses();
+  structure.M = matrix(n, [](int i, int j) { return i == j ? 1. : 0.; });
+  structure.K = matrix(n, [&](int i, int j) { return stiffness(row, ones, i, j); });
+  structure.K_loss = matrix(n, [&](int i, int j) { return stiffness(row, row.loss, i, j); });
+  structure.loss_omega = row.loss_omega;
+  structure.C = matrix(n, [&](int i, int j)
+                       { return (i == j ? row.alpha : 0) + stiffness(row, row.loss, i, j) / row.loss_omega; });
+  check(MatCreateVecs(structure.K, structure.load.put(), nullptr));
+  PetscInt local = 0;
+  check(MatGetLocalSize(structure.K, &local, nullptr));
+  model.interface.B = matrix_of_rows({}, local, PETSC_COMM_WORLD);
+  ModesSettings settings;
+  settings.method = ModesMethod::full;
+  settings.band = band;
+  return test::modes_of(model, find_equilibrium(model.structure, model.interface, {}), settings, {});
+}
+
+std::vector<const ComplexMode*> by_frequency(const Modes& modes)
+{
+  std::vector<const ComplexMode*> result;
+  for (const ComplexMode& mode : modes.modes) result.push_back(&mode);
+  std::sort(result.begin(), result.end(),
+            [](const ComplexMode* a, const ComplexMode* b) { return a->lambda.imag() < b->lambda.imag(); });
+  return result;
+}
+
+Complex nearest(const std::vector<Complex>& values, Complex to)
+{
+  return *std::min_element(values.begin(), values.end(),
+                           [&](Complex a, Complex b) { return std::abs(a - to) < std::abs(b - to); });
+}
+
+/// (lambda^2 + lambda C + K) of dense matrices.
+std::vector<Complex> dense_pairs(const Eigen::MatrixXcd& C, const Eigen::MatrixXcd& K)
+{
+  const Eigen::Index n = K.rows();
+  Eigen::MatrixXcd companion(2 * n, 2 * n);
+  companion << -C, -K, Eigen::MatrixXcd::Identity(n, n), Eigen::MatrixXcd::Zero(n, n);
+  const Eigen::VectorXcd values = Eigen::ComplexEigenSolver<Eigen::MatrixXcd>(companion, false).eigenvalues();
+  return {values.begin(), values.end()};
+}
+
+} // namespace
+
+TEST_CASE("one loss factor everywhere gives the viscous equivalent in closed form, whatever frequency C is stated at")
+{
+  for (const int n : {8, 1500}) // solved whole, and by slices
+    for (const double eta : {0.02, 0.4})
+      for (const double stated : {20., 300.})
+      {
+        CAPTURE(n);
+        CAPTURE(eta);
+        Row row{std::vector<double>(static_cast<std::size_t>(n) + 1, eta), n == 8 ? 2e4 : 1e8, 0, stated};
+        const Modes modes = modes_of(row, n == 8 ? 1000 : 150);
+        CHECK(modes.outcome.kind == OutcomeKind::converged);
+        CHECK(modes.outcome.residual < 1e-12);
+        const auto ordered = by_frequency(modes);
+        REQUIRE(ordered.size() > 7);
+        int j = 0;
+        for (const ComplexMode* mode : ordered)
+        {
+          const double w = 2 * std::sqrt(row.s) * std::sin(++j * std::numbers::pi / (2 * (n + 1)));
+          const double omega = w * std::sqrt((1 + std::sqrt(1 - eta * eta)) / 2);
+          const Complex exact(-eta * w * w / (2 * omega), omega);
+          const Complex complex = Complex(0, w) * std::sqrt(Complex(1, eta));
+          CHECK(std::abs(mode->lambda - exact) < 1e-9 * w); // rounding of K at the end of a stiff row
+          CHECK(std::abs(mode->loss_error - std::abs(exact - complex) / std::abs(exact)) < 1e-9);
+        }
+      }
+}
+
+TEST_CASE("parts of different loss factors have the modes of dense algebra, and the distance to complex stiffness")
+{
+  Row row{{}, 1e4, 1.5, 90};
+  for (int i = 0; i < 13; ++i) row.loss.push_back(i < 5 ? 0.3 : i < 9 ? 0.01 : 0);
+  const int n = row.masses();
+  Eigen::MatrixXd K(n, n), L(n, n);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+    {
+      K(i, j) = stiffness(row, std::vector<double>(row.loss.size(), 1), i, j);
+      L(i, j) = stiffness(row, row.loss, i, j);
+    }
+  const Eigen::MatrixXd C_0 = row.alpha * Eigen::MatrixXd::Identity(n, n);
+  const std::vector<Complex> stiff = dense_pairs(C_0, K + Complex(0, 1) * L);
+  const Modes modes = modes_of(row, 1000);
+  REQUIRE(modes.modes.size() == static_cast<std::size_t>(n));
+  double largest = 0;
+  for (const ComplexMode& mode : modes.modes)
+  {
+    Complex own = mode.lambda;
+    for (int i = 0; i < 40; ++i) own = nearest(dense_pairs(C_0 + L / own.imag(), K.cast<Complex>()), own);
+    CHECK(std::abs(mode.lambda - own) < 1e-11 * std::abs(own)); // rounding of the companion matrix
+    const double distance = std::abs(own - nearest(stiff, own)) / std::abs(own);
+    CHECK(std::abs(mode.loss_error - distance) < 1e-10);
+    CHECK(mode.backward_error < 1e-12);
+    largest = std::max(largest, distance);
+  }
+  CHECK(largest > 1e-4); // the two differ
+  CHECK(std::is_sorted(modes.modes.begin(), modes.modes.end(),
+                       [](const ComplexMode& a, const ComplexMode& b) { return a.lambda.real() > b.lambda.real(); }));
+}
