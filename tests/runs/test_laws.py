@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from conftest import INPUTS
-from models import Mesh, STEEL, bricks, lattice, quads, write_scene
+from models import Mesh, STEEL, bricks, lattice, quads, write_matrices, write_scene
 
 OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "friction.coefficient=0.25", "--set",
               "friction.static_coefficient=0.4", "--set", "friction.decay_speed=0.5", "--set", "cycle.steps_per_period=200"]
@@ -102,3 +102,25 @@ def test_a_loss_factor_damps_every_mode_at_its_own_frequency(converged, tmp_path
     for mode, value, distance in zip(lossy, exact, error):
         assert abs(2 * np.pi * mode["frequency_hz"] * 1j + mode["growth_rate"] - value) < 1e-9 * abs(value)
         assert mode["loss_error"] == pytest.approx(distance, rel=1e-4)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_modes_of_matrices_alone_have_the_skew_parts_of_all_files(converged, tmp_path, ranks):
+    """An unsymmetric K and C, and G and H beside them: the pairs of the companion matrix of their sums."""
+    random = np.random.default_rng(3)
+    skew = [np.triu(random.uniform(-1, 1, (6, 6)), 1) for _ in range(4)]
+    skew = [part - part.T for part in skew]
+    K, C, M = np.diag(np.linspace(20, 60, 6)), 0.1 * np.eye(6), np.diag(np.linspace(1, 2, 6))
+    folder = write_matrices(tmp_path / "matrices", B=np.ones((2, 6)), gap=[0], drive=[1], F=np.zeros(6), M=M,
+                            C=C + 0.3 * skew[0], K=K + 4 * skew[1], G=0.2 * skew[2], H=3 * skew[3])
+    for name in ("B", "gap", "drive"):
+        (folder / f"{name}.petsc").unlink()
+    report = converged(write_scene(tmp_path, matrices={"folder": "matrices"}, modes={"band": 10}), ranks=ranks).report
+    all_of_C, all_of_K = C + 0.3 * skew[0] + 0.2 * skew[2], K + 4 * skew[1] + 3 * skew[3]
+    inverse = np.linalg.inv(M)
+    exact = np.linalg.eigvals(np.block([[-inverse @ all_of_C, -inverse @ all_of_K], [np.eye(6), np.zeros((6, 6))]]))
+    exact = sorted(exact[exact.imag > 0], key=lambda value: -value.real)
+    found = [mode["growth_rate"] + 2j * np.pi * mode["frequency_hz"] for mode in report["modes"]["modes"]]
+    assert np.allclose(found, exact, rtol=1e-11, atol=0)
+    assert report["modes"]["count_certified_by"] == "all pairs" and report["modes"]["unstable_count"] > 0
+    assert report["estimate"]["outcome"] == "skipped"
