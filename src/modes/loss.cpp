@@ -159,15 +159,6 @@ std::vector<std::size_t> by_frequency(const std::vector<Eigenpair>& pairs)
   return order;
 }
 
-/// C - K_loss/omega
-Owned<Mat> without_loss(const LossProblem& loss)
-{
-  Owned<Mat> C;
-  check(MatDuplicate(loss.problem.C, MAT_COPY_VALUES, C.put()));
-  check(MatAXPY(C, -1 / loss.omega, loss.K_loss, DIFFERENT_NONZERO_PATTERN));
-  return C;
-}
-
 double one_norm(Mat A)
 {
   double norm = 0;
@@ -177,20 +168,20 @@ double one_norm(Mat A)
 
 } // namespace
 
-std::vector<double> correct_loss(QuadraticSolution& solution, const LossProblem& loss, const PencilOptions& options)
+std::vector<double> correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
+                                 const PencilOptions& options)
 {
-  const Owned<Mat> C_0 = without_loss(loss);
-  const std::array<Mat, 4> matrices = {loss.problem.M, C_0, loss.problem.K, loss.K_loss};
+  const std::array<Mat, 4> matrices = {problem.M, problem.C, problem.K, K_loss};
   std::array<double, 4> norms{};
   std::transform(matrices.begin(), matrices.end(), norms.begin(), one_norm);
   std::vector<double> errors(solution.pairs.size(), 0.);
   const std::vector<std::size_t> order = by_frequency(solution.pairs);
-  ShiftInvert pencil = make_shift_invert(loss.problem.K, loss.problem.M, Symmetry::none, options);
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
   for (std::size_t first = 0; first < order.size(); first += in_group)
   {
     const std::size_t end = std::min(first + in_group, order.size());
     const std::size_t from = first < neighbours ? 0 : first - neighbours, to = std::min(end + neighbours, order.size());
-    const MultiVector none = empty_multivector(loss.problem.K);
+    const MultiVector none = empty_multivector(problem.K);
     Projected space{matrices, norms, none, {none, none, none, none}, {}};
     MultiVector shapes = none;
     for (std::size_t k = from; k < to; ++k)

@@ -12,15 +12,10 @@
 namespace squeal
 {
 
-struct LossProblem
-{
-  const QuadraticProblem& problem; // whose C holds K_loss/omega
-  Mat K_loss = nullptr;            // in the rows and columns of the problem
-  double omega = 0;                // [rad/s]
-};
-
-/// Replaces the pairs of the problem, except real ones, by those of their own frequency. Returns the distance of each
-/// to the complex problem over |lambda|, in the order of the pairs. Sets outcome.residual. Collective.
-std::vector<double> correct_loss(QuadraticSolution& solution, const LossProblem& loss, const PencilOptions& options);
+/// Replaces the pairs of a problem without loss factors, whose C is C_0, by those of their own frequency; real ones
+/// stay. `K_loss`: in the rows and columns of the problem. Returns the distance of each to the complex problem over
+/// |lambda|, in the order of the pairs. Sets outcome.residual. Collective.
+std::vector<double> correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
+                                 const PencilOptions& options);
 
 } // namespace squeal

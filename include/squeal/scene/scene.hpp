@@ -33,10 +33,10 @@ struct Orthotropy
 /// Linear elasticity.
 struct Material
 {
-  double young = 0;                     // [Pa] Young's modulus
-  double poisson = 0;                   // [-] Poisson's ratio
-  double density = 0;                   // [kg/m3] mass density
-  std::optional<Orthotropy> orthotropy; // instead of young and poisson; of solids
+  double young = 0;                       // [Pa] Young's modulus
+  double poisson = 0;                     // [-] Poisson's ratio
+  double density = 0;                     // [kg/m3] mass density
+  std::optional<Orthotropy> orthotropy{}; // instead of young and poisson; of solids
 };
 
 /// Rayleigh damping C = alpha M + beta K.
