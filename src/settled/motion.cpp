@@ -69,7 +69,7 @@ MotionVerdict judge_motion(const std::vector<Estimated>& exponents, std::span<co
   if (positive > 0) return {MotionKind::irregular, "", ""};
   if (zero == 1) return {MotionKind::periodic, "", ""};
   // slow motions that die out have exponents within their bars of zero, too
-  if (zero > 1 && base.second == 0 && steady(energies)) return {MotionKind::periodic, "", ""};
+  if (zero > 1 && steady(energies)) return {MotionKind::periodic, "", ""};
   if (zero == 2) return judge_torus(energies, base);
   if (zero == 0) return {MotionKind::undecided, "a cycle and rest: no exponent is zero within its bar", more};
   return {MotionKind::undecided, "quasi-periodic with more than two frequencies and weakly irregular",
