@@ -5,6 +5,7 @@
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/build.hpp"
 #include "squeal/mesh/names.hpp"
+#include "superelements.hpp"
 
 namespace squeal
 {
@@ -81,6 +82,7 @@ Mesh read_mesh(const Scene& scene, MPI_Comm comm)
   for (const RigidBody& body : scene.rigid_bodies) add_point(body.name, body.at, mesh);
   if (mesh.nodes.empty()) throw Error("the scene has neither a mesh nor points: nothing to compute");
   check_names(mesh, scene);
+  add_superelements(scene, mesh, comm);
   return mesh;
 }
 

@@ -84,6 +84,7 @@ private:
     refuse(s.points, "point", why);
     refuse(s.rigid_bodies, "rigid_body", why);
     refuse(s.springs, "spring", why);
+    refuse(s.superelements, "superelement", why);
     refuse(s.pressures, "pressure", why);
     refuse(s.contacts, "contact", why);
     refuse(s.ties, "tie", why);
@@ -123,10 +124,11 @@ private:
 
   void check_names() const
   {
-    std::set<std::string> parts, nodes = {"ground"}, probes; // springs refer to "ground"
+    std::set<std::string> parts, nodes = {"ground"}, superelements, probes; // springs refer to "ground"
     need_different(scene_.parts, "part", parts);
     need_different(scene_.points, "point", nodes);
     need_different(scene_.rigid_bodies, "rigid_body", nodes);
+    need_different(scene_.superelements, "superelement", superelements);
     need_different(scene_.probes, "probe", probes);
   }
 

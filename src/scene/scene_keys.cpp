@@ -106,6 +106,15 @@ SceneKeys keys_of(Spring& s)
   };
 }
 
+SceneKeys keys_of(Superelement& s)
+{
+  return {
+      {"name", &s.name, required, Rule::any, "text", "name for messages"},
+      {"folder", &s.folder, required, Rule::folder, "path", "folder of M K .petsc, dofs.txt, nodes.txt; of C.petsc"},
+      {"on", &s.on, required, Rule::any, "texts", "named group, point or rigid body that has its nodes, or a list"},
+  };
+}
+
 SceneKeys keys_of(Support& s)
 {
   return {

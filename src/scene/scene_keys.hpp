@@ -66,6 +66,7 @@ SceneKeys keys_of(Orthotropy& orthotropy);
 SceneKeys keys_of(Point& point);
 SceneKeys keys_of(RigidBody& body);
 SceneKeys keys_of(Spring& spring);
+SceneKeys keys_of(Superelement& superelement);
 SceneKeys keys_of(Support& support);
 SceneKeys keys_of(Force& force);
 SceneKeys keys_of(Pressure& pressure);
@@ -91,6 +92,7 @@ template <class Visit> void for_each_table(Scene& scene, Visit visit)
   visit("point", scene.points, "a node of its own: a point mass, or an end of springs");
   visit("rigid_body", scene.rigid_bodies, "named surfaces that move as one rigid body");
   visit("spring", scene.springs, "spring and dashpot between two points or rigid bodies, or to \"ground\"");
+  visit("superelement", scene.superelements, "a reduced structure of another code, joined to nodes");
   visit("support", scene.supports, "fixed motions of a named group or point");
   visit("force", scene.forces, "force on a point, a rigid body or a named group");
   visit("pressure", scene.pressures, "pressure on a named surface");

@@ -20,6 +20,12 @@ void name_nodes(const Mesh& mesh, const Scene& scene, DofNames& names)
   };
   for (const Point& point : scene.points) name_point("point", point.name);
   for (const RigidBody& body : scene.rigid_bodies) name_point("rigid body", body.name);
+  for (std::size_t i = 0; i < mesh.superelements.size(); ++i)
+  {
+    for (const SuperelementRow& row : mesh.superelements[i])
+      if (row.coordinate) names.body[row.node] = static_cast<int>(names.bodies.size());
+    names.bodies.push_back("superelement " + scene.superelements[i].name);
+  }
 }
 
 std::string describe(const DofNames& names, PetscInt dof)

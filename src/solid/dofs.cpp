@@ -75,6 +75,16 @@ Constraints unconstrained(const Mesh& mesh, const Scene& scene)
     set_components(constraints, point_node(mesh, point.name, "point"), point.free);
   for (const RigidBody& body : scene.rigid_bodies)
     set_components(constraints, point_node(mesh, body.name, "rigid body"), body.free);
+  for (std::size_t i = 0; i < mesh.superelements.size(); ++i)
+    for (const SuperelementRow& row : mesh.superelements[i])
+    {
+      DofKind& kind = constraints.kind_of(row.node, row.motion);
+      if (row.coordinate) kind = DofKind::free;
+      if (kind == DofKind::absent)
+        throw Error("superelement " + scene.superelements[i].name + " has the motion " + motion_words[row.motion] +
+                    " of a node where the parts have none, " + node_text(row.node, mesh.nodes[row.node]) +
+                    ": retain translations alone, or join it to a [[point]] or [[rigid_body]]");
+    }
   return constraints;
 }
 

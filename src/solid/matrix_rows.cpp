@@ -6,9 +6,6 @@
 #include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
-#include <fstream>
-#include <set>
-#include <sstream>
 
 namespace squeal
 {
@@ -16,37 +13,9 @@ namespace squeal
 namespace
 {
 
-/// Returns the motion in one line "node motion". Throws Error if the line has another form.
-NodeMotion motion_in(const std::string& line, const std::string& place)
-{
-  std::istringstream words(line);
-  NodeMotion found;
-  std::string motion, rest;
-  const bool is_form = (words >> found.node >> motion) && !(words >> rest);
-  const auto* const known = std::find(motion_words.begin(), motion_words.end(), motion);
-  if (!is_form || (known == motion_words.end() && motion != "-"))
-    throw Error(place + ": '" + shortened(line) +
-                "': expected a node's number and one of x y z rx ry rz, such as '1017 x'; or '-' for what is no motion "
-                "of a node");
-  if (known != motion_words.end()) found.motion = static_cast<int>(known - motion_words.begin());
-  return found;
-}
-
 std::vector<NodeMotion> motions_in(const std::filesystem::path& file, PetscInt size)
 {
-  std::ifstream stream(file);
-  if (!stream) throw Error(file.string() + ": cannot be read");
-  std::vector<NodeMotion> motions;
-  std::set<std::pair<PetscInt, int>> seen;
-  std::string line;
-  for (int number = 1; std::getline(stream, line); ++number)
-  {
-    const std::string place = file.string() + ", line " + std::to_string(number);
-    motions.push_back(motion_in(line, place));
-    const NodeMotion& last = motions.back();
-    if (last.motion >= 0 && !seen.insert({last.node, last.motion}).second)
-      throw Error(place + ": '" + line + "' is there twice: each row of the matrices is a motion of its own");
-  }
+  auto motions = read_row_motions(file);
   if (static_cast<PetscInt>(motions.size()) != size)
     throw Error(file.string() + ": " + std::to_string(motions.size()) + " lines, but M.petsc has " +
                 std::to_string(size) + " rows: one line for each row is needed");
@@ -176,6 +145,7 @@ Elimination::Elimination(const std::vector<PetscInt>& held, Vec layout)
 
 Owned<Mat> Elimination::square(Mat A) const
 {
+  if (!A) return {};
   Owned<Mat> result;
   check(MatCreateSubMatrix(A, kept_, kept_, MAT_INITIAL_MATRIX, result.put()));
   return result;
@@ -183,6 +153,7 @@ Owned<Mat> Elimination::square(Mat A) const
 
 Owned<Mat> Elimination::columns(Mat A) const
 {
+  if (!A) return {};
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(A, &first, &last));
   Owned<IS> rows;

@@ -1,15 +1,16 @@
 /// M, C, K and the load on the free degrees of freedom: sums of T_e' A_e T_e over contributions, u_e = T_e q.
 ///
-/// A contribution is that of an element, or lumped: the mass of a point or rigid body, a spring. Every rank holds the
-/// whole mesh, so that it counts the entries of its own rows exactly and without communication. Contributions to rows
-/// of other ranks are sent at the end of the assembly. All three matrices receive every contribution, zeros included,
-/// which gives them one pattern.
+/// A contribution is that of an element, or lumped: the mass of a point or rigid body, a spring, a superelement. Every
+/// rank holds the whole mesh, so that it counts the entries of its own rows exactly and without communication.
+/// Contributions to rows of other ranks are sent at the end of the assembly. All three matrices receive every
+/// contribution, zeros included, which gives them one pattern.
 #include "squeal/solid/structure.hpp"
 
 #include "loads.hpp"
 #include "matrices.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
+#include "squeal/solid/binary.hpp"
 #include "squeal/solid/element.hpp"
 
 #include <algorithm>
@@ -81,6 +82,51 @@ std::vector<Contribution> lumped_contributions(const Mesh& mesh, const Scene& sc
   for (const RigidBody& body : scene.rigid_bodies)
     result.push_back(mass_contribution(point_node(mesh, body.name, "rigid body"), body.mass, body.inertia));
   for (const Spring& spring : scene.springs) result.push_back(spring_contribution(mesh, spring));
+  return result;
+}
+
+/// Returns a small matrix in a file, whole. Throws Error unless it is symmetric and of this order.
+Eigen::MatrixXd small_matrix(const std::filesystem::path& file, Eigen::Index order)
+{
+  const MatrixSize size = check_matrix_file(file, PETSC_COMM_SELF);
+  if (size.rows != order || size.columns != order)
+    throw Error(file.string() + ": " + std::to_string(size.rows) + " x " + std::to_string(size.columns) +
+                ", but dofs.txt beside it has " + std::to_string(order) + " lines");
+  const auto sparse = load_matrix(file, size, size, PETSC_COMM_SELF);
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(order, order);
+  for_each_row(sparse,
+               [&](PetscInt row, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
+               {
+                 for (std::size_t k = 0; k < columns.size(); ++k) A(row, columns[k]) = values[k];
+               });
+  constexpr double rounding = 1e-9; // of exported matrices
+  if ((A - A.transpose()).cwiseAbs().maxCoeff() > rounding * A.cwiseAbs().maxCoeff())
+    throw Error(file.string() + ": not symmetric");
+  return A;
+}
+
+/// The superelements; their matrices on rank 0 alone. Collective.
+std::vector<Contribution> superelement_contributions(const Mesh& mesh, const Scene& scene, MPI_Comm comm)
+{
+  std::vector<Contribution> result;
+  for (std::size_t i = 0; i < mesh.superelements.size(); ++i)
+  {
+    Contribution& added = result.emplace_back();
+    for (const SuperelementRow& row : mesh.superelements[i])
+      added.nodal_dofs.push_back(6 * PetscInt{row.node} + row.motion);
+    const auto order = static_cast<Eigen::Index>(added.nodal_dofs.size());
+    const std::filesystem::path& folder = scene.superelements[i].folder;
+    const auto read = [&]
+    {
+      added.M = small_matrix(folder / "M.petsc", order);
+      added.K = small_matrix(folder / "K.petsc", order);
+      if (is_file(folder / "C.petsc"))
+        added.C = small_matrix(folder / "C.petsc", order);
+      else
+        added.C = scene.damping.alpha * added.M + scene.damping.beta * added.K;
+    };
+    on_rank_zero(comm, read);
+  }
   return result;
 }
 
@@ -232,7 +278,8 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
   Structure structure;
   structure.elements = static_cast<std::int64_t>(mesh.elements.size());
   structure.names = dofs.names;
-  const auto lumped = lumped_contributions(mesh, scene);
+  auto lumped = lumped_contributions(mesh, scene);
+  for (Contribution& added : superelement_contributions(mesh, scene, comm)) lumped.push_back(std::move(added));
   {
     const auto counts = count_entries(mesh, dofs, lumped);
     for (Owned<Mat>* A : {&structure.M, &structure.C, &structure.K}) *A = empty_matrix(dofs, counts, comm);

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 import scipy.linalg
 from conftest import INPUTS, ROOT
 from models import write_scene
@@ -53,7 +54,7 @@ class StripDeck:
     """A lining on a strip in mm, N, s and t: a deck, and its matrices as Abaqus writes them."""
 
     def __init__(self):
-        parts = {"strip": ((0, 0, -1), (4, 1, 0), STEEL), "lining": ((1, 0, 0), (3, 1, 1), LINING)}
+        parts = {"strip": ((0, 0, -1), (6, 1, 0), STEEL), "lining": ((1, 0, 0), (3, 1, 1), LINING)}
         self.cells = {part: list(tetrahedra(low, high)) for part, (low, high, _) in parts.items()}
         self.material = {part: material for part, (*_, material) in parts.items()}
         places = [(part, p) for part, cells in self.cells.items() for p in sorted({p for cell in cells for p in cell})]
@@ -65,7 +66,7 @@ class StripDeck:
     def those(self, part, test):
         return [number for (of, place), number in self.nodes.items() if of == part and test(place)]
 
-    def write_deck(self, file):
+    def write_deck(self, file, sets=None):
         lines = ["*NODE"] + [f"{n}, " + ", ".join(f"{x:.17g}" for x in self.position(place)) for (_, place), n in self.nodes.items()]
         number = itertools.count(1)
         for part, cells in self.cells.items():
@@ -74,7 +75,7 @@ class StripDeck:
             lines += [f"{next(number)}, " + ", ".join(str(self.nodes[part, p]) for p in cell) for cell in cells]
             lines += [f"*MATERIAL, NAME={part}", "*ELASTIC", f"{young}, {poisson}", "*DENSITY", f"{density}",
                       f"*SOLID SECTION, ELSET={part}, MATERIAL={part}"]
-        sets = {"ends": self.those("strip", lambda p: p[0] in (0, 4)), "face": self.those("strip", lambda p: p[2] == 0),
+        sets = sets or {"ends": self.those("strip", lambda p: p[0] in (0, 6)), "face": self.those("strip", lambda p: p[2] == 0),
                 "foot": self.those("lining", lambda p: p[2] == 0), "top": self.those("lining", lambda p: p[2] == 1)}
         lines += [line for name, of in sets.items() for line in (f"*NSET, NSET={name}", ", ".join(map(str, of)))]
         file.write_text("\n".join([*lines, "*BOUNDARY", "ends, 1, 3", "top, 1, 2", ""]))
@@ -124,6 +125,77 @@ def test_matrices_have_the_eigenvalues_of_the_mesh_of_their_deck(converged, tmp_
     np.testing.assert_allclose(found, expected, rtol=1e-10)
     pressed = [run.report["equilibrium"]["normal_force_sum"] for run in (of_matrices, of_mesh)]
     np.testing.assert_allclose(pressed, 100, rtol=1e-10)
+
+
+# ---- a superelement
+
+
+def reduced(K, M, kept, count):
+    """Craig and Bampton: static shapes of the kept rows, and `count` modes with these held. Columns: kept rows, then modes."""
+    inner = np.setdiff1d(np.arange(len(K)), kept)
+    _, modes = scipy.linalg.eigh(K[np.ix_(inner, inner)], M[np.ix_(inner, inner)])
+    shapes = np.zeros((len(K), len(kept) + count))
+    shapes[kept, np.arange(len(kept))] = 1
+    shapes[inner, : len(kept)] = -np.linalg.solve(K[np.ix_(inner, inner)], K[np.ix_(inner, kept)])
+    shapes[np.ix_(inner, len(kept) + np.arange(count))] = modes[:, :count]
+    return shapes.T @ K @ shapes, shapes.T @ M @ shapes
+
+
+def write_superelement(deck, folder, cells, count):
+    """A part of the strip on its nodes next to the mesh and on modes, as Nastran writes it: nodes, and scalar points behind."""
+    own = sorted({deck.nodes["strip", p] for cell in cells for p in cell})
+    rows = {node: 3 * i for i, node in enumerate(own)}
+    K, M = np.zeros((2, 3 * len(own), 3 * len(own)))
+    for cell in cells:
+        places = [rows[deck.nodes["strip", p]] + c for p in cell for c in range(3)]
+        stiffness, mass = element(np.array([deck.position(p) for p in cell]), STEEL)
+        K[np.ix_(places, places)] += stiffness
+        M[np.ix_(places, places)] += mass
+    held = [rows[n] + c for n in deck.those("strip", lambda p: p[0] == 6) for c in range(3)]
+    seam = deck.those("strip", lambda p: p[0] == 4)
+    free = np.setdiff1d(np.arange(len(K)), held)
+    kept = np.searchsorted(free, [rows[n] + c for n in seam for c in range(3)])
+    K, M = reduced(K[np.ix_(free, free)], M[np.ix_(free, free)], kept, len(free) - len(kept) if count is None else count)
+    names = [(n, c) for n in seam for c in (1, 2, 3)] + [(9001 + i, 0) for i in range(len(K) - len(kept))]
+    text = ""
+    for name, A in (("K", K), ("M", M)):
+        text += f"DMIG,{name},0,6,2,0,,,{len(names)}\n"
+        for j, (node, c) in enumerate(names):
+            text += f"DMIG*   {name:16}{node:16d}{c:16d}\n"
+            text += "".join(f"*,{names[i][0]},{names[i][1]},{A[i, j]:.17e}\n" for i in range(j, len(names)))
+    (folder / "strip.pch").write_text(text)
+    (folder / "super.toml").write_text('K = "strip.pch:K"\nM = "strip.pch:M"\nnodes = "deck.inp"\nlength = 0.001\n')
+    run_tool("matrices", folder / "super.toml", folder / "super")
+
+
+@pytest.mark.parametrize("count", [None, 0])
+def test_superelement_takes_the_place_of_a_part_of_the_mesh(converged, tmp_path, count):
+    """With all its modes a reduced half of the strip is that half: the eigenvalues are those of the whole mesh, to the rounding of
+    the reduction. With none it is stiffer, and the lowest frequency lies above."""
+    deck = StripDeck()
+    sets = deck.write_deck(tmp_path / "deck.inp")
+    whole = deck.cells["strip"]
+    far = [cell for cell in whole if min(p[0] for p in cell) >= 4]
+    write_superelement(deck, tmp_path, far, count)
+    physics = {"friction": {"coefficient": 0.4}, "damping": {"beta": 1e-8}, "modes": {"method": "full", "band": 60000},
+               "force": [{"on": "top", "vector": [0, 0, -100]}],
+               "contact": [{"rotor": "face", "stator": "foot", "tangents": ["x"], "velocity": [1, 0, 0]}]}
+    found = {}
+    for name, cells, extra in (("whole", whole, {}), ("joined", [cell for cell in whole if cell not in far],
+                                                      {"superelement": [{"name": "far", "folder": "../super", "on": "seam"}]})):
+        deck.cells["strip"] = cells
+        sets["seam"] = deck.those("strip", lambda p: p[0] == 4)
+        deck.write_deck(tmp_path / f"{name}.inp", sets if name == "joined" else None)
+        run_tool("mesh", tmp_path / f"{name}.inp", tmp_path / name, "--length", "0.001")
+        (tmp_path / "more").mkdir(exist_ok=True)
+        more = write_scene(tmp_path / "more", **physics, **extra).read_text()
+        scene = tmp_path / name / "scene.toml"
+        scene.write_text(scene.read_text().partition("# [[contact]]")[0] + more)
+        found[name] = eigenvalues(converged(scene, ranks=2 if name == "joined" else 1).report)
+    if count is None:
+        np.testing.assert_allclose(found["joined"], found["whole"], rtol=1e-9)
+    else:
+        assert found["joined"][0].imag > 1.0001 * found["whole"][0].imag
 
 
 # ---- the scene of CalculiX's matrices

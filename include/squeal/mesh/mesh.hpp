@@ -48,15 +48,24 @@ struct Face
   bool of_shell = false;      // counter-clockwise as the shell's nodes are, which may be seen from either side
 };
 
+/// What a row of a superelement's matrices is: a motion of a node.
+struct SuperelementRow
+{
+  int node = 0;            // index in Mesh::nodes
+  int motion = 0;          // of motion_words
+  bool coordinate = false; // a modal coordinate, which this motion of a node of its own carries
+};
+
 /// Nodes, elements and named sets of them. Nodes of the file come first, then the scene's points, then the reference
-/// points of rigid bodies.
+/// points of rigid bodies, then what carries the modal coordinates of superelements.
 struct Mesh
 {
-  std::vector<Vec3> nodes;                             // [m]
-  std::vector<Element> elements;                       // in the order of the file
-  std::map<std::string, std::vector<Face>> surfaces;   // of every named surface, those of shells included
-  std::map<std::string, std::vector<int>> node_groups; // nodes of every named group of any dimension, ascending
-  std::map<std::string, int> points;                   // node of every scene point and rigid body
+  std::vector<Vec3> nodes;                                 // [m]
+  std::vector<Element> elements;                           // in the order of the file
+  std::map<std::string, std::vector<Face>> surfaces;       // of every named surface, those of shells included
+  std::map<std::string, std::vector<int>> node_groups;     // nodes of every named group of any dimension, ascending
+  std::map<std::string, int> points;                       // node of every scene point and rigid body
+  std::vector<std::vector<SuperelementRow>> superelements; // in the scene's order
 };
 
 /// Returns the scene's mesh with its points and reference points; without a mesh file it holds these points only.

@@ -87,6 +87,14 @@ struct Spring
   double damping = 0;        // [N s/m]
 };
 
+/// A reduced structure of another code: its matrices on motions of retained nodes and on modal coordinates.
+struct Superelement
+{
+  std::string name;
+  std::filesystem::path folder; // of M K C .petsc, dofs.txt and nodes.txt; absolute
+  std::vector<std::string> on;  // named groups, points or rigid bodies that have its retained nodes
+};
+
 /// Fixed motions of the nodes of a group.
 struct Support
 {
@@ -320,6 +328,7 @@ struct Scene
   std::vector<Point> points;
   std::vector<RigidBody> rigid_bodies;
   std::vector<Spring> springs;
+  std::vector<Superelement> superelements;
   std::vector<Support> supports;
   std::vector<Force> forces;
   std::vector<Pressure> pressures;

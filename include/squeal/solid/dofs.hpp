@@ -3,6 +3,7 @@
 /// Nodal degree of freedom 6 * node + c is component c of a node, c = 0..5 for x y z rx ry rz.
 #include "squeal/base/petsc.hpp"
 #include "squeal/mesh/partition.hpp"
+#include "squeal/mesh/row_motions.hpp"
 
 #include <span>
 #include <string>
@@ -10,13 +11,6 @@
 
 namespace squeal
 {
-
-/// A motion of a node of another code's model.
-struct NodeMotion
-{
-  PetscInt node = -1; // its number there
-  int motion = -1;    // of motion_words; -1: not the motion of a node
-};
 
 /// What each free degree of freedom is. Texts are made on demand only, since a model has many degrees of freedom.
 struct DofNames

@@ -28,7 +28,7 @@ std::vector<PetscInt> held_rows(const MatrixRows& rows, const std::vector<Suppor
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const MatrixRows& rows, PetscInt local_columns, MPI_Comm comm);
 
 /// Takes held rows and columns out of a matrix, or columns alone, and held entries out of a vector. Each keeps its
-/// layout otherwise. Collective.
+/// layout otherwise; of no matrix it makes none. Collective.
 class Elimination
 {
 public:

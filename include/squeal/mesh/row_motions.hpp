@@ -1,0 +1,32 @@
+#pragma once
+/// What the rows of another code's matrices are, by the text files beside them.
+#include "squeal/base/vec3.hpp"
+
+#include <filesystem>
+#include <vector>
+
+namespace squeal
+{
+
+/// A motion of a node of another code's model.
+struct NodeMotion
+{
+  long node = -1;  // its number there
+  int motion = -1; // of motion_words; -1: not the motion of a node, such as a modal coordinate
+};
+
+/// Returns the motions in a `dofs.txt`, which has a line "node motion" for each row, such as "1017 rx", or "-" for the
+/// motion. Throws Error with the line that is wrong.
+std::vector<NodeMotion> read_row_motions(const std::filesystem::path& file);
+
+struct PlacedNode
+{
+  long node = -1; // its number
+  Vec3 at{};      // [m]
+};
+
+/// Returns the nodes in a `nodes.txt`, which has a line "node x y z" for each. Throws Error with the line that is
+/// wrong.
+std::vector<PlacedNode> read_placed_nodes(const std::filesystem::path& file);
+
+} // namespace squeal

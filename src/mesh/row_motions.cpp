@@ -1,0 +1,83 @@
+#include "squeal/mesh/row_motions.hpp"
+
+#include "squeal/base/error.hpp"
+#include "squeal/scene/scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Calls read(line, place) for every line of a file.
+template <class Read> void for_each_line(const std::filesystem::path& file, Read read)
+{
+  if (!is_file(file)) throw Error(file.string() + ": no such file; tools/matrices writes one");
+  std::ifstream stream(file);
+  if (!stream) throw Error(file.string() + ": cannot be read");
+  std::string line;
+  for (int number = 1; std::getline(stream, line); ++number)
+    read(line, file.string() + ", line " + std::to_string(number));
+}
+
+NodeMotion motion_in(const std::string& line, const std::string& place)
+{
+  std::istringstream words(line);
+  NodeMotion found;
+  std::string motion, rest;
+  const bool is_form = (words >> found.node >> motion) && !(words >> rest);
+  const auto* const known = std::find(motion_words.begin(), motion_words.end(), motion);
+  if (!is_form || (known == motion_words.end() && motion != "-"))
+    throw Error(place + ": '" + shortened(line) +
+                "': expected a node's number and one of x y z rx ry rz, such as '1017 x'; or '-' for what is no motion "
+                "of a node");
+  if (known != motion_words.end()) found.motion = static_cast<int>(known - motion_words.begin());
+  return found;
+}
+
+} // namespace
+
+std::vector<NodeMotion> read_row_motions(const std::filesystem::path& file)
+{
+  std::vector<NodeMotion> motions;
+  std::set<std::pair<long, int>> seen;
+  for_each_line(file,
+                [&](const std::string& line, const std::string& place)
+                {
+                  motions.push_back(motion_in(line, place));
+                  const NodeMotion& last = motions.back();
+                  if (last.motion >= 0 && !seen.insert({last.node, last.motion}).second)
+                    throw Error(place + ": '" + line +
+                                "' is there twice: each row of the matrices is a motion of its own");
+                });
+  return motions;
+}
+
+std::vector<PlacedNode> read_placed_nodes(const std::filesystem::path& file)
+{
+  std::vector<PlacedNode> nodes;
+  std::set<long> seen;
+  for_each_line(file,
+                [&](const std::string& line, const std::string& place)
+                {
+                  std::istringstream words(line);
+                  PlacedNode found;
+                  std::string rest;
+                  const bool is_form =
+                      (words >> found.node >> found.at[0] >> found.at[1] >> found.at[2]) && !(words >> rest);
+                  if (!is_form || !std::isfinite(norm(found.at)))
+                    throw Error(place + ": '" + shortened(line) + "': expected a node's number and its x, y, z in m");
+                  if (!seen.insert(found.node).second)
+                    throw Error(place + ": node " + std::to_string(found.node) + " is there twice");
+                  nodes.push_back(found);
+                });
+  return nodes;
+}
+
+} // namespace squeal
