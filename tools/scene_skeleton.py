@@ -46,7 +46,7 @@ def names_of(model):
 def contacts(model):
     lines = []
     for slave, master in model.ties:
-        lines.append(f"# The deck ties {slave} (slave) to {master} (master). Parts that share nodes are joined.")
+        lines += ["[[tie]]", f"slave = {text(slave)}", f"master = {text(master)}", ""]
     pairs = model.contacts or [("", "")]
     for slave, master in pairs:
         found = f"the deck has a contact of {slave} (slave) and {master} (master)" if slave else "the surface that moves: " + (

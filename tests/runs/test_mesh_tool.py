@@ -258,7 +258,7 @@ def test_all_that_an_input_deck_may_name(tmp_path):
     assert model.node_sets == {"both": [2, 3, 6, 7, 1], "node_1": [1]}  # the others are the nodes of their surfaces
     assert model.supports == [("node_1", ["z", "rx", "ry"]), ("Right", ["y"])]
     text = convert(tmp_path / "deck.inp", tmp_path / "out").read_text()
-    for words in ("ties side (slave) to hull", "contact of Skin (slave) and side (master)", "1 elements of type SPRINGA", "the set ref",
+    for words in ('[[tie]]\nslave = "side"\nmaster = "hull"', "contact of Skin (slave) and side (master)", "1 elements of type SPRINGA", "the set ref",
                   "prescribed motion 0.1 of Right", "*ELASTIC, TYPE=ENGINEERING CONSTANTS is not isotropic"):
         assert words in text, words
 
