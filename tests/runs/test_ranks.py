@@ -70,9 +70,9 @@ def largest_of(cycle):
 
 
 @pytest.mark.parametrize("scene", [
-    (["pin_on_disc/scene.toml", "--set", "mesh.parameters.divisions=3", "--set", "modes.band=6000", "--set",
-      "modes.method=full", "--set", "fidelity=full", "--set", "cycle.tolerance=1e-10"],
-    (["oscillator/scene.toml", "--set", "cycle.tolerance=1e-10"],
+    ["pin_on_disc/scene.toml", "--set", "mesh.parameters.divisions=3", "--set", "modes.band=6000", "--set",
+     "modes.method=full", "--set", "fidelity=full", "--set", "cycle.tolerance=1e-10"],
+    ["oscillator/scene.toml", "--set", "cycle.tolerance=1e-10"],
 ], ids=["oblique", "whole"])
 def test_multipliers(scene, converged):
     """1e-6: two cycles found to 1e-10 differ by less, and the passes end when the largest has settled to 2.5e-7."""
