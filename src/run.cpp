@@ -8,8 +8,11 @@
 #include "squeal/forecast.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/scene/doubts.hpp"
+#include "squeal/study/sensitivity.hpp"
+#include "squeal/study/sweep.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <optional>
 
@@ -253,13 +256,51 @@ BrakeBranch run_branch(const Chain& chain)
   if (!reason.empty()) return not_run<BrakeBranch>(OutcomeKind::skipped, reason);
   const auto model_at = [&](double parameter)
   {
-    Model model = rebuild_model(chain.model, scene_on_branch(scene, parameter), comm_of(chain.model.structure.load));
+    Model model = rebuild_model(chain.model, scene_with(scene, std::array{SceneNumber{scene.branch->key, parameter}}),
+                                comm_of(chain.model.structure.load));
     return BranchModel{std::move(model.structure), std::move(model.interface)};
   };
   return find_branch({*scene.branch, model_at, chain.sliding(), report.cycle,
                       steps > 0 ? steps : std::min(report.cycle.steps_per_period, 128), tolerance, chain.model.probes,
                       scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.step,
                       chain.options.cycle.shooting});
+}
+
+Sensitivity run_sensitivity(const Chain& chain)
+{
+  const Scene& scene = chain.scene;
+  if (!scene.sensitivity) return not_run<Sensitivity>(OutcomeKind::off, "the scene has no [sensitivity]");
+  const std::string reason = no_mode_to_follow(chain.report);
+  if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
+  const MPI_Comm comm = comm_of(chain.model.structure.load);
+  const auto model_with = [&](const SceneNumber& number)
+  {
+    Model model = rebuild_model(chain.model, scene_with(scene, std::span(&number, 1)), comm);
+    return BranchModel{std::move(model.structure), std::move(model.interface)};
+  };
+  std::vector<int> probes;
+  for (const Change& change : scene.changes)
+    probes.push_back(
+        static_cast<int>(std::ranges::find(scene.probes, change.probe, &Probe::name) - scene.probes.begin()));
+  return find_sensitivity({chain.sliding(), *chain.linearised, chain.report.modes, sensitive_numbers(scene), model_with,
+                           chain.model.probes, scene.changes, probes, scene.modes, chain.options.modes,
+                           chain.options.equilibrium});
+}
+
+Sweep run_scene_sweep(const Chain& chain)
+{
+  const Scene& scene = chain.scene;
+  if (!scene.sweep) return not_run<Sweep>(OutcomeKind::off, "the scene has no [sweep]");
+  const MPI_Comm comm = comm_of(chain.model.structure.load);
+  const auto model_at = [&](std::span<const double> values)
+  {
+    std::vector<SceneNumber> numbers;
+    for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.sweep->key[i], values[i]});
+    Model model = rebuild_model(chain.model, scene_with(scene, numbers), comm);
+    return BranchModel{std::move(model.structure), std::move(model.interface)};
+  };
+  return run_sweep(
+      {*scene.sweep, model_at, scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.sweep}, comm);
 }
 
 std::vector<std::string> stages_run(const Report& report)
@@ -346,6 +387,10 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   if (has_run(report.attractors.outcome)) save();
   if (checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
   report.branch = stage(report, "branch", comm, [&] { return run_branch(chain); });
+  if (has_run(report.branch.outcome)) save();
+  report.sensitivity = stage(report, "sensitivity", comm, [&] { return run_sensitivity(chain); });
+  if (has_run(report.sensitivity.outcome)) save();
+  report.sweep = stage(report, "sweep", comm, [&] { return run_scene_sweep(chain); });
 
   const ExitCode code = exit_code_of(report);
   report.exit_code = static_cast<int>(code);

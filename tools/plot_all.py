@@ -6,6 +6,7 @@ import plot_motion
 import plot_shape
 import plot_spectra
 import plot_stability
+import plot_sweep
 from plot_basis import plt
 from squeal import Missing
 
@@ -31,6 +32,8 @@ FIGURES = {
     "newton": (plot_stability.draw_newton, False, "How the limit cycle was found: distance from periodic motion against periods "
                "integrated."),
     "branch": (plot_stability.draw_branch, True, "The limit cycle along a number of the scene."),
+    "sweep": (plot_sweep.draw_sweep, True, "Frequency and growth of the followed modes against a number of the scene; of two "
+              "numbers a map of stability. Dotted lines are thresholds."),
 }
 ANIMATION = "One period, over and over: the whole, and what moves most, exaggerated."
 

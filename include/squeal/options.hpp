@@ -5,6 +5,7 @@
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/cycle/options.hpp"
 #include "squeal/settled/motion.hpp"
+#include "squeal/study/sweep.hpp"
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/transient.hpp"
 
@@ -22,6 +23,7 @@ struct ProgramOptions
   CycleOptions cycle;
   SettledOptions settled;
   AttractorOptions attractors;
+  SweepOptions sweep;
   bool force = false; // --force: run whatever the forecast says
 };
 

@@ -52,6 +52,108 @@ bool order_and_read(SchurForm& schur, const std::vector<lapack_logical>& chosen)
 
 } // namespace
 
+namespace
+{
+
+/// (Q mu^2 + (C + 2 shift M) mu + M) y = 0 of the scaled matrices, by LAPACK with the left vectors (a, b) of the
+/// companion matrix as well: those of the quadratic problem are Q^-T a.
+std::vector<TwoSidedPair> solve_two_sided(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
+{
+  std::vector<TwoSidedPair> result;
+  const Index n = K.rows();
+  const double stiffness = n > 0 ? norm_1(K) : 0, mass = n > 0 ? norm_1(M) : 0;
+  if (mass == 0 || stiffness == 0) return result;
+  const double omega = std::sqrt(stiffness / mass), shift = 1e-2; // of nu = lambda/omega: any that is no eigenvalue
+  const MatrixXd m = omega * omega / stiffness * M, c = omega / stiffness * C, k = K / stiffness;
+  MatrixXd A = companion(m, c, k, shift), left(2 * n, 2 * n), right(2 * n, 2 * n);
+  VectorXd re(2 * n), im(2 * n);
+  const int size = to_int(2 * n);
+  if (LAPACKE_dgeev(LAPACK_COL_MAJOR, 'V', 'V', size, A.data(), size, re.data(), im.data(), left.data(), size,
+                    right.data(), size) != 0)
+    throw Error("the QR algorithm did not converge on the dense quadratic eigenproblem");
+  const MatrixXd chi =
+      solve_dense((k + shift * (c + shift * m)).transpose(), left.topRows(n),
+                  "the quadratic eigenproblem is singular: some motion has neither mass nor stiffness");
+  for (Index j = 0; j < 2 * n; ++j)
+  {
+    const Complex mu(re(j), im(j));
+    if (mu.imag() < 0 || std::abs(mu) < 1e-12) continue; // a conjugate; or lambda is infinite, without mass
+    // LAPACK's left vectors u obey u^H A = mu u^H. Im(1/mu) < 0 where Im(mu) > 0: the pair's conjugate is taken.
+    const auto part = std::abs(mu) > 1 ? right.topRows(n) : right.bottomRows(n);
+    TwoSidedPair pair{std::conj(omega * (shift + 1.0 / mu)), part.col(j).cast<Complex>(), chi.col(j).cast<Complex>()};
+    if (mu.imag() != 0)
+    {
+      pair.right.imag() = -part.col(j + 1);
+      pair.left.imag() = chi.col(j + 1);
+    }
+    pair.right.normalize();
+    pair.left.normalize();
+    result.push_back(std::move(pair));
+  }
+  return result;
+}
+
+/// Gives every rank the pairs of rank 0, whose vectors have the names `vectors` and `rows` entries.
+template <class Pair>
+void share(MPI_Comm comm, std::vector<Pair>& pairs, Index rows, std::initializer_list<Eigen::VectorXcd Pair::*> vectors)
+{
+  int count = to_int(pairs.size());
+  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
+  pairs.resize(static_cast<std::size_t>(count));
+  for (Pair& pair : pairs)
+  {
+    MPI_Bcast(&pair.lambda, 1, MPI_CXX_DOUBLE_COMPLEX, 0, comm);
+    for (const auto member : vectors)
+    {
+      (pair.*member).resize(rows);
+      MPI_Bcast((pair.*member).data(), to_int(rows), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
+    }
+  }
+}
+
+} // namespace
+
+namespace
+{
+
+/// By the eigenvalues nu = 1/(theta + limit) of (K + limit M)^-1 M, whose left vectors u give (K + limit M)^-T u.
+InvariantSubspaces invariant_subspaces(const MatrixXd& M, const MatrixXd& K, double limit)
+{
+  const char* singular = "the undamped eigenproblem is singular at its shift";
+  const MatrixXd shifted = K + limit * M;
+  MatrixXd A = solve_dense(shifted, M, singular), left(A.rows(), A.rows()), right(A.rows(), A.rows());
+  VectorXd re(A.rows()), im(A.rows());
+  const int size = to_int(A.rows());
+  if (LAPACKE_dgeev(LAPACK_COL_MAJOR, 'V', 'V', size, A.data(), size, re.data(), im.data(), left.data(), size,
+                    right.data(), size) != 0)
+    throw Error("the QR algorithm did not converge on a dense eigenproblem");
+  std::vector<Index> wanted; // real and imaginary parts of a pair have one |theta|
+  for (Index j = 0; j < A.rows(); ++j)
+    if (const Complex nu(re(j), im(j)); nu != 0. && std::abs(1. / nu - limit) <= limit) wanted.push_back(j);
+  const MatrixXd chosen = left(Eigen::all, wanted);
+  return {orthonormal_columns(right(Eigen::all, wanted)),
+          orthonormal_columns(solve_dense(shifted.transpose(), chosen, singular))};
+}
+
+} // namespace
+
+InvariantSubspaces invariant_subspaces_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& K, double limit)
+{
+  InvariantSubspaces spaces;
+  on_rank_zero(comm, [&] { spaces = invariant_subspaces(M, K, limit); });
+  broadcast(spaces.right, comm);
+  broadcast(spaces.left, comm);
+  return spaces;
+}
+
+std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
+{
+  std::vector<TwoSidedPair> pairs;
+  on_rank_zero(comm, [&] { pairs = solve_two_sided(M, C, K); });
+  share(comm, pairs, K.rows(), {&TwoSidedPair::right, &TwoSidedPair::left});
+  return pairs;
+}
+
 std::vector<DenseEigenpair> solve_dense_quadratic(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
 {
   std::vector<DenseEigenpair> result;
@@ -85,15 +187,7 @@ std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Ma
 {
   std::vector<DenseEigenpair> pairs;
   on_rank_zero(comm, [&] { pairs = solve_dense_quadratic(M, C, K); });
-  int count = to_int(pairs.size());
-  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
-  pairs.resize(static_cast<std::size_t>(count));
-  for (DenseEigenpair& pair : pairs)
-  {
-    pair.y.resize(K.rows());
-    MPI_Bcast(&pair.lambda, 1, MPI_CXX_DOUBLE_COMPLEX, 0, comm);
-    MPI_Bcast(pair.y.data(), to_int(pair.y.size()), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
-  }
+  share(comm, pairs, K.rows(), {&DenseEigenpair::y});
   return pairs;
 }
 

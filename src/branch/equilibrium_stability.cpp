@@ -1,5 +1,7 @@
 #include "equilibrium_stability.hpp"
 
+#include "squeal/algebra/root.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -10,7 +12,6 @@ namespace
 {
 
 constexpr int intervals = 10;         // of the range
-constexpr int most_secants = 12;      // steps of false position
 constexpr double close_enough = 1e-5; // of the range
 
 EquilibriumStability stability_at(BrakeFamily& family, const BrakeBranchProblem& problem, double parameter)
@@ -38,36 +39,23 @@ EquilibriumStability stability_at(BrakeFamily& family, const BrakeBranchProblem&
   return stability;
 }
 
-/// Where the growth rate of this rank crosses zero between two values; by false position (Illinois).
+/// Where the growth rate of this rank crosses zero between two values.
 BranchEvent crossing(BrakeFamily& family, const BrakeBranchProblem& problem, std::size_t rank,
                      const EquilibriumStability& from, const EquilibriumStability& to)
 {
-  const double range = std::abs(problem.settings.to - problem.settings.from);
-  double a = from.parameter, b = to.parameter, growth_a = from.growth_rates[rank], growth_b = to.growth_rates[rank];
-  const double last_growth = growth_b;
+  const double tolerance = close_enough * std::abs(problem.settings.to - problem.settings.from);
   double frequency = to.frequencies[rank];
-  for (int i = 0; i < most_secants && std::abs(b - a) > close_enough * range; ++i)
+  const auto growth = [&](double parameter) -> std::optional<double>
   {
-    const double middle = (a * growth_b - b * growth_a) / (growth_b - growth_a);
-    const EquilibriumStability now = stability_at(family, problem, middle);
-    if (!now.known || now.growth_rates.size() <= rank) break;
-    const double growth = now.growth_rates[rank];
+    const EquilibriumStability now = stability_at(family, problem, parameter);
+    if (!now.known || now.growth_rates.size() <= rank) return std::nullopt;
     frequency = now.frequencies[rank];
-    if ((growth > 0) == (growth_b > 0))
-      growth_a /= 2;
-    else
-    {
-      a = b;
-      growth_a = growth_b;
-    }
-    const double step = std::abs(middle - b);
-    b = middle;
-    growth_b = growth;
-    if (step < close_enough * range) break;
-  }
-  const double parameter = growth_b == growth_a ? b : (a * growth_b - b * growth_a) / (growth_b - growth_a);
-  return {BranchEventKind::hopf, parameter, std::max(std::abs(parameter - b), close_enough * range),
-          1 / frequency,         0,         last_growth > 0 ? 1 : -1};
+    return now.growth_rates[rank];
+  };
+  const Bracket bracket{from.parameter, to.parameter, from.growth_rates[rank], to.growth_rates[rank]};
+  const Root root = find_root(growth, bracket, tolerance);
+  const int change = to.growth_rates[rank] > 0 ? 1 : -1;
+  return {BranchEventKind::hopf, root.x, std::max(root.error, tolerance), 1 / frequency, 0, change};
 }
 
 } // namespace

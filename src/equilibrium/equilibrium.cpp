@@ -104,8 +104,12 @@ std::vector<char> first_split(const ComplementarityProblem& problem, const Inter
 
 /// The status iteration, with a second chance from the fixed point's set where friction makes it cycle.
 StatusSolution find_split(const ComplementarityProblem& problem, const Interface& interface, int max_iterations,
-                          double rho)
+                          double rho, const std::vector<char>& expected)
 {
+  if (expected.size() == problem.q.size())
+    if (StatusSolution near = solve_by_status(problem, expected, max_iterations);
+        near.outcome == StatusOutcome::converged)
+      return near;
   StatusSolution solution = solve_by_status(problem, first_split(problem, interface), max_iterations);
   if (solution.outcome == StatusOutcome::converged || problem.N.size() > 0) return solution;
   const auto projected = solve_by_projection(problem, rho, 1e-8, 5000);
@@ -277,20 +281,44 @@ OptionList options_of(EquilibriumOptions& options)
   };
 }
 
+struct PairCompliance::Parts
+{
+  Held held;
+  std::vector<double> D; // on rank 0; empty without pairs
+};
+
+PairCompliance::PairCompliance(const Structure& structure, const Interface& interface,
+                               const EquilibriumOptions& options)
+    : parts_(std::make_unique<Parts>(hold(structure, interface, options.factor)))
+{
+  if (interface.pairs > 0) parts_->D = parts_->held.factor.condensed(1);
+}
+
+PairCompliance::PairCompliance(PairCompliance&&) noexcept = default;
+PairCompliance& PairCompliance::operator=(PairCompliance&&) noexcept = default;
+PairCompliance::~PairCompliance() = default;
+
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
+{
+  if (!stays_at_rest(structure, interface))
+    return find_equilibrium(structure, interface, PairCompliance(structure, interface, options), {}, options);
+  Equilibrium equilibrium;
+  equilibrium.u = zeros_like(structure.load);
+  equilibrium.directions = interface.directions;
+  equilibrium.outcome = {OutcomeKind::converged, "", 0, 0};
+  return equilibrium;
+}
+
+Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const PairCompliance& compliance,
+                             const std::vector<char>& expected, const EquilibriumOptions& options)
 {
   const MPI_Comm comm = comm_of(structure.load);
   const auto pairs = static_cast<std::size_t>(interface.pairs);
+  const Held& held = compliance.parts().held;
 
   Equilibrium equilibrium;
   equilibrium.u = zeros_like(structure.load);
   equilibrium.directions = interface.directions;
-  if (stays_at_rest(structure, interface))
-  {
-    equilibrium.outcome = {OutcomeKind::converged, "", 0, 0};
-    return equilibrium;
-  }
-  Held held = hold(structure, interface, options.factor);
   equilibrium.auxiliary_stiffness = held.kappa;
   const std::vector<double> nothing(pairs, 0.);
   displace(held, structure, interface, pair_forces(interface, nothing, nothing, held.kappa), equilibrium.u);
@@ -300,7 +328,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   search.solution.outcome = StatusOutcome::converged;
   if (pairs > 0)
   {
-    const std::vector<double> D = held.factor.condensed(1);
+    const std::vector<double>& D = compliance.parts().D;
     on_rank_zero(comm,
                  [&]
                  {
@@ -310,7 +338,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
                        search.D_nn, normal_compliance(view, interface, drive_friction(interface)), held.kappa, q);
                    search.rho = 1 / largest_eigenvalue(search.D_nn, 30);
                    search.solution = find_split(search.problem, interface, static_cast<int>(options.max_iterations),
-                                                1.5 * search.rho);
+                                                1.5 * search.rho, expected);
                  });
     share(search.solution, pairs, comm);
   }

@@ -242,6 +242,7 @@ ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface
   result.Z = assemble_basis(elimination, &Coefficients::normal, structure.K);
   result.Y = assemble_basis(elimination, &Coefficients::sliding, structure.K);
   result.reaction = assemble_reaction(rows, pivots, result.pairs, interface);
+  result.pivots = elimination.pivots;
   return result;
 }
 

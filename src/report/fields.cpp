@@ -303,6 +303,13 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
     on_rank_zero(comm, [&] { write_contact(*file, report.equilibrium, nodes, layout); });
   }
   write_modes(file, gather, report.modes, layout, comm);
+  on_rank_zero(comm,
+               [&]
+               {
+                 for (int number = 0; const ModeCauses& causes : report.sensitivity.modes)
+                   file->write("modes/" + std::to_string(++number) + "/pair_power", {causes.pair_powers.size()},
+                               causes.pair_powers, "1/s");
+               });
   const auto& samples = report.cycle.measured.displacements;
   for (std::size_t i = 0; i < samples.size(); ++i)
   {

@@ -3,6 +3,7 @@
 #include "branch_results.hpp"
 #include "derived.hpp"
 #include "files.hpp"
+#include "sweep_results.hpp"
 
 #include <algorithm>
 
@@ -75,6 +76,7 @@ void write_history(const Report& report, const Scene& scene, const std::filesyst
     write_spectrum(file, report.settled.examined.spectrum, report.settled.spectrum_probe < 0 ? "N" : "m");
   }
   if (has_run(report.branch.outcome)) write_branch(file, report.branch, scene);
+  if (has_run(report.sweep.outcome)) write_sweep(file, report.sweep);
   file.keep();
 }
 

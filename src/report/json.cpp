@@ -4,6 +4,8 @@
 #include "derived.hpp"
 #include "files.hpp"
 #include "heard.hpp"
+#include "sensitivity_results.hpp"
+#include "sweep_results.hpp"
 #include "warnings.hpp"
 
 #include <algorithm>
@@ -274,6 +276,20 @@ Json branch_entry(const Report& report, const Scene& scene)
   return entry;
 }
 
+Json sensitivity_entry(const Report& report, const Scene& scene)
+{
+  Json entry = entry_of(report.sensitivity.outcome);
+  if (has_run(report.sensitivity.outcome)) add_sensitivity(report.sensitivity, scene, entry);
+  return entry;
+}
+
+Json sweep_entry(const Report& report, const Scene& scene)
+{
+  Json entry = entry_of(report.sweep.outcome);
+  if (has_run(report.sweep.outcome)) add_sweep(report.sweep, scene, entry);
+  return entry;
+}
+
 /// What of each contact's slave surface faces the other one.
 void add_coverage(const std::vector<Coverage>& coverage, const Scene& scene, Json& model)
 {
@@ -327,6 +343,8 @@ std::string report_json(const Report& report, const Scene& scene)
   json["fidelity"] = fidelity_entry(report.fidelity);
   json["attractors"] = attractors_entry(report);
   json["branch"] = branch_entry(report, scene);
+  json["sensitivity"] = sensitivity_entry(report, scene);
+  json["sweep"] = sweep_entry(report, scene);
   const Warnings warnings = warnings_of(report);
   const auto warn = [&json](const char* stage, const std::vector<std::string>& sentences)
   {

@@ -3,6 +3,7 @@
 #include "squeal/report/fields.hpp"
 #include "squeal/report/history.hpp"
 #include "squeal/report/json.hpp"
+#include "sweep_results.hpp"
 
 #include <cctype>
 #include <dmumps_c.h>
@@ -47,7 +48,7 @@ const Estimate& followed_estimate(const Report& report)
   return report.estimates.empty() ? none : report.estimates.front();
 }
 
-std::array<std::pair<const char*, Outcome>, 8> outcomes_of(const Report& report)
+std::array<std::pair<const char*, Outcome>, 10> outcomes_of(const Report& report)
 {
   return {{{"equilibrium", report.equilibrium.outcome},
            {"modes", report.modes.outcome},
@@ -56,7 +57,9 @@ std::array<std::pair<const char*, Outcome>, 8> outcomes_of(const Report& report)
            {"cycle", report.cycle.outcome},
            {"settled", report.settled.outcome},
            {"attractors", report.attractors.outcome},
-           {"branch", report.branch.outcome}}};
+           {"branch", report.branch.outcome},
+           {"sensitivity", report.sensitivity.outcome},
+           {"sweep", report.sweep.outcome}}};
 }
 
 std::vector<std::pair<std::string, std::string>> versions()
@@ -93,6 +96,9 @@ void write_results(const Report& report, const Scene& scene, const FieldNodes& n
                    const std::filesystem::path& output, MPI_Comm comm)
 {
   on_rank_zero(comm, [&] { write_history(report, scene, output / "history.h5"); });
+  if (has_run(report.sweep.outcome))
+    on_rank_zero(comm,
+                 [&] { write_whole_file(output / "sweep.csv", sweep_csv(report.sweep, scene), Flush::by_system); });
   write_fields(report, scene, nodes, output, comm);
   // Last: where there is a report, the rest is there too.
   on_rank_zero(comm, [&] { write_whole_file(output / "report.json", report_json(report, scene), Flush::by_system); });

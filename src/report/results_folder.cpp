@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 namespace
 {
 
-constexpr std::array result_files = {"report.json",   "history.h5",  "fields.h5", "fields.xdmf",
-                                     "resolved.toml", "options.txt", "checkpoint"};
+constexpr std::array result_files = {"report.json", "history.h5",    "sweep.csv",   "fields.h5",
+                                     "fields.xdmf", "resolved.toml", "options.txt", "checkpoint"};
 constexpr const char* lock_file = "running";
 
 bool is_result(const fs::path& name)

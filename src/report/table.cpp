@@ -3,6 +3,8 @@
 #include "branch_results.hpp"
 #include "derived.hpp"
 #include "heard.hpp"
+#include "sensitivity_results.hpp"
+#include "sweep_results.hpp"
 #include "warnings.hpp"
 
 #include <algorithm>
@@ -249,6 +251,9 @@ std::string table(const Report& report, const Scene& scene)
   text += fidelity_text(report.fidelity);
   text += optional_text("attractors", report.attractors.outcome, [&] { return attractor_lines(report.attractors); });
   text += optional_text("branch", report.branch.outcome, [&] { return branch_lines(report.branch, scene); });
+  text += optional_text("sensitivity", report.sensitivity.outcome,
+                        [&] { return sensitivity_lines(report.sensitivity, scene); });
+  text += optional_text("sweep", report.sweep.outcome, [&] { return sweep_lines(report.sweep, scene); });
   return text + timings_text(report);
 }
 

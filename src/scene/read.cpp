@@ -301,6 +301,27 @@ private:
     if (target.empty()) fail(node, "at least one name");
   }
 
+  /// A number, or a list of numbers.
+  template <class Number> void read_numbers(const toml::node& node, std::vector<Number>& target) const
+  {
+    const toml::array* array = node.as_array();
+    target.clear();
+    const auto add = [&](const toml::node& entry)
+    {
+      Number value{};
+      read(entry, value);
+      target.push_back(value);
+    };
+    if (!array)
+      add(node);
+    else
+      for (const toml::node& entry : *array) add(entry);
+    if (target.empty()) fail(node, "at least one number");
+  }
+
+  void read(const toml::node& node, std::vector<double>& target) const { read_numbers(node, target); }
+  void read(const toml::node& node, std::vector<int>& target) const { read_numbers(node, target); }
+
   void read(const toml::node& node, std::array<double, 6>& target) const
   {
     const auto values = numbers(node, "a list of three or six numbers");

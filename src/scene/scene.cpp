@@ -41,6 +41,8 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
   read_tables(root, scene, places);
   check_scene(scene, places);
   resolve_branch(scene, places);
+  resolve_sweep(scene, places);
+  check_sensitivity(scene, places);
   return scene;
 }
 

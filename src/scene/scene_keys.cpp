@@ -260,6 +260,38 @@ SceneKeys keys_of(BranchSettings& b)
   };
 }
 
+SceneKeys keys_of(SweepSettings& s)
+{
+  return {
+      {"key", &s.key, required, Rule::any, "texts", "number of the scene, as --set names it, or a list of two"},
+      {"from", &s.from, optional, Rule::any, "-",
+       "first value, in the number's own unit; a list of two numbers' values"},
+      {"to", &s.to, optional, Rule::any, "-", "last value"},
+      {"points", &s.points, optional, Rule::positive, "-", "number of values from the first to the last"},
+      {"values", &s.values, optional, Rule::any, "-", "list of a single number's values, instead"},
+      {"samples", &s.samples, optional, Rule::not_negative, "-", "number of random points of the ranges, instead"},
+      {"seed", &s.seed, optional, Rule::not_negative, "-", "of the random points"},
+      {"directions", choice_of(s.directions), optional, Rule::any, "word", "of rotation: one, or both"},
+      {"stages", choice_of(s.stages), optional, Rule::any, "word", "at each point: equilibrium alone, or modes too"},
+  };
+}
+
+SceneKeys keys_of(SensitivitySettings& s)
+{
+  return {{"numbers", &s.numbers, optional, Rule::any, "texts",
+           "derivatives with respect to these only, as --set names them"}};
+}
+
+SceneKeys keys_of(Change& c)
+{
+  return {
+      {"probe", &c.probe, required, Rule::any, "text", "name of the probe where it acts, along its direction"},
+      {"mass", &c.mass, optional, Rule::not_negative, "kg", "added mass"},
+      {"damping", &c.damping, optional, Rule::not_negative, "N s/m", "dashpot to the ground"},
+      {"stiffness", &c.stiffness, optional, Rule::not_negative, "N/m", "spring to the ground, relaxed at equilibrium"},
+  };
+}
+
 SceneKeys keys_of(Probe& p)
 {
   return {

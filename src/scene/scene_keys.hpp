@@ -17,10 +17,11 @@ struct DampingTarget
 
 /// The member that a key fills.
 
-using Target = std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*,
-                            std::optional<Vec3>*, std::vector<Vec3>*, std::vector<std::string>*, std::array<double, 6>*,
-                            Motions*, std::map<std::string, double>*, std::optional<Rotation>*,
-                            std::optional<Orthotropy>*, DampingTarget, Start*, CycleStart*, Choice>;
+using Target =
+    std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*, std::optional<Vec3>*,
+                 std::vector<Vec3>*, std::vector<std::string>*, std::vector<double>*, std::vector<int>*,
+                 std::array<double, 6>*, Motions*, std::map<std::string, double>*, std::optional<Rotation>*,
+                 std::optional<Orthotropy>*, DampingTarget, Start*, CycleStart*, Choice>;
 
 /// Whether a key must be given.
 enum class Need
@@ -80,6 +81,9 @@ SceneKeys keys_of(EstimateSettings& estimate);
 SceneKeys keys_of(TransientSettings& transient);
 SceneKeys keys_of(CycleSettings& cycle);
 SceneKeys keys_of(BranchSettings& branch);
+SceneKeys keys_of(SweepSettings& sweep);
+SceneKeys keys_of(SensitivitySettings& sensitivity);
+SceneKeys keys_of(Change& change);
 SceneKeys keys_of(Probe& probe);
 
 /// Calls visit(key, member, meaning) for each table of a scene file, in the order in which they are written.
@@ -105,6 +109,10 @@ template <class Visit> void for_each_table(Scene& scene, Visit visit)
   visit("transient", scene.transient, "time integration; runs when the table is present");
   visit("cycle", scene.cycle, "limit cycle by shooting; runs when the table is present");
   visit("branch", scene.branch, "the limit cycle along a number of the scene; runs when the table is present");
+  visit("sweep", scene.sweep, "stability at many values of one or two numbers; runs when the table is present");
+  visit("sensitivity", scene.sensitivity,
+        "derivatives, energies and powers of the unstable modes; runs when the table is present");
+  visit("change", scene.changes, "a mass, damper or spring proposed at a probe, predicted and computed");
   visit("probe", scene.probes, "a displacement that is recorded in time");
 }
 
@@ -124,5 +132,11 @@ void check_scene(const Scene& scene, const Places& places);
 /// Finds the scene's own value of the number that a branch follows. Throws Error if there is none, or no branch from
 /// it.
 void resolve_branch(Scene& scene, const Places& places);
+
+/// Gives every number of a sweep its points. Throws Error if there is no such number, or its values make no scene.
+void resolve_sweep(Scene& scene, const Places& places);
+
+/// Throws Error where a number of the sensitivity is none of the scene, or a change is at no probe or changes nothing.
+void check_sensitivity(const Scene& scene, const Places& places);
 
 } // namespace squeal

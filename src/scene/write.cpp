@@ -73,7 +73,17 @@ std::string print(const std::vector<Vec3>& list)
 
 std::string print(const std::vector<std::string>& list)
 {
-  return print_list(list);
+  return list.empty() ? "" : print_list(list);
+}
+
+std::string print(const std::vector<double>& list)
+{
+  return list.empty() ? "" : print_list(list);
+}
+
+std::string print(const std::vector<int>& list)
+{
+  return list.size() == 1 ? print(list.front()) : print_list(list);
 }
 
 std::string print(const std::array<double, 6>& list)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 # What each room may include, besides itself and what stands in the same line before it.
-CHAIN = ["base", "algebra", "solid", "contact", "equilibrium", "modes", "transient", "reduction", "cycle", "settled", "attractors", "branch", "report"]
+CHAIN = ["base", "algebra", "solid", "contact", "equilibrium", "modes", "transient", "reduction", "cycle", "settled", "attractors", "branch", "study", "report"]
 ALLOWED = {room: set(CHAIN[: place + 1]) | {"scene", "mesh"} for place, room in enumerate(CHAIN)}
 ALLOWED |= {
     "base": {"base"},
@@ -18,6 +18,7 @@ ALLOWED |= {
 ALLOWED["cycle"] |= {"shooting"}
 ALLOWED["settled"] |= {"shooting"}
 ALLOWED["branch"] |= {"shooting"}
+ALLOWED["study"] |= {"shooting"}
 ALLOWED["report"] |= {"shooting"}
 PROGRAM = set(ALLOWED["report"])  # src/*.cpp and include/squeal/*.hpp
 

@@ -113,11 +113,13 @@ RUNS = {
     "oscillator": [INPUTS / "oscillator" / "scene.toml", "--set", "cycle.steps_per_period=100", "--set",
                    "transient.periods=20", "--set", "transient.steps_per_period=50", "--set", "fidelity=auto",
                    "--set", "branch.key=friction.coefficient", "--set", "branch.from=0.28", "--set", "branch.to=0.32",
-                   "--set", "branch.points=4", "--set", "cycle.starts=2"],
+                   "--set", "branch.points=4", "--set", "cycle.starts=2", "--set", "sweep.key=friction.coefficient", "--set",
+                   "sweep.from=0.1", "--set", "sweep.to=0.3", "--set", "sweep.points=3", "--set",
+                   "change=[{probe='pad_y',mass=1e-3}]", "--set", "sensitivity.numbers=friction.coefficient"],
     # the reduced model, a rotation, a mesh; coarse, and damped like this, its cycle is found in a second
     "pin_on_disc": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
                     "damping.beta=6e-7", "--set", "cycle.steps_per_period=40", "--set", "fidelity=auto",
-                    "-cycle_watched_periods", "40"],
+                    "-cycle_watched_periods", "40", "--set", "sensitivity.numbers=friction.coefficient"],
     # no cycle attracts: a settled motion, whose kind stays undecided over so few periods
     "settled": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
                 "friction.coefficient=0.4", "--set", "modes.method=full", "-cycle_free_periods", "10",
@@ -155,6 +157,8 @@ def data_sets_of(file):
 
 # Written with a verdict that is unstable or undecided, or by Arnoldi in place of a projection: no run here ends so.
 UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide", "cycle.multipliers.refusal"}
+# Written of points of a sweep that fail.
+UNLESS_STABLE |= {"sweep.points[].reason"}
 # Written of branches with events, and where a stable cycle stands beside a stable equilibrium.
 OF_SOME_BRANCHES = re.compile(r"branch\.(events|coexistence)\[\]\.\w+")
 

@@ -21,7 +21,30 @@ struct DenseEigenpair
 std::vector<DenseEigenpair> solve_dense_quadratic(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
                                                   const Eigen::MatrixXd& K);
 
-/// The same from the matrices of rank 0, with the pairs on every rank. Collective.
+/// An eigenvalue with both of its vectors: Q(lambda) right = 0, left' Q(lambda) = 0, Q = lambda^2 M + lambda C + K; the
+/// prime transposes without conjugation. 2-norms are 1.
+struct TwoSidedPair
+{
+  std::complex<double> lambda;
+  Eigen::VectorXcd right, left;
+};
+
+/// The pairs of solve_dense_quadratic with their left vectors, from the matrices of rank 0, on every rank. Collective.
+std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
+                                                 const Eigen::MatrixXd& K);
+
+/// Orthonormal bases of the right and left invariant subspaces of K y = theta M y, neither symmetric, with
+/// |theta| <= limit. K + limit M is regular.
+struct InvariantSubspaces
+{
+  Eigen::MatrixXd right, left;
+};
+
+/// From the matrices of rank 0, on every rank. Collective.
+InvariantSubspaces invariant_subspaces_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& K,
+                                              double limit);
+
+/// The pairs of solve_dense_quadratic from the matrices of rank 0, on every rank. Collective.
 std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Eigen::MatrixXd& M,
                                                          const Eigen::MatrixXd& C, const Eigen::MatrixXd& K);
 

@@ -16,6 +16,8 @@
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/equilibrium/state.hpp"
 
+#include <memory>
+
 namespace squeal
 {
 
@@ -62,8 +64,29 @@ struct EquilibriumOptions
 
 OptionList options_of(EquilibriumOptions& options);
 
+/// The stiffness factored and the compliance D of the pairs. Neither load, drive nor friction changes them.
+class PairCompliance
+{
+public:
+  /// Error: K is singular on a body that contact does not hold either (which body). Collective.
+  PairCompliance(const Structure& structure, const Interface& interface, const EquilibriumOptions& options);
+  PairCompliance(PairCompliance&&) noexcept;
+  PairCompliance& operator=(PairCompliance&&) noexcept;
+  ~PairCompliance();
+
+  struct Parts;
+  const Parts& parts() const { return *parts_; }
+
+private:
+  std::unique_ptr<Parts> parts_;
+};
+
 /// Error: K is singular on a body that contact does not hold either (which body).
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options);
+
+/// The same with a compliance that is at hand, first tried with these closed pairs; empty: none are expected.
+Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const PairCompliance& compliance,
+                             const std::vector<char>& expected, const EquilibriumOptions& options);
 
 /// A model at its sliding equilibrium, as every stage after it sees it. Borrows all three.
 struct SlidingEquilibrium

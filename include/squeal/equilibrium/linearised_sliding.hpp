@@ -18,6 +18,7 @@ struct ClosedContact
   Owned<Mat> Z, Y;        // dofs x (dofs - closed pairs)
   Owned<Mat> reaction;    // pairs x dofs: lambda_n = reaction f of forces f = R' lambda_n + g, g = 0 on the pivots
   std::vector<int> pairs; // the closed ones, ascending
+  std::vector<PetscInt> pivots; // the degrees of freedom that are eliminated, ascending
 };
 
 /// `closed`: by pairs. Error: a closed pair whose normal motion the other closed pairs already fix, or that the

@@ -7,6 +7,8 @@
 #include "squeal/contact/resultants.hpp"
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/settled/settled_motion.hpp"
+#include "squeal/study/sensitivity.hpp"
+#include "squeal/study/sweep.hpp"
 
 #include <array>
 #include <filesystem>
@@ -54,6 +56,8 @@ struct Report
   SettledMotion settled; // where no cycle attracts
   Attractors attractors;
   BrakeBranch branch;
+  Sensitivity sensitivity;
+  Sweep sweep;
   std::vector<Timing> timings; // in order
 };
 
@@ -61,7 +65,7 @@ struct Report
 const Estimate& followed_estimate(const Report& report);
 
 /// The outcome of every stage, in the order they run in, by the stage's name.
-std::array<std::pair<const char*, Outcome>, 8> outcomes_of(const Report& report);
+std::array<std::pair<const char*, Outcome>, 10> outcomes_of(const Report& report);
 
 /// Where the nodes of the fields are.
 struct FieldNodes

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -307,6 +308,62 @@ struct BranchSettings
   double own = 0;          // the scene's own value of the number, which the branch starts from; no key of its own
 };
 
+/// The directions of rotation that a sweep examines.
+enum class SweepDirections
+{
+  one,  // that of the scene
+  both, // that of the scene, then the other
+};
+
+inline constexpr std::array sweep_directions_words = {"one", "both"};
+
+inline Words words_of(SweepDirections)
+{
+  return sweep_directions_words;
+}
+
+/// How far the chain of stages goes at each point of a sweep.
+enum class SweepStages
+{
+  equilibrium,
+  modes,
+};
+
+inline constexpr std::array sweep_stages_words = {"equilibrium", "modes"};
+
+inline Words words_of(SweepStages)
+{
+  return sweep_stages_words;
+}
+
+/// Stability at many values of one number of the scene, or of two.
+struct SweepSettings
+{
+  std::vector<std::string> key; // of the numbers, as overrides name them
+  std::vector<double> from, to; // in the keys' units, one a key
+  std::vector<int> points{11};  // [-] of the grid, one a key
+  std::vector<double> values;   // of a single key, instead of a grid
+  int samples = 0;              // [-] number of random points of the ranges, instead of a grid; 0: none
+  int seed = 1;                 // [-] of the random points
+  SweepDirections directions{}; // of rotation
+  SweepStages stages = SweepStages::modes;
+};
+
+/// Why modes are unstable: derivatives of their eigenvalues, and where their energy comes from and goes to.
+struct SensitivitySettings
+{
+  std::vector<std::string> numbers; // derivatives with respect to these, as overrides name them; empty: to all
+};
+
+/// A change that is proposed at a probe, along its direction. It is relaxed at the sliding equilibrium.
+struct Change
+{
+  std::string probe;
+  double mass = 0;      // [kg]
+  double damping = 0;   // [N s/m] to the ground
+  double stiffness = 0; // [N/m] to the ground
+};
+
 /// A displacement that is recorded in time: of the node of a point, body or group, along a direction.
 struct Probe
 {
@@ -341,6 +398,9 @@ struct Scene
   TransientSettings transient;
   CycleSettings cycle;
   std::optional<BranchSettings> branch;
+  std::optional<SweepSettings> sweep;
+  std::optional<SensitivitySettings> sensitivity;
+  std::vector<Change> changes;
   std::vector<Probe> probes;
 };
 
@@ -354,8 +414,19 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
 /// Returns the scene as TOML with all defaults; read_scene of it gives the same scene.
 std::string resolved_scene(const Scene& scene);
 
-/// Returns the scene with another value of the number that the branch follows. Throws Error if there is no such number.
-Scene scene_on_branch(const Scene& scene, double value);
+/// A number of a scene, as overrides name it, and a value of it.
+struct SceneNumber
+{
+  std::string key;
+  double value = 0;
+};
+
+/// Returns the scene with other values of numbers that it has. Throws Error if that is no scene.
+Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers);
+
+/// The numbers with respect to which eigenvalues are derived, with the scene's values: those that it names, else
+/// friction, and what is not zero of parts, points, bodies, springs, damping and rates of rotation.
+std::vector<SceneNumber> sensitive_numbers(const Scene& scene);
 
 /// Returns a list of all keys of a scene file with their meanings, units and defaults.
 std::string scene_reference();

@@ -1,0 +1,26 @@
+#pragma once
+/// A zero of a function of one number between two values of different sign.
+#include <functional>
+#include <optional>
+
+namespace squeal
+{
+
+/// Values of different sign at both ends.
+struct Bracket
+{
+  double a = 0, b = 0; // arguments
+  double value_a = 0, value_b = 0;
+};
+
+/// `error`: the length of the last bracket, which holds the zero.
+struct Root
+{
+  double x = 0, error = 0;
+};
+
+/// False position (Illinois; Dowell and Jarratt 1971) with bisection where that is slow, until the bracket is no longer
+/// than `tolerance`. Where the function has no value the search ends with the bracket that it has.
+Root find_root(const std::function<std::optional<double>(double)>& function, Bracket bracket, double tolerance);
+
+} // namespace squeal

@@ -1,0 +1,71 @@
+#pragma once
+/// Why modes are unstable and what would change them (src/README.md, section 12): derivatives of their eigenvalues,
+/// shares of the parts in their energies, powers of contact and damping, and changes that are proposed.
+#include "squeal/modes/modes.hpp"
+#include "squeal/study/sweep.hpp"
+
+namespace squeal
+{
+
+/// By one number of the scene, equilibrium included, closed pairs fixed.
+struct NumberDerivative
+{
+  SceneNumber number;
+  bool known = false;             // the closed pairs are the same on both sides
+  std::complex<double> lambda{};  // d lambda / d number [1/s per unit of the number]
+  double kinetic = 0, strain = 0; // d ln / d ln number of phi^H M phi and phi^H K phi: shares of a part
+};
+
+/// By what is added at a probe along its direction.
+struct ProbeDerivative
+{
+  std::complex<double> mass, damping, stiffness; // d lambda / d of each [1/s per kg, N s/m, N/m]
+};
+
+/// A change with the eigenvalue that the derivatives predict and the one that the changed structure has.
+struct ChangeEffect
+{
+  bool found = false; // the mode of the changed structure
+  std::complex<double> predicted, computed;
+};
+
+/// Powers are over the mean energy (|lambda|^2 phi^H M phi + phi^H K phi)/4 of the motion [1/s].
+struct ModeCauses
+{
+  std::complex<double> lambda;
+  double backward_error = 0; // the larger one of the right and of the left vector
+  std::vector<NumberDerivative> numbers;
+  std::vector<ProbeDerivative> probes;
+  std::vector<double> pair_powers;    // that the contact forces of each pair put in
+  std::vector<double> contact_powers; // their sums over the scene's contacts; one of a matrix scene
+  double damping_power = 0;           // that C and the damping of the friction direction take
+  double defect = 0;                  // sum of contact_powers - damping_power - 2 Re(lambda)
+  std::vector<ChangeEffect> changes;
+};
+
+/// outcome: "converged", "not converged" (the vectors, or a mode of a change was not found), "skipped", "off".
+struct Sensitivity
+{
+  Outcome outcome;
+  std::vector<ModeCauses> modes; // the unstable ones, falling growth rate
+};
+
+struct SensitivityProblem
+{
+  SlidingEquilibrium sliding;
+  const LinearisedSliding& linearised;
+  const Modes& modes;
+  std::vector<SceneNumber> numbers;
+  std::function<BranchModel(const SceneNumber&)> model_with; // the scene with another value
+  Mat probes = nullptr;                                      // a row a probe
+  const std::vector<Change>& changes;
+  std::vector<int> probes_of_changes; // their rows
+  const ModesSettings& modes_settings;
+  const ModesOptions& modes_options;
+  const EquilibriumOptions& equilibrium_options;
+};
+
+/// Collective.
+Sensitivity find_sensitivity(const SensitivityProblem& problem);
+
+} // namespace squeal

@@ -1,0 +1,78 @@
+#pragma once
+/// Stability of sliding at many values of one or two numbers of the scene, with the modes followed from value to value
+/// (src/README.md, section 11).
+#include "squeal/branch/brake_branch.hpp"
+
+namespace squeal
+{
+
+/// A mode at a point. Its track is the same number at every point along a line where it could be followed.
+struct SweptMode
+{
+  std::complex<double> lambda; // [1/s]
+  double backward_error = 0;   // the larger one of the right and of the left vector
+  int track = -1;              // -1: not followed
+  double mac = 1;              // with the mode of this track at the point before; 1 at the first
+  int subspace = 1;            // number of modes that were followed together, whose subspace has this MAC
+};
+
+/// outcome: that of the stage that ended the point: "converged", or what failed and why.
+struct SweepPoint
+{
+  std::vector<double> values; // of the swept numbers
+  bool reversed = false;      // direction of rotation
+  bool inserted = false;      // between points of the scene, where modes were unclear
+  Outcome outcome;
+  int closed = 0;               // pairs
+  int unstable = 0;             // modes in the band
+  std::vector<SweptMode> modes; // in the band, falling growth rate
+};
+
+/// Where the growth rate of a followed mode passes zero along the first number.
+struct Threshold
+{
+  std::vector<double> values; // of the swept numbers
+  bool reversed = false;
+  int track = 0;
+  double error = 0;        // of the first value
+  double frequency_hz = 0; // of the mode there
+  int change = 0;          // of the number of unstable modes as the value rises
+};
+
+/// outcome: "converged", "not converged" (points failed: how many, and the first reason), "off".
+/// residual: the largest backward error. iterations: number of points.
+struct Sweep
+{
+  Outcome outcome;
+  std::vector<SweepPoint> points; // line by line, along the first number
+  std::vector<Threshold> thresholds;
+  int tracks = 0;       // number of followed modes
+  int lost = 0;         // modes in the band that could not be followed to the next point
+  double least_mac = 1; // along all tracks
+  int basis = 0;        // shapes of the basis in the end
+  int passes = 0;       // corrections of the basis by residuals
+};
+
+struct SweepOptions
+{
+  double tolerance = 1e-10; // backward error of right and left vectors on the basis
+  PetscInt passes = 8;      // corrections at a point, at most
+  PetscInt depth = 6;       // times that a step is halved, at most
+};
+
+OptionList options_of(SweepOptions& options);
+
+struct SweepProblem
+{
+  const SweepSettings& settings;
+  std::function<BranchModel(std::span<const double> values)> model_at;
+  const ModesSettings& modes;
+  const ModesOptions& modes_options;
+  const EquilibriumOptions& equilibrium_options;
+  const SweepOptions& options;
+};
+
+/// Collective.
+Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm);
+
+} // namespace squeal

@@ -1,0 +1,113 @@
+#include "sensitivity_results.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Json = nlohmann::ordered_json;
+
+double in_hz(double omega)
+{
+  return omega / (2 * std::numbers::pi);
+}
+
+/// A change of an eigenvalue as one of growth rate and of frequency.
+Json change_entry(std::complex<double> lambda)
+{
+  return {{"growth_rate", lambda.real()}, {"frequency_hz", in_hz(lambda.imag())}};
+}
+
+Json number_entry(const NumberDerivative& derivative)
+{
+  Json entry = {{"key", derivative.number.key}, {"value", derivative.number.value}};
+  entry["known"] = derivative.known;
+  if (!derivative.known) return entry;
+  entry["growth_rate_by"] = derivative.lambda.real();
+  entry["frequency_hz_by"] = in_hz(derivative.lambda.imag());
+  entry["kinetic_share"] = derivative.kinetic;
+  entry["strain_share"] = derivative.strain;
+  return entry;
+}
+
+Json mode_entry(const ModeCauses& causes, const Scene& scene)
+{
+  Json entry = change_entry(causes.lambda);
+  entry["backward_error"] = causes.backward_error;
+  entry["derivatives"] = Json::array();
+  for (const NumberDerivative& derivative : causes.numbers) entry["derivatives"].push_back(number_entry(derivative));
+  entry["probes"] = Json::array();
+  for (std::size_t i = 0; i < causes.probes.size(); ++i)
+    entry["probes"].push_back({{"name", scene.probes[i].name},
+                               {"growth_rate_by_mass", causes.probes[i].mass.real()},
+                               {"growth_rate_by_damping", causes.probes[i].damping.real()},
+                               {"growth_rate_by_stiffness", causes.probes[i].stiffness.real()}});
+  entry["contact_powers"] = causes.contact_powers;
+  entry["damping_power"] = causes.damping_power;
+  entry["power_defect"] = causes.defect;
+  entry["changes"] = Json::array();
+  for (std::size_t i = 0; i < causes.changes.size(); ++i)
+  {
+    const Change& change = scene.changes[i];
+    Json effect = {{"probe", change.probe},
+                   {"mass", change.mass},
+                   {"damping", change.damping},
+                   {"stiffness", change.stiffness},
+                   {"predicted", change_entry(causes.changes[i].predicted)}};
+    if (causes.changes[i].found) effect["computed"] = change_entry(causes.changes[i].computed);
+    entry["changes"].push_back(effect);
+  }
+  return entry;
+}
+
+/// Derivatives by falling effect of a relative change.
+std::vector<NumberDerivative> strongest(const ModeCauses& causes)
+{
+  std::vector<NumberDerivative> list = causes.numbers;
+  std::erase_if(list, [](const NumberDerivative& derivative) { return !derivative.known; });
+  const auto effect = [](const NumberDerivative& d) { return std::abs(d.number.value * d.lambda.real()); };
+  std::stable_sort(list.begin(), list.end(), [&](const auto& a, const auto& b) { return effect(a) > effect(b); });
+  return list;
+}
+
+} // namespace
+
+void add_sensitivity(const Sensitivity& sensitivity, const Scene& scene, Json& entry)
+{
+  entry["residual"] = sensitivity.outcome.residual;
+  entry["modes"] = Json::array();
+  for (const ModeCauses& causes : sensitivity.modes) entry["modes"].push_back(mode_entry(causes, scene));
+}
+
+std::vector<std::string> sensitivity_lines(const Sensitivity& sensitivity, const Scene& scene)
+{
+  constexpr std::size_t modes_shown = 3, numbers_shown = 6;
+  std::vector<std::string> lines;
+  for (std::size_t m = 0; m < std::min(modes_shown, sensitivity.modes.size()); ++m)
+  {
+    const ModeCauses& causes = sensitivity.modes[m];
+    std::string powers;
+    for (const double power : causes.contact_powers) powers += format("%s%.5g", powers.empty() ? "" : " + ", power);
+    lines.push_back(format("%.7g Hz, growth %.6g 1/s: contacts put in %s 1/s of the energy, damping takes %.5g 1/s",
+                           in_hz(causes.lambda.imag()), causes.lambda.real(), powers.c_str(), causes.damping_power));
+    const std::vector<NumberDerivative> list = strongest(causes);
+    for (std::size_t i = 0; i < std::min(numbers_shown, list.size()); ++i)
+      lines.push_back(format("  1 %% of %-28s moves the growth by %+.4g 1/s, the frequency by %+.4g Hz",
+                             list[i].number.key.c_str(), 0.01 * list[i].number.value * list[i].lambda.real(),
+                             0.01 * list[i].number.value * in_hz(list[i].lambda.imag())));
+    for (std::size_t i = 0; i < causes.changes.size(); ++i)
+      lines.push_back(format("  change at %s: growth %.6g 1/s predicted", scene.changes[i].probe.c_str(),
+                             causes.changes[i].predicted.real()) +
+                      (causes.changes[i].found ? format(", %.6g 1/s computed", causes.changes[i].computed.real())
+                                               : std::string(", not found")));
+  }
+  return lines;
+}
+
+} // namespace squeal

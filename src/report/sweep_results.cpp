@@ -1,0 +1,216 @@
+#include "sweep_results.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Json = nlohmann::ordered_json;
+
+double frequency_of(const SweptMode& mode)
+{
+  return std::abs(mode.lambda.imag()) / (2 * std::numbers::pi);
+}
+
+double damping_ratio_of(const SweptMode& mode)
+{
+  return -mode.lambda.real() / std::abs(mode.lambda);
+}
+
+int direction_of(bool reversed)
+{
+  return reversed ? -1 : 1;
+}
+
+/// A followed mode where it grows most.
+struct Track
+{
+  const SweepPoint* point = nullptr;
+  const SweptMode* mode = nullptr;
+  int points = 0, unstable = 0; // where it was found, and where it is unstable
+  double least_mac = 1;
+};
+
+std::vector<Track> tracks_of(const Sweep& sweep)
+{
+  std::vector<Track> tracks(static_cast<std::size_t>(sweep.tracks));
+  for (const SweepPoint& point : sweep.points)
+    for (const SweptMode& mode : point.modes)
+    {
+      if (mode.track < 0) continue;
+      Track& track = tracks[static_cast<std::size_t>(mode.track)];
+      ++track.points;
+      track.unstable += is_unstable(mode.lambda);
+      track.least_mac = std::min(track.least_mac, mode.mac);
+      if (track.mode && track.mode->lambda.real() >= mode.lambda.real()) continue;
+      track.point = &point;
+      track.mode = &mode;
+    }
+  return tracks;
+}
+
+Json point_entry(const SweepPoint& point)
+{
+  Json entry = {{"values", point.values}, {"direction", direction_of(point.reversed)}};
+  entry["outcome"] = word(point.outcome.kind);
+  if (!point.outcome.reason.empty()) entry["reason"] = point.outcome.reason;
+  entry["inserted"] = point.inserted;
+  entry["closed"] = point.closed;
+  entry["unstable_modes"] = point.unstable;
+  if (point.modes.empty()) return entry;
+  entry["growth_rate"] = point.modes.front().lambda.real();
+  entry["frequency_hz"] = frequency_of(point.modes.front());
+  return entry;
+}
+
+/// values as "0.3, 1e-6".
+std::string text_of(const std::vector<double>& values)
+{
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ", ") + format("%.7g", value);
+  return text;
+}
+
+std::string csv_text(const std::string& text)
+{
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+} // namespace
+
+void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
+{
+  const SweepSettings& settings = *scene.sweep;
+  entry["keys"] = settings.key;
+  entry["stages"] = word(settings.stages);
+  entry["directions"] = word(settings.directions);
+  entry["followed_modes"] = sweep.tracks;
+  entry["lost_modes"] = sweep.lost;
+  entry["least_mac"] = sweep.least_mac;
+  entry["residual"] = sweep.outcome.residual;
+  entry["basis_shapes"] = sweep.basis;
+  entry["basis_corrections"] = sweep.passes;
+  entry["points"] = Json::array();
+  for (const SweepPoint& point : sweep.points) entry["points"].push_back(point_entry(point));
+  entry["unstable_tracks"] = Json::array();
+  for (int number = 0; const Track& track : tracks_of(sweep))
+  {
+    if (track.unstable > 0)
+      entry["unstable_tracks"].push_back({{"track", number},
+                                          {"points", track.points},
+                                          {"unstable_points", track.unstable},
+                                          {"least_mac", track.least_mac},
+                                          {"greatest_growth_rate", track.mode->lambda.real()},
+                                          {"frequency_hz", frequency_of(*track.mode)},
+                                          {"values", track.point->values},
+                                          {"direction", direction_of(track.point->reversed)}});
+    ++number;
+  }
+  entry["thresholds"] = Json::array();
+  for (const Threshold& threshold : sweep.thresholds)
+    entry["thresholds"].push_back({{"values", threshold.values},
+                                   {"direction", direction_of(threshold.reversed)},
+                                   {"error", threshold.error},
+                                   {"track", threshold.track},
+                                   {"frequency_hz", threshold.frequency_hz},
+                                   {"change", threshold.change}});
+}
+
+void write_sweep(Hdf5File& file, const Sweep& sweep)
+{
+  const std::size_t points = sweep.points.size(), tracks = static_cast<std::size_t>(sweep.tracks);
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> values, frequency(points * tracks, none), growth(points * tracks, none),
+      mac(points * tracks, none);
+  std::vector<int> direction, closed, unstable;
+  for (std::size_t i = 0; i < points; ++i)
+  {
+    const SweepPoint& point = sweep.points[i];
+    values.insert(values.end(), point.values.begin(), point.values.end());
+    direction.push_back(direction_of(point.reversed));
+    closed.push_back(point.closed);
+    unstable.push_back(point.unstable);
+    for (const SweptMode& mode : point.modes)
+    {
+      if (mode.track < 0) continue;
+      const std::size_t place = i * tracks + static_cast<std::size_t>(mode.track);
+      frequency[place] = frequency_of(mode);
+      growth[place] = mode.lambda.real();
+      mac[place] = mode.mac;
+    }
+  }
+  if (points == 0) return;
+  file.write("sweep/value", {points, values.size() / points}, values, "units of the keys");
+  file.write("sweep/direction", {points}, direction, "1 as in the scene, -1 reversed");
+  file.write("sweep/closed", {points}, closed, "pairs");
+  file.write("sweep/unstable_modes", {points}, unstable, "-");
+  if (tracks == 0) return;
+  file.write("sweep/frequency", {points, tracks}, frequency, "Hz");
+  file.write("sweep/growth_rate", {points, tracks}, growth, "1/s");
+  file.write("sweep/mac", {points, tracks}, mac, "-");
+}
+
+std::string sweep_csv(const Sweep& sweep, const Scene& scene)
+{
+  std::string text;
+  for (const std::string& key : scene.sweep->key) text += csv_text(key) + ",";
+  text += "direction,inserted,outcome,closed_pairs,track,frequency_hz,growth_rate,damping_ratio,backward_error,mac,"
+          "subspace\n";
+  for (const SweepPoint& point : sweep.points)
+  {
+    std::string head;
+    for (const double value : point.values) head += format("%.17g,", value);
+    head += format("%d,%d,%s,%d,", direction_of(point.reversed), point.inserted ? 1 : 0, word(point.outcome.kind),
+                   point.closed);
+    if (point.modes.empty()) text += head + ",,,,,,\n";
+    for (const SweptMode& mode : point.modes)
+      text += head + (mode.track < 0 ? "" : std::to_string(mode.track)) +
+              format(",%.17g,%.17g,%.17g,%.3g,%.6g,%d\n", frequency_of(mode), mode.lambda.real(),
+                     damping_ratio_of(mode), mode.backward_error, mode.mac, mode.subspace);
+  }
+  return text;
+}
+
+std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
+{
+  constexpr std::size_t shown = 12;
+  std::string keys;
+  for (const std::string& key : scene.sweep->key) keys += (keys.empty() ? "" : " and ") + key;
+  std::vector<std::string> lines = {format("%zu points of %s", sweep.points.size(), keys.c_str())};
+  if (scene.sweep->stages == SweepStages::equilibrium) return lines;
+  lines.back() += format("; backward error %.1e at most, on a basis of %d shapes after %d corrections",
+                         sweep.outcome.residual, sweep.basis, sweep.passes);
+  if (sweep.tracks > 0)
+    lines.push_back(
+        format("%d modes followed, MAC %.3f at least, %d lost on the way", sweep.tracks, sweep.least_mac, sweep.lost));
+  std::size_t unstable = 0;
+  for (int number = 0; const Track& track : tracks_of(sweep))
+  {
+    if (track.unstable > 0 && ++unstable <= shown)
+      lines.push_back(format("mode %d unstable at %d of %d points, most at %s%s: %.7g Hz, growth %.6g 1/s", number,
+                             track.unstable, track.points, text_of(track.point->values).c_str(),
+                             track.point->reversed ? " reversed" : "", frequency_of(*track.mode),
+                             track.mode->lambda.real()));
+    ++number;
+  }
+  for (std::size_t i = 0; i < std::min(shown, sweep.thresholds.size()); ++i)
+  {
+    const Threshold& t = sweep.thresholds[i];
+    lines.push_back(format("threshold of mode %d at %s%s +- %.1e, %.7g Hz (%+d)", t.track, text_of(t.values).c_str(),
+                           t.reversed ? " reversed" : "", t.error, t.frequency_hz, t.change));
+  }
+  if (sweep.thresholds.size() > shown || unstable > shown)
+    lines.emplace_back("the rest is in report.json and sweep.csv");
+  return lines;
+}
+
+} // namespace squeal

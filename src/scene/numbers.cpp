@@ -1,0 +1,264 @@
+/// Numbers of a scene that a branch follows or a sweep varies, found in the scene's own text and replaced there.
+#include "squeal/base/error.hpp"
+#include "toml_values.hpp"
+
+#include <algorithm>
+#include <charconv>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Tables whose numbers are of the structure, its contact and its loads.
+const std::vector<std::string> physical = {"part",     "point",   "rigid_body", "spring", "force",
+                                           "pressure", "contact", "friction",   "damping"};
+
+std::string text_of_number(double value)
+{
+  char digits[32];
+  return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
+}
+
+/// The scene with all defaults, as a document.
+toml::table document_of(const Scene& scene)
+{
+  return toml::parse(resolved_scene(scene), std::string_view("scene"));
+}
+
+/// The value of a number. `table`: "[branch]" or "[sweep]", for messages. Throws Error if the key is not that of a
+/// number that the structure, its contact or its loads have.
+double number_at(const Scene& scene, const std::string& key, const std::string& table)
+{
+  const auto refusal = [&](const std::string& why) { return Error(table + " key = \"" + key + "\" " + why); };
+  const std::string first = key.substr(0, key.find('.'));
+  if (first == "mesh" || first == "matrices")
+    throw refusal("would change the mesh; name a number of " + joined(physical));
+  if (std::find(physical.begin(), physical.end(), first) == physical.end())
+    throw refusal("is not a number of the structure, its contact or its loads" + hint_or_list(first, physical) +
+                  ", such as friction.coefficient");
+  toml::table document = document_of(scene);
+  const toml::node* node = find_value(document, key);
+  if (!node) throw refusal("is not in the scene: name a number as --set does, such as friction.coefficient");
+  if (!node->is_number())
+    throw refusal("is " + kind_of(*node) + ", not a number; of a list name an entry, such as force.0.vector.2");
+  return *node->value<double>();
+}
+
+/// Throws Error, with the place of the member, if the scene is none with this value of the number.
+void need_scene(const Scene& scene, const SceneNumber& number, const std::string& place, const std::string& label)
+{
+  try
+  {
+    (void)scene_with(scene, std::span(&number, 1));
+  }
+  catch (const Error& error)
+  {
+    throw Error(place + ": " + label + error.what());
+  }
+}
+
+/// The checks of a sweep, each of which throws Error with the place of the wrong value.
+class SweepChecker
+{
+public:
+  SweepChecker(SweepSettings& sweep, const Scene& scene, const Places& places)
+      : sweep_(sweep), scene_(scene), places_(places)
+  {
+  }
+
+  void check_all()
+  {
+    const std::size_t numbers = sweep_.key.size();
+    if (numbers > 2) fail(&sweep_.key, "names " + std::to_string(numbers) + " numbers: give one or two");
+    if (numbers == 2 && sweep_.key[0] == sweep_.key[1])
+      fail(&sweep_.key, "names \"" + sweep_.key[0] + "\" twice: give two different numbers");
+    for (const std::string& key : sweep_.key) try
+      {
+        (void)number_at(scene_, key, "[sweep]");
+      }
+      catch (const Error& error)
+      {
+        throw Error(places_.at(&sweep_.key) + ": " + error.what());
+      }
+    check_form();
+    for (std::size_t i = 0; i < numbers; ++i)
+      for (const auto* list : {&sweep_.from, &sweep_.to})
+        if (!list->empty())
+          need_scene(scene_, {sweep_.key[i], (*list)[i]}, places_.at(list), "[sweep] this end is no scene: ");
+    for (const double value : sweep_.values)
+      need_scene(scene_, {sweep_.key[0], value}, places_.at(&sweep_.values), "[sweep] one of the values is no scene: ");
+  }
+
+private:
+  [[noreturn]] void fail(const void* member, const std::string& text) const
+  {
+    throw Error(places_.at(member) + ": [sweep] " + text);
+  }
+
+  template <class List> void need_length(const List& list, const char* name) const
+  {
+    if (list.size() != sweep_.key.size())
+      fail(places_.given.count(&list) ? static_cast<const void*>(&list) : &sweep_.key,
+           std::string(name) + " holds " + std::to_string(list.size()) + " numbers for " +
+               std::to_string(sweep_.key.size()) + " keys: give one a key");
+  }
+
+  /// A list of values, a grid, or samples of a range.
+  void check_form()
+  {
+    if (!sweep_.values.empty())
+    {
+      if (sweep_.key.size() > 1) fail(&sweep_.values, "values belong to a single key: give from, to and points");
+      if (!sweep_.from.empty() || !sweep_.to.empty() || sweep_.samples > 0 || places_.given.count(&sweep_.points))
+        fail(&sweep_.values, "values exclude from, to, points and samples: keep one form");
+      return;
+    }
+    need_length(sweep_.from, "from");
+    need_length(sweep_.to, "to");
+    for (std::size_t i = 0; i < sweep_.from.size(); ++i)
+      if (sweep_.from[i] == sweep_.to[i])
+        fail(&sweep_.to, "from and to are both " + text_of_number(sweep_.to[i]) + ": give a range, or values");
+    if (sweep_.samples > 0 && places_.given.count(&sweep_.points))
+      fail(&sweep_.samples, "samples and points exclude each other: keep one");
+    if (sweep_.points.size() == 1) sweep_.points.resize(sweep_.key.size(), sweep_.points.front());
+    need_length(sweep_.points, "points");
+    for (const int points : sweep_.points)
+      if (points < 2) fail(&sweep_.points, "points = " + std::to_string(points) + ": a grid has at least two");
+  }
+
+  SweepSettings& sweep_;
+  const Scene& scene_;
+  const Places& places_;
+};
+
+} // namespace
+
+Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)
+{
+  toml::table document = document_of(scene);
+  for (const auto& [key, value] : numbers) apply_override(document, key + "=" + text_of_number(value));
+  Scene changed;
+  changed.file = scene.file;
+  Places places{scene.file.string(), {}};
+  read_tables(document, changed, places);
+  check_scene(changed, places);
+  return changed;
+}
+
+void resolve_branch(Scene& scene, const Places& places)
+{
+  if (!scene.branch) return;
+  BranchSettings& branch = *scene.branch;
+  const auto fail = [&](const void* member, const std::string& text) { throw Error(places.at(member) + ": " + text); };
+  try
+  {
+    branch.own = number_at(scene, branch.key, "[branch]");
+  }
+  catch (const Error& error)
+  {
+    fail(&branch.key, error.what());
+  }
+  if (branch.from == branch.to)
+    fail(&branch.to, "[branch] from and to are both " + text_of_number(branch.to) + ": give a range");
+  if (branch.own < std::min(branch.from, branch.to) || branch.own > std::max(branch.from, branch.to))
+    fail(&branch.from, "[branch] the scene has " + branch.key + " = " + text_of_number(branch.own) +
+                           ", where the branch starts: it must lie between from = " + text_of_number(branch.from) +
+                           " and to = " + text_of_number(branch.to));
+  if (!scene.cycle.enabled)
+    fail(&branch.key, "[branch] starts from the cycle of the scene: give [cycle], or enable it");
+  for (const double* end : {&branch.from, &branch.to})
+    need_scene(scene, {branch.key, *end}, places.at(end), "[branch] this end is no scene: ");
+}
+
+void resolve_sweep(Scene& scene, const Places& places)
+{
+  if (scene.sweep) SweepChecker(*scene.sweep, scene, places).check_all();
+}
+
+namespace
+{
+
+/// Keys of one entry of a list, by its place.
+std::string key_of(const char* list, std::size_t place, const char* key)
+{
+  return std::string(list) + "." + std::to_string(place) + "." + key;
+}
+
+/// Whether two entries of a list have a name that reads as a place: then places would not name them.
+template <class List> bool names_are_places(const List& list)
+{
+  return std::ranges::any_of(list, [](const auto& entry)
+                             { return entry.name.find_first_not_of("0123456789") == std::string::npos; });
+}
+
+void add_named(const Scene& scene, std::vector<SceneNumber>& numbers)
+{
+  if (!names_are_places(scene.parts))
+    for (std::size_t i = 0; i < scene.parts.size(); ++i)
+    {
+      const Part& part = scene.parts[i];
+      numbers.push_back({key_of("part", i, "young"), part.material.young});
+      numbers.push_back({key_of("part", i, "density"), part.material.density});
+      if (part.damping) numbers.push_back({key_of("part", i, "alpha"), part.damping->alpha});
+      if (part.damping) numbers.push_back({key_of("part", i, "beta"), part.damping->beta});
+    }
+  if (!names_are_places(scene.points))
+    for (std::size_t i = 0; i < scene.points.size(); ++i)
+      numbers.push_back({key_of("point", i, "mass"), scene.points[i].mass});
+  if (!names_are_places(scene.rigid_bodies))
+    for (std::size_t i = 0; i < scene.rigid_bodies.size(); ++i)
+      numbers.push_back({key_of("rigid_body", i, "mass"), scene.rigid_bodies[i].mass});
+}
+
+} // namespace
+
+std::vector<SceneNumber> sensitive_numbers(const Scene& scene)
+{
+  std::vector<SceneNumber> numbers;
+  for (const std::string& key : scene.sensitivity->numbers)
+    numbers.push_back({key, number_at(scene, key, "[sensitivity]")});
+  if (!numbers.empty()) return numbers;
+  numbers.push_back({"friction.coefficient", scene.friction.coefficient});
+  if (!scene.matrices) numbers.push_back({"damping.alpha", scene.damping.alpha});
+  if (!scene.matrices) numbers.push_back({"damping.beta", scene.damping.beta});
+  add_named(scene, numbers);
+  for (std::size_t i = 0; i < scene.springs.size(); ++i)
+  {
+    numbers.push_back({key_of("spring", i, "stiffness"), scene.springs[i].stiffness});
+    numbers.push_back({key_of("spring", i, "damping"), scene.springs[i].damping});
+  }
+  for (std::size_t i = 0; i < scene.contacts.size(); ++i)
+    if (scene.contacts[i].rotation)
+      numbers.push_back({key_of("contact", i, "rotation.rate"), scene.contacts[i].rotation->rate});
+  std::erase_if(numbers, [](const SceneNumber& number) { return number.value == 0; });
+  return numbers;
+}
+
+void check_sensitivity(const Scene& scene, const Places& places)
+{
+  if (scene.sensitivity) try
+    {
+      for (const SceneNumber& number : sensitive_numbers(scene))
+        if (number.value == 0) throw Error("[sensitivity] " + number.key + " is 0: leave it out, or give it a value");
+    }
+    catch (const Error& error)
+    {
+      throw Error(places.at(&scene.sensitivity->numbers) + ": " + error.what());
+    }
+  std::vector<std::string> probes;
+  for (const Probe& probe : scene.probes) probes.push_back(probe.name);
+  for (const Change& change : scene.changes)
+  {
+    if (!scene.sensitivity)
+      throw Error(places.at(&change) + ": [[change]] is part of [sensitivity]: give that table too");
+    if (std::ranges::find(probes, change.probe) == probes.end())
+      throw Error(places.at(&change.probe) + ": [[change]] probe = \"" + change.probe + "\" is not defined" +
+                  hint_or_list(change.probe, probes));
+    if (change.mass == 0 && change.damping == 0 && change.stiffness == 0)
+      throw Error(places.at(&change) + ": [[change]] at " + change.probe + " has neither mass, damping nor stiffness");
+  }
+}
+
+} // namespace squeal

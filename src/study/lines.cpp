@@ -1,0 +1,66 @@
+#include "lines.hpp"
+
+#include <algorithm>
+#include <random>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// The values of one number, ascending or descending.
+std::vector<double> grid_of(const SweepSettings& settings, std::size_t number)
+{
+  std::vector<double> values = settings.values;
+  std::sort(values.begin(), values.end());
+  if (!values.empty()) return values;
+  const double from = settings.from[number], to = settings.to[number];
+  const int points = settings.points[number];
+  for (int i = 0; i < points; ++i) values.push_back(from + i * (to - from) / (points - 1));
+  return values;
+}
+
+/// Evenly distributed in the ranges, the same on every machine.
+std::vector<std::vector<double>> random_points(const SweepSettings& settings)
+{
+  std::mt19937_64 generator(static_cast<std::uint64_t>(settings.seed));
+  std::vector<std::vector<double>> points;
+  for (int i = 0; i < settings.samples; ++i)
+  {
+    std::vector<double>& values = points.emplace_back();
+    for (std::size_t k = 0; k < settings.key.size(); ++k)
+    {
+      const double part = static_cast<double>(generator() >> 11) * 0x1p-53; // in [0, 1)
+      values.push_back(settings.from[k] + part * (settings.to[k] - settings.from[k]));
+    }
+  }
+  return points;
+}
+
+} // namespace
+
+std::vector<SweepLine> lines_of(const SweepSettings& settings)
+{
+  std::vector<SweepLine> lines;
+  if (settings.samples > 0)
+    lines.push_back({random_points(settings), false, false});
+  else if (settings.key.size() == 1)
+  {
+    SweepLine& line = lines.emplace_back();
+    for (const double value : grid_of(settings, 0)) line.points.push_back({value});
+  }
+  else
+    for (const double second : grid_of(settings, 1))
+    {
+      SweepLine& line = lines.emplace_back();
+      for (const double first : grid_of(settings, 0)) line.points.push_back({first, second});
+    }
+  if (settings.directions == SweepDirections::one) return lines;
+  std::vector<SweepLine> both;
+  for (const SweepLine& line : lines)
+    for (const bool reversed : {false, true}) both.push_back({line.points, reversed, line.ordered});
+  return both;
+}
+
+} // namespace squeal

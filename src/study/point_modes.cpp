@@ -1,0 +1,300 @@
+#include "point_modes.hpp"
+
+#include "squeal/modes/real_modes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index sketched = 32;      // random vectors: their mean square is off by 25 % (one standard deviation)
+constexpr double basis_band = 1.25; // of the real modes, over the band
+constexpr std::size_t fewest = 20;  // real modes
+constexpr double share = 0.02;      // directions of corrections below this part of the largest wait for the next pass
+constexpr Index small_basis = 120;  // shapes: such a problem is solved whole at once
+constexpr double undamped_reach = 1.2; // undamped modes on which a large basis is solved first, over the window
+constexpr double spurious = 1e-8;      // backward error of what is no mode
+
+/// The closed pairs taken out, and the damping of the friction direction; null where there is none.
+struct LinearisedPoint
+{
+  ClosedContact contact;
+  Owned<Mat> Cf{};
+};
+
+LinearisedPoint linearise_point(const SlidingEquilibrium& sliding)
+{
+  const auto& [structure, interface, equilibrium] = sliding;
+  LinearisedPoint point{eliminate_closed_pairs(structure, interface, equilibrium.closed)};
+  if (interface.friction.direction_damping)
+    point.Cf = direction_damping(interface, equilibrium.closed, equilibrium.reactions);
+  return point;
+}
+
+/// Static shapes of forces on pairs that the basis takes for open.
+void attach(ModesBasis& modes, const Interface& interface, const std::vector<char>& closed)
+{
+  std::vector<int> pairs;
+  for (std::size_t i = 0; i < closed.size(); ++i)
+    if (closed[i] && !modes.closed[i] && !modes.attached[i])
+    {
+      pairs.push_back(static_cast<int>(i));
+      modes.attached[i] = 1;
+    }
+  if (pairs.empty()) return;
+  const Owned<Mat> forces = transpose_of(rows_of(interface, pairs, RowsTaken::normal));
+  MultiVector columns{comm_of(forces), MatrixXd::Zero(modes.basis.T.entries.rows(), static_cast<Index>(pairs.size()))};
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(forces, &first, &last));
+  for_each_row(forces,
+               [&](PetscInt row, std::span<const PetscInt> column, std::span<const PetscScalar> value)
+               {
+                 for (std::size_t k = 0; k < column.size(); ++k) columns.entries(row - first, column[k]) = value[k];
+               });
+  const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, columns));
+  extend(modes.basis, product(modes.contact.Z, responses));
+}
+
+/// The two-norms of the parts of vectors that are no pivots.
+VectorXd kept_norms(const MatrixXcd& a, const MatrixXd& kept)
+{
+  return (a.conjugate().cwiseProduct(kept * a)).colwise().sum().real().cwiseMax(0).cwiseSqrt();
+}
+
+enum class Side
+{
+  right,
+  left,
+};
+
+/// The vectors of one side, one a column.
+MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, Side side)
+{
+  if (pairs.empty()) return {};
+  MatrixXcd a(pairs.front().right.size(), static_cast<Index>(pairs.size()));
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    a.col(static_cast<Index>(k)) = side == Side::right ? pairs[k].right : pairs[k].left;
+  return a;
+}
+
+/// Backward errors in the full problem, estimated by the random vectors. Left vectors solve the transposed problem.
+std::vector<double> backward_errors(const ModesBasis& modes, const ProjectedSliding& on_basis,
+                                    const std::vector<TwoSidedPair>& pairs, Side side)
+{
+  if (pairs.empty()) return {};
+  const Index tests = modes.basis.sketched, shapes = modes.basis.shapes();
+  const auto block = [&](const MatrixXd& A) -> MatrixXd
+  {
+    if (side == Side::right) return A.topRightCorner(tests, shapes);
+    return A.bottomLeftCorner(shapes, tests).transpose();
+  };
+  const MatrixXcd a = vectors_of(pairs, side);
+  const MatrixXcd M = block(on_basis.M) * a, C = block(on_basis.C) * a, K = block(on_basis.K) * a;
+  const VectorXd sizes = kept_norms(a, on_basis.kept);
+  std::vector<double> errors;
+  for (Index k = 0; k < a.cols(); ++k)
+  {
+    const Complex lambda = pairs[static_cast<std::size_t>(k)].lambda;
+    const double w = std::abs(lambda), scale = w * w * modes.norms.M + w * modes.norms.C + modes.norms.K;
+    // the random entries lie evenly in (-1, 1): their mean square is 1/3
+    const double residual =
+        (lambda * (lambda * M.col(k) + C.col(k)) + K.col(k)).norm() * std::sqrt(3. / static_cast<double>(tests));
+    errors.push_back(residual / (scale * sizes(k)));
+  }
+  return errors;
+}
+
+/// Appends to `residuals` the real and imaginary parts of the residuals of some vectors, over their backward error's
+/// scale, with zeros at the pivots.
+void append_residuals(const ModesBasis& modes, const PointProblem& problem, const LinearisedPoint& point,
+                      const std::vector<TwoSidedPair>& pairs, Side side, MultiVector& residuals)
+{
+  if (pairs.empty()) return;
+  const auto count = static_cast<Index>(pairs.size());
+  const Structure& structure = problem.sliding.structure;
+  const MatrixXcd a = vectors_of(pairs, side);
+  const MultiVector shapes = columns_from(modes.basis.T, modes.basis.sketched);
+  const MultiVector kept = kept_rows(shapes, point.contact);
+  const Mat lift = side == Side::right ? point.contact.Z : point.contact.Y;
+  const Owned<Mat> test = transpose_of(side == Side::right ? point.contact.Y : point.contact.Z);
+  MatrixXd parts(a.rows(), 2 * count);
+  parts << a.real(), a.imag();
+  const MultiVector x = product(lift, combination(kept, parts));
+  MultiVector Cx = product(structure.C, x);
+  if (point.Cf.get()) Cx.entries += product(point.Cf, x).entries;
+  const MultiVector Mx = product(structure.M, x), Kx = product(structure.K, x);
+  MultiVector force{x.comm, MatrixXd(x.entries.rows(), 2 * count)};
+  for (Index k = 0; k < count; ++k)
+  {
+    const Complex lambda = pairs[static_cast<std::size_t>(k)].lambda, square = lambda * lambda;
+    const double w = std::abs(lambda), scale = w * w * modes.norms.M + w * modes.norms.C + modes.norms.K;
+    const Index re = k, im = count + k;
+    const auto& m = Mx.entries;
+    const auto& c = Cx.entries;
+    force.entries.col(re) = (square.real() * m.col(re) - square.imag() * m.col(im) + lambda.real() * c.col(re) -
+                             lambda.imag() * c.col(im) + Kx.entries.col(re)) /
+                            scale;
+    force.entries.col(im) = (square.real() * m.col(im) + square.imag() * m.col(re) + lambda.real() * c.col(im) +
+                             lambda.imag() * c.col(re) + Kx.entries.col(im)) /
+                            scale;
+  }
+  append(residuals, with_zero_pivots(product(test, force), point.contact));
+}
+
+/// Those pairs whose error of a side exceeds the tolerance.
+std::vector<TwoSidedPair> inexact(const std::vector<TwoSidedPair>& pairs, const std::vector<double>& errors,
+                                  double tolerance)
+{
+  std::vector<TwoSidedPair> chosen;
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    if (errors[k] > tolerance) chosen.push_back(pairs[k]);
+  return chosen;
+}
+
+/// How much of the projected problem is solved.
+enum class Extent
+{
+  near_band, // on the undamped modes in and near the band: exact under Rayleigh damping
+  whole,
+};
+
+/// The pairs of the projected problem in the window, falling growth rate.
+std::vector<TwoSidedPair> solve_projected(const ModesBasis& modes, const ProjectedSliding& on_basis,
+                                          const Window& window, Extent extent)
+{
+  const Index shapes = modes.basis.shapes();
+  const MPI_Comm comm = modes.basis.T.comm;
+  MatrixXd M = on_basis.M.bottomRightCorner(shapes, shapes), C = on_basis.C.bottomRightCorner(shapes, shapes),
+           K = on_basis.K.bottomRightCorner(shapes, shapes);
+  InvariantSubspaces spaces;
+  if (extent == Extent::near_band)
+  {
+    spaces = invariant_subspaces_shared(comm, M, K, undamped_reach * undamped_reach * window.limit);
+    for (MatrixXd* A : {&M, &C, &K}) *A = (spaces.left.transpose() * *A * spaces.right).eval();
+  }
+  std::vector<TwoSidedPair> pairs = solve_two_sided_shared(comm, M, C, K);
+  std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); });
+  if (extent == Extent::near_band)
+    for (TwoSidedPair& pair : pairs)
+    {
+      pair.right = (spaces.right * pair.right).eval();
+      pair.left = (spaces.left * pair.left).eval();
+    }
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const TwoSidedPair& a, const TwoSidedPair& b) { return a.lambda.real() > b.lambda.real(); });
+  return pairs;
+}
+
+/// The corrections (K_z - tau M_z)^-1 r of residuals join the basis. Returns whether they add anything.
+bool correct(ModesBasis& modes, MultiVector residuals)
+{
+  PetscInt unknowns = 0;
+  check(MatGetSize(modes.K_z, &unknowns, nullptr));
+  if (residuals.columns() == 0 || modes.basis.shapes() >= unknowns) return false;
+  orthonormalise(residuals, share * share);
+  const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, residuals));
+  ++modes.passes;
+  return extend(modes.basis, product(modes.contact.Z, responses)) > 0;
+}
+
+/// Leaves out what is no mode.
+void finish(PointModes& result, const ProjectedSliding& on_basis, Index shapes)
+{
+  std::vector<TwoSidedPair> pairs;
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < result.pairs.size(); ++k)
+  {
+    if (result.errors[k] > spurious) continue;
+    result.outcome.residual = std::max(result.outcome.residual, result.errors[k]);
+    pairs.push_back(std::move(result.pairs[k]));
+    errors.push_back(result.errors[k]);
+  }
+  result.pairs = std::move(pairs);
+  result.errors = std::move(errors);
+  result.M = on_basis.M.bottomRightCorner(shapes, shapes);
+  result.C = on_basis.C.bottomRightCorner(shapes, shapes);
+}
+
+} // namespace
+
+ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>& closed)
+{
+  ModesBasis modes{make_basis(problem.structure, problem.interface, sketched)};
+  rebase(modes, problem, closed);
+  return modes;
+}
+
+void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed)
+{
+  const Structure& structure = problem.structure;
+  set_structure(modes.basis, structure);
+  modes.closed = closed;
+  modes.attached.assign(closed.size(), 0);
+  modes.contact = eliminate_closed_pairs(structure, problem.interface, closed);
+  modes.M_z = project_symmetric(structure.M, modes.contact.Z);
+  modes.K_z = project_symmetric(structure.K, modes.contact.Z);
+  modes.Z_transposed = transpose_of(modes.contact.Z);
+  const Owned<Mat> C_z = project_symmetric(structure.C, modes.contact.Z);
+  check(MatNorm(modes.M_z, NORM_1, &modes.norms.M));
+  check(MatNorm(C_z, NORM_1, &modes.norms.C));
+  check(MatNorm(modes.K_z, NORM_1, &modes.norms.K));
+  RealModes real = solve_real_modes_below(modes.M_z, modes.K_z, basis_band * problem.band, problem.options);
+  if (real.omega.size() < fewest) real = solve_real_modes(modes.M_z, modes.K_z, fewest, problem.options);
+  MultiVector shapes = empty_multivector(modes.K_z);
+  for (const Owned<Vec>& shape : real.shapes) append(shapes, shape);
+  extend(modes.basis, product(modes.contact.Z, shapes));
+  modes.pencil = make_shift_invert(modes.K_z, modes.M_z, Symmetry::symmetric, problem.options.pencil);
+  move_to(modes.pencil, shift_below_zero(modes.M_z, modes.K_z));
+}
+
+PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
+{
+  const auto& [structure, interface, equilibrium] = problem.sliding;
+  set_structure(modes.basis, structure);
+  attach(modes, interface, equilibrium.closed);
+  const LinearisedPoint point = linearise_point(problem.sliding);
+  const double end = 2 * std::numbers::pi * followed_band * problem.band;
+  const Window window{vibration_floor(modes.norms), end * end};
+  PointModes result;
+  result.outcome.kind = OutcomeKind::converged;
+  for (PetscInt pass = 0;; ++pass)
+  {
+    const ProjectedSliding on_basis = project(modes.basis, point.contact, point.Cf);
+    std::vector<double> right, left;
+    const auto solve = [&](Extent extent)
+    {
+      result.pairs = solve_projected(modes, on_basis, window, extent);
+      right = backward_errors(modes, on_basis, result.pairs, Side::right);
+      left = backward_errors(modes, on_basis, result.pairs, Side::left);
+    };
+    const bool small = modes.basis.shapes() <= small_basis;
+    solve(small ? Extent::whole : Extent::near_band);
+    const auto exact = [&](double error) { return error <= problem.options.tolerance; };
+    if (!small && !(std::ranges::all_of(right, exact) && std::ranges::all_of(left, exact))) solve(Extent::whole);
+    result.outcome.iterations = static_cast<int>(pass);
+    MultiVector residuals{modes.basis.T.comm, MatrixXd(modes.basis.T.entries.rows(), 0)};
+    const double tolerance = problem.options.tolerance;
+    if (pass < problem.options.passes)
+    {
+      append_residuals(modes, problem, point, inexact(result.pairs, right, tolerance), Side::right, residuals);
+      append_residuals(modes, problem, point, inexact(result.pairs, left, tolerance), Side::left, residuals);
+    }
+    if (correct(modes, std::move(residuals))) continue;
+    for (std::size_t k = 0; k < right.size(); ++k) result.errors.push_back(std::max(right[k], left[k]));
+    finish(result, on_basis, modes.basis.shapes());
+    return result;
+  }
+}
+
+} // namespace squeal

@@ -1,0 +1,65 @@
+#pragma once
+/// The modes of a sliding equilibrium on a basis that serves many, with left vectors, checked by the full residual
+/// (src/README.md, section 11.2).
+#include "sliding_basis.hpp"
+#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/algebra/shift_invert.hpp"
+#include "squeal/modes/modes.hpp"
+#include "squeal/modes/quadratic.hpp"
+#include "squeal/study/sweep.hpp"
+
+namespace squeal
+{
+
+/// Modes of the frictionless structure in and beyond the band, corrected wherever a point needs it.
+struct ModesBasis
+{
+  SlidingBasis basis;
+  ClosedContact contact{};      // of the pairs that are closed at every point: without friction
+  std::vector<char> closed{};   // those pairs
+  std::vector<char> attached{}; // other pairs whose static shapes the basis holds
+  Owned<Mat> M_z{}, K_z{};
+  Owned<Mat> Z_transposed{};
+  ShiftInvert pencil{};   // of K_z, M_z just below zero
+  QuadraticNorms norms{}; // of M_z, C_z and K_z
+  int passes = 0;         // corrections so far
+};
+
+/// The structure on which a basis is made, and the band of its modes [Hz].
+struct BasisProblem
+{
+  const Structure& structure;
+  const Interface& interface;
+  double band = 0;
+  const ModesOptions& options;
+};
+
+ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>& closed);
+
+/// Goes over to fewer closed pairs: their modes join the basis, whose shapes keep their places.
+void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed);
+
+/// What modes are sought on, and how exactly.
+struct PointProblem
+{
+  const SlidingEquilibrium& sliding;
+  double band = 0; // [Hz]
+  const SweepOptions& options;
+};
+
+/// Vectors are coefficients of the basis; those of earlier points lack the shapes that came later.
+struct PointModes
+{
+  Outcome outcome;
+  std::vector<TwoSidedPair> pairs; // falling growth rate, up to a little beyond the band
+  std::vector<double> errors;      // the larger backward error of both vectors
+  Eigen::MatrixXd M{}, C{};        // of the point, on the basis
+};
+
+/// Error: a closed pair that friction jams. The closed pairs include those of the basis.
+PointModes find_point_modes(ModesBasis& basis, const PointProblem& problem);
+
+/// Modes are followed a little beyond the band, so that none is lost at its end.
+inline constexpr double followed_band = 1.05;
+
+} // namespace squeal

@@ -1,0 +1,64 @@
+#pragma once
+/// A basis for the modes of many sliding equilibria of one structure (src/README.md, section 11.2).
+///
+/// The shapes T are kept in the structure's degrees of freedom. At a point with the bases Z and Y of its closed pairs,
+/// T is lifted: its pivots are replaced by what Z or Y gives from the other degrees of freedom. Lifts change the rows
+/// of the pivots alone, so that the projected matrices follow from T'A T and from the rows of A T at the contact:
+///     (T + D_Y)'A(T + D_Z) = T'A T + D_Y'(A T) + (A T)'D_Z + D_Y'A D_Z
+#include "squeal/algebra/multivector.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
+
+namespace squeal
+{
+
+/// A symmetric matrix on T.
+struct BasisImage
+{
+  Owned<Mat> matrix;          // a copy of A
+  MultiVector contact_rows{}; // of A T, at the degrees of freedom of the contact that this rank has
+  Eigen::MatrixXd products{}; // T'A T
+};
+
+/// The first columns of T are random vectors, `sketched` of them. They only test: the products with a residual show its
+/// size.
+struct SlidingBasis
+{
+  MultiVector T;
+  Eigen::Index sketched = 0;
+  std::vector<Eigen::Index> contact_dofs{}; // local rows, ascending
+  BasisImage M{}, C{}, K{};
+
+  Eigen::Index shapes() const { return T.columns() - sketched; }
+};
+
+SlidingBasis make_basis(const Structure& structure, const Interface& interface, Eigen::Index sketched);
+
+/// Appends what the shapes X add to the span. Returns the number of columns gained.
+Eigen::Index extend(SlidingBasis& basis, MultiVector X);
+
+/// Takes over the matrices of a structure where they have changed.
+void set_structure(SlidingBasis& basis, const Structure& structure);
+
+/// The structure at a point, on T: Y'M Z, Y'(C + C_f) Z, Y'K Z, and the inner products of the shapes without the
+/// pivots.
+struct ProjectedSliding
+{
+  Eigen::MatrixXd M{}, C{}, K{}, kept{};
+};
+
+/// `Cf`: the damping of the friction direction; may be null.
+ProjectedSliding project(const SlidingBasis& basis, const ClosedContact& contact, Mat Cf);
+
+/// The degrees of freedom of x that are no pivots.
+MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact);
+
+/// The reverse, with zeros at the pivots.
+MultiVector with_zero_pivots(const MultiVector& kept, const ClosedContact& contact);
+
+/// Whether two matrices of one layout are equal. Collective.
+bool equal(Mat A, Mat B);
+
+Owned<Mat> copy_of(Mat A);
+Owned<Mat> transpose_of(Mat A);
+
+} // namespace squeal

@@ -1,0 +1,134 @@
+#include "sweep_checkpoint.hpp"
+
+#include "squeal/base/checkpoint.hpp"
+#include "squeal/base/petsc.hpp"
+#include "squeal/base/run_control.hpp"
+
+namespace squeal
+{
+
+namespace
+{
+
+constexpr const char* name_of_file = "sweep";
+
+/// Reads the numbers of a list one after the other.
+class List
+{
+public:
+  List(const Checkpoint& checkpoint, const std::string& name) : values_(checkpoint.list(name)) {}
+
+  bool ended() const { return next_ >= values_.size(); }
+
+  double number()
+  {
+    if (ended()) throw Error("the checkpoint of the sweep is cut short: run again without --restart");
+    return values_[next_++];
+  }
+
+  int integer() { return static_cast<int>(number()); }
+
+  std::vector<double> numbers()
+  {
+    std::vector<double> list(static_cast<std::size_t>(number()));
+    for (double& value : list) value = number();
+    return list;
+  }
+
+private:
+  const std::vector<double>& values_;
+  std::size_t next_ = 0;
+};
+
+void append(const std::vector<double>& numbers, std::vector<double>& list)
+{
+  list.push_back(static_cast<double>(numbers.size()));
+  list.insert(list.end(), numbers.begin(), numbers.end());
+}
+
+void append(const SweepPoint& point, std::vector<double>& list)
+{
+  append(point.values, list);
+  for (const int value :
+       {static_cast<int>(point.reversed), static_cast<int>(point.inserted), static_cast<int>(point.outcome.kind),
+        point.closed, point.unstable, static_cast<int>(point.modes.size())})
+    list.push_back(value);
+  list.push_back(point.outcome.residual);
+  for (const SweptMode& mode : point.modes)
+    list.insert(list.end(), {mode.lambda.real(), mode.lambda.imag(), mode.backward_error,
+                             static_cast<double>(mode.track), mode.mac, static_cast<double>(mode.subspace)});
+}
+
+SweepPoint point_from(List& list)
+{
+  SweepPoint point;
+  point.values = list.numbers();
+  point.reversed = list.integer() != 0;
+  point.inserted = list.integer() != 0;
+  point.outcome.kind = static_cast<OutcomeKind>(list.integer());
+  if (point.outcome.kind != OutcomeKind::converged) point.outcome.reason = "it failed before the restart";
+  point.closed = list.integer();
+  point.unstable = list.integer();
+  point.modes.resize(static_cast<std::size_t>(list.integer()));
+  point.outcome.residual = list.number();
+  for (SweptMode& mode : point.modes)
+  {
+    const double real = list.number(), imaginary = list.number();
+    mode.lambda = {real, imaginary};
+    mode.backward_error = list.number();
+    mode.track = list.integer();
+    mode.mac = list.number();
+    mode.subspace = list.integer();
+  }
+  return point;
+}
+
+} // namespace
+
+void keep_sweep(const Sweep& sweep, MPI_Comm comm)
+{
+  checkpoint_made();
+  if (!checkpoints_are_kept() || rank_of(comm) != 0) return;
+  std::vector<double> points, thresholds;
+  for (const SweepPoint& point : sweep.points) append(point, points);
+  for (const Threshold& threshold : sweep.thresholds)
+  {
+    append(threshold.values, thresholds);
+    thresholds.insert(thresholds.end(),
+                      {static_cast<double>(threshold.reversed), static_cast<double>(threshold.track), threshold.error,
+                       threshold.frequency_hz, static_cast<double>(threshold.change)});
+  }
+  Checkpoint checkpoint;
+  checkpoint.set("points", std::move(points));
+  checkpoint.set("thresholds", std::move(thresholds));
+  checkpoint.set("following", std::vector<double>{static_cast<double>(sweep.tracks), static_cast<double>(sweep.lost),
+                                                  sweep.least_mac, sweep.outcome.residual});
+  keep(checkpoint, name_of_file);
+}
+
+Sweep kept_sweep(MPI_Comm comm)
+{
+  Sweep sweep;
+  sweep.outcome.kind = OutcomeKind::converged;
+  const std::optional<Checkpoint> checkpoint = kept_everywhere(name_of_file, comm);
+  if (!checkpoint) return sweep;
+  List points(*checkpoint, "points"), thresholds(*checkpoint, "thresholds"), following(*checkpoint, "following");
+  while (!points.ended()) sweep.points.push_back(point_from(points));
+  while (!thresholds.ended())
+  {
+    Threshold& threshold = sweep.thresholds.emplace_back();
+    threshold.values = thresholds.numbers();
+    threshold.reversed = thresholds.integer() != 0;
+    threshold.track = thresholds.integer();
+    threshold.error = thresholds.number();
+    threshold.frequency_hz = thresholds.number();
+    threshold.change = thresholds.integer();
+  }
+  sweep.tracks = following.integer();
+  sweep.lost = following.integer();
+  sweep.least_mac = following.number();
+  sweep.outcome.residual = following.number();
+  return sweep;
+}
+
+} // namespace squeal

@@ -1,0 +1,134 @@
+"""Derivatives against central differences of single runs, powers against the growth rate, changes against their prediction."""
+
+import h5py
+import numpy as np
+import pytest
+from conftest import INPUTS
+
+OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"]
+# Two directions, so that friction turns and the equilibrium enters; two unstable modes.
+PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
+       "--set", "modes.method=full", "--set", "modes.band=20000", "--set", "friction.coefficient=0.5"]
+
+
+def sensitivity_of(*numbers):
+    return ["--set", "sensitivity.numbers=[" + ",".join(f"'{number}'" for number in numbers) + "]"]
+
+
+def lambda_of(report, near):
+    modes = [complex(mode["growth_rate"], 2 * np.pi * mode["frequency_hz"]) for mode in report["modes"]["modes"]]
+    return min(modes, key=lambda mode: abs(mode - near))
+
+
+def overridden(key, value):
+    head, _, last = key.rpartition(".")
+    if head.endswith("rotation"):
+        return f"{head}={{axis='z',rate={value!r}}}"
+    return f"{key}={value!r}"
+
+
+@pytest.mark.parametrize("scene, keys", [
+    (OSCILLATOR, ["friction.coefficient", "spring.0.stiffness", "spring.0.damping", "point.pad.mass", "point.disc.mass"]),
+    (PIN, ["friction.coefficient", "part.pin.young", "part.disc.young", "part.pin.density", "damping.beta",
+           "rigid_body.holder.mass", "spring.0.stiffness", "contact.0.rotation.rate", "part.pin.poisson"]),
+])
+def test_derivatives_are_central_differences(scene, keys, converged):
+    entry = converged(*scene, *sensitivity_of(*keys), ranks=1).report["sensitivity"]
+    mode = entry["modes"][0]
+    own = complex(mode["growth_rate"], 2 * np.pi * mode["frequency_hz"])
+    assert [d["key"] for d in mode["derivatives"]] == keys
+    for d in mode["derivatives"]:
+        found = d["value"] * complex(d["growth_rate_by"], 2 * np.pi * d["frequency_hz_by"])
+        # Richardson's extrapolation of two steps: the error of fourth order is below 1e-8 of the eigenvalue
+        quotients = []
+        for step in (1e-3, 2e-3):
+            sides = [lambda_of(converged(*scene, "--set", overridden(d["key"], d["value"] * (1 + sign * step)),
+                                         ranks=1).report, own) for sign in (1, -1)]
+            quotients.append((sides[0] - sides[1]) / (2 * step))
+        wanted = (4 * quotients[0] - quotients[1]) / 3
+        assert abs(found - wanted) <= 1e-6 * max(abs(wanted), 1e-2 * abs(own)), (d["key"], found, wanted)
+
+
+@pytest.fixture(scope="module")
+def pin(tmp_path_factory):
+    from conftest import Run
+    changes = ["--set", "sensitivity.numbers=['friction.coefficient','part.pin.young','part.disc.young','part.pin.density',"
+               "'part.disc.density','rigid_body.holder.mass','spring.0.stiffness']"]
+    run = Run([*PIN, *changes], 1, tmp_path_factory.mktemp("pin"))
+    assert run.code == 0, run.printed[-2000:] + run.errors[-2000:]
+    return run
+
+
+def test_powers_sum_to_twice_the_growth_rate(pin):
+    modes = pin.report["sensitivity"]["modes"]
+    assert len(modes) == pin.report["modes"]["unstable_count"] >= 1
+    for mode in modes:
+        # beside |lambda|, by which the terms are rounded
+        size = 2 * np.pi * mode["frequency_hz"]
+        assert abs(sum(mode["contact_powers"]) - mode["damping_power"] - 2 * mode["growth_rate"]) <= 1e-10 * size
+        assert mode["power_defect"] == pytest.approx(0, abs=1e-10 * size)
+    with h5py.File(pin.output / "fields.h5") as fields:
+        for number, mode in enumerate(modes, 1):
+            assert fields[f"modes/{number}/pair_power"][()].sum() == pytest.approx(sum(mode["contact_powers"]), rel=1e-12)
+
+
+def test_shares_sum_to_one(pin):
+    for mode in pin.report["sensitivity"]["modes"]:
+        share = {d["key"]: d for d in mode["derivatives"]}
+        kinetic = [share[key]["kinetic_share"] for key in ("part.pin.density", "part.disc.density", "rigid_body.holder.mass")]
+        strain = [share[key]["strain_share"] for key in ("part.pin.young", "part.disc.young", "spring.0.stiffness")]
+        assert sum(kinetic) == pytest.approx(1, abs=1e-9) and min(kinetic) > -1e-9
+        assert sum(strain) == pytest.approx(1, abs=1e-9) and min(strain) > -1e-9
+        # friction changes neither matrix
+        assert abs(share["friction.coefficient"]["kinetic_share"]) < 1e-9
+
+
+def test_changes_move_the_growth_as_predicted(tmp_path, squeal):
+    text = (INPUTS / "oscillator" / "scene.toml").read_text()
+    scene = tmp_path / "scene.toml"
+    scene.write_text(text + '\n[sensitivity]\n[[change]]\nprobe = "pad_y"\nmass = 2e-3\ndamping = 1e-3\n'
+                     '[[change]]\nprobe = "pad_x"\nstiffness = 2e-3\n')
+    run = squeal(scene, "--set", "transient.enabled=false", "--set", "cycle.enabled=false", ranks=1)
+    assert run.code == 0, run.errors
+    mode = run.report["sensitivity"]["modes"][0]
+    for change in mode["changes"]:
+        moved = change["computed"]["growth_rate"] - mode["growth_rate"]
+        assert abs(moved) > 1e-6
+        assert change["predicted"]["growth_rate"] - mode["growth_rate"] == pytest.approx(moved, rel=0.1)
+    # the same damper as a spring of the scene
+    single = squeal(INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false",
+                    "--set", "spring.0.stiffness=1.002", "--set", "force.0.vector=[0,-1,0]", ranks=1).report
+    wanted = single["modes"]["modes"][0]["growth_rate"]
+    assert mode["changes"][1]["computed"]["growth_rate"] == pytest.approx(wanted, rel=1e-9)
+
+
+def test_ranks_agree(pin, squeal):
+    run = squeal(*PIN, *sensitivity_of("friction.coefficient", "part.pin.young"), ranks=2)
+    assert run.code == 0
+    for one, other in zip(pin.report["sensitivity"]["modes"], run.report["sensitivity"]["modes"], strict=True):
+        for a, b in zip(one["derivatives"][:2], other["derivatives"], strict=True):
+            size = 2 * np.pi * one["frequency_hz"]
+            assert a["value"] * (a["growth_rate_by"] - b["growth_rate_by"]) == pytest.approx(0, abs=1e-8 * size)
+
+
+def test_a_stable_scene_has_nothing_to_explain(converged):
+    report = converged(*OSCILLATOR, "--set", "friction.coefficient=0.1", *sensitivity_of("friction.coefficient"),
+                       ranks=1).report
+    assert report["sensitivity"]["outcome"] == "skipped"
+
+
+@pytest.mark.parametrize("lines, words", [
+    ("[sensitivity]\nnumbers = ['friction.coefficent']", "not in the scene"),
+    ("[sensitivity]\nnumbers = ['damping.beta']", "is 0"),
+    ("[[change]]\nprobe = 'pad_y'\nmass = 1", "give that table too"),
+    ("[sensitivity]\n[[change]]\nprobe = 'pad_z'\nmass = 1", "is not defined"),
+    ("[sensitivity]\n[[change]]\nprobe = 'pad_y'", "neither mass, damping nor stiffness"),
+    ("[sensitivity]\n[[change]]\nprobe = 'pad_y'\nmass = -1", "zero or a positive number"),
+])
+def test_bad_input_is_refused_before_the_first_stage(lines, words, tmp_path, squeal):
+    scene = tmp_path / "scene.toml"
+    scene.write_text((INPUTS / "oscillator" / "scene.toml").read_text() + "\n" + lines + "\n")
+    run = squeal(scene, "--dry-run", ranks=1)
+    assert run.code == 1
+    assert len(run.messages) == 1 and words in run.messages[0] and "scene.toml, line" in run.messages[0], run.errors
+    assert "model …" not in run.printed

@@ -1,0 +1,214 @@
+"""Sweeps: points and thresholds against single runs and exact values, followed modes, other ranks; bad input; pictures."""
+
+import csv
+import json
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from conftest import INPUTS, ROOT
+
+OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"]
+PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
+       "--set", "modes.method=full", "--set", "modes.band=20000"]
+TWO = "['friction.coefficient','spring.0.damping']"
+HOPF = 0.17649288  # exact: the characteristic polynomial of the sliding oscillator has an imaginary pair
+
+
+def sweep_of(key="friction.coefficient", start=0.05, end=0.5, **more):
+    settings = {"key": key, "from": start, "to": end, **more}
+    return [word for name, value in settings.items() for word in ("--set", f"sweep.{name}={value}")]
+
+
+def rows_of(folder):
+    with open(folder / "sweep.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def modes_at(rows, value, direction=1, key="friction.coefficient"):
+    """Eigenvalues at a point, by falling growth rate."""
+    return [complex(float(row["growth_rate"]), 2 * np.pi * float(row["frequency_hz"])) for row in rows
+            if row["frequency_hz"] and abs(float(row[key]) - value) < 1e-12 and int(row["direction"]) == direction]
+
+
+def lambdas(report):
+    return [complex(mode["growth_rate"], 2 * np.pi * mode["frequency_hz"]) for mode in report["modes"]["modes"]]
+
+
+def same_modes(found, wanted, tolerance):
+    """Each is there, once; growth rates and frequencies to a part of the eigenvalue's size."""
+    found = list(found)
+    assert len(found) == len(wanted), (len(found), len(wanted))
+    for one in wanted:
+        nearest = min(found, key=lambda other: abs(other - one))
+        assert abs(nearest - one) <= tolerance * abs(one), (nearest, one)
+        found.remove(nearest)
+
+
+@pytest.fixture(scope="module")
+def pin(tmp_path_factory):
+    from conftest import Run
+    run = Run([*PIN, *sweep_of(end=0.65, points=5, directions="both")], 1, tmp_path_factory.mktemp("pin"))
+    assert run.code == 0, run.printed[-2000:] + run.errors[-2000:]
+    return run
+
+
+def test_points_are_single_runs(pin, converged):
+    """The basis, made once and corrected by residuals, gives what the full problem gives at each friction."""
+    rows = rows_of(pin.output)
+    for mu in (0.05, 0.35, 0.65):
+        single = converged(*PIN, "--set", f"friction.coefficient={mu}", ranks=1).report
+        # backward errors of both vectors are below 1e-10; lambda is off by their product, times at most 1e9 here
+        same_modes(modes_at(rows, mu), lambdas(single), 1e-9)
+
+
+def test_the_other_direction_is_a_single_run(pin, converged):
+    single = converged(*PIN, "--set", "friction.coefficient=0.35", "--set",
+                       "contact.0.rotation={axis='z', rate=-20}", ranks=1).report
+    same_modes(modes_at(rows_of(pin.output), 0.35, -1), lambdas(single), 1e-9)
+
+
+def test_modes_are_followed(pin):
+    sweep = pin.report["sweep"]
+    assert sweep["lost_modes"] == 0 and sweep["least_mac"] >= 0.9
+    rows = rows_of(pin.output)
+    for direction in (1, -1):
+        for value in {float(row["friction.coefficient"]) for row in rows}:
+            tracks = [row["track"] for row in rows
+                      if float(row["friction.coefficient"]) == value and int(row["direction"]) == direction]
+            assert len(set(tracks)) == len(tracks)
+    # a followed frequency moves by less than its neighbours are apart on average, at the scene's points and between
+    with h5py.File(pin.output / "history.h5") as file:
+        frequency = file["sweep/frequency"][()]
+        assert frequency.shape == (len(sweep["points"]), sweep["followed_modes"])
+
+
+def test_thresholds_of_the_pin_are_where_single_runs_change(pin, converged):
+    thresholds = [t for t in pin.report["sweep"]["thresholds"] if t["direction"] == 1]
+    assert thresholds
+    mu, change = thresholds[0]["values"][0], thresholds[0]["change"]
+    counts = [converged(*PIN, "--set", f"friction.coefficient={mu + step}", ranks=1).report["modes"]["unstable_count"]
+              for step in (-1e-4 * mu, 1e-4 * mu)]
+    assert counts[1] - counts[0] == change
+
+
+@pytest.mark.parametrize("points", [2, 3, 12])
+def test_the_exact_threshold_of_the_oscillator(points, converged):
+    """Whatever the points: lock-in lies between two of them, and the growth rate is flat before it."""
+    run = converged(*OSCILLATOR, *sweep_of(points=points), ranks=1)
+    sweep = run.report["sweep"]
+    assert [t["change"] for t in sweep["thresholds"]] == [1]
+    assert sweep["thresholds"][0]["values"][0] == pytest.approx(HOPF, abs=1e-5 * 0.5 + 1e-8)
+    assert sweep["lost_modes"] == 0 and sweep["least_mac"] >= 0.9
+
+
+@pytest.mark.parametrize("key, value, override", [
+    ("spring.0.damping", 0.03, "spring.0.damping={}"),
+    ("spring.1.stiffness", 0.5, "spring.1.stiffness={}"),
+    ("contact.0.velocity.0", 0.9, "contact.0.velocity=[{},0,0]"),
+    ("force.0.vector.1", -2.0, "force.0.vector=[0,{},0]"),
+    ("point.pad.mass", 1.3, "point.pad.mass={}"),
+])
+def test_any_number_of_the_scene(key, value, override, converged):
+    run = converged(*OSCILLATOR, "--set", f"sweep.key={key}", "--set", f"sweep.values=[{0.9 * value}, {value}]", ranks=1)
+    single = converged(*OSCILLATOR, "--set", override.format(value), ranks=1).report
+    same_modes(modes_at(rows_of(run.output), value, key=key), lambdas(single), 1e-10)
+
+
+def test_a_modulus_of_the_pin(converged):
+    """K and M change with the number: the basis of one modulus is corrected for the other."""
+    run = converged(*PIN, *sweep_of("part.pin.young", 4e9, 6e9, points=3), ranks=1)
+    single = converged(*PIN, "--set", "part.pin.young=6e9", ranks=1).report
+    same_modes(modes_at(rows_of(run.output), 6e9, key="part.pin.young"), lambdas(single), 1e-9)
+
+
+def test_two_numbers(converged):
+    run = converged(*OSCILLATOR, *sweep_of(TWO, "[0.1,0.02]", "[0.3,0.05]", points="[3,2]"), ranks=1)
+    points = run.report["sweep"]["points"]
+    grid = {tuple(np.round(p["values"], 12)) for p in points if not p["inserted"]}
+    assert grid == {(mu, damping) for mu in (0.1, 0.2, 0.3) for damping in (0.02, 0.05)}
+    thresholds = {t["values"][1]: t["values"][0] for t in run.report["sweep"]["thresholds"]}
+    assert thresholds[0.02] == pytest.approx(HOPF, abs=1e-5) and abs(thresholds[0.05] - HOPF) > 1e-4
+
+
+def test_random_points_repeat_with_their_seed(converged):
+    ask = [*OSCILLATOR, *sweep_of(samples=6)]
+    first, again = (rows_of(converged(*ask, ranks=1).output) for _ in range(2))
+    other = rows_of(converged(*ask, "--set", "sweep.seed=2", ranks=1).output)
+    assert first == again and first != other
+    assert len({row["friction.coefficient"] for row in first}) == 6
+    assert all(0.05 <= float(row["friction.coefficient"]) <= 0.5 and row["track"] == "" for row in first)
+
+
+def test_ranks_agree(pin, squeal):
+    other = squeal(*PIN, *sweep_of(end=0.65, points=5, directions="both"), ranks=2)
+    assert other.code == 0
+    first, second = rows_of(pin.output), rows_of(other.output)
+    for mu in (0.05, 0.65):
+        same_modes(modes_at(first, mu, -1), modes_at(second, mu, -1), 1e-9)
+    for a, b in zip(pin.report["sweep"]["thresholds"], other.report["sweep"]["thresholds"], strict=True):
+        assert a["values"][0] == pytest.approx(b["values"][0], abs=a["error"] + b["error"])
+
+
+def test_points_that_fail_are_passed_over(squeal):
+    """Turned round, friction presses the pad on: beyond D_nn/D_nt = 2.87/0.185 = 15.5 there is no equilibrium."""
+    run = squeal(*OSCILLATOR, "--set", "contact.0.velocity=[-0.6,0,0]", "--set", "sweep.key=friction.coefficient", "--set",
+                 "sweep.values=[0.1, 0.3, 50]", ranks=1)
+    assert run.code == 2
+    sweep = run.report["sweep"]
+    assert sweep["outcome"] == "not converged" and "1 of 3 points failed" in sweep["reason"]
+    assert [p["outcome"] == "converged" for p in sweep["points"] if not p["inserted"]] == [True, True, False]
+    assert sweep["points"][-1]["reason"]
+
+
+def test_equilibrium_alone(converged):
+    sweep = converged(*PIN, *sweep_of(points=3, stages="equilibrium"), ranks=1).report["sweep"]
+    assert [p["closed"] > 0 for p in sweep["points"]] == [True] * 3 and "growth_rate" not in sweep["points"][0]
+
+
+@pytest.mark.parametrize("settings, words", [
+    (sweep_of("friction.coefficent"), "not in the scene"),
+    (sweep_of("friction.direction_damping"), "not a number"),
+    (sweep_of("mesh.parameters.size"), "change the mesh"),
+    (sweep_of("cycle.tolerance"), "known: part"),
+    (sweep_of(start=0.3, end=0.3), "give a range"),
+    (sweep_of(start=-0.1), "zero or a positive number"),
+    (sweep_of(points=1), "at least two"),
+    (sweep_of(points="[3,4]"), "give one a key"),
+    (sweep_of(samples=3, points=4), "exclude each other"),
+    (sweep_of(values="[0.1]"), "keep one form"),
+    (sweep_of("['friction.coefficient','friction.coefficient']"), "twice"),
+    (sweep_of(TWO), "give one a key"),
+    (sweep_of(directions="all"), "none of one, both"),
+    (["--set", "sweep.key=friction.coefficient"], "from holds 0 numbers"),
+])
+def test_bad_sweeps_are_refused_before_the_first_stage(settings, words, squeal):
+    run = squeal(*OSCILLATOR, *settings, "--dry-run", ranks=1)
+    assert run.code == 1
+    assert len(run.messages) == 1 and words in run.messages[0] and "--set sweep." in run.messages[0], run.errors
+    assert "model …" not in run.printed
+
+
+def test_the_pictures_are_drawn(pin, converged):
+    two = converged(*OSCILLATOR, *sweep_of(TWO, "[0.1,0.02]", "[0.3,0.05]", points="[5,4]"),
+                    ranks=1)
+    for run in (pin, two):
+        subprocess.run([sys.executable, ROOT / "tools" / "plot", run.output], check=True, capture_output=True)
+        assert (run.output / "sweep.png").stat().st_size > 10000
+
+
+def test_an_interrupted_sweep_goes_on_where_it_was(squeal, tmp_path):
+    """The same points and thresholds as in one piece, whatever was done before the end."""
+    ask = [*PIN, *sweep_of(end=0.65, points=5), "--output", tmp_path / "in_two"]
+    whole = squeal(*PIN, *sweep_of(end=0.65, points=5), ranks=1)
+    seconds = whole.report["timings"]
+    limit = sum(seconds.values()) - 0.5 * seconds["sweep"]
+    first = squeal(*ask, "--time-limit", f"{limit:.2f}", ranks=1)
+    again = squeal(*ask, "--restart", ranks=1) if first.code == 3 else first
+    assert whole.code == again.code == 0, again.errors
+    one, two = whole.report["sweep"], json.loads((tmp_path / "in_two" / "report.json").read_text())["sweep"]
+    assert [p["values"] for p in one["points"]] == [p["values"] for p in two["points"]]
+    for a, b in zip(one["thresholds"], two["thresholds"], strict=True):
+        assert a["values"][0] == pytest.approx(b["values"][0], abs=a["error"] + b["error"]) and a["track"] == b["track"]
