@@ -266,12 +266,20 @@ BrakeBranch run_branch(const Chain& chain)
                       chain.options.cycle.shooting});
 }
 
+/// Why left vectors and sweeps are refused; empty if they are not.
+std::string unsymmetric_part(const Structure& structure)
+{
+  if (structure.G.get() || structure.H.get()) return "the structure has gyroscopic or circulatory parts";
+  return structure.K_loss.get() ? "parts have loss factors" : "";
+}
+
 Sensitivity run_sensitivity(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   if (!scene.sensitivity) return not_run<Sensitivity>(OutcomeKind::off, "the scene has no [sensitivity]");
-  const std::string reason = no_mode_to_follow(chain.report);
+  const std::string reason = no_mode_to_follow(chain.report), part = unsymmetric_part(chain.model.structure);
   if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
+  if (!part.empty()) return not_run<Sensitivity>(OutcomeKind::refused, part);
   const MPI_Comm comm = comm_of(chain.model.structure.load);
   const auto model_with = [&](const SceneNumber& number)
   {
@@ -291,6 +299,8 @@ Sweep run_scene_sweep(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   if (!scene.sweep) return not_run<Sweep>(OutcomeKind::off, "the scene has no [sweep]");
+  const std::string part = unsymmetric_part(chain.model.structure);
+  if (!part.empty()) return not_run<Sweep>(OutcomeKind::refused, part);
   const MPI_Comm comm = comm_of(chain.model.structure.load);
   const auto model_at = [&](std::span<const double> values)
   {

@@ -37,8 +37,8 @@ LinearisedPoint linearise_point(const SlidingEquilibrium& sliding)
 {
   const auto& [structure, interface, equilibrium] = sliding;
   LinearisedPoint point{eliminate_closed_pairs(structure, interface, equilibrium.closed)};
-  if (interface.friction.direction_damping)
-    point.Cf = direction_damping(interface, equilibrium.closed, equilibrium.reactions);
+  const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
+  point.Cf = friction_damping(interface, equilibrium.closed, equilibrium.reactions, part);
   return point;
 }
 

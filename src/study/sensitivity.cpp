@@ -78,8 +78,9 @@ AtHeldVectors at_held_vectors(const SlidingEquilibrium& sliding, const Vectors& 
   const auto& [structure, interface, equilibrium] = sliding;
   const std::size_t count = vectors.count();
   MultiVector C_right = product(structure.C, vectors.right);
-  if (interface.friction.direction_damping && interface.pairs > 0)
-    if (const Owned<Mat> Cf = direction_damping(interface, equilibrium.closed, equilibrium.reactions); Cf.get())
+  const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
+  if (interface.pairs > 0)
+    if (const Owned<Mat> Cf = friction_damping(interface, equilibrium.closed, equilibrium.reactions, part); Cf.get())
       C_right.entries += product(Cf, vectors.right).entries;
   const MultiVector M_right = product(structure.M, vectors.right), K_right = product(structure.K, vectors.right);
   const MatrixXd M = inner_products(vectors.left, M_right), C = inner_products(vectors.left, C_right),
@@ -301,12 +302,12 @@ Owned<Mat> with_added(Mat A, Mat probes, int probe, double factor)
 Modes changed_modes(const SensitivityProblem& problem, const Change& change, int probe)
 {
   const Structure& own = problem.sliding.structure;
-  Structure changed{with_added(own.M, problem.probes, probe, change.mass),
-                    with_added(own.C, problem.probes, probe, change.damping),
-                    with_added(own.K, problem.probes, probe, change.stiffness),
-                    copy_of(own.load),
-                    own.elements,
-                    own.names};
+  Structure changed;
+  changed.M = with_added(own.M, problem.probes, probe, change.mass);
+  changed.C = with_added(own.C, problem.probes, probe, change.damping);
+  changed.K = with_added(own.K, problem.probes, probe, change.stiffness);
+  changed.load = copy_of(own.load);
+  changed.names = own.names;
   const SlidingEquilibrium sliding{changed, problem.sliding.interface, problem.sliding.equilibrium};
   ModesSettings settings = problem.modes_settings;
   settings.method = ModesMethod::full;
