@@ -80,7 +80,8 @@ def draw_chart(results, sweep, table):
     axes[1, 0].set_ylabel("growth rate [1/s]")
     if any(axes[0, 0].get_legend_handles_labels()[1]):
         handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)), fontsize=8)
+        figure.get_layout_engine().set(rect=(0, 0.06, 1, 0.94))  # the legend is below
+        figure.legend(handles, labels, loc="lower center", ncols=min(4, len(labels)), fontsize=8)
     figure.suptitle(heading([results], "modes against " + sweep["keys"][0]))
     return figure
 
@@ -111,7 +112,8 @@ def draw_map(results, sweep, table):
             ax.set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
     axes[0, 0].set_ylabel(sweep["keys"][1])
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)), fontsize=8)
+    figure.get_layout_engine().set(rect=(0, 0.06, 1, 0.94))  # the legend is below
+    figure.legend(handles, labels, loc="lower center", ncols=min(4, len(labels)), fontsize=8)
     figure.colorbar(shade, ax=axes, label="largest growth rate [1/s]")
     figure.suptitle(heading([results], "stability"))
     return figure

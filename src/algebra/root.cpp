@@ -16,8 +16,13 @@ Root find_root(const std::function<std::optional<double>(double)>& function, Bra
     double x = (a * value_b - b * value_a) / (value_b - value_a);
     if (i % 4 == 3) // four values halve the bracket at least
     {
-      if (2 * std::abs(b - a) > longest) x = (a + b) / 2;
+      const bool slow = 2 * std::abs(b - a) > longest;
       longest = std::abs(b - a);
+      if (slow)
+      {
+        x = (a + b) / 2;
+        longest /= 2;
+      }
     }
     x = std::clamp(x, std::min(a, b) + beside * tolerance, std::max(a, b) - beside * tolerance);
     const std::optional<double> value = function(x);

@@ -58,10 +58,11 @@ TEST_CASE("left and right vectors of unsymmetric quadratic problems solve them, 
     {
       const auto& [lambda, right, left] = pairs[i];
       const MatrixXcd Q = lambda * lambda * M + lambda * C + K;
-      // the QR algorithm is backward stable: a modest multiple of 1e-16 times the norm of the companion matrix
-      const double rounding = 1e-12 * Q.cwiseAbs().sum();
+      // the QR algorithm is backward stable: a modest multiple of 1e-16 times the sizes of the three terms
+      const double rounding =
+          1e-12 * (std::norm(lambda) * M.norm() + std::abs(lambda) * C.norm() + K.norm()) * right.norm();
       CHECK((Q * right).norm() < rounding);
-      CHECK((left.transpose() * Q).norm() < rounding);
+      CHECK((left.transpose() * Q).norm() * right.norm() < rounding * left.norm());
       for (std::size_t j = 0; j < pairs.size(); ++j)
       {
         const Complex form = (left.transpose() * ((lambda + pairs[j].lambda) * M + C) * pairs[j].right).value();
