@@ -115,23 +115,60 @@ SeenGrowth fit_growth(const std::vector<double>& logarithms)
   return {static_cast<long>(logarithms.size()), std::exp(slope), error * std::exp(slope)};
 }
 
-/// Whether a motion beside an orbit is seen to leave it: the return residual, which is in proportion to the distance,
-/// doubles over as many periods as should make it four times as large. Where the largest multiplier itself is below 1,
-/// its bar alone reaching across, that many periods do not exist.
-bool is_left(const Search& search, const Attempt& attempt)
+/// Distances from the orbit, without their part along the flow and over the fluctuation, at the ends of periods of a
+/// motion that begins beside it by `part` of the fluctuation. They end where the distance exceeds a third or falls to a
+/// tenth of `part`: the shift in time that a motion ends with leaves the flow's direction by its square.
+std::vector<double> distances_beside(const Search& search, const Attempt& attempt, double part, long periods)
 {
   const auto& [problem, options, log, start] = search;
-  const auto& values = attempt.floquet.multipliers.values;
-  const double largest = values.empty() ? 0 : std::abs(values.front());
-  if (!attempt.floquet.fastest.get() || largest < 1.005) return false;
-  const int count = std::clamp(static_cast<int>(std::ceil(std::log(4) / std::log(largest))), 10, 80);
-  if (log.convergence.periods + count > options.max_periods) return false;
-  const double period = attempt.found.orbit.period;
-  const Owned<Vec> beside = state_beside(problem, attempt, 0.03);
-  const Orbit first = evaluate(problem, log, beside, period);
-  check(VecAXPY(beside, 1, first.defect));
-  const Orbit last = integrate_free_periods(problem, log, beside, period, {count - 1, 0});
-  return !(return_residual(problem, last) <= 2 * return_residual(problem, first));
+  const Orbit& orbit = attempt.found.orbit;
+  const Owned<Vec> state = state_beside(problem, attempt, part), flow = copy_of(orbit.rate.get());
+  normalise(problem.flow, flow);
+  std::vector<double> distances;
+  for (long k = 0; k < periods; ++k)
+  {
+    const Orbit now = evaluate(problem, log, state, orbit.period);
+    check(VecAXPY(state, 1, now.defect));
+    const Owned<Vec> away = copy_of(state.get());
+    check(VecAXPY(away, -1, orbit.state));
+    check(VecAXPY(away, -energy_product(problem.flow, flow, away), flow));
+    distances.push_back(energy_norm(problem.flow, away) / orbit.fluctuation);
+    if (!(distances.back() < 1. / 3) || distances.back() < 0.1 * part) break;
+  }
+  return distances;
+}
+
+/// Holds a verdict against a motion beside the orbit, over as many periods as should make its distance four times as
+/// large. One that doubles shows that an undecided orbit repels. One that does not contradicts the verdict "unstable":
+/// where contact only just opens, closes or sticks, the tangent holds in a neighbourhood that no motion stays in.
+/// Where the largest multiplier is hardly above 1, that many periods cost too much.
+void hold_against_motion(const Search& search, Attempt& attempt)
+{
+  constexpr double part = 0.01;             // of the fluctuation: above the orbit's tolerance, below its saturation
+  constexpr long few = 10, large_many = 20; // periods; the most of a large model
+  constexpr long many = 80;
+  const auto& [problem, options, log, start] = search;
+  Multipliers& multipliers = attempt.floquet.multipliers;
+  const double largest = multipliers.values.empty() ? 0 : std::abs(multipliers.values.front());
+  const bool unstable = multipliers.stability == Stability::unstable;
+  if (!attempt.floquet.fastest.get() || !(largest > 1) || multipliers.stability == Stability::stable) return;
+  PetscInt dofs = 0;
+  check(VecGetSize(displacement(attempt.found.orbit.state), &dofs));
+  const double needed = std::ceil(std::log(4) / std::log(largest));
+  if (!(needed <= static_cast<double>(dofs > large_model ? large_many : many))) return;
+  const long count = std::max(few, static_cast<long>(needed));
+  if (log.convergence.periods + count > options.max_periods) return;
+  const std::vector<double> distances = distances_beside(search, attempt, part, count);
+  const bool doubles = !(distances.back() <= 2 * part);
+  if (!unstable) attempt.left = doubles;
+  if (!unstable || doubles) return;
+  multipliers.stability = Stability::undecided;
+  multipliers.crossing = Crossing::none;
+  multipliers.would_decide =
+      format("small motions grow %.4g times a period by the tangent, but one that began %.2g %% beside the cycle is "
+             "%.2g %% away after %zu periods: contact that only just opens, closes or sticks; other steps a period, or "
+             "-cycle_watched_periods",
+             largest, 100 * part, 100 * distances.back(), distances.size());
 }
 
 /// Shoots from the end of the free motion.
@@ -148,7 +185,7 @@ Attempt attempt_from(const Search& search, const Orbit& free)
   if (!attempt.converged()) return attempt;
   attempt.found = prefer_half_period(problem, options, log, std::move(attempt.found));
   attempt.floquet = find_multipliers(problem, options, attempt.found.orbit, start.other_unstable);
-  if (attempt.floquet.multipliers.stability == Stability::undecided) attempt.left = is_left(search, attempt);
+  hold_against_motion(search, attempt);
   return attempt;
 }
 
@@ -221,32 +258,16 @@ std::string leaving_time(const Multipliers& multipliers, double period)
                 std::abs(std::arg(fastest)) / (2 * std::numbers::pi * period), periods, periods * period);
 }
 
-/// Integrates beside the orbit and fits the growth of the distance from it, without its part along the flow. The first
-/// quarter is left out, where other motions decay, and what comes after the distance exceeds a third of the
-/// fluctuation or falls to a tenth of its start: the shift in time that a motion ends with leaves the flow's direction
-/// by its square.
+/// Integrates beside the orbit and fits the growth of the distance from it. The first quarter is left out, where other
+/// motions decay.
 SeenGrowth watch(const Search& search, const Attempt& attempt)
 {
   constexpr double first = 0.03; // of the fluctuation
-  const auto& [problem, options, log, start] = search;
-  const Orbit& orbit = attempt.found.orbit;
-  SeenGrowth seen;
-  if (!attempt.converged() || !attempt.floquet.fastest.get()) return seen;
-  const Owned<Vec> state = state_beside(problem, attempt, first), flow = copy_of(orbit.rate.get());
-  normalise(problem.flow, flow);
-  std::vector<double> distances;
-  for (PetscInt k = 0; k < options.watched_periods; ++k)
-  {
-    const Orbit now = evaluate(problem, log, state, orbit.period);
-    check(VecAXPY(state, 1, now.defect));
-    const Owned<Vec> away = copy_of(state.get());
-    check(VecAXPY(away, -1, orbit.state));
-    check(VecAXPY(away, -energy_product(problem.flow, flow, away), flow));
-    const double distance = energy_norm(problem.flow, away) / orbit.fluctuation;
-    if (!(distance < 1. / 3) || distance < 0.1 * first) break;
-    distances.push_back(std::log(distance));
-  }
-  return fit_growth(distances);
+  if (!attempt.converged() || !attempt.floquet.fastest.get()) return {};
+  std::vector<double> logarithms = distances_beside(search, attempt, first, search.options.watched_periods);
+  if (!(logarithms.back() < 1. / 3) || logarithms.back() < 0.1 * first) logarithms.pop_back();
+  for (double& value : logarithms) value = std::log(value);
+  return fit_growth(logarithms);
 }
 
 /// How the search for an orbit ended. `rests`: the free motion decays to the equilibrium.

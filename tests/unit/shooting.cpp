@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <doctest/doctest.h>
+#include <numbers>
 
 using namespace squeal;
 using namespace squeal::test;
@@ -144,6 +145,25 @@ TEST_CASE("a cycle that repels is left for one that attracts")
   const auto met = std::count_if(cycle.convergence.records.begin(), cycle.convergence.records.end(),
                                  [](const NewtonRecord& entry) { return entry.residual_full < 1e-9; });
   CHECK(met >= 2);
+}
+
+TEST_CASE("a cycle that motions leave by a thousandth only is not called unstable")
+{
+  // The amplitude a = 1 + e follows e' = 0.1 e (1 - |e|/1e-3): the tangent at e = 0 grows, all motions come to 1e-3.
+  const auto rate_of = [](const std::vector<double>& x, std::vector<double>& rate)
+  {
+    const double amplitude = std::hypot(x[0], x[1]), e = amplitude - 1;
+    const double growth = 0.1 * e * (1 - std::abs(e) / 1e-3) / amplitude;
+    rate = {x[1] + growth * x[0], -x[0] + growth * x[1]};
+  };
+  const SmoothModel model = make_smooth_model(rate_of, {1});
+  const ShootingResult cycle = shoot_from(model, {1}, 2 * std::numbers::pi, 0, {});
+  CHECK(cycle.outcome.kind == OutcomeKind::converged);
+  CHECK(cycle.multipliers.stability == Stability::undecided);
+  CHECK(cycle.multipliers.would_decide.find("after 10 periods") != std::string::npos);
+  REQUIRE(cycle.multipliers.values.size() == 1);
+  // difference quotients of 1e-6 see 1e-6/1e-3 less growth
+  CHECK(cycle.multipliers.values[0].real() == doctest::Approx(std::exp(0.2 * std::numbers::pi)).epsilon(2e-3));
 }
 
 TEST_CASE("an orbit gone round twice is taken for one that closes in half the period")
