@@ -1,5 +1,5 @@
 #pragma once
-/// Modes followed from point to point by the biorthogonal MAC (src/README.md, section 11.3).
+/// Modes followed from point to point by the biorthogonal MAC (src/README.md, section 10.3).
 #include "point_modes.hpp"
 
 namespace squeal

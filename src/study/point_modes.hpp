@@ -1,6 +1,6 @@
 #pragma once
 /// The modes of a sliding equilibrium on a basis that serves many, with left vectors, checked by the full residual
-/// (src/README.md, section 11.2).
+/// (src/README.md, section 10.2).
 #include "sliding_basis.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/shift_invert.hpp"

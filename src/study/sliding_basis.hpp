@@ -1,5 +1,5 @@
 #pragma once
-/// A basis for the modes of many sliding equilibria of one structure (src/README.md, section 11.2).
+/// A basis for the modes of many sliding equilibria of one structure (src/README.md, section 10.2).
 ///
 /// The shapes T are kept in the structure's degrees of freedom. At a point with the bases Z and Y of its closed pairs,
 /// T is lifted: its pivots are replaced by what Z or Y gives from the other degrees of freedom. Lifts change the rows

@@ -1,5 +1,5 @@
 #pragma once
-/// Why modes are unstable and what would change them (src/README.md, section 12): derivatives of their eigenvalues,
+/// Why modes are unstable and what would change them (src/README.md, section 11): derivatives of their eigenvalues,
 /// shares of the parts in their energies, powers of contact and damping, and changes that are proposed.
 #include "squeal/modes/modes.hpp"
 #include "squeal/study/sweep.hpp"

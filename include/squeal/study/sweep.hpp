@@ -1,6 +1,6 @@
 #pragma once
 /// Stability of sliding at many values of one or two numbers of the scene, with the modes followed from value to value
-/// (src/README.md, section 11).
+/// (src/README.md, section 10).
 #include "squeal/branch/brake_branch.hpp"
 
 namespace squeal
