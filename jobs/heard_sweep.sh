@@ -3,13 +3,16 @@
 #SBATCH --nodes=1
 #SBATCH --ntasks=1
 #SBATCH --mem-per-cpu=3G
-#SBATCH --output=%x-%j.txt
 #SBATCH --time=08:00:00
+#SBATCH --signal=B:USR1@60
+#SBATCH --requeue
+#SBATCH --open-mode=append
+#SBATCH --output=%x-%j.txt
 # What squeal says is heard against the friction coefficient, beside an independent direct integration from another start:
 # the unstable mode at AMPLITUDE times the estimate's. Its kind and means are found here, by the table's own script.
 # What is done stays: stop it when you like and start it again.
-# Knobs: SCENE, MU (list), PERIODS (of the direct integration), STEPS (a period, of both), AMPLITUDE, RANKS, OUTPUT, and
-# any further arguments for squeal. The small brake: SCENE=inputs/tgv/scene.toml MU="$(seq 0.2 0.02 0.4)" STEPS=64 with
+# Knobs: SCENE, MU (list), PERIODS (of the direct integration), STEPS (a period, of both), AMPLITUDE, RANKS, LAUNCH,
+# OUTPUT, and # any further arguments for squeal. The small brake: SCENE=inputs/tgv/scene.toml MU="$(seq 0.2 0.02 0.4)" STEPS=64 with
 # the arguments of src/README.md, section 1.7.
 set -eu
 # Where squeal is: SQUEAL_ROOT, or the folder above this script, of which Slurm runs a copy.
@@ -20,23 +23,24 @@ root=${SQUEAL_ROOT:-$(dirname "$(realpath "$script")")/..}
 scene=${SCENE:-inputs/pin_on_disc/scene.toml}
 output=${OUTPUT:-results/heard_sweep}
 steps=${STEPS:-60}
-squeal() { mpirun -n "${RANKS:-${SLURM_NTASKS:-1}}" "${SQUEAL:-build/squeal}" "$scene" --set modes.method=full "$@"; }
-for mu in ${MU:-$(seq 0.25 0.05 0.8)}; do
-  said=$output/mu_$mu/said direct=$output/mu_$mu/direct
-  mkdir -p "$output/mu_$mu"
-  [ -e "$said/report.json" ] || squeal --set friction.coefficient="$mu" --set transient.enabled=false \
-    --set cycle.steps_per_period="$steps" --output "$said" "$@" >"$output/mu_$mu/said.txt" 2>&1 || echo "mu = $mu: exit code $?"
+values=(${MU:-$(seq 0.25 0.05 0.8)})
+for mu in "${values[@]}"; do
+  said=$output/mu_$mu/said
+  squeal_run "$said" "$scene" --set modes.method=full --set friction.coefficient="$mu" --set transient.enabled=false \
+    --set cycle.steps_per_period="$steps" "$@"
+  ended_run "$said" || continue
   amplitude=$(python3 -c "import json; e = json.load(open('$said/report.json'))['estimate']
 print(${AMPLITUDE:-1.5} * (e.get('amplitude') or 2 * (e.get('lift_off_amplitude') or 0)))")
   [ "$amplitude" != 0 ] && [ "$amplitude" != 0.0 ] || { echo "mu = $mu: no mode grows"; continue; }
-  [ -e "$direct/report.json" ] || squeal --set friction.coefficient="$mu" --set cycle.enabled=false \
-    --set transient.enabled=true --set transient.start=mode --set transient.amplitude="$amplitude" \
-    --set transient.periods="${PERIODS:-1000}" --set transient.steps_per_period="$steps" --output "$direct" "$@" \
-    >"$output/mu_$mu/direct.txt" 2>&1 || echo "mu = $mu: exit code $?"
+  squeal_run "$output/mu_$mu/direct" "$scene" --set modes.method=full --set friction.coefficient="$mu" \
+    --set cycle.enabled=false --set transient.enabled=true --set transient.start=mode \
+    --set transient.amplitude="$amplitude" --set transient.periods="${PERIODS:-1000}" \
+    --set transient.steps_per_period="$steps" "$@"
 done
-/usr/bin/python3 - "$output" <<'TABLE'
+finish
+/usr/bin/python3 - "$output" "${values[@]}" <<'TABLE'
 """The last half of the direct integration, in windows of the squeal's strongest line, and what squeal said."""
-import glob, json, sys
+import json, sys
 import h5py
 import numpy as np
 
@@ -78,12 +82,9 @@ def direct(file):
 
 print("| mu | squeal says | mean energy [J] | direct integration | mean energy [J] | spread of windows | strongest line [Hz] |")
 print("|---|---|---|---|---|---|---|")
-for folder in sorted(glob.glob(sys.argv[1] + "/mu_*"), key=lambda f: float(f.split("mu_")[-1])):
-    mu = folder.split("mu_")[-1]
-    try:
-        report = json.load(open(folder + "/said/report.json"))
-    except FileNotFoundError:
-        continue
+for mu in sys.argv[2:]:
+    folder = f"{sys.argv[1]}/mu_{mu}"
+    report = json.load(open(folder + "/said/report.json"))
     settled, cycle = report["settled"], report["cycle"]
     if "mean_fluctuating_energy" in settled:
         mean = settled["mean_fluctuating_energy"]

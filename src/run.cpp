@@ -151,7 +151,7 @@ Trajectory run_transient(const Chain& chain)
 {
   const TransientSettings& settings = chain.scene.transient;
   const std::string reason = no_mode_to_follow(chain.report);
-  if (!settings.enabled) return not_run<Trajectory>(OutcomeKind::off, "the scene has no [transient]");
+  if (!settings.enabled) return not_run<Trajectory>(OutcomeKind::off, "the scene has no [transient], or turns it off");
   if (chain.report.equilibrium.outcome.kind != OutcomeKind::converged ||
       (!reason.empty() && !starts_from_file(settings)))
     return not_run<Trajectory>(OutcomeKind::skipped, reason);
@@ -188,7 +188,7 @@ FittedCycle run_cycle(const Chain& chain)
   FittedCycle result;
   const std::string reason = no_cycle_start(chain);
   if (!scene.cycle.enabled)
-    result.cycle = not_run<LimitCycle>(OutcomeKind::off, "the scene has no [cycle]");
+    result.cycle = not_run<LimitCycle>(OutcomeKind::off, "the scene has no [cycle], or turns it off");
   else if (!reason.empty())
     result.cycle = not_run<LimitCycle>(OutcomeKind::skipped, reason);
   else

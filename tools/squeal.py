@@ -191,7 +191,10 @@ class Results:
 
     def series(self, run, name):
         """A data set of history.h5; run: transient, cycle, settled or branch."""
-        return self._array("history.h5", f"{run}/{name}")
+        values = self._array("history.h5", f"{run}/{name}")
+        if len(values) == 0:
+            raise Missing(f"{run}: no step was made")
+        return values
 
     def probes(self, run):
         """Displacements of the probes [m], by name."""
