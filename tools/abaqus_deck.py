@@ -1,7 +1,8 @@
-"""Meshes of Abaqus and CalculiX: a flat input deck to a mesh_model.Model."""
+"""Meshes of Abaqus and CalculiX: an input deck to a mesh_model.Model."""
 
 import re
 
+from abaqus_parts import flattened
 from deck_files import Problem, abaqus_nodes, blocks_of, number, whole
 from mesh_model import FLAT, KINDS, MOTIONS, Model, Part
 
@@ -44,7 +45,7 @@ class Sets:
 
 
 def read_inp(file):
-    blocks = blocks_of(file)
+    blocks = flattened(blocks_of(file))
     model = Model(file)
     labels, positions = abaqus_nodes(blocks)
     model.nodes = dict(zip(labels.tolist(), positions))

@@ -69,10 +69,6 @@ def blocks_of(file, depth=0):
             raise Problem(f"{place}: '{line[:60]}': expected a keyword, such as *NODE")
         else:
             blocks[-1].lines.append((place, line))
-    for block in blocks:
-        if block.name in ("INSTANCE", "ASSEMBLY"):
-            raise Problem(f"{block.place}: *{block.name}: parts with numbers of their own are not read; write a flat deck "
-                          "(in Abaqus/CAE: Model, Edit Attributes, Do not use parts and assemblies in input files)")
     return blocks
 
 
@@ -99,6 +95,9 @@ def abaqus_nodes(blocks):
     """Numbers and positions of all *NODE blocks, in order."""
     labels, positions = [], []
     for block in blocks:
+        if block.name in ("INSTANCE", "ASSEMBLY"):
+            raise Problem(f"{block.place}: *{block.name}: the solver numbers the nodes of parts anew; write a flat deck "
+                          "(in Abaqus/CAE: Model, Edit Attributes, Do not use parts and assemblies in input files)")
         if block.name != "NODE":
             continue
         if block.options.get("SYSTEM", "R").upper() != "R":
@@ -181,9 +180,61 @@ def cards_of(file, depth=0):
 def nastran_nodes(cards):
     """Numbers and positions of all GRID cards, in order."""
     grids = [card for card in cards if card.name == "GRID"]
+    systems = Systems(cards)
+    default = next((card.field(3) for card in cards if card.name == "GRDSET"), "")
+    labels, positions = [], []
     for card in grids:
-        if card.whole(3, 0) != 0:
-            raise Problem(f"{card.place}: GRID {card.field(2)} in coordinate system {card.field(3)}: only the basic system "
-                          "is read; have the preprocessor write positions in it")
-    labels = [card.whole(2) for card in grids]
-    return np.array(labels, np.int64), np.array([[c.number(i, 0.0) for i in (4, 5, 6)] for c in grids]).reshape(-1, 3)
+        labels.append(card.whole(2))
+        place = f"{card.place}, GRID {card.field(2)}"
+        system = whole(card.field(3) or default or "0", place)
+        positions.append(systems.position(system, [card.number(i, 0.0) for i in (4, 5, 6)], place))
+    return np.array(labels, np.int64), np.array(positions).reshape(-1, 3)
+
+
+class Systems:
+    """Coordinate systems by number: CORD2R, CORD2C and CORD2S, each by three points in another system."""
+
+    def __init__(self, cards):
+        self.cards = {card.whole(2): card for card in cards if re.fullmatch(r"CORD[12][RCS]", card.name)}
+        self.known = {0: (np.zeros(3), np.eye(3))}
+
+    def frame(self, number, place, depth=0):
+        """Origin, and the axes in the columns of a matrix, both in the basic system."""
+        if number in self.known:
+            return self.known[number]
+        card = self.cards.get(number)
+        if card is None:
+            raise Problem(f"{place}: coordinate system {number}: expected its card, CORD2R, CORD2C or CORD2S")
+        if card.name.startswith("CORD1"):
+            raise Problem(f"{card.place}: {card.name} {number} is given by nodes: expected CORD2R, CORD2C or CORD2S")
+        if depth > len(self.cards):
+            raise Problem(f"{card.place}: coordinate system {number} is given in itself")
+        base = card.whole(3, 0)
+        self.frame(base, card.place, depth + 1)
+        origin, on_z, in_plane = (self.position(base, [card.number(i + k, 0.0) for k in range(3)], card.place) for i in (4, 7, 10))
+        z, x = on_z - origin, in_plane - origin
+        y = np.cross(z, x)
+        if not np.linalg.norm(y) > 1e-12 * np.linalg.norm(z) * np.linalg.norm(x):
+            raise Problem(f"{card.place}: the three points of coordinate system {number} lie on a line")
+        z, y = z / np.linalg.norm(z), y / np.linalg.norm(y)
+        self.known[number] = origin, np.stack([np.cross(y, z), y, z], axis=1)
+        return self.known[number]
+
+    def position(self, number, at, place):
+        """Basic coordinates of a point that is given in a system."""
+        origin, axes = self.frame(number, place)
+        a, b, c = at
+        kind = self.cards[number].name[-1] if number else "R"
+        if kind == "C":
+            a, b = a * np.cos(np.radians(b)), a * np.sin(np.radians(b))
+        elif kind == "S":  # radius, angle from z, angle about z
+            polar, around = np.radians(b), np.radians(c)
+            a, b, c = a * np.sin(polar) * np.cos(around), a * np.sin(polar) * np.sin(around), a * np.cos(polar)
+        return origin + axes @ np.array([a, b, c])
+
+    def are_basic_axes(self, number, place):
+        """Whether motions along the axes of a system are those along x, y and z."""
+        if number == 0:
+            return True
+        _, axes = self.frame(number, place)
+        return self.cards[number].name[-1] == "R" and np.abs(axes - np.eye(3)).max() < 1e-12

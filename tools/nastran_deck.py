@@ -2,13 +2,13 @@
 
 import re
 
-from deck_files import Problem, cards_of, lines_of, nastran_nodes
+from deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes
 from mesh_model import FLAT, KINDS, MOTIONS, Model, Part
 
 ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6", ("CTETRA", 4): "tet4",
             ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3"}
 CORNERS = {"CHEXA": (8, 20), "CPENTA": (6, 15), "CTETRA": (4, 10), "CQUAD4": (4, 4), "CTRIA3": (3, 3)}
-READ = {"GRID", "PSOLID", "PSHELL", "MAT1", "SPC", "SPC1", "SPCADD", "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS}
+READ = {"GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "SPC", "SPC1", "SPCADD", "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS}
 
 
 def read_bdf(file):
@@ -124,12 +124,30 @@ def read_supports(cards, model):
                     held.setdefault((card.field(2), card.field(i + 1)), []).append(card.whole(i))
         elif card.name == "GRID" and card.field(8).strip("0"):
             held.setdefault(("grid", card.field(8)), []).append(card.whole(2))
+    turned = turned_nodes(cards)
     for (number, motions), nodes in held.items():
         if not motions.isdigit() or not set(motions) <= set("123456"):
             raise Problem(f"{model.source}: SPC1 {number} holds '{motions}'; expected digits from 1 to 6")
+        oblique = [n for n in nodes if n in turned]
+        if oblique and not ({"1", "2", "3"} <= set(motions) and len(set(motions) & set("456")) in (0, 3)):
+            raise Problem(f"{turned[oblique[0]]}: SPC {number} holds motions {motions} of node {oblique[0]} in a turned system: "
+                          "expected all translations, or motions along the basic axes")
         name = f"spc_{number}_{motions}"
         model.node_sets[name] = list(dict.fromkeys(nodes))
         model.supports.append((name, [MOTIONS[int(digit) - 1] for digit in sorted(motions)]))
+
+
+def turned_nodes(cards):
+    """Places of the nodes whose motions are along other axes than the basic ones."""
+    systems = Systems(cards)
+    default = next((card.field(7) for card in cards if card.name == "GRDSET"), "")
+    found = {}
+    for card in cards:
+        if card.name == "GRID":
+            system = card.field(7) or default or "0"
+            if system != "-1" and not systems.are_basic_axes(int(system), card.place):
+                found[card.whole(2)] = card.place
+    return found
 
 
 def read_sets(cards, file, model):

@@ -102,6 +102,32 @@ class TwoBlocks:
         text += "*BOUNDARY\nplate_clamp, ENCASTRE\npad_top, 1, 2\n*CONTACT PAIR, INTERACTION=i\npad_bottom, upper\n"
         file.write_text(text)
 
+    def write_parts(self, file):
+        """Each body a part with numbers of its own, written shifted and turned; instances put both in place."""
+        kind, order = {"brick": "C3D8", "brick20": "C3D20", "tet10": "C3D10"}[self.kind], ORDERS["abaqus"].get(self.kind, list(range(8)))
+        text, assembly = "*HEADING\n two parts\n", "*ASSEMBLY, NAME=all\n"
+        for name, cells in self.cells.items():
+            used = np.unique(cells)
+            local = {n: i + 1 for i, n in enumerate(used)}
+            at = np.array(self.mesh.nodes)[used] - (0.03, 0.01, 0.02)
+            at = at @ np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])  # by -90 degrees about z
+            text += f"*PART, NAME={name}-part\n*NODE\n" + "".join(f"{i}, {x:.17g}, {y:.17g}, {z:.17g}\n" for i, (x, y, z) in enumerate(at, 1))
+            text += f"*ELEMENT, TYPE={kind}\n"
+            for number, cell in enumerate(cells, 1):
+                fields = [number, *(local[n] for n in cell[order])]
+                text += ", ".join(map(str, fields[:14])) + (",\n" + ", ".join(map(str, fields[14:])) if fields[14:] else "") + "\n"
+            text += f"*ELSET, ELSET=all, GENERATE\n1, {len(cells)}, 1\n*NSET, NSET=top\n"
+            text += "".join(f"{local[n]}\n" for n in self.sets[f"{name}_top"])
+            text += f"*SOLID SECTION, ELSET=all, MATERIAL=of_{name}\n,\n*END PART\n"
+            # Abaqus shifts first: the turn about the line through the shift is the inverse of the one above
+            assembly += f"*INSTANCE, NAME={name}-1, PART={name}-part\n0.03, 0.01, 0.02\n0.03, 0.01, 0., 0.03, 0.01, 1., 90.\n*END INSTANCE\n"
+            for side in ("bottom", "clamp"):
+                assembly += f"*NSET, NSET={name}_{side}, INSTANCE={name}-1\n" + "".join(f"{local[n]}\n" for n in self.sets[f"{name}_{side}"])
+        assembly += "*NSET, NSET=upper\nplate-1.top\n*END ASSEMBLY\n"
+        for name, stuff in (("plate", STEEL), ("pad", LINING)):
+            assembly += f"*MATERIAL, NAME=of_{name}\n*ELASTIC\n{stuff['young']:g}, {stuff['poisson']}\n*DENSITY\n{stuff['density']}\n"
+        file.write_text(text + assembly + "*BOUNDARY\nplate_clamp, ENCASTRE\npad-1.top, 1, 2\n")
+
     def write_bdf(self, file):
         """Small, large and free fields, continuations, lists with THRU."""
         name_of = {"brick": "CHEXA", "brick20": "CHEXA", "tet10": "CTETRA"}[self.kind]
@@ -198,6 +224,26 @@ def test_decks_have_the_eigenvalues_of_the_mesh(module_run, expected, tmp_path, 
     np.testing.assert_allclose(found, expected(kind), rtol=1e-10)
 
 
+def test_parts_and_instances_have_the_eigenvalues_of_the_mesh(module_run, expected, tmp_path):
+    """Two parts with the same numbers and the same names of sets, in other places than their instances."""
+    TwoBlocks("brick20").write_parts(tmp_path / "two.inp")
+    scene = convert(tmp_path / "two.inp", tmp_path / "out")
+    text = scene.read_text()
+    assert '"plate-1_all"' in text and '"pad-1_all"' in text
+    found = eigenvalues(module_run(completed(scene, ("upper", "pad_bottom", "pad-1_top")), ranks=1))
+    np.testing.assert_allclose(found, expected("brick20"), rtol=1e-10)
+
+
+def test_nodes_of_local_coordinate_systems(tmp_path):
+    """A cube of edge 1 at (1, 2, 3), turned by 90 degrees about z: one node in each kind of system, systems in systems."""
+    (tmp_path / "a.bdf").write_text(
+        "CORD2R,7,,1.,2.,3.,1.,2.,4.\n,1.,3.,3.\nCORD2C,8,7,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nCORD2S,9,0,0.,0.,1.,0.,0.,2.\n,1.,0.,1.\n"
+        "GRDSET,,7\nGRID,1,,0.,0.,0.\nGRID,2,7,1.,0.,0.\nGRID,3,8,1.,90.,2.\nGRID,4,9,2.,90.,180.\nGRID,5,0,1.,1.,1.\nCTRIA3,1,1,1,2,3\n")
+    nodes = TOOL.read_deck(tmp_path / "a.bdf").nodes
+    for number, at in {1: (1, 2, 3), 2: (1, 3, 3), 3: (0, 2, 5), 4: (-2, 0, 1), 5: (1, 1, 1)}.items():
+        assert np.allclose(nodes[number], at, rtol=0, atol=1e-15), number
+
+
 @pytest.mark.parametrize("ending", ["vtu", "vtk", "med", "xdmf"])
 def test_meshio_formats_keep_volumes_and_groups(tmp_path, ending):
     """Volumes by the divergence theorem, to rounding, of every element in gmsh's order; groups as far as a format has them."""
@@ -288,14 +334,20 @@ BAD = {
     "a kind without a kernel": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D15\n", ["line 3", "C3D15", "4, 6, 8, 10 or 20"]),
     "a set that is missing": ("*NODE\n1,0,0,0\n*NSET, NSET=a\nb\n", ["line 4", "'b'"]),
     "a word for a number": ("*NODE\n1,0,zero,0\n", ["line 2", "'zero'", "a number"]),
-    "parts and assemblies": ("*NODE\n1,0,0,0\n*ASSEMBLY, NAME=a\n", ["line 3", "flat deck"]),
+    "a part that is missing": ("*PART, NAME=a\n*NODE\n1,0,0,0\n*END PART\n*INSTANCE, NAME=b, PART=c\n", ["line 5", "'c'", "known are A"]),
+    "an instance that is missing": ("*PART, NAME=a\n*NODE\n1,0,0,0\n*END PART\n*INSTANCE, NAME=b, PART=a\n*END INSTANCE\n"
+                                    "*NSET, NSET=n, INSTANCE=d\n1\n", ["line 7", "'d'", "known are b"]),
+    "no instance": ("*PART, NAME=a\n*NODE\n1,0,0,0\n*END PART\n", ["*INSTANCE"]),
     "nothing": ("*HEADING\nx\n", ["two.inp", "*NODE"]),
     "a face that is not there": ("*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT, TYPE=C3D4, ELSET=e\n9,1,2,3,4\n*SURFACE, NAME=s\ne, S5\n",
                                  ["line 9", "'S5'", "S1 to S4"]),
 }
 BAD_BULK = {
     "mid-side nodes missing": ("GRID,1\nCTETRA,1,1,1,1,1,1,1,\n,1\n", ["two.bdf, line 2", "mid-side"]),
-    "another coordinate system": ("GRID,1,7,0.,0.,0.\n", ["line 1", "system 7"]),
+    "a coordinate system that is missing": ("GRID,1,7,0.,0.,0.\n", ["line 1", "system 7", "CORD2R"]),
+    "points on a line": ("CORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,0.,2.\nGRID,1,7,0.,0.,0.\n", ["line 1", "on a line"]),
+    "a system in itself": ("CORD2R,7,7,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nGRID,1,7,0.,0.,0.\n", ["line 1", "in itself"]),
+    "a support in a turned system": ("CORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,1.,0.\nGRID,1,,0.,0.,0.,7,1\n", ["line 3", "turned system"]),
     "a word for a number": ("GRID,1,,x,0.,0.\n", ["line 1", "GRID, field 4", "'x'"]),
     "an element twice": ("GRID,1\nCTRIA3,1,1,1,1,1\nCTRIA3,1,1,1,1,1\n", ["line 3", "element 1", "twice"]),
 }
