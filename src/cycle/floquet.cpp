@@ -192,8 +192,9 @@ ReducedModel model_for(const CycleProblem& problem, const RecordedPeriods& perio
       std::none_of(pairs.begin(), pairs.end(), [](const PairHistory& pair) { return pair.stuck || pair.turned; });
   const bool many = roles.active.size() * static_cast<std::size_t>(1 + interface.directions) > 150;
   const RealModes beyond = modes_beyond_band(problem);
+  constexpr double highest = 0.25; // of the modes: what they change says what those beyond them may
   return reduce(problem.sliding, problem.modes, roles,
-                {static_cast<int>(problem.modes.size()), 1e-5, slide && many, &beyond, problem.step.factor});
+                {static_cast<int>(problem.modes.size()), 1e-5, slide && many, &beyond, problem.step.factor, highest});
 }
 
 /// What the grid of time changes the modulus of each value of the spectrum by. A step of order 2 on grids of n and 2 n
@@ -228,12 +229,13 @@ bool holds_every_motion(const ReducedModel& model, int eliminated, Vec state)
   return model.size() + eliminated == dofs;
 }
 
-/// Whether three quarters of the shapes give as many multipliers above 0.95.
-bool confirmed_by_fewer_shapes(const ReducedModel& model, const ReducedMap& map, double period,
-                               std::span<const RecordedContact> contacts, const std::vector<Complex>& values,
-                               MPI_Comm comm)
+/// Whether the model without its highest modes has as many multipliers above 0.95. The attachments stay: friction on
+/// pairs without their own flexibility is another problem.
+bool confirmed_by_fewer_modes(const ReducedModel& model, const ReducedMap& map, double period,
+                              std::span<const RecordedContact> contacts, const std::vector<Complex>& values,
+                              MPI_Comm comm)
 {
-  const ReducedModel smaller = truncated(model, (3 * model.size() + 3) / 4);
+  const ReducedModel smaller = without_modes_apart(model);
   ReducedMap few{smaller, map.steps, map.theta};
   return as_many_above(0.95, values, large_multipliers(few, period, contacts, wanted, comm).values);
 }
@@ -290,7 +292,7 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
   }
   set_grid_errors(spectrum, own, other_steps, period, contacts, slow);
   slow.confirmed = holds_every_motion(model, eliminated_pairs(problem, periods), start) ||
-                   confirmed_by_fewer_shapes(model, own, period, recorded, spectrum.values, comm);
+                   confirmed_by_fewer_modes(model, own, period, recorded, spectrum.values, comm);
   slow.right = lifted(model, spectrum.right, start);
   slow.left = lifted(model, energy_representatives(model, spectrum.left), start);
   slow.others = slow_sliding_motions(problem.modes, start);

@@ -44,18 +44,33 @@ Owned<VecScatter> to_kept(Mat Z, Vec u, Vec y)
   return scatter;
 }
 
-/// The shapes of the real modes above all complex ones.
-std::vector<Vec> shapes_above(const RealModes* real, const std::vector<ComplexMode>& modes)
+/// A column of the modes.
+struct ModeShape
 {
-  std::vector<Vec> shapes;
+  double frequency = 0; // [rad/s]
+  Vec shape = nullptr;
+};
+
+/// The shapes of the real modes above all complex ones.
+std::vector<ModeShape> shapes_above(const RealModes* real, const std::vector<ComplexMode>& modes)
+{
+  std::vector<ModeShape> shapes;
   const double highest = 2 * std::numbers::pi * highest_frequency(modes);
   for (std::size_t i = 0; real && i < real->shapes.size(); ++i)
-    if (real->omega[i] > highest) shapes.push_back(real->shapes[i]);
+    if (real->omega[i] > highest) shapes.push_back({real->omega[i], real->shapes[i]});
   return shapes;
 }
 
+/// Shapes of modes, and how many of them come after the attachments.
+struct ModeColumns
+{
+  MultiVector columns;
+  Index apart = 0;
+};
+
 /// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts. Then real modes.
-MultiVector mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction, Mat Z)
+/// Those kept apart are the last ones.
+ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction, Mat Z)
 {
   const double omega = modes.front().lambda.imag();
   std::vector<const ComplexMode*> taken;
@@ -64,20 +79,32 @@ MultiVector mode_columns(const std::vector<ComplexMode>& modes, const Reduction&
             [&](const ComplexMode* a, const ComplexMode* b)
             { return std::abs(a->lambda.imag() - omega) < std::abs(b->lambda.imag() - omega); });
   taken.resize(std::min(taken.size(), static_cast<std::size_t>(reduction.modes)));
+  std::vector<ModeShape> shapes;
+  for (const ComplexMode* mode : taken)
+    for (const Vec part : {mode->real.get(), mode->imaginary.get()})
+      shapes.push_back({std::abs(mode->lambda.imag()), part});
+  for (const ModeShape& shape : shapes_above(reduction.real, modes)) shapes.push_back(shape);
+  const auto count = static_cast<std::ptrdiff_t>(std::ceil(reduction.apart * static_cast<double>(shapes.size())));
+  if (count > 0)
+  {
+    std::vector<double> frequencies;
+    for (const ModeShape& shape : shapes) frequencies.push_back(shape.frequency);
+    std::sort(frequencies.begin(), frequencies.end(), std::greater<>());
+    const double limit = frequencies[static_cast<std::size_t>(count) - 1];
+    std::stable_partition(shapes.begin() + 2, shapes.end(),
+                          [limit](const ModeShape& shape) { return shape.frequency < limit; });
+  }
+  ModeColumns result{empty_multivector(Z), std::min(count, static_cast<std::ptrdiff_t>(shapes.size()) - 2)};
   Owned<Vec> y;
   check(MatCreateVecs(Z, y.put(), nullptr));
   const Owned<VecScatter> scatter = to_kept(Z, modes.front().real, y);
-  MultiVector columns = empty_multivector(Z);
-  std::vector<Vec> shapes;
-  for (const ComplexMode* mode : taken) shapes.insert(shapes.end(), {mode->real.get(), mode->imaginary.get()});
-  for (const Vec shape : shapes_above(reduction.real, modes)) shapes.push_back(shape);
-  for (const Vec shape : shapes)
+  for (const ModeShape& mode : shapes)
   {
-    check(VecScatterBegin(scatter, shape, y, INSERT_VALUES, SCATTER_FORWARD));
-    check(VecScatterEnd(scatter, shape, y, INSERT_VALUES, SCATTER_FORWARD));
-    append(columns, y);
+    check(VecScatterBegin(scatter, mode.shape, y, INSERT_VALUES, SCATTER_FORWARD));
+    check(VecScatterEnd(scatter, mode.shape, y, INSERT_VALUES, SCATTER_FORWARD));
+    append(result.columns, y);
   }
-  return columns;
+  return result;
 }
 
 /// The rows of a matrix of few, as columns.
@@ -224,21 +251,33 @@ MatrixXd gram_matrix(Mat A, const MultiVector& X)
   return (G + G.transpose()) / 2;
 }
 
-/// Replaces the columns by the basis: the modes, the attachments next to them, all by falling period. `E`: K_z +
-/// omega^2 M_z.
-void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, Index of_modes, double threshold)
+/// Orthonormal combinations of shapes that are orthonormal in the energy, by falling period: u'M u against the energy.
+/// `mass`: of the shapes.
+MatrixXd by_falling_period(const MatrixXd& mass, double omega, Index& slow)
 {
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((mass + mass.transpose()) / 2);
+  constexpr double fastest = 4; // times omega
+  slow = (spectrum.eigenvalues().array() * (1 + fastest * fastest) * omega * omega > 1).count();
+  return spectrum.eigenvectors().rowwise().reverse();
+}
+
+/// Replaces the columns by the basis: the modes, the attachments next to them, the modes kept apart, all by falling
+/// period. `E`: K_z + omega^2 M_z; `of_modes`: columns of modes, `apart` of them the last columns of all.
+void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, std::pair<Index, Index> of_modes_and_apart,
+                  double threshold)
+{
+  const auto [of_modes, apart] = of_modes_and_apart;
   const MatrixXd energy = gram_matrix(E, columns);
   Orthonormal basis{energy, MatrixXd(columns.columns(), 0)};
   model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
-  model.modes += extend(basis, of_modes - 2, 1e-6);
+  model.modes += extend(basis, of_modes - apart - 2, 1e-6);
   model.attachments = extend(basis, columns.columns() - of_modes, threshold);
-  // of falling period: u'M u against the energy
+  const int last = extend(basis, apart, 1e-6);
+  model.modes += last;
   const MatrixXd mass = basis.T.transpose() * (gram_matrix(M_z, columns) * basis.T);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((mass + mass.transpose()) / 2);
-  constexpr double fastest = 4; // times omega
-  model.slow = (spectrum.eigenvalues().array() * (1 + fastest * fastest) * model.omega * model.omega > 1).count();
-  columns = combination(columns, basis.T * spectrum.eigenvectors().rowwise().reverse());
+  const MatrixXd turn = by_falling_period(mass, model.omega, model.slow);
+  model.apart = turn.bottomRows(last).transpose();
+  columns = combination(columns, basis.T * turn);
 }
 
 } // namespace
@@ -332,11 +371,15 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   check(MatMatMult(B, contact.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
   const auto forces = [&](Mat rows)
   { return reduction.sliding ? sliding_forces(transposed(rows), interface, active) : transposed(rows); };
-  MultiVector columns = mode_columns(modes, reduction, contact.Z);
-  const Index of_modes = columns.columns();
+  ModeColumns of_modes = mode_columns(modes, reduction, contact.Z);
+  MultiVector& columns = of_modes.columns;
+  const Index modal = columns.columns();
+  const MultiVector last{columns.comm, columns.entries.rightCols(of_modes.apart)};
+  columns.entries.conservativeResize(Eigen::NoChange, modal - of_modes.apart);
   append(columns, attachment_columns(E, forces(BZ), reduction.factor));
+  append(columns, last);
   model.omega = omega;
-  choose_basis(model, E, M_z, columns, of_modes, reduction.threshold);
+  choose_basis(model, E, M_z, columns, {modal, of_modes.apart}, reduction.threshold);
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
   MultiVector X = product(contact.Z, columns);
   project(model, structure, contact, columns, X);
@@ -365,14 +408,19 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   return model;
 }
 
-ReducedModel truncated(const ReducedModel& model, Index size)
+ReducedModel without_modes_apart(const ReducedModel& model)
 {
+  const Index size = model.size(), apart = model.apart.cols();
+  MatrixXd basis = MatrixXd::Identity(size, size);
+  Eigen::HouseholderQR<MatrixXd>(model.apart).householderQ().applyThisOnTheLeft(basis);
+  basis = basis.rightCols(size - apart).eval();
   ReducedModel result;
+  basis *= by_falling_period(basis.transpose() * model.M_z * basis, model.omega, result.slow);
   for (MatrixXd ReducedModel::*const part : {&ReducedModel::M, &ReducedModel::C, &ReducedModel::K, &ReducedModel::M_z,
                                              &ReducedModel::C_z, &ReducedModel::K_z})
-    result.*part = (model.*part).topLeftCorner(size, size);
-  result.H = model.H.topRows(size);
-  result.G = model.G.leftCols(size);
+    result.*part = basis.transpose() * (model.*part * basis);
+  result.H = basis.transpose() * model.H;
+  result.G = model.G * basis;
   result.active = model.active;
   result.directions = model.directions;
   result.friction = model.friction;
@@ -380,7 +428,6 @@ ReducedModel truncated(const ReducedModel& model, Index size)
   result.drive = model.drive;
   result.reactions = model.reactions;
   result.omega = model.omega;
-  result.slow = std::min(model.slow, size);
   return result;
 }
 

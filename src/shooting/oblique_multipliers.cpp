@@ -353,7 +353,7 @@ Coverage coverage_of(const SlowMotions& slow, const Search& search, double shift
     return {false, format("the multiplier of a shift in time is %.2g away from 1: more steps a period would decide",
                           shift_distance)};
   if (!slow.confirmed)
-    return {false, "the reduced model has another number of large multipliers with fewer shapes: more modes "
+    return {false, "the reduced model has another number of large multipliers with fewer modes: more of them "
                    "(modes.band) would decide"};
   if (search.bounded) return {true, ""};
   return {false, format("beside the slowest motions a Ritz value of %.4f has a residual of %.1e: a larger "

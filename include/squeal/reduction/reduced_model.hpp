@@ -44,6 +44,7 @@ struct ReducedModel
   double omega = 0;               // [rad/s] of the followed mode
   int modes = 0, attachments = 0; // columns that V came from
   Eigen::Index slow = 0;          // those that swing by less than four times omega, the first ones
+  Eigen::MatrixXd apart;          // coordinates of what the modes kept apart add to all others, orthonormal columns
 
   int size() const { return static_cast<int>(M.rows()); }
 };
@@ -65,6 +66,7 @@ struct Reduction
   bool sliding = false;    // the active pairs slide along the drive throughout
   const RealModes* real = nullptr; // frictionless ones; those above the complex modes are taken, too. Null: none
   FactorOptions factor{};
+  double apart = 0; // part of the modes, those of highest frequency, that come after the attachments
 };
 
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
@@ -81,8 +83,8 @@ struct PairRoles
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, const PairRoles& roles,
                     const Reduction& reduction);
 
-/// The model on its first `size` shapes, those of longest period, without the shapes themselves.
-ReducedModel truncated(const ReducedModel& model, Eigen::Index size);
+/// The model without what the modes kept apart add to its other shapes, and without the shapes themselves.
+ReducedModel without_modes_apart(const ReducedModel& model);
 
 /// Position and velocity about the equilibrium.
 struct ReducedState
