@@ -16,6 +16,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// A sum over all ranks may differ in the last bit from rank to rank: rank 0 adds up.
+void add_up(MatrixXd& parts, MPI_Comm comm)
+{
+  const int size = to_int(parts.size());
+  const bool here = rank_of(comm) == 0;
+  MPI_Reduce(here ? MPI_IN_PLACE : parts.data(), parts.data(), size, MPI_DOUBLE, MPI_SUM, 0, comm);
+  MPI_Bcast(parts.data(), size, MPI_DOUBLE, 0, comm);
+}
+
 /// A PETSc matrix that borrows the entries.
 Owned<Mat> as_matrix(const MultiVector& X)
 {
@@ -144,11 +153,23 @@ MultiVector columns_from(const MultiVector& X, Index first)
 MatrixXd inner_products(const MultiVector& X, const MultiVector& Y)
 {
   MatrixXd result = X.entries.transpose() * Y.entries;
-  // A sum over all ranks may differ in the last bit from rank to rank: rank 0 adds up.
-  const int size = to_int(result.size());
-  const bool here = rank_of(X.comm) == 0;
-  MPI_Reduce(here ? MPI_IN_PLACE : result.data(), result.data(), size, MPI_DOUBLE, MPI_SUM, 0, X.comm);
-  MPI_Bcast(result.data(), size, MPI_DOUBLE, 0, X.comm);
+  add_up(result, X.comm);
+  return result;
+}
+
+MatrixXd symmetric_inner_products(const MultiVector& X, const MultiVector& Y)
+{
+  constexpr Index width = 128; // of a block of columns, of which the part above the diagonal is left out
+  const Index size = X.columns();
+  MatrixXd result = MatrixXd::Zero(size, size);
+  for (Index j = 0; j < size; j += width)
+  {
+    const Index count = std::min(width, size - j);
+    result.block(j, j, size - j, count).noalias() =
+        X.entries.rightCols(size - j).transpose() * Y.entries.middleCols(j, count);
+  }
+  add_up(result, X.comm);
+  result.triangularView<Eigen::StrictlyUpper>() = result.transpose();
   return result;
 }
 

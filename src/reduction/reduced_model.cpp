@@ -238,8 +238,7 @@ void project(ReducedModel& model, const Structure& structure, const ClosedContac
         std::tuple{structure.K.get(), &model.K, &model.K_z}})
   {
     const MultiVector image = product(matrix, X);
-    *symmetric = inner_products(X, image);
-    *symmetric = (*symmetric + symmetric->transpose()).eval() / 2;
+    *symmetric = symmetric_inner_products(X, image);
     *unsymmetric = *symmetric + inner_products(more, rows_of(image, follow));
   }
 }
@@ -247,8 +246,7 @@ void project(ReducedModel& model, const Structure& structure, const ClosedContac
 /// The symmetric X'AX.
 MatrixXd gram_matrix(Mat A, const MultiVector& X)
 {
-  const MatrixXd G = inner_products(X, product(A, X));
-  return (G + G.transpose()) / 2;
+  return symmetric_inner_products(X, product(A, X));
 }
 
 /// Orthonormal combinations of shapes that are orthonormal in the energy, by falling period: u'M u against the energy.

@@ -45,6 +45,9 @@ MultiVector columns_from(const MultiVector& X, Eigen::Index first);
 /// X'Y, the same to the last bit on every rank.
 Eigen::MatrixXd inner_products(const MultiVector& X, const MultiVector& Y);
 
+/// The same where the result is symmetric, as X'A X: half the work.
+Eigen::MatrixXd symmetric_inner_products(const MultiVector& X, const MultiVector& Y);
+
 /// 2-norms of the columns.
 Eigen::VectorXd column_norms(const MultiVector& X);
 
