@@ -270,7 +270,7 @@ void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, std
   model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
   model.modes += extend(basis, of_modes - apart - 2, 1e-6);
   model.attachments = extend(basis, columns.columns() - of_modes, threshold);
-  const int last = extend(basis, apart, 1e-6);
+  const int last = extend(basis, apart, threshold);
   model.modes += last;
   const MatrixXd mass = basis.T.transpose() * (gram_matrix(M_z, columns) * basis.T);
   const MatrixXd turn = by_falling_period(mass, model.omega, model.slow);
@@ -410,7 +410,7 @@ ReducedModel without_modes_apart(const ReducedModel& model)
 {
   const Index size = model.size(), apart = model.apart.cols();
   MatrixXd basis = MatrixXd::Identity(size, size);
-  Eigen::HouseholderQR<MatrixXd>(model.apart).householderQ().applyThisOnTheLeft(basis);
+  if (apart > 0) Eigen::HouseholderQR<MatrixXd>(model.apart).householderQ().applyThisOnTheLeft(basis);
   basis = basis.rightCols(size - apart).eval();
   ReducedModel result;
   basis *= by_falling_period(basis.transpose() * model.M_z * basis, model.omega, result.slow);
