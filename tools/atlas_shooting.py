@@ -6,7 +6,7 @@ import common
 
 common.needs("matplotlib", "numpy")
 import numpy as np
-from atlas_runs import OSCILLATOR, PIN, plt, run, runs, save
+from atlas_runs import OSCILLATOR, plt, run, runs, save
 from common import BLUE, GREEN, GREY, ORANGE, RED
 
 
@@ -30,32 +30,21 @@ def draw_basin(axes, points, heard):
 
 
 def basin_map(results):
-    """Where the search leads, over start amplitude and free periods (oscillator, pin on a disc)."""
+    """Where the search leads on the oscillator, over start amplitude and free periods."""
     amplitudes = [0.05, 0.1, 0.2, 0.35, 0.6, 1, 1.7, 3, 5, 9, 14, 20]
     free = [0, 5, 10, 20]
-    models = [(OSCILLATOR, dict(transient__enabled="false", cycle__steps_per_period=100, cycle__tolerance=1e-6)),
-              (PIN, dict(mesh__parameters__divisions=3, modes__method="full", modes__band=6000))]
-    estimates = [run(results, scene, **dict(fixed, cycle__enabled="false"))["estimate"]["amplitude"] for scene, fixed in models]
-    jobs = [(scene, [], dict(fixed, cycle__start="mode", cycle__amplitude=a * estimate, cycle__free_periods=n))
-            for (scene, fixed), estimate in zip(models, estimates) for n in free for a in amplitudes]
-    done = [r["cycle"] for r in runs(results, jobs)]
-    parts = [done[: len(done) // 2], done[len(done) // 2 :]]
-    long = run(results, PIN, cycle__enabled="false", transient__enabled="true", transient__periods=150,
-               transient__steps_per_period=100, **models[1][1])
-    settled = long.history("energy")[-5000:].mean()
-    pin = min((entry for entry in parts[1] if entry["outcome"] == "converged"), default={"period": 1},
-              key=lambda entry: abs(entry["mean_energy"] - settled))
-    heard = [(5.954461004653, 1.77650678461), (pin["period"], settled)]
-    figure, rows = plt.subplots(1, 2, figsize=(9, 4.6))
-    for axes, entries, known, title in zip(rows, parts, heard, ("Oscillator", "Pin on a disc")):
-        pairs = [(a, n) for n in free for a in amplitudes]
-        draw_basin(axes, [(a, n, entry) for (a, n), entry in zip(pairs, entries)], known)
-        axes.set(xscale="log", xlabel="start amplitude over the estimate's", ylabel="free periods before the first attempt",
-                 title=title)
-        low, high = axes.get_ylim()
-        axes.set_ylim(low, high + 0.42 * (high - low))
-        axes.legend(loc="upper left", fontsize=8)
+    fixed = dict(transient__enabled="false", cycle__steps_per_period=100, cycle__tolerance=1e-6)
+    estimate = run(results, OSCILLATOR, **dict(fixed, cycle__enabled="false"))["estimate"]["amplitude"]
+    starts = [(a, n) for n in free for a in amplitudes]
+    done = runs(results, [(OSCILLATOR, [], dict(fixed, cycle__start="mode", cycle__amplitude=a * estimate, cycle__free_periods=n))
+                          for a, n in starts])
+    figure, axes = plt.subplots(figsize=(4.8, 4.2))
+    draw_basin(axes, [(a, n, r["cycle"]) for (a, n), r in zip(starts, done)], (5.954461004653, 1.77650678461))
+    axes.set(xscale="log", xlabel="start amplitude over the estimate's", ylabel="free periods before the first attempt",
+             title="Oscillator", ylim=(-1, 30))
+    axes.legend(loc="upper left", fontsize=8)
     save(results, "basin_map", figure)
+    print("basin_map: periods integrated", sorted(r["cycle"]["periods_integrated"] for r in done))
 
 
 def two_oscillators(folder, slower):

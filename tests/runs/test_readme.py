@@ -205,6 +205,47 @@ def test_words_of_outcomes_and_choices_are_explained():
     assert found > 20
 
 
+def test_quoted_usage_is_that_of_the_tools():
+    """An indented line with brackets that names a tool stands in the tool's first lines, which are its help."""
+    found = 0
+    for page in pages_of_readers():
+        for name, rest in re.findall(r"^    tools/(\w+)( [^#\n]*\[[^#\n]*)", page.read_text(), re.M):
+            found += 1
+            head = (ROOT / "tools" / name).read_text()[:3000]
+            assert f"tools/{name}{rest.rstrip()}" in head, f"{page.relative_to(ROOT)}: tools/{name}{rest}"
+    assert found
+
+
+def test_every_tool_has_a_row():
+    """Tools are the executable files of tools/; those that are installed are the ones that tools/README.md names so."""
+    page = ROOT / "tools" / "README.md"
+    rows = {name for heading, cells in tables(page) if heading == "The tools" for name in re.findall(r"\w+", cells[0])}
+    tools = {file.name for file in (ROOT / "tools").iterdir() if not file.suffix and file.is_file()}
+    assert tools and tools <= rows, tools - rows
+    named = re.search(r"without the sources: ([^.]*)\.", page.read_text())[1]
+    programs = re.search(r"install\(PROGRAMS ([^)]*?)\s+DESTINATION", (ROOT / "CMakeLists.txt").read_text())[1]
+    assert set(re.findall(r"`(\w+)`", named)) == set(re.findall(r"tools/(\w+)", programs))
+
+
+def test_every_test_has_a_row():
+    """tests/README.md says of every file of tests what it proves, below the name of its folder, in cells that can be read."""
+    page = ROOT / "tests" / "README.md"
+    rows = {}
+    for heading, cells in tables(page):
+        rows.setdefault(heading.partition(":")[0], []).append(cells)
+    for folder in ("unit", "verify", "stability", "runs"):
+        files = {file.stem for file in [*(page.parent / folder).glob("*.cpp"), *(page.parent / folder).glob("test_*.py")]}
+        names = [name for cells in rows[folder] for name in cells[0].split(", ")]
+        assert sorted(names) == sorted(files), folder
+        assert max(len(cell.split()) for cells in rows[folder] for cell in cells) <= 40, folder
+
+
+def pages_of_readers():
+    pages = [page for page in ROOT.rglob("README.md") if "build" not in page.relative_to(ROOT).parts]
+    assert len(pages) >= 8
+    return pages
+
+
 def anchors_of(page):
     """Names by which headings are linked: small letters, digits, hyphens for spaces."""
     heads = re.findall(r"^#+ (.*)", page.read_text(), re.M)
@@ -213,9 +254,7 @@ def anchors_of(page):
 
 def test_links_lead_somewhere():
     """Every relative link and picture of every README exists, and so does the heading that a link names."""
-    pages = [page for page in ROOT.rglob("README.md") if "build" not in page.relative_to(ROOT).parts]
-    assert len(pages) >= 8
-    for page in pages:
+    for page in pages_of_readers():
         for target, anchor in re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)\)", page.read_text()):
             if "://" not in target:
                 aim = (page.parent / target) if target else page
