@@ -270,7 +270,7 @@ int main(int argc, char** argv)
   }
   catch (const LibraryError& error)
   {
-    // Perhaps this rank's alone: the others would wait for ever. The lowest failing rank speaks first and ends all.
+    // Perhaps this rank's alone: the others would wait for ever. The lowest failing rank reports first and ends all.
     std::this_thread::sleep_for(std::chrono::milliseconds(300 * rank));
     std::fprintf(stderr, "squeal: error on rank %d: %s\n", rank, error.what());
     MPI_Abort(PETSC_COMM_WORLD, 1);

@@ -1,5 +1,5 @@
 #pragma once
-/// The whole method, once: mesh -> structure -> equilibrium -> modes -> estimate -> transient -> cycle -> report.
+/// The whole method, once: model, equilibrium, modes, estimate, transient, cycle, settled motion, studies, report.
 #include "squeal/options.hpp"
 #include "squeal/report/results_folder.hpp"
 

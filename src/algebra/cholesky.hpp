@@ -1,6 +1,6 @@
 #pragma once
 /// Supernodal multifrontal Cholesky factor, on one process, of a positive definite A bordered by rows B that are not
-/// eliminated:
+/// eliminated (src/README.md, sections 8.1 and 8.2):
 ///     A = L L',   E = B L^-T,   B A^-1 B' = E E' (Schur complement),
 /// so that a solve has two halves, y = L^-1 b with E y = B A^-1 b, and x = L^-T (y - E' lambda).
 #include "symbolic_factor.hpp"

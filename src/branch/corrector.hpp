@@ -3,7 +3,7 @@
 ///
 /// Quasi-Newton on z = (x, T, p) with the rows of phase and arclength. Pairs (dz, P^-1 dF) of earlier steps stand for
 /// the Jacobian. Where they serve no longer, GCR with exact columns of the tangent solves the linear system, and its
-/// pairs replace them: a point costs few periods as long as the Jacobian changes little.
+/// pairs replace them. A point costs few periods as long as the Jacobian changes little.
 #include "squeal/branch/continuation.hpp"
 
 #include <deque>

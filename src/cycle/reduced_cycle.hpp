@@ -29,9 +29,9 @@ struct ReducedCycle
   double energy = 0; // [J] mean fluctuating
 };
 
-/// The reduced model's first cycle, from the estimate, with as many active pairs as its motion needs: it runs free
-/// until it is periodic, and where it outgrows the amplitude that its pairs were chosen for they are chosen anew.
-/// Returns why there is none, or nothing.
+/// The reduced model's first cycle, from the estimate, with as many active pairs as its motion needs. It runs free
+/// until it is periodic. Where it outgrows the amplitude that its pairs were chosen for they are chosen anew. Returns
+/// why there is none, or nothing.
 std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle);
 
 /// The cycle of the reduced model near `start`, with another number of steps a period. The same on every rank.

@@ -1,6 +1,6 @@
 #pragma once
-/// Cycles of the full model near one that is known: at as many steps a period as the accuracy needs, or one period to
-/// see how far another model's cycle is off (src/README.md, section 7.8).
+/// Cycles of the full model near one that is known (src/README.md, section 7.8). They have as many steps a period as
+/// the accuracy needs, or one period shows how far another model's cycle is off.
 #include "squeal/cycle/fidelity.hpp"
 
 namespace squeal

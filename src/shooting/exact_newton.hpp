@@ -1,5 +1,5 @@
 #pragma once
-/// Newton on a small system with the whole matrix of the exact tangent (src/README.md, section 6.8): each iteration
+/// Newton on a small system with the whole matrix of the exact tangent (src/README.md, section 6.8). Each iteration
 /// integrates one period, and all its columns follow together along that period.
 ///
 /// Caveat: the period map is only piecewise smooth, and there is no globalisation. The step is clamped, and the stage

@@ -2,10 +2,10 @@
 /// right vectors and the flow at first; W holds as many energy images, of approximate left vectors and of what else Q
 /// has:
 ///     A = dPhi_T/dx,     (W'Q)^-1 W'A Q y = m y,     bar_i = 2 |m_i - its last value| + errors_i.
-/// Where a bar reaches across 1, Q takes in (A_r - m)^-1 (A - m) Q y, A_r the reduced model's matrix: Davidson's
-/// method. Beside the vectors V = Q y the largest Ritz values of (1 - V (W'V)^-1 W') A are sought in a block Arnoldi
-/// space: where they are below 1 by more than their residuals, no larger multiplier is to be expected. That is likely,
-/// not proven.
+/// Where a bar reaches across 1, Q takes in (A_r - m)^-1 (A - m) Q y, A_r the reduced model's matrix (Davidson
+/// 1975). The largest Ritz values of (1 - V (W'V)^-1 W') A, V = Q y, are sought in a block Arnoldi space. Where
+/// they are below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not
+/// proven.
 #include "monodromy.hpp"
 #include "state_block.hpp"
 

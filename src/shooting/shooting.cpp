@@ -94,7 +94,7 @@ Owned<Vec> state_beside(const OrbitProblem& problem, const Attempt& attempt, dou
 }
 
 /// The slope of a line through all but the first quarter of the logarithms, and twice its standard error as if eight
-/// values in a row were one: neighbours hang together.
+/// values in a row were one, since neighbours are correlated.
 SeenGrowth fit_growth(const std::vector<double>& logarithms)
 {
   const std::size_t first = logarithms.size() / 4, count = logarithms.size() - first;
@@ -117,7 +117,7 @@ SeenGrowth fit_growth(const std::vector<double>& logarithms)
 
 /// Distances from the orbit, without their part along the flow and over the fluctuation, at the ends of periods of a
 /// motion that begins beside it by `part` of the fluctuation. They end where the distance exceeds a third or falls to a
-/// tenth of `part`: the shift in time that a motion ends with leaves the flow's direction by its square.
+/// tenth of `part`. A shift in time leaves the flow's direction by its square.
 std::vector<double> distances_beside(const Search& search, const Attempt& attempt, double part, long periods)
 {
   const auto& [problem, options, log, start] = search;

@@ -161,8 +161,8 @@ void solve_least_squares(Mat J, Vec b, Vec x, double rank_tolerance)
   if (!solution.allFinite()) throw Error("shooting: the Jacobian on the subspace is not finite");
 }
 
-/// Adds a record and sets `reason`, besides the library's own reasons: when the iterate falls onto the equilibrium
-/// (where any residual vanishes), and when what is left lies outside the base, or hardly shrinks, and a full-space
+/// Adds a record and sets `reason`, besides the library's own reasons, in two cases. The iterate falls onto the
+/// equilibrium, where any residual vanishes. What is left is outside the base, or hardly shrinks, and a full-space
 /// finish follows.
 void decide_convergence(SubspaceSystem& system, PetscInt iteration, PetscReal norm, SNESConvergedReason* reason)
 {

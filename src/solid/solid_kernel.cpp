@@ -7,7 +7,7 @@
 ///     m = 1 - xi_k^2 for hex8,   m = xi^2 - xi, eta^2 - eta, xi eta, 1 - zeta^2 for wedge6.
 /// Their gradients are corrected (Taylor, Beresford, Wilson 1976) to  det(J0)/det(J) J0^-1 dm,  with J0 the Jacobian at
 /// the centre and dm less its mean. They then integrate to zero over any shape, so that the patch test holds. The
-/// parameters a_k are condensed statically, in the stiffness and in the mass: without the share of the modes in the
+/// parameters a_k are condensed statically, in the stiffness and in the mass. Without the share of the modes in the
 /// motion the frequency of a bent element is wrong by (k L)^2 / 12.
 ///
 /// Caveats: wedge6 is stiff in bending within the plane of its triangles, as the constant-strain triangle is; it is for

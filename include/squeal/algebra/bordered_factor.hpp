@@ -1,9 +1,9 @@
 #pragma once
-/// Direct factor of A (symmetric, meant to be positive definite) bordered by rows B that are never eliminated:
+/// Direct factor of A (symmetric, positive definite) bordered by rows B (src/README.md, sections 8.1 to 8.4):
 ///     [A  B'] [x     ]   [b]
 ///     [B  0 ] [lambda] = [*]     leaves the Schur complement -B A^-1 B' of the border.
-/// A solve has two halves: `forward` turns b into B A^-1 b, `backward` then gives x = A^-1 (b - B' lambda) for a lambda
-/// that the caller chooses in between. Both together cost less than two solves with A alone. Right-hand sides, several
+/// B is never eliminated. A solve has two halves: `forward` turns b into B A^-1 b, and `backward` gives x = A^-1 (b -
+/// B' lambda) for the caller's lambda. Both together cost less than two solves with A alone. Right-hand sides, several
 /// at once where there are several, pass through rank 0.
 #include "squeal/base/options.hpp"
 #include "squeal/base/petsc.hpp"

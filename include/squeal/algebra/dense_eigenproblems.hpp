@@ -1,5 +1,5 @@
 #pragma once
-/// Eigenproblems of dense matrices, solved by Eigen with LAPACK underneath.
+/// Eigenproblems of dense matrices, solved by Eigen with LAPACK underneath (src/README.md, section 8.8).
 #include "squeal/algebra/dense_matrix.hpp"
 
 #include <complex>

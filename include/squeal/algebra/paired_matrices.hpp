@@ -1,6 +1,6 @@
 #pragma once
-/// M and K, symmetric and whole on one process, stored together: one pass through the upper triangle of their common
-/// pattern gives the products of both, for several trajectories at once.
+/// M and K, symmetric and whole on one process, stored together (src/README.md, section 8.5). One pass through their
+/// upper triangles gives the products of both, for several trajectories at once.
 #include "squeal/base/petsc.hpp"
 
 #include <array>

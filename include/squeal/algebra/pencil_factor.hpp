@@ -1,6 +1,6 @@
 #pragma once
-/// The factor of K - shift M by MUMPS, with METIS's nested dissection. It takes MUMPS's own interface, since PETSc's
-/// has no way to pass an order of elimination. Right-hand sides pass through rank 0.
+/// The factor of K - shift M by MUMPS, with METIS's nested dissection (src/README.md, section 8.6). It takes MUMPS's
+/// own interface, since PETSc's has no way to pass an order of elimination. Right-hand sides pass through rank 0.
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/options.hpp"
 

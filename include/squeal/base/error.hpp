@@ -2,8 +2,8 @@
 /// Errors, and how all ranks come to throw them together.
 ///
 /// Bad input and failed calls are exceptions whose text names the place, the value and the remedy. What may fail on one
-/// rank only (reading a file on rank 0, say) is agreed by all ranks before anyone throws, so that no rank is left
-/// waiting in a collective call. A stage that does not converge is a result, never an exception.
+/// rank only (reading a file on rank 0, say) is agreed by all ranks before anyone throws. No rank is then left waiting
+/// in a collective call. A stage that does not converge is a result, never an exception.
 #include <filesystem>
 #include <mpi.h>
 #include <stdexcept>

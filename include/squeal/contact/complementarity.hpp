@@ -1,12 +1,12 @@
 #pragma once
-/// Unilateral contact with friction of known direction, as a linear complementarity problem in gaps and reactions:
+/// Unilateral contact with friction of known direction, in gaps and reactions (src/README.md, section 2.4):
 ///     N g = q + M r,   0 <= g _|_ r >= 0.
 /// N is the identity, unless the structure is held by contact only (equilibrium/equilibrium.hpp says how it arises).
 ///
 /// Status iteration: with the pairs split into closed (g = 0) and open (r = 0) the problem is linear; every pair whose
-/// sign is wrong changes status. When that stops reducing their number, only the last one does: block principal
-/// pivoting (Judice and Pires 1994), finite when M is a P-matrix, that is as long as friction is not too large. Beyond,
-/// a split met twice ends it.
+/// sign is wrong changes status. When that stops reducing their number, only the last one does. This block principal
+/// pivoting (Judice and Pires 1994) is finite when M is a P-matrix, which too much friction prevents. Beyond, a split
+/// met twice ends it.
 #include <Eigen/Core>
 #include <vector>
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The condensed contact operator W = scale B A^-1 B' (dense, symmetric, whole on rank 0) and the factor of A it came
-/// with.
+/// The condensed contact operator W = scale B A^-1 B' (dense, symmetric, whole on rank 0) and the factor of A that it
+/// came with (src/README.md, sections 4.4 and 8.4).
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/contact/interface.hpp"
 

@@ -1,11 +1,11 @@
 #pragma once
-/// The condensed operator W of the contact solvers, symmetric, over the rows of all pairs (src/README.md, section 4).
+/// The condensed operator W of the contact solvers, symmetric, over the rows of all pairs (src/README.md, section 4.4).
 /// How it is stored is known to this type alone: solvers use its products, the blocks of its diagonal, and its rows
 /// added up pair by pair.
 ///
-/// The near field holds the blocks that matter during sweeps, in single precision: of a row all but the smallest ones,
-/// whose sizes add up to a hundredth of the pair's own block. What it leaves out is met by a product with W after the
-/// sweeps, so that each such round can gain a factor of a hundred.
+/// The near field (section 4.7) holds the blocks that matter during sweeps, in single precision. Of a row it lacks the
+/// smallest ones, whose sizes add up to a hundredth of the pair's own block. What it leaves out is met by a product
+/// with W after the sweeps, so that each such round can gain a factor of a hundred.
 #include "squeal/contact/pair_law.hpp"
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 #pragma once
-/// The contact interface: pairs, the gap and sliding operators, and the drive (src/README.md, section 1).
+/// The contact interface: pairs, the gap and sliding operators, and the drive (src/README.md, section 1.2).
 ///     g = gap + B_n u >= 0,   s = B_t v - v_d,   r_n >= 0 pushes the pair apart,   |r_t| <= mu r_n.
 ///
 /// A pair is a block of rows of B, its normal row first, with any number of nodes. Contact vectors (reactions, gaps,

@@ -1,15 +1,15 @@
 #pragma once
-/// Signorini-Coulomb contact of one pair (src/README.md, section 1):
+/// Signorini-Coulomb contact of one pair (src/README.md, sections 1.3 and 4.5):
 ///     0 <= w_n _|_ r_n >= 0,   |r_t| <= mu r_n,   w_t = -sigma r_t with sigma >= 0 (zero while |r_t| < mu r_n),
 /// w_n the gap or its rate, w_t the velocity that friction opposes, mu = mu(|w_t|).
 ///
 /// The local problem holds all other pairs: find r with w = A r + q, A the pair's own block of W, symmetric and
 /// positive semi-definite. It is solved to round-off by cases. Open: q_n >= 0. Stick: A r = -q. Slip: r_t = mu r_n d
-/// with a unit d, so that w_n = 0 gives r_n = -q_n / (A_nn + mu A_nt d), and d is a zero of the cross product of d and
-/// w_t, a trigonometric polynomial of degree two in the angle of d (the quartic of Bonnefon and Daviet, 2011, in angle
-/// form): Newton from the last direction, a scan of the circle when that fails.
+/// with a unit d. Then w_n = 0 gives r_n = -q_n / (A_nn + mu A_nt d), and d is a zero of the cross product of d and
+/// w_t. That is a trigonometric polynomial of degree two in the angle of d (Bonnefon and Daviet 2011). Newton starts
+/// from the last direction; the circle is scanned when that fails.
 ///
-/// Where mu depends on the speed, stick is judged by mu(0), and slip has the speed v with |w_t| = v at mu(v), which is
+/// Where mu depends on the speed, stick is accepted by mu(0). Slip has the speed v with |w_t| = v at mu(v), which is
 /// unique while |mu'| r_n A_tt < 1. In a step w_t is s_theta/theta: `law_of_step` takes mu at s_theta.
 ///
 /// In a direction in which neither side can move (a zero row of W), r_t opposes the drive while the pair slides along
@@ -108,7 +108,7 @@ inline double normal_map(double r, double w, double rho)
   return std::abs(r - std::max(0., r - rho * w));
 }
 
-/// |r - proj(r - rho w)|: zero where the law holds. The disc's radius is mu r_n, since r_n is judged by its own row.
+/// |r - proj(r - rho w)|: zero where the law holds. The disc's radius is mu r_n, since r_n has its own row.
 inline double natural_map(const PairVector& r, const PairVector& w, const FrictionLaw& law, const NaturalScale& rho)
 {
   const double t1 = r[1] - rho.tangential * w[1], t2 = r[2] - rho.tangential * w[2];
@@ -147,8 +147,8 @@ enum class ContactStatus : char
 };
 
 /// A closed pair sticks where its friction stays inside the Coulomb disc of rest by more than 1e-8 of the largest
-/// normal reaction of all pairs. Where mu depends on the speed, friction of slip may lie inside that disc: a pair then
-/// sticks only if its sliding speed w_t is below 1e-5 of the law's decay speed.
+/// normal reaction of all pairs. Where mu depends on the speed, friction of slip may be inside that disc too. A pair
+/// then sticks only if its sliding speed w_t is below 1e-5 of the law's decay speed.
 ContactStatus contact_status(const PairVector& r, const PairVector& w, const FrictionLaw& law, double largest);
 
 /// `w`: contact velocities, which are read where mu depends on the speed; may be empty elsewhere.

@@ -1,7 +1,7 @@
 #pragma once
 /// Entries of contact vectors by pairs. A contact vector (reactions, gaps with slidings, velocities) has an entry for
-/// every row of B (src/README.md, section 1): of each pair its normal row, then its `directions` tangential ones. Only
-/// this header knows that order. How many nodes a pair reads is a matter of its rows of B alone.
+/// every row of B (src/README.md, section 1.2). Of each pair these are its normal row and its `directions` tangential
+/// ones. Only this header knows that order. How many nodes a pair reads is a matter of its rows of B alone.
 #include <array>
 #include <cmath>
 #include <cstddef>

@@ -1,5 +1,5 @@
 #pragma once
-/// What the reactions of a contact add up to.
+/// What the reactions of a contact add up to (src/README.md, section 2.7).
 #include "squeal/contact/interface.hpp"
 
 namespace squeal

@@ -1,8 +1,8 @@
 #pragma once
-/// Contact with Coulomb friction on the condensed operator (src/README.md, section 4): find r with w = W r + b and
-/// every pair's law of pair_law.hpp. Residual, one measure for every solver: the natural map per pair, |r - proj(r -
-/// rho w)| with rho = 1/W_ii, over the largest reaction, or over rho max|b| where that is smaller. It is always that of
-/// W itself, in double precision.
+/// Contact with Coulomb friction on the condensed operator (src/README.md, sections 4.4, 4.6, 4.7): find r with w = W r
+/// + b and every pair's law of pair_law.hpp. Every solver has the same residual, the natural map of a pair |r - proj(r
+/// - rho w)| with rho = 1/W_ii. It is over the largest reaction, or over rho max|b| where that is smaller, and always
+/// of W itself in double precision.
 ///
 /// gauss_seidel: one exact local solve a pair and sweep; w follows each change of a reaction, pairs that no longer move
 /// are passed over. A large W is swept over through its near field, in single precision, and one product with W

@@ -1,15 +1,15 @@
 #pragma once
-/// The cycle on no larger a model than the accuracy asked for needs (src/README.md, section 7).
+/// The cycle on no larger a model than the accuracy asked for needs (src/README.md, section 7.8).
 ///
-/// The reduced model (reduction/reduced_model.hpp) runs free from the estimate until its motion is periodic, its active
-/// pairs chosen again where it outgrows the amplitude they were chosen for, and is shot at. Its cycle is the start on
-/// the full model, its derivative the preconditioner.
+/// The reduced model (reduction/reduced_model.hpp) runs free from the estimate until its motion is periodic. Where it
+/// outgrows the amplitude that its active pairs were chosen for, they are chosen again. Then it is shot at. Its cycle
+/// is the start on the full model, its derivative the preconditioner.
 ///
 /// "reduced": a period of the full model gives the reduced cycle's error, a cycle at twice as many steps the step's.
-/// "auto": what the scene gives is kept. Where it leaves the steps open, the full model's cycle is found at few, its
-/// stability is judged there, and two further numbers of steps give the error of the step and the number that the
-/// accuracy needs. Where the reduced model would not be small or has no cycle, or where several modes are unstable,
-/// the start is the estimate on the full model. The reduced model decides how soon this ends, not where.
+/// "auto": what the scene gives is kept. Where it leaves the steps open, the full model's cycle is found at few, and
+/// its verdict is given there. Two further numbers of steps give the error of the step and the number that the accuracy
+/// needs. Where the reduced model would not be small or has no cycle, or where several modes are unstable, the start is
+/// the estimate on the full model. The reduced model decides how soon this ends, not where.
 #include "squeal/cycle/limit_cycle.hpp"
 
 namespace squeal

@@ -4,7 +4,7 @@
 /// The derivative in the period is (x_(N+1) - x_(N-1))/2h. That is exact for theta = 1/2 and a linear structure, stiff
 /// modes included.
 ///
-/// A map that keeps its step integrates a period T near N h with the h at hand, and goes on from N h to T along that
+/// A map that keeps its step integrates a period T near N h with the h at hand. It goes on from N h to T along that
 /// derivative, as long as what this neglects is small (section 6.2). A and W are then those of the period before.
 #include "squeal/shooting/flow.hpp"
 #include "squeal/transient/step_tangent.hpp"

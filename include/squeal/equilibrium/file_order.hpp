@@ -1,6 +1,6 @@
 #pragma once
-/// The order of the degrees of freedom in files, which does not depend on the number of ranks: as the matrices of a
-/// matrix scene, else by node of the mesh and direction (x y z rx ry rz), free ones only.
+/// The order of the degrees of freedom in files, which does not depend on the number of ranks. It is that of a matrix
+/// scene's matrices, else by node of the mesh and direction (x y z rx ry rz), free ones only.
 #include "squeal/solid/structure.hpp"
 
 namespace squeal

@@ -1,8 +1,8 @@
 #pragma once
-/// The closed pairs taken out of the equations without multipliers (src/README.md, section 3).
+/// The closed pairs taken out of the equations without multipliers (src/README.md, sections 3.1 to 3.5).
 ///
-/// While the pairs that are closed at equilibrium stay closed, B_n du = 0 on them, and a normal reaction lambda_n of a
-/// sliding pair enters the equations as R' lambda_n with the row R = B_n + mu e.B_t, e the direction of the drive:
+/// While the pairs that are closed at equilibrium stay closed, B_n du = 0 on them. The normal reaction lambda_n of a
+/// sliding pair enters as R' lambda_n, R = B_n + mu e.B_t, with e the direction of the drive:
 ///     du = Z y,  B_n Z = 0,      Y'(equations),  R Y = 0.
 /// Both bases follow from one sparse Gauss-Jordan elimination of one degree of freedom a pair, its pivot. They are the
 /// identity on the degrees of freedom that remain, so y is du there.

@@ -1,5 +1,5 @@
 #pragma once
-/// State of the structure: displacements, velocities and the reactions that they came with.
+/// State of the structure (src/README.md, section 1.5): displacements, velocities and the reactions with them.
 #include "squeal/base/outcome.hpp"
 #include "squeal/contact/interface.hpp"
 

@@ -24,7 +24,7 @@ struct Script
 Script read_script(const std::filesystem::path& file, Statements statements);
 
 /// Returns whether gmsh takes the file for a script. Throws Error if its content does not fit its ending, since gmsh
-/// would then take it for a script, or if its ending belongs to no format that holds a mesh or a geometry.
+/// would then take it for a script. It also does if its ending belongs to no format that holds a mesh or a geometry.
 bool is_script(const std::filesystem::path& file);
 
 } // namespace squeal

@@ -1,5 +1,5 @@
 #pragma once
-/// Complex modes of the structure linearised about steady sliding (src/README.md, section 3):
+/// Complex modes of the structure linearised about steady sliding (src/README.md, section 3.4):
 ///     (lambda^2 Y'M Z + lambda Y'(C + C_f) Z + Y'K Z) phi = 0,   u(t) ~ phi exp(lambda t),   Re(lambda) > 0:
 ///     squeal may start.
 /// Z keeps closed pairs closed, Y removes their normal reactions; all three matrices are unsymmetric.

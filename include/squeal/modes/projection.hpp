@@ -1,5 +1,5 @@
 #pragma once
-/// The quadratic eigenproblem on a small subspace that is corrected by residuals (src/README.md, section 3).
+/// The quadratic eigenproblem on a small subspace that is corrected by residuals (src/README.md, section 3.7).
 ///
 /// On an orthonormal V, V'(lambda^2 M + lambda C + K) V a = 0 is small and dense. The residual r of a pair y = V a
 /// shows what V lacks: P^-1 r is appended to V, where P is a factor that is at hand, for some passes.
@@ -11,7 +11,7 @@ namespace squeal
 {
 
 /// Each pass corrects the pairs of largest growth ratio, Re/|lambda|, whose backward error exceeds a tolerance. From a
-/// growth ratio of -1e-3 on the tolerance is `sharp`: the error of an eigenvalue may be 1e4 times its backward error,
+/// growth ratio of -1e-3 on the tolerance is `sharp`. The error of an eigenvalue may be 1e4 times its backward error,
 /// and growth is a small part of the eigenvalue.
 struct Correction
 {

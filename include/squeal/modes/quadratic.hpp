@@ -1,5 +1,5 @@
 #pragma once
-/// The quadratic eigenproblem of real unsymmetric sparse matrices, (lambda^2 M + lambda C + K) y = 0.
+/// The quadratic eigenproblem (lambda^2 M + lambda C + K) y = 0, unsymmetric (src/README.md, sections 3.4, 8.8).
 ///
 /// Small problems are solved whole, by LAPACK's QR on the companion matrix of mu = 1/(lambda - shift), which allows a
 /// singular M or K. Large ones are solved by SLEPc's two-level Arnoldi method (TOAR; Lu, Su, Bai 2016), shift-inverted

@@ -1,5 +1,5 @@
 #pragma once
-/// All pairs of a band of the full quadratic problem, by slices of frequency (src/README.md, section 3).
+/// All pairs of a band of the full quadratic problem, by slices of frequency (src/README.md, sections 3.8 and 3.9).
 ///
 /// A slice starts from the undamped problem with friction, K x = theta M x, real and unsymmetric. One real factor of
 /// K - sigma M gives the invariant subspace V of all theta about the slice's middle sigma (shift_invert.hpp). Under
@@ -16,9 +16,9 @@
 namespace squeal
 {
 
-/// Pairs remain pairs when friction and damping move them. As mu grows from zero, their number in a disc
-/// |lambda| < omega changes only where one crosses its edge, and the modes at mu = 0 without damping are counted by
-/// inertia (Sylvester).
+/// Pairs remain pairs when friction and damping move them. As mu grows from zero, their number in a disc |lambda| <
+/// omega changes only where one crosses its edge. The modes at mu = 0 without damping are counted by inertia
+/// (Sylvester).
 struct PairCount
 {
   double frequency = 0; // [Hz] up to which both were counted

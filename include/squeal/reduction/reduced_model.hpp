@@ -1,22 +1,22 @@
 #pragma once
-/// A model no larger than its cycle needs, about the sliding equilibrium (u0, r0).
+/// A model no larger than its cycle needs, about the sliding equilibrium (u0, r0) (src/README.md, sections 7.1 to 7.3).
 ///
 /// Pairs that stay closed and sliding are eliminated as in the modes (paper, eq. 5): du = Z y, equations tested by Y.
 /// The others, the active ones, keep unilateral contact and Coulomb friction. Then y = V q, V dense:
 ///     M q'' + C q' + K q = H (r - r0),   M = (Y V)'M (Z V) ...,  H = (Y V)'B_a',
 ///     g = g0 + G_n q >= 0,   s = G_t q' - v_d,   G = B_a Z V,
-/// all three matrices unsymmetric. V holds the complex modes of the full problem in the band (real and imaginary
-/// parts, so that the reduced model has exactly their growth rates), frictionless real modes above the band, and the
+/// all three matrices unsymmetric. V holds real and imaginary parts of the full problem's complex modes in the band, so
+/// that the reduced model has exactly their growth rates. It holds frictionless real modes above the band and the
 /// attachment shapes of the active pairs,
 ///     (K_z + w^2 M_z) X = Z'B_a',   K_z = Z'K Z, w the followed mode's,
 /// orthonormal in the energy of K_z + w^2 M_z; of the attachments what is new above a threshold.
 ///
-/// Active pairs that slide along the drive throughout, e, have one row and one shape each instead of three, of
-/// B_n' + mu B_t'e: the normal force with the friction that it brings along.
+/// An active pair that slides along the drive e throughout has one row and one shape instead of three. They are of B_n'
+/// + mu B_t'e, the normal force with its friction.
 ///
-/// Caveats: friction that follows turns with the sliding direction to first order only, by C_f of the reaction at
-/// equilibrium, and an eliminated pair is taken never to part or stick. What all that is worth is measured: one period
-/// of the full model from the reduced cycle.
+/// Caveats: friction of such pairs turns with the sliding direction to first order only, by C_f of the reaction at
+/// equilibrium. An eliminated pair is taken never to part or stick. What all that is worth is measured: one period of
+/// the full model from the reduced cycle.
 ///
 /// Everything reduced is dense, small, and the same on every rank.
 #include "squeal/algebra/multivector.hpp"

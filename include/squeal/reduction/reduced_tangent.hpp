@@ -8,7 +8,7 @@
 namespace squeal
 {
 
-/// The contact of the active pairs in one step, on which the step's tangent is a linear map (src/README.md, 4.13).
+/// The contact of the active pairs in one step. The step's tangent on it is linear (src/README.md, section 4.13).
 struct RecordedContact
 {
   Eigen::VectorXd r, w;            // [N, m/s] contact vectors: reactions, contact velocity

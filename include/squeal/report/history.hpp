@@ -1,5 +1,5 @@
 #pragma once
-/// history.h5: energies, powers, probes and contact counts against time, groups "transient" and "cycle".
+/// history.h5: histories of "transient", "cycle" and "settled" against time; the groups "branch" and "sweep".
 #include "squeal/report/report.hpp"
 
 namespace squeal

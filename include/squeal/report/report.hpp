@@ -1,7 +1,7 @@
 #pragma once
-/// All results of a run, and what it leaves behind: report.json, fields.h5 + fields.xdmf, history.h5, resolved.toml
-/// (the scene with every default), options.txt, and the printed table. Every number comes with its unit and with what
-/// it is worth (residual, backward error, defect).
+/// All results of a run, and its files: report.json, fields.h5 + fields.xdmf, history.h5, sweep.csv, resolved.toml (the
+/// scene with every default), options.txt, and the printed table. Every number comes with its unit and with what it is
+/// worth (residual, backward error, defect).
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/contact/resultants.hpp"

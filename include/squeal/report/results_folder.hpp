@@ -2,8 +2,8 @@
 /// The results of a run as one whole: stages write into a folder beside the results' place, PLACE.partial, which takes
 /// that place in one move when the run ends. Earlier results stay until then.
 ///
-/// Where PLACE cannot be moved (the working folder, a mount point, a folder whose parent is read-only) or holds other
-/// files than results, the files themselves are moved: report.json goes first and comes last.
+/// PLACE may be a working folder, a mount point, or a folder whose parent is read-only, or hold other files than
+/// results. Then the files themselves are moved: report.json goes first and comes last.
 #include "squeal/scene/scene.hpp"
 
 #include <mpi.h>

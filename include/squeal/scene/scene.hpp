@@ -137,8 +137,8 @@ inline Words words_of(SlaveSide)
 }
 
 /// Contact of two named surfaces, whose meshes need not match, or of two named points. Without a reach the surfaces
-/// coincide; with one their distance along the normal is added to the gap.
-/// The sliding velocity of a pair is s = B_t v - v_d (src/README.md, section 1).
+/// coincide; with one their distance along the normal is added to the gap. The sliding velocity of a pair is s = B_t v
+/// - v_d (src/README.md, section 1.2).
 struct Contact
 {
   std::string rotor;                // surface or point that the drive moves
@@ -424,8 +424,8 @@ struct SceneNumber
 /// Returns the scene with other values of numbers that it has. Throws Error if that is no scene.
 Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers);
 
-/// The numbers with respect to which eigenvalues are derived, with the scene's values: those that it names, else
-/// friction, and what is not zero of parts, points, bodies, springs, damping and rates of rotation.
+/// The numbers with respect to which eigenvalues are derived, with the scene's values. They are those that it names,
+/// else friction and what is not zero of parts, points, bodies, springs, damping and rates of rotation.
 std::vector<SceneNumber> sensitive_numbers(const Scene& scene);
 
 /// Returns a list of all keys of a scene file with their meanings, units and defaults.

@@ -1,5 +1,5 @@
 #pragma once
-/// The largest Lyapunov exponents of a flow along a motion, from its batched tangent (src/README.md, section 7.10): a
+/// The largest Lyapunov exponents of a flow along a motion, from its batched tangent (src/README.md, section 7.10). A
 /// few columns are carried along and made orthonormal again in the energy product after every period. The logarithms of
 /// what they were stretched by are the exponents, per period.
 #include "squeal/settled/statistics.hpp"

@@ -16,15 +16,15 @@ struct Estimated
 /// other over less than a batch. Of fewer than 16 values 4 batches; of fewer than 4 no bar (NaN).
 Estimated batch_mean(std::span<const double> series);
 
-/// Whether the means of the first quarter and of the last half agree within the bar of their difference, as the last
-/// half alone gives it (Geweke), or to 1e-3.
+/// Whether the means of the first quarter and of the last half agree to 1e-3, or within the bar of their difference, as
+/// the last half alone gives it (Geweke 1992).
 bool is_stationary(std::span<const double> series);
 
 /// How many values to leave out until the rest is stationary: none, an eighth, a quarter or a half; all where that does
 /// not do either.
 std::size_t values_before_stationary(std::span<const double> series);
 
-/// The rate at which the spread of the series about its mean decays, per value: the slope of the logarithm of its
+/// The rate at which the spread of the series about its mean decays, per value. It is the slope of the logarithm of its
 /// standard deviation over 8 batches, positive for a decay.
 Estimated decay_of_spread(std::span<const double> series);
 

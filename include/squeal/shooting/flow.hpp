@@ -13,8 +13,8 @@
 namespace squeal
 {
 
-/// Approximations of the largest multipliers of dPhi_T/dx and of the spans of their eigenvectors (src/README.md,
-/// section 6.9). All lists are of one size but `others`.
+/// Approximations of the largest multipliers of dPhi_T/dx and spans of eigenvectors (src/README.md, section 6.9). All
+/// lists are of one size but `others`.
 struct SlowMotions
 {
   std::vector<std::complex<double>> values; // largest first

@@ -83,8 +83,8 @@ struct FloquetAnalysis
 };
 
 /// All multipliers of a system of up to 100 degrees of freedom, or 25 without an exact tangent. Of a larger one those
-/// of the slow motions, or as many Arnoldi steps as its leading value needs: at most 96, or 24 beyond 10 000 degrees of
-/// freedom. -cycle_multiplier_method forces a method.
+/// of the slow motions, or of as many Arnoldi steps as its leading value needs. These are at most 96, or 24 beyond 10
+/// 000 degrees of freedom. -cycle_multiplier_method forces a method.
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable);
 

@@ -3,10 +3,10 @@
 /// period a step, no difference columns. States are bordered by T and by the phase row <f, dx>; B is the bordered P, G
 /// = B^-1 (F, 0) the preconditioned defect. With the last steps X and their changes of G, Y = Q R,
 ///     dx = -X R^-1 Q'G - (1 - Q Q') G.
-/// Q is orthogonal in the energy norm of G, not of F: there the slow motions weigh what they are worth, and what the
-/// next period damps out anyhow does not hide them.
+/// Q is orthogonal in the energy norm of G, not of F. In F, motions that the next period damps out would be larger than
+/// the slow ones that are sought.
 ///
-/// Caveat: no globalisation. The step is clamped and the iteration guarded, and it gives up rather than wander.
+/// Caveat: no globalisation. The step is clamped and the iteration guarded, and it ends without progress.
 #include "squeal/shooting/options.hpp"
 #include "squeal/shooting/orbit.hpp"
 
@@ -37,8 +37,8 @@ struct Multisecant
   RelativeChange remaining{};   // estimate of what all further steps would change
 };
 
-/// Sets `last_step` to what the next step from the orbit would change, and `remaining` to twice that, or half of the
-/// step before if that is more: the signs of the steps alternate.
+/// Sets `last_step` to what the next step from the orbit would change. `remaining` is twice that, or half of the step
+/// before if that is more, since the signs of the steps alternate.
 void estimate_remaining_change(const OrbitProblem& problem, const ShootingOptions& options, Multisecant& multisecant,
                                const Orbit& orbit);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Free degrees of freedom q and the constraints u = T q on the nodal degrees of freedom u.
+/// Free degrees of freedom q and constraints u = T q on nodal degrees of freedom u (src/README.md, sections 1.4, 1.6).
 /// Nodal degree of freedom 6 * node + c is component c of a node, c = 0..5 for x y z rx ry rz.
 #include "squeal/base/petsc.hpp"
 #include "squeal/mesh/partition.hpp"
@@ -47,10 +47,10 @@ struct DofMap
   std::span<const DofTerm> terms_of(PetscInt nodal_dof) const;
 };
 
-/// Numbers the free degrees of freedom and eliminates supports and rigid bodies. Collective.
-/// The rotation of a node that shells and solids share follows the least-squares rotation of the solid nodes around it,
-/// so that the moments of the shell act on the solid as couples.
-/// Throws Error for a support or rigid body that contradicts another, and if nothing is free.
+/// Numbers the free degrees of freedom and eliminates supports and rigid bodies. Collective. The rotation of a node
+/// that shells and solids share follows the least-squares rotation of the solid nodes around it. The moments of the
+/// shell then act on the solid as couples. Throws Error for a support or rigid body that contradicts another, and if
+/// nothing is free.
 DofMap number_dofs(const Mesh& mesh, const Scene& scene, const Partition& partition, MPI_Comm comm);
 
 } // namespace squeal

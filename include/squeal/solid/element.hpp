@@ -1,5 +1,5 @@
 #pragma once
-/// Element kernels: pure functions on arrays, without PETSc.
+/// Element kernels (src/README.md, section 1.6): pure functions on arrays, without PETSc.
 ///
 /// hex8, wedge6: incompatible modes in Taylor's corrected form. Both pass the patch test on any shape; hex8 does not
 ///     lock in bending, wedge6 does and is for filling.

@@ -1,5 +1,5 @@
 #pragma once
-/// From the mesh to the equations of motion of the free degrees of freedom q:
+/// From the mesh to the equations of motion of the free degrees of freedom q (src/README.md, section 1.4):
 ///     M q'' + C q' + K q = load + contact forces,   C = sum of alpha M + beta K of each part, and dashpots.
 /// Supports and rigid bodies are exact constraints (squeal/solid/dofs.hpp).
 #include "squeal/solid/dofs.hpp"
@@ -30,9 +30,9 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
 
 /// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder, and of G.petsc and H.petsc where
 /// they are there; C and F are zero without their files. Without a B.petsc C and K may be unsymmetric: their skew parts
-/// join G and H. Collective.
-/// Throws Error for a file that is missing, truncated or not PETSc binary, sizes that disagree, entries that are not
-/// finite, an M, C or K that is not symmetric, and a G or H that is not skew.
+/// join G and H. Collective. Throws Error for a file that is missing, truncated or not PETSc binary, and for sizes that
+/// disagree. It does so for entries that are not finite, for an unsymmetric M, C or K, and for a G or H that is not
+/// skew.
 Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm);
 
 /// Declares to PETSc that A stays symmetric and that its pattern is complete.

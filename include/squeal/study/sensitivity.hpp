@@ -1,6 +1,6 @@
 #pragma once
-/// Why modes are unstable and what would change them (src/README.md, section 11): derivatives of their eigenvalues,
-/// shares of the parts in their energies, powers of contact and damping, and changes that are proposed.
+/// Why modes are unstable and what would change them (src/README.md, section 11). It gives derivatives of eigenvalues,
+/// shares of the parts in energies, powers of contact and damping, and the effect of proposed changes.
 #include "squeal/modes/modes.hpp"
 #include "squeal/study/sweep.hpp"
 
@@ -43,7 +43,7 @@ struct ModeCauses
   std::vector<ChangeEffect> changes;
 };
 
-/// outcome: "converged", "not converged" (the vectors, or a mode of a change was not found), "skipped", "off".
+/// outcome: "converged", "not converged" (vectors or a changed mode were not found), "refused", "skipped", "off".
 struct Sensitivity
 {
   Outcome outcome;

@@ -39,7 +39,7 @@ struct Threshold
   int change = 0;          // of the number of unstable modes as the value rises
 };
 
-/// outcome: "converged", "not converged" (points failed: how many, and the first reason), "off".
+/// outcome: "converged", "not converged" (points failed: how many, the first reason), "refused", "skipped", "off".
 /// residual: the largest backward error. iterations: number of points.
 struct Sweep
 {

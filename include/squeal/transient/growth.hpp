@@ -1,5 +1,5 @@
 #pragma once
-/// Growth of one mode during a transient.
+/// Growth of one mode during a transient (src/README.md, section 4.12).
 ///
 /// In persistent sliding the step is linear and leaves the plane of the mode invariant: (u - u0, v) = Re(q (phi, lambda
 /// phi)), and q grows by exp(lambda_h h) a step, lambda_h the discrete eigenvalue. |q| is found by projection in the

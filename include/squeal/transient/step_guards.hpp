@@ -1,6 +1,6 @@
 #pragma once
-/// When theta and the step size h would show a wrong growth (src/README.md, section 4). In sliding an eigenvalue lambda
-/// is marched as
+/// When theta and the step size h would show a wrong growth (src/README.md, sections 4.10, 4.11). In sliding an
+/// eigenvalue lambda is marched as
 ///     lambda_h = ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h,   Re(lambda_h) = 0 where
 ///     2 Re(lambda) = (2 theta - 1) h |lambda|^2:
 /// - theta > 1/2 with fewer than 2 pi (theta - 1/2) |lambda|^2/(omega sigma) steps a period: what grows looks stable;
@@ -8,8 +8,8 @@
 /// - theta < 1/2 also amplifies every stable mode with -Re(lambda) < (1/2 - theta) h |lambda|^2, up to the highest one
 ///   of the mesh. With C = beta K that is h > beta/(1 - 2 theta), or h > 2/((1 - 2 theta) |lambda|) where the mode is
 ///   overdamped, lambda its faster root.
-/// - friction that falls with the speed so steeply that a step may have several solutions: the largest eigenvalue of
-///   |mu'| diag(r_n0) W_tt, at rest, is not below 1. W holds h, so that enough steps bring it below.
+/// - friction falls with the speed so steeply that a step may have several solutions. The largest eigenvalue of |mu'|
+///   diag(r_n0) W_tt, at rest, is not below 1. W holds h, so that enough steps bring it below.
 /// All refusals are lifted by StepOptions::refuse.
 #include "squeal/modes/modes.hpp"
 #include "squeal/transient/theta_step.hpp"

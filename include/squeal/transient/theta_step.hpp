@@ -1,12 +1,12 @@
 #pragma once
-/// A step of the modified theta-method with exact contact (src/README.md, section 4):
+/// A step of the modified theta-method with exact contact (src/README.md, sections 4.1 to 4.3):
 ///     A v+ = [M - h(1-theta) C - h^2 theta(1-theta) K] v - h K u + h F + h B'r+,   A = M + h theta C + h^2 theta^2 K,
 ///     0 <= gap + B_n ut + h B_n v+  _|_  r_n+ >= 0,   ut = u + h(1-theta) v,   r_t+ in the Coulomb disc.
 /// Reactions are implicit, an impulse h r+ of the whole step; theta = 1/2 adds no damping of its own.
 ///
-/// Friction opposes s_theta = theta s+ + (1-theta) s, the velocity that its work is done with: a step is then of second
-/// order in sliding where friction turns, too, and friction never gives energy. Where that would stop a pair or turn
-/// it back it opposes s+ instead, since s_theta = 0 is not rest. (The paper's s+ everywhere is of first order where
+/// Friction opposes s_theta = theta s+ + (1-theta) s, the velocity that its work is done with. A step is then of second
+/// order in sliding where friction turns, too, and friction never gives energy. Where that would stop a pair or turn it
+/// back it opposes s+ instead, since s_theta = 0 is not rest. (The paper's s+ everywhere is of first order where
 /// friction turns.)
 #include "squeal/algebra/paired_matrices.hpp"
 #include "squeal/contact/condensed.hpp"
@@ -35,8 +35,8 @@ struct ThetaStep
   double factor_seconds = 0, condensed_seconds = 0; // to factor A with the corner that W is, to prepare W
 };
 
-/// The law of a pair as a function of the step's w_t, so that mu is taken at the mean sliding speed |s_theta|, and at
-/// |s+| where friction opposes that everywhere.
+/// The law of a pair as a function of the step's w_t. So mu is taken at the mean sliding speed |s_theta|, and at |s+|
+/// where friction opposes that everywhere.
 inline FrictionLaw law_of_step(const ThetaStep& step, const FrictionLaw& law)
 {
   return law_of_step(law, step.opposed == Opposed::theta ? step.theta : 1);

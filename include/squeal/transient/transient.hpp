@@ -1,5 +1,5 @@
 #pragma once
-/// The transient: theta steps from a start state, and what is recorded of them (src/README.md, section 4).
+/// The transient: theta steps from a start state, and what is recorded of them (src/README.md, sections 4.9, 4.12).
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/step_guards.hpp"
 #include "squeal/transient/theta_step.hpp"
