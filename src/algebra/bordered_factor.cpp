@@ -6,6 +6,7 @@
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <type_traits>
 #include <variant>
 
@@ -16,11 +17,13 @@ struct Factor::Parts
 {
   MPI_Comm comm = MPI_COMM_NULL;
   int dofs = 0, border = 0;
-  RowLayout layout;                                                          // of the degrees of freedom
-  std::variant<std::monostate, Cholesky, MumpsFactor, DenseFactor> factor{}; // MumpsFactor on all ranks, others on 0
+  RowLayout layout;                                                           // of the degrees of freedom
+  std::optional<Cholesky> cholesky{};                                         // takes and gives each rank's own rows
+  std::variant<std::monostate, MumpsFactor, DenseFactor> through_rank_zero{}; // DenseFactor on rank 0 only
   bool failed = false;
-  std::vector<double> right{}; // on rank 0: right-hand sides and then solutions, `dofs` long each
-  int columns = 0;             // of the last forward
+  std::vector<double>
+      right{};     // on rank 0, through which they pass: right-hand sides and then solutions, `dofs` long each
+  int columns = 0; // of the last forward
 
   bool on_rank_zero() const { return rank_of(comm) == 0; }
   int own_rows() const { return layout.counts[static_cast<std::size_t>(rank_of(comm))]; }
@@ -61,7 +64,7 @@ bool is_small_or_full(Mat A, const Triplets& own)
 struct Plan
 {
   FactorKind kind;         // not automatic
-  Triplets entries;        // on rank 0; without values for MUMPS, to which every rank gives its share
+  Triplets entries;        // dense: all, on rank 0; else this rank's share
   SymbolicFactor symbolic; // on rank 0, but for dense
   double memory = 0;       // of a supernodal factor [bytes]
 };
@@ -72,13 +75,19 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   FactorKind kind = options.kind;
   Triplets own = bordered(A, B);
   if (kind == FactorKind::automatic && is_small_or_full(A, own)) kind = FactorKind::dense;
-  const auto content = kind == FactorKind::mumps ? TripletContent::pattern : TripletContent::values;
-  Plan plan{kind, gather(std::move(own), content, comm), {}, 0};
-  if (kind == FactorKind::dense) return plan;
+  Plan plan{kind, {}, {}, 0};
+  if (kind == FactorKind::dense)
+  {
+    plan.entries = gather(std::move(own), TripletContent::values, comm);
+    return plan;
+  }
+  plan.entries = std::move(own);
+  Triplets pattern;
+  if (ranks_of(comm) > 1) pattern = gather(plan.entries, TripletContent::pattern, comm);
   on_rank_zero(comm,
                [&]
                {
-                 plan.symbolic = analyse(plan.entries, rows_of(A), rows_of(B));
+                 plan.symbolic = analyse(ranks_of(comm) > 1 ? pattern : plan.entries, rows_of(A), rows_of(B));
                  plan.memory = cholesky_memory(plan.symbolic);
                });
   MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);
@@ -101,8 +110,8 @@ void scale_and_mirror(std::vector<double>& matrix, int size, double factor)
           matrix[i * n + j] = matrix[j * n + i] *= factor;
 }
 
-/// Calls work(factor) with the factor that this rank holds, if it holds one.
-template <class Result, class Factors, class Work> Result with_factor(Factors& factors, Work work)
+/// Calls work(factor) with the factor that works through rank 0, if this rank holds one.
+template <class Result, class Parts, class Work> Result on_held_factor(Parts& parts, Work work)
 {
   return std::visit(
       [&](auto& factor) -> Result
@@ -112,7 +121,13 @@ template <class Result, class Factors, class Work> Result with_factor(Factors& f
         else
           return work(factor);
       },
-      factors);
+      parts.through_rank_zero);
+}
+
+/// Calls work(factor) with the factor that this rank holds, if it holds one.
+template <class Result, class Parts, class Work> Result with_factor(Parts& parts, Work work)
+{
+  return parts.cholesky ? work(*parts.cholesky) : on_held_factor<Result>(parts, work);
 }
 
 } // namespace
@@ -132,20 +147,15 @@ Factor::Factor(Mat A, Mat B, const FactorOptions& options) : parts_(std::make_un
   Plan plan = make_plan(A, B, options);
   if (plan.kind == FactorKind::mumps)
   {
-    plan.entries = {};
-    parts.factor.emplace<MumpsFactor>(
-        BorderedEntries{bordered(A, B), plan.symbolic.position, parts.dofs, parts.border, parts.comm});
+    parts.through_rank_zero.emplace<MumpsFactor>(
+        BorderedEntries{std::move(plan.entries), plan.symbolic.position, parts.dofs, parts.border, parts.comm});
   }
+  else if (plan.kind == FactorKind::supernodal)
+    parts.cholesky.emplace(std::move(plan.entries), std::move(plan.symbolic), parts.layout, parts.comm);
   else
     on_rank_zero(parts.comm,
-                 [&]
-                 {
-                   if (plan.kind == FactorKind::supernodal)
-                     parts.factor.emplace<Cholesky>(std::move(plan.entries), std::move(plan.symbolic));
-                   else
-                     parts.factor.emplace<DenseFactor>(plan.entries, parts.dofs, parts.border);
-                 });
-  int failed = with_factor<bool>(parts.factor, [](const auto& factor) { return factor.failed(); });
+                 [&] { parts.through_rank_zero.emplace<DenseFactor>(plan.entries, parts.dofs, parts.border); });
+  int failed = with_factor<bool>(parts, [](const auto& factor) { return factor.failed(); });
   MPI_Bcast(&failed, 1, MPI_INT, 0, parts.comm);
   parts.failed = failed;
 }
@@ -157,8 +167,7 @@ bool Factor::failed() const
 
 std::vector<double> Factor::condensed(double scale)
 {
-  auto result =
-      with_factor<std::vector<double>>(parts_->factor, [](auto& factor) { return factor.take_schur_complement(); });
+  auto result = with_factor<std::vector<double>>(*parts_, [](auto& factor) { return factor.take_schur_complement(); });
   if (parts_->on_rank_zero()) scale_and_mirror(result, parts_->border, scale);
   return result;
 }
@@ -166,37 +175,45 @@ std::vector<double> Factor::condensed(double scale)
 std::vector<double> Factor::forward(std::span<const Vec> b) const
 {
   Parts& parts = *parts_;
-  parts.columns = to_int(b.size());
-  if (parts.on_rank_zero()) parts.right.resize(b.size() * static_cast<std::size_t>(parts.dofs));
-  for (std::size_t k = 0; k < b.size(); ++k)
+  std::vector<const double*> own(b.size());
+  for (std::size_t k = 0; k < b.size(); ++k) check(VecGetArrayRead(b[k], &own[k]));
+  std::vector<double> result;
+  if (parts.cholesky)
+    result = parts.cholesky->forward(own);
+  else
   {
-    const double* own = nullptr;
-    check(VecGetArrayRead(b[k], &own));
-    MPI_Gatherv(own, parts.own_rows(), MPI_DOUBLE, parts.column(k), parts.layout.counts.data(),
-                parts.layout.starts.data(), MPI_DOUBLE, 0, parts.comm);
-    check(VecRestoreArrayRead(b[k], &own));
+    parts.columns = to_int(b.size());
+    if (parts.on_rank_zero()) parts.right.resize(b.size() * static_cast<std::size_t>(parts.dofs));
+    for (std::size_t k = 0; k < b.size(); ++k)
+      MPI_Gatherv(own[k], parts.own_rows(), MPI_DOUBLE, parts.column(k), parts.layout.counts.data(),
+                  parts.layout.starts.data(), MPI_DOUBLE, 0, parts.comm);
+    result = on_held_factor<std::vector<double>>(parts, [&](auto& factor)
+                                                 { return factor.forward(parts.right, parts.columns); });
   }
-  return with_factor<std::vector<double>>(parts.factor,
-                                          [&](auto& factor) { return factor.forward(parts.right, parts.columns); });
+  for (std::size_t k = 0; k < b.size(); ++k) check(VecRestoreArrayRead(b[k], &own[k]));
+  return result;
 }
 
 void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x) const
 {
   Parts& parts = *parts_;
-  with_factor<void>(parts.factor, [&](auto& factor) { factor.backward(lambda, parts.right); });
-  for (std::size_t k = 0; k < x.size(); ++k)
+  std::vector<double*> own(x.size());
+  for (std::size_t k = 0; k < x.size(); ++k) check(VecGetArrayWrite(x[k], &own[k]));
+  if (parts.cholesky)
+    parts.cholesky->backward(lambda, own);
+  else
   {
-    double* own = nullptr;
-    check(VecGetArrayWrite(x[k], &own));
-    MPI_Scatterv(parts.column(k), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, own,
-                 parts.own_rows(), MPI_DOUBLE, 0, parts.comm);
-    check(VecRestoreArrayWrite(x[k], &own));
+    on_held_factor<void>(parts, [&](auto& factor) { factor.backward(lambda, parts.right); });
+    for (std::size_t k = 0; k < x.size(); ++k)
+      MPI_Scatterv(parts.column(k), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, own[k],
+                   parts.own_rows(), MPI_DOUBLE, 0, parts.comm);
   }
+  for (std::size_t k = 0; k < x.size(); ++k) check(VecRestoreArrayWrite(x[k], &own[k]));
 }
 
 double Factor::entries() const
 {
-  double entries = with_factor<double>(parts_->factor, [](const auto& factor) { return factor.entries(); });
+  double entries = with_factor<double>(*parts_, [](const auto& factor) { return factor.entries(); });
   MPI_Bcast(&entries, 1, MPI_DOUBLE, 0, parts_->comm);
   return entries;
 }
@@ -205,7 +222,7 @@ OptionList options_of(FactorOptions& options)
 {
   return {
       {"-factor", choice_of(options.kind), Range::any,
-       "of the step and of equilibrium: supernodal (on rank 0), mumps (on all), dense"},
+       "of the step and of equilibrium: supernodal, mumps (both on all ranks), dense (on rank 0)"},
       {"-factor_limit", &options.limit, Range::not_negative,
        "GB of a supernodal factor; beyond it several ranks share MUMPS's instead"},
   };

@@ -1,11 +1,14 @@
 #include "cholesky.hpp"
 
+#include "front.hpp"
 #include "large_pages.hpp"
 #include "squeal/algebra/panel.hpp"
+#include "squeal/base/integers.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <memory>
-#include <petscblaslapack.h>
+#include <utility>
 
 namespace squeal
 {
@@ -18,70 +21,13 @@ std::size_t at(int number)
   return static_cast<std::size_t>(number);
 }
 
-/// Entries of a matrix by columns, in the order of elimination.
-struct Columns
-{
-  std::vector<std::size_t> starts;
-  std::vector<int> rows;
-  std::vector<double> values;
-};
-
-Columns ordered(const Triplets& lower, const SymbolicFactor& symbolic)
-{
-  const std::size_t count = lower.row.size();
-  Columns columns;
-  columns.starts.assign(at(symbolic.dofs) + 1, 0);
-  columns.rows.resize(count);
-  columns.values.resize(count);
-  const auto place = [&](std::size_t k)
-  {
-    const int i = lower.row[k] - 1, q = symbolic.position[at(lower.column[k] - 1)];
-    const int p = i < symbolic.dofs ? symbolic.position[at(i)] : i;
-    return std::pair(std::max(p, q), std::min(p, q));
-  };
-  for (std::size_t k = 0; k < count; ++k) ++columns.starts[at(place(k).second) + 1];
-  for (std::size_t j = 0; j < at(symbolic.dofs); ++j) columns.starts[j + 1] += columns.starts[j];
-  std::vector<std::size_t> next(columns.starts.begin(), columns.starts.end() - 1);
-  for (std::size_t k = 0; k < count; ++k)
-  {
-    const auto [row, column] = place(k);
-    const std::size_t here = next[at(column)]++;
-    columns.rows[here] = row;
-    columns.values[here] = lower.value[k];
-  }
-  return columns;
-}
-
-/// The lower triangle of the frontal matrix of a supernode: columns for its pivots and inner rows, and the same rows
-/// followed by those of the border.
-struct Front
-{
-  const Supernode& supernode;
-  const int* below; // positions of the rows below
-  double* values;
-
-  std::size_t height() const { return at(supernode.height()); }
-  std::size_t pivots() const { return at(supernode.columns); }
-  double* column(std::size_t j) const { return values + j * height(); }
-};
-
-std::size_t front_size(const Supernode& supernode)
-{
-  return at(supernode.height()) * at(supernode.columns + supernode.inner());
-}
-
-/// Size of the update that a front leaves to its parent, inner columns with `below` rows each.
-std::size_t update_size(const Supernode& supernode)
-{
-  return at(supernode.inner()) * at(supernode.below);
-}
-
-/// The largest sizes of the stack of updates that wait for their parents, and of a front.
-std::pair<std::size_t, std::size_t> largest_sizes(const SymbolicFactor& symbolic)
+/// The largest sizes of the stack of updates that wait for their parents, and of a front, of the first supernodes.
+std::pair<std::size_t, std::size_t> largest_sizes(const SymbolicFactor& symbolic, std::size_t count)
 {
   std::size_t waiting = 0, most = 0, front = 0;
-  for (const Supernode& supernode : symbolic.supernodes)
+  for (std::size_t k = 0; k < count; ++k)
   {
+    const Supernode& supernode = symbolic.supernodes[k];
     for (const int child : supernode.children) waiting -= update_size(symbolic.supernodes[at(child)]);
     waiting += update_size(supernode);
     most = std::max(most, waiting);
@@ -90,189 +36,377 @@ std::pair<std::size_t, std::size_t> largest_sizes(const SymbolicFactor& symbolic
   return {most, front};
 }
 
-/// Factorises the pivots and subtracts their products from the inner rows. Returns false if a pivot is not positive.
-bool eliminate_pivots(const Front& front)
+/// This rank's entries of its columns and of shared ones. Collective.
+Triplets entries_of_columns(const Triplets& own, const TreeShare& share, MPI_Comm comm)
 {
-  PetscBLASInt n = static_cast<PetscBLASInt>(front.height()), pivots = front.supernode.columns,
-               below = front.supernode.below, inner = front.supernode.inner(), border = front.supernode.border,
-               info = 0;
-  const double one = 1, minus = -1;
-  double *L = front.values, *lower = L + pivots, *update = L + at(pivots) * at(n) + pivots;
-  LAPACKpotrf_("L", &pivots, L, &n, &info);
-  if (info != 0) return false;
-  if (below > 0) BLAStrsm_("R", "L", "T", "N", &below, &pivots, &one, L, &n, lower, &n);
-  if (inner == 0) return true;
-  BLASsyrk_("L", "N", &inner, &pivots, &minus, lower, &n, &one, update, &n);
-  if (border > 0)
-    BLASgemm_("N", "T", &border, &inner, &pivots, &minus, lower + inner, &n, lower, &n, &one, update + inner, &n);
-  return true;
+  const int ranks = ranks_of(comm);
+  std::vector<int> counts(at(ranks), 0), starts(counts.size(), 0), received(counts.size()), places(counts.size(), 0);
+  const auto for_each_target = [&](std::size_t k, const auto& work)
+  {
+    const int owner = share.owner[at(place_of(own, k, share.symbolic).second)];
+    for (int rank = owner == everyone ? 0 : owner; rank < (owner == everyone ? ranks : owner + 1); ++rank)
+      work(at(rank));
+  };
+  for (std::size_t k = 0; k < own.row.size(); ++k) for_each_target(k, [&](std::size_t rank) { ++counts[rank]; });
+  MPI_Alltoall(counts.data(), 1, MPI_INT, received.data(), 1, MPI_INT, comm);
+  for (std::size_t p = 1; p < counts.size(); ++p)
+  {
+    starts[p] = starts[p - 1] + counts[p - 1];
+    places[p] = places[p - 1] + received[p - 1];
+  }
+  const auto exchange = [&](const auto& from, auto& to, MPI_Datatype type)
+  {
+    std::remove_cvref_t<decltype(to)> out(at(starts.back() + counts.back()));
+    to.resize(at(places.back() + received.back()));
+    std::vector<int> next = starts;
+    for (std::size_t k = 0; k < from.size(); ++k)
+      for_each_target(k, [&](std::size_t rank) { out[at(next[rank]++)] = from[k]; });
+    MPI_Alltoallv(out.data(), counts.data(), starts.data(), type, to.data(), received.data(), places.data(), type,
+                  comm);
+  };
+  Triplets result;
+  exchange(own.row, result.row, MPI_INT);
+  exchange(own.column, result.column, MPI_INT);
+  exchange(own.value, result.value, MPI_DOUBLE);
+  return result;
 }
 
-/// Adds E E' of the front's border rows to the lower triangle of the Schur complement, tile by tile.
-void add_to_schur_complement(const Front& front, const SymbolicFactor& symbolic, std::vector<double>& product,
-                             std::vector<double>& schur_complement)
+/// Zeros that take no memory before they are written.
+using LazyZeros = std::unique_ptr<double[], decltype(&std::free)>;
+
+LazyZeros lazy_zeros(std::size_t count)
 {
-  PetscBLASInt n = static_cast<PetscBLASInt>(front.height()), pivots = front.supernode.columns,
-               rows = front.supernode.border, border = symbolic.border;
-  const double one = 1, zero = 0;
-  const int inner = front.supernode.inner(), *positions = front.below + inner;
-  const double* E = front.values + pivots + inner;
-  if (rows == border)
+  return {static_cast<double*>(std::calloc(std::max<std::size_t>(1, count), sizeof(double))), &std::free};
+}
+
+/// Adds the lower triangles of all ranks to that of rank 0. Collective.
+void sum_on_rank_zero(double* matrix, int size, MPI_Comm comm)
+{
+  constexpr std::size_t together = 1 << 18; // numbers
+  const std::size_t n = at(size);
+  std::vector<double> part;
+  for (std::size_t first = 0, last = 0; first < n; first = last)
   {
-    BLASsyrk_("L", "N", &border, &pivots, &one, E, &n, &one, schur_complement.data(), &border);
-    return;
+    part.clear();
+    for (; last < n && part.size() < together; ++last)
+      part.insert(part.end(), matrix + last * n + last, matrix + (last + 1) * n);
+    const bool receives = rank_of(comm) == 0;
+    MPI_Reduce(receives ? MPI_IN_PLACE : part.data(), part.data(), static_cast<int>(part.size()), MPI_DOUBLE, MPI_SUM,
+               0, comm);
+    const double* from = part.data();
+    for (std::size_t j = first; receives && j < last; from += n - j++) std::copy_n(from, n - j, matrix + j * n + j);
   }
-  constexpr PetscBLASInt most = 128;
-  for (PetscBLASInt first = 0; first < rows; first += most)
+}
+
+/// Adds E E' of a shared supernode to this rank's part of the Schur complement. `own`: this rank's rows of E, `height`
+/// apart. All rows are brought together for some pivots at a time. Collective.
+void add_shared_to_schur_complement(const SymbolicFactor& symbolic, const SharedSupernode& shared, const double* own,
+                                    std::pair<std::size_t, std::size_t> height_and_pivots, MPI_Comm comm,
+                                    double* schur_complement)
+{
+  const auto [height, pivots] = height_and_pivots;
+  const int ranks = ranks_of(comm), rows = to_int(shared.border.size());
+  std::vector<int> count(at(ranks), 0), border(at(rows)), holder(at(rows));
+  for (std::size_t i = 0; i < at(rows); ++i)
   {
-    PetscBLASInt width = std::min(most, rows - first), height = rows - first;
-    product.resize(std::max(product.size(), at(height) * at(width)));
-    BLASgemm_("N", "T", &height, &width, &pivots, &one, E + first, &n, E + first, &n, &zero, product.data(), &height);
-    for (int j = 0; j < width; ++j)
+    border[i] = shared.border[i] - symbolic.dofs;
+    holder[i] = holder_of(border[i], ranks);
+    ++count[at(holder[i])];
+  }
+  const std::size_t mine = at(count[at(rank_of(comm))]);
+  constexpr std::size_t together = 128;
+  for (std::size_t first = 0; first < pivots; first += together)
+  {
+    const std::size_t width = std::min(together, pivots - first);
+    std::vector<double> part(mine * width), all(at(rows) * width), E(all.size());
+    for (std::size_t j = 0; j < width; ++j) std::copy_n(own + (first + j) * height, mine, &part[j * mine]);
+    std::vector<int> counts(count), starts(count.size(), 0);
+    for (std::size_t p = 0; p < counts.size(); ++p)
     {
-      double* column = &schur_complement[at(positions[first + j] - symbolic.dofs) * at(border)];
-      const double* from = &product[at(j) * at(height)];
-      for (int i = j; i < height; ++i) column[positions[first + i] - symbolic.dofs] += from[i];
+      counts[p] *= static_cast<int>(width);
+      if (p > 0) starts[p] = starts[p - 1] + counts[p - 1];
     }
-  }
-}
-
-/// Sets the front to the entries of A and B in its columns, and `local` to the row in the front of each position.
-void assemble(const Front& front, const Columns& A, std::vector<int>& local)
-{
-  const std::size_t first = at(front.supernode.first), pivots = front.pivots();
-  std::fill_n(front.values, front_size(front.supernode), 0.);
-  for (std::size_t j = 0; j < pivots; ++j) local[first + j] = static_cast<int>(j);
-  for (std::size_t i = 0; i < at(front.supernode.below); ++i) local[at(front.below[i])] = static_cast<int>(pivots + i);
-  for (std::size_t j = 0; j < pivots; ++j)
-    for (std::size_t k = A.starts[first + j]; k < A.starts[first + j + 1]; ++k)
-      front.column(j)[local[at(A.rows[k])]] += A.values[k];
-}
-
-/// Adds the update that a child left, whose rows are the positions `rows`.
-void add_update(const Front& front, const Supernode& child, const int* rows, const double* update,
-                const std::vector<int>& local)
-{
-  const std::size_t below = at(child.below);
-  for (std::size_t j = 0; j < at(child.inner()); ++j)
-  {
-    double* column = front.column(at(local[at(rows[j])]));
-    for (std::size_t i = j; i < below; ++i) column[local[at(rows[i])]] += update[j * below + i];
+    MPI_Allgatherv(part.data(), to_int(part.size()), MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE,
+                   comm);
+    std::vector<std::size_t> next(starts.begin(), starts.end());
+    for (std::size_t i = 0; i < at(rows); ++i)
+    {
+      const std::size_t rank = at(holder[i]), from = next[rank]++;
+      for (std::size_t j = 0; j < width; ++j) E[j * at(rows) + i] = all[from + j * at(count[rank])];
+    }
+    add_to_schur_complement({E.data(), rows, static_cast<int>(width), border}, symbolic.border, rank_of(comm), ranks,
+                            schur_complement);
   }
 }
 
 } // namespace
 
-bool Cholesky::factorise(Triplets lower)
+Cholesky::Cholesky(Triplets own, SymbolicFactor symbolic, const RowLayout& layout, MPI_Comm comm)
+    : comm_(comm), share_(share_tree(std::move(symbolic), comm)),
+      exchange_(layout, share_.symbolic.position, share_.owner, comm)
 {
-  const Columns A = ordered(lower, symbolic_);
-  lower = {};
-  const auto [most, largest] = largest_sizes(symbolic_);
-  // Updates form a stack, since children come before parents. Its memory is not touched before it is needed.
-  const auto waiting = std::make_unique_for_overwrite<double[]>(most);
-  const auto front_values = std::make_unique_for_overwrite<double[]>(largest);
-  std::vector<double> product;
-  std::vector<int> local(at(symbolic_.dofs + symbolic_.border));
-  values_ = vector_on_large_pages(symbolic_.values);
-  schur_complement_ = vector_on_large_pages(at(symbolic_.border) * at(symbolic_.border));
-  schur_complement_.resize(schur_complement_.capacity(), 0.);
-  double* top = waiting.get();
-  for (const Supernode& supernode : symbolic_.supernodes)
+  if (ranks_of(comm) > 1) own = entries_of_columns(own, share_, comm);
+  factorise(own);
+}
+
+void Cholesky::factorise(const Triplets& own)
+{
+  const SymbolicFactor& symbolic = share_.symbolic;
+  const Columns A = ordered(own, symbolic);
+  const bool first = rank_of(comm_) == 0;
+  const std::size_t border = at(symbolic.border);
+  if (first)
   {
-    const Front front{supernode, symbolic_.rows.data() + supernode.rows_begin, front_values.get()};
-    const std::size_t pivots = front.pivots(), below = at(supernode.below);
+    schur_complement_ = vector_on_large_pages(border * border);
+    schur_complement_.resize(schur_complement_.capacity(), 0.);
+  }
+  const LazyZeros part = lazy_zeros(first ? 0 : border * border);
+  double* const sum = first ? schur_complement_.data() : part.get();
+  values_ = vector_on_large_pages(symbolic.values);
+  // Updates form a stack, since children come before parents. Its memory is not touched before it is needed.
+  const auto waiting = std::make_unique_for_overwrite<double[]>(largest_sizes(symbolic, share_.own).first);
+  int failed = !eliminate_own(A, waiting.get(), sum);
+  if (ranks_of(comm_) > 1)
+  {
+    MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_LOR, comm_);
+    if (!failed) failed = !eliminate_shared(A, sum);
+    MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_LOR, comm_);
+    if (!failed) sum_on_rank_zero(sum, symbolic.border, comm_);
+  }
+  failed_ = failed;
+}
+
+/// Packs the pivots of a front into the factor, with the rows below as one panel, or as two, split before row `split`.
+void Cholesky::pack(const Supernode& supernode, const double* front, std::size_t split)
+{
+  const std::size_t pivots = at(supernode.columns), below = at(supernode.below), height = pivots + below;
+  values_.resize(supernode.values_begin + packed_triangle(pivots) + packed_panel(split, pivots) +
+                 packed_panel(below - split, pivots));
+  double* to = pack_triangle(front, height, pivots, &values_[supernode.values_begin]);
+  to = pack_panel(front + pivots, height, split, pivots, to);
+  pack_panel(front + pivots + split, height, below - split, pivots, to);
+}
+
+/// Leaves the updates of the subtrees' roots in `waiting`.
+bool Cholesky::eliminate_own(const Columns& A, double* waiting, double* schur_complement)
+{
+  const SymbolicFactor& symbolic = share_.symbolic;
+  const auto values = std::make_unique_for_overwrite<double[]>(largest_sizes(symbolic, share_.own).second);
+  std::vector<int> local(at(symbolic.dofs + symbolic.border)), border;
+  left_.assign(share_.own, nullptr);
+  double* top = waiting;
+  for (std::size_t k = 0; k < share_.own; ++k)
+  {
+    const Supernode& supernode = symbolic.supernodes[k];
+    const Front front{supernode, rows_of(supernode), values.get()};
+    const std::size_t pivots = front.pivots(), inner = at(supernode.inner());
     assemble(front, A, local);
     for (auto number = supernode.children.rbegin(); number != supernode.children.rend(); ++number)
     {
-      const Supernode& child = symbolic_.supernodes[at(*number)];
+      const Supernode& child = symbolic.supernodes[at(*number)];
       top -= update_size(child);
-      add_update(front, child, symbolic_.rows.data() + child.rows_begin, top, local);
+      add_update(front, {at(child.inner()), {rows_of(child), at(child.below)}, top}, local);
     }
     if (!eliminate_pivots(front)) return false;
-    values_.resize(supernode.values_begin + packed_triangle(pivots) + packed_panel(below, pivots));
-    double* const rest = pack_triangle(front.values, front.height(), pivots, &values_[supernode.values_begin]);
-    pack_panel(front.values + pivots, front.height(), below, pivots, rest);
-    if (supernode.border > 0) add_to_schur_complement(front, symbolic_, product, schur_complement_);
-    for (std::size_t j = 0; j < at(supernode.inner()); ++j, top += below)
-      std::copy_n(front.column(pivots + j) + pivots, below, top);
+    pack(supernode, front.values, at(supernode.below));
+    border.clear();
+    for (std::size_t i = inner; i < at(supernode.below); ++i) border.push_back(front.below[i] - symbolic.dofs);
+    if (!border.empty())
+      add_to_schur_complement({front.values + pivots + inner, supernode.height(), supernode.columns, border},
+                              symbolic.border, 0, 1, schur_complement);
+    copy_update(front, top);
+    left_[k] = top;
+    top += update_size(supernode);
   }
   return true;
 }
 
-Cholesky::Cholesky(Triplets lower, SymbolicFactor symbolic) : symbolic_(std::move(symbolic))
+/// Continues where a pivot is not positive, since all ranks take part.
+bool Cholesky::eliminate_shared(const Columns& A, double* schur_complement)
 {
-  failed_ = !factorise(std::move(lower));
+  const SymbolicFactor& symbolic = share_.symbolic;
+  const int ranks = ranks_of(comm_), me = rank_of(comm_);
+  std::vector<int> local(at(symbolic.dofs + symbolic.border), -1);
+  updates_.resize(share_.shared.size());
+  std::vector<double> values, received;
+  bool positive = true;
+  for (std::size_t k = 0; k < share_.shared.size(); ++k)
+  {
+    const Supernode& supernode = symbolic.supernodes[share_.own + k];
+    const SharedSupernode& shared = share_.shared[k];
+    values.resize(std::max(values.size(), front_size(supernode)));
+    const Front front{supernode, rows_of(supernode), values.data()};
+    const std::size_t pivots = front.pivots(), inner = at(supernode.inner());
+    for (const int row : shared.border)
+      if (holder_of(row - symbolic.dofs, ranks) != me) local[at(row)] = -1;
+    assemble(front, A, local);
+    for (const Branch& branch : shared.branches)
+    {
+      const std::size_t size = branch.inner * branch.below.size();
+      received.resize(std::max(received.size(), size));
+      if (branch.owner == me) std::copy_n(left_[branch.root], size, received.data());
+      MPI_Bcast(received.data(), to_int(size), MPI_DOUBLE, branch.owner, comm_);
+      add_update(front, {branch.inner, branch.below, received.data()}, local);
+    }
+    for (const int number : supernode.children)
+    {
+      const Supernode& child = symbolic.supernodes[at(number)];
+      std::vector<double>& update = updates_[at(number) - share_.own];
+      add_update(front, {at(child.inner()), {rows_of(child), at(child.below)}, update.data()}, local);
+      update = {};
+    }
+    positive = eliminate_pivots(front) && positive;
+    pack(supernode, front.values, inner);
+    if (!shared.border.empty())
+      add_shared_to_schur_complement(symbolic, shared, front.values + pivots + inner, {front.height(), pivots}, comm_,
+                                     schur_complement);
+    updates_[k].resize(update_size(supernode));
+    copy_update(front, updates_[k].data());
+  }
+  updates_.clear();
+  left_.clear();
+  return positive;
 }
 
 namespace
 {
 
-/// x: entries of all positions, then those of the border, `lanes` each.
-void forward_substitution(const SymbolicFactor& symbolic, const double* values, std::size_t lanes, double* x)
+/// The triangle of a supernode and the panels below it.
+struct Packed
 {
-  std::vector<double> part;
-  for (const Supernode& supernode : symbolic.supernodes)
+  const double* triangle;
+  Panel inner, border;
+
+  /// Both panels follow each other in shared supernodes; in others `inner` holds all rows below.
+  Packed(const Supernode& supernode, const double* values, bool shared)
+      : triangle(values + supernode.values_begin), inner{}, border{}
   {
-    const std::size_t pivots = at(supernode.columns), below = at(supernode.below);
-    const double* const triangle = values + supernode.values_begin;
-    double* own = x + at(supernode.first) * lanes;
-    solve_triangle(triangle, pivots, lanes, own);
-    part.assign((below + tile) * lanes, 0.);
-    subtract_product(Panel{triangle + packed_triangle(pivots), below, pivots}, lanes, own, part.data());
-    const int* rows = symbolic.rows.data() + supernode.rows_begin;
-    for (std::size_t i = 0; i < below; ++i)
-      for (std::size_t l = 0; l < lanes; ++l) x[at(rows[i]) * lanes + l] += part[i * lanes + l];
+    const std::size_t pivots = at(supernode.columns), rows = at(shared ? supernode.inner() : supernode.below);
+    inner = {triangle + packed_triangle(pivots), rows, pivots};
+    border = {inner.values + packed_panel(rows, pivots), at(supernode.below) - rows, pivots};
   }
+};
+
+/// x at the rows -= L times the pivots' own entries.
+void subtract_below(const Panel& L, const int* rows, std::size_t lanes, const double* own, double* x,
+                    std::vector<double>& part)
+{
+  part.assign((L.rows + tile) * lanes, 0.);
+  subtract_product(L, lanes, own, part.data());
+  for (std::size_t i = 0; i < L.rows; ++i)
+    for (std::size_t l = 0; l < lanes; ++l) x[at(rows[i]) * lanes + l] += part[i * lanes + l];
 }
 
-void backward_substitution(const SymbolicFactor& symbolic, const double* values, std::size_t lanes, double* x)
+/// own -= L' times x at the rows.
+void subtract_above(const Panel& L, const int* rows, std::size_t lanes, const double* x, double* own,
+                    std::vector<double>& part)
 {
-  std::vector<double> part;
-  for (auto supernode = symbolic.supernodes.rbegin(); supernode != symbolic.supernodes.rend(); ++supernode)
-  {
-    const std::size_t pivots = at(supernode->columns), below = at(supernode->below);
-    const double* const triangle = values + supernode->values_begin;
-    double* own = x + at(supernode->first) * lanes;
-    const int* rows = symbolic.rows.data() + supernode->rows_begin;
-    part.assign((below + tile) * lanes, 0.);
-    for (std::size_t i = 0; i < below; ++i)
-      for (std::size_t l = 0; l < lanes; ++l) part[i * lanes + l] = x[at(rows[i]) * lanes + l];
-    subtract_transposed(Panel{triangle + packed_triangle(pivots), below, pivots}, lanes, part.data(), own);
-    solve_transposed_triangle(triangle, pivots, lanes, own);
-  }
+  part.assign((L.rows + tile) * lanes, 0.);
+  for (std::size_t i = 0; i < L.rows; ++i)
+    for (std::size_t l = 0; l < lanes; ++l) part[i * lanes + l] = x[at(rows[i]) * lanes + l];
+  subtract_transposed(L, lanes, part.data(), own);
 }
 
 } // namespace
 
-std::vector<double> Cholesky::forward(const std::vector<double>& b, int columns)
+std::vector<double> Cholesky::forward(std::span<const double* const> b)
 {
-  columns_ = at(columns);
+  const SymbolicFactor& symbolic = share_.symbolic;
+  columns_ = b.size();
   lanes_ = lanes_for(columns_);
-  const std::size_t dofs = at(symbolic_.dofs), border = at(symbolic_.border);
+  const std::size_t dofs = at(symbolic.dofs), border = at(symbolic.border);
   work_.assign((dofs + border + tile) * lanes_, 0.);
-  for (std::size_t i = 0; i < dofs; ++i)
-    for (std::size_t k = 0; k < columns_; ++k) work_[at(symbolic_.position[i]) * lanes_ + k] = b[k * dofs + i];
-  forward_substitution(symbolic_, values_.data(), lanes_, work_.data());
+  exchange_.gather(b, lanes_, work_);
+  double* const x = work_.data();
+  std::vector<double> part;
+  for (std::size_t k = 0; k < symbolic.supernodes.size(); ++k)
+  {
+    const Supernode& supernode = symbolic.supernodes[k];
+    const Packed packed(supernode, values_.data(), k >= share_.own);
+    double* const own = x + at(supernode.first) * lanes_;
+    if (k == share_.own) sum_shared_pivots();
+    solve_triangle(packed.triangle, at(supernode.columns), lanes_, own);
+    subtract_below(packed.inner, rows_of(supernode), lanes_, own, x, part);
+    if (packed.border.rows > 0)
+      subtract_below(packed.border, rows_of(supernode) + supernode.inner(), lanes_, own, x, part);
+  }
   std::vector<double> result(border * columns_);
   for (std::size_t i = 0; i < border; ++i)
-    for (std::size_t k = 0; k < columns_; ++k) result[k * border + i] = -work_[(dofs + i) * lanes_ + k];
+    for (std::size_t k = 0; k < columns_; ++k) result[k * border + i] = -x[(dofs + i) * lanes_ + k];
+  if (ranks_of(comm_) == 1) return result;
+  const bool first = rank_of(comm_) == 0;
+  MPI_Reduce(first ? MPI_IN_PLACE : result.data(), result.data(), to_int(result.size()), MPI_DOUBLE, MPI_SUM, 0, comm_);
+  if (!first) result.clear();
   return result;
 }
 
-void Cholesky::backward(const std::vector<double>& lambda, std::vector<double>& x)
+/// Adds up what the ranks have at the pivots of shared supernodes.
+void Cholesky::sum_shared_pivots()
 {
-  const std::size_t dofs = at(symbolic_.dofs), border = at(symbolic_.border);
+  std::vector<double> sum;
+  const auto shared = std::span(share_.symbolic.supernodes).subspan(share_.own);
+  const auto begin_of = [&](const Supernode& supernode)
+  { return work_.begin() + static_cast<std::ptrdiff_t>(at(supernode.first) * lanes_); };
+  const auto size_of = [&](const Supernode& supernode) { return at(supernode.columns) * lanes_; };
+  for (const Supernode& supernode : shared)
+    sum.insert(sum.end(), begin_of(supernode), begin_of(supernode) + static_cast<std::ptrdiff_t>(size_of(supernode)));
+  MPI_Allreduce(MPI_IN_PLACE, sum.data(), to_int(sum.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  const double* from = sum.data();
+  for (const Supernode& supernode : shared)
+  {
+    std::copy_n(from, size_of(supernode), begin_of(supernode));
+    from += size_of(supernode);
+  }
+}
+
+/// Subtracts E' lambda of all ranks from the pivots of shared supernodes.
+void Cholesky::subtract_shared_border()
+{
+  std::vector<double> sum, part;
+  const auto shared = std::span(share_.symbolic.supernodes).subspan(share_.own);
+  const auto size_of = [&](const Supernode& supernode) { return at(supernode.columns) * lanes_; };
+  for (const Supernode& supernode : shared)
+  {
+    sum.resize(sum.size() + size_of(supernode), 0.);
+    subtract_above(Packed(supernode, values_.data(), true).border, rows_of(supernode) + supernode.inner(), lanes_,
+                   work_.data(), sum.data() + sum.size() - size_of(supernode), part);
+  }
+  MPI_Allreduce(MPI_IN_PLACE, sum.data(), to_int(sum.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  const double* from = sum.data();
+  for (const Supernode& supernode : shared)
+    for (std::size_t i = 0; i < size_of(supernode); ++i) work_[at(supernode.first) * lanes_ + i] += *from++;
+}
+
+void Cholesky::backward(const std::vector<double>& lambda, std::span<double* const> x)
+{
+  const SymbolicFactor& symbolic = share_.symbolic;
+  const std::size_t dofs = at(symbolic.dofs), border = at(symbolic.border);
+  std::vector<double> of_rank_zero;
+  if (ranks_of(comm_) > 1)
+  {
+    of_rank_zero.resize(border * columns_);
+    if (rank_of(comm_) == 0) std::copy_n(lambda.begin(), of_rank_zero.size(), of_rank_zero.begin());
+    MPI_Bcast(of_rank_zero.data(), to_int(of_rank_zero.size()), MPI_DOUBLE, 0, comm_);
+  }
+  const std::vector<double>& forces = ranks_of(comm_) > 1 ? of_rank_zero : lambda;
   for (std::size_t i = 0; i < border; ++i)
-    for (std::size_t k = 0; k < columns_; ++k) work_[(dofs + i) * lanes_ + k] = lambda[k * border + i];
-  backward_substitution(symbolic_, values_.data(), lanes_, work_.data());
-  x.resize(dofs * columns_);
-  for (std::size_t i = 0; i < dofs; ++i)
-    for (std::size_t k = 0; k < columns_; ++k) x[k * dofs + i] = work_[at(symbolic_.position[i]) * lanes_ + k];
+    for (std::size_t k = 0; k < columns_; ++k) work_[(dofs + i) * lanes_ + k] = forces[k * border + i];
+  if (share_.own < symbolic.supernodes.size()) subtract_shared_border();
+  std::vector<double> part;
+  for (std::size_t k = symbolic.supernodes.size(); k-- > 0;)
+  {
+    const Supernode& supernode = symbolic.supernodes[k];
+    const Packed packed(supernode, values_.data(), k >= share_.own);
+    double* const own = work_.data() + at(supernode.first) * lanes_;
+    subtract_above(packed.inner, rows_of(supernode), lanes_, work_.data(), own, part);
+    solve_transposed_triangle(packed.triangle, at(supernode.columns), lanes_, own);
+  }
+  exchange_.scatter(work_, lanes_, x);
 }
 
 double cholesky_memory(const SymbolicFactor& symbolic)
 {
-  const auto [waiting, front] = largest_sizes(symbolic);
+  const auto [waiting, front] = largest_sizes(symbolic, symbolic.supernodes.size());
   return sizeof(double) * static_cast<double>(symbolic.values + waiting + front) +
          sizeof(int) * static_cast<double>(symbolic.rows.size());
 }

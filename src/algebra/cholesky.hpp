@@ -1,46 +1,62 @@
 #pragma once
-/// Supernodal multifrontal Cholesky factor, on one process, of a positive definite A bordered by rows B that are not
-/// eliminated (src/README.md, sections 8.1 and 8.2):
+/// Supernodal multifrontal Cholesky factor of a positive definite A bordered by rows B that are not eliminated
+/// (src/README.md, sections 8.1 and 8.2):
 ///     A = L L',   E = B L^-T,   B A^-1 B' = E E' (Schur complement),
-/// so that a solve has two halves, y = L^-1 b with E y = B A^-1 b, and x = L^-T (y - E' lambda).
-#include "symbolic_factor.hpp"
+/// so that a solve has two halves, y = L^-1 b with E y = B A^-1 b, and x = L^-T (y - E' lambda). Each rank holds its
+/// share of the elimination tree (tree_share.hpp).
+#include "position_exchange.hpp"
+#include "tree_share.hpp"
 
 namespace squeal
 {
 
+struct Columns;
+struct Front;
+
 class Cholesky
 {
 public:
-  /// `lower`: the lower triangle of A and, from row dofs + 1 on, B, whose analysis is `symbolic`.
-  Cholesky(Triplets lower, SymbolicFactor symbolic);
+  /// `own`: this rank's entries of the lower triangle of A and, from row dofs + 1 on, of B. `symbolic`: their analysis,
+  /// read on rank 0. `layout`: of the rows of A. Collective.
+  Cholesky(Triplets own, SymbolicFactor symbolic, const RowLayout& layout, MPI_Comm comm);
 
-  /// Whether A is not positive definite; the factor is then not to be used.
+  /// Whether A is not positive definite, the same on all ranks; the factor is then not to be used.
   bool failed() const { return failed_; }
 
-  /// E E' by columns, of which the lower triangle is set. Moves its storage out: call it once.
+  /// E E' by columns, of which the lower triangle is set; on rank 0. Moves its storage out: call it once.
   std::vector<double> take_schur_complement() { return std::move(schur_complement_); }
 
-  /// E L^-1 b of `columns` right-hand sides, `dofs` long each; keeps L^-1 b.
-  std::vector<double> forward(const std::vector<double>& b, int columns);
+  /// E L^-1 b, on rank 0, of right-hand sides whose own rows are given; keeps L^-1 b. Collective.
+  std::vector<double> forward(std::span<const double* const> b);
 
-  /// L^-T (L^-1 b - E' lambda) into x.
-  void backward(const std::vector<double>& lambda, std::vector<double>& x);
+  /// L^-T (L^-1 b - E' lambda) into the own rows x; lambda is read on rank 0. Collective.
+  void backward(const std::vector<double>& lambda, std::span<double* const> x);
 
-  /// Entries of L and E.
-  double entries() const { return symbolic_.entries; }
+  /// Entries of L and E on all ranks.
+  double entries() const { return share_.symbolic.entries; }
 
 private:
-  bool factorise(Triplets lower);
+  void factorise(const Triplets& own);
+  bool eliminate_own(const Columns& A, double* waiting, double* schur_complement);
+  bool eliminate_shared(const Columns& A, double* schur_complement);
+  void pack(const Supernode& supernode, const double* front, std::size_t split);
+  void sum_shared_pivots();
+  void subtract_shared_border();
+  const int* rows_of(const Supernode& supernode) const { return share_.symbolic.rows.data() + supernode.rows_begin; }
 
-  SymbolicFactor symbolic_;
-  std::vector<double> values_; // L and E, packed
+  MPI_Comm comm_;
+  TreeShare share_;
+  PositionExchange exchange_;
+  std::vector<double> values_;               // L and E, packed
+  std::vector<std::vector<double>> updates_; // of shared supernodes, until they are added to their parents
+  std::vector<const double*> left_;          // the same of own subtrees' roots
   std::vector<double> schur_complement_;
   std::vector<double> work_;            // L^-1 b: the entries of all columns at a position are neighbours
   std::size_t columns_ = 0, lanes_ = 0; // of `work_`: lanes_ - columns_ of each position are not used
   bool failed_ = false;
 };
 
-/// The largest memory that a Cholesky takes, without its Schur complement [bytes].
+/// The largest memory that a Cholesky takes on one rank, without its Schur complement [bytes].
 double cholesky_memory(const SymbolicFactor& symbolic);
 
 } // namespace squeal
