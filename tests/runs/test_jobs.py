@@ -8,9 +8,9 @@ import time
 from conftest import INPUTS, ROOT
 
 
-def job(folder, name="mu_sweep.sh", wait=True, **knobs):
+def job(folder, name="mu_sweep.sh", wait=True, arguments=(), **knobs):
     environment = os.environ | {"OUTPUT": str(folder), "RANKS": "1", "SCENE": str(INPUTS / "oscillator" / "scene.toml")} | knobs
-    run = subprocess.Popen([ROOT / "jobs" / name], cwd="/", env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    run = subprocess.Popen([ROOT / "jobs" / name, *arguments], cwd="/", env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                            text=True)
     return (run, *run.communicate(timeout=120)) if wait else run
 
@@ -44,6 +44,50 @@ def test_a_signal_ends_a_job_and_the_next_start_goes_on(tmp_path):
     report = json.loads((tmp_path / "estimate" / "report.json").read_text())
     assert report["exit_code"] == 3 and (tmp_path / "estimate" / "checkpoint").exists()
     assert not (tmp_path / "mode").exists()
+
+
+def columns_of(folder):
+    head, *rows = (line.split(",") for line in (folder / "table.csv").read_text().splitlines())
+    return {name: [row[k] for row in rows] for k, name in enumerate(head)}
+
+
+PIN = {"SCENE": str(INPUTS / "pin_on_disc" / "scene.toml")}
+QUICK = [word for stage in ("modes", "estimate", "cycle") for word in ("--set", f"{stage}.enabled=false")]
+
+
+def test_scaling_jobs_tabulate_and_draw(tmp_path):
+    run, printed, errors = job(tmp_path / "strong", "strong_scaling.sh", arguments=QUICK, COUNTS="1 2", **PIN)
+    assert run.returncode == 0, errors
+    strong = columns_of(tmp_path / "strong")
+    assert strong["ranks"] == ["1", "2"] and strong["dofs"] == ["2821", "2821"] and float(strong["whole run eff."][0]) == 1
+    reports = [json.loads((tmp_path / "strong" / f"ranks_{n}" / "report.json").read_text()) for n in (1, 2)]
+    assert [r["model"]["ranks"] for r in reports] == [1, 2]
+    t = [sum(r["timings"].values()) for r in reports]
+    assert abs(float(strong["whole run eff."][1]) - t[0] / t[1] / 2) < 0.006  # of two decimals
+    run, printed, errors = job(tmp_path / "weak", "weak_scaling.sh", arguments=QUICK, COUNTS="1 2", PER_RANK="2",
+                               KEY="mesh.parameters.divisions", **PIN)
+    assert run.returncode == 0, errors
+    weak = columns_of(tmp_path / "weak")
+    assert weak["dofs"][1] == "2821" and int(weak["dofs"][0]) < 1000
+    for kind in ("strong", "weak"):
+        assert (tmp_path / kind / "chart.png").stat().st_size > 5000
+
+
+def test_many_runs_go_side_by_side_and_skip_those_that_are_done(tmp_path):
+    knobs = {"KEY": "friction.coefficient", "VALUES": "0.1 0.2 0.3", "SIDE": "2", **PIN}
+    run, printed, errors = job(tmp_path, "many_runs.sh", arguments=QUICK, **knobs)
+    assert run.returncode == 0, errors
+    assert columns_of(tmp_path)["value"] == ["0.1", "0.2", "0.3"]
+    times = {line.split()[0]: tuple(map(float, line.split()[1:])) for line in (tmp_path / "times.txt").read_text().splitlines()}
+    first, second = sorted(times.values())[:2]
+    assert second[0] < first[1]  # two at a time
+    assert max(sum(start <= at < end for start, end in times.values()) for at, _ in times.values()) == 2
+    assert (tmp_path / "chart.png").stat().st_size > 5000
+    before = (tmp_path / "times.txt").read_bytes()
+    run, printed, errors = job(tmp_path, "many_runs.sh", arguments=QUICK, **knobs)
+    assert run.returncode == 0 and (tmp_path / "times.txt").read_bytes() == before
+    run, printed, errors = job(tmp_path / "bad", "many_runs.sh", arguments=QUICK, **{**knobs, "SCENE": "no.toml"})
+    assert run.returncode == 1 and "value_0.1: exit code 1" in (tmp_path / "bad" / "value_0.1.txt").read_text()
 
 
 def test_the_study_in_python_runs(tmp_path):
