@@ -8,7 +8,7 @@
 #SBATCH --requeue
 #SBATCH --open-mode=append
 #SBATCH --output=%x-%j.txt
-# The judge of the shooting: direct integration from the energy estimate, long enough for the transient to die out, and
+# The check of the shooting: direct integration from the energy estimate, long enough for the transient to die out, and
 # from near the equilibrium beside it (the two starts of the mean-energy figure).
 # Knobs: SCENE, PERIODS, STEPS (a period), RANKS, LAUNCH, OUTPUT, and any further arguments for squeal.
 set -eu

@@ -56,7 +56,7 @@ namespace
 {
 
 /// (Q mu^2 + (C + 2 shift M) mu + M) y = 0 of the scaled matrices, by LAPACK with the left vectors (a, b) of the
-/// companion matrix as well: those of the quadratic problem are Q^-T a.
+/// companion matrix as well. Those of the quadratic problem are Q^-T a.
 std::vector<TwoSidedPair> solve_two_sided(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
 {
   std::vector<TwoSidedPair> result;

@@ -7,7 +7,7 @@
 ///     Xc = Phi'X Phi - mu (e.B_t Phi)' L X Phi   for X = M, C + C_f, K;   L: reactions lambda_n of a force,
 /// with friction on the reactions that the motion takes. N theta steps multiply its eigenvectors (y, lambda y) by
 ///     m = [(1 + (1-theta) lambda h)/(1 - theta lambda h)]^N,   D: 1/(m - 1) + 1.
-/// At the cycle the unstable pair has become {1, a contraction}: it is taken to decay at three times the rate of its
+/// At the cycle the unstable pair has become {1, a contraction}. It is taken to decay at three times the rate of its
 /// growth, the followed one in step with the cycle. Near the onset of the instability, where the square of the
 /// amplitude limits the growth, the rate is twice; too slow a decay makes the steps too long.
 #include "squeal/cycle/limit_cycle.hpp"

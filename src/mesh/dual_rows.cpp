@@ -43,8 +43,8 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> multiplier_vectors(const Face& face, st
   return chi;
 }
 
-/// Sets the nodes' normals, and how far the chords of linear faces may stand off the surface: an arc that turns by
-/// angle between the middle and the end of a chord h stands h angle/4 above it. Twice that is allowed.
+/// Sets the nodes' normals, and how far the chords of linear faces may stand off the surface. An arc that turns by
+/// angle between the middle and the end of a chord h is h angle/4 above it. Twice that is allowed.
 void set_normals(ContactSurface& surface)
 {
   std::vector<Vec3> sum(surface.nodes.size(), Vec3{});

@@ -2,8 +2,8 @@
 ///
 /// W is slightly unsymmetric (friction of the eliminated pairs) and far from local (a few shapes carry far), so the
 /// solvers of contact/solver.hpp do not fit. The normal laws are swept over alone, each pair's friction turned as it
-/// slides at the time: a row of W a pair, in single precision, since it acts on changes only. One product with W then
-/// gives the rates, and pairs that still miss the law - those that stick or turn - are solved one by one.
+/// slides at the time. A pair has one row of W, in single precision, since it acts on changes only. One product with W
+/// then gives the rates, and pairs that still miss the law - those that stick or turn - are solved one by one.
 #include "reduced_contact.hpp"
 #include "squeal/contact/force_scale.hpp"
 

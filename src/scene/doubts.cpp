@@ -1,6 +1,6 @@
-/// Bounds of solids (Ashby, Materials Selection in Mechanical Design, charts of moduli and densities): densities from
-/// 20 kg/m3 (foams) to 22 590 (osmium), Young's moduli from 1e4 Pa (gels) to 1.3e12 (diamond), and speeds of sound
-/// sqrt(E/rho) from 10 m/s (soft rubber has 30) to 20 000 (diamond has 18 000).
+/// Bounds of solids (Ashby, Materials Selection in Mechanical Design, charts of moduli and densities). Densities go
+/// from 20 kg/m3 (foams) to 22 590 (osmium), Young's moduli from 1e4 Pa (gels) to 1.3e12 (diamond). Speeds of
+/// sound sqrt(E/rho) go from 10 m/s (soft rubber has 30) to 20 000 (diamond has 18 000).
 #include "squeal/scene/doubts.hpp"
 
 #include "squeal/base/error.hpp"

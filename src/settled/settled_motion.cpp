@@ -118,8 +118,8 @@ void name_means(SettledMotion& motion, int pairs)
   motion.greatest_energy = *greatest;
 }
 
-/// The mean fluctuating energy with half as many steps a period, from where the motion ends: of the second half of as
-/// many periods as cost a quarter of the motion's own.
+/// The mean fluctuating energy with half as many steps a period, from where the motion ends. It is of the second half
+/// of as many periods as cost a quarter of the motion's own.
 Estimated energy_by_half_the_steps(const CycleProblem& problem, const SettledMotion& motion, double theta, Vec end)
 {
   PeriodMap map{problem.sliding, problem.step, std::max(motion.steps_per_period / 2, 1), theta};

@@ -93,8 +93,8 @@ Owned<Vec> state_beside(const OrbitProblem& problem, const Attempt& attempt, dou
   return state;
 }
 
-/// The slope of a line through all but the first quarter of the logarithms, and twice its standard error as if eight
-/// values in a row were one, since neighbours are correlated.
+/// The slope of a line through all but the first quarter of the logarithms, and twice its standard error. Neighbours
+/// are correlated: eight values in a row count as one.
 SeenGrowth fit_growth(const std::vector<double>& logarithms)
 {
   const std::size_t first = logarithms.size() / 4, count = logarithms.size() - first;
@@ -115,8 +115,8 @@ SeenGrowth fit_growth(const std::vector<double>& logarithms)
   return {static_cast<long>(logarithms.size()), std::exp(slope), error * std::exp(slope)};
 }
 
-/// Distances from the orbit, without their part along the flow and over the fluctuation, at the ends of periods of a
-/// motion that begins beside it by `part` of the fluctuation. They end where the distance exceeds a third or falls to a
+/// Distances from the orbit at the ends of periods, without their part along the flow and over the fluctuation. The
+/// motion begins beside it by `part` of the fluctuation. They end where the distance exceeds a third or falls to a
 /// tenth of `part`. A shift in time leaves the flow's direction by its square.
 std::vector<double> distances_beside(const Search& search, const Attempt& attempt, double part, long periods)
 {
@@ -196,7 +196,7 @@ bool better(const Attempt& first, const Attempt& second)
   return second.answers() || (!first.converged() && second.found.orbit.residual < first.found.orbit.residual);
 }
 
-/// Whether a motion beside an orbit that repels takes so long to leave it that the search cannot see where it goes:
+/// Whether a motion beside an orbit that repels leaves it so slowly that the search cannot see where it goes. It leaves
 /// from a tenth of the fluctuation to all of it. A small model is searched all the same: its periods cost little.
 bool leaves_too_slowly(const Search& search, const Attempt& attempt, int done)
 {

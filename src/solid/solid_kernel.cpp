@@ -151,7 +151,7 @@ Eigen::Matrix<double, 3 * rows, 3 * columns> in_three_directions(const Eigen::Ma
 }
 
 /// Returns M from the scalar mass S = int rho f f' dV of the shape functions and modes, f = (N, m), and the amplitudes
-/// A of the modes: with S partitioned like f, M = S_NN + A' S_mN + S_Nm A + A' S_mm A in three directions.
+/// A of the modes. With S partitioned like f, M = S_NN + A' S_mN + S_Nm A + A' S_mm A in three directions.
 template <int n, int modes> Eigen::Matrix<double, 3 * n, 3 * n>
 mass_matrix(Shape shape, const NodePositions& X, const Kinematics<n, modes>& kinematics, double density)
 {

@@ -16,8 +16,8 @@ struct Estimated
 /// other over less than a batch. Of fewer than 16 values 4 batches; of fewer than 4 no bar (NaN).
 Estimated batch_mean(std::span<const double> series);
 
-/// Whether the means of the first quarter and of the last half agree to 1e-3, or within the bar of their difference, as
-/// the last half alone gives it (Geweke 1992).
+/// Whether the means of the first quarter and of the last half agree to 1e-3, or within the bar of their difference
+/// (Geweke 1992). The last half gives the bar.
 bool is_stationary(std::span<const double> series);
 
 /// How many values to leave out until the rest is stationary: none, an eighth, a quarter or a half; all where that does

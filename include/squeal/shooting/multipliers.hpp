@@ -25,7 +25,7 @@ enum class Stability
   not_examined,
   stable,
   unstable,
-  undecided, // a bar reaches across 1, or the Arnoldi space has not converged
+  undecided, // a bar reaches across 1, the result is not complete, or a motion beside the orbit does not grow
 };
 
 inline constexpr std::array stability_words = {"", "stable", "unstable", "undecided"};

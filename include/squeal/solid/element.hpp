@@ -36,10 +36,10 @@ ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Mat
 std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec3> x, const Material& material,
                                                 std::span<const double> u);
 
-/// Returns the resultants at the integration points of a shell under the nodal displacements u [m, rad], 6 a node:
-/// membrane forces Nx Ny Nxy = int stress dz [N/m] and moments Mx My Mxy = int z stress dz [N].
-/// Their x is along axis1 projected on the element, their z along its normal (its nodes are counter-clockwise).
-/// Throws std::runtime_error if axis1 is normal to the element.
+/// Returns resultants at the integration points of a shell under the nodal displacements u [m, rad], 6 a node. They are
+/// membrane forces Nx Ny Nxy = int stress dz [N/m] and moments Mx My Mxy = int z stress dz [N]. Their x is along axis1
+/// projected on the element, their z along its normal (its nodes are counter-clockwise). Throws std::runtime_error if
+/// axis1 is normal to the element.
 std::vector<std::array<double, 6>> shell_resultants(Shape shape, std::span<const Vec3> x, const Material& material,
                                                     double thickness, const Vec3& axis1, std::span<const double> u);
 

@@ -5,7 +5,7 @@
 ///     P_C = mean u'.C u',   P_R = mean sum w.(r_t - r_t0),  w = B_t u',
 ///     r_n = max(0, r_n0 + q Re(rho e^{i w t})),   r_t = -mu r_n s/|s|,   s = w - v_d:
 /// the interface force saturates by lift-off and by reversal of the sliding. rho is what this motion takes in the rows
-/// of the eliminated degrees of freedom at s = i w: it differs from the mode's own reaction, at lambda, by
+/// of the eliminated degrees of freedom at s = i w. It differs from the mode's own reaction, at lambda, by
 /// Re(lambda)/w.
 ///
 /// E is twice the mean kinetic energy, which is the mean energy of a free vibration (friction makes the mean potential
