@@ -1,6 +1,7 @@
 #include "squeal/algebra/root.hpp"
 
-#include <algorithm>
+#include <array>
+#include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 
 namespace squeal
@@ -8,37 +9,34 @@ namespace squeal
 
 Root find_root(const std::function<std::optional<double>(double)>& function, Bracket bracket, double tolerance)
 {
-  auto [a, b, value_a, value_b] = bracket;
-  constexpr double beside = 0.4; // of the tolerance: a zero this near an end is enclosed by the next value
-  double longest = std::abs(b - a);
-  for (int i = 0; std::abs(b - a) > tolerance; ++i)
+  struct NoValue
   {
-    double x = (a * value_b - b * value_a) / (value_b - value_a);
-    if (i % 4 == 3) // four values halve the bracket at least
-    {
-      const bool slow = 2 * std::abs(b - a) > longest;
-      longest = std::abs(b - a);
-      if (slow)
-      {
-        x = (a + b) / 2;
-        longest /= 2;
-      }
-    }
-    x = std::clamp(x, std::min(a, b) + beside * tolerance, std::max(a, b) - beside * tolerance);
+  };
+  auto [a, b, value_a, value_b] = bracket;
+  const auto narrowed = [&](double x)
+  {
     const std::optional<double> value = function(x);
-    if (!value) break;
+    if (!value) throw NoValue{};
     if ((*value > 0) == (value_b > 0))
-      value_a /= 2;
+      b = x, value_b = *value;
     else
-    {
-      a = b;
-      value_a = value_b;
-    }
-    b = x;
-    value_b = *value;
+      a = x, value_a = *value;
+    return *value;
+  };
+  const auto [low, at_low, high, at_high] =
+      a < b ? std::array{a, value_a, b, value_b} : std::array{b, value_b, a, value_a};
+  std::uintmax_t evaluations = 400;
+  try
+  {
+    boost::math::tools::toms748_solve(
+        narrowed, low, high, at_low, at_high, [&](double from, double to) { return to - from <= tolerance; },
+        evaluations);
+  }
+  catch (const NoValue&)
+  {
   }
   const double x = value_a == value_b ? (a + b) / 2 : (a * value_b - b * value_a) / (value_b - value_a);
-  return {x, std::abs(b - a)};
+  return {x, value_a == 0 || value_b == 0 ? 0 : std::abs(b - a)};
 }
 
 } // namespace squeal

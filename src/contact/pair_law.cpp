@@ -1,6 +1,7 @@
 #include "squeal/contact/pair_law.hpp"
 
 #include <algorithm>
+#include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 #include <optional>
 
@@ -176,7 +177,7 @@ bool holds(const PairVector& r, double mu)
 }
 
 /// Slip at the speed v that its own mu(v) leaves, between rest, where mu is too small to stick, and the greatest speed
-/// of constant friction. By false position (Illinois).
+/// of constant friction.
 PairVector slip_at_own_speed(const PairBlock& A, const PairVector& q, int directions, const FrictionLaw& law,
                              const PairVector& last)
 {
@@ -194,20 +195,20 @@ PairVector slip_at_own_speed(const PairBlock& A, const PairVector& q, int direct
     return length(w[1], w[2]);
   };
   const auto excess = [&](double v) { return speed_of(friction_coefficient(law, v).value) - v; };
-  double low = 0, at_low = excess(0);
+  const double at_low = excess(0);
   if (at_low <= 0) return r;
   double high = std::max(at_low, speed_of(law.coefficient)), at_high = excess(high);
   for (int doubling = 0; at_high > 0 && doubling < 60; ++doubling) high *= 2, at_high = excess(high);
-  for (int pass = 0; pass < 100 && at_high != 0 && high - low > 4e-16 * high; ++pass)
+  if (!(at_high < 0)) return r;
+  const auto rounded = [&](double v) // zero where the excess is at the rounding of v
   {
-    const double middle = (low * at_high - high * at_low) / (at_high - at_low), value = excess(middle);
-    if (middle <= low || middle >= high || value == 0) return r;
-    if ((value > 0) == (at_low > 0))
-      low = middle, at_low = value, at_high /= 2;
-    else
-      high = middle, at_high = value, at_low /= 2;
-    if (std::abs(value) <= 1e-15 * middle) return r;
-  }
+    const double value = excess(v);
+    return std::abs(value) <= 1e-15 * v ? 0 : value;
+  };
+  std::uintmax_t evaluations = 100;
+  const auto [below, above] = boost::math::tools::toms748_solve(
+      rounded, 0., high, at_low, at_high, boost::math::tools::eps_tolerance<double>(), evaluations);
+  excess((below + above) / 2); // sets r
   return r;
 }
 

@@ -19,8 +19,8 @@ struct Root
   double x = 0, error = 0;
 };
 
-/// False position (Illinois; Dowell and Jarratt 1971) with bisection where that is slow, until the bracket is no longer
-/// than `tolerance`. Where the function has no value the search ends with the bracket that it has.
+/// TOMS 748 (Alefeld, Potra and Shi 1995) until the bracket is no longer than `tolerance`. Where the function has no
+/// value the search ends with the bracket that it has.
 Root find_root(const std::function<std::optional<double>(double)>& function, Bracket bracket, double tolerance);
 
 } // namespace squeal
