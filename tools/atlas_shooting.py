@@ -10,41 +10,26 @@ from atlas_runs import OSCILLATOR, plt, run, runs, save
 from common import BLUE, GREEN, GREY, ORANGE, RED
 
 
-def cycle_look(entry, period, energy):
-    """Marker, colour and label of a cycle's outcome; `period`, `energy`: of the cycle on which direct integration settles."""
-    word = entry["outcome"]
-    if word == "converged":
-        heard = abs(entry["period"] / period - 1) < 3e-3 and abs(entry["mean_energy"] / energy - 1) < 0.03
-        return ("o", BLUE, "the cycle of direct integration") if heard else ("s", ORANGE, "another cycle that attracts")
-    return {"unstable cycle": ("D", "black", "unstable cycle"), "settled": ("P", "purple", "no cycle attracts"),
-            "collapsed to equilibrium": ("x", GREY, "collapsed to equilibrium"),
-            "not periodic": ("v", GREEN, "not periodic")
-            }.get(word, ("^", RED, "not converged"))
-
-
-def draw_basin(axes, points, heard):
-    for x, y, entry in points:
-        marker, colour, label = cycle_look(entry, *heard)
-        old = axes.get_legend_handles_labels()[1]
-        axes.plot(x, y, marker, color=colour, ms=7, label=None if label in old else label)
-
-
 def basin_map(results):
-    """Where the search leads on the oscillator, over start amplitude and free periods."""
+    """Periods until the oscillator's one cycle is found, over start amplitude and free periods."""
     amplitudes = [0.05, 0.1, 0.2, 0.35, 0.6, 1, 1.7, 3, 5, 9, 14, 20]
-    free = [0, 5, 10, 20]
     fixed = dict(transient__enabled="false", cycle__steps_per_period=100, cycle__tolerance=1e-6)
     estimate = run(results, OSCILLATOR, **dict(fixed, cycle__enabled="false"))["estimate"]["amplitude"]
-    starts = [(a, n) for n in free for a in amplitudes]
-    done = runs(results, [(OSCILLATOR, [], dict(fixed, cycle__start="mode", cycle__amplitude=a * estimate, cycle__free_periods=n))
-                          for a, n in starts])
-    figure, axes = plt.subplots(figsize=(4.8, 4.2))
-    draw_basin(axes, [(a, n, r["cycle"]) for (a, n), r in zip(starts, done)], (5.954461004653, 1.77650678461))
-    axes.set(xscale="log", xlabel="start amplitude over the estimate's", ylabel="free periods before the first attempt",
-             title="Oscillator", ylim=(-1, 30))
-    axes.legend(loc="upper left", fontsize=8)
+    period = 5.954461004653  # exact
+    figure, axes = plt.subplots(figsize=(5.4, 3.6))
+    for free, colour in zip((0, 5, 10, 20), (BLUE, ORANGE, GREEN, RED)):
+        done = [r["cycle"] for r in runs(results, [(OSCILLATOR, [], dict(fixed, cycle__start="mode", cycle__amplitude=a * estimate,
+                                                                         cycle__free_periods=free)) for a in amplitudes])]
+        found = [c["outcome"] == "converged" and abs(c["period"] / period - 1) < 3e-3 for c in done]
+        axes.plot(amplitudes, [c["periods_integrated"] for c in done], color=colour, label=f"{free} free periods")
+        for marker, wanted in (("o", True), ("x", False)):
+            chosen = [(a, c["periods_integrated"]) for a, c, ok in zip(amplitudes, done, found) if ok == wanted]
+            if chosen:
+                axes.plot(*zip(*chosen), marker, color=colour)
+    axes.set(xscale="log", xlabel="start amplitude over the estimate's", ylabel="periods integrated", ylim=(0, None),
+             title="Oscillator: dots find its cycle, crosses do not")
+    axes.legend(fontsize=8)
     save(results, "basin_map", figure)
-    print("basin_map: periods integrated", sorted(r["cycle"]["periods_integrated"] for r in done))
 
 
 def two_oscillators(folder, slower):
