@@ -5,6 +5,7 @@
 #include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"
 #include "squeal/session_options.hpp"
+#include "squeal/solver_options.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -113,6 +114,8 @@ void examine_options(Arguments& arguments, std::vector<char*>& words)
 
 void print_help()
 {
+  std::string prefixes;
+  for (const SolverPrefix& prefix : solver_prefixes) prefixes += std::string(" -") + prefix.text;
   std::printf(
       "squeal %s: friction-induced vibration of a finite-element structure\n\n"
       "  mpirun -n 2 squeal SCENE [--set key=value]… [--output DIR] [--dry-run] [options]\n\n"
@@ -131,11 +134,11 @@ void print_help()
       "  exit code: 0 all converged, 2 a stage did not (the report says which), 3 asked to end, 1 an error\n\n"
       "%s\n"
       "Algorithm options (PETSc options database) [default]\n%s\n"
-      "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes -modes_pep_ -modes_st_\n"
-      "-cycle_snes_ -cycle_full_snes_ -cycle_full_ksp_: e.g. -cycle_snes_monitor, -modes_pep_monitor,\n"
-      "-cycle_full_ksp_rtol 1e-3.\n\n"
+      "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes\n %s\n"
+      "e.g. -cycle_snes_monitor, -modes_pep_monitor, -cycle_full_ksp_rtol 1e-3.\n\n"
       "Options of the whole run, PETSc's:\n%s",
-      SQUEAL_VERSION, scene_reference().c_str(), option_reference().c_str(), session_option_reference().c_str());
+      SQUEAL_VERSION, scene_reference().c_str(), option_reference().c_str(), prefixes.c_str(),
+      session_option_reference().c_str());
 }
 
 /// The default place of the results: named after the scene's folder when the file is called scene.toml.
@@ -205,7 +208,7 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   print_sources(arguments.option_sources, comm);
   ProgramOptions options = read_program_options(comm);
   options.force = arguments.force;
-  check_solver_options(comm);
+  check_solver_options(options, comm);
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
   if (scene.mesh && arguments.allow_scripts) scene.mesh->statements = Statements::any;

@@ -2,9 +2,9 @@
 
 #include "squeal/base/petsc.hpp"
 #include "squeal/session_options.hpp"
+#include "squeal/solver_options.hpp"
 
 #include <algorithm>
-#include <array>
 #include <sstream>
 
 namespace squeal
@@ -13,30 +13,12 @@ namespace squeal
 namespace
 {
 
-constexpr std::array stages = {"equilibrium_", "modes_",   "transient_",  "cycle_",  "cycle_full_",
-                               "estimate_",    "reduced_", "attractors_", "settled_"};
-
-// What a stage hands on to a solver object, which checks the rest itself.
-constexpr std::array solver_parts = {"snes_", "ksp_", "pc_", "pep_", "eps_", "st_",
-                                     "mat_",  "bv_",  "ds_", "rg_",  "vec_"};
-
-bool begins(const std::string& name, const char* prefix)
-{
-  return name.rfind(prefix, 0) == 0;
-}
-
-template <class Prefixes> bool begins_with_one_of(const std::string& name, const Prefixes& prefixes)
-{
-  return std::any_of(prefixes.begin(), prefixes.end(), [&](const char* prefix) { return begins(name, prefix); });
-}
-
 std::string nearest_option(const std::string& option)
 {
   ProgramOptions unused;
   std::vector<std::string> known;
   for (const Option& candidate : options_of(unused)) known.push_back(candidate.name);
-  for (const char* stage : stages)
-    for (const char* part : solver_parts) known.push_back(std::string("-") + stage + part + "…");
+  for (const SolverPrefix& prefix : solver_prefixes) known.push_back(std::string("-") + prefix.text + "…");
   const std::string nearest = nearest_word(option, known);
   return nearest.empty() ? "squeal -help lists the options" : "did you mean " + nearest + "?";
 }
@@ -49,9 +31,7 @@ std::string problem_of_option_name(const std::string& name)
   ProgramOptions unused;
   const OptionList own = options_of(unused);
   if (std::any_of(own.begin(), own.end(), [&](const Option& known) { return option == known.name; })) return {};
-  if (is_session_option(name)) return {};
-  for (const char* stage : stages)
-    if (begins(name, stage) && begins_with_one_of(name.substr(std::string(stage).size()), solver_parts)) return {};
+  if (is_session_option(name) || solver_prefix_of(name)) return {};
   return "unknown option " + shortened(option) + "; " + nearest_option(option.substr(0, 60));
 }
 
@@ -88,7 +68,7 @@ ProgramOptions read_program_options(MPI_Comm comm)
   return options;
 }
 
-void check_options_used(const std::vector<std::string>& stages_run, MPI_Comm comm)
+void check_options_used(const std::vector<Stage>& stages_run, MPI_Comm comm)
 {
   PetscInt count = 0;
   char **names = nullptr, **values = nullptr;
@@ -96,17 +76,12 @@ void check_options_used(const std::vector<std::string>& stages_run, MPI_Comm com
   std::string problem;
   for (PetscInt i = 0; i < count; ++i)
   {
-    const std::string name = names[i];
-    if (is_session_option(name)) continue;
-    const auto stage =
-        std::find_if(stages.begin(), stages.end(), [&](const char* prefix) { return begins(name, prefix); });
-    const bool ran = stage == stages.end() || std::any_of(stages_run.begin(), stages_run.end(),
-                                                          [&](const std::string& run) { return run + "_" == *stage; });
-    if (ran)
-      problem += (problem.empty() ? "" : "; ") + ("option -" + name + " was never used, ") + nearest_option("-" + name);
+    const SolverPrefix* prefix = solver_prefix_of(names[i]);
+    if (!prefix || std::ranges::find(stages_run, prefix->stage) == stages_run.end()) continue;
+    problem += (problem.empty() ? "" : "; ") + ("option -" + std::string(names[i]) + " was never used");
   }
   check(PetscOptionsLeftRestore(nullptr, &count, &names, &values));
-  agree(comm, problem);
+  agree(comm, problem.empty() ? "" : problem + ": leave it out; earlier results stay as they were");
 }
 
 } // namespace squeal

@@ -37,13 +37,14 @@ struct Chain
 };
 
 /// Runs one stage under its -log_view name, times it, and prints which one is at work.
-template <class Work> auto timed(Report& report, const char* name, MPI_Comm comm, Work work)
+template <class Work> auto timed(Report& report, Stage which, MPI_Comm comm, Work work)
 {
+  const char* const name = word(which);
   const LogStage log(name);
   if (rank_of(comm) == 0) std::printf("%s …\n", name), std::fflush(stdout);
   const double start = MPI_Wtime(), processor_start = processor_time();
   auto result = work();
-  report.timings.push_back({name, MPI_Wtime() - start, processor_time() - processor_start});
+  report.timings.push_back({which, MPI_Wtime() - start, processor_time() - processor_start});
   return result;
 }
 
@@ -64,7 +65,7 @@ Outcome& outcome_of(std::vector<Estimate>& estimates)
 
 /// Runs one stage of the chain. Where the run is asked to end, the stage is left out or ends, and the later ones are
 /// left out.
-template <class Work> auto stage(Report& report, const char* name, MPI_Comm comm, Work work)
+template <class Work> auto stage(Report& report, Stage which, MPI_Comm comm, Work work)
 {
   decltype(work()) result;
   const auto leave_out = [&](const std::string& when) {
@@ -77,7 +78,7 @@ template <class Work> auto stage(Report& report, const char* name, MPI_Comm comm
   }
   try
   {
-    result = timed(report, name, comm, work);
+    result = timed(report, which, comm, work);
     if (outcome_of(result).kind == OutcomeKind::interrupted) report.ended_by = who_asked_to_end();
   }
   catch (const Interrupted&)
@@ -313,18 +314,18 @@ Sweep run_scene_sweep(const Chain& chain)
       {*scene.sweep, model_at, scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.sweep}, comm);
 }
 
-std::vector<std::string> stages_run(const Report& report)
+std::vector<Stage> stages_run(const Report& report)
 {
-  std::vector<std::string> stages;
-  for (const auto& [name, outcome] : outcomes_of(report))
-    if (has_run(outcome)) stages.emplace_back(name);
+  std::vector<Stage> stages;
+  for (const auto& [which, outcome] : outcomes_of(report))
+    if (has_run(outcome)) stages.push_back(which);
   return stages;
 }
 
 ExitCode exit_code_of(const Report& report)
 {
   if (!report.ended_by.empty()) return ExitCode::interrupted;
-  for (const auto& [name, outcome] : outcomes_of(report))
+  for (const auto& [which, outcome] : outcomes_of(report))
     if (!succeeded(outcome)) return ExitCode::not_converged;
   return ExitCode::converged;
 }
@@ -362,7 +363,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
 {
   Report report;
   report.run = results.run();
-  const Model model = timed(report, "model", comm, [&] { return build_model(scene, comm); });
+  const Model model = timed(report, Stage::model, comm, [&] { return build_model(scene, comm); });
   report.model = summary_with_doubts(model, scene, comm);
   print_model(report.model, comm);
   if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options), comm));
@@ -373,7 +374,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
     chain.cycle_file = read_state(scene.cycle.start.file, model.structure);
   const FieldNodes nodes{model.mesh, model.dofs, model.structure, model.interface};
   const auto save = [&] { write_results(report, scene, nodes, results.partial(), comm); };
-  report.equilibrium = stage(report, "equilibrium", comm,
+  report.equilibrium = stage(report, Stage::equilibrium, comm,
                              [&] { return find_equilibrium(model.structure, model.interface, options.equilibrium); });
   if (report.equilibrium.outcome.kind == OutcomeKind::converged)
   {
@@ -381,35 +382,35 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
     report.equilibrium_probes = probe_values(model.probes, report.equilibrium.u);
   }
   save();
-  report.modes = stage(report, "modes", comm, [&] { return run_modes(chain); });
-  report.estimates = stage(report, "estimate", comm, [&] { return run_estimates(chain); });
+  report.modes = stage(report, Stage::modes, comm, [&] { return run_modes(chain); });
+  report.estimates = stage(report, Stage::estimate, comm, [&] { return run_estimates(chain); });
   if (has_run(report.modes.outcome)) save();
-  report.transient = stage(report, "transient", comm, [&] { return run_transient(chain); });
+  report.transient = stage(report, Stage::transient, comm, [&] { return run_transient(chain); });
   if (has_run(report.transient.outcome)) save();
-  FittedCycle fitted = stage(report, "cycle", comm, [&] { return run_cycle(chain); });
+  FittedCycle fitted = stage(report, Stage::cycle, comm, [&] { return run_cycle(chain); });
   report.cycle = std::move(fitted.cycle);
   report.fidelity = std::move(fitted.fidelity);
   if (has_run(report.cycle.outcome)) save();
-  report.settled = stage(report, "settled", comm, [&] { return run_settled(chain); });
+  report.settled = stage(report, Stage::settled, comm, [&] { return run_settled(chain); });
   accept_settled_motion(report);
   if (has_run(report.settled.outcome)) save();
-  report.attractors = stage(report, "attractors", comm, [&] { return run_attractors(chain); });
+  report.attractors = stage(report, Stage::attractors, comm, [&] { return run_attractors(chain); });
   if (has_run(report.attractors.outcome)) save();
   if (checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
-  report.branch = stage(report, "branch", comm, [&] { return run_branch(chain); });
+  report.branch = stage(report, Stage::branch, comm, [&] { return run_branch(chain); });
   if (has_run(report.branch.outcome)) save();
-  report.sensitivity = stage(report, "sensitivity", comm, [&] { return run_sensitivity(chain); });
+  report.sensitivity = stage(report, Stage::sensitivity, comm, [&] { return run_sensitivity(chain); });
   if (has_run(report.sensitivity.outcome)) save();
-  report.sweep = stage(report, "sweep", comm, [&] { return run_scene_sweep(chain); });
+  report.sweep = stage(report, Stage::sweep, comm, [&] { return run_scene_sweep(chain); });
 
   const ExitCode code = exit_code_of(report);
   report.exit_code = static_cast<int>(code);
   report.model.memory_bytes = peak_memory(comm);
+  if (code != ExitCode::interrupted) check_options_used(stages_run(report), comm);
   save();
   results.publish(code == ExitCode::interrupted ? Checkpoints::published : Checkpoints::removed);
   print_table(report, scene, comm);
   print_end(report, results, comm);
-  if (code != ExitCode::interrupted) check_options_used(stages_run(report), comm);
   return code;
 }
 

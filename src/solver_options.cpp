@@ -1,8 +1,8 @@
-/// Options of the stages' PETSc and SLEPc objects, tried on objects that are thrown away: the stages themselves would
-/// find a wrong type or word only when they begin.
-#include "squeal/base/petsc.hpp"
-#include "squeal/options.hpp"
+#include "squeal/solver_options.hpp"
 
+#include "squeal/algebra/shift_invert.hpp"
+
+#include <algorithm>
 #include <slepcpep.h>
 
 namespace squeal
@@ -19,48 +19,24 @@ PetscErrorCode keep_message(MPI_Comm, int, const char*, const char*, PetscErrorC
   return code;
 }
 
-/// A copy of the options database in the place of the database itself, which so counts no option as used.
-class CopiedOptions
-{
-public:
-  CopiedOptions()
-  {
-    char* all = nullptr;
-    check(PetscOptionsGetAll(nullptr, &all));
-    text = all;
-    check(PetscFree(all));
-    check(PetscOptionsCreate(&copy_));
-    check(PetscOptionsInsertString(copy_, text.c_str()));
-    check(PetscOptionsPush(copy_));
-  }
-  ~CopiedOptions()
-  {
-    (void)PetscOptionsPop();
-    (void)PetscOptionsDestroy(&copy_);
-  }
-  CopiedOptions(const CopiedOptions&) = delete;
-  CopiedOptions& operator=(const CopiedOptions&) = delete;
-
-  std::string text;
-
-private:
-  PetscOptions copy_ = nullptr;
-};
-
-PetscErrorCode try_snes(const char* prefix)
+PetscErrorCode try_snes(const char* prefix, MPI_Comm comm)
 {
   SNES snes = nullptr;
-  PetscErrorCode code = SNESCreate(PETSC_COMM_SELF, &snes);
+  PetscErrorCode code = SNESCreate(comm, &snes);
   if (!code) code = SNESSetOptionsPrefix(snes, prefix);
   if (!code) code = SNESSetFromOptions(snes);
   (void)SNESDestroy(&snes);
   return code;
 }
 
-PetscErrorCode try_pep(const char* prefix)
+/// With the spectral transformation of the modes, which has a linear solver of its own.
+PetscErrorCode try_pep(const char* prefix, MPI_Comm comm)
 {
   PEP pep = nullptr;
-  PetscErrorCode code = PEPCreate(PETSC_COMM_SELF, &pep);
+  ST transformation = nullptr;
+  PetscErrorCode code = PEPCreate(comm, &pep);
+  if (!code) code = PEPGetST(pep, &transformation);
+  if (!code) use_mumps(transformation);
   if (!code) code = PEPSetOptionsPrefix(pep, prefix);
   if (!code) code = PEPSetFromOptions(pep);
   (void)PEPDestroy(&pep);
@@ -69,32 +45,73 @@ PetscErrorCode try_pep(const char* prefix)
 
 struct Trial
 {
-  const char* prefix;
-  PetscErrorCode (*run)(const char* prefix);
+  const char* object;
+  PetscErrorCode (*run)(const char* prefix, MPI_Comm comm);
 };
 
 constexpr std::array trials = {Trial{"cycle_full_", try_snes}, Trial{"cycle_", try_snes}, Trial{"modes_", try_pep}};
 
+// Parts of names that objects ask for only while they are set up or solve; a trial does not get there.
+constexpr std::array asked_later = {"_view", "_converged_reason", "_test_", "_compare_", "_mat_"};
+
+bool is_asked_later(const std::string& name)
+{
+  return std::ranges::any_of(asked_later, [&](const char* part) { return name.find(part) != std::string::npos; });
+}
+
+/// The options of solvers in the database that no one has asked for yet.
+std::vector<std::string> unused_solver_options()
+{
+  PetscInt count = 0;
+  char **names = nullptr, **values = nullptr;
+  std::vector<std::string> unused;
+  check(PetscOptionsLeftGet(nullptr, &count, &names, &values));
+  for (PetscInt i = 0; i < count; ++i)
+    if (solver_prefix_of(names[i])) unused.emplace_back(names[i]);
+  check(PetscOptionsLeftRestore(nullptr, &count, &names, &values));
+  return unused;
+}
+
+void run_trial(const Trial& trial, MPI_Comm comm)
+{
+  std::string message;
+  check(PetscPushErrorHandler(keep_message, &message));
+  const PetscErrorCode code = trial.run(trial.object, comm);
+  check(PetscPopErrorHandler());
+  if (code != PETSC_SUCCESS)
+    throw Error(std::string("options -") + trial.object +
+                "…, of PETSc's solvers: " + (message.empty() ? "a value that they do not take" : message));
+}
+
+/// Whether the run's options leave out the solver of a prefix, whatever the run finds.
+bool leaves_out(const ProgramOptions& options, const SolverPrefix& prefix)
+{
+  return prefix.stage == Stage::modes && options.modes.solver != ModesSolver::toar;
+}
+
 } // namespace
 
-void check_solver_options(MPI_Comm comm)
+const SolverPrefix* solver_prefix_of(const std::string& name)
 {
-  on_rank_zero(comm,
-               []
-               {
-                 const CopiedOptions options;
-                 for (const Trial& trial : trials)
-                 {
-                   if (options.text.find(std::string("-") + trial.prefix) == std::string::npos) continue;
-                   std::string message;
-                   check(PetscPushErrorHandler(keep_message, &message));
-                   const PetscErrorCode code = trial.run(trial.prefix);
-                   check(PetscPopErrorHandler());
-                   if (code != PETSC_SUCCESS)
-                     throw Error(std::string("options -") + trial.prefix + "…, of PETSc's solvers: " +
-                                 (message.empty() ? "a value that they do not take" : message));
-                 }
-               });
+  const auto found =
+      std::ranges::find_if(solver_prefixes, [&](const SolverPrefix& prefix) { return name.starts_with(prefix.text); });
+  return found == solver_prefixes.end() ? nullptr : &*found;
+}
+
+void check_solver_options(const ProgramOptions& options, MPI_Comm comm)
+{
+  const std::vector<std::string> given = unused_solver_options();
+  for (const Trial& trial : trials) run_trial(trial, comm);
+  std::string problem;
+  for (const std::string& name : given)
+    if (leaves_out(options, *solver_prefix_of(name)))
+      problem = "option -" + shortened(name) +
+                ": no solver of this run takes it; leave it out, or give -modes_solver toar as well";
+  for (const std::string& name : unused_solver_options())
+    if (!is_asked_later(name))
+      problem = "unknown option -" + shortened(name) + ": the solver behind -" + solver_prefix_of(name)->text +
+                "… has none of this name";
+  agree(comm, problem);
 }
 
 } // namespace squeal

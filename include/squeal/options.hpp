@@ -4,6 +4,7 @@
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/cycle/options.hpp"
+#include "squeal/report/stage.hpp"
 #include "squeal/settled/motion.hpp"
 #include "squeal/study/sweep.hpp"
 #include "squeal/transient/estimate.hpp"
@@ -40,11 +41,9 @@ std::string option_reference();
 /// PETSc starts (squeal/session_options.hpp).
 ProgramOptions read_program_options(MPI_Comm comm);
 
-/// Collective. Throws Error for options of the stages' solver objects that PETSc or SLEPc does not take.
-void check_solver_options(MPI_Comm comm);
-
-/// After the run, collective. Error for options that nobody asked for, with the nearest known ones. Options of a stage
-/// that did not run are let pass, since whether it runs is found out on the way. `stages`: those that ran ("modes", …).
-void check_options_used(const std::vector<std::string>& stages, MPI_Comm comm);
+/// After the stages, before their results are published; collective. Error: an option of a solver object that nobody
+/// asked for though its stage ran. Options of other stages are let pass, since a run finds out on its way which stages
+/// it needs.
+void check_options_used(const std::vector<Stage>& stages_run, MPI_Comm comm);
 
 } // namespace squeal

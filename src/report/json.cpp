@@ -334,32 +334,32 @@ std::string report_json(const Report& report, const Scene& scene)
     json["model"]["condensed_operator_seconds"] =
         std::max(report.transient.condensed_seconds, report.cycle.costs.condensed_seconds);
   }
-  json["equilibrium"] = equilibrium_entry(report, scene);
-  json["modes"] = modes_entry(report.modes);
-  json["estimate"] = estimate_entry(followed_estimate(report));
-  json["transient"] = transient_entry(report);
-  json["cycle"] = cycle_entry(report, scene);
-  json["settled"] = settled_entry(report, scene);
+  json[word(Stage::equilibrium)] = equilibrium_entry(report, scene);
+  json[word(Stage::modes)] = modes_entry(report.modes);
+  json[word(Stage::estimate)] = estimate_entry(followed_estimate(report));
+  json[word(Stage::transient)] = transient_entry(report);
+  json[word(Stage::cycle)] = cycle_entry(report, scene);
+  json[word(Stage::settled)] = settled_entry(report, scene);
   json["fidelity"] = fidelity_entry(report.fidelity);
-  json["attractors"] = attractors_entry(report);
-  json["branch"] = branch_entry(report, scene);
-  json["sensitivity"] = sensitivity_entry(report, scene);
-  json["sweep"] = sweep_entry(report, scene);
+  json[word(Stage::attractors)] = attractors_entry(report);
+  json[word(Stage::branch)] = branch_entry(report, scene);
+  json[word(Stage::sensitivity)] = sensitivity_entry(report, scene);
+  json[word(Stage::sweep)] = sweep_entry(report, scene);
   const Warnings warnings = warnings_of(report);
-  const auto warn = [&json](const char* stage, const std::vector<std::string>& sentences)
+  const auto warn = [&json](Stage stage, const std::vector<std::string>& sentences)
   {
-    if (!sentences.empty()) json[stage]["warnings"] = sentences;
+    if (!sentences.empty()) json[word(stage)]["warnings"] = sentences;
   };
-  warn("model", report.model.warnings);
-  warn("equilibrium", warnings.equilibrium);
-  warn("modes", warnings.modes);
-  warn("estimate", warnings.estimate);
-  warn("transient", warnings.transient);
-  warn("cycle", warnings.cycle);
+  warn(Stage::model, report.model.warnings);
+  warn(Stage::equilibrium, warnings.equilibrium);
+  warn(Stage::modes, warnings.modes);
+  warn(Stage::estimate, warnings.estimate);
+  warn(Stage::transient, warnings.transient);
+  warn(Stage::cycle, warnings.cycle);
   for (const auto& [stage, seconds, processor_seconds] : report.timings)
   {
-    json["timings"][stage] = seconds;
-    json["processor_seconds"][stage] = processor_seconds;
+    json["timings"][word(stage)] = seconds;
+    json["processor_seconds"][word(stage)] = processor_seconds;
   }
   Json libraries = Json::object();
   for (const auto& [name, version] : versions()) libraries[name] = version;

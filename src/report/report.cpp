@@ -48,18 +48,18 @@ const Estimate& followed_estimate(const Report& report)
   return report.estimates.empty() ? none : report.estimates.front();
 }
 
-std::array<std::pair<const char*, Outcome>, 10> outcomes_of(const Report& report)
+std::array<std::pair<Stage, Outcome>, 10> outcomes_of(const Report& report)
 {
-  return {{{"equilibrium", report.equilibrium.outcome},
-           {"modes", report.modes.outcome},
-           {"estimate", followed_estimate(report).outcome},
-           {"transient", report.transient.outcome},
-           {"cycle", report.cycle.outcome},
-           {"settled", report.settled.outcome},
-           {"attractors", report.attractors.outcome},
-           {"branch", report.branch.outcome},
-           {"sensitivity", report.sensitivity.outcome},
-           {"sweep", report.sweep.outcome}}};
+  return {{{Stage::equilibrium, report.equilibrium.outcome},
+           {Stage::modes, report.modes.outcome},
+           {Stage::estimate, followed_estimate(report).outcome},
+           {Stage::transient, report.transient.outcome},
+           {Stage::cycle, report.cycle.outcome},
+           {Stage::settled, report.settled.outcome},
+           {Stage::attractors, report.attractors.outcome},
+           {Stage::branch, report.branch.outcome},
+           {Stage::sensitivity, report.sensitivity.outcome},
+           {Stage::sweep, report.sweep.outcome}}};
 }
 
 std::vector<std::pair<std::string, std::string>> versions()

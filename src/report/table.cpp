@@ -224,7 +224,7 @@ std::string timings_text(const Report& report)
   std::string text;
   for (const auto& [stage, seconds, processor_seconds] : report.timings)
   {
-    text += row(text.empty() ? "time" : "", format("%10.2f s  %s", seconds, stage.c_str()));
+    text += row(text.empty() ? "time" : "", format("%10.2f s  %s", seconds, word(stage)));
     total += seconds;
   }
   return text + row("", format("%10.2f s  in all", total));

@@ -231,7 +231,7 @@ def test_unwritable_output(squeal, tmp_path):
 
 
 def test_an_unused_option_is_named(squeal):
-    """Known by its shape, but no solver asks for it: only the run can tell, so the results stand."""
+    """It has the prefix of a solver, which asks for no such option."""
     run = squeal(INPUTS / "oscillator" / "scene.toml", "--set", "cycle.enabled=false", "--set",
                  "transient.enabled=false", "-modes_pep_monitr")
     assert run.code == 1 and len(run.messages) == 1 and "-modes_pep_monitr" in run.messages[0]

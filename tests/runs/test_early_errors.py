@@ -31,6 +31,12 @@ OPTIONS = {
     "an object of PETSc's that squeal has not": (["-mat_type", "magic"], ["-mat_type"]),
     "no type of solver": (["-cycle_snes_type", "magic"], ["-cycle_", "magic"]),
     "no number for a solver": (["-modes_pep_tol", "magic"], ["-modes_", "magic"]),
+    "a solver that its stage has not": (["-reduced_ksp_rtol", "1"], ["-reduced_ksp_rtol"]),
+    "a solver that the equilibrium has not": (["-equilibrium_ksp_rtol", "1"], ["-equilibrium_ksp_rtol"]),
+    "a solver inside another": (["-cycle_ksp_rtol", "1"], ["-cycle_ksp_rtol"]),
+    "a solver that slices leave out": (["-modes_pep_tol", "1e-9"], ["-modes_pep_tol", "toar"]),
+    "no option of the eigensolver": (["-modes_solver", "toar", "-modes_pep_tool", "1"], ["-modes_pep_tool"]),
+    "no option of the linear solver": (["-cycle_full_ksp_rtoll", "1"], ["-cycle_full_ksp_rtoll"]),
     "no file of options": (["-options_file", "missing"], ["-options_file", "missing"]),
     "a log of no format": (["-log_view", "foo:bar:baz"], ["-log_view", "foo"]),
     "a log of no known format": (["-log_view", ":log.txt:magic"], ["-log_view", "ascii_xml"]),
@@ -51,6 +57,27 @@ OPTIONS = {
 def test_one_message_before_the_first_stage(squeal, name):
     given, words = OPTIONS[name]
     refused(squeal(OSCILLATOR, *given, ranks=1), *words)
+
+
+def test_options_of_solvers_are_taken(squeal):
+    """Also where the run finds out only later whether it needs the solver, and where a part of it asks for the option."""
+    run = squeal(OSCILLATOR, "--dry-run", "-modes_solver", "toar", "-modes_pep_tol", "1e-9", "-modes_st_pc_type", "lu",
+                 "-modes_st_ksp_type", "preonly", "-modes_pep_view", "-cycle_snes_monitor", "-cycle_snes_rtol", "1e-9",
+                 "-cycle_snes_linesearch_type", "basic", "-cycle_full_snes_max_it", "3", "-cycle_full_ksp_gmres_restart", "9",
+                 ranks=1)
+    assert run.code == 0, run.errors
+
+
+def test_an_option_that_turns_out_unused_leaves_earlier_results(squeal):
+    """The solver asks for it only at work, so the end of the run tells; that comes before the results take their place."""
+    given = [OSCILLATOR, "--set", "cycle.enabled=false", "--set", "transient.enabled=false"]
+    first = squeal(*given, ranks=1)
+    before = first.report
+    assert first.code == 0
+    run = squeal(*given, "--output", first.output, "-modes_solver", "toar", "-modes_pep_view_vectorz", ranks=1)
+    assert run.code == 1 and len(run.messages) == 1 and "-modes_pep_view_vectorz" in run.messages[0], run.errors
+    assert first.report == before
+    assert not first.output.with_name(first.output.name + ".partial").exists()
 
 
 def run_here(folder, *arguments, **environment):

@@ -142,7 +142,7 @@ Report full_report(const Model& model)
   report.cycle.measured.statuses = {{ContactStatus::open, ContactStatus::slip},
                                     {ContactStatus::stick, ContactStatus::slip}};
   for (int i = 0; i < 4; ++i) report.cycle.measured.displacements.push_back(ramp(model, i));
-  report.timings = {{"modes", 1.5, 1.25}};
+  report.timings = {{Stage::modes, 1.5, 1.25}};
   return report;
 }
 

@@ -6,6 +6,7 @@
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/contact/resultants.hpp"
 #include "squeal/cycle/fidelity.hpp"
+#include "squeal/report/stage.hpp"
 #include "squeal/settled/settled_motion.hpp"
 #include "squeal/study/sensitivity.hpp"
 #include "squeal/study/sweep.hpp"
@@ -33,7 +34,7 @@ struct ModelSummary
 
 struct Timing
 {
-  std::string stage;
+  Stage stage{};
   double seconds = 0;           // by the clock on the wall
   double processor_seconds = 0; // of rank 0, its waiting for others included: a busy machine does not stretch it
 };
@@ -64,8 +65,8 @@ struct Report
 /// The estimate of the followed mode.
 const Estimate& followed_estimate(const Report& report);
 
-/// The outcome of every stage, in the order they run in, by the stage's name.
-std::array<std::pair<const char*, Outcome>, 10> outcomes_of(const Report& report);
+/// The outcome of every stage but the model, in the order in which they run.
+std::array<std::pair<Stage, Outcome>, 10> outcomes_of(const Report& report);
 
 /// Where the nodes of the fields are.
 struct FieldNodes

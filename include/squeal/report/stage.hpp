@@ -1,0 +1,33 @@
+#pragma once
+/// The stages of a run, in the order in which they run, and their names.
+#include "squeal/base/words.hpp"
+
+#include <array>
+
+namespace squeal
+{
+
+enum class Stage
+{
+  model,
+  equilibrium,
+  modes,
+  estimate,
+  transient,
+  cycle,
+  settled,
+  attractors,
+  branch,
+  sensitivity,
+  sweep,
+};
+
+inline constexpr std::array stage_names = {"model",   "equilibrium", "modes",  "estimate",    "transient", "cycle",
+                                           "settled", "attractors",  "branch", "sensitivity", "sweep"};
+
+inline Words words_of(Stage)
+{
+  return stage_names;
+}
+
+} // namespace squeal
