@@ -27,7 +27,7 @@ one_run() {
   start=$(date +%s.%N)
   RANKS=1 LAUNCH="mpirun --bind-to none --host $1" squeal_run "$folder" "${SCENE:-inputs/pin_on_disc/scene.toml}" \
     --set "${KEY:-friction.coefficient}=$2" "${@:3}" >"$folder.txt" 2>&1
-  echo "$2 $start $(date +%s.%N)" >>"$output/times.txt"
+  ! ended_run "$folder" || echo "$2 $start $(date +%s.%N)" >>"$output/times.txt"
   [ "$failed" = 0 ] || echo "see $folder.txt" >&2
 }
 

@@ -90,6 +90,19 @@ def test_many_runs_go_side_by_side_and_skip_those_that_are_done(tmp_path):
     assert run.returncode == 1 and "value_0.1: exit code 1" in (tmp_path / "bad" / "value_0.1.txt").read_text()
 
 
+def test_many_runs_end_in_order_and_go_on(tmp_path):
+    knobs = {"KEY": "friction.coefficient", "VALUES": "0.3 0.4 0.5", "SIDE": "2"}
+    run = job(tmp_path, "many_runs.sh", wait=False, arguments=["--set", "cycle.enabled=false", "--set", "transient.periods=100000"], **knobs)
+    end = time.time() + 60
+    while len(list(tmp_path.glob("*.partial/history.h5"))) < 2 and time.time() < end:
+        time.sleep(0.05)
+    run.terminate()
+    run.communicate(timeout=60)
+    assert run.returncode == 3 and not (tmp_path / "times.txt").exists() and not (tmp_path / "value_0.5").exists()
+    for value in ("0.3", "0.4"):
+        assert json.loads((tmp_path / f"value_{value}" / "report.json").read_text())["exit_code"] == 3
+
+
 def test_the_study_in_python_runs(tmp_path):
     run = subprocess.run([ROOT / "jobs" / "study.py"], cwd=tmp_path, capture_output=True, text=True, timeout=200)
     assert run.returncode == 0, run.stderr
