@@ -44,6 +44,7 @@ std::vector<double> first_problem(const ThetaStep& step, const Structure& struct
 std::pair<double, int> cold_contact(const ThetaStep& step, const FrictionLaw& friction, const std::vector<double>& b,
                                     ContactSolver solver)
 {
+  const ServedProducts served(step.W);
   if (b.empty()) return {0, 0};
   ContactSettings settings = step.contact;
   settings.solver = solver;

@@ -92,7 +92,7 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
                });
   MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);
   constexpr double gigabyte = 1e9;
-  const bool too_large = ranks_of(comm) > 1 && plan.memory > options.limit * gigabyte;
+  const bool too_large = ranks_of(comm) > 1 && plan.memory / ranks_of(comm) > options.limit * gigabyte;
   if (kind == FactorKind::automatic) plan.kind = too_large ? FactorKind::mumps : FactorKind::supernodal;
   return plan;
 }
@@ -224,7 +224,7 @@ OptionList options_of(FactorOptions& options)
       {"-factor", choice_of(options.kind), Range::any,
        "of the step and of equilibrium: supernodal, mumps (both on all ranks), dense (on rank 0)"},
       {"-factor_limit", &options.limit, Range::not_negative,
-       "GB of a supernodal factor; beyond it several ranks share MUMPS's instead"},
+       "GB of a rank's share in a supernodal factor; beyond it several ranks take MUMPS"},
   };
 }
 

@@ -1,7 +1,7 @@
 #include "cholesky.hpp"
 
 #include "front.hpp"
-#include "large_pages.hpp"
+#include "squeal/algebra/large_pages.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/base/integers.hpp"
 
@@ -146,13 +146,14 @@ Cholesky::Cholesky(Triplets own, SymbolicFactor symbolic, const RowLayout& layou
       exchange_(layout, share_.symbolic.position, share_.owner, comm)
 {
   if (ranks_of(comm) > 1) own = entries_of_columns(own, share_, comm);
-  factorise(own);
+  factorise(std::move(own));
 }
 
-void Cholesky::factorise(const Triplets& own)
+void Cholesky::factorise(Triplets own)
 {
   const SymbolicFactor& symbolic = share_.symbolic;
   const Columns A = ordered(own, symbolic);
+  own = {};
   const bool first = rank_of(comm_) == 0;
   const std::size_t border = at(symbolic.border);
   if (first)

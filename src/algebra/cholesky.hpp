@@ -36,7 +36,7 @@ public:
   double entries() const { return share_.symbolic.entries; }
 
 private:
-  void factorise(const Triplets& own);
+  void factorise(Triplets own);
   bool eliminate_own(const Columns& A, double* waiting, double* schur_complement);
   bool eliminate_shared(const Columns& A, double* schur_complement);
   void pack(const Supernode& supernode, const double* front, std::size_t split);

@@ -1,4 +1,4 @@
-#include "large_pages.hpp"
+#include "squeal/algebra/large_pages.hpp"
 
 #ifdef __linux__
 #include <cstdint>

@@ -3,7 +3,9 @@
 #include "squeal/algebra/panel.hpp"
 #include "squeal/algebra/simd.hpp"
 
+#include <algorithm>
 #include <cstring>
+#include <numeric>
 
 namespace squeal
 {
@@ -18,7 +20,7 @@ using Eight = double __attribute__((vector_size(64)));
 /// y += A x for the upper triangles of symmetric matrices. With two parts an Entry belongs to one matrix, and a row of
 /// x holds v and then u of all trajectories. With one part an Entry holds those of both, and a row of x is (v, u).
 template <std::size_t parts, class Entry, class Vector>
-SQUEAL_INLINE void add_product(const PairedMatrices& matrices, const double* x, double* y)
+SQUEAL_INLINE void add_product(const PairedRows& matrices, const double* x, double* y)
 {
   constexpr std::size_t width = sizeof(Vector) / sizeof(double), stride = parts * width;
   const PetscInt* const columns = matrices.columns.data();
@@ -53,33 +55,154 @@ SQUEAL_INLINE void add_product(const PairedMatrices& matrices, const double* x, 
 }
 
 /// One trajectory. Without fused products K u of a body that moves without strain is zero to the last bit.
-void add_both(const PairedMatrices& matrices, const double* x, double* y)
+void add_both(const PairedRows& matrices, const double* x, double* y)
 {
   add_product<1, Two, Two>(matrices, x, y);
 }
 
 /// 4 or 8 trajectories.
-SQUEAL_SIMD void add_products(const PairedMatrices& matrices, std::size_t count, const double* x, double* y)
+SQUEAL_SIMD void add_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
 {
   count == 4 ? add_product<2, double, Four>(matrices, x, y) : add_product<2, double, Eight>(matrices, x, y);
 }
 
-bool is_sequential_sparse(Mat A)
+/// y += A x for columns of other ranks; Entry, Vector and the rows of x as above.
+template <std::size_t parts, class Entry, class Vector>
+SQUEAL_INLINE void add_foreign(const PairedRows& matrices, const double* x, double* y)
+{
+  constexpr std::size_t width = sizeof(Vector) / sizeof(double), stride = parts * width;
+  Entry entry;
+  Vector sum, other;
+  for (std::size_t i = 0; i + 1 < matrices.starts.size(); ++i)
+    for (std::size_t part = 0; part < parts && matrices.starts[i] < matrices.starts[i + 1]; ++part)
+    {
+      std::memcpy(&sum, y + i * stride + part * width, sizeof sum);
+      for (auto k = static_cast<std::size_t>(matrices.starts[i]); k < static_cast<std::size_t>(matrices.starts[i + 1]);
+           ++k)
+      {
+        std::memcpy(&entry, &matrices.values[k][part], sizeof entry);
+        std::memcpy(&other, x + static_cast<std::size_t>(matrices.columns[k]) * stride + part * width, sizeof other);
+        sum += entry * other;
+      }
+      std::memcpy(y + i * stride + part * width, &sum, sizeof sum);
+    }
+}
+
+void add_foreign_both(const PairedRows& matrices, const double* x, double* y)
+{
+  add_foreign<1, Two, Two>(matrices, x, y);
+}
+
+SQUEAL_SIMD void add_foreign_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
+{
+  count == 4 ? add_foreign<2, double, Four>(matrices, x, y) : add_foreign<2, double, Eight>(matrices, x, y);
+}
+
+bool is_sparse(Mat A)
 {
   PetscBool sparse = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(A), MATSEQAIJ, &sparse));
+  check(PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(A), &sparse, MATSEQAIJ, MATMPIAIJ, ""));
   return sparse;
 }
+
+/// Columns of other ranks in this rank's rows, ascending.
+std::vector<PetscInt> foreign_columns(Mat M, Mat K)
+{
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(M, &first, &last));
+  std::vector<PetscInt> columns;
+  for (Mat A : {M, K})
+    for_each_row(A,
+                 [&](PetscInt, std::span<const PetscInt> of_row, std::span<const PetscScalar>)
+                 {
+                   for (const PetscInt j : of_row)
+                     if (j < first || j >= last) columns.push_back(j);
+                 });
+  std::sort(columns.begin(), columns.end());
+  columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
+  return columns;
+}
+
+std::vector<int> starts_of(const std::vector<int>& counts)
+{
+  std::vector<int> starts(counts.size(), 0);
+  std::partial_sum(counts.begin(), counts.end() - 1, starts.begin() + 1);
+  return starts;
+}
+
+/// The exchange that brings these rows of other ranks. Collective.
+RowExchange exchange_of(std::vector<PetscInt> wanted, const RowLayout& layout, MPI_Comm comm)
+{
+  RowExchange exchange;
+  exchange.receive_counts.assign(layout.counts.size(), 0);
+  exchange.send_counts = exchange.receive_counts;
+  for (PetscInt& row : wanted)
+  {
+    const auto above = std::upper_bound(layout.starts.begin(), layout.starts.end(), row); // of empty ranks the last
+    const auto rank = above - layout.starts.begin() - 1;
+    ++exchange.receive_counts[static_cast<std::size_t>(rank)];
+    row -= layout.starts[static_cast<std::size_t>(rank)];
+  }
+  MPI_Alltoall(exchange.receive_counts.data(), 1, MPI_INT, exchange.send_counts.data(), 1, MPI_INT, comm);
+  const std::vector<int> from = starts_of(exchange.receive_counts), to = starts_of(exchange.send_counts);
+  exchange.sent.resize(static_cast<std::size_t>(to.back() + exchange.send_counts.back()));
+  MPI_Alltoallv(wanted.data(), exchange.receive_counts.data(), from.data(), MPIU_INT, exchange.sent.data(),
+                exchange.send_counts.data(), to.data(), MPIU_INT, comm);
+  return exchange;
+}
+
+/// The rows of x, `stride` numbers each, of other ranks. Collective.
+std::vector<double> rows_of_others(const RowExchange& exchange, const std::vector<double>& x, std::size_t stride,
+                                   MPI_Comm comm)
+{
+  const int width = static_cast<int>(stride);
+  std::vector<int> sent = exchange.send_counts, received = exchange.receive_counts;
+  for (std::vector<int>* counts : {&sent, &received})
+    for (int& count : *counts) count *= width;
+  const std::vector<int> to = starts_of(sent), from = starts_of(received);
+  std::vector<double> out(exchange.sent.size() * stride), in(static_cast<std::size_t>(from.back() + received.back()));
+  for (std::size_t i = 0; i < exchange.sent.size(); ++i)
+    std::copy_n(&x[static_cast<std::size_t>(exchange.sent[i]) * stride], stride, &out[i * stride]);
+  MPI_Alltoallv(out.data(), sent.data(), to.data(), MPI_DOUBLE, in.data(), received.data(), from.data(), MPI_DOUBLE,
+                comm);
+  return in;
+}
+
+/// Appends rows of two matrices side by side.
+class RowJoiner
+{
+public:
+  RowJoiner(PairedRows& rows, std::size_t columns) : rows_(rows), place_(columns, 0) {}
+
+  void add(PetscInt column, std::size_t which, double value)
+  {
+    PetscInt& here = place_[static_cast<std::size_t>(column)]; // one more than where the column's last entry is
+    if (here <= rows_.starts.back())
+    {
+      rows_.columns.push_back(column);
+      rows_.values.push_back({});
+      here = static_cast<PetscInt>(rows_.columns.size());
+    }
+    rows_.values[static_cast<std::size_t>(here) - 1][which] += value;
+  }
+
+  void end_row() { rows_.starts.push_back(static_cast<PetscInt>(rows_.columns.size())); }
+
+private:
+  PairedRows& rows_;
+  std::vector<PetscInt> place_;
+};
 
 } // namespace
 
 std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
 {
-  if (!is_sequential_sparse(M) || !is_sequential_sparse(K)) return std::nullopt;
-  PetscInt rows = 0;
-  check(MatGetSize(M, &rows, nullptr));
-  PairedMatrices matrices{{0}, {}, {}};
-  std::vector<PetscInt> place(static_cast<std::size_t>(rows), 0); // one more than where a column's last entry is
+  if (!is_sparse(M) || !is_sparse(K)) return std::nullopt;
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(M, &first, &last));
+  const std::vector<PetscInt> others = foreign_columns(M, K);
+  PairedMatrices matrices{comm_of(M), {}, {}, exchange_of(others, row_layout(M), comm_of(M))};
+  RowJoiner own(matrices.own, static_cast<std::size_t>(last - first)), foreign(matrices.foreign, others.size());
   const auto enter = [&](Mat A, PetscInt i, std::size_t which)
   {
     PetscInt count = 0;
@@ -87,28 +210,20 @@ std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
     const PetscScalar* values = nullptr;
     check(MatGetRow(A, i, &count, &columns, &values));
     for (PetscInt k = 0; k < count; ++k)
-    {
-      if (columns[k] < i) continue;
-      PetscInt& here = place[static_cast<std::size_t>(columns[k])];
-      if (here <= matrices.starts.back())
-      {
-        matrices.columns.push_back(columns[k]);
-        matrices.values.push_back({});
-        here = static_cast<PetscInt>(matrices.columns.size());
-      }
-      matrices.values[static_cast<std::size_t>(here) - 1][which] = values[k];
-    }
+      if (columns[k] < first || columns[k] >= last)
+        foreign.add(static_cast<PetscInt>(std::lower_bound(others.begin(), others.end(), columns[k]) - others.begin()),
+                    which, values[k]);
+      else if (columns[k] >= i)
+        own.add(columns[k] - first, which, values[k]);
     check(MatRestoreRow(A, i, &count, &columns, &values));
   };
-  for (PetscInt i = 0; i < rows; ++i)
+  for (PetscInt i = first; i < last; ++i)
   {
-    // a row begins with its diagonal entry, be it zero
-    place[static_cast<std::size_t>(i)] = static_cast<PetscInt>(matrices.columns.size()) + 1;
-    matrices.columns.push_back(i);
-    matrices.values.push_back({});
+    own.add(i - first, 0, 0.); // a row begins with its diagonal entry, be it zero
     enter(M, i, 0);
     enter(K, i, 1);
-    matrices.starts.push_back(static_cast<PetscInt>(matrices.columns.size()));
+    own.end_row();
+    foreign.end_row();
   }
   return matrices;
 }
@@ -116,7 +231,7 @@ std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
 void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> u,
                    std::span<const Vec> Mv, std::span<const Vec> Ku)
 {
-  const std::size_t rows = matrices.starts.size() - 1, lanes = std::min<std::size_t>(8, lanes_for(v.size()));
+  const std::size_t rows = matrices.own.starts.size() - 1, lanes = std::min<std::size_t>(8, lanes_for(v.size()));
   std::vector<double> x(2 * lanes * rows), y;
   for (std::size_t first = 0; first < v.size(); first += lanes)
   {
@@ -133,7 +248,13 @@ void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::
     for (std::size_t i = 0; i < rows; ++i)
       for (std::size_t k = 0; k < 2 * count; ++k) x[i * 2 * lanes + k / count * lanes + k % count] = from[k][i];
     y.assign(x.size(), 0.);
-    lanes == 1 ? add_both(matrices, x.data(), y.data()) : add_products(matrices, lanes, x.data(), y.data());
+    lanes == 1 ? add_both(matrices.own, x.data(), y.data()) : add_products(matrices.own, lanes, x.data(), y.data());
+    if (ranks_of(matrices.comm) > 1)
+    {
+      const std::vector<double> z = rows_of_others(matrices.exchange, x, 2 * lanes, matrices.comm);
+      lanes == 1 ? add_foreign_both(matrices.foreign, z.data(), y.data())
+                 : add_foreign_products(matrices.foreign, lanes, z.data(), y.data());
+    }
     for (std::size_t i = 0; i < rows; ++i)
       for (std::size_t k = 0; k < 2 * count; ++k) to[k][i] = y[i * 2 * lanes + k / count * lanes + k % count];
     for (std::size_t k = 0; k < count; ++k)

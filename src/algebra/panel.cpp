@@ -312,13 +312,21 @@ SQUEAL_SIMD void dense_product(const double* W, std::size_t size, std::size_t la
   lanes == 4 ? multiply<Four>(W, size, lanes, x, y) : multiply<Eight>(W, size, lanes, x, y);
 }
 
-SQUEAL_SIMD void symmetric_product(const double* W, std::size_t size, const double* x, double* y)
+SQUEAL_SIMD void add_symmetric_product(const double* W, std::size_t size, std::size_t columns, const double* x,
+                                       double* y)
 {
-  std::fill_n(y, size, 0.);
   std::size_t j = 0;
-  for (; j + tile <= size; j += tile) add_columns(W, size, j, x, y);
-  for (std::size_t k = j; k < size; ++k)
-    for (std::size_t i = j; i < size; ++i) y[k] += W[std::min(i, k) * size + std::max(i, k)] * x[i];
+  for (; j + tile <= columns; j += tile) add_columns(W, size, j, x, y);
+  for (; j < columns; ++j)
+  {
+    const double* const column = W + j * size;
+    y[j] += column[j] * x[j];
+    for (std::size_t i = j + 1; i < size; ++i)
+    {
+      y[i] += column[i] * x[j];
+      y[j] += column[i] * x[i];
+    }
+  }
 }
 
 std::size_t packed_panel(std::size_t rows, std::size_t columns)

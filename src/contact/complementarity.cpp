@@ -42,13 +42,9 @@ double relative_defect(const MatrixXd& matrix, const VectorXd& x, const VectorXd
   return scale > 0 ? (rhs - matrix * x).lpNorm<Eigen::Infinity>() / scale : 0;
 }
 
-/// Where a pivot is lost in rounding, the shortest of the least-squares solutions: pairs that share a rigid face share
-/// its load evenly.
-VectorXd solve_dense(const MatrixXd& matrix, const VectorXd& rhs)
+/// The shortest of the least-squares solutions: pairs that share a rigid face share its load evenly.
+VectorXd shortest_solution(const MatrixXd& matrix, const VectorXd& rhs)
 {
-  const Eigen::PartialPivLU<MatrixXd> factors(matrix);
-  const VectorXd pivots = factors.matrixLU().diagonal().cwiseAbs();
-  if (pivots.minCoeff() > 1e-13 * pivots.maxCoeff()) return factors.solve(rhs);
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal;
   orthogonal.setThreshold(1e-12);
   orthogonal.compute(matrix);
@@ -57,25 +53,38 @@ VectorXd solve_dense(const MatrixXd& matrix, const VectorXd& rhs)
 
 } // namespace
 
-SplitSolution solve_split(const ComplementarityProblem& problem, const std::vector<char>& closed,
-                          const std::vector<double>& rhs)
+SplitSolver::SplitSolver(const ComplementarityProblem& problem, std::vector<char> closed)
+    : closed_(std::move(closed)), compliance_(problem.compliance), matrix_(split_matrix(problem, closed_))
 {
-  const std::size_t n = problem.q.size();
+  if (closed_.empty()) return;
+  if (!matrix_.allFinite()) throw Error("contact at rest: the compliance of the pairs is not a finite number");
+  factors_.emplace(matrix_);
+  const VectorXd pivots = factors_->matrixLU().diagonal().cwiseAbs();
+  if (!(pivots.minCoeff() > 1e-13 * pivots.maxCoeff())) factors_.reset();
+}
+
+SplitSolution SplitSolver::solve(const std::vector<double>& rhs) const
+{
+  const std::size_t n = closed_.size();
   SplitSolution solution;
   solution.gap.assign(n, 0.);
   solution.reaction.assign(n, 0.);
   if (n == 0) return solution;
-  const MatrixXd matrix = split_matrix(problem, closed);
-  if (!matrix.allFinite() || !as_vector(rhs).allFinite())
-    throw Error("contact at rest: the compliance of the pairs is not a finite number");
-  const VectorXd x = solve_dense(matrix, as_vector(rhs));
-  solution.defect = relative_defect(matrix, x, as_vector(rhs));
+  if (!as_vector(rhs).allFinite()) throw Error("contact at rest: the compliance of the pairs is not a finite number");
+  const VectorXd x = factors_ ? VectorXd(factors_->solve(as_vector(rhs))) : shortest_solution(matrix_, as_vector(rhs));
+  solution.defect = relative_defect(matrix_, x, as_vector(rhs));
   for (std::size_t i = 0; i < n; ++i)
-    if (closed[i])
-      solution.reaction[i] = x[static_cast<Index>(i)] / problem.compliance;
+    if (closed_[i])
+      solution.reaction[i] = x[static_cast<Index>(i)] / compliance_;
     else
       solution.gap[i] = x[static_cast<Index>(i)];
   return solution;
+}
+
+SplitSolution solve_split(const ComplementarityProblem& problem, const std::vector<char>& closed,
+                          const std::vector<double>& rhs)
+{
+  return SplitSolver(problem, closed).solve(rhs);
 }
 
 namespace

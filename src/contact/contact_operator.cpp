@@ -116,7 +116,7 @@ void ContactOperator::multiply(std::span<const std::span<const double>> x, std::
 {
   const std::size_t n = size(), lanes = lanes_for(x.size());
   if (x.empty()) return;
-  if (lanes == 1) return symmetric_product(values_.data(), n, x[0].data(), y[0].data());
+  if (lanes == 1) return multiply_one(x[0], y[0]);
   std::vector<double> from(n * lanes), to(n * lanes);
   for (std::size_t k = 0; k < x.size(); ++k)
     for (std::size_t i = 0; i < n; ++i) from[i * lanes + k] = x[k][i];

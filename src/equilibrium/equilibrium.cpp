@@ -1,11 +1,13 @@
 #include "squeal/equilibrium/equilibrium.hpp"
 
 #include "held_stiffness.hpp"
+#include "squeal/algebra/lent_cores.hpp"
 #include "squeal/contact/complementarity.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace squeal
 {
@@ -160,22 +162,24 @@ void settle(const Held& held, const Structure& structure, const Interface& inter
             Equilibrium& equilibrium, MPI_Comm comm)
 {
   auto& [outcome, iterations, closed, gap, reaction] = search.solution;
+  std::optional<SplitSolver> solver; // on rank 0
   for (int pass = 0;; ++pass)
   {
     displace(held, structure, interface, pair_forces(interface, reaction, gap, held.kappa), equilibrium.u);
     if (pass == 2 || interface.pairs == 0) break;
     std::vector<double> error = gaps_of(interface, equilibrium.u);
     for (std::size_t i = 0; i < error.size(); ++i) error[i] -= gap[i];
-    on_rank_zero(comm,
-                 [&]
-                 {
-                   const auto change = solve_split(search.problem, closed, error);
-                   for (std::size_t i = 0; i < error.size(); ++i)
-                   {
-                     gap[i] = std::max(0., gap[i] + change.gap[i]);
-                     reaction[i] = std::max(0., reaction[i] + change.reaction[i]);
-                   }
-                 });
+    on_rank_zero_with_lent_cores(comm,
+                                 [&]
+                                 {
+                                   if (!solver) solver.emplace(search.problem, closed);
+                                   const auto change = solver->solve(error);
+                                   for (std::size_t i = 0; i < error.size(); ++i)
+                                   {
+                                     gap[i] = std::max(0., gap[i] + change.gap[i]);
+                                     reaction[i] = std::max(0., reaction[i] + change.reaction[i]);
+                                   }
+                                 });
     broadcast(gap, error.size(), comm);
     broadcast(reaction, error.size(), comm);
   }
@@ -220,7 +224,7 @@ void check_solution(const Structure& structure, const Interface& interface, cons
   const bool balanced = balances(structure, interface, equilibrium);
   const auto gap = gaps_of(interface, equilibrium.u);
   Checks checks;
-  on_rank_zero(comm, [&] { checks = check_reactions(search, gap, options); });
+  on_rank_zero_with_lent_cores(comm, [&] { checks = check_reactions(search, gap, options); });
   MPI_Bcast(&checks, sizeof checks, MPI_BYTE, 0, comm);
   equilibrium.outcome.residual = checks.residual;
   equilibrium.check_residual = checks.check_residual;
@@ -329,17 +333,18 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   if (pairs > 0)
   {
     const std::vector<double>& D = compliance.parts().D;
-    on_rank_zero(comm,
-                 [&]
-                 {
-                   const PairMatrixView view(D, pairs, interface.directions);
-                   search.D_nn = normal_compliance(view, interface, std::vector<double>(pairs, 0.));
-                   search.problem = problem_of(
-                       search.D_nn, normal_compliance(view, interface, drive_friction(interface)), held.kappa, q);
-                   search.rho = 1 / largest_eigenvalue(search.D_nn, 30);
-                   search.solution = find_split(search.problem, interface, static_cast<int>(options.max_iterations),
-                                                1.5 * search.rho, expected);
-                 });
+    on_rank_zero_with_lent_cores(
+        comm,
+        [&]
+        {
+          const PairMatrixView view(D, pairs, interface.directions);
+          search.D_nn = normal_compliance(view, interface, std::vector<double>(pairs, 0.));
+          search.problem =
+              problem_of(search.D_nn, normal_compliance(view, interface, drive_friction(interface)), held.kappa, q);
+          search.rho = 1 / largest_eigenvalue(search.D_nn, 30);
+          search.solution = find_split(search.problem, interface, static_cast<int>(options.max_iterations),
+                                       1.5 * search.rho, expected);
+        });
     share(search.solution, pairs, comm);
   }
 

@@ -167,26 +167,31 @@ void record_contact(const Interface& interface, const State& state, const std::v
     record.gap[i] += PairView(position, interface.directions).normal(i);
 }
 
+/// Solves contact of all trajectories on rank 0, for which all ranks form products with W. Returns the text of an
+/// error, on rank 0.
+std::string solve_all(const StepBatch& batch, std::vector<StepProblem>& problems)
+{
+  const ServedProducts served(batch.step.W);
+  if (rank_of(comm_of(batch.interface.B)) != 0) return {};
+  try
+  {
+    std::vector<std::size_t> unsolved(problems.size());
+    std::iota(unsolved.begin(), unsolved.end(), 0);
+    while (!unsolved.empty()) unsolved = solve_once(batch, problems, unsolved);
+  }
+  catch (const std::exception& error)
+  {
+    return error.what();
+  }
+  return {};
+}
+
 } // namespace
 
 void find_reactions(const StepBatch& batch, const std::vector<double>& Bv_free)
 {
   std::vector<StepProblem> problems = make_problems(batch, Bv_free);
-  std::string problem;
-  if (rank_of(comm_of(batch.interface.B)) == 0)
-  {
-    try
-    {
-      std::vector<std::size_t> unsolved(problems.size());
-      std::iota(unsolved.begin(), unsolved.end(), 0);
-      while (!unsolved.empty()) unsolved = solve_once(batch, problems, unsolved);
-    }
-    catch (const std::exception& error)
-    {
-      problem = error.what();
-    }
-  }
-  share_from_rank_zero(batch, problem);
+  share_from_rank_zero(batch, solve_all(batch, problems));
   for (std::size_t k = 0; k < problems.size(); ++k)
     if (StepRecord* const record = batch.works[k].record)
       record_contact(batch.interface, batch.states[k], problems[k].past, *record);

@@ -139,28 +139,33 @@ double fall_of_friction(const ThetaStep& step, const Interface& interface, const
   const double fall = steepest_fall(law_of_step(step, interface.friction));
   if (fall == 0 || interface.pairs == 0) return 0;
   double largest = 0;
-  on_rank_zero(comm_of(interface.B),
-               [&]
-               {
-                 // power iteration on sqrt(r_n) W_tt sqrt(r_n)
-                 std::vector<double> x(interface.size(), 0.), y = x;
-                 const PairView<double> start(x, interface.directions);
-                 for (std::size_t i = 0; i < start.pairs(); ++i)
-                   for (double& entry : start.tangential(i)) entry = 1 + 0.1 * std::sin(static_cast<double>(i));
-                 for (int pass = 0; pass < 30; ++pass)
-                 {
-                   const double size = std::sqrt(dot(x, x));
-                   if (size == 0) break;
-                   for (double& entry : x) entry /= size;
-                   largest = size;
-                   scale_by_roots(reactions, interface.directions, x);
-                   const std::span<const double> in = x;
-                   const std::span<double> out = y;
-                   step.W.multiply(std::span(&in, 1), std::span(&out, 1));
-                   scale_by_roots(reactions, interface.directions, y);
-                   std::swap(x, y);
-                 }
-               });
+  const auto iterate = [&]
+  {
+    // power iteration on sqrt(r_n) W_tt sqrt(r_n)
+    std::vector<double> x(interface.size(), 0.), y = x;
+    const PairView<double> start(x, interface.directions);
+    for (std::size_t i = 0; i < start.pairs(); ++i)
+      for (double& entry : start.tangential(i)) entry = 1 + 0.1 * std::sin(static_cast<double>(i));
+    for (int pass = 0; pass < 30; ++pass)
+    {
+      const double size = std::sqrt(dot(x, x));
+      if (size == 0) break;
+      for (double& entry : x) entry /= size;
+      largest = size;
+      scale_by_roots(reactions, interface.directions, x);
+      const std::span<const double> in = x;
+      const std::span<double> out = y;
+      step.W.multiply(std::span(&in, 1), std::span(&out, 1));
+      scale_by_roots(reactions, interface.directions, y);
+      std::swap(x, y);
+    }
+  };
+  on_every_rank(comm_of(interface.B),
+                [&]
+                {
+                  const ServedProducts served(step.W);
+                  if (rank_of(comm_of(interface.B)) == 0) iterate();
+                });
   MPI_Bcast(&largest, 1, MPI_DOUBLE, 0, comm_of(interface.B));
   return fall * largest;
 }

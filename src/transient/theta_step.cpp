@@ -146,6 +146,7 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.factor_seconds = MPI_Wtime() - start;
   if (rank_of(comm_of(structure.load)) == 0)
     step.W = make_contact_operator(std::move(condensed.W), interface.pairs, interface.directions);
+  step.W.share_columns(comm_of(structure.load));
   step.matrices = pair_matrices(structure.M, structure.K);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
   return step;

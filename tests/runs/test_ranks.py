@@ -1,7 +1,9 @@
-"""The same answer on 1, 2 and 3 ranks, to solver tolerance, on the small brake and on the pin."""
+"""The same answer on 1, 2 and 3 ranks, to solver tolerance, on the small brake, on the pin and on two plates."""
 
+import numpy as np
 import pytest
 from conftest import INPUTS
+from models import Mesh, bricks, lattice, quads, write_scene, write_state
 
 # The coarse mesh needs pins and a damping of its own for one weakly unstable mode: inputs/tgv/README.md.
 BRAKE = [INPUTS / "tgv" / "scene.toml", "--set", "mesh.parameters.size=4000", "--set", "mesh.parameters.pin_radius=0.0175",
@@ -80,3 +82,47 @@ def test_multipliers(scene, converged):
     first, second = (converged(*arguments, ranks=ranks).report["cycle"] for ranks in (1, 2))
     assert second["multipliers"]["method"] == first["multipliers"]["method"]
     assert largest_of(second) == pytest.approx(largest_of(first), abs=1e-6)
+
+
+SIDE = (40, 10)  # 451 pairs: their W is large enough to be shared by the ranks
+
+
+def plates(folder):
+    """Two plates of one element each, one on the other; returns the scene. Every node column crosses the one contact
+    patch, so that every partition cuts it."""
+    mesh = Mesh()
+    for name, z in (("belt", (-0.01, 0)), ("plate", (0, 0.01))):
+        nodes = mesh.add_nodes(lattice((*SIDE, 1), lambda x, y, k: (0.2 * x, 0.05 * y, z[0] + (z[1] - z[0]) * k)))
+        mesh.add(name, "brick", bricks(nodes))
+        face, back = (1, 0) if name == "belt" else (0, 1)
+        mesh.add(f"{name}:face", "quad", quads(nodes[:, :, face]))
+        mesh.add(f"{name}:back", "quad", quads(nodes[:, :, back]))
+    mesh.write(folder / "plates.msh")
+    off = {"enabled": False}
+    rubber = {"young": 1e8, "poisson": 0.3, "density": 1500}
+    return write_scene(folder, title="two plates", mesh={"file": "plates.msh"}, modes=off, estimate=off,
+                       friction={"coefficient": 0.4}, damping={"beta": 1e-6},
+                       part=[{"name": "belt"} | rubber, {"name": "plate"} | rubber],
+                       contact=[{"rotor": "belt:face", "stator": "plate:face", "velocity": [1.0, 0.0, 0.0]}],
+                       pressure=[{"on": "plate:back", "value": 1e4}], support=[{"on": "belt:back", "fixed": "all"},
+                                                                             {"on": "plate:back", "fixed": "xy"}],
+                       transient={"start": "start.state", "steps": 40, "step_size": 2e-5, "save_state": "end.state"})
+
+
+def test_a_patch_that_every_partition_cuts(module_run, tmp_path):
+    """Motion from noise through lift-off, stick and slip: 1e-8 of the largest entry after 40 steps of contact solved to
+    1e-10. Equilibrium: 1e-8 as above."""
+    nodes = (SIDE[0] + 1) * (SIDE[1] + 1)
+    scene = plates(tmp_path)
+    noise = np.random.default_rng(1).uniform(-1, 1, 7 * nodes)
+    write_state(tmp_path / "start.state", 0 * noise, 0.05 * noise)
+    reports, ends = [], []
+    for ranks in (1, 2, 3, 4):
+        reports.append(module_run(scene, ranks=ranks))
+        data = (tmp_path / "end.state").read_bytes()
+        ends.append([np.frombuffer(half[8:], ">f8") for half in (data[:len(data) // 2], data[len(data) // 2:])])
+    assert reports[0]["transient"]["contact_iterations_mean"] > 3  # pairs move
+    for report, end in zip(reports[1:], ends[1:]):
+        assert report["equilibrium"]["normal_force_max"] == pytest.approx(reports[0]["equilibrium"]["normal_force_max"], rel=1e-8)
+        for own, first in zip(end, ends[0]):
+            assert np.abs(own - first).max() < 1e-8 * np.abs(first).max()

@@ -1,4 +1,4 @@
-// ranks: 1 2 3
+// ranks: 1 2 3 4
 #include "../support/option.hpp"
 #include "../support/small_models.hpp"
 #include "squeal/contact/condensed.hpp"

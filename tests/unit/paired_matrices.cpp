@@ -1,4 +1,4 @@
-// ranks: 1 2
+// ranks: 1 2 3
 #include "squeal/algebra/paired_matrices.hpp"
 
 #include <cmath>
@@ -55,8 +55,7 @@ TEST_CASE("matrices of different patterns side by side give the products of each
 {
   const auto M = striped(41, 3), K = striped(41, 2);
   const std::optional<PairedMatrices> matrices = pair_matrices(M, K);
-  CHECK(matrices.has_value() == (ranks_of(PETSC_COMM_WORLD) == 1));
-  if (!matrices) return;
+  REQUIRE(matrices.has_value());
   for (const int count : {1, 3, 11})
   {
     std::vector<Owned<Vec>> owned;

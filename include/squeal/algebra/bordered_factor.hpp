@@ -3,8 +3,8 @@
 ///     [A  B'] [x     ]   [b]
 ///     [B  0 ] [lambda] = [*]     leaves the Schur complement -B A^-1 B' of the border.
 /// B is never eliminated. A solve has two halves: `forward` turns b into B A^-1 b, and `backward` gives x = A^-1 (b -
-/// B' lambda) for the caller's lambda. Both together cost less than two solves with A alone. Right-hand sides, several
-/// at once where there are several, pass through rank 0.
+/// B' lambda) for the caller's lambda. Both together cost less than two solves with A alone. Several right-hand sides
+/// are solved at once.
 #include "squeal/base/options.hpp"
 #include "squeal/base/petsc.hpp"
 
@@ -19,7 +19,7 @@ namespace squeal
 enum class FactorKind
 {
   automatic,  // dense if A is small or full; else supernodal, or mumps where FactorOptions::limit says so
-  supernodal, // L L' by supernodes in METIS's ordering, on rank 0; the fastest
+  supernodal, // L L' by supernodes in METIS's ordering, subtrees by ranks; the fastest
   mumps,      // MUMPS in the same ordering, spread over all ranks
   dense,      // on rank 0
 };
@@ -35,7 +35,7 @@ inline Words words_of(FactorKind)
 struct FactorOptions
 {
   FactorKind kind = FactorKind::automatic;
-  double limit = 0.3; // [GB] of a supernodal factor; beyond it several ranks share MUMPS's
+  double limit = 4; // [GB] of a rank's share in a supernodal factor; beyond it several ranks take MUMPS
 };
 
 OptionList options_of(FactorOptions& options);

@@ -1,6 +1,6 @@
 #pragma once
-/// M and K, symmetric and whole on one process, stored together (src/README.md, section 8.5). One pass through their
-/// upper triangles gives the products of both, for several trajectories at once.
+/// M and K, symmetric, stored together (src/README.md, section 8.5). One pass gives the products of both, for several
+/// trajectories at once. Of the columns that a rank owns the upper triangle is stored, of others each entry.
 #include "squeal/base/petsc.hpp"
 
 #include <array>
@@ -11,16 +11,33 @@
 namespace squeal
 {
 
-struct PairedMatrices
+/// Entries of M and K by rows: M_ij, K_ij.
+struct PairedRows
 {
-  std::vector<PetscInt> starts, columns;     // of each row, from the diagonal on
-  std::vector<std::array<double, 2>> values; // M_ij, K_ij
+  std::vector<PetscInt> starts{0}, columns{};
+  std::vector<std::array<double, 2>> values{};
 };
 
-/// Nothing unless M and K are sparse and whole on this process.
+/// Rows of vectors that ranks send each other: those that this rank sends, and the number of those it receives, of one
+/// rank after the other.
+struct RowExchange
+{
+  std::vector<PetscInt> sent{};
+  std::vector<int> send_counts{}, receive_counts{};
+};
+
+struct PairedMatrices
+{
+  MPI_Comm comm = MPI_COMM_NULL;
+  PairedRows own;     // from the diagonal on
+  PairedRows foreign; // columns of other ranks, counted in the order in which they are received
+  RowExchange exchange;
+};
+
+/// Nothing unless M and K are sparse. Collective.
 std::optional<PairedMatrices> pair_matrices(Mat M, Mat K);
 
-/// Mv = M v and Ku = K u of each.
+/// Mv = M v and Ku = K u of each. Collective.
 void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> u,
                    std::span<const Vec> Mv, std::span<const Vec> Ku);
 

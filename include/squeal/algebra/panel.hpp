@@ -46,8 +46,9 @@ void solve_triangle(const double* L, std::size_t columns, std::size_t lanes, dou
 /// x = L^-T x
 void solve_transposed_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x);
 
-/// y = W x for a symmetric W stored by columns, of which the lower triangle is read once.
-void symmetric_product(const double* W, std::size_t size, const double* x, double* y);
+/// y += the part that the first `columns` of a symmetric W have in W x. W is stored by columns, of which the lower
+/// triangle is read once.
+void add_symmetric_product(const double* W, std::size_t size, std::size_t columns, const double* x, double* y);
 
 /// y = W x for a W stored by rows and at least four lanes.
 void dense_product(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y);

@@ -7,7 +7,8 @@
 /// sign is wrong changes status. When that stops reducing their number, only the last one does. This block principal
 /// pivoting (Judice and Pires 1994) is finite when M is a P-matrix, which too much friction prevents. Beyond, a split
 /// met twice ends it.
-#include <Eigen/Core>
+#include <Eigen/LU>
+#include <optional>
 #include <vector>
 
 namespace squeal
@@ -26,8 +27,22 @@ struct SplitSolution
   double defect = 0;                 // of the linear equations, relative: not small if the split is singular
 };
 
-/// N g - M r = rhs with g = 0 on closed pairs and r = 0 on open ones; least squares where that is singular.
-/// Error: an entry is not finite.
+/// N g - M r = rhs with g = 0 on closed pairs and r = 0 on open ones, factored once for several right-hand sides; least
+/// squares where that is singular. Error: an entry is not finite.
+class SplitSolver
+{
+public:
+  SplitSolver(const ComplementarityProblem& problem, std::vector<char> closed);
+  SplitSolution solve(const std::vector<double>& rhs) const;
+
+private:
+  std::vector<char> closed_;
+  double compliance_ = 0;
+  Eigen::MatrixXd matrix_;
+  std::optional<Eigen::PartialPivLU<Eigen::MatrixXd>> factors_; // none if a pivot is lost in rounding
+};
+
+/// Of one right-hand side.
 SplitSolution solve_split(const ComplementarityProblem& problem, const std::vector<char>& closed,
                           const std::vector<double>& rhs);
 

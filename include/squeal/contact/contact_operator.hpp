@@ -6,6 +6,7 @@
 /// The near field (section 4.7) holds the blocks that matter during sweeps, in single precision. Of a row it lacks the
 /// smallest ones, whose sizes add up to a hundredth of the pair's own block. What it leaves out is met by a product
 /// with W after the sweeps, so that each such round can gain a factor of a hundred.
+#include "squeal/base/petsc.hpp"
 #include "squeal/contact/pair_law.hpp"
 
 #include <cstddef>
@@ -30,7 +31,7 @@ struct NearField
   std::vector<float> values; // run after run, the pair's rows of each run one after the other
 };
 
-/// On one rank.
+/// On rank 0. A large W gives its columns to several ranks too, which then form products together.
 class ContactOperator
 {
 public:
@@ -55,6 +56,10 @@ public:
   bool has_near_field() const { return !near_.runs.empty(); }
   double near_share() const; // entries of the near field over those of W
 
+  /// Gives every rank its part of the columns of a large W, from which products with one vector are formed from now on
+  /// within ServedProducts only. Collective.
+  void share_columns(MPI_Comm comm);
+
   /// W on these rows and columns.
   Eigen::MatrixXd submatrix(std::span<const Eigen::Index> rows) const;
 
@@ -63,13 +68,43 @@ public:
 
 private:
   friend ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
+  friend class ServedProducts;
+
+  /// Strips of eight columns of the lower triangle, one after the other, from each strip's first row on.
+  struct Strips
+  {
+    std::size_t first = 0, last = 0; // columns
+    std::vector<double> values{};    // not on rank 0, which has W
+  };
+
+  void multiply_one(std::span<const double> x, std::span<double> y) const;
+  void add_strips(std::span<const double> x, std::span<double> y) const;
+  void serve() const;
+  void end_products() const;
 
   std::size_t pairs_ = 0;
   int directions_ = 0;
   std::vector<double> values_; // by rows
   std::vector<PairBlock> diagonal_;
   std::vector<NaturalScale> scale_;
-  NearField near_; // empty: W is small
+  NearField near_;                     // empty: W is small
+  MPI_Comm shared_by_ = MPI_COMM_NULL; // the ranks that form products together
+  std::size_t rows_ = 0;               // of W, on all of them
+  Strips strips_;                      // of this rank
+};
+
+/// While rank 0 works with products that W's ranks form together, the constructor of the others serves until rank 0's
+/// object ends. Nothing where W is not shared. Collective.
+class ServedProducts
+{
+public:
+  explicit ServedProducts(const ContactOperator& W);
+  ServedProducts(const ServedProducts&) = delete;
+  ServedProducts& operator=(const ServedProducts&) = delete;
+  ~ServedProducts();
+
+private:
+  const ContactOperator& W_;
 };
 
 /// From a dense symmetric W, stored by rows. Error: the number of its entries does not fit.

@@ -26,7 +26,7 @@ namespace squeal
 struct ThetaStep
 {
   double h = 0, theta = 0.5;              // [s], [-]
-  std::optional<PairedMatrices> matrices; // M and K; not on several ranks
+  std::optional<PairedMatrices> matrices; // M and K, unless they are dense
   Factor factor;                          // of A bordered by B
   ContactOperator W;                      // on rank 0
   ContactLaw law = ContactLaw::displacement;

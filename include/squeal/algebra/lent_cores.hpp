@@ -1,0 +1,35 @@
+#pragma once
+/// Dense algebra of rank 0 on the cores of ranks that wait for it (src/README.md, section 8.8).
+#include "squeal/base/petsc.hpp"
+
+namespace squeal
+{
+
+/// While it lives, rank 0's BLAS has a thread for each rank of its node, as far as rank 0 may use their cores. The
+/// others sleep at the end of their object's life until rank 0's ends. With BLAS libraries other than OpenBLAS nothing
+/// changes. Collective.
+class LentCores
+{
+public:
+  explicit LentCores(MPI_Comm comm);
+  LentCores(const LentCores&) = delete;
+  LentCores& operator=(const LentCores&) = delete;
+  ~LentCores();
+
+private:
+  MPI_Comm comm_;
+  int threads_ = 0; // of BLAS before; 0: they were left alone
+};
+
+/// work() on rank 0 with the cores of the others. Error on every rank: what it throws.
+template <class Work> void on_rank_zero_with_lent_cores(MPI_Comm comm, Work work)
+{
+  on_every_rank(comm,
+                [&]
+                {
+                  const LentCores cores(comm);
+                  if (rank_of(comm) == 0) work();
+                });
+}
+
+} // namespace squeal

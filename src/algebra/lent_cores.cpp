@@ -1,0 +1,77 @@
+#include "squeal/algebra/lent_cores.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <dlfcn.h>
+#include <thread>
+
+#ifdef __linux__
+#include <sched.h>
+#endif
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Cores that this process may run on.
+int allowed_cores()
+{
+#ifdef __linux__
+  cpu_set_t set;
+  if (sched_getaffinity(0, sizeof set, &set) == 0) return CPU_COUNT(&set);
+#endif
+  return 1;
+}
+
+int ranks_of_node(MPI_Comm comm)
+{
+  MPI_Comm node = MPI_COMM_NULL;
+  MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node);
+  int ranks = 1;
+  MPI_Comm_size(node, &ranks);
+  MPI_Comm_free(&node);
+  return ranks;
+}
+
+template <class Function> Function* function_of_blas(const char* name)
+{
+  return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));
+}
+
+void set_threads(int threads)
+{
+  if (auto* const set = function_of_blas<void(int)>("openblas_set_num_threads")) set(threads);
+}
+
+} // namespace
+
+LentCores::LentCores(MPI_Comm comm) : comm_(comm)
+{
+  if (ranks_of(comm) == 1) return;
+  const int threads = std::min(ranks_of_node(comm), allowed_cores());
+  auto* const get = function_of_blas<int()>("openblas_get_num_threads");
+  if (rank_of(comm) != 0 || !get || get() >= threads) return;
+  threads_ = get();
+  set_threads(threads);
+}
+
+LentCores::~LentCores()
+{
+  if (ranks_of(comm_) == 1) return;
+  if (threads_ > 0) set_threads(threads_);
+  MPI_Request ended = MPI_REQUEST_NULL;
+  MPI_Ibarrier(comm_, &ended);
+  if (rank_of(comm_) == 0)
+  {
+    MPI_Wait(&ended, MPI_STATUS_IGNORE);
+    return;
+  }
+  constexpr auto pause = std::chrono::microseconds(200); // MPI's own waiting would take the core
+  int done = 0;
+  for (MPI_Test(&ended, &done, MPI_STATUS_IGNORE); !done; MPI_Test(&ended, &done, MPI_STATUS_IGNORE))
+    std::this_thread::sleep_for(pause);
+}
+
+} // namespace squeal
