@@ -47,9 +47,9 @@ void set_threads(int threads)
 
 } // namespace
 
-LentCores::LentCores(MPI_Comm comm) : comm_(comm)
+LentCores::LentCores(MPI_Comm comm, std::size_t rows) : comm_(ranks_of(comm) > 1 && rows >= 500 ? comm : MPI_COMM_NULL)
 {
-  if (ranks_of(comm) == 1) return;
+  if (comm_ == MPI_COMM_NULL) return;
   const int threads = std::min(ranks_of_node(comm), allowed_cores());
   auto* const get = function_of_blas<int()>("openblas_get_num_threads");
   if (rank_of(comm) != 0 || !get || get() >= threads) return;
@@ -59,7 +59,7 @@ LentCores::LentCores(MPI_Comm comm) : comm_(comm)
 
 LentCores::~LentCores()
 {
-  if (ranks_of(comm_) == 1) return;
+  if (comm_ == MPI_COMM_NULL) return;
   if (threads_ > 0) set_threads(threads_);
   MPI_Request ended = MPI_REQUEST_NULL;
   MPI_Ibarrier(comm_, &ended);

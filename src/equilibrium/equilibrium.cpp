@@ -169,7 +169,7 @@ void settle(const Held& held, const Structure& structure, const Interface& inter
     if (pass == 2 || interface.pairs == 0) break;
     std::vector<double> error = gaps_of(interface, equilibrium.u);
     for (std::size_t i = 0; i < error.size(); ++i) error[i] -= gap[i];
-    on_rank_zero_with_lent_cores(comm,
+    on_rank_zero_with_lent_cores(comm, static_cast<std::size_t>(interface.pairs),
                                  [&]
                                  {
                                    if (!solver) solver.emplace(search.problem, closed);
@@ -224,7 +224,8 @@ void check_solution(const Structure& structure, const Interface& interface, cons
   const bool balanced = balances(structure, interface, equilibrium);
   const auto gap = gaps_of(interface, equilibrium.u);
   Checks checks;
-  on_rank_zero_with_lent_cores(comm, [&] { checks = check_reactions(search, gap, options); });
+  on_rank_zero_with_lent_cores(comm, static_cast<std::size_t>(interface.pairs),
+                               [&] { checks = check_reactions(search, gap, options); });
   MPI_Bcast(&checks, sizeof checks, MPI_BYTE, 0, comm);
   equilibrium.outcome.residual = checks.residual;
   equilibrium.check_residual = checks.check_residual;
@@ -334,7 +335,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   {
     const std::vector<double>& D = compliance.parts().D;
     on_rank_zero_with_lent_cores(
-        comm,
+        comm, pairs,
         [&]
         {
           const PairMatrixView view(D, pairs, interface.directions);

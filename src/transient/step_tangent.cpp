@@ -4,6 +4,7 @@
 #include "squeal/transient/step_tangent.hpp"
 
 #include "linear_contact.hpp"
+#include "squeal/algebra/lent_cores.hpp"
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/run_control.hpp"
 
@@ -86,16 +87,18 @@ MatrixXd reactions(const ThetaStep& step, const Interface& interface, const Step
                    std::span<const TangentColumn> columns, MatrixXd db, const std::vector<double>& Bv_free)
 {
   MatrixXd dr = MatrixXd::Zero(db.rows(), db.cols());
-  on_rank_zero(comm_of(interface.B),
-               [&]
-               {
-                 db += MatrixXd::Map(Bv_free.data(), db.rows(), db.cols());
-                 VectorXd dmu(db.cols());
-                 for (Index k = 0; k < dmu.size(); ++k) dmu(k) = columns[static_cast<std::size_t>(k)].friction;
-                 LinearContact contact(step.W, law_of_step(step, interface.friction), record,
-                                       contact_status(interface, record.reactions, record.contact_velocity));
-                 dr = contact.response(db, dmu);
-               });
+  on_rank_zero_with_lent_cores(comm_of(interface.B), interface.size(),
+                               [&]
+                               {
+                                 db += MatrixXd::Map(Bv_free.data(), db.rows(), db.cols());
+                                 VectorXd dmu(db.cols());
+                                 for (Index k = 0; k < dmu.size(); ++k)
+                                   dmu(k) = columns[static_cast<std::size_t>(k)].friction;
+                                 LinearContact contact(
+                                     step.W, law_of_step(step, interface.friction), record,
+                                     contact_status(interface, record.reactions, record.contact_velocity));
+                                 dr = contact.response(db, dmu);
+                               });
   MPI_Bcast(dr.data(), static_cast<int>(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));
   return dr;
 }

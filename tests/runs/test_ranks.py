@@ -105,7 +105,7 @@ def plates(folder):
                        part=[{"name": "belt"} | rubber, {"name": "plate"} | rubber],
                        contact=[{"rotor": "belt:face", "stator": "plate:face", "velocity": [1.0, 0.0, 0.0]}],
                        pressure=[{"on": "plate:back", "value": 1e4}], support=[{"on": "belt:back", "fixed": "all"},
-                                                                             {"on": "plate:back", "fixed": "xy"}],
+                                                                             {"on": "plate:back", "fixed": "x y"}],
                        transient={"start": "start.state", "steps": 40, "step_size": 2e-5, "save_state": "end.state"})
 
 

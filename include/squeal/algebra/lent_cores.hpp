@@ -6,28 +6,28 @@ namespace squeal
 {
 
 /// While it lives, rank 0's BLAS has a thread for each rank of its node, as far as rank 0 may use their cores. The
-/// others sleep at the end of their object's life until rank 0's ends. With BLAS libraries other than OpenBLAS nothing
-/// changes. Collective.
+/// others sleep at the end of their object's life until rank 0's ends. Nothing changes for matrices of fewer than 500
+/// rows, nor with BLAS libraries other than OpenBLAS. Collective.
 class LentCores
 {
 public:
-  explicit LentCores(MPI_Comm comm);
+  LentCores(MPI_Comm comm, std::size_t rows);
   LentCores(const LentCores&) = delete;
   LentCores& operator=(const LentCores&) = delete;
   ~LentCores();
 
 private:
-  MPI_Comm comm_;
+  MPI_Comm comm_;   // null: nothing changes
   int threads_ = 0; // of BLAS before; 0: they were left alone
 };
 
-/// work() on rank 0 with the cores of the others. Error on every rank: what it throws.
-template <class Work> void on_rank_zero_with_lent_cores(MPI_Comm comm, Work work)
+/// work() on rank 0, on matrices of `rows` rows, with the cores of the others. Error on every rank: what it throws.
+template <class Work> void on_rank_zero_with_lent_cores(MPI_Comm comm, std::size_t rows, Work work)
 {
   on_every_rank(comm,
                 [&]
                 {
-                  const LentCores cores(comm);
+                  const LentCores cores(comm, rows);
                   if (rank_of(comm) == 0) work();
                 });
 }
