@@ -3,6 +3,7 @@
 #include "squeal/base/run_control.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/base/integers.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -107,7 +108,7 @@ Leading leading_subspace_shared(const Krylov& krylov, PetscInt count, double lea
   on_rank_zero(comm, [&] { leading = leading_subspace(krylov, count, least); });
   broadcast(leading.Q, comm);
   leading.nu.resize(leading.Q.cols());
-  MPI_Bcast(leading.nu.data(), static_cast<int>(leading.nu.size()), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
+  MPI_Bcast(leading.nu.data(), to_int(leading.nu.size()), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
   MPI_Bcast(&leading.next, 1, MPI_DOUBLE, 0, comm);
   MPI_Bcast(&leading.residual, 1, MPI_DOUBLE, 0, comm);
   return leading;

@@ -104,7 +104,7 @@ std::vector<std::size_t> wrong_pairs(const SplitSolution& split, double complian
 
 } // namespace
 
-StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, int max_iterations)
+StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, long max_iterations)
 {
   constexpr int patience = 10;
   StatusSolution result;
@@ -160,7 +160,7 @@ double unilateral_residual(const std::vector<double>& reaction, const std::vecto
 }
 
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
-                                       int max_iterations)
+                                       long max_iterations)
 {
   const std::size_t n = problem.q.size();
   const std::vector<double> scale(n, 1 / problem.compliance);

@@ -133,7 +133,7 @@ void ContactOperator::add_product(std::size_t pair, const PairVector& change, st
 
 void ContactOperator::add_near_product(std::size_t pair, const PairVector& change, std::span<float> w) const
 {
-  add_runs(near_, pair, static_cast<std::size_t>(1 + directions_), change, w.data());
+  add_runs(near_, pair, PairRows<std::size_t>(directions_).per_pair(), change, w.data());
 }
 
 double ContactOperator::near_share() const
@@ -159,7 +159,7 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
   const PairMatrixView view(W, count, directions);
   const std::size_t n = view.size();
   if (W.size() != n * n)
-    throw Error("contact: " + std::to_string(pairs) + " pairs of " + std::to_string(1 + directions) + " rows need " +
+    throw Error("contact: " + std::to_string(pairs) + " pairs of " + std::to_string(view.rows_per_pair()) + " rows need " +
                 std::to_string(n * n) + " entries of W, not " + std::to_string(W.size()));
   ContactOperator op;
   op.pairs_ = count;

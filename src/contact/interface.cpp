@@ -157,17 +157,18 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
   const std::string B = (folder / "B.petsc").string();
   if (size.columns != dofs)
     throw Error(B + ": " + std::to_string(size.columns) + " columns, but M.petsc has " + std::to_string(dofs));
-  if (size.rows != 2 * interface.pairs && size.rows != 3 * interface.pairs)
+  const std::optional<int> directions = directions_of<PetscInt>(size.rows, interface.pairs);
+  if (!directions)
     throw Error(B + ": " + std::to_string(size.rows) + " rows for the " + std::to_string(interface.pairs) +
                 " pairs of gap.petsc; each pair has its normal row and one or two tangential rows");
-  interface.directions = static_cast<int>(size.rows) / interface.pairs - 1;
+  interface.directions = *directions;
   if (interface.drive.size() != interface.gap.size() * static_cast<std::size_t>(interface.directions))
     throw Error((folder / "drive.petsc").string() + ": length " + std::to_string(interface.drive.size()) + " for " +
                 std::to_string(interface.pairs) + " pairs with " + std::to_string(interface.directions) +
                 " tangential row(s) each in B.petsc");
   const auto [first, last] = local_range(interface.pairs, comm);
   interface.B =
-      load_matrix(B, size, {PairRows<PetscInt>(interface.directions).per_pair() * (last - first), local_dofs}, comm);
+      load_matrix(B, size, {PairRows<PetscInt>(interface.directions).rows_of(last - first), local_dofs}, comm);
   check_interface(interface, folder.string(), comm);
   return interface;
 }

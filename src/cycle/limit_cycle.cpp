@@ -62,7 +62,7 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
                    {},
                    {}};
   cycle.free = std::move(found.free);
-  cycle.measured = measure_period(map, {problem.probes, static_cast<int>(options.samples)}, cycle.orbit.period,
+  cycle.measured = measure_period(map, {problem.probes, options.samples}, cycle.orbit.period,
                                   cycle.orbit.state, nullptr);
   ++cycle.convergence.periods;
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};

@@ -1,5 +1,6 @@
 #include "reduced_cycle.hpp"
 
+#include "squeal/base/integers.hpp"
 #include "step_refinement.hpp"
 
 #include "squeal/shooting/full_space.hpp"
@@ -62,7 +63,7 @@ void build_model(ReducedSearch& search, double amplitude)
                        slide_throughout(problem.sliding.interface, problem.unstable.modes.front(), amplitude);
   search.model =
       reduce(problem.sliding, problem.modes, search.active,
-             {static_cast<int>(options.modes), options.threshold, sliding, &search.real, problem.step.factor});
+             {options.modes, options.threshold, sliding, &search.real, problem.step.factor});
   search.energy = energy_matrices(search.model);
   describe_model(search);
   search.fidelity.reduction_seconds += MPI_Wtime() - clock;
@@ -158,7 +159,7 @@ void share_from_first_rank(ReducedCycle& cycle, MPI_Comm comm)
   std::vector<double> values = {cycle.converged ? 1. : 0., cycle.period, cycle.energy};
   values.insert(values.end(), cycle.state.q.begin(), cycle.state.q.end());
   values.insert(values.end(), cycle.state.v.begin(), cycle.state.v.end());
-  MPI_Bcast(values.data(), static_cast<int>(values.size()), MPI_DOUBLE, 0, comm);
+  MPI_Bcast(values.data(), to_int(values.size()), MPI_DOUBLE, 0, comm);
   cycle.converged = values[0] > 0;
   cycle.period = values[1];
   cycle.energy = values[2];
@@ -174,7 +175,7 @@ std::string size_refusal(const ReducedSearch& search)
   PetscInt dofs = 0;
   check(VecGetSize(problem.sliding.structure.load, &dofs));
   const std::size_t shapes = std::min(problem.modes.size(), static_cast<std::size_t>(search.options.reduced.modes)) +
-                             search.active.size() * static_cast<std::size_t>(1 + problem.sliding.interface.directions);
+                             PairRows<std::size_t>(problem.sliding.interface.directions).rows_of(search.active.size());
   if (2 * shapes <= static_cast<std::size_t>(dofs)) return {};
   return "a reduced model of " + std::to_string(shapes) + " shapes is not small next to " + std::to_string(dofs) +
          " degrees of freedom";

@@ -125,7 +125,7 @@ void make_flow(const CycleCorrection& correction, MeasuredFlow& result)
   result.map.reactions = problem.sliding.equilibrium.reactions;
   result.map.options.contact.tolerance =
       std::min(result.map.options.contact.tolerance, 1e-3 * correction.fidelity.accuracy);
-  const Recording recording{problem.probes, static_cast<int>(correction.options.samples)};
+  const Recording recording{problem.probes, correction.options.samples};
   const auto integrate = [&result, recording](double period, Vec from, Vec end, Vec rate)
   {
     result.measured = measure_period(result.map, recording, period, from, rate);

@@ -2,6 +2,7 @@
 
 #include "held_stiffness.hpp"
 #include "squeal/algebra/lent_cores.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/contact/complementarity.hpp"
 
 #include <algorithm>
@@ -16,9 +17,9 @@ namespace
 {
 
 /// Iterations of the fixed point that checks the reactions.
-int check_iterations(const EquilibriumOptions& options, int pairs)
+PetscInt check_iterations(const EquilibriumOptions& options, std::size_t pairs)
 {
-  if (options.check_max_iterations >= 0) return static_cast<int>(options.check_max_iterations);
+  if (options.check_max_iterations >= 0) return options.check_max_iterations;
   return pairs <= 600 ? 20000 : 0;
 }
 
@@ -105,7 +106,7 @@ std::vector<char> first_split(const ComplementarityProblem& problem, const Inter
 }
 
 /// The status iteration, with a second chance from the fixed point's set where friction makes it cycle.
-StatusSolution find_split(const ComplementarityProblem& problem, const Interface& interface, int max_iterations,
+StatusSolution find_split(const ComplementarityProblem& problem, const Interface& interface, PetscInt max_iterations,
                           double rho, const std::vector<char>& expected)
 {
   if (expected.size() == problem.q.size())
@@ -121,12 +122,6 @@ StatusSolution find_split(const ComplementarityProblem& problem, const Interface
   StatusSolution again = solve_by_status(problem, std::move(closed), max_iterations);
   again.iterations += solution.iterations;
   return again;
-}
-
-void broadcast(std::vector<double>& values, std::size_t size, MPI_Comm comm)
-{
-  values.resize(size);
-  MPI_Bcast(values.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm);
 }
 
 /// Sets the force residual. Returns whether it is small, or at the rounding of K u: a soft support lets u be large
@@ -180,8 +175,8 @@ void settle(const Held& held, const Structure& structure, const Interface& inter
                                      reaction[i] = std::max(0., reaction[i] + change.reaction[i]);
                                    }
                                  });
-    broadcast(gap, error.size(), comm);
-    broadcast(reaction, error.size(), comm);
+    broadcast(gap, comm);
+    broadcast(reaction, comm);
   }
 }
 
@@ -205,7 +200,7 @@ Checks check_reactions(const Search& search, const std::vector<double>& gap, con
   checks.residual = unilateral_residual(reaction, gap, rho, gap);
   if (search.problem.N.size() > 0) return checks;
   checks.uniqueness = has_one_solution(search.problem) ? Uniqueness::assured : Uniqueness::not_assured;
-  const int limit = check_iterations(options, static_cast<int>(pairs));
+  const PetscInt limit = check_iterations(options, pairs);
   if (limit == 0 || pairs == 0) return checks;
   const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12, limit);
   checks.check_iterations = run.iterations;
@@ -259,10 +254,11 @@ void share(StatusSolution& solution, std::size_t pairs, MPI_Comm comm)
 {
   MPI_Bcast(&solution.outcome, sizeof solution.outcome, MPI_BYTE, 0, comm);
   MPI_Bcast(&solution.iterations, 1, MPI_INT, 0, comm);
-  solution.closed.resize(pairs);
-  MPI_Bcast(solution.closed.data(), static_cast<int>(pairs), MPI_CHAR, 0, comm);
-  broadcast(solution.gap, pairs, comm);
-  broadcast(solution.reaction, pairs, comm);
+  solution.gap.resize(pairs); // empty where none was found
+  solution.reaction.resize(pairs);
+  broadcast(solution.closed, comm);
+  broadcast(solution.gap, comm);
+  broadcast(solution.reaction, comm);
 }
 
 /// What nothing touches and nothing loads stays where it is, held or free: the modes of a free body need no support.
@@ -343,8 +339,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
           search.problem =
               problem_of(search.D_nn, normal_compliance(view, interface, drive_friction(interface)), held.kappa, q);
           search.rho = 1 / largest_eigenvalue(search.D_nn, 30);
-          search.solution = find_split(search.problem, interface, static_cast<int>(options.max_iterations),
-                                       1.5 * search.rho, expected);
+          search.solution = find_split(search.problem, interface, options.max_iterations, 1.5 * search.rho, expected);
         });
     share(search.solution, pairs, comm);
   }

@@ -1,14 +1,11 @@
-/// States: energies, copies, and files. A file is two PETSc binary vectors: class id, length, entries, all big-endian.
+/// States: energies, copies, and files. A file is two PETSc binary vectors (solid/binary.hpp).
 #include "squeal/equilibrium/state.hpp"
 
 #include "squeal/base/whole_file.hpp"
 #include "squeal/equilibrium/file_order.hpp"
+#include "squeal/solid/binary.hpp"
 
-#include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 
 namespace squeal
@@ -26,14 +23,6 @@ double half_quadratic_form(Mat A, Vec x)
   return product / 2;
 }
 
-/// A big-endian integer of the width this PETSc writes.
-PetscInt read_integer(std::istream& stream, std::size_t width)
-{
-  PetscInt value = 0;
-  for (std::size_t i = 0; i < width; ++i) value = (value << 8) | (stream.get() & 0xff);
-  return value;
-}
-
 /// What is wrong with a state file, before any rank opens it through PETSc; throws Error.
 void check_state_file(const std::filesystem::path& file, PetscInt size)
 {
@@ -42,19 +31,18 @@ void check_state_file(const std::filesystem::path& file, PetscInt size)
   if (!is_file(file) || !stream)
     throw Error(name + " cannot be read: write one with save_state, or correct the path of transient.start");
 
-  const auto header = static_cast<std::streamoff>(sizeof(int) + sizeof(PetscInt));
+  const auto header = static_cast<std::streamoff>(vector_header_size);
   const auto bytes = static_cast<std::streamoff>(std::filesystem::file_size(file));
   std::streamoff at = 0;
   for (const char* part : {"displacement", "velocity"})
   {
-    stream.seekg(at);
-    const PetscInt id = bytes < at + header ? 0 : read_integer(stream, sizeof(int));
-    const PetscInt length = bytes < at + header ? 0 : read_integer(stream, sizeof(PetscInt));
     if (bytes < at + header && at > 0)
       throw Error(name + " ends after the displacement: it must hold two vectors, displacement and velocity");
-    if (id != VEC_FILE_CLASSID) throw Error(name + " is not a PETSc binary vector (" + part + ")");
-    if (length != size)
-      throw Error(name + ": the " + part + " has " + std::to_string(length) + " entries, the structure has " +
+    stream.seekg(at);
+    const std::optional<PetscInt> length = read_vector_header(stream);
+    if (!length) throw Error(name + " is not a PETSc binary vector (" + part + ")");
+    if (*length != size)
+      throw Error(name + ": the " + part + " has " + std::to_string(*length) + " entries, the structure has " +
                   std::to_string(size) + " degrees of freedom; it was written by another scene or mesh");
     at += header + static_cast<std::streamoff>(sizeof(double)) * size;
     if (bytes < at)
@@ -63,36 +51,11 @@ void check_state_file(const std::filesystem::path& file, PetscInt size)
   }
 }
 
-/// The order of bytes of a big-endian machine.
-template <class Number> void append_big_endian(Number number, std::string& bytes)
-{
-  std::array<char, sizeof number> own{};
-  std::memcpy(own.data(), &number, sizeof number);
-  if constexpr (std::endian::native == std::endian::little) std::reverse(own.begin(), own.end());
-  bytes.append(own.data(), own.size());
-}
-
-/// As a PETSc binary vector.
-void append_vector(const std::vector<double>& entries, std::string& bytes)
-{
-  append_big_endian(static_cast<int>(VEC_FILE_CLASSID), bytes);
-  append_big_endian(static_cast<PetscInt>(entries.size()), bytes);
-  for (const double entry : entries) append_big_endian(entry, bytes);
-}
-
 /// The entries of the next vector of a file that was checked.
-std::vector<double> read_entries(std::istream& stream, PetscInt size)
+std::vector<double> next_vector(std::istream& stream)
 {
-  stream.seekg(static_cast<std::streamoff>(sizeof(int) + sizeof(PetscInt)), std::ios::cur);
-  std::vector<double> entries(static_cast<std::size_t>(size));
-  for (double& entry : entries)
-  {
-    std::array<char, sizeof entry> bytes{};
-    stream.read(bytes.data(), bytes.size());
-    if constexpr (std::endian::native == std::endian::little) std::reverse(bytes.begin(), bytes.end());
-    std::memcpy(&entry, bytes.data(), sizeof entry);
-  }
-  return entries;
+  const std::optional<PetscInt> length = read_vector_header(stream);
+  return read_vector_entries(stream, *length);
 }
 
 void require_finite(Vec x, const std::string& what)
@@ -144,8 +107,8 @@ State read_state(const std::filesystem::path& file, const Structure& structure)
                {
                  check_state_file(file, size);
                  std::ifstream stream(file, std::ios::binary);
-                 u = read_entries(stream, size);
-                 v = read_entries(stream, size);
+                 u = next_vector(stream);
+                 v = next_vector(stream);
                });
   const FileOrder order(structure);
   State state{zeros_like(structure.load), zeros_like(structure.load), 0, {}};

@@ -139,7 +139,7 @@ PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution
 
 CountedSolution solve_full(const ModesProblem& problem, RealCount& real)
 {
-  const int limit = static_cast<int>(problem.options.dense_limit);
+  const PetscInt limit = problem.options.dense_limit;
   const double band = problem.settings.band, end = 2 * std::numbers::pi * band;
   PetscInt n = 0;
   check(MatGetSize(problem.linearised.K_z, &n, nullptr));
@@ -175,7 +175,7 @@ QuadraticSolution solve_by_projection(const ModesProblem& problem)
   if (static_cast<int>(basis.omega.size()) < wanted) basis = solve_real_modes(M, K, wanted, options);
   return solve_projected(
       problem.reduced, M, K, basis,
-      {settings.band, settings.residual_passes, static_cast<int>(options.candidates), options.pencil});
+      {settings.band, settings.residual_passes, options.candidates, options.pencil});
 }
 
 int unstable_in(const std::vector<ComplexMode>& modes)

@@ -176,7 +176,7 @@ Inertia inertia_at(double limit, ShiftInvert& pencil)
 
 /// The modes with theta < limit, at most `count` of them. One factor just below zero finds them, and one above the last
 /// of them counts them. A space grown from one vector may miss copies of multiple modes; those are sought again.
-RealModes search_from_below_zero(Mat M, Mat K, double limit, int count, const PencilOptions& options)
+RealModes search_from_below_zero(Mat M, Mat K, double limit, PetscInt count, const PencilOptions& options)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
@@ -186,7 +186,7 @@ RealModes search_from_below_zero(Mat M, Mat K, double limit, int count, const Pe
   if (std::isfinite(limit)) inertia = inertia_at(limit, pencil);
   RealPairs found{.x = empty_multivector(K)};
   RealModes modes;
-  int missing = inertia ? inertia->below : count;
+  PetscInt missing = inertia ? inertia->below : count;
   for (int attempt = 0; attempt < 6 && missing > 0 && found.x.columns() < n; ++attempt)
   {
     move_to(pencil, shift);
@@ -196,13 +196,14 @@ RealModes search_from_below_zero(Mat M, Mat K, double limit, int count, const Pe
     // The count lies above the last mode by 1e-6 of its distance from the shift, far above the error of theta.
     if (!inertia && found.theta.size() >= count)
       inertia = inertia_at(found.theta[count - 1] + 1e-6 * (found.theta[count - 1] - shift), pencil);
-    missing = inertia ? inertia->below - found.number_below(inertia->limit) : count - to_int(found.theta.size());
+    missing = inertia ? inertia->below - found.number_below(inertia->limit)
+                      : count - static_cast<PetscInt>(found.theta.size());
   }
   modes.outcome.kind = missing == 0 ? OutcomeKind::converged : OutcomeKind::not_converged;
   if (missing != 0)
     modes.outcome.reason = std::to_string(found.theta.size()) + " real modes found, and the inertia says that " +
                            std::to_string(missing) + " are missing";
-  const Index kept = std::min(count, found.number_below(limit));
+  const Index kept = std::min<Index>(count, found.number_below(limit));
   found = {found.theta.head(kept), {found.x.comm, found.x.entries.leftCols(kept)}};
   modes.outcome.residual = largest_residual(found, M, K);
   for (Index k = 0; k < kept; ++k)
@@ -295,13 +296,13 @@ std::vector<double> omegas_between(RealCount& count, double least, double top)
   return omega;
 }
 
-RealModes solve_real_modes(Mat M, Mat K, int count, const ModesOptions& options)
+RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& options)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
   if (count <= 0) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (n <= options.dense_limit) return first_of(solve_whole(M, K), K, count);
-  return search_from_below_zero(M, K, HUGE_VAL, static_cast<int>(std::min<PetscInt>(count, n)), options.pencil);
+  return search_from_below_zero(M, K, HUGE_VAL, std::min(count, n), options.pencil);
 }
 
 RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options)

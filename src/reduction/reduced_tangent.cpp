@@ -4,6 +4,7 @@
 #include "squeal/reduction/reduced_tangent.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/base/integers.hpp"
 #include "squeal/contact/sliding_direction.hpp"
 
 #include <Eigen/LU>
@@ -176,7 +177,7 @@ MatrixXd gathered(const MatrixXd& own, Index columns, MPI_Comm comm)
 {
   MatrixXd result = MatrixXd::Zero(own.rows(), columns);
   result.middleCols(share_of(columns, comm).first, own.cols()) = own;
-  MPI_Allreduce(MPI_IN_PLACE, result.data(), static_cast<int>(result.size()), MPI_DOUBLE, MPI_SUM, comm);
+  MPI_Allreduce(MPI_IN_PLACE, result.data(), to_int(result.size()), MPI_DOUBLE, MPI_SUM, comm);
   return result;
 }
 
@@ -212,7 +213,7 @@ std::vector<RecordedContact> recorded_contacts(const ReducedModel& model, int di
                                                std::span<const StepRecord> records)
 {
   std::vector<RecordedContact> contacts;
-  const auto rows = static_cast<Index>(model.active.size()) * (1 + model.directions);
+  const auto rows = PairRows<Index>(model.directions).rows_of(static_cast<Index>(model.active.size()));
   for (const StepRecord& record : records)
   {
     RecordedContact& contact = contacts.emplace_back(RecordedContact{VectorXd(rows), VectorXd(rows), {}});

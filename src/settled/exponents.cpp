@@ -39,10 +39,10 @@ std::vector<double> orthonormalise(const Flow& flow, std::vector<Owned<Vec>>& co
 
 } // namespace
 
-TangentBundle make_bundle(const Flow& flow, Vec like, int count)
+TangentBundle make_bundle(const Flow& flow, Vec like, PetscInt count)
 {
   TangentBundle bundle;
-  for (int k = 0; k < count; ++k)
+  for (PetscInt k = 0; k < count; ++k)
   {
     Owned<Vec> column = zeros_like(like);
     fill(displacement(column), k, 0.3);

@@ -80,7 +80,7 @@ ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, Ve
                               const SettledOptions& options)
 {
   ExaminedMotion motion;
-  TangentBundle bundle = make_bundle(flow, state, static_cast<int>(options.exponents));
+  TangentBundle bundle = make_bundle(flow, state, options.exponents);
   Progress progress(comm_of(displacement(state)), "settled", static_cast<double>(options.periods));
   const auto most = static_cast<std::size_t>(options.periods);
   std::size_t samples = 0; // a period

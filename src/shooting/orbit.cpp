@@ -25,7 +25,7 @@ Orbit evaluate(const OrbitProblem& problem, ConvergenceLog& log, Vec state, doub
   return orbit;
 }
 
-void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, int unknowns, double residual_projected)
+void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, PetscInt unknowns, double residual_projected)
 {
   Convergence& convergence = log.convergence;
   convergence.records.push_back(
@@ -39,7 +39,7 @@ void record_full(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit)
 {
   PetscInt dofs = 0;
   check(VecGetSize(displacement(orbit.state), &dofs));
-  record(log, stage, orbit, static_cast<int>(2 * dofs + 1), std::nan(""));
+  record(log, stage, orbit, 2 * dofs + 1, std::nan(""));
 }
 
 bool admissible_period(const OrbitProblem& problem, double period)

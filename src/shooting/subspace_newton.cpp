@@ -2,6 +2,7 @@
 
 #include "shell_preconditioner.hpp"
 #include "squeal/base/callback.hpp"
+#include "squeal/base/integers.hpp"
 
 #include <cmath>
 #include <Eigen/Dense>
@@ -39,7 +40,7 @@ std::vector<double> entries_of(const SubspaceSystem& system, Vec y)
   std::vector<double> result(entries, entries + size);
   check(VecRestoreArrayRead(y, &entries));
   // all ranks go the same way in the solver only if they hold the same bits
-  MPI_Bcast(result.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm_of(system.origin));
+  MPI_Bcast(result.data(), to_int(size), MPI_DOUBLE, 0, comm_of(system.origin));
   return result;
 }
 
@@ -78,7 +79,7 @@ void form_residual(SubspaceSystem& system, Vec y, Vec R)
     check(VecDot(system.phase, moved, &along));
   }
   rows.insert(rows.begin(), along);
-  MPI_Bcast(rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, 0, comm_of(system.origin));
+  MPI_Bcast(rows.data(), to_int(rows.size()), MPI_DOUBLE, 0, comm_of(system.origin));
   for (PetscInt i = 0; i < system.size(); ++i)
     check(VecSetValue(R, i, rows[static_cast<std::size_t>(i)] / system.scale, INSERT_VALUES));
   check(VecAssemblyBegin(R));
@@ -103,7 +104,7 @@ void set_column(const SubspaceSystem& system, Mat J, PetscInt column, double fir
 {
   std::vector<double> rows = {first};
   for (const double value : rest) rows.push_back(value * factor);
-  MPI_Bcast(rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, 0, comm_of(system.origin));
+  MPI_Bcast(rows.data(), to_int(rows.size()), MPI_DOUBLE, 0, comm_of(system.origin));
   for (std::size_t i = 0; i < rows.size(); ++i)
     check(MatSetValue(J, static_cast<PetscInt>(i), column, rows[i], INSERT_VALUES));
 }

@@ -30,6 +30,15 @@ template <class Number> std::vector<Number> read_big_endian(std::istream& stream
   return values;
 }
 
+template <class Number> void append_big_endian(Number number, std::string& bytes)
+{
+  const auto* own = reinterpret_cast<const char*>(&number);
+  const std::size_t begin = bytes.size();
+  bytes.append(own, sizeof number);
+  if constexpr (std::endian::native == std::endian::little)
+    std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(begin), bytes.end());
+}
+
 /// Opens a file. Throws Error if it is missing or unreadable.
 std::ifstream open_file(const std::filesystem::path& file)
 {
@@ -111,7 +120,7 @@ std::vector<double> checked_vector(const std::filesystem::path& file)
   auto stream = open_file(file);
   const std::int64_t length = read_header(stream, file, VEC_FILE_CLASSID, "vector", 1)[0];
   if (length < 0) throw Error(file.string() + ": a vector of " + std::to_string(length));
-  check_length(file, 2 * static_cast<std::int64_t>(sizeof(Index)) + length * 8);
+  check_length(file, static_cast<std::int64_t>(vector_header_size) + length * 8);
   std::vector<double> values = read_big_endian<double>(stream, length);
   const auto bad = std::find_if_not(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
   if (bad != values.end())
@@ -164,6 +173,25 @@ std::vector<double> read_vector(const std::filesystem::path& file, MPI_Comm comm
   on_rank_zero(comm, [&] { values = checked_vector(file); });
   broadcast(values, comm);
   return values;
+}
+
+std::optional<PetscInt> read_vector_header(std::istream& stream)
+{
+  const auto header = read_big_endian<Index>(stream, 2);
+  if (!stream || header[0] != VEC_FILE_CLASSID) return {};
+  return static_cast<PetscInt>(header[1]);
+}
+
+std::vector<double> read_vector_entries(std::istream& stream, PetscInt length)
+{
+  return read_big_endian<double>(stream, length);
+}
+
+void append_vector(const std::vector<double>& entries, std::string& bytes)
+{
+  append_big_endian(static_cast<Index>(VEC_FILE_CLASSID), bytes);
+  append_big_endian(static_cast<Index>(entries.size()), bytes);
+  for (const double entry : entries) append_big_endian(entry, bytes);
 }
 
 } // namespace squeal

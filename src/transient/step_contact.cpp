@@ -1,5 +1,6 @@
 #include "step_contact.hpp"
 
+#include "squeal/base/integers.hpp"
 #include "squeal/contact/sliding_direction.hpp"
 
 #include <algorithm>
@@ -135,7 +136,7 @@ void share_from_rank_zero(const StepBatch& batch, const std::string& problem)
     entries[3] = report.fall_of_friction;
     std::copy(batch.states[k].reactions.begin(), batch.states[k].reactions.end(), entries + 4);
   }
-  MPI_Bcast(message.data(), static_cast<int>(message.size()), MPI_DOUBLE, 0, comm);
+  MPI_Bcast(message.data(), to_int(message.size()), MPI_DOUBLE, 0, comm);
   if (message[0] != 0) agree(comm, problem);
   for (std::size_t k = 0; k < batch.states.size(); ++k)
   {
@@ -158,7 +159,7 @@ void record_contact(const Interface& interface, const State& state, const std::v
   record.opposes_theta.clear();
   for (std::size_t i = 0; i < interface.gap.size(); ++i)
     record.opposes_theta.push_back(opposes_end(PairView(past, interface.directions), i) ? 0 : 1);
-  MPI_Bcast(record.contact_velocity.data(), static_cast<int>(interface.size()), MPI_DOUBLE, 0, comm);
+  MPI_Bcast(record.contact_velocity.data(), to_int(interface.size()), MPI_DOUBLE, 0, comm);
   MPI_Bcast(record.opposes_theta.data(), interface.pairs, MPI_CHAR, 0, comm);
   if (record.wanted == Recorded::contact) return;
   record.gap = interface.gap;

@@ -6,6 +6,7 @@
 #include "linear_contact.hpp"
 #include "squeal/algebra/lent_cores.hpp"
 #include "squeal/algebra/multivector.hpp"
+#include "squeal/base/integers.hpp"
 #include "squeal/base/run_control.hpp"
 
 #include <algorithm>
@@ -99,7 +100,7 @@ MatrixXd reactions(const ThetaStep& step, const Interface& interface, const Step
                                      contact_status(interface, record.reactions, record.contact_velocity));
                                  dr = contact.response(db, dmu);
                                });
-  MPI_Bcast(dr.data(), static_cast<int>(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));
+  MPI_Bcast(dr.data(), to_int(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));
   return dr;
 }
 

@@ -62,7 +62,7 @@ struct StatusSolution
   std::vector<double> gap, reaction; // [m, N]; empty unless converged or singular
 };
 
-StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, int max_iterations);
+StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, long max_iterations);
 
 /// Whether the symmetric part of M is positive definite, N being the identity: then there is one solution and no other.
 bool has_one_solution(const ComplementarityProblem& problem);
@@ -81,7 +81,7 @@ struct ProjectionSolution
 };
 
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
-                                       int max_iterations);
+                                       long max_iterations);
 
 /// Largest eigenvalue of a symmetric positive semi-definite matrix, by power iteration: a lower bound.
 double largest_eigenvalue(const Eigen::Ref<const Eigen::MatrixXd>& A, int iterations);

@@ -39,7 +39,7 @@ public:
 
   std::size_t pairs() const { return pairs_; }
   int directions() const { return directions_; }
-  std::size_t size() const { return pairs_ * static_cast<std::size_t>(1 + directions_); } // rows
+  std::size_t size() const { return PairRows<std::size_t>(directions_).rows_of(pairs_); } // rows
 
   /// W_ii
   const PairBlock& diagonal(std::size_t pair) const { return diagonal_[pair]; }

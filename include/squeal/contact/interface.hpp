@@ -23,7 +23,7 @@ struct Interface
   FrictionLaw friction;
 
   /// Of a contact vector.
-  std::size_t size() const { return static_cast<std::size_t>(pairs) * static_cast<std::size_t>(1 + directions); }
+  std::size_t size() const { return PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs)); }
 };
 
 /// Rows n, t1, t2 of every pair: n.w and t.w, with w the weighted sum of its nodes' displacements. Tangents: the

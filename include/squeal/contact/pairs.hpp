@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -26,10 +27,19 @@ template <class Index> struct PairRows
   Index per_pair() const { return 1 + directions; }
   Index normal(Index pair) const { return pair * per_pair(); }
   Index tangential(Index pair) const { return normal(pair) + 1; } // the first one
+  Index rows_of(Index pairs) const { return pairs * per_pair(); }
   Index pair_of(Index row) const { return row / per_pair(); }
   Index component_of(Index row) const { return row % per_pair(); } // 0: normal, then the tangential ones
   bool is_normal(Index row) const { return component_of(row) == 0; }
 };
+
+/// The number of tangential rows that each of `pairs` has where all have `rows`; none where pairs cannot have that many.
+template <class Index> std::optional<int> directions_of(Index rows, Index pairs)
+{
+  for (const int directions : {1, 2})
+    if (rows == PairRows<Index>(directions).rows_of(pairs)) return directions;
+  return {};
+}
 
 /// A contact vector read and written by pairs: a view of a std::vector, a span or an Eigen vector.
 template <class Value> class PairView
@@ -103,7 +113,7 @@ class PairMatrixView
 {
 public:
   PairMatrixView(std::span<const double> values, std::size_t pairs, int directions)
-      : values_(values), rows_(directions), size_(pairs * rows_.per_pair())
+      : values_(values), rows_(directions), size_(rows_.rows_of(pairs))
   {
   }
 

@@ -21,7 +21,7 @@ struct MeasuredPeriod
 struct Recording
 {
   Mat probes = nullptr; // a row for each probe, or null
-  int samples = 0;      // of the displacements
+  PetscInt samples = 0; // of the displacements
 };
 
 /// Integrates a period from the state `start`. `rate`: dPhi/dperiod at its end, or null.

@@ -17,7 +17,7 @@ struct Correction
 {
   Window window;        // the pairs sought
   int passes = 0;       // at most
-  int pairs = 0;        // corrected in each pass, at most
+  PetscInt pairs = 0;   // corrected in each pass, at most
   double tolerance = 0; // backward error
   double sharp = 0;     // the same of nearly critical pairs
   double share = 0;     // directions of the residuals below this part of the largest are left to later passes
@@ -31,7 +31,7 @@ struct ProjectionSettings
 {
   double band = 0;    // [Hz]
   int passes = 0;     // of residual correction
-  int candidates = 0; // pairs corrected in each pass
+  PetscInt candidates = 0; // pairs corrected in each pass
   PencilOptions pencil{};
 };
 

@@ -39,7 +39,7 @@ struct QuadraticSettings
   double band = 0;  // [Hz] every pair with |lambda| <= 2 pi band
   double shift = 0; // of large problems: real, near zero, in parts of 2 pi band, not an eigenvalue; 0 if K is regular
   int expected = 0; // pairs in the band, for a start
-  int dense_limit = 0; // up to which size a problem is solved whole
+  PetscInt dense_limit = 0; // up to which size a problem is solved whole
 };
 
 /// outcome: "converged" or "not converged" (the band was not covered); residual: the largest backward error.

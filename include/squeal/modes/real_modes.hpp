@@ -33,7 +33,7 @@ int count_below(RealCount& count, double omega);
 std::vector<double> omegas_between(RealCount& count, double least, double top);
 
 /// The lowest `count` modes, or all if there are fewer. Shapes are x, in the rows of K.
-RealModes solve_real_modes(Mat M, Mat K, int count, const ModesOptions& options);
+RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& options);
 
 /// All modes with frequency below `band` [Hz]. Shapes are x, in the rows of K.
 RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options);

@@ -61,7 +61,7 @@ bool slide_throughout(const Interface& interface, const ComplexMode& mode, doubl
 
 struct Reduction
 {
-  int modes = 0;           // complex modes taken, nearest in frequency to the followed one, which is the first of all
+  PetscInt modes = 0;      // complex modes taken, nearest in frequency to the followed one, which is the first of all
   double threshold = 1e-5; // an attachment shape is dropped when less than this part of it is new
   bool sliding = false;    // the active pairs slide along the drive throughout
   const RealModes* real = nullptr; // frictionless ones; those above the complex modes are taken, too. Null: none

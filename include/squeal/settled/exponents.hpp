@@ -17,7 +17,7 @@ struct TangentBundle
 };
 
 /// `count` columns in no special direction.
-TangentBundle make_bundle(const Flow& flow, Vec like, int count);
+TangentBundle make_bundle(const Flow& flow, Vec like, PetscInt count);
 
 /// Carries the columns along the period that the flow recorded last.
 void follow_period(const Flow& flow, TangentBundle& bundle);

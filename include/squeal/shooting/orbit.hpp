@@ -63,7 +63,7 @@ inline Words words_of(ShootingStage)
 struct NewtonRecord
 {
   ShootingStage stage = ShootingStage::free_periods;
-  int unknowns = 0;
+  PetscInt unknowns = 0;
   long periods = 0;  // integrated so far
   double period = 0; // [s]
   double residual_projected = 0, residual_full = 0;
@@ -104,7 +104,7 @@ struct StageResult
 Orbit evaluate(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period);
 
 /// Adds a record. `unknowns`: of the stage's system; 0 where nothing is solved for.
-void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, int unknowns, double residual_projected);
+void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, PetscInt unknowns, double residual_projected);
 
 /// The same for a stage whose unknowns are u, v and T.
 void record_full(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit);

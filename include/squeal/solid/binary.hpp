@@ -6,6 +6,8 @@
 #include "squeal/base/petsc.hpp"
 
 #include <filesystem>
+#include <iosfwd>
+#include <optional>
 #include <vector>
 
 namespace squeal
@@ -25,5 +27,18 @@ Owned<Mat> load_matrix(const std::filesystem::path& file, MatrixSize size, Matri
 
 /// Returns all entries of a vector file on every rank. Throws Error as above.
 std::vector<double> read_vector(const std::filesystem::path& file, MPI_Comm comm);
+
+/// Size [byte] of the header of a vector: its class id and its length, which PETSc writes as two PetscInt.
+inline constexpr std::size_t vector_header_size = 2 * sizeof(PetscInt);
+
+/// Reads the header of a vector. Returns its length; none if there is no such header. Not collective, nor are the two
+/// below.
+std::optional<PetscInt> read_vector_header(std::istream& stream);
+
+/// Reads the entries behind a header.
+std::vector<double> read_vector_entries(std::istream& stream, PetscInt length);
+
+/// Appends a vector with its header.
+void append_vector(const std::vector<double>& entries, std::string& bytes);
 
 } // namespace squeal
