@@ -8,6 +8,7 @@
 #include "squeal/solver_options.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <new>
@@ -35,8 +36,6 @@ bool is_scene_folder(const std::string& word)
   return is_file(std::filesystem::path(word) / "scene.toml");
 }
 
-constexpr std::array with_values = {"--set", "--output", "--time-limit", "--checkpoint"};
-
 /// A number of seconds above 0; otherwise sets the problem.
 void read_seconds(const std::string& word, const std::string& value, double& seconds, std::string& problem)
 {
@@ -45,13 +44,47 @@ void read_seconds(const std::string& word, const std::string& value, double& sec
   if (*end != 0 || !(seconds > 0)) problem = word + " " + value + ": it needs a number of seconds above 0";
 }
 
-/// Takes an argument that has a value.
-void take_value(const std::string& word, const std::string& value, Arguments& arguments)
+/// An argument of squeal's own: how it is written, what the help says, and what it does. Those with a value name it.
+struct Argument
 {
-  if (word == "--set") arguments.overrides.push_back(value);
-  if (word == "--output") arguments.output = value;
-  if (word == "--time-limit") read_seconds(word, value, arguments.limits.time_limit, arguments.problem);
-  if (word == "--checkpoint") read_seconds(word, value, arguments.limits.checkpoint_interval, arguments.problem);
+  const char* name;
+  const char* value; // null: it takes none
+  const char* meaning;
+  void (*take)(Arguments& arguments, const std::string& value);
+};
+
+const std::array known_arguments = {
+    Argument{"--set", "key=value", "overrides a key of the scene, e.g. --set friction.coefficient=0.25",
+             [](Arguments& arguments, const std::string& value) { arguments.overrides.push_back(value); }},
+    Argument{"--output", "DIR", "where results go (results/<scene>)",
+             [](Arguments& arguments, const std::string& value) { arguments.output = value; }},
+    Argument{"--time-limit", "S", "ends the run in order after S seconds, as SIGTERM, SIGINT and SIGUSR1 do",
+             [](Arguments& arguments, const std::string& value)
+             { read_seconds("--time-limit", value, arguments.limits.time_limit, arguments.problem); }},
+    Argument{"--checkpoint", "S", "seconds between checkpoints [600]",
+             [](Arguments& arguments, const std::string& value)
+             { read_seconds("--checkpoint", value, arguments.limits.checkpoint_interval, arguments.problem); }},
+    Argument{"--restart", nullptr,
+             "goes on from the checkpoints of a run that ended early or was killed, if there are any",
+             [](Arguments& arguments, const std::string&) { arguments.beginning = Beginning::from_checkpoints; }},
+    Argument{"--version", nullptr, "versions of squeal and of the libraries it runs on",
+             [](Arguments& arguments, const std::string&) { arguments.version = true; }},
+    Argument{"--help", nullptr, "this text; -help and -h as well",
+             [](Arguments& arguments, const std::string&) { arguments.help = true; }},
+    Argument{"--allow-scripts", nullptr,
+             "lets the scene's geometry hold any statement of gmsh, which may run commands and write files",
+             [](Arguments& arguments, const std::string&) { arguments.allow_scripts = true; }},
+    Argument{"--force", nullptr, "runs even where the forecast says more than a day, or more memory than is free",
+             [](Arguments& arguments, const std::string&) { arguments.force = true; }},
+    Argument{"--dry-run", nullptr,
+             "checks scene and mesh, prints the resolved scene, the model's size and the forecast, and stops",
+             [](Arguments& arguments, const std::string&) { arguments.dry_run = true; }}};
+
+std::string unknown_argument(const std::string& word)
+{
+  std::vector<std::string> names;
+  for (const Argument& known : known_arguments) names.emplace_back(known.name);
+  return "unknown argument " + shortened(word) + "; did you mean " + nearest_word(word.substr(0, 40), names) + "?";
 }
 
 /// Takes squeal's own arguments out of argv; what stays is PETSc's.
@@ -61,34 +94,16 @@ Arguments take_arguments(int& argc, char** argv)
   int kept = 1;
   for (int i = 1; i < argc; ++i)
   {
-    const std::string word = argv[i];
-    const bool has_value = i + 1 < argc;
-    if (word == "-help" || word == "--help" || word == "-h")
-      arguments.help = true;
-    else if (word == "--version")
-      arguments.version = true;
-    else if (word == "--restart")
-      arguments.beginning = Beginning::from_checkpoints;
-    else if (word == "--dry-run")
-      arguments.dry_run = true;
-    else if (word == "--allow-scripts")
-      arguments.allow_scripts = true;
-    else if (word == "--force")
-      arguments.force = true;
-    else if (std::find(with_values.begin(), with_values.end(), word) != with_values.end())
-    {
-      if (has_value)
-        take_value(word, argv[++i], arguments);
-      else
-        arguments.problem = word + " needs a value: squeal -help lists the arguments";
-    }
-    else if (word.rfind("--", 0) == 0)
-      arguments.problem =
-          "unknown argument " + shortened(word) + "; did you mean " +
-          nearest_word(word.substr(0, 40),
-                       std::vector<std::string>{"--set", "--output", "--time-limit", "--checkpoint", "--restart",
-                                                "--dry-run", "--help", "--version", "--allow-scripts", "--force"}) +
-          "?";
+    const std::string given = argv[i], word = given == "-help" || given == "-h" ? "--help" : given;
+    const auto known = std::ranges::find_if(known_arguments, [&](const Argument& one) { return word == one.name; });
+    if (known != known_arguments.end() && !known->value)
+      known->take(arguments, {});
+    else if (known != known_arguments.end() && i + 1 < argc)
+      known->take(arguments, argv[++i]);
+    else if (known != known_arguments.end())
+      arguments.problem = word + " needs a value: squeal -help lists the arguments";
+    else if (word.starts_with("--"))
+      arguments.problem = unknown_argument(word);
     else if (arguments.scene.empty() && word[0] != '-' && (word.ends_with(".toml") || is_scene_folder(word)))
       arguments.scene =
           word.ends_with(".toml") ? std::filesystem::path(word) : std::filesystem::path(word) / "scene.toml";
@@ -112,33 +127,34 @@ void examine_options(Arguments& arguments, std::vector<char*>& words)
   words = {words.front(), skip};
 }
 
+/// A line for each argument.
+std::string argument_reference()
+{
+  std::string text;
+  for (const Argument& known : known_arguments)
+  {
+    const std::string name = std::string(known.name) + (known.value ? std::string(" ") + known.value : "");
+    text += format("  %-17s %s\n", name.c_str(), known.meaning);
+  }
+  return text;
+}
+
 void print_help()
 {
   std::string prefixes;
   for (const SolverPrefix& prefix : solver_prefixes) prefixes += std::string(" -") + prefix.text;
-  std::printf(
-      "squeal %s: friction-induced vibration of a finite-element structure\n\n"
-      "  mpirun -n 2 squeal SCENE [--set key=value]… [--output DIR] [--dry-run] [options]\n\n"
-      "  SCENE             a scene file (.toml), or a folder that holds a scene.toml\n"
-      "  --set key=value   overrides a key of the scene, e.g. --set friction.coefficient=0.25\n"
-      "  --output DIR      where results go (results/<scene>)\n"
-      "  --time-limit S    ends the run in order after S seconds, as SIGTERM, SIGINT and SIGUSR1 do\n"
-      "  --checkpoint S    seconds between checkpoints [600]\n"
-      "  --restart         goes on from the checkpoints of a run that ended early or was killed, if there are any\n"
-      "  --version         versions of squeal and of the libraries it runs on\n"
-      "  --allow-scripts   lets the scene's geometry hold any statement of gmsh, which may run commands and write "
-      "files\n"
-      "  --force           runs even where the forecast says more than a day, or more memory than is free\n"
-      "  --dry-run         checks scene and mesh, prints the resolved scene, the model's size and the forecast, and "
-      "stops\n"
-      "  exit code: 0 all converged, 2 a stage did not (the report says which), 3 asked to end, 1 an error\n\n"
-      "%s\n"
-      "Algorithm options (PETSc options database) [default]\n%s\n"
-      "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes\n %s\n"
-      "e.g. -cycle_snes_monitor, -modes_pep_monitor, -cycle_full_ksp_rtol 1e-3.\n\n"
-      "Options of the whole run, PETSc's:\n%s",
-      SQUEAL_VERSION, scene_reference().c_str(), option_reference().c_str(), prefixes.c_str(),
-      session_option_reference().c_str());
+  std::printf("squeal %s: friction-induced vibration of a finite-element structure\n\n"
+              "  mpirun -n 2 squeal SCENE [--set key=value]… [--output DIR] [--dry-run] [options]\n\n"
+              "  SCENE             a scene file (.toml), or a folder that holds a scene.toml\n"
+              "%s"
+              "  exit code: 0 all converged, 2 a stage did not (the report says which), 3 asked to end, 1 an error\n\n"
+              "%s\n"
+              "Algorithm options (PETSc options database) [default]\n%s\n"
+              "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes\n %s\n"
+              "e.g. -cycle_snes_monitor, -modes_pep_monitor, -cycle_full_ksp_rtol 1e-3.\n\n"
+              "Options of the whole run, PETSc's:\n%s",
+              SQUEAL_VERSION, argument_reference().c_str(), scene_reference().c_str(), option_reference().c_str(),
+              prefixes.c_str(), session_option_reference().c_str());
 }
 
 /// The default place of the results: named after the scene's folder when the file is called scene.toml.

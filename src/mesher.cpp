@@ -120,7 +120,7 @@ MesherAnswer answer_of(int argc, char** argv)
   try
   {
     initialise(argc, argv);
-    const bool script = std::string(argv[1]) == "script";
+    const bool script = std::string(argv[1]) == word(MesherInput::script);
     answer.mesh = read_or_generate(script ? "/proc/self/fd/" + std::to_string(script_descriptor) : argv[2]);
   }
   catch (const std::string& text) // libgmsh before 4.9 throws strings

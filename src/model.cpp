@@ -145,6 +145,12 @@ Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm)
   return scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, model.mesh, comm);
 }
 
+BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers)
+{
+  Model changed = rebuild_model(model, scene_with(scene, numbers), comm_of(model.structure.load));
+  return {std::move(changed.structure), std::move(changed.interface)};
+}
+
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)
 {
   ModelSummary summary;

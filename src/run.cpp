@@ -213,15 +213,6 @@ SettledMotion run_settled(const Chain& chain)
   return find_settled_motion(cycle_problem(chain), cycle, chain.options.settled);
 }
 
-/// A settled motion answers where no cycle does.
-void accept_settled_motion(Report& report)
-{
-  Outcome& outcome = report.cycle.outcome;
-  if (report.settled.outcome.kind != OutcomeKind::settled) return;
-  outcome.reason = std::string(word(outcome.kind)) + ": " + outcome.reason;
-  outcome.kind = OutcomeKind::settled;
-}
-
 Attractors run_attractors(const Chain& chain)
 {
   const CycleSettings& settings = chain.scene.cycle;
@@ -229,21 +220,8 @@ Attractors run_attractors(const Chain& chain)
     return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
   const std::string reason = no_mode_to_follow(chain.report);
   if (!reason.empty()) return not_run<Attractors>(OutcomeKind::skipped, reason);
-  CycleSettings used = settings;
-  if (used.steps_per_period == 0)
-    used.steps_per_period = first_steps; // the step's error of the energy is then about a percent
-  return find_attractors({chain.sliding(), chain.report.modes.modes, chain.unstable(), used, chain.options.step},
+  return find_attractors({chain.sliding(), chain.report.modes.modes, chain.unstable(), settings, chain.options.step},
                          chain.options.attractors);
-}
-
-/// Why no branch can start from the cycle; empty if it can.
-std::string no_cycle_to_follow(const LimitCycle& cycle, double tolerance)
-{
-  if (!has_run(cycle.outcome) || !cycle.orbit.state.get()) return "there is no cycle to start from";
-  // one that repels is a cycle as well
-  if (cycle.outcome.kind != OutcomeKind::converged && !(cycle.orbit.residual <= tolerance))
-    return "the cycle to start from did not converge";
-  return {};
 }
 
 BrakeBranch run_branch(const Chain& chain)
@@ -252,26 +230,15 @@ BrakeBranch run_branch(const Chain& chain)
   const Report& report = chain.report;
   if (!scene.branch) return not_run<BrakeBranch>(OutcomeKind::off, "the scene has no [branch]");
   const double tolerance = scene.cycle.tolerance > 0 ? scene.cycle.tolerance : plain_tolerance;
-  const int steps = scene.cycle.steps_per_period;
   const std::string reason = no_cycle_to_follow(report.cycle, tolerance);
   if (!reason.empty()) return not_run<BrakeBranch>(OutcomeKind::skipped, reason);
-  const auto model_at = [&](double parameter)
-  {
-    Model model = rebuild_model(chain.model, scene_with(scene, std::array{SceneNumber{scene.branch->key, parameter}}),
-                                comm_of(chain.model.structure.load));
-    return BranchModel{std::move(model.structure), std::move(model.interface)};
+  const auto model_at = [&](double parameter) {
+    return model_with(chain.model, scene, std::array{SceneNumber{scene.branch->key, parameter}});
   };
   return find_branch({*scene.branch, model_at, chain.sliding(), report.cycle,
-                      steps > 0 ? steps : std::min(report.cycle.steps_per_period, 128), tolerance, chain.model.probes,
-                      scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.step,
+                      steps_along_branch(scene.cycle, report.cycle), tolerance, chain.model.probes, scene.modes,
+                      chain.options.modes, chain.options.equilibrium, chain.options.step,
                       chain.options.cycle.shooting});
-}
-
-/// Why left vectors and sweeps are refused; empty if they are not.
-std::string unsymmetric_part(const Structure& structure)
-{
-  if (structure.G.get() || structure.H.get()) return "the structure has gyroscopic or circulatory parts";
-  return structure.K_loss.get() ? "parts have loss factors" : "";
 }
 
 Sensitivity run_sensitivity(const Chain& chain)
@@ -281,17 +248,13 @@ Sensitivity run_sensitivity(const Chain& chain)
   const std::string reason = no_mode_to_follow(chain.report), part = unsymmetric_part(chain.model.structure);
   if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
   if (!part.empty()) return not_run<Sensitivity>(OutcomeKind::refused, part);
-  const MPI_Comm comm = comm_of(chain.model.structure.load);
-  const auto model_with = [&](const SceneNumber& number)
-  {
-    Model model = rebuild_model(chain.model, scene_with(scene, std::span(&number, 1)), comm);
-    return BranchModel{std::move(model.structure), std::move(model.interface)};
-  };
+  const auto model_at = [&](const SceneNumber& number)
+  { return model_with(chain.model, scene, std::span(&number, 1)); };
   std::vector<int> probes;
   for (const Change& change : scene.changes)
     probes.push_back(
         static_cast<int>(std::ranges::find(scene.probes, change.probe, &Probe::name) - scene.probes.begin()));
-  return find_sensitivity({chain.sliding(), *chain.linearised, chain.report.modes, sensitive_numbers(scene), model_with,
+  return find_sensitivity({chain.sliding(), *chain.linearised, chain.report.modes, sensitive_numbers(scene), model_at,
                            chain.model.probes, scene.changes, probes, scene.modes, chain.options.modes,
                            chain.options.equilibrium});
 }
@@ -302,16 +265,15 @@ Sweep run_scene_sweep(const Chain& chain)
   if (!scene.sweep) return not_run<Sweep>(OutcomeKind::off, "the scene has no [sweep]");
   const std::string part = unsymmetric_part(chain.model.structure);
   if (!part.empty()) return not_run<Sweep>(OutcomeKind::refused, part);
-  const MPI_Comm comm = comm_of(chain.model.structure.load);
   const auto model_at = [&](std::span<const double> values)
   {
     std::vector<SceneNumber> numbers;
     for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.sweep->key[i], values[i]});
-    Model model = rebuild_model(chain.model, scene_with(scene, numbers), comm);
-    return BranchModel{std::move(model.structure), std::move(model.interface)};
+    return model_with(chain.model, scene, numbers);
   };
   return run_sweep(
-      {*scene.sweep, model_at, scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.sweep}, comm);
+      {*scene.sweep, model_at, scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.sweep},
+      comm_of(chain.model.structure.load));
 }
 
 std::vector<Stage> stages_run(const Report& report)
@@ -392,7 +354,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   report.fidelity = std::move(fitted.fidelity);
   if (has_run(report.cycle.outcome)) save();
   report.settled = stage(report, Stage::settled, comm, [&] { return run_settled(chain); });
-  accept_settled_motion(report);
+  take_as_answer(report.settled, report.cycle.outcome);
   if (has_run(report.settled.outcome)) save();
   report.attractors = stage(report, Stage::attractors, comm, [&] { return run_attractors(chain); });
   if (has_run(report.attractors.outcome)) save();

@@ -2,6 +2,7 @@
 /// The model of a scene: from a mesh, from points and springs, or from matrices; everything after it is the same.
 #include "squeal/contact/interface.hpp"
 #include "squeal/report/report.hpp"
+#include "squeal/scene/numbers.hpp"
 
 namespace squeal
 {
@@ -21,6 +22,9 @@ Model build_model(const Scene& scene, MPI_Comm comm);
 
 /// The model of a scene on the same mesh, in the same layout. Collective.
 Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm);
+
+/// Structure and contact of the scene with other values of its numbers, likewise. Collective.
+BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers);
 
 /// What the model is, as far as it is known before anything is solved. Collective.
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm);

@@ -73,6 +73,20 @@ std::vector<ParameterRange> coexistence_of(const BrakeBranch& found, const std::
 
 } // namespace
 
+std::string no_cycle_to_follow(const LimitCycle& cycle, double tolerance)
+{
+  if (!has_run(cycle.outcome) || !cycle.orbit.state.get()) return "there is no cycle to start from";
+  // one that repels is a cycle as well
+  if (cycle.outcome.kind != OutcomeKind::converged && !(cycle.orbit.residual <= tolerance))
+    return "the cycle to start from did not converge";
+  return {};
+}
+
+int steps_along_branch(const CycleSettings& settings, const LimitCycle& cycle)
+{
+  return settings.steps_per_period > 0 ? settings.steps_per_period : std::min(cycle.steps_per_period, 128);
+}
+
 BrakeBranch find_branch(const BrakeBranchProblem& problem)
 {
   const BranchSettings& settings = problem.settings;

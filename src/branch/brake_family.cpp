@@ -1,5 +1,7 @@
 #include "brake_family.hpp"
 
+#include "squeal/scene/numbers.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -27,7 +29,7 @@ void count_statuses(const MeasuredPeriod& measured, const std::vector<char>& clo
 
 } // namespace
 
-BrakeAt::BrakeAt(double value, BranchModel made, const BrakeBranchProblem& problem)
+BrakeAt::BrakeAt(double value, BrakeModel made, const BrakeBranchProblem& problem)
     : parameter(value), model(std::move(made)), map{{model.structure, model.interface, equilibrium},
                                                     problem.step,
                                                     problem.steps_per_period,
@@ -37,7 +39,7 @@ BrakeAt::BrakeAt(double value, BranchModel made, const BrakeBranchProblem& probl
 }
 
 BrakeFamily::BrakeFamily(const BrakeBranchProblem& problem)
-    : problem_(problem), friction_(problem.settings.key == "friction.coefficient"),
+    : problem_(problem), friction_(problem.settings.key == friction_coefficient_key),
       range_(std::abs(problem.settings.to - problem.settings.from))
 {
   set_parameter(problem.settings.own);

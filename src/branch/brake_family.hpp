@@ -11,10 +11,10 @@ namespace squeal
 /// The brake at a value of the parameter.
 struct BrakeAt
 {
-  BrakeAt(double value, BranchModel made, const BrakeBranchProblem& problem);
+  BrakeAt(double value, BrakeModel made, const BrakeBranchProblem& problem);
 
   double parameter;
-  BranchModel model;
+  BrakeModel model;
   Equilibrium equilibrium{};
   bool equilibrium_known = false;
   PeriodMap map;

@@ -16,6 +16,13 @@ namespace
 constexpr int most_steps = 4096; // tried, until the growth at these is not misleading
 constexpr int plain_steps = 100; // a period of a model that the scene names
 
+/// What sets the number of steps a period.
+enum class StepChoice
+{
+  given,       // the scene, or a plain number
+  by_accuracy, // the accuracy that the scene asks for
+};
+
 /// Why theta and the steps a period would give misleading growth; empty if they would not.
 std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
 {
@@ -48,7 +55,7 @@ CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& set
 
 /// The full model's cycle from the reduced model's, whose derivative is the preconditioner, and the finer steps that
 /// the accuracy needs. Returns why there is none, or nothing.
-std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& reduced, bool steps_open,
+std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& reduced, StepChoice steps,
                                   LimitCycle& cycle)
 {
   const CycleProblem& problem = search.problem;
@@ -67,7 +74,7 @@ std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& red
   if (cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium || cycle.outcome.kind == OutcomeKind::not_periodic)
     return "the full model's shooting from the reduced model's cycle left it";
   if (cycle.outcome.kind != OutcomeKind::converged) return {}; // the free motion went on from there
-  if (steps_open)
+  if (steps == StepChoice::by_accuracy)
     refine_steps(correction, cycle);
   else
     estimate_model_errors(correction, cycle);
@@ -75,22 +82,22 @@ std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& red
 }
 
 /// The cycle by way of the reduced model's. Returns why there is none, or nothing.
-std::string find_by_reduced_model(ReducedSearch& search, bool steps_open, LimitCycle& cycle)
+std::string find_by_reduced_model(ReducedSearch& search, StepChoice steps, LimitCycle& cycle)
 {
   if (search.problem.unstable.modes.size() > 1)
     return "several modes are unstable: only the full model's shooting excites them all";
   ReducedCycle reduced;
   if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
   const double clock = MPI_Wtime();
-  const std::string reason = correct_on_full_model(search, reduced, steps_open, cycle);
+  const std::string reason = correct_on_full_model(search, reduced, steps, cycle);
   search.fidelity.full_seconds += MPI_Wtime() - clock;
   const bool converged = search.fidelity.asked == CycleModel::reduced || cycle.outcome.kind == OutcomeKind::converged;
-  if (converged && !steps_open) estimate_reduced_step_errors(search, reduced);
+  if (converged && steps == StepChoice::given) estimate_reduced_step_errors(search, reduced);
   return reason;
 }
 
 /// The cycle of the full model, from the estimate.
-void find_by_full_model(const CycleProblem& problem, const CycleOptions& options, bool steps_open, FittedCycle& result)
+void find_by_full_model(const CycleProblem& problem, const CycleOptions& options, StepChoice steps, FittedCycle& result)
 {
   const double clock = MPI_Wtime();
   Fidelity& fidelity = result.fidelity;
@@ -99,7 +106,7 @@ void find_by_full_model(const CycleProblem& problem, const CycleOptions& options
   found.convergence.periods += fidelity.full_periods; // of a search that stalled
   result.cycle = std::move(found);
   fidelity.full_periods = result.cycle.convergence.periods;
-  if (steps_open)
+  if (steps == StepChoice::by_accuracy)
   {
     const Preconditioner preconditioner = estimated_preconditioner(problem, options.band_factor);
     refine_steps({problem, options, preconditioner, fidelity}, result.cycle);
@@ -108,7 +115,7 @@ void find_by_full_model(const CycleProblem& problem, const CycleOptions& options
 }
 
 /// The cycle on the model asked for, or on the full one where "auto" cannot do without it.
-void find_on_model(const CycleProblem& problem, const CycleOptions& options, bool steps_open, FittedCycle& result)
+void find_on_model(const CycleProblem& problem, const CycleOptions& options, StepChoice steps, FittedCycle& result)
 {
   Fidelity& fidelity = result.fidelity;
   if (fidelity.asked != CycleModel::full)
@@ -120,7 +127,7 @@ void find_on_model(const CycleProblem& problem, const CycleOptions& options, boo
     search.tolerance = fidelity.asked == CycleModel::automatic ? 1e-3 : 3e-4 * fidelity.accuracy;
     try
     {
-      fidelity.reason = find_by_reduced_model(search, steps_open, result.cycle);
+      fidelity.reason = find_by_reduced_model(search, steps, result.cycle);
     }
     catch (const Error& error) // on every rank alike: the reduced model is the same on all
     {
@@ -135,7 +142,7 @@ void find_on_model(const CycleProblem& problem, const CycleOptions& options, boo
     result.cycle.outcome.reason = fidelity.reason;
     return;
   }
-  find_by_full_model(problem, options, steps_open, result);
+  find_by_full_model(problem, options, steps, result);
 }
 
 } // namespace
@@ -154,8 +161,8 @@ FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& 
   result.fidelity.asked = request.model;
   result.fidelity.accuracy = request.accuracy;
   result.fidelity.verdict_steps = settings.steps_per_period;
-  const bool steps_open = request.model == CycleModel::automatic && given.settings.steps_per_period == 0;
-  find_on_model(problem, options, steps_open, result);
+  const bool open = request.model == CycleModel::automatic && given.settings.steps_per_period == 0;
+  find_on_model(problem, options, open ? StepChoice::by_accuracy : StepChoice::given, result);
   result.fidelity.steps_per_period = result.cycle.steps_per_period;
   const State& start = result.cycle.measured.start;
   const std::filesystem::path& file = settings.save_state;

@@ -59,7 +59,7 @@ void check_names(const Mesh& mesh, const Scene& scene)
     for (const std::string& name : body.surfaces) named_faces(mesh, name, "rigid body '" + body.name + "'");
   for (const Spring& spring : scene.springs)
     for (const std::string& name : {spring.from, spring.to})
-      if (name != "ground") point_node(mesh, name, "spring");
+      if (name != ground) point_node(mesh, name, "spring");
   for (const Support& support : scene.supports) named_nodes(mesh, support.on, "support");
   for (const Force& force : scene.forces) named_nodes(mesh, force.on, "force");
   for (const Pressure& pressure : scene.pressures) named_faces(mesh, pressure.on, "pressure");

@@ -95,7 +95,8 @@ int script_file(const std::string& text)
 
 std::vector<std::string> arguments_of(const MesherTask& task)
 {
-  std::vector<std::string> arguments = {mesher_program().string(), task.script.empty() ? "file" : "script", task.file};
+  std::vector<std::string> arguments = {mesher_program().string(),
+                                        word(task.script.empty() ? MesherInput::file : MesherInput::script), task.file};
   for (const auto& [name, value] : task.parameters)
   {
     arguments.push_back(name);

@@ -173,9 +173,8 @@ QuadraticSolution solve_by_projection(const ModesProblem& problem)
   if (settings.real_modes == 0) basis = solve_real_modes_below(M, K, 1.05 * settings.band, options);
   const int wanted = settings.real_modes > 0 ? settings.real_modes : fewest;
   if (static_cast<int>(basis.omega.size()) < wanted) basis = solve_real_modes(M, K, wanted, options);
-  return solve_projected(
-      problem.reduced, M, K, basis,
-      {settings.band, settings.residual_passes, options.candidates, options.pencil});
+  return solve_projected(problem.reduced, M, K, basis,
+                         {settings.band, settings.residual_passes, options.candidates, options.pencil});
 }
 
 int unstable_in(const std::vector<ComplexMode>& modes)
@@ -184,18 +183,16 @@ int unstable_in(const std::vector<ComplexMode>& modes)
       std::count_if(modes.begin(), modes.end(), [](const ComplexMode& mode) { return is_unstable(mode.lambda); }));
 }
 
-constexpr const char* all_pairs = "all pairs";
-
 /// The sentence that Modes::count_check holds.
 std::string describe_count(const Modes& modes)
 {
-  const bool confirmed = !modes.count.certified_by.empty() && !modes.routes_disagree;
+  const bool confirmed = modes.count.certified_by != Certificate::none && !modes.routes_disagree;
   std::string text = confirmed ? "confirmed: " : "NOT confirmed: ";
   if (modes.method == ModesMethod::both)
     text += std::to_string(modes.unstable_count) + " unstable by the full problem, " +
             std::to_string(unstable_in(modes.projected)) + " by projection on real modes; ";
   text += format("%d pairs below %.6g Hz, ", modes.count.found, modes.count.frequency);
-  if (modes.count.certified_by == all_pairs) return text + "where the whole problem was solved";
+  if (modes.count.certified_by == Certificate::all_pairs) return text + "where the whole problem was solved";
   text += format("%d expected by the inertia of the ", modes.count.expected);
   if (!modes.beyond_inertia) return text + "frictionless structure";
   return text + "symmetric part, which cannot count what gyroscopic or circulatory parts change";
@@ -218,14 +215,16 @@ void assess(Modes& modes)
 
 ModeCount certified(const PairCount& count)
 {
-  return {count.expected == count.found ? "inertia" : "", count.frequency, count.expected, count.found};
+  return {count.expected == count.found ? Certificate::inertia : Certificate::none, count.frequency, count.expected,
+          count.found};
 }
 
 /// Where inertia does not count, a problem that is solved whole has all its pairs.
 ModeCount certified_whole(const PairCount& count, const ModesProblem& problem, PetscInt size)
 {
   const bool whole = size <= problem.options.dense_limit && problem.settings.method != ModesMethod::projection;
-  return {whole ? all_pairs : "", count.frequency, whole ? count.found : count.expected, count.found};
+  return {whole ? Certificate::all_pairs : Certificate::none, count.frequency, whole ? count.found : count.expected,
+          count.found};
 }
 
 /// Keeps of the modes beyond the band, which were found for the count, the frequencies only.

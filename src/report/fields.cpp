@@ -6,6 +6,7 @@
 
 #include "files.hpp"
 #include "squeal/base/whole_file.hpp"
+#include "squeal/report/result_files.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -48,9 +49,24 @@ XdmfShape xdmf_shape(Shape shape)
 
 constexpr int polyvertex = 1; // followed by its number of nodes
 
+/// What a field has values at, as XDMF calls it.
+enum class Center
+{
+  node,
+  cell,
+};
+
+constexpr std::array center_words = {"Node", "Cell"};
+
+Words words_of(Center)
+{
+  return center_words;
+}
+
 struct Attribute
 {
-  std::string name, data, center; // center: "Node" or "Cell"
+  std::string name, data;
+  Center center{};
   int components = 1;
 };
 
@@ -85,7 +101,7 @@ void write_mesh(Hdf5File& file, const Mesh& mesh, Layout& layout)
   file.write("mesh/nodes", {layout.nodes, 3}, position, "m");
   file.write("mesh/topology", {topology.size()}, topology, "XDMF mixed topology");
   file.write("mesh/part", {part.size()}, part, "index of the scene's part; -1: a point");
-  layout.still.push_back({"part", "mesh/part", "Cell", 1});
+  layout.still.push_back({"part", "mesh/part", Center::cell, 1});
 }
 
 /// Brings vectors of degrees of freedom to rank 0 as nodal displacements.
@@ -156,9 +172,9 @@ void write_contact(Hdf5File& file, const Equilibrium& equilibrium, const FieldNo
   file.write("equilibrium/normal_reaction", {normal.size()}, normal, "N");
   file.write("equilibrium/friction_reaction", {friction.size()}, friction, "N");
   file.write("equilibrium/pressure", {pressure.size()}, pressure, "Pa");
-  layout.still.push_back({"contact pressure at equilibrium [Pa]", "equilibrium/pressure", "Node", 1});
-  layout.still.push_back({"normal reaction at equilibrium [N]", "equilibrium/normal_reaction", "Node", 1});
-  layout.still.push_back({"friction at equilibrium [N]", "equilibrium/friction_reaction", "Node", 1});
+  layout.still.push_back({"contact pressure at equilibrium [Pa]", "equilibrium/pressure", Center::node, 1});
+  layout.still.push_back({"normal reaction at equilibrium [N]", "equilibrium/normal_reaction", Center::node, 1});
+  layout.still.push_back({"friction at equilibrium [N]", "equilibrium/friction_reaction", Center::node, 1});
 }
 
 /// The pairs, one a row, with the reactions and pressures of the equilibrium where there is one.
@@ -211,10 +227,10 @@ constexpr const char* reals = "NumberType=\"Float\" Precision=\"8\"";
 std::string attribute_text(const Attribute& attribute, const Layout& layout)
 {
   const bool vector = attribute.components == 3;
-  const bool cell = attribute.center == "Cell";
+  const bool cell = attribute.center == Center::cell;
   const std::string size = std::to_string(cell ? layout.cells : layout.nodes) + (vector ? " 3" : "");
   return "        <Attribute Name=\"" + attribute.name + "\" AttributeType=\"" + (vector ? "Vector" : "Scalar") +
-         "\" Center=\"" + attribute.center + "\">" + data_item(attribute.data, size, cell ? integers : reals) +
+         "\" Center=\"" + word(attribute.center) + "\">" + data_item(attribute.data, size, cell ? integers : reals) +
          "</Attribute>\n";
 }
 
@@ -241,7 +257,7 @@ std::string xdmf_text(const Layout& layout, const std::string& run)
          << data_item("mesh/nodes", std::to_string(layout.nodes) + " 3", reals) << "</Geometry>\n";
     for (const Attribute& attribute : layout.still) text << attribute_text(attribute, layout);
     if (!layout.time.empty())
-      text << attribute_text({"displacement in the cycle [m]", cycle_data(i), "Node", 3}, layout);
+      text << attribute_text({"displacement in the cycle [m]", cycle_data(i), Center::node, 3}, layout);
     text << "      </Grid>\n";
   }
   text << "    </Grid>\n  </Domain>\n</Xdmf>\n";
@@ -268,8 +284,8 @@ void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Mode
     name << (grows ? "unstable mode " : "mode ") << number << ", " << std::lround(mode.frequency_hz()) << " Hz, ";
     write_displacement(file, gather, mode.real, data + "real", comm);
     write_displacement(file, gather, mode.imaginary, data + "imaginary", comm);
-    layout.still.push_back({name.str() + "real part", data + "real", "Node", 3});
-    layout.still.push_back({name.str() + "imaginary part", data + "imaginary", "Node", 3});
+    layout.still.push_back({name.str() + "real part", data + "real", Center::node, 3});
+    layout.still.push_back({name.str() + "imaginary part", data + "imaginary", Center::node, 3});
   }
 }
 
@@ -285,7 +301,7 @@ double sample_time(const LimitCycle& cycle, std::size_t sample)
 void write_fields(const Report& report, const Scene& scene, const FieldNodes& nodes,
                   const std::filesystem::path& output, MPI_Comm comm)
 {
-  const auto place = output / "fields.h5", xdmf = output / "fields.xdmf";
+  const auto place = output / word(ResultFile::fields), xdmf = output / word(ResultFile::field_places);
   if (scene.matrices) return;
   Layout layout;
   std::optional<Hdf5File> file; // on rank 0
@@ -299,7 +315,7 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
   if (report.equilibrium.u.get())
   {
     write_displacement(file, gather, report.equilibrium.u, "equilibrium/displacement", comm);
-    layout.still.push_back({"displacement at equilibrium [m]", "equilibrium/displacement", "Node", 3});
+    layout.still.push_back({"displacement at equilibrium [m]", "equilibrium/displacement", Center::node, 3});
     on_rank_zero(comm, [&] { write_contact(*file, report.equilibrium, nodes, layout); });
   }
   write_modes(file, gather, report.modes, layout, comm);

@@ -64,7 +64,7 @@ std::string stability_text(const Multipliers& multipliers)
 }
 
 /// As many digits as the error leaves, at least two.
-std::string energy_text(const Estimated& energy)
+std::string energy_text(const MeanValue& energy)
 {
   const double ratio = energy.value / std::max(energy.error, 1e-5 * energy.value);
   const int digits = std::clamp(static_cast<int>(std::ceil(std::log10(std::max(ratio, 1.)))) + 1, 2, 6);
@@ -94,10 +94,10 @@ std::string settled_text(const Report& report, const Scene& scene)
            format(", strongest line %.5g Hz", first);
     break;
   }
-  Estimated energy = report.settled.fluctuating_energy;
+  MeanValue energy = report.settled.fluctuating_energy;
   energy.error += report.settled.step_error;
   return text + beside_mode(report, first) + energy_text(energy) +
-         largest_swing(scene, report.settled.peak_to_peak, [](const Estimated& swing) { return swing.value; });
+         largest_swing(scene, report.settled.peak_to_peak, [](const MeanValue& swing) { return swing.value; });
 }
 
 std::string cycle_text(const Report& report, const Scene& scene)

@@ -80,7 +80,8 @@ Json modes_entry(const Modes& modes)
   entry["band_hz"] = modes.band;
   entry["unstable_count"] = modes.unstable_count;
   entry["count_check"] = modes.count_check;
-  entry["count_certified_by"] = modes.count.certified_by.empty() ? Json(nullptr) : Json(modes.count.certified_by);
+  entry["count_certified_by"] =
+      modes.count.certified_by == Certificate::none ? Json(nullptr) : Json(word(modes.count.certified_by));
   entry["count_expected"] = modes.count.expected;
   entry["count_found"] = modes.count.found;
   entry["count_frequency_hz"] = modes.count.frequency;
@@ -188,7 +189,7 @@ Json cycle_entry(const Report& report, const Scene& scene)
   return entry;
 }
 
-Json estimated(const Estimated& value)
+Json estimated(const MeanValue& value)
 {
   return {{"mean", value.value}, {"error", value.error}};
 }
@@ -230,7 +231,7 @@ Json settled_entry(const Report& report, const Scene& scene)
   for (std::size_t i = 0; i < probes; ++i)
     entry["peak_to_peak"][scene.probes[i].name] = estimated(settled.peak_to_peak[i]);
   entry["exponents"] = Json::array();
-  for (const Estimated& one : motion.exponents) entry["exponents"].push_back(estimated(one));
+  for (const MeanValue& one : motion.exponents) entry["exponents"].push_back(estimated(one));
   entry["base_frequencies_hz"] = base_entry(motion.base);
   const bool of_probe = settled.spectrum_probe >= 0;
   entry["spectrum_of"] =

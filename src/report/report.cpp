@@ -3,6 +3,7 @@
 #include "squeal/report/fields.hpp"
 #include "squeal/report/history.hpp"
 #include "squeal/report/json.hpp"
+#include "squeal/report/result_files.hpp"
 #include "sweep_results.hpp"
 
 #include <cctype>
@@ -87,21 +88,25 @@ void write_request(const Scene& scene, const std::string& run, const std::filesy
   on_rank_zero(comm,
                [&]
                {
-                 write_whole_file(output / "resolved.toml", provenance(run) + resolved_scene(scene), Flush::by_system);
-                 write_whole_file(output / "options.txt", provenance(run) + option_text(), Flush::by_system);
+                 write_whole_file(output / word(ResultFile::resolved_scene), provenance(run) + resolved_scene(scene),
+                                  Flush::by_system);
+                 write_whole_file(output / word(ResultFile::options), provenance(run) + option_text(),
+                                  Flush::by_system);
                });
 }
 
 void write_results(const Report& report, const Scene& scene, const FieldNodes& nodes,
                    const std::filesystem::path& output, MPI_Comm comm)
 {
-  on_rank_zero(comm, [&] { write_history(report, scene, output / "history.h5"); });
+  on_rank_zero(comm, [&] { write_history(report, scene, output / word(ResultFile::history)); });
   if (has_run(report.sweep.outcome))
-    on_rank_zero(comm,
-                 [&] { write_whole_file(output / "sweep.csv", sweep_csv(report.sweep, scene), Flush::by_system); });
+    on_rank_zero(
+        comm,
+        [&] { write_whole_file(output / word(ResultFile::sweep), sweep_csv(report.sweep, scene), Flush::by_system); });
   write_fields(report, scene, nodes, output, comm);
   // Last: where there is a report, the rest is there too.
-  on_rank_zero(comm, [&] { write_whole_file(output / "report.json", report_json(report, scene), Flush::by_system); });
+  on_rank_zero(comm, [&]
+               { write_whole_file(output / word(ResultFile::report), report_json(report, scene), Flush::by_system); });
 }
 
 } // namespace squeal

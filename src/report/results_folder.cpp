@@ -22,13 +22,11 @@ namespace fs = std::filesystem;
 namespace
 {
 
-constexpr std::array result_files = {"report.json", "history.h5",    "sweep.csv",   "fields.h5",
-                                     "fields.xdmf", "resolved.toml", "options.txt", "checkpoint"};
 constexpr const char* lock_file = "running";
 
 bool is_result(const fs::path& name)
 {
-  return std::find(result_files.begin(), result_files.end(), name) != result_files.end();
+  return std::find(result_file_words.begin(), result_file_words.end(), name) != result_file_words.end();
 }
 
 /// "2026-01-31T12:00:00.123456Z HOST 4711": time, machine and process tell any two runs apart.
@@ -177,8 +175,8 @@ void ResultsFolder::make(Beginning beginning)
   for (const auto& entry : fs::directory_iterator(partial_))
     if (entry.path().filename() != lock_file && !(goes_on && entry.path() == checkpoints()))
       fs::remove_all(entry.path());
-  if (goes_on && !fs::exists(checkpoints()) && fs::exists(place_ / "checkpoint"))
-    fs::copy(place_ / "checkpoint", checkpoints(), fs::copy_options::recursive);
+  if (goes_on && !fs::exists(checkpoints()) && fs::exists(place_ / checkpoints().filename()))
+    fs::copy(place_ / checkpoints().filename(), checkpoints(), fs::copy_options::recursive);
 }
 
 ResultsFolder::~ResultsFolder()
@@ -222,12 +220,13 @@ void ResultsFolder::move_whole()
 void ResultsFolder::move_by_file()
 {
   fs::create_directories(place_);
-  fs::remove(place_ / "report.json");
-  for (const char* name : result_files) fs::remove_all(place_ / name);
+  const char* const report = word(ResultFile::report);
+  fs::remove(place_ / report);
+  for (const char* name : result_file_words) fs::remove_all(place_ / name);
   for (const auto& entry : fs::directory_iterator(partial_))
-    if (const fs::path name = entry.path().filename(); name != "report.json" && name != lock_file)
+    if (const fs::path name = entry.path().filename(); name != report && name != lock_file)
       rename_or_throw(entry.path(), place_ / name);
-  rename_or_throw(partial_ / "report.json", place_ / "report.json");
+  rename_or_throw(partial_ / report, place_ / report);
   fs::remove_all(partial_);
 }
 
@@ -274,7 +273,7 @@ std::vector<fs::path> inputs_of(const Scene& scene)
 void check_outputs(const Scene& scene, const fs::path& place)
 {
   std::vector<fs::path> results;
-  for (const char* name : result_files) results.push_back(place / name);
+  for (const char* name : result_file_words) results.push_back(place / name);
   const std::vector<fs::path> inputs = inputs_of(scene);
   const auto refuse_on = [](const fs::path& output, const std::vector<fs::path>& others, const std::string& remedy)
   {

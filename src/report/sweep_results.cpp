@@ -24,9 +24,10 @@ double damping_ratio_of(const SweptMode& mode)
   return -mode.lambda.real() / std::abs(mode.lambda);
 }
 
-int direction_of(bool reversed)
+/// Of a point or a threshold.
+template <class At> int direction_of(const At& at)
 {
-  return reversed ? -1 : 1;
+  return at.reversed ? -1 : 1;
 }
 
 /// A followed mode where it grows most.
@@ -58,7 +59,7 @@ std::vector<Track> tracks_of(const Sweep& sweep)
 
 Json point_entry(const SweepPoint& point)
 {
-  Json entry = {{"values", point.values}, {"direction", direction_of(point.reversed)}};
+  Json entry = {{"values", point.values}, {"direction", direction_of(point)}};
   entry["outcome"] = word(point.outcome.kind);
   if (!point.outcome.reason.empty()) entry["reason"] = point.outcome.reason;
   entry["inserted"] = point.inserted;
@@ -112,13 +113,13 @@ void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
                                           {"greatest_growth_rate", track.mode->lambda.real()},
                                           {"frequency_hz", frequency_of(*track.mode)},
                                           {"values", track.point->values},
-                                          {"direction", direction_of(track.point->reversed)}});
+                                          {"direction", direction_of(*track.point)}});
     ++number;
   }
   entry["thresholds"] = Json::array();
   for (const Threshold& threshold : sweep.thresholds)
     entry["thresholds"].push_back({{"values", threshold.values},
-                                   {"direction", direction_of(threshold.reversed)},
+                                   {"direction", direction_of(threshold)},
                                    {"error", threshold.error},
                                    {"track", threshold.track},
                                    {"frequency_hz", threshold.frequency_hz},
@@ -136,7 +137,7 @@ void write_sweep(Hdf5File& file, const Sweep& sweep)
   {
     const SweepPoint& point = sweep.points[i];
     values.insert(values.end(), point.values.begin(), point.values.end());
-    direction.push_back(direction_of(point.reversed));
+    direction.push_back(direction_of(point));
     closed.push_back(point.closed);
     unstable.push_back(point.unstable);
     for (const SweptMode& mode : point.modes)
@@ -169,8 +170,7 @@ std::string sweep_csv(const Sweep& sweep, const Scene& scene)
   {
     std::string head;
     for (const double value : point.values) head += format("%.17g,", value);
-    head += format("%d,%d,%s,%d,", direction_of(point.reversed), point.inserted ? 1 : 0, word(point.outcome.kind),
-                   point.closed);
+    head += format("%d,%d,%s,%d,", direction_of(point), point.inserted ? 1 : 0, word(point.outcome.kind), point.closed);
     if (point.modes.empty()) text += head + ",,,,,,\n";
     for (const SweptMode& mode : point.modes)
       text += head + (mode.track < 0 ? "" : std::to_string(mode.track)) +

@@ -153,7 +153,7 @@ std::string cycle_text(const Report& report, const Scene& scene)
   return text;
 }
 
-std::string mean_text(const char* name, const Estimated& mean, const char* unit)
+std::string mean_text(const char* name, const MeanValue& mean, const char* unit)
 {
   return format("%s %.4g +- %.1g %s", name, mean.value, mean.error, unit);
 }
@@ -177,7 +177,7 @@ std::string settled_text(const SettledMotion& settled, const Scene& scene)
       row("", format("of the pairs %.1f %% are open, %.1f %% stick, %.1f %% slip", 100 * settled.open_fraction.value,
                      100 * settled.stick_fraction.value, 100 * settled.slip_fraction.value));
   std::string exponents = "Lyapunov exponents a period:";
-  for (const Estimated& one : motion.exponents) exponents += format(" %.4f +- %.4f", one.value, one.error);
+  for (const MeanValue& one : motion.exponents) exponents += format(" %.4f +- %.4f", one.value, one.error);
   text += row("", exponents);
   text += row("", format("base frequencies %.6g and %.6g Hz, of %zu lines", motion.base.first, motion.base.second,
                          motion.spectrum.lines.size()));

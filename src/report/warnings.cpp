@@ -53,7 +53,7 @@ Sentences of_modes(const Report& report)
   if (modes.routes_disagree)
     sentences.push_back("the two routes disagree on the number of unstable modes: raise modes.real_modes or "
                         "modes.residual_passes");
-  if (modes.count.certified_by.empty() && modes.count.expected != modes.count.found)
+  if (modes.count.certified_by == Certificate::none && modes.count.expected != modes.count.found)
     sentences.push_back(format("%d pairs were found where %d are expected, so an unstable one may be missing: %s",
                                modes.count.found, modes.count.expected,
                                modes.method == ModesMethod::projection

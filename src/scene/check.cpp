@@ -124,7 +124,7 @@ private:
 
   void check_names() const
   {
-    std::set<std::string> parts, nodes = {"ground"}, superelements, probes; // springs refer to "ground"
+    std::set<std::string> parts, nodes = {ground}, superelements, probes; // springs refer to the ground
     need_different(scene_.parts, "part", parts);
     need_different(scene_.points, "point", nodes);
     need_different(scene_.rigid_bodies, "rigid_body", nodes);
@@ -184,7 +184,7 @@ private:
   void check_spring(const Spring& spring) const
   {
     std::vector<std::string> ends = nodes_;
-    ends.push_back("ground");
+    ends.push_back(ground);
     need_known(spring.from, ends, &spring.from, "[[spring]] from");
     need_known(spring.to, ends, &spring.to, "[[spring]] to");
     if (spring.from == spring.to)

@@ -1,4 +1,6 @@
 /// Numbers of a scene that a branch follows or a sweep varies, found in the scene's own text and replaced there.
+#include "squeal/scene/numbers.hpp"
+
 #include "squeal/base/error.hpp"
 #include "toml_values.hpp"
 
@@ -14,6 +16,9 @@ namespace
 /// Tables whose numbers are of the structure, its contact and its loads.
 const std::vector<std::string> physical = {"part",     "point",   "rigid_body", "spring", "force",
                                            "pressure", "contact", "friction",   "damping"};
+
+/// Tables on which the mesh or the given matrices depend.
+constexpr std::array of_the_mesh = {"mesh", "matrices"};
 
 std::string text_of_number(double value)
 {
@@ -33,14 +38,15 @@ double number_at(const Scene& scene, const std::string& key, const std::string& 
 {
   const auto refusal = [&](const std::string& why) { return Error(table + " key = \"" + key + "\" " + why); };
   const std::string first = key.substr(0, key.find('.'));
-  if (first == "mesh" || first == "matrices")
+  if (std::ranges::find(of_the_mesh, first) != of_the_mesh.end())
     throw refusal("would change the mesh; name a number of " + joined(physical));
   if (std::find(physical.begin(), physical.end(), first) == physical.end())
     throw refusal("is not a number of the structure, its contact or its loads" + hint_or_list(first, physical) +
-                  ", such as friction.coefficient");
+                  ", such as " + friction_coefficient_key);
   toml::table document = document_of(scene);
   const toml::node* node = find_value(document, key);
-  if (!node) throw refusal("is not in the scene: name a number as --set does, such as friction.coefficient");
+  if (!node)
+    throw refusal(std::string("is not in the scene: name a number as --set does, such as ") + friction_coefficient_key);
   if (!node->is_number())
     throw refusal("is " + kind_of(*node) + ", not a number; of a list name an entry, such as force.0.vector.2");
   return *node->value<double>();
@@ -220,7 +226,7 @@ std::vector<SceneNumber> sensitive_numbers(const Scene& scene)
   for (const std::string& key : scene.sensitivity->numbers)
     numbers.push_back({key, number_at(scene, key, "[sensitivity]")});
   if (!numbers.empty()) return numbers;
-  numbers.push_back({"friction.coefficient", scene.friction.coefficient});
+  numbers.push_back({friction_coefficient_key, scene.friction.coefficient});
   if (!scene.matrices) numbers.push_back({"damping.alpha", scene.damping.alpha});
   if (!scene.matrices) numbers.push_back({"damping.beta", scene.damping.beta});
   add_named(scene, numbers);

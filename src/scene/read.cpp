@@ -194,8 +194,9 @@ private:
       std::string axis = text(node);
       const double sign = axis.rfind('-', 0) == 0 ? -1 : 1;
       if (sign < 0) axis.erase(0, 1);
-      if (axis != "x" && axis != "y" && axis != "z") fail(node, "x, y, z, -x, -y, -z or a list of three numbers");
-      v[axis[0] - 'x'] = sign;
+      const auto* const found = std::find(motion_words.begin(), motion_words.begin() + 3, axis);
+      if (found == motion_words.begin() + 3) fail(node, "x, y, z, -x, -y, -z or a list of three numbers");
+      v[static_cast<std::size_t>(found - motion_words.begin())] = sign;
       return v;
     }
     const auto values = numbers(node, "a list of three numbers");
@@ -338,11 +339,11 @@ private:
     for (std::string word; words >> word;)
     {
       const auto found = std::find(motion_words.begin(), motion_words.end(), word);
-      if (word == "all")
+      if (word == all_motions)
         target.fill(true);
       else if (found != motion_words.end())
         target[found - motion_words.begin()] = true;
-      else if (word != "none")
+      else if (word != no_motions)
         fail(node, "some of x y z rx ry rz with blanks between, all, or none");
     }
   }

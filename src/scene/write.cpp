@@ -96,7 +96,7 @@ std::string print(const Motions& motions)
   std::string text;
   for (std::size_t i = 0; i < 6; ++i)
     if (motions[i]) text += std::string(text.empty() ? "" : " ") + motion_words[i];
-  return print(text.empty() ? std::string("none") : text);
+  return print(text.empty() ? no_motions : text);
 }
 
 std::string print(const std::map<std::string, double>& table)

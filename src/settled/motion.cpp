@@ -14,7 +14,7 @@ namespace
 /// Of two exponents that are zero: a torus, or a motion that winds down to a cycle.
 MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencies& base)
 {
-  const Estimated decay = decay_of_spread(energies);
+  const MeanValue decay = decay_of_spread(energies);
   const double length = static_cast<double>(energies.size());
   if (base.explained < 0.8)
     return {MotionKind::undecided, "quasi-periodic and weakly irregular",
@@ -38,7 +38,7 @@ bool steady(std::span<const double> energies)
   for (const double energy : energies) sum += energy;
   const double middle = sum / static_cast<double>(energies.size());
   for (const double energy : energies) squares += (energy - middle) * (energy - middle);
-  const Estimated decay = decay_of_spread(energies);
+  const MeanValue decay = decay_of_spread(energies);
   return std::sqrt(squares / static_cast<double>(energies.size())) < 1e-3 * middle && decay.value + decay.error >= 0;
 }
 
@@ -53,7 +53,7 @@ OptionList options_of(SettledOptions& options)
   };
 }
 
-MotionVerdict judge_motion(const std::vector<Estimated>& exponents, std::span<const double> energies,
+MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<const double> energies,
                            const BaseFrequencies& base)
 {
   const std::string more = "more periods would decide (-settled_periods)";
@@ -63,9 +63,9 @@ MotionVerdict judge_motion(const std::vector<Estimated>& exponents, std::span<co
   // Bars of 95 % each: 1.4 times as wide they hold for four exponents at once.
   constexpr double together = 1.4;
   const auto positive = std::count_if(exponents.begin(), exponents.end(),
-                                      [](const Estimated& one) { return one.value > together * one.error; });
+                                      [](const MeanValue& one) { return one.value > together * one.error; });
   const auto zero = std::count_if(exponents.begin(), exponents.end(),
-                                  [](const Estimated& one) { return std::abs(one.value) <= together * one.error; });
+                                  [](const MeanValue& one) { return std::abs(one.value) <= together * one.error; });
   if (positive > 0) return {MotionKind::irregular, "", ""};
   if (zero == 1) return {MotionKind::periodic, "", ""};
   // slow motions that die out have exponents within their bars of zero, too

@@ -98,9 +98,9 @@ PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, Settled
 /// Names the parts of what was examined.
 void name_means(SettledMotion& motion, int pairs)
 {
-  const std::vector<Estimated>& means = motion.examined.means;
+  const std::vector<MeanValue>& means = motion.examined.means;
   const auto fraction = [&](Channel channel) {
-    return Estimated{means[channel].value / pairs, means[channel].error / pairs};
+    return MeanValue{means[channel].value / pairs, means[channel].error / pairs};
   };
   motion.fluctuating_energy = means[fluctuating_energy];
   motion.energy = means[energy];
@@ -120,7 +120,7 @@ void name_means(SettledMotion& motion, int pairs)
 
 /// The mean fluctuating energy with half as many steps a period, from where the motion ends. It is of the second half
 /// of as many periods as cost a quarter of the motion's own.
-Estimated energy_by_half_the_steps(const CycleProblem& problem, const SettledMotion& motion, double theta, Vec end)
+MeanValue energy_by_half_the_steps(const CycleProblem& problem, const SettledMotion& motion, double theta, Vec end)
 {
   PeriodMap map{problem.sliding, problem.step, std::max(motion.steps_per_period / 2, 1), theta};
   set_period(map, motion.period);
@@ -138,6 +138,13 @@ Estimated energy_by_half_the_steps(const CycleProblem& problem, const SettledMot
 }
 
 } // namespace
+
+void take_as_answer(const SettledMotion& motion, Outcome& of_cycle)
+{
+  if (motion.outcome.kind != OutcomeKind::settled) return;
+  of_cycle.reason = std::string(word(of_cycle.kind)) + ": " + of_cycle.reason;
+  of_cycle.kind = OutcomeKind::settled;
+}
 
 SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, const SettledOptions& options)
 {

@@ -43,10 +43,10 @@ double batch_error(std::span<const double> series, std::size_t count, double stu
 
 } // namespace
 
-Estimated batch_mean(std::span<const double> series)
+MeanValue batch_mean(std::span<const double> series)
 {
   if (series.empty()) return {std::nan(""), std::nan("")};
-  Estimated result{mean(series), std::nan("")};
+  MeanValue result{mean(series), std::nan("")};
   if (series.size() < 4) return result;
   if (series.size() < 16) return {result.value, batch_error(series, 4, 3.182)};
   result.error = 0;
@@ -60,7 +60,7 @@ bool is_stationary(std::span<const double> series)
 {
   if (series.size() < 16) return false;
   const double early = mean(series.first(series.size() / 4));
-  const Estimated late = batch_mean(series.last(series.size() / 2));
+  const MeanValue late = batch_mean(series.last(series.size() / 2));
   // The late half alone gives the variance: a drift would widen the early quarter's own bar. Half as many values have
   // twice its variance, and the difference three times.
   return std::abs(early - late.value) <= std::max(std::sqrt(3.) * late.error, 1e-3 * std::abs(late.value));
@@ -73,7 +73,7 @@ std::size_t values_before_stationary(std::span<const double> series)
   return series.size();
 }
 
-Estimated decay_of_spread(std::span<const double> series)
+MeanValue decay_of_spread(std::span<const double> series)
 {
   constexpr std::size_t count = 8;
   if (series.size() < 4 * count) return {0, HUGE_VAL};

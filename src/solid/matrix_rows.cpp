@@ -49,7 +49,8 @@ std::vector<PetscInt> rows_of(const MatrixRows& rows, const std::string& on, con
 
 bool names_nodes(const std::string& on)
 {
-  return on.starts_with("node:");
+  const std::optional<RowNames> names = row_names(on);
+  return names && names->nodes;
 }
 
 } // namespace

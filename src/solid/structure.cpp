@@ -65,7 +65,7 @@ Contribution spring_contribution(const Mesh& mesh, const Spring& spring)
   Eigen::VectorXd s;
   for (const auto& [name, sign] : {std::pair{spring.from, -1.}, std::pair{spring.to, 1.}})
   {
-    if (name == "ground") continue;
+    if (name == ground) continue;
     nodes.push_back(point_node(mesh, name, "spring from " + spring.from + " to " + spring.to));
     s.conservativeResize(s.size() + 3);
     s.tail<3>() = sign * direction;
@@ -304,6 +304,12 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
   }
   structure.load = assemble_load(mesh, scene, partition, dofs, comm);
   return structure;
+}
+
+std::string unsymmetric_part(const Structure& structure)
+{
+  if (structure.G.get() || structure.H.get()) return "the structure has gyroscopic or circulatory parts";
+  return structure.K_loss.get() ? "parts have loss factors" : "";
 }
 
 } // namespace squeal

@@ -193,7 +193,7 @@ public:
   }
 
   /// Nothing where it is the equilibrium of the problem itself.
-  std::optional<Equilibrium> at(const BranchModel& model)
+  std::optional<Equilibrium> at(const BrakeModel& model)
   {
     const auto& [structure, interface, equilibrium] = problem_.sliding;
     PetscBool same_load = PETSC_FALSE;
@@ -220,7 +220,7 @@ private:
 std::optional<AtHeldVectors> hold_at(const SensitivityProblem& problem, NearbyEquilibria& equilibria,
                                      const Vectors& vectors, const SceneNumber& number)
 {
-  const BranchModel model = problem.model_with(number);
+  const BrakeModel model = problem.model_with(number);
   const std::optional<Equilibrium> other = equilibria.at(model);
   const Equilibrium& equilibrium = other ? *other : problem.sliding.equilibrium;
   if (equilibrium.outcome.kind != OutcomeKind::converged || equilibrium.closed != problem.sliding.equilibrium.closed)

@@ -126,11 +126,11 @@ private:
   /// The modes at a point; nothing if it fails, which is recorded.
   std::optional<Followed> evaluate(Followed point)
   {
-    const Equilibrium& at = model_.equilibrium_at(point.values, point.reversed);
+    const Equilibrium& at = model_.equilibrium_at({point.values, point.reversed});
     point.closed = static_cast<int>(std::ranges::count(at.closed, 1));
     point.modes.outcome = at.outcome;
     if (at.outcome.kind == OutcomeKind::converged && problem_.settings.stages == SweepStages::modes)
-      point.modes = model_.modes_at(point.values, point.reversed);
+      point.modes = model_.modes_at({point.values, point.reversed});
     if (point.modes.outcome.kind == OutcomeKind::converged) return point;
     record(point, {});
     return std::nullopt;

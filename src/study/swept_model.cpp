@@ -1,5 +1,7 @@
 #include "swept_model.hpp"
 
+#include "squeal/scene/numbers.hpp"
+
 #include <algorithm>
 
 namespace squeal
@@ -11,7 +13,7 @@ namespace
 /// Place of the friction coefficient among the swept numbers; -1: it is none of them.
 int friction_place(const SweepSettings& settings)
 {
-  const auto found = std::ranges::find(settings.key, "friction.coefficient");
+  const auto found = std::ranges::find(settings.key, friction_coefficient_key);
   return found == settings.key.end() ? -1 : static_cast<int>(found - settings.key.begin());
 }
 
@@ -31,22 +33,22 @@ SweptModel::SweptModel(const SweepProblem& problem)
   if (equilibrium_options_.check_max_iterations < 0) equilibrium_options_.check_max_iterations = 0;
 }
 
-void SweptModel::go_to(const Point& point)
+void SweptModel::go_to(const SweptPlace& place)
 {
-  if (model_ && at_ == point) return;
+  if (model_ && at_ == place) return;
   const SweepSettings& settings = problem_.settings;
-  if (!model_ || without_friction(at_.first, settings) != without_friction(point.first, settings))
+  if (!model_ || without_friction(at_.values, settings) != without_friction(place.values, settings))
   {
     model_.reset();
-    model_ = problem_.model_at(point.first);
-    at_ = {point.first, false};
+    model_ = problem_.model_at(place.values);
+    at_ = {place.values};
   }
   Interface& interface = model_->interface;
-  if (const int place = friction_place(settings); place >= 0)
-    interface.friction.coefficient = point.first[static_cast<std::size_t>(place)];
-  if (at_.second != point.second)
+  if (const int friction = friction_place(settings); friction >= 0)
+    interface.friction.coefficient = place.values[static_cast<std::size_t>(friction)];
+  if (at_.reversed != place.reversed)
     for (double& velocity : interface.drive) velocity = -velocity;
-  at_ = point;
+  at_ = place;
 }
 
 const PairCompliance& SweptModel::compliance()
@@ -59,23 +61,22 @@ const PairCompliance& SweptModel::compliance()
   return compliance_.emplace(structure, interface, equilibrium_options_);
 }
 
-Equilibrium SweptModel::find(const Point& point)
+Equilibrium SweptModel::find(const SweptPlace& place)
 {
-  go_to(point);
+  go_to(place);
   const auto& [structure, interface] = *model_;
   if (interface.pairs == 0) return find_equilibrium(structure, interface, equilibrium_options_);
   return find_equilibrium(structure, interface, compliance(), closed_, equilibrium_options_);
 }
 
-const Equilibrium& SweptModel::equilibrium_at(const std::vector<double>& values, bool reversed)
+const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
 {
-  const Point point{values, reversed};
-  const auto known = equilibria_.find(point);
+  const auto known = equilibria_.find(place);
   if (known != equilibria_.end()) return known->second;
   Equilibrium equilibrium;
   try
   {
-    equilibrium = find(point);
+    equilibrium = find(place);
   }
   catch (const LibraryError&)
   {
@@ -87,7 +88,7 @@ const Equilibrium& SweptModel::equilibrium_at(const std::vector<double>& values,
     equilibrium.outcome = {OutcomeKind::no_equilibrium, error.what(), 0, 1};
   }
   if (equilibrium.outcome.kind == OutcomeKind::converged) closed_ = equilibrium.closed;
-  return equilibria_[point] = std::move(equilibrium);
+  return equilibria_[place] = std::move(equilibrium);
 }
 
 void SweptModel::prepare(const std::vector<SweepLine>& lines)
@@ -95,7 +96,7 @@ void SweptModel::prepare(const std::vector<SweepLine>& lines)
   for (const SweepLine& line : lines)
     for (const std::vector<double>& values : line.points)
     {
-      const Equilibrium& equilibrium = equilibrium_at(values, line.reversed);
+      const Equilibrium& equilibrium = equilibrium_at({values, line.reversed});
       if (equilibrium.outcome.kind != OutcomeKind::converged) continue;
       if (at_every_.empty()) at_every_ = equilibrium.closed;
       for (std::size_t i = 0; i < at_every_.size(); ++i)
@@ -108,13 +109,13 @@ BasisProblem SweptModel::basis_problem() const
   return {model_->structure, model_->interface, problem_.modes.band, problem_.modes_options};
 }
 
-PointModes SweptModel::modes_at(const std::vector<double>& values, bool reversed)
+PointModes SweptModel::modes_at(const SweptPlace& place)
 {
-  const Equilibrium& equilibrium = equilibrium_at(values, reversed);
+  const Equilibrium& equilibrium = equilibrium_at(place);
   PointModes modes;
   try
   {
-    go_to({values, reversed});
+    go_to(place);
     std::vector<char> common = basis_ ? basis_->closed : at_every_;
     if (common.size() != equilibrium.closed.size())
       throw Error(

@@ -10,6 +10,15 @@
 namespace squeal
 {
 
+/// Where a sweep is: the values of its numbers, and whether the rotation is reversed.
+struct SweptPlace
+{
+  std::vector<double> values{};
+  bool reversed = false;
+
+  auto operator<=>(const SweptPlace&) const = default;
+};
+
 class SweptModel
 {
 public:
@@ -19,25 +28,23 @@ public:
   void prepare(const std::vector<SweepLine>& lines);
 
   /// What cannot be computed at a point, for whatever reason, is in the outcome.
-  const Equilibrium& equilibrium_at(const std::vector<double>& values, bool reversed);
-  PointModes modes_at(const std::vector<double>& values, bool reversed);
+  const Equilibrium& equilibrium_at(const SweptPlace& place);
+  PointModes modes_at(const SweptPlace& place);
 
   Eigen::Index shapes() const { return basis_ ? basis_->basis.shapes() : 0; }
   int passes() const { return basis_ ? basis_->passes : 0; }
 
 private:
-  using Point = std::pair<std::vector<double>, bool>; // values, and whether the rotation is reversed
-
-  void go_to(const Point& point);
-  Equilibrium find(const Point& point);
+  void go_to(const SweptPlace& place);
+  Equilibrium find(const SweptPlace& place);
   const PairCompliance& compliance();
   BasisProblem basis_problem() const;
 
   const SweepProblem& problem_;
   EquilibriumOptions equilibrium_options_;
-  std::optional<BranchModel> model_{}; // at the point visited last
-  Point at_{};
-  std::map<Point, Equilibrium> equilibria_{};
+  std::optional<BrakeModel> model_{}; // at the point visited last
+  SweptPlace at_{};
+  std::map<SweptPlace, Equilibrium> equilibria_{};
   std::vector<char> closed_{};   // at the equilibrium found last
   std::vector<char> at_every_{}; // pairs closed at every point prepared
   std::optional<PairCompliance> compliance_{};

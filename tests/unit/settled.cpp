@@ -163,7 +163,7 @@ TEST_CASE("bars of batch means hold the true mean in nine series of ten or more"
     int held = 0;
     for (int i = 0; i < 400; ++i)
     {
-      const Estimated mean = batch_mean(noise_with_memory(random, memory));
+      const MeanValue mean = batch_mean(noise_with_memory(random, memory));
       held += std::abs(mean.value - 1) <= mean.error;
     }
     CAPTURE(memory);
@@ -185,9 +185,9 @@ TEST_CASE("a drift is not stationary, a beat is; what comes before the motion ha
 TEST_CASE("the spread of a beat that dies decays at its rate")
 {
   const auto dying = sampled(512, [](double i) { return 1 + std::exp(-0.01 * i) * std::sin(0.8 * i); });
-  const Estimated decay = decay_of_spread(dying);
+  const MeanValue decay = decay_of_spread(dying);
   CHECK(std::abs(decay.value - 0.01) <= decay.error);
-  const Estimated none = decay_of_spread(sampled(512, [](double i) { return 1 + std::sin(0.8 * i); }));
+  const MeanValue none = decay_of_spread(sampled(512, [](double i) { return 1 + std::sin(0.8 * i); }));
   CHECK(std::abs(none.value) <= none.error);
 }
 

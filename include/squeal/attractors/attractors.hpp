@@ -4,6 +4,7 @@
 ///
 /// Caveat: motions are distinguished by mean energy and frequency alone, and one that few starts lead to may be missed.
 #include "squeal/base/options.hpp"
+#include "squeal/settled/statistics.hpp"
 #include "squeal/transient/transient.hpp"
 
 namespace squeal
@@ -23,12 +24,6 @@ inline Words words_of(ReachedKind)
 {
   return reached_words;
 }
-
-/// A mean and its error bar.
-struct MeanValue
-{
-  double value = 0, error = 0;
-};
 
 /// A motion that starts lead to.
 struct ReachedMotion

@@ -11,13 +11,6 @@
 namespace squeal
 {
 
-/// What a value of the parameter makes of the scene. Matrices have the layout of the scene's own.
-struct BranchModel
-{
-  Structure structure;
-  Interface interface;
-};
-
 /// The stability of the sliding equilibrium at a value of the parameter.
 struct EquilibriumStability
 {
@@ -48,9 +41,9 @@ struct BrakeBranch
 struct BrakeBranchProblem
 {
   const BranchSettings& settings;
-  std::function<BranchModel(double parameter)> model_at;
-  SlidingEquilibrium sliding; // of the scene itself
-  const LimitCycle& cycle;    // where the branch starts
+  std::function<BrakeModel(double parameter)> model_at; // with matrices of the layout of the scene's own
+  SlidingEquilibrium sliding;                           // of the scene itself
+  const LimitCycle& cycle;                              // where the branch starts
   int steps_per_period = 0;
   double tolerance = 0; // on the full-space residual
   Mat probes = nullptr;
@@ -61,6 +54,15 @@ struct BrakeBranchProblem
   const ShootingOptions& shooting;
 };
 
+/// Why no branch can start from the cycle; empty if it can. `tolerance`: of the residual. [-]
+std::string no_cycle_to_follow(const LimitCycle& cycle, double tolerance);
+
+/// The number of steps a period along a branch: the scene's, else that of the cycle it starts from, at most 128, since
+/// every point takes several periods.
+int steps_along_branch(const CycleSettings& settings, const LimitCycle& cycle);
+
+/// Follows the cycle both ways from the scene's own value to the ends of the range, with the equilibrium beside it.
+/// Collective. Error: a value of the parameter makes no scene.
 BrakeBranch find_branch(const BrakeBranchProblem& problem);
 
 } // namespace squeal

@@ -26,6 +26,13 @@ struct Interface
   std::size_t size() const { return PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs)); }
 };
 
+/// The structure of a scene, or of the scene with other numbers, and its contact.
+struct BrakeModel
+{
+  Structure structure;
+  Interface interface;
+};
+
 /// Rows n, t1, t2 of every pair: n.w and t.w, with w the weighted sum of its nodes' displacements. Tangents: the
 /// scene's, else t1 along the drive. Error: zero drive velocity at a pair where mu > 0.
 Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm);

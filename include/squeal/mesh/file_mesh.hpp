@@ -2,7 +2,9 @@
 /// The content of a mesh file, before the scene's parts and surfaces are extracted from it, and its form on the way
 /// from the mesher to the program. This header knows no MPI, because the mesher knows none.
 #include "squeal/base/vec3.hpp"
+#include "squeal/base/words.hpp"
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -38,6 +40,20 @@ std::string packed(const MesherAnswer& answer);
 
 /// Returns the answer that was packed. Throws std::runtime_error if the bytes are not a whole one.
 MesherAnswer unpacked(const std::string& bytes);
+
+/// What the mesher reads: a file of the name given, or a checked script from its descriptor.
+enum class MesherInput
+{
+  file,
+  script,
+};
+
+inline constexpr std::array mesher_input_words = {"file", "script"};
+
+inline Words words_of(MesherInput)
+{
+  return mesher_input_words;
+}
 
 /// Descriptors of the mesher: it writes its answer to one, and reads a checked script from the other.
 inline constexpr int answer_descriptor = 3, script_descriptor = 4;

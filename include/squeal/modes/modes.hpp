@@ -37,10 +37,25 @@ struct RealModes
   std::vector<Owned<Vec>> shapes; // in the structure's dofs
 };
 
+/// What certifies that no mode is missing.
+enum class Certificate
+{
+  none,
+  inertia,   // of the frictionless structure
+  all_pairs, // the whole problem was solved
+};
+
+inline constexpr std::array certificate_words = {"none", "inertia", "all pairs"};
+
+inline Words words_of(Certificate)
+{
+  return certificate_words;
+}
+
 /// The count that shows whether a mode is missing.
 struct ModeCount
 {
-  std::string certified_by;    // "inertia" of the frictionless structure, "all pairs"; empty: not certified
+  Certificate certified_by{};
   double frequency = 0;        // [Hz] the end of the band or near it, where friction moved no pair across
   int expected = 0, found = 0; // pairs below it
 };

@@ -4,6 +4,7 @@
 ///
 /// PLACE may be a working folder, a mount point, or a folder whose parent is read-only, or hold other files than
 /// results. Then the files themselves are moved: report.json goes first and comes last.
+#include "squeal/report/result_files.hpp"
 #include "squeal/scene/scene.hpp"
 
 #include <mpi.h>
@@ -59,7 +60,7 @@ public:
   /// Where a file of the user's own name is written meanwhile: in the partial folder if it belongs into the place.
   std::filesystem::path meanwhile(const std::filesystem::path& file) const;
 
-  std::filesystem::path checkpoints() const { return partial_ / "checkpoint"; }
+  std::filesystem::path checkpoints() const { return partial_ / word(ResultFile::checkpoints); }
 
   /// Moves the results to their place, with their checkpoints if the run can go on. Collective.
   void publish(Checkpoints checkpoints);

@@ -24,6 +24,6 @@ void follow_period(const Flow& flow, TangentBundle& bundle);
 
 /// Largest first, per period, from the periods after the first `skipped`. A column that shears without growing, as on a
 /// torus, is stretched in proportion to the time: ln 2 over the last half of the periods, which the bars include.
-std::vector<Estimated> exponents_of(const TangentBundle& bundle, std::size_t skipped);
+std::vector<MeanValue> exponents_of(const TangentBundle& bundle, std::size_t skipped);
 
 } // namespace squeal

@@ -58,8 +58,8 @@ struct ExaminedMotion
   std::vector<std::vector<double>> channels; // [channel][period], from the start
   std::vector<double> coordinate, beside;    // all samples
   std::size_t discarded = 0;                 // periods before the motion was stationary; all of them if it never was
-  std::vector<Estimated> means;              // of each channel, from the periods after those
-  std::vector<Estimated> exponents;          // per period, largest first
+  std::vector<MeanValue> means;              // of each channel, from the periods after those
+  std::vector<MeanValue> exponents;          // per period, largest first
   Spectrum spectrum;                         // of the same periods
   BaseFrequencies base;
   MotionVerdict verdict;
@@ -68,7 +68,7 @@ struct ExaminedMotion
 };
 
 /// The kind that exponents, energies of the periods and base frequencies show.
-MotionVerdict judge_motion(const std::vector<Estimated>& exponents, std::span<const double> energies,
+MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<const double> energies,
                            const BaseFrequencies& base);
 
 /// Integrates 128 periods, and twice as many until the kind is decided or the options' number is reached. The state

@@ -15,14 +15,17 @@ struct SettledMotion
   double period = 0; // [s] of the windows that are called periods here
   ExaminedMotion examined;
   int spectrum_probe = -1;              // whose spectrum it is: the one that swings most [m]; -1: the normal force [N]
-  Estimated fluctuating_energy, energy; // [J]
+  MeanValue fluctuating_energy, energy; // [J]
   double step_error = 0; // [J] what the mean of the fluctuating energy changes by with half as many steps a period
   double least_energy = 0, greatest_energy = 0;       // [J] of the means of the fluctuating energy over single periods
-  Estimated damping_power, contact_power, load_power; // [W]
-  Estimated open_fraction, stick_fraction, slip_fraction;
-  std::vector<Estimated> peak_to_peak; // [m] within a period, of each probe
+  MeanValue damping_power, contact_power, load_power; // [W]
+  MeanValue open_fraction, stick_fraction, slip_fraction;
+  std::vector<MeanValue> peak_to_peak; // [m] within a period, of each probe
   History history;                     // of all periods
 };
+
+/// Where the motion answers, the outcome of the search for a cycle becomes "settled".
+void take_as_answer(const SettledMotion& motion, Outcome& of_cycle);
 
 /// Integrates on from the end of the search's free motion.
 SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, const SettledOptions& options);

@@ -7,14 +7,14 @@ namespace squeal
 {
 
 /// A value and its error bar, of 95 %.
-struct Estimated
+struct MeanValue
 {
   double value = 0, error = 0;
 };
 
 /// The mean, its bar by means of 8, 16 and 32 batches: the widest of the three. Neighbouring values may depend on each
 /// other over less than a batch. Of fewer than 16 values 4 batches; of fewer than 4 no bar (NaN).
-Estimated batch_mean(std::span<const double> series);
+MeanValue batch_mean(std::span<const double> series);
 
 /// Whether the means of the first quarter and of the last half agree to 1e-3, or within the bar of their difference
 /// (Geweke 1992). The last half gives the bar.
@@ -26,6 +26,6 @@ std::size_t values_before_stationary(std::span<const double> series);
 
 /// The rate at which the spread of the series about its mean decays, per value. It is the slope of the logarithm of its
 /// standard deviation over 8 batches, positive for a decay.
-Estimated decay_of_spread(std::span<const double> series);
+MeanValue decay_of_spread(std::span<const double> series);
 
 } // namespace squeal

@@ -35,6 +35,10 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
 /// skew.
 Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm);
 
+/// What keeps the matrices without contact from being those of a real symmetric problem, in a sentence; empty if
+/// nothing does.
+std::string unsymmetric_part(const Structure& structure);
+
 /// Declares to PETSc that A stays symmetric and that its pattern is complete.
 void mark_symmetric(Mat A);
 

@@ -2,7 +2,9 @@
 /// Why modes are unstable and what would change them (src/README.md, section 11). It gives derivatives of eigenvalues,
 /// shares of the parts in energies, powers of contact and damping, and the effect of proposed changes.
 #include "squeal/modes/modes.hpp"
-#include "squeal/study/sweep.hpp"
+#include "squeal/scene/numbers.hpp"
+
+#include <functional>
 
 namespace squeal
 {
@@ -56,8 +58,8 @@ struct SensitivityProblem
   const LinearisedSliding& linearised;
   const Modes& modes;
   std::vector<SceneNumber> numbers;
-  std::function<BranchModel(const SceneNumber&)> model_with; // the scene with another value
-  Mat probes = nullptr;                                      // a row a probe
+  std::function<BrakeModel(const SceneNumber&)> model_with; // the scene with another value
+  Mat probes = nullptr;                                     // a row a probe
   const std::vector<Change>& changes;
   std::vector<int> probes_of_changes; // their rows
   const ModesSettings& modes_settings;

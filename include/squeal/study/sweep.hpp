@@ -1,7 +1,9 @@
 #pragma once
 /// Stability of sliding at many values of one or two numbers of the scene, with the modes followed from value to value
 /// (src/README.md, section 10).
-#include "squeal/branch/brake_branch.hpp"
+#include "squeal/modes/modes.hpp"
+
+#include <functional>
 
 namespace squeal
 {
@@ -65,7 +67,7 @@ OptionList options_of(SweepOptions& options);
 struct SweepProblem
 {
   const SweepSettings& settings;
-  std::function<BranchModel(std::span<const double> values)> model_at;
+  std::function<BrakeModel(std::span<const double> values)> model_at;
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;

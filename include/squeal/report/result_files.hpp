@@ -1,0 +1,30 @@
+#pragma once
+/// The names that results have in their folder.
+#include "squeal/base/words.hpp"
+
+#include <array>
+
+namespace squeal
+{
+
+enum class ResultFile
+{
+  report,
+  history,
+  sweep,
+  fields,
+  field_places, // how ParaView finds its way in the fields
+  resolved_scene,
+  options,
+  checkpoints, // a folder
+};
+
+inline constexpr std::array result_file_words = {"report.json", "history.h5",    "sweep.csv",   "fields.h5",
+                                                 "fields.xdmf", "resolved.toml", "options.txt", "checkpoint"};
+
+inline Words words_of(ResultFile)
+{
+  return result_file_words;
+}
+
+} // namespace squeal

@@ -1,0 +1,191 @@
+#pragma once
+/// What the model of a scene is made of: materials, parts, points, springs, supports, loads, contacts and ties, as
+/// plain data in SI units.
+#include "squeal/base/vec3.hpp"
+#include "squeal/base/words.hpp"
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace squeal
+{
+
+/// A choice among the motions x y z rx ry rz of a node or body.
+using Motions = std::array<bool, 6>;
+
+inline constexpr std::array motion_words = {"x", "y", "z", "rx", "ry", "rz"};
+inline constexpr const char *all_motions = "all", *no_motions = "none"; // instead of a list of them
+
+/// Nine constants of orthotropic elasticity along the axes 1, 2 and 3 = 1 x 2. A stress along i alone strains i by
+/// stress/E_i and j by -nu_ij stress/E_i; nu_ij/E_i = nu_ji/E_j.
+struct Orthotropy
+{
+  Vec3 young{};            // [Pa] E1 E2 E3
+  Vec3 poisson{};          // [-] nu12 nu13 nu23: contraction along the second axis under tension along the first
+  Vec3 shear{};            // [Pa] G12 G13 G23
+  Vec3 axis_1 = {1, 0, 0}; // [-] unit
+  Vec3 axis_2 = {0, 1, 0}; // [-] unit, square to axis_1
+};
+
+/// Linear elasticity.
+struct Material
+{
+  double young = 0;                       // [Pa] Young's modulus
+  double poisson = 0;                     // [-] Poisson's ratio
+  double density = 0;                     // [kg/m3] mass density
+  std::optional<Orthotropy> orthotropy{}; // instead of young and poisson; of solids
+};
+
+/// Rayleigh damping C = alpha M + beta K.
+struct RayleighDamping
+{
+  double alpha = 0;          // [1/s]
+  double beta = 0;           // [s]
+  double loss_frequency = 0; // [Hz] at which loss factors have their viscous equivalent in time; of the scene alone
+};
+
+/// A named volume of the mesh, or a named surface if it has a thickness (shell).
+struct Part
+{
+  std::string name;
+  Material material;
+  double thickness = 0;                   // [m] of a shell; 0 for a solid
+  std::optional<RayleighDamping> damping; // if absent, the scene's
+  double loss_factor = 0;                 // [-] eta of the stiffness K (1 + i eta)
+};
+
+/// A node of its own: a point mass, or an end of springs.
+struct Point
+{
+  std::string name;
+  Vec3 at{};       // [m] position
+  double mass = 0; // [kg]
+  Motions free{};  // the other motions are fixed
+};
+
+/// Named surfaces that move as one rigid body: u(x) = u_ref + theta x (x - at), an exact constraint.
+struct RigidBody
+{
+  std::string name;
+  std::vector<std::string> surfaces;
+  Vec3 at{};                       // [m] reference point
+  double mass = 0;                 // [kg] at the reference point
+  std::array<double, 6> inertia{}; // [kg m2] xx yy zz xy yz zx about the reference point
+  Motions free{};                  // of the reference point; the other motions are fixed
+};
+
+/// The end of a spring that does not move.
+inline constexpr const char* ground = "ground";
+
+/// A spring and a dashpot in parallel, between two points or rigid bodies, or from one of them to the ground.
+struct Spring
+{
+  std::string from;        // point, rigid body or ground
+  std::string to = ground; // the same
+  Vec3 direction{};        // [-] unit vector of the line of action
+  double stiffness = 0;    // [N/m]
+  double damping = 0;      // [N s/m]
+};
+
+/// A reduced structure of another code: its matrices on motions of retained nodes and on modal coordinates.
+struct Superelement
+{
+  std::string name;
+  std::filesystem::path folder; // of M K C .petsc, dofs.txt and nodes.txt; absolute
+  std::vector<std::string> on;  // named groups, points or rigid bodies that have its retained nodes
+};
+
+/// Fixed motions of the nodes of a group.
+struct Support
+{
+  std::string on; // named group or point; rows of a matrix scene (squeal/scene/row_names.hpp), also below
+  Motions fixed{};
+};
+
+struct Force
+{
+  std::string on; // point, rigid body, or node group whose nodes share the force equally
+  Vec3 vector{};  // [N] total force
+};
+
+struct Pressure
+{
+  std::string on;   // named surface
+  double value = 0; // [Pa] positive towards the solid
+};
+
+struct Rotation
+{
+  Vec3 axis{};     // [-] unit vector
+  Vec3 centre{};   // [m] a point of the axis
+  double rate = 0; // [rad/s]
+};
+
+/// The side of a contact whose nodes have the pairs.
+enum class SlaveSide
+{
+  stator,
+  rotor,
+};
+
+inline constexpr std::array slave_side_words = {"stator", "rotor"};
+
+inline Words words_of(SlaveSide)
+{
+  return slave_side_words;
+}
+
+/// Contact of two named surfaces, whose meshes need not match, or of two named points. Without a reach the surfaces
+/// coincide; with one their distance along the normal is added to the gap. The sliding velocity of a pair is s = B_t v
+/// - v_d (src/README.md, section 1.2).
+struct Contact
+{
+  std::string rotor;                // surface or point that the drive moves
+  std::string stator;               // surface or point that slides on it
+  double gap = 0;                   // [m] initial gap, positive if open
+  std::optional<Vec3> normal;       // [-] unit, out of the rotor; required for points, else the slave surface's
+  std::vector<Vec3> tangents;       // [-] one: plane friction along it; two; empty: two chosen from the normal
+  std::optional<Rotation> rotation; // of the rotor: v_d is the tangential part of rate axis x (x - centre)
+  Vec3 velocity{};                  // [m/s] of the rotor's surface if there is no rotation
+  double reach = 0;                 // [m] largest distance of the surfaces along the normal
+  SlaveSide slave{};                // has one pair a node
+};
+
+/// Two surfaces of parts meshed apart that move as one; nodes of the slave follow the master.
+struct Tie
+{
+  std::string slave;  // named surface, the finer or softer one
+  std::string master; // named surface
+  double reach = 0;   // [m] largest distance of the surfaces along the normal
+};
+
+/// Coulomb's law with mu(s) = coefficient + (static_coefficient - coefficient) exp(-s/decay_speed) at the sliding speed
+/// s.
+struct FrictionLaw
+{
+  double coefficient = 0;        // [-]
+  bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3)
+  double static_coefficient = 0; // [-] mu at rest; of no meaning without a decay_speed
+  double decay_speed = 0;        // [m/s] 0: mu is `coefficient` at every speed
+};
+
+/// The statements that a geometry may hold.
+enum class Statements
+{
+  listed, // geometry, sizes, physical groups, constants, loops
+  any,    // whatever gmsh runs: commands of the shell among them
+};
+
+struct MeshSource
+{
+  std::filesystem::path file;               // mesh or geometry that libgmsh reads; absolute
+  std::map<std::string, double> parameters; // values for the DefineConstant of a .geo, in its own units
+  double scale = 1;                         // [m] length unit of the file
+  Statements statements{};                  // not of the scene file, but of the command line
+};
+
+} // namespace squeal

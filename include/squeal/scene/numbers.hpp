@@ -1,0 +1,27 @@
+#pragma once
+/// Numbers of a scene by their keys, for branches, sweeps and derivatives.
+#include "squeal/scene/scene.hpp"
+
+#include <span>
+
+namespace squeal
+{
+
+/// A number of a scene, as overrides name it, and a value of it.
+struct SceneNumber
+{
+  std::string key;
+  double value = 0;
+};
+
+/// The key of the friction coefficient: matrices do not depend on it.
+inline constexpr const char* friction_coefficient_key = "friction.coefficient";
+
+/// Returns the scene with other values of numbers that it has. Throws Error if that is no scene.
+Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers);
+
+/// The numbers with respect to which eigenvalues are derived, with the scene's values. They are those that it names,
+/// else friction and what is not zero of parts, points, bodies, springs, damping and rates of rotation.
+std::vector<SceneNumber> sensitive_numbers(const Scene& scene);
+
+} // namespace squeal
