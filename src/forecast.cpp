@@ -3,6 +3,7 @@
 #include "squeal/forecast.hpp"
 
 #include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/base/available_memory.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -46,17 +47,14 @@ bool seeks_modes(const Scene& scene)
   return scene.modes.enabled || scene.cycle.enabled || scene.transient.enabled;
 }
 
-/// A size of /proc/meminfo [bytes]; infinite where there is none.
+/// What the node and the limits of its control group leave [byte].
 double free_memory_of_node()
 {
-  std::ifstream info("/proc/meminfo");
-  double kilobytes = 0, cgroup = HUGE_VAL, used = 0;
-  bool found = false;
-  for (std::string word; !found && info >> word;) found = word == "MemAvailable:" && info >> kilobytes;
+  double cgroup = HUGE_VAL, used = 0;
   std::ifstream limit("/sys/fs/cgroup/memory.max"), usage("/sys/fs/cgroup/memory.current");
   if (!(limit >> cgroup)) cgroup = HUGE_VAL; // also the word "max"
   usage >> used;
-  return std::min(found ? 1024 * kilobytes : HUGE_VAL, cgroup - used);
+  return std::min(available_memory(), cgroup - used);
 }
 
 /// Of all nodes together.

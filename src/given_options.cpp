@@ -1,5 +1,5 @@
-/// The places that PETSc takes options from: files .petscrc of the home and the working folder, petscrc, PETSC_OPTIONS,
-/// and the command line, each with the files of its -options_file.
+#include "squeal/given_options.hpp"
+
 #include "squeal/base/error.hpp"
 #include "squeal/options.hpp"
 #include "squeal/session_options.hpp"
@@ -29,14 +29,6 @@ bool is_letter(const std::string& word, std::size_t place)
 bool is_option(const std::string& word)
 {
   return word.size() > 1 && word[0] == '-' && (is_letter(word, 1) || (word[1] == '-' && is_letter(word, 2)));
-}
-
-Strings words_in(const std::string& text)
-{
-  Strings words;
-  std::istringstream stream(text);
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
 }
 
 class Examiner

@@ -1,6 +1,7 @@
 #include "squeal/base/checkpoint.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/forecast.hpp"
+#include "squeal/given_options.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"

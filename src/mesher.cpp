@@ -4,11 +4,11 @@
 ///   squeal_mesher script NAME [parameter value]…   reads a checked script from its descriptor
 ///
 /// The answer goes to a descriptor of its own. This program knows no MPI.
+#include "squeal/base/available_memory.hpp"
 #include "squeal/mesh/file_mesh.hpp"
 
 #include <algorithm>
 #include <csignal>
-#include <fstream>
 #include <gmsh.h>
 #include <new>
 #include <stdexcept>
@@ -141,13 +141,10 @@ MesherAnswer answer_of(int argc, char** argv)
 /// Leaves a fifth of the free memory to the others, so that a mesh that is too fine ends the mesher alone.
 [[maybe_unused]] void limit_memory()
 {
-  std::ifstream info("/proc/meminfo");
-  double kilobytes = 0;
-  for (std::string word; info >> word;)
-    if (word == "MemAvailable:" && info >> kilobytes) break;
+  const double available = available_memory();
   rlimit limit{};
-  if (kilobytes == 0 || getrlimit(RLIMIT_AS, &limit) != 0) return;
-  limit.rlim_cur = std::min(limit.rlim_cur, static_cast<rlim_t>(0.8 * 1024 * kilobytes));
+  if (std::isinf(available) || getrlimit(RLIMIT_AS, &limit) != 0) return;
+  limit.rlim_cur = std::min(limit.rlim_cur, static_cast<rlim_t>(0.8 * available));
   (void)setrlimit(RLIMIT_AS, &limit);
 }
 

@@ -1,8 +1,7 @@
 #pragma once
-/// Options of PETSc's session, which PETSc obeys while it starts, and the places that options come from. They are
-/// checked before PETSc starts, because it ends the process at the first value that it does not take.
+/// Options of PETSc's session, which PETSc obeys while it starts. They are checked before PETSc starts, because it ends
+/// the process at the first value that it does not take.
 #include <string>
-#include <vector>
 
 namespace squeal
 {
@@ -15,14 +14,5 @@ std::string problem_of_session_option(const std::string& name, const std::string
 
 /// A line for each session option: name and value.
 std::string session_option_reference();
-
-struct GivenOptions
-{
-  std::vector<std::string> sources; // other than the command line: "PETSC_OPTIONS", "file .petscrc"
-  std::string problem;              // empty, or why PETSc must not see them
-};
-
-/// Looks through the command line, PETSC_OPTIONS, the files .petscrc and those of -options_file. Needs no PETSc.
-GivenOptions given_options(int argc, char** argv);
 
 } // namespace squeal

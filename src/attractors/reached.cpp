@@ -1,5 +1,4 @@
-/// What a motion has settled on: means of a window, their trend, and which motions are the same.
-#include "squeal/attractors/attractors.hpp"
+#include "squeal/attractors/reached.hpp"
 
 #include <algorithm>
 #include <cmath>

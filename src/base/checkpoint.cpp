@@ -182,7 +182,7 @@ std::optional<Checkpoint> kept(const std::string& name)
   return Checkpoint::from(bytes_kept(name));
 }
 
-void forget(const std::string& name)
+void remove_kept(const std::string& name)
 {
   std::error_code ignored;
   fs::remove(place().folder / name, ignored);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <new>
 #include <numeric>
+#include <sstream>
 #include <vector>
 
 namespace squeal
@@ -26,6 +27,14 @@ void agree(MPI_Comm comm, const std::string& problem)
   text.resize(static_cast<std::size_t>(length));
   MPI_Bcast(text.data(), length, MPI_CHAR, first, comm);
   throw Error(text);
+}
+
+std::vector<std::string> words_in(const std::string& text)
+{
+  std::vector<std::string> words;
+  std::istringstream stream(text);
+  for (std::string word; stream >> word;) words.push_back(word);
+  return words;
 }
 
 std::string shortened(const std::string& text)

@@ -213,7 +213,7 @@ void form_jacobian(BranchCorrector& corrector, const Orbit& orbit)
 }
 
 /// Whether an iterate may lead to an orbit of this branch.
-bool hopeful(const BranchCorrector& corrector, const Orbit& orbit, double first_residual)
+bool makes_progress(const BranchCorrector& corrector, const Orbit& orbit, double first_residual)
 {
   return std::isfinite(orbit.residual) && orbit.residual < 10 * std::max(first_residual, 1e-3) &&
          orbit.fluctuation < 4 * corrector.scales.fluctuation;
@@ -271,7 +271,7 @@ std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const BranchVe
   bool renew = corrector.secants.empty();
   for (int iteration = 0; iteration <= most_iterations; ++iteration)
   {
-    if (!hopeful(corrector, orbit, first_residual)) return {};
+    if (!makes_progress(corrector, orbit, first_residual)) return {};
     record_full(corrector.log, ShootingStage::multisecant, orbit);
     if (orbit.residual <= problem.tolerance) return CorrectedOrbit{std::move(orbit), z.parameter, iteration};
     if (renew) form_jacobian(corrector, orbit);

@@ -43,7 +43,7 @@ double least_resistance(const Factor& factor, Vec D, Vec x)
   return quotient;
 }
 
-PetscInt largest_entry(Vec x)
+PetscInt row_of_largest_entry(Vec x)
 {
   PetscInt where = 0;
   double value = 0;
@@ -73,7 +73,7 @@ void find_loose(Mat A, Vec D, const FactorOptions& options, Factored& result)
     if (failed) result.indefinite = true;
     if (!failed) least_resistance(factor, uniform, x);
   }
-  result.loose = largest_entry(x);
+  result.loose = row_of_largest_entry(x);
 }
 
 } // namespace
@@ -94,7 +94,7 @@ Factored factor_positive(Mat A, const Interface& interface, const FactorOptions&
   // a singular matrix often factors without complaint; rounding leaves it this much resistance and no more
   const auto x = uneven_vector(A);
   result.resistance = least_resistance(result.factor, D, x);
-  if (!(result.resistance > 1e-14)) result.loose = largest_entry(x);
+  if (!(result.resistance > 1e-14)) result.loose = row_of_largest_entry(x);
   return result;
 }
 

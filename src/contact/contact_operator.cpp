@@ -159,8 +159,8 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
   const PairMatrixView view(W, count, directions);
   const std::size_t n = view.size();
   if (W.size() != n * n)
-    throw Error("contact: " + std::to_string(pairs) + " pairs of " + std::to_string(view.rows_per_pair()) + " rows need " +
-                std::to_string(n * n) + " entries of W, not " + std::to_string(W.size()));
+    throw Error("contact: " + std::to_string(pairs) + " pairs of " + std::to_string(view.rows_per_pair()) +
+                " rows need " + std::to_string(n * n) + " entries of W, not " + std::to_string(W.size()));
   ContactOperator op;
   op.pairs_ = count;
   op.directions_ = directions;

@@ -73,7 +73,7 @@ constexpr int unread_at_most = 20; // extrapolated products gather rounding
 /// Puts the extrapolation of least residual into r and W r; false if nothing is remembered that belongs to r.
 bool start_warm(ContactWork& work, const ContactMemory& memory, int highest_order)
 {
-  if (memory.r.empty() || memory.r[0] != work.r || memory.unread >= unread_at_most) return false;
+  if (memory.r.empty() || memory.r[0] != work.r || memory.since_read >= unread_at_most) return false;
   std::vector<double> best_r, best_Wr;
   double least = std::numeric_limits<double>::infinity();
   const auto orders = std::min(memory.r.size(), static_cast<std::size_t>(highest_order) + 1);
@@ -100,7 +100,7 @@ bool start_warm(ContactWork& work, const ContactMemory& memory, int highest_orde
 
 void remember(const ContactWork& work, ContactMemory& memory)
 {
-  memory.unread = work.reads > 0 ? 0 : memory.unread + 1;
+  memory.since_read = work.reads > 0 ? 0 : memory.since_read + 1;
   memory.r.insert(memory.r.begin(), work.r);
   memory.Wr.insert(memory.Wr.begin(), work.Wr);
   if (memory.r.size() > 3) memory.r.pop_back(), memory.Wr.pop_back();

@@ -62,8 +62,8 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
                    {},
                    {}};
   cycle.free = std::move(found.free);
-  cycle.measured = measure_period(map, {problem.probes, options.samples}, cycle.orbit.period,
-                                  cycle.orbit.state, nullptr);
+  cycle.measured =
+      measure_period(map, {problem.probes, options.samples}, cycle.orbit.period, cycle.orbit.state, nullptr);
   ++cycle.convergence.periods;
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
   add_remedies(map, cycle.outcome);

@@ -1,21 +1,16 @@
 #include "squeal/cycle/measured_period.hpp"
 
+#include "squeal/base/mean.hpp"
 #include "squeal/base/run_control.hpp"
 
 #include <algorithm>
 #include <cstdint>
-#include <numeric>
 
 namespace squeal
 {
 
 namespace
 {
-
-double mean(const std::vector<double>& values)
-{
-  return std::accumulate(values.begin(), values.end(), 0.) / static_cast<double>(values.size());
-}
 
 /// Means and extremes from the history.
 void summarise(MeasuredPeriod& measured)
@@ -24,7 +19,7 @@ void summarise(MeasuredPeriod& measured)
   if (history.energy.empty()) return;
   measured.mean_energy = mean(history.energy);
   measured.mean_fluctuating_energy = mean(history.fluctuating_energy);
-  measured.open_pairs_mean = mean({history.open.begin(), history.open.end()});
+  measured.open_pairs_mean = mean(history.open);
   measured.open_pairs_max = *std::max_element(history.open.begin(), history.open.end());
   measured.stick_pairs_max = *std::max_element(history.stick.begin(), history.stick.end());
   for (const auto& probe : history.probes)

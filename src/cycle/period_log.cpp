@@ -72,7 +72,7 @@ bool matches(const std::vector<double>& logged, const std::array<double, 3>& mar
 /// From here on periods are appended. Of the present chunk, what was taken stays. On rank 0.
 void stop_reading(PeriodLog& log)
 {
-  for (int later = log.chunks; kept(chunk_name(later)); ++later) forget(chunk_name(later));
+  for (int later = log.chunks; kept(chunk_name(later)); ++later) remove_kept(chunk_name(later));
   Checkpoint taken;
   for (int i = 0; i < log.next; ++i)
     for (const char* part : {"marks", "end u", "end v", "rate u", "rate v", "reactions", "unconverged", "kept step"})

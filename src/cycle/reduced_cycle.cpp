@@ -61,9 +61,8 @@ void build_model(ReducedSearch& search, double amplitude)
   // where its cycle is the answer, friction is left free
   const bool sliding = search.fidelity.asked != CycleModel::reduced &&
                        slide_throughout(problem.sliding.interface, problem.unstable.modes.front(), amplitude);
-  search.model =
-      reduce(problem.sliding, problem.modes, search.active,
-             {options.modes, options.threshold, sliding, &search.real, problem.step.factor});
+  search.model = reduce(problem.sliding, problem.modes, search.active,
+                        {options.modes, options.threshold, sliding, &search.real, problem.step.factor});
   search.energy = energy_matrices(search.model);
   describe_model(search);
   search.fidelity.reduction_seconds += MPI_Wtime() - clock;

@@ -89,12 +89,10 @@ void turn_shells(SurfaceContact& c)
 /// Throws Error if the surfaces are joined.
 void check_apart(const SurfaceContact& c)
 {
-  std::vector<int> shared;
-  std::set_intersection(c.slave.nodes.begin(), c.slave.nodes.end(), c.master.nodes.begin(), c.master.nodes.end(),
-                        std::back_inserter(shared));
-  if (shared.empty()) return;
+  const std::size_t shared = shared_nodes(c.slave, c.master);
+  if (shared == 0) return;
   throw Error("contact surfaces '" + c.contact.rotor + "' and '" + c.contact.stator + "' share " +
-              std::to_string(shared.size()) +
+              std::to_string(shared) +
               " nodes, so the bodies are joined there: give each body its own copy of the surface and its nodes");
 }
 

@@ -199,6 +199,13 @@ ContactSurface contact_surface(const Mesh& mesh, const std::string& name)
   return surface;
 }
 
+std::size_t shared_nodes(const ContactSurface& a, const ContactSurface& b)
+{
+  std::vector<int> shared;
+  std::ranges::set_intersection(a.nodes, b.nodes, std::back_inserter(shared));
+  return shared.size();
+}
+
 SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits)
 {
   constexpr double sliver = 1e-8; // share of a face: the rounding of its inverse Gram matrix is 1e-16 over this share

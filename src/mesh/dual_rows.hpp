@@ -42,6 +42,9 @@ struct SlaveRows
   OverlapFindings findings;
 };
 
+/// The number of nodes that two surfaces share.
+std::size_t shared_nodes(const ContactSurface& a, const ContactSurface& b);
+
 /// Returns the rows of all slave nodes, light ones included.
 /// Throws Error where master faces lie above each other.
 SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits);

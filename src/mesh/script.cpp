@@ -1,7 +1,7 @@
 /// Geometry scripts with their included files, and the signatures of mesh files.
 #include "squeal/mesh/script.hpp"
 
-#include "script_tokens.hpp"
+#include "script_check.hpp"
 #include "script_words.hpp"
 #include "squeal/base/error.hpp"
 

@@ -1,7 +1,5 @@
-/// The statements that a geometry may hold. A word is allowed if it is one of gmsh's listed words, or a name that the
-/// script itself defines. A statement that begins with such a name must be an assignment: gmsh takes any other name
-/// before a text for a command. Names before a text in brackets are refused, since they would be functions.
-#include "script_tokens.hpp"
+#include "script_check.hpp"
+
 #include "script_words.hpp"
 #include "squeal/base/error.hpp"
 

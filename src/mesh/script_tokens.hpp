@@ -36,7 +36,4 @@ std::string place_of(const Token& token, const Tokens& tokens);
 /// Returns the tokens of one file's content, without comments. Throws Error for a character that no statement has.
 std::vector<Token> scan(const std::string& content, const std::filesystem::path& file, int file_index);
 
-/// Throws Error for the first statement that a geometry may not hold. `constants`: names in DefineConstant lists.
-void check_statements(const Tokens& tokens, const std::vector<std::string>& constants);
-
 } // namespace squeal

@@ -2,7 +2,8 @@
 /// use, none reaches a file, a process or the environment.
 #include "script_words.hpp"
 
-#include <sstream>
+#include "squeal/base/error.hpp"
+
 #include <string>
 #include <unordered_set>
 
@@ -14,17 +15,15 @@ namespace
 
 using Words = std::unordered_set<std::string>;
 
-Words words_in(const char* text)
+Words set_of_words(const char* text)
 {
-  std::istringstream stream(text);
-  Words words;
-  for (std::string word; stream >> word;) words.insert(word);
-  return words;
+  const std::vector<std::string> words = words_in(text);
+  return {words.begin(), words.end()};
 }
 
 const Words& allowed_words()
 {
-  static const Words words = words_in(
+  static const Words words = set_of_words(
       // control and constants
       "If ElseIf Else EndIf For In EndFor Macro Function Return Call Include Merge DefineConstant DefineNumber "
       "UndefineConstant SetNumber GetNumber Exists Printf Error Warning Delete Recursive Model Physicals Meshes All "
@@ -63,7 +62,7 @@ const Words& allowed_words()
 /// Words that reach files, processes, the environment or the window, beside the allowed ones.
 const Words& refused_words()
 {
-  static const Words words = words_in(
+  static const Words words = set_of_words(
       "Abort AbsolutePath AdaptMesh Alias AliasWithOptions Append Betti Catenary CodeName Cohomology ColorTable "
       "CopyOptions Cpu CreateDir CurrentDir CurrentDirectory CurrentFileName DefineString DimNameSpace DirName Draw "
       "Elliptic Exit ExternalProcess FileExists FixRelativePath GeoEntity GetEnv GetForced GetForcedStr GetString "
@@ -91,13 +90,13 @@ bool is_reserved_word(std::string_view word)
 
 bool is_allowed_general_option(std::string_view name)
 {
-  static const Words words = words_in("Terminal Verbosity NumThreads ExpertMode");
+  static const Words words = set_of_words("Terminal Verbosity NumThreads ExpertMode");
   return words.contains(std::string(name));
 }
 
 bool is_allowed_text_option(std::string_view name)
 {
-  static const Words words = words_in("OCCTargetUnit PipeDefaultTrihedron");
+  static const Words words = set_of_words("OCCTargetUnit PipeDefaultTrihedron");
   return words.contains(std::string(name));
 }
 

@@ -21,11 +21,8 @@ std::string name_of(const Tie& tie)
 
 void check_apart(const Tie& tie, const ContactSurface& slave, const ContactSurface& master)
 {
-  std::vector<int> shared;
-  std::set_intersection(slave.nodes.begin(), slave.nodes.end(), master.nodes.begin(), master.nodes.end(),
-                        std::back_inserter(shared));
-  if (!shared.empty())
-    throw Error(name_of(tie) + "the surfaces share " + std::to_string(shared.size()) +
+  if (const std::size_t shared = shared_nodes(slave, master); shared > 0)
+    throw Error(name_of(tie) + "the surfaces share " + std::to_string(shared) +
                 " nodes, so that the parts are joined there: take the tie out");
 }
 

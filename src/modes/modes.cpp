@@ -1,6 +1,7 @@
 #include "squeal/modes/modes.hpp"
 
 #include "loss.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/projection.hpp"
 #include "squeal/modes/quadratic.hpp"
@@ -9,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace squeal
 {
@@ -20,7 +20,7 @@ namespace
 using Complex = std::complex<double>;
 
 /// The entry of phi with the largest modulus. Of nearly equal ones it is the first, for any number of ranks.
-std::complex<double> largest_entry(Vec real, Vec imaginary)
+std::complex<double> largest_component(Vec real, Vec imaginary)
 {
   PetscInt first = 0, last = 0;
   const PetscScalar *re = nullptr, *im = nullptr;
@@ -54,7 +54,7 @@ void set_shape(ComplexMode& mode, const ClosedContact& contact, const Eigenpair&
   check(MatMult(contact.Z, pair.real, mode.real));
   mode.imaginary = zeros_like(mode.real);
   check(MatMult(contact.Z, pair.imaginary, mode.imaginary));
-  const std::complex<double> turn = 1.0 / largest_entry(mode.real, mode.imaginary);
+  const std::complex<double> turn = 1.0 / largest_component(mode.real, mode.imaginary);
   const Owned<Vec> real = copy_of(mode.real);
   check(VecAXPBY(mode.real, -turn.imag(), turn.real(), mode.imaginary));
   check(VecAXPBY(mode.imaginary, turn.imag(), turn.real(), real));
@@ -132,7 +132,7 @@ Owned<Mat> without_loss(Mat C, const Structure& structure)
 PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution& solution, RealCount& real,
                         double band)
 {
-  const double end = 2 * std::numbers::pi * band;
+  const double end = two_pi * band;
   const int free = count_below(real, std::sqrt(vibration_floor(norms_of(problem))));
   return count_pairs(solution, real, free, 0.8 * end, end);
 }
@@ -140,7 +140,7 @@ PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution
 CountedSolution solve_full(const ModesProblem& problem, RealCount& real)
 {
   const PetscInt limit = problem.options.dense_limit;
-  const double band = problem.settings.band, end = 2 * std::numbers::pi * band;
+  const double band = problem.settings.band, end = two_pi * band;
   PetscInt n = 0;
   check(MatGetSize(problem.linearised.K_z, &n, nullptr));
   CountedSolution result;
@@ -230,23 +230,33 @@ ModeCount certified_whole(const PairCount& count, const ModesProblem& problem, P
 /// Keeps of the modes beyond the band, which were found for the count, the frequencies only.
 void drop_beyond_band(Modes& modes)
 {
-  const auto beyond = std::stable_partition(modes.modes.begin(), modes.modes.end(),
-                                            [&](const ComplexMode& mode)
-                                            { return std::abs(mode.lambda) < 2 * std::numbers::pi * modes.band; });
+  const auto beyond =
+      std::stable_partition(modes.modes.begin(), modes.modes.end(),
+                            [&](const ComplexMode& mode) { return std::abs(mode.lambda) < two_pi * modes.band; });
   for (auto mode = beyond; mode != modes.modes.end(); ++mode) modes.beyond_band.push_back(mode->frequency_hz());
   modes.modes.erase(beyond, modes.modes.end());
 }
 
 } // namespace
 
+double frequency_hz_of(std::complex<double> lambda)
+{
+  return std::abs(lambda.imag()) / two_pi;
+}
+
+double damping_ratio_of(std::complex<double> lambda)
+{
+  return -lambda.real() / std::abs(lambda);
+}
+
 double ComplexMode::frequency_hz() const
 {
-  return std::abs(lambda.imag()) / (2 * std::numbers::pi);
+  return frequency_hz_of(lambda);
 }
 
 double ComplexMode::damping_ratio() const
 {
-  return -lambda.real() / std::abs(lambda);
+  return damping_ratio_of(lambda);
 }
 
 OptionList options_of(ModesOptions& options)

@@ -1,12 +1,12 @@
 #include "squeal/modes/slices.hpp"
 
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/modes/projection.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 namespace squeal
 {
@@ -25,7 +25,6 @@ constexpr double tolerance = 1e-12, sharp = 1e-14; // backward errors of pairs, 
 constexpr double spurious = 1e-8;                  // backward error of what is no pair
 constexpr double rigid_share = 1e-6;               // theta below this part of the largest may be a free body's
 constexpr double residual_share = 1e-2;            // a pass divides residuals by about ten: a quarter of them stay
-constexpr double two_pi = 2 * std::numbers::pi;
 
 /// The pairs with lower <= |lambda| < upper [rad/s].
 struct Slice

@@ -62,9 +62,9 @@ void admit(Iterate& iterate)
     change_reaction(iterate, pair, admissible(iterate.reaction(pair), iterate.velocity(pair), iterate.friction));
 }
 
-/// What a unit of each pair's normal reaction brings along: itself and, unless the pair sticks, friction against
+/// What a unit of each pair's normal reaction goes with: itself and, unless the pair sticks, friction against
 /// sliding.
-std::vector<PairVector> pushes(const Iterate& iterate)
+std::vector<PairVector> unit_reactions(const Iterate& iterate)
 {
   const std::vector<ContactStatus> status =
       contact_status(PairView<const double>(iterate.r, iterate.directions),
@@ -72,13 +72,13 @@ std::vector<PairVector> pushes(const Iterate& iterate)
   std::vector<PairVector> result;
   for (std::size_t pair = 0; pair < iterate.pairs(); ++pair)
   {
-    PairVector& push = result.emplace_back(PairVector{1, 0, 0});
+    PairVector& unit = result.emplace_back(PairVector{1, 0, 0});
     const PairVector w = iterate.velocity(pair);
     const double speed = length(w[1], w[2]);
     if (speed == 0 || status[pair] == ContactStatus::stick) continue;
     const double mu = friction_coefficient(iterate.friction, speed).value;
-    push[1] = -mu * w[1] / speed;
-    push[2] = -mu * w[2] / speed;
+    unit[1] = -mu * w[1] / speed;
+    unit[2] = -mu * w[2] / speed;
   }
   return result;
 }
@@ -87,13 +87,13 @@ std::vector<PairVector> pushes(const Iterate& iterate)
 Eigen::MatrixXf normal_responses(const Iterate& iterate)
 {
   const Eigen::MatrixXf& W = iterate.map.W_n;
-  const std::vector<PairVector> push = pushes(iterate);
+  const std::vector<PairVector> unit = unit_reactions(iterate);
   Eigen::MatrixXf responses(W.rows(), W.rows());
   for (Index j = 0; j < W.rows(); ++j)
   {
     responses.col(j) = W.col(iterate.rows.normal(j));
     for (Index k = 1; k < iterate.rows.per_pair(); ++k)
-      responses.col(j) += static_cast<float>(push[static_cast<std::size_t>(j)][static_cast<std::size_t>(k)]) *
+      responses.col(j) += static_cast<float>(unit[static_cast<std::size_t>(j)][static_cast<std::size_t>(k)]) *
                           W.col(iterate.rows.normal(j) + k);
   }
   return responses;
@@ -104,11 +104,11 @@ void sweep_normals(Iterate& iterate, const Eigen::MatrixXf& responses, double en
 {
   const PairView<double> r(iterate.r, iterate.directions);
   const PairView<const double> w(iterate.w, iterate.directions);
-  const std::vector<PairVector> push = pushes(iterate);
+  const std::vector<PairVector> unit = unit_reactions(iterate);
   const std::size_t count = iterate.pairs();
   Eigen::VectorXf dw = Eigen::VectorXf::Zero(responses.rows());
   for (std::size_t i = 0; i < count; ++i)
-    if (push[i][1] != 0 || push[i][2] != 0) r.set(i, r.normal(i) * push[i]);
+    if (unit[i][1] != 0 || unit[i][2] != 0) r.set(i, r.normal(i) * unit[i]);
   constexpr double relaxation = 1.2;
   double largest = HUGE_VAL;
   for (int sweep = 0; largest > enough && sweep < 50; ++sweep)
@@ -121,7 +121,7 @@ void sweep_normals(Iterate& iterate, const Eigen::MatrixXf& responses, double en
       const double change = std::max(-r.normal(i), -relaxation * rate / static_cast<double>(responses(row, row)));
       if (std::abs(change) <= enough / 8) continue;
       largest = std::max(largest, std::abs(change));
-      r.set(i, r.vector(i) + change * push[i]);
+      r.set(i, r.vector(i) + change * unit[i]);
       add_rows(responses.col(row).data(), count, 1, {change, 0, 0}, dw.data());
     }
   }
@@ -177,11 +177,11 @@ VectorXd product_single(const ReducedMap& map, const VectorXd& x)
 /// Linear in time.
 void extrapolate(const ReducedMap& map, ReducedContact& contact)
 {
-  if (contact.unread >= unread_at_most || contact.Wr.size() == 0)
+  if (contact.since_read >= unread_at_most || contact.Wr.size() == 0)
   {
     contact.Wr = map.W * contact.r;
     contact.r_before.resize(0); // the step before's product has gathered rounding, too
-    contact.unread = 0;
+    contact.since_read = 0;
   }
   const bool alone = contact.r_before.size() == 0;
   const VectorXd r = alone ? contact.r : VectorXd(2 * contact.r - contact.r_before);
@@ -200,7 +200,7 @@ bool solve_contact(const ReducedMap& map, const VectorXd& b, ReducedContact& con
   VectorXd& r = contact.r;
   Iterate iterate{map, r, contact.w, b.cwiseAbs().maxCoeff()};
   admit(iterate);
-  if (contact.unread++ == 0) contact.normal_responses = normal_responses(iterate);
+  if (contact.since_read++ == 0) contact.normal_responses = normal_responses(iterate);
   double worst = HUGE_VAL;
   bool converged = false;
   for (int pass = 0; pass < map.contact.max_iterations; ++pass)

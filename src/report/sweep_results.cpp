@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 namespace squeal
 {
@@ -13,16 +12,6 @@ namespace
 {
 
 using Json = nlohmann::ordered_json;
-
-double frequency_of(const SweptMode& mode)
-{
-  return std::abs(mode.lambda.imag()) / (2 * std::numbers::pi);
-}
-
-double damping_ratio_of(const SweptMode& mode)
-{
-  return -mode.lambda.real() / std::abs(mode.lambda);
-}
 
 /// Of a point or a threshold.
 template <class At> int direction_of(const At& at)
@@ -67,7 +56,7 @@ Json point_entry(const SweepPoint& point)
   entry["unstable_modes"] = point.unstable;
   if (point.modes.empty()) return entry;
   entry["growth_rate"] = point.modes.front().lambda.real();
-  entry["frequency_hz"] = frequency_of(point.modes.front());
+  entry["frequency_hz"] = frequency_hz_of(point.modes.front().lambda);
   return entry;
 }
 
@@ -111,7 +100,7 @@ void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
                                           {"unstable_points", track.unstable},
                                           {"least_mac", track.least_mac},
                                           {"greatest_growth_rate", track.mode->lambda.real()},
-                                          {"frequency_hz", frequency_of(*track.mode)},
+                                          {"frequency_hz", frequency_hz_of(track.mode->lambda)},
                                           {"values", track.point->values},
                                           {"direction", direction_of(*track.point)}});
     ++number;
@@ -144,7 +133,7 @@ void write_sweep(Hdf5File& file, const Sweep& sweep)
     {
       if (mode.track < 0) continue;
       const std::size_t place = i * tracks + static_cast<std::size_t>(mode.track);
-      frequency[place] = frequency_of(mode);
+      frequency[place] = frequency_hz_of(mode.lambda);
       growth[place] = mode.lambda.real();
       mac[place] = mode.mac;
     }
@@ -174,8 +163,8 @@ std::string sweep_csv(const Sweep& sweep, const Scene& scene)
     if (point.modes.empty()) text += head + ",,,,,,\n";
     for (const SweptMode& mode : point.modes)
       text += head + (mode.track < 0 ? "" : std::to_string(mode.track)) +
-              format(",%.17g,%.17g,%.17g,%.3g,%.6g,%d\n", frequency_of(mode), mode.lambda.real(),
-                     damping_ratio_of(mode), mode.backward_error, mode.mac, mode.subspace);
+              format(",%.17g,%.17g,%.17g,%.3g,%.6g,%d\n", frequency_hz_of(mode.lambda), mode.lambda.real(),
+                     damping_ratio_of(mode.lambda), mode.backward_error, mode.mac, mode.subspace);
   }
   return text;
 }
@@ -198,7 +187,7 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
     if (track.unstable > 0 && ++unstable <= shown)
       lines.push_back(format("mode %d unstable at %d of %d points, most at %s%s: %.7g Hz, growth %.6g 1/s", number,
                              track.unstable, track.points, text_of(track.point->values).c_str(),
-                             track.point->reversed ? " reversed" : "", frequency_of(*track.mode),
+                             track.point->reversed ? " reversed" : "", frequency_hz_of(track.mode->lambda),
                              track.mode->lambda.real()));
     ++number;
   }

@@ -1,5 +1,6 @@
 #include "squeal/settled/settled_motion.hpp"
 
+#include "squeal/base/mean.hpp"
 #include "squeal/base/run_control.hpp"
 
 #include <algorithm>
@@ -23,11 +24,6 @@ enum Channel : std::size_t
   slip_pairs,
   probes, // and those after it
 };
-
-template <class Value> double mean(const std::vector<Value>& values)
-{
-  return std::accumulate(values.begin(), values.end(), 0.) / static_cast<double>(values.size());
-}
 
 /// Appends a history to another.
 void append(const History& from, History& to)

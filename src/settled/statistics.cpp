@@ -1,5 +1,7 @@
 #include "squeal/settled/statistics.hpp"
 
+#include "squeal/base/mean.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -10,11 +12,6 @@ namespace squeal
 
 namespace
 {
-
-double mean(std::span<const double> values)
-{
-  return std::accumulate(values.begin(), values.end(), 0.) / static_cast<double>(values.size());
-}
 
 double standard_deviation(std::span<const double> values)
 {

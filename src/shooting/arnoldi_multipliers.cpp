@@ -1,5 +1,4 @@
-/// Multipliers from an Arnoldi space of the monodromy matrix, in the energy product.
-#include "monodromy.hpp"
+#include "arnoldi_multipliers.hpp"
 
 #include <algorithm>
 #include <cmath>

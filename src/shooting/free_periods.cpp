@@ -9,7 +9,7 @@ namespace squeal
 namespace
 {
 
-constexpr double worth_a_factor = 0.02; // a correction over the period: shooting makes smaller ones
+constexpr double smallest_refactored = 0.02; // a correction over the period: shooting makes smaller ones
 
 /// The recurrence nearest to the start lies where the defect is orthogonal to the flow. [s], from the period's end.
 double nearest_recurrence(const OrbitProblem& problem, const Orbit& orbit)
@@ -40,7 +40,7 @@ Orbit integrate_free_periods(const OrbitProblem& problem, ConvergenceLog& log, V
     // A new period costs a factorisation, so a small correction waits for the last one.
     const bool last = done + 1 == asked.periods || return_residual(problem, orbit) <= asked.near_periodic;
     const double correction = nearest_recurrence(problem, orbit);
-    const bool worth_it = last || std::abs(correction) > worth_a_factor * period;
+    const bool worth_it = last || std::abs(correction) > smallest_refactored * period;
     if (worth_it && admissible_period(problem, period + correction)) period += correction;
     if (last) break;
   }
@@ -50,7 +50,8 @@ Orbit integrate_free_periods(const OrbitProblem& problem, ConvergenceLog& log, V
   for (int tries = 0; tries < 3; ++tries)
   {
     const double correction = nearest_recurrence(problem, orbit);
-    if (!(std::abs(correction) > worth_a_factor * period) || !admissible_period(problem, period + correction)) break;
+    if (!(std::abs(correction) > smallest_refactored * period) || !admissible_period(problem, period + correction))
+      break;
     period += correction;
     record(log, ShootingStage::free_periods, orbit, 0, std::nan(""));
     orbit = evaluate(problem, log, current, period);

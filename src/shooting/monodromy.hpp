@@ -37,10 +37,6 @@ struct Coverage
 /// smaller ones that have not converged.
 void decide(Multipliers& multipliers, const Coverage& coverage, std::size_t converged);
 
-/// From an Arnoldi space of `steps` columns at most; where `steps` is negative, at most -`steps` until the largest
-/// value has converged. Bars: twice the residual of each Ritz pair.
-FloquetAnalysis multipliers_by_arnoldi(Monodromy& monodromy, Owned<Vec> start, PetscInt steps);
-
 /// By oblique projection on approximate right and left vectors (src/README.md, section 6.9). `columns`: at most for the
 /// search beside them. Nothing, with the reason in `refusal`, where these vectors do not serve.
 std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodromy, PetscInt columns,

@@ -1,6 +1,6 @@
 #include "squeal/shooting/multipliers.hpp"
 
-#include "monodromy.hpp"
+#include "arnoldi_multipliers.hpp"
 #include "whole_matrix.hpp"
 
 #include <algorithm>

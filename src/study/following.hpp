@@ -16,7 +16,7 @@ struct Match
 /// At least this much of a mode, or of a subspace, must be found again.
 inline constexpr double clear_mac = 0.9;
 
-/// For each mode of a point its match at the next one.
+/// For each mode of a point its match at the next one, by the MAC of right with left vectors. Not collective.
 std::vector<Match> follow(const PointModes& from, const PointModes& to);
 
 } // namespace squeal

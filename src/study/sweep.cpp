@@ -3,6 +3,7 @@
 #include "following.hpp"
 #include "lines.hpp"
 #include "squeal/algebra/root.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "sweep_checkpoint.hpp"
@@ -33,7 +34,7 @@ struct Followed
 
 bool in_band(const TwoSidedPair& pair, double band)
 {
-  return std::abs(pair.lambda) < 2 * std::numbers::pi * band;
+  return std::abs(pair.lambda) < two_pi * band;
 }
 
 /// Positive where the mode counts as unstable.
@@ -266,7 +267,7 @@ private:
           const auto place = static_cast<std::size_t>(matches[i].to);
           here->tracks[place] = nearest->tracks[i];
           if (nearest->tracks[i] != track) continue;
-          frequency = std::abs(here->modes.pairs[place].lambda.imag()) / (2 * std::numbers::pi);
+          frequency = frequency_hz_of(here->modes.pairs[place].lambda);
           result = instability(here->modes.pairs[place].lambda);
         }
       between.push_back(std::move(*here));

@@ -21,7 +21,7 @@ using Complex = std::complex<double>;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // A sliding pair as the mode shakes it, per metre of q and w t = 0 .. 2 pi.
-struct ShakenPair
+struct PairMotion
 {
   std::size_t directions = 1;
   FrictionLaw law;
@@ -38,7 +38,7 @@ double real_part(Complex z, Complex turn)
 }
 
 // w.(r_t - r_t0) at the instant, over q^2: the small differences are formed before the division.
-double power_at(const ShakenPair& pair, double q, double angle)
+double power_at(const PairMotion& pair, double q, double angle)
 {
   const Complex turn = std::polar(1.0, angle);
   const double change = std::max(real_part(pair.reaction, turn), -pair.reaction0 / q); // of r_n, over q
@@ -69,7 +69,7 @@ double greatest_coefficient(const FrictionLaw& law)
 }
 
 // What rounding leaves of the integral: the differences in power_at are of terms of this size.
-double rounding(const ShakenPair& pair, double q, double length)
+double rounding(const PairMotion& pair, double q, double length)
 {
   const double force = std::abs(pair.reaction) + pair.reaction0 / q;
   const double velocity = std::hypot(std::abs(pair.velocity[0]), std::abs(pair.velocity[1]));
@@ -97,7 +97,7 @@ template <class Power> double bisected(const Power& power, const Piece& whole, d
 }
 
 // Integral to an absolute tolerance, but not below rounding, by 7-15 points of Gauss and Kronrod.
-double integrate_between(const ShakenPair& pair, double q, double from, double to, double tolerance)
+double integrate_between(const PairMotion& pair, double q, double from, double to, double tolerance)
 {
   constexpr int bisections = 20;
   const auto power = [&](double angle) { return power_at(pair, q, angle); };
@@ -117,13 +117,13 @@ void add_sign_changes(double level, double q, Complex amplitude, std::vector<dou
     angles.push_back(angle - 2 * std::numbers::pi * std::floor(angle / (2 * std::numbers::pi)));
 }
 
-Complex along_drive(const ShakenPair& pair)
+Complex along_drive(const PairMotion& pair)
 {
   return pair.along[0] * pair.velocity[0] + pair.along[1] * pair.velocity[1];
 }
 
 // Mean power over a period, over q^2. Between its kinks, at lift-off and where the sliding reverses, it is smooth.
-double mean_power(const ShakenPair& pair, double q, double tolerance)
+double mean_power(const PairMotion& pair, double q, double tolerance)
 {
   std::vector<double> angles = {0, 2 * std::numbers::pi};
   add_sign_changes(pair.reaction0, q, pair.reaction, angles);
@@ -136,7 +136,7 @@ double mean_power(const ShakenPair& pair, double q, double tolerance)
 }
 
 // As q -> 0: mu e rho, and what sliding friction damps of the motion.
-double linear_power(const ShakenPair& pair)
+double linear_power(const PairMotion& pair)
 {
   const SlidingFriction friction =
       sliding_friction(pair.law, pair.reaction0, std::span(pair.drive).first(pair.directions));
@@ -150,7 +150,7 @@ double linear_power(const ShakenPair& pair)
   return power;
 }
 
-std::vector<ShakenPair> shaken_pairs(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
+std::vector<PairMotion> pair_motions(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
                                      const ComplexMode& mode)
 {
   const Interface& interface = sliding.interface;
@@ -160,11 +160,11 @@ std::vector<ShakenPair> shaken_pairs(const SlidingEquilibrium& sliding, const Li
   const std::vector<double> e = drive_directions(interface), real = relative(interface, mode.real),
                             imaginary = relative(interface, mode.imaginary);
   const int directions = interface.directions;
-  std::vector<ShakenPair> pairs;
+  std::vector<PairMotion> pairs;
   for (std::size_t i = 0; i < static_cast<std::size_t>(interface.pairs); ++i)
   {
     if (!equilibrium.closed[i]) continue;
-    ShakenPair pair;
+    PairMotion pair;
     pair.directions = static_cast<std::size_t>(directions);
     pair.law = interface.friction;
     pair.reaction0 = PairView(equilibrium.reactions, directions).normal(i);
@@ -199,12 +199,12 @@ double quadratic_form(Mat A, const ComplexMode& mode)
 
 // Phase at which the smallest reaction at t = 0, min over pairs of r_n0 + q Re(rho e^{i phase}), is largest; the start
 // is on the mode itself, so rho is the mode's own.
-double best_phase(const std::vector<ShakenPair>& pairs, double q)
+double best_phase(const std::vector<PairMotion>& pairs, double q)
 {
   const auto smallest = [&](double phase)
   {
     double least = infinity;
-    for (const ShakenPair& pair : pairs)
+    for (const PairMotion& pair : pairs)
       least = std::min(least, pair.reaction0 + q * real_part(pair.mode_reaction, std::polar(1.0, phase)));
     return least;
   };
@@ -287,12 +287,12 @@ Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedS
     result.outcome = {OutcomeKind::skipped, "the mode grows without vibrating", 0, 0};
     return result;
   }
-  const std::vector<ShakenPair> pairs = shaken_pairs(sliding, linearised, mode);
+  const std::vector<PairMotion> pairs = pair_motions(sliding, linearised, mode);
   const double energy = omega * omega * quadratic_form(structure.M, mode) / 2; // E/q^2
   result.damping_rate = omega * omega * quadratic_form(structure.C, mode) / 2 / energy;
   double linear = 0, scale = 0;
   result.lift_off_amplitude = result.reversal_amplitude = infinity;
-  for (const ShakenPair& pair : pairs)
+  for (const PairMotion& pair : pairs)
   {
     linear += linear_power(pair);
     scale += std::abs(linear_power(pair));

@@ -52,7 +52,7 @@ std::vector<double> marks_of(const Structure& structure, const MarchPlan& plan)
 /// Of the reactions, on rank 0.
 void read_memory(const Checkpoint& checkpoint, ContactMemory& memory)
 {
-  memory.unread = static_cast<int>(checkpoint.number("work unread"));
+  memory.since_read = static_cast<int>(checkpoint.number("work unread"));
   for (std::size_t i = 0; checkpoint.has("memory r " + std::to_string(i)); ++i)
   {
     memory.r.push_back(checkpoint.list("memory r " + std::to_string(i)));
@@ -96,7 +96,7 @@ Checkpoint MarchCheckpoint::made(const MarchProgress& progress) const
   checkpoint.set("state time", progress.state.time);
   checkpoint.set("reactions", progress.state.reactions);
   checkpoint.set("work energy", progress.work.energy);
-  checkpoint.set("work unread", progress.work.memory.unread);
+  checkpoint.set("work unread", progress.work.memory.since_read);
   for (std::size_t i = 0; i < progress.work.memory.r.size(); ++i)
   {
     checkpoint.set("memory r " + std::to_string(i), progress.work.memory.r[i]);

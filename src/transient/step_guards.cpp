@@ -1,15 +1,14 @@
 #include "squeal/transient/step_guards.hpp"
 
+#include "squeal/base/constants.hpp"
+
 #include <cmath>
-#include <numbers>
 
 namespace squeal
 {
 
 namespace
 {
-
-constexpr double two_pi = 2 * std::numbers::pi;
 
 std::string mode_refusal(const ComplexMode& mode, double theta, double h)
 {

@@ -2,6 +2,7 @@
 #include "squeal/transient/transient.hpp"
 
 #include "march_checkpoint.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/transient/growth.hpp"
@@ -9,15 +10,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 namespace squeal
 {
 
 namespace
 {
-
-constexpr double two_pi = 2 * std::numbers::pi;
 
 /// Distance of a state to the equilibrium, and its products, at the current step.
 struct Fluctuation

@@ -12,6 +12,7 @@
 namespace squeal
 {
 
+/// The pencil K - shift M, factored at its shift [units of theta].
 struct ShiftInvert
 {
   Mat K = nullptr, M = nullptr; // borrowed
@@ -19,6 +20,7 @@ struct ShiftInvert
   std::unique_ptr<PencilFactor> factor{}; // of K - shift M
 };
 
+/// The pencil at shift 0, not yet factored. Collective. K and M are borrowed and must outlive it.
 ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options);
 
 /// Factors K - shift M, or with a slightly lower shift where this one is an eigenvalue. Throws LibraryError if memory

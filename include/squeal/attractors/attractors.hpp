@@ -3,36 +3,12 @@
 /// of modes, integrated together until their energies have settled.
 ///
 /// Caveat: motions are distinguished by mean energy and frequency alone, and one that few starts lead to may be missed.
+#include "squeal/attractors/reached.hpp"
 #include "squeal/base/options.hpp"
-#include "squeal/settled/statistics.hpp"
 #include "squeal/transient/transient.hpp"
 
 namespace squeal
 {
-
-enum class ReachedKind
-{
-  rest,      // the motion decayed
-  steady,    // the mean energy of every tenth of the window is within half a percent
-  varying,   // it is not, but it has no trend: no cycle attracts there
-  unsettled, // the energy still has a trend
-};
-
-inline constexpr std::array reached_words = {"rest", "steady", "varying", "unsettled"};
-
-inline Words words_of(ReachedKind)
-{
-  return reached_words;
-}
-
-/// A motion that starts lead to.
-struct ReachedMotion
-{
-  ReachedKind kind = ReachedKind::unsettled;
-  MeanValue energy;                // [J] mean fluctuating energy
-  MeanValue frequency;             // [Hz] of the mode's coordinate that moves most; 0 at rest
-  std::vector<std::size_t> starts; // numbers of the starts that lead to it
-};
 
 /// outcome: "completed"; "not converged" where the energy of some motion still had a trend; "skipped"; "off".
 struct Attractors
@@ -51,6 +27,7 @@ struct AttractorOptions
 
 OptionList options_of(AttractorOptions& options);
 
+/// The brake about its equilibrium, and the starts that the scene asks for.
 struct AttractorProblem
 {
   SlidingEquilibrium sliding;
@@ -60,14 +37,8 @@ struct AttractorProblem
   const StepOptions& step;
 };
 
+/// Integrates the motions of all starts together until their energies have settled, for at most as many periods as the
+/// options allow. Collective.
 Attractors find_attractors(const AttractorProblem& problem, const AttractorOptions& options);
-
-/// What one motion has settled on, from the energies of its periods and the upward zero crossings [s] of a coordinate.
-/// `rest`: an energy below it is that of a motion at rest.
-ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<double>& crossings, double rest);
-
-/// Joins motions of one kind whose energies and frequencies agree within their bars, or within a percent and a
-/// thousandth. Those that most starts lead to come first.
-std::vector<ReachedMotion> joined(std::vector<ReachedMotion> motions);
 
 } // namespace squeal

@@ -55,7 +55,7 @@ void keep(const Checkpoint& checkpoint, const std::string& name);
 std::optional<Checkpoint> kept(const std::string& name);
 
 /// Removes the one of this name.
-void forget(const std::string& name);
+void remove_kept(const std::string& name);
 
 /// The same on every rank. Collective.
 std::optional<Checkpoint> kept_everywhere(const std::string& name, MPI_Comm comm);

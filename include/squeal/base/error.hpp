@@ -8,6 +8,7 @@
 #include <mpi.h>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace squeal
 {
@@ -61,6 +62,9 @@ template <class Work> void on_rank_zero(MPI_Comm comm, Work work)
                   if (rank == 0) work();
                 });
 }
+
+/// The words of a text, which blanks and ends of lines separate.
+std::vector<std::string> words_in(const std::string& text);
 
 /// Returns the text, or its beginning if it has more than 300 characters, for messages.
 std::string shortened(const std::string& text);

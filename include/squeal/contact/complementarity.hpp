@@ -62,6 +62,8 @@ struct StatusSolution
   std::vector<double> gap, reaction; // [m, N]; empty unless converged or singular
 };
 
+/// Solves by status iteration from the split `closed`, in at most `max_iterations` splits. The outcome says how it
+/// ended. Error: an entry is not finite.
 StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, long max_iterations);
 
 /// Whether the symmetric part of M is positive definite, N being the identity: then there is one solution and no other.
@@ -72,7 +74,7 @@ bool has_one_solution(const ComplementarityProblem& problem);
 double unilateral_residual(const std::vector<double>& reaction, const std::vector<double>& gap,
                            const std::vector<double>& rho, const std::vector<double>& pull);
 
-/// r <- max(0, r - rho g), g = q + M r; N must be the identity. `rho` is halved when the residual grows.
+/// The end of the projection iteration.
 struct ProjectionSolution
 {
   int iterations = 0;
@@ -80,6 +82,8 @@ struct ProjectionSolution
   std::vector<double> reaction;
 };
 
+/// Iterates r <- max(0, r - rho g), g = q + M r, from r = 0; N must be the identity. `rho` [N/m] is halved when the
+/// residual grows. `tolerance`: of the residual.
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
                                        long max_iterations);
 

@@ -31,6 +31,7 @@ struct Factored
   double resistance = 0;   // x'A x / x' diag(A) x, the least that inverse iteration found
 };
 
+/// Factors A bordered by B, after inverse iteration where A is not definite. Collective. Error: memory runs out.
 Factored factor_positive(Mat A, const Interface& interface, const FactorOptions& options);
 
 } // namespace squeal

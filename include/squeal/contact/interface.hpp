@@ -11,6 +11,7 @@
 namespace squeal
 {
 
+/// Contact of a structure: its pairs with their operator, gaps, drive and friction.
 struct Interface
 {
   int pairs = 0;

@@ -33,7 +33,8 @@ template <class Index> struct PairRows
   bool is_normal(Index row) const { return component_of(row) == 0; }
 };
 
-/// The number of tangential rows that each of `pairs` has where all have `rows`; none where pairs cannot have that many.
+/// The number of tangential rows that each of `pairs` has where all have `rows`; none where pairs cannot have that
+/// many.
 template <class Index> std::optional<int> directions_of(Index rows, Index pairs)
 {
   for (const int directions : {1, 2})

@@ -33,6 +33,7 @@ inline Words words_of(ContactSolver)
   return contact_solver_words;
 }
 
+/// How contact problems are solved.
 struct ContactSettings
 {
   ContactSolver solver = ContactSolver::gauss_seidel;
@@ -44,6 +45,7 @@ struct ContactSettings
 
 OptionList options_of(ContactSettings& settings);
 
+/// How one problem ended.
 struct ContactResult
 {
   int iterations = 0; // sweeps
@@ -55,7 +57,7 @@ struct ContactResult
 struct ContactMemory
 {
   std::vector<std::vector<double>> r, Wr;
-  int unread = 0; // solutions accepted since W was last read
+  int since_read = 0; // solutions accepted since W was last read
 };
 
 /// One problem. An infinite b_n keeps its pair out: r = 0. `r`: start in, solution out.
@@ -66,6 +68,8 @@ struct ContactProblem
   ContactMemory& memory;
 };
 
+/// Solves all problems, each from its `r`, which becomes the solution [N]. A problem that does not converge says so in
+/// its result. Not collective: W is one rank's.
 std::vector<ContactResult> solve_contacts(const ContactOperator& W, const FrictionLaw& friction,
                                           const ContactSettings& settings, std::span<const ContactProblem> problems);
 

@@ -44,12 +44,16 @@ struct Fidelity
   double reduction_seconds = 0, reduced_seconds = 0, full_seconds = 0;
 };
 
+/// A cycle and how it was found.
 struct FittedCycle
 {
   LimitCycle cycle;
   Fidelity fidelity;
 };
 
+/// Finds the cycle on the model that the request names, or for "auto" on the smallest one that its accuracy allows.
+/// Collective. A search that fails has its outcome and reason. Error: a reduced model that was asked for cannot be
+/// made.
 FittedCycle find_fitted_cycle(const CycleProblem& problem, const FidelityRequest& request, const CycleOptions& options);
 
 } // namespace squeal

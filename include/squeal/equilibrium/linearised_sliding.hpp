@@ -13,6 +13,7 @@
 namespace squeal
 {
 
+/// Bases that keep the closed pairs closed.
 struct ClosedContact
 {
   Owned<Mat> Z, Y;        // dofs x (dofs - closed pairs)
@@ -52,6 +53,7 @@ struct ReactionOperator
   Owned<Mat> M, C, K; // pairs x dofs
 };
 
+/// lambda_n per pair [N per m of the motion], whole on every rank. `real`, `imaginary`: of phi. Collective.
 std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
                                                    Vec imaginary);
 
@@ -65,6 +67,7 @@ struct LinearisedSliding
   Owned<Mat> M_z, K_z; // Z'M Z, Z'K Z, symmetric: the frictionless bilateral problem
 };
 
+/// Linearises about the equilibrium. Collective. Error: as of eliminate_closed_pairs.
 LinearisedSliding linearise(const SlidingEquilibrium& sliding);
 
 } // namespace squeal

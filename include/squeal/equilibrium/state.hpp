@@ -8,6 +8,7 @@
 namespace squeal
 {
 
+/// A state of motion, absolute: u and v are not those about the equilibrium.
 struct State
 {
   Owned<Vec> u, v;               // [m, m/s]
@@ -15,6 +16,7 @@ struct State
   std::vector<double> reactions; // [N] of the last step (impulse / h); warm start of the next; empty: none known
 };
 
+/// A deep copy.
 State copy_of(const State& state);
 
 /// Scalar energies and norms in the structure's own inner product.

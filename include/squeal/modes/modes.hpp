@@ -28,6 +28,12 @@ struct ComplexMode
   double damping_ratio() const; // -Re/|lambda|
 };
 
+/// |Im(lambda)|/2 pi [Hz].
+double frequency_hz_of(std::complex<double> lambda);
+
+/// -Re(lambda)/|lambda| [-].
+double damping_ratio_of(std::complex<double> lambda);
+
 /// Frictionless undamped modes with closed pairs kept closed, M-normalised, ascending.
 /// outcome: "converged", or "not converged": fewer than asked, or fewer than the inertia of K - omega^2 M counts.
 struct RealModes
@@ -111,6 +117,7 @@ inline Words words_of(ModesSolver)
   return modes_solver_words;
 }
 
+/// Options -modes_...: how the eigenproblems are solved.
 struct ModesOptions
 {
   PetscInt dense_limit = 400; // up to this size eigenproblems are solved whole by LAPACK
@@ -133,6 +140,8 @@ RealModes find_real_modes_below(const LinearisedSliding& linearised, double band
 RealModes find_real_modes_between(const LinearisedSliding& linearised, double low, double high,
                                   const ModesOptions& options);
 
+/// Finds all modes below the band of the settings by the route that they name, counts them, and marks unstable ones.
+/// Collective. A search that misses modes has the outcome "not converged". Error: a factorisation runs out of memory.
 Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised, const ModesSettings& settings,
                  const ModesOptions& options);
 

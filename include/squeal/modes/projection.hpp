@@ -27,10 +27,11 @@ struct Correction
 QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector basis, const PencilFactor& P,
                                     const Correction& correction);
 
+/// How the route by projection is taken.
 struct ProjectionSettings
 {
-  double band = 0;    // [Hz]
-  int passes = 0;     // of residual correction
+  double band = 0;         // [Hz]
+  int passes = 0;          // of residual correction
   PetscInt candidates = 0; // pairs corrected in each pass
   PencilOptions pencil{};
 };

@@ -14,11 +14,13 @@
 namespace squeal
 {
 
+/// (lambda^2 M + lambda C + K) y = 0.
 struct QuadraticProblem
 {
   Owned<Mat> M, C, K; // AIJ, of one layout
 };
 
+/// An eigenvalue with its vector.
 struct Eigenpair
 {
   std::complex<double> lambda; // [1/s]
@@ -56,15 +58,19 @@ QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const Quadrat
 /// Sorts the pairs by falling real part, and sets outcome.residual to the largest backward error.
 void sort_and_measure(QuadraticSolution& solution);
 
+/// Sizes of M [kg], C [N s/m] and K [N/m], for backward errors.
 struct QuadraticNorms
 {
   double M = 0, C = 0, K = 0; // 1-norms
 };
 
+/// The norms of the three matrices. Collective.
 QuadraticNorms norms_of(const QuadraticProblem& problem);
 
 /// |lambda|^2 up to which a motion is that of a free body, not a vibration: 1e-12 |K|/|M| [1/s2].
 double vibration_floor(const QuadraticNorms& norms);
+
+/// eta = |Q(lambda) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|) [-]. Collective.
 double backward_error(const QuadraticProblem& problem, const QuadraticNorms& norms, const Eigenpair& pair);
 
 } // namespace squeal

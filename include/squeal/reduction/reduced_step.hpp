@@ -15,7 +15,7 @@ struct ReducedContact
   Eigen::VectorXd Wr{};                    // W r; empty: not known
   Eigen::VectorXd w{};                     // [m/s] W r + b
   Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
-  int unread = 0;                          // steps since W was read in double precision
+  int since_read = 0;                      // steps since W was read in double precision
   std::vector<double> past{};              // [m/s] w_t - s+, as sliding_direction.hpp says
   /// W_nn + mu W_nt d, d the direction of each pair's friction when W was read: normal rates by normal reactions.
   Eigen::MatrixXf normal_responses{};

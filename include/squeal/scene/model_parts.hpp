@@ -168,7 +168,7 @@ struct Tie
 struct FrictionLaw
 {
   double coefficient = 0;        // [-]
-  bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3)
+  bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3.3)
   double static_coefficient = 0; // [-] mu at rest; of no meaning without a decay_speed
   double decay_speed = 0;        // [m/s] 0: mu is `coefficient` at every speed
 };

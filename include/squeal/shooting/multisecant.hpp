@@ -42,6 +42,8 @@ struct Multisecant
 void estimate_remaining_change(const OrbitProblem& problem, const ShootingOptions& options, Multisecant& multisecant,
                                const Orbit& orbit);
 
+/// Iterates from `start` until the residual meets the problem's tolerance, or the remaining change the target error.
+/// The ending says whether it did, stalled or collapsed to the equilibrium. Collective. Error: as of the flow.
 StageResult shoot_by_multisecant(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
                                  Multisecant& multisecant, const Orbit& start);
 

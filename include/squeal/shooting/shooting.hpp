@@ -48,6 +48,9 @@ void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable
 OrbitProblem problem_of(const Flow& flow, const Preconditioner& preconditioner, const ShootingStart& start,
                         double tolerance);
 
+/// Finds an orbit from the start: free periods, the subspace, a finish in the full space, multipliers. The outcome says
+/// how the search ended; where no orbit attracts, `free` is the end of the free motion. Collective. Error: as of the
+/// flow.
 ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, const ShootingStart& start,
                      const ShootingSettings& settings, const ShootingOptions& options);
 

@@ -67,7 +67,8 @@ struct SensitivityProblem
   const EquilibriumOptions& equilibrium_options;
 };
 
-/// Collective.
+/// Derivatives, energies, powers and changes of every unstable mode. Collective. Error: a number's value makes no
+/// scene.
 Sensitivity find_sensitivity(const SensitivityProblem& problem);
 
 } // namespace squeal

@@ -74,7 +74,8 @@ struct SweepProblem
   const SweepOptions& options;
 };
 
-/// Collective.
+/// Visits all points, follows the modes along each line and finds the thresholds on the way. A point that fails is
+/// recorded with its reason. Collective.
 Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm);
 
 } // namespace squeal

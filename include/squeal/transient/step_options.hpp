@@ -1,5 +1,5 @@
 #pragma once
-/// Which variant of the theta step is marched (src/README.md, section 4), of the transient and of the cycle.
+/// Which variant of the theta step is marched (src/README.md, section 4.2), of the transient and of the cycle.
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/contact/solver.hpp"
 

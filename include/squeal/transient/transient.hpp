@@ -49,7 +49,7 @@ struct Recorder
   const MarchCheckpoint* checkpoint = nullptr; // null: none is kept
 };
 
-/// `steps` steps in place, recorded.
+/// Takes `steps` steps from `state`, which becomes the end, and records them. Collective.
 MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, long steps, State& state,
                    const Recorder& recorder);
 
@@ -60,7 +60,9 @@ struct Trajectory
 {
   Outcome outcome;
   ContactLaw law = ContactLaw::displacement;
-  double theta = 0, step_size = 0, periods = 0;
+  double theta = 0;     // [-]
+  double step_size = 0; // [s]
+  double periods = 0;   // [-] of the followed mode
   long steps = 0;
   double growth_rate_fit = 0;     // [1/s] of the followed mode's amplitude before the first event; NaN: too short
   std::complex<double> predicted; // [1/s] discrete eigenvalue of the followed mode; NaN: none is followed
@@ -80,7 +82,7 @@ State transient_start(const SlidingEquilibrium& sliding, const UnstableModes& un
                       const TransientSettings& settings);
 
 /// Integrates from `start`; `mode` is the followed mode (null: no growth is fitted, and the settings must give steps
-/// and step_size).
+/// and step_size). Collective. A step that would show a wrong growth has the outcome "refused".
 Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode, const TransientSettings& settings,
                      const StepOptions& options, State start, Mat probes);
 

@@ -1,0 +1,46 @@
+#pragma once
+/// What a motion has settled on (src/README.md, section 9.4): means of a window, their trend, and which motions are the
+/// same.
+#include "squeal/base/words.hpp"
+#include "squeal/settled/statistics.hpp"
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace squeal
+{
+
+enum class ReachedKind
+{
+  rest,      // the motion decayed
+  steady,    // the mean energy of every tenth of the window is within half a percent
+  varying,   // it is not, but it has no trend: no cycle attracts there
+  unsettled, // the energy still has a trend
+};
+
+inline constexpr std::array reached_words = {"rest", "steady", "varying", "unsettled"};
+
+inline Words words_of(ReachedKind)
+{
+  return reached_words;
+}
+
+/// A motion that starts lead to.
+struct ReachedMotion
+{
+  ReachedKind kind = ReachedKind::unsettled;
+  MeanValue energy;                // [J] mean fluctuating energy
+  MeanValue frequency;             // [Hz] of the mode's coordinate that moves most; 0 at rest
+  std::vector<std::size_t> starts; // numbers of the starts that lead to it
+};
+
+/// What one motion has settled on, from the energies of its periods and the upward zero crossings [s] of a coordinate.
+/// `rest`: an energy below it is that of a motion at rest.
+ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<double>& crossings, double rest);
+
+/// Joins motions of one kind whose energies and frequencies agree within their bars, or within a percent and a
+/// thousandth. Those that most starts lead to come first.
+std::vector<ReachedMotion> joined(std::vector<ReachedMotion> motions);
+
+} // namespace squeal
