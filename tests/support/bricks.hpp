@@ -63,21 +63,29 @@ inline void add_box(Mesh& mesh, const std::string& name, int part, const Vec3& l
       }
 }
 
-/// 4-node shells over the parallelogram origin, origin + a, origin + a + b, origin + b; groups "name" and "name:end"
-/// (the edge at origin + a).
-inline void add_strip(Mesh& mesh, const std::string& name, int part, const Vec3& origin, const Vec3& a, const Vec3& b,
-                      int along, int across)
+/// A parallelogram origin, origin + a, origin + a + b, origin + b, and its numbers of cells.
+struct Strip
+{
+  Vec3 origin, a, b;
+  int along, across;
+};
+
+/// 4-node shells over a strip; groups "name" and "name:end" (the edge at origin + a).
+inline void add_strip(Mesh& mesh, const std::string& name, int part, const Strip& strip)
 {
   const auto at = [&](int i, int j)
-  { return node_at(mesh, origin + (static_cast<double>(i) / along) * a + (static_cast<double>(j) / across) * b); };
-  for (int i = 0; i < along; ++i)
-    for (int j = 0; j < across; ++j)
+  {
+    const double x = static_cast<double>(i) / strip.along, y = static_cast<double>(j) / strip.across;
+    return node_at(mesh, strip.origin + x * strip.a + y * strip.b);
+  };
+  for (int i = 0; i < strip.along; ++i)
+    for (int j = 0; j < strip.across; ++j)
     {
       Element element{Shape::shell4, part, {}};
       element.nodes = {at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)};
       mesh.elements.push_back(element);
       add_to_group(mesh, name, std::span(element.nodes).first(4));
-      if (i == along - 1) add_to_group(mesh, name + ":end", std::span(element.nodes).subspan(1, 2));
+      if (i == strip.along - 1) add_to_group(mesh, name + ":end", std::span(element.nodes).subspan(1, 2));
     }
 }
 

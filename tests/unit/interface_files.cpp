@@ -167,19 +167,32 @@ TEST_CASE("relative and add_reactions are B x and B'r, whole on every rank")
   CHECK(first % (1 + interface.directions) == 0);
 }
 
-TEST_CASE("a damaged folder is one message on every rank")
+/// A folder of files that are written anew after each message.
+struct Damaged
 {
-  const TemporaryFolder folder;
-  const auto& path = folder.path;
-  write_scene(path);
-  REQUIRE(message(path) == "");
-  const auto says = [&](const std::string& text)
+  TemporaryFolder folder{};
+  const std::filesystem::path& path = folder.path;
+
+  Damaged()
+  {
+    write_scene(path);
+    REQUIRE(message(path) == "");
+  }
+
+  void says(const std::string& text) const
   {
     const auto found = message(path);
     CAPTURE(found);
     CHECK(found.find(text) != std::string::npos);
     write_scene(path);
-  };
+  }
+};
+
+TEST_CASE("files that are missing or damaged are one message on every rank")
+{
+  const Damaged files;
+  const auto& path = files.path;
+  const auto says = [&](const std::string& text) { files.says(text); };
   SUBCASE("missing damping and load, which are zero")
   {
     if (rank_of(world) == 0)
@@ -211,6 +224,13 @@ TEST_CASE("a damaged folder is one message on every rank")
     write(path / "F.petsc", Dense{{1, 2, 3, 4}});
     says("F.petsc: not a vector");
   }
+}
+
+TEST_CASE("files that contradict each other are one message on every rank")
+{
+  const Damaged files;
+  const auto& path = files.path;
+  const auto says = [&](const std::string& text) { files.says(text); };
   SUBCASE("sizes that disagree")
   {
     write(path / "K.petsc", Dense{{1, 0}, {0, 1}});

@@ -20,7 +20,7 @@ Mesh cube_and_strip(int cells)
 {
   Mesh mesh;
   add_box(mesh, "cube", 0, {0, 0, -0.05}, {0.1, 0.1, 0.05}, {cells, cells, cells});
-  add_strip(mesh, "strip", 1, {0.1, 0, 0}, {length, 0, 0}, {0, width, 0}, 2 * cells, cells);
+  add_strip(mesh, "strip", 1, {{0.1, 0, 0}, {length, 0, 0}, {0, width, 0}, 2 * cells, cells});
   return mesh;
 }
 
