@@ -56,11 +56,11 @@ enum class Center
   cell,
 };
 
-constexpr std::array center_words = {"Node", "Cell"};
+constexpr std::array xdmf_centers = {"Node", "Cell"};
 
 Words words_of(Center)
 {
-  return center_words;
+  return xdmf_centers;
 }
 
 struct Attribute

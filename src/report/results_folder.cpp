@@ -26,7 +26,7 @@ constexpr const char* lock_file = "running";
 
 bool is_result(const fs::path& name)
 {
-  return std::find(result_file_words.begin(), result_file_words.end(), name) != result_file_words.end();
+  return std::find(result_file_names.begin(), result_file_names.end(), name) != result_file_names.end();
 }
 
 /// "2026-01-31T12:00:00.123456Z HOST 4711": time, machine and process tell any two runs apart.
@@ -222,7 +222,7 @@ void ResultsFolder::move_by_file()
   fs::create_directories(place_);
   const char* const report = word(ResultFile::report);
   fs::remove(place_ / report);
-  for (const char* name : result_file_words) fs::remove_all(place_ / name);
+  for (const char* name : result_file_names) fs::remove_all(place_ / name);
   for (const auto& entry : fs::directory_iterator(partial_))
     if (const fs::path name = entry.path().filename(); name != report && name != lock_file)
       rename_or_throw(entry.path(), place_ / name);
@@ -273,7 +273,7 @@ std::vector<fs::path> inputs_of(const Scene& scene)
 void check_outputs(const Scene& scene, const fs::path& place)
 {
   std::vector<fs::path> results;
-  for (const char* name : result_file_words) results.push_back(place / name);
+  for (const char* name : result_file_names) results.push_back(place / name);
   const std::vector<fs::path> inputs = inputs_of(scene);
   const auto refuse_on = [](const fs::path& output, const std::vector<fs::path>& others, const std::string& remedy)
   {

@@ -48,11 +48,11 @@ enum class MesherInput
   script,
 };
 
-inline constexpr std::array mesher_input_words = {"file", "script"};
+inline constexpr std::array mesher_input_names = {"file", "script"};
 
 inline Words words_of(MesherInput)
 {
-  return mesher_input_words;
+  return mesher_input_names;
 }
 
 /// Descriptors of the mesher: it writes its answer to one, and reads a checked script from the other.

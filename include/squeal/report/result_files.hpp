@@ -19,12 +19,12 @@ enum class ResultFile
   checkpoints, // a folder
 };
 
-inline constexpr std::array result_file_words = {"report.json", "history.h5",    "sweep.csv",   "fields.h5",
+inline constexpr std::array result_file_names = {"report.json", "history.h5",    "sweep.csv",   "fields.h5",
                                                  "fields.xdmf", "resolved.toml", "options.txt", "checkpoint"};
 
 inline Words words_of(ResultFile)
 {
-  return result_file_words;
+  return result_file_names;
 }
 
 } // namespace squeal
