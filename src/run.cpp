@@ -6,6 +6,7 @@
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/cycle/period_log.hpp"
 #include "squeal/forecast.hpp"
+#include "squeal/reduction/model_files.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/scene/doubts.hpp"
 #include "squeal/study/sensitivity.hpp"
@@ -347,6 +348,9 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   report.modes = stage(report, Stage::modes, comm, [&] { return run_modes(chain); });
   report.estimates = stage(report, Stage::estimate, comm, [&] { return run_estimates(chain); });
   if (has_run(report.modes.outcome)) save();
+  if (scene.modes.reduced_matrices && !report.modes.modes.empty())
+    write_reduced_matrices(chain.sliding(), report.modes.modes, options.step.factor,
+                           results.partial() / word(ResultFile::reduced));
   report.transient = stage(report, Stage::transient, comm, [&] { return run_transient(chain); });
   if (has_run(report.transient.outcome)) save();
   FittedCycle fitted = stage(report, Stage::cycle, comm, [&] { return run_cycle(chain); });

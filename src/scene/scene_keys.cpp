@@ -210,6 +210,8 @@ SceneKeys keys_of(ModesSettings& m)
        "real modes of the projection; 0: those of the band"},
       {"residual_passes", &m.residual_passes, optional, Rule::not_negative, "-", "corrections of the projection"},
       {"band", &m.band, optional, Rule::positive, "Hz", "every mode below is reported"},
+      {"reduced_matrices", &m.reduced_matrices, optional, Rule::any, "switch",
+       "write the brake reduced to the modes and the pairs' attachment shapes as matrices, into reduced/"},
   };
 }
 

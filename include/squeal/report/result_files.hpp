@@ -16,11 +16,13 @@ enum class ResultFile
   field_places, // how ParaView finds its way in the fields
   resolved_scene,
   options,
+  reduced,     // a folder of matrices
   checkpoints, // a folder
 };
 
-inline constexpr std::array result_file_names = {"report.json", "history.h5",    "sweep.csv",   "fields.h5",
-                                                 "fields.xdmf", "resolved.toml", "options.txt", "checkpoint"};
+inline constexpr std::array result_file_names = {"report.json", "history.h5",  "sweep.csv",
+                                                 "fields.h5",   "fields.xdmf", "resolved.toml",
+                                                 "options.txt", "reduced",     "checkpoint"};
 
 inline Words words_of(ResultFile)
 {

@@ -85,9 +85,10 @@ struct ModesSettings
 {
   bool enabled = true;
   ModesMethod method = ModesMethod::both;
-  int real_modes = 0;      // [-] number of real modes of the projection; 0: those below the band
-  int residual_passes = 3; // [-] number of corrections of the projection
-  double band = 20000;     // [Hz] modes below this frequency are reported
+  int real_modes = 0;            // [-] number of real modes of the projection; 0: those below the band
+  int residual_passes = 3;       // [-] number of corrections of the projection
+  double band = 20000;           // [Hz] modes below this frequency are reported
+  bool reduced_matrices = false; // the brake reduced to them and to the pairs' attachments is written as matrices
 };
 
 struct EstimateSettings
