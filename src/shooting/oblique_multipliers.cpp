@@ -77,6 +77,7 @@ struct Passes
   std::vector<double> changes{};       // when a pair was refined last
   std::vector<double> bars{}, rises{}; // rises: the bars upwards
   std::size_t shift = 0;               // the place of the shift in time; the number of pairs: it is not there
+  DenseEigenpair shift_pair{};         // the shift itself
   double shift_distance = 0;           // of its multiplier from 1
 };
 
@@ -130,7 +131,8 @@ void project(const Monodromy& monodromy, const SlowMotions& slow, const std::vec
   const Owned<Vec> rate = copy_of(monodromy.orbit.rate.get());
   const StateBlock flow = block_of(std::span(&rate, 1));
   const std::size_t shift = find_shift(all, inner_products(space.V, energy_images(monodromy.flow, flow)).col(0));
-  passes.shift_distance = std::abs(all[shift].lambda - 1.);
+  passes.shift_pair = all[shift];
+  passes.shift_distance = std::abs(passes.shift_pair.lambda - 1.);
   passes.shift = last.size();
   passes.pairs.clear();
   passes.changes.resize(last.size(), 0);
@@ -244,22 +246,29 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
 }
 
 /// Removes the shift in time from the pairs. Where it has met another real multiplier in a complex pair, the sum of
-/// both is the pair's: the other one stays.
+/// both is the pair's: the other one stays, or comes where it was not among the pairs.
 void take_out_shift(Passes& passes)
 {
-  if (passes.shift == passes.pairs.size()) return;
-  const Complex value = passes.pairs[passes.shift].lambda;
+  const std::size_t place = passes.shift, count = passes.pairs.size();
+  const Complex value = passes.shift_pair.lambda;
   if (value.imag() != 0)
-    for (std::size_t i = 0; i < passes.pairs.size(); ++i)
-      if (passes.pairs[i].lambda == std::conj(value))
-      {
-        passes.pairs[i].lambda = 2 * value.real() - 1;
-        passes.bars[i] += passes.shift_distance;
-        passes.rises[i] += passes.shift_distance;
-      }
-  passes.pairs.erase(passes.pairs.begin() + static_cast<std::ptrdiff_t>(passes.shift));
+  {
+    std::size_t other = 0;
+    while (other < count && passes.pairs[other].lambda != std::conj(value)) ++other;
+    if (other == count)
+    {
+      passes.pairs.push_back({std::conj(value), passes.shift_pair.y.conjugate()});
+      passes.bars.push_back(0);
+      passes.rises.push_back(0);
+    }
+    passes.pairs[other].lambda = 2 * value.real() - 1;
+    passes.bars[other] += passes.shift_distance;
+    passes.rises[other] += passes.shift_distance;
+  }
+  if (place == count) return;
+  passes.pairs.erase(passes.pairs.begin() + static_cast<std::ptrdiff_t>(place));
   for (std::vector<double>* bars : {&passes.bars, &passes.rises})
-    bars->erase(bars->begin() + static_cast<std::ptrdiff_t>(passes.shift));
+    bars->erase(bars->begin() + static_cast<std::ptrdiff_t>(place));
 }
 
 /// What the search beside V found.
@@ -345,13 +354,8 @@ Search search_beside(const Monodromy& monodromy, const Projector& projector, con
   return search;
 }
 
-/// `shift_distance`: of the shift's own multiplier from 1.
-Coverage coverage_of(const SlowMotions& slow, const Search& search, double shift_distance)
+Coverage coverage_of(const SlowMotions& slow, const Search& search)
 {
-  constexpr double far = 0.05; // a real multiplier may hide in what the grid of time does to the shift
-  if (shift_distance > far)
-    return {false, format("the multiplier of a shift in time is %.2g away from 1: more steps a period would decide",
-                          shift_distance)};
   if (!slow.confirmed)
     return {false, "the reduced model has another number of large multipliers with fewer modes: more of them "
                    "(modes.band) would decide"};
@@ -404,7 +408,7 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
     multipliers.upper.push_back(std::abs(passes.pairs[i].lambda) + passes.rises[i]);
   }
   if (std::abs(search.largest) - 2 * search.residual > 1) add_value(multipliers, search.largest, 2 * search.residual);
-  decide(multipliers, coverage_of(slow, search, passes.shift_distance), multipliers.values.size());
+  decide(multipliers, coverage_of(slow, search), multipliers.values.size());
   if (passes.pairs.empty()) return result;
   const MatrixXd fastest = real_part(passes.pairs[order.front()].y);
   result.fastest = std::move(states_of(combination(passes.space.V, fastest), orbit.state).front());
