@@ -68,17 +68,28 @@ struct Search
   const ShootingStart& start;
 };
 
+/// What a motion beside an orbit was seen to do.
+enum class Beside
+{
+  not_seen,
+  leaves,
+  unclear, // against the verdict "unstable" it does not leave, and hardly comes nearer
+};
+
 /// What shooting from one state led to.
 struct Attempt
 {
   StageResult found;
   FloquetAnalysis floquet{}; // of a converged orbit
   double first_return = 0;   // return residual where it started
-  bool left = false;         // a motion beside it was seen to leave
+  Beside beside = Beside::not_seen;
 
   bool converged() const { return found.ending == StageEnding::converged; }
-  bool repels() const { return converged() && (left || floquet.multipliers.stability == Stability::unstable); }
-  bool answers() const { return converged() && !repels(); }
+  bool repels() const
+  {
+    return converged() && (beside == Beside::leaves || floquet.multipliers.stability == Stability::unstable);
+  }
+  bool answers() const { return converged() && !repels() && beside != Beside::unclear; }
 };
 
 /// A state beside an orbit, displaced by a part of its fluctuation along the motion that grows most. `part`: positive
@@ -115,17 +126,24 @@ SeenGrowth fit_growth(const std::vector<double>& logarithms)
   return {static_cast<long>(logarithms.size()), std::exp(slope), error * std::exp(slope)};
 }
 
-/// Distances from the orbit at the ends of periods, without their part along the flow and over the fluctuation. The
-/// motion begins beside it by `part` of the fluctuation. They end where the distance exceeds a third or falls to a
-/// tenth of `part`. A shift in time leaves the flow's direction by its square.
-std::vector<double> distances_beside(const Search& search, const Attempt& attempt, double part, long periods)
+/// A motion beside an orbit, as parts of its fluctuation.
+struct Watched
+{
+  double first = 0;               // where the motion begins
+  double lowest = 0, highest = 0; // where it has been seen long enough
+  long periods = 0;               // at most
+};
+
+/// Distances from the orbit at the ends of periods of a motion that begins beside it, without their part along the
+/// flow.
+std::vector<double> distances_beside(const Search& search, const Attempt& attempt, const Watched& watched)
 {
   const auto& [problem, options, log, start] = search;
   const Orbit& orbit = attempt.found.orbit;
-  const Owned<Vec> state = state_beside(problem, attempt, part), flow = copy_of(orbit.rate.get());
+  const Owned<Vec> state = state_beside(problem, attempt, watched.first), flow = copy_of(orbit.rate.get());
   normalise(problem.flow, flow);
   std::vector<double> distances;
-  for (long k = 0; k < periods; ++k)
+  for (long k = 0; k < watched.periods; ++k)
   {
     const Orbit now = evaluate(problem, log, state, orbit.period);
     check(VecAXPY(state, 1, now.defect));
@@ -133,20 +151,19 @@ std::vector<double> distances_beside(const Search& search, const Attempt& attemp
     check(VecAXPY(away, -1, orbit.state));
     check(VecAXPY(away, -energy_product(problem.flow, flow, away), flow));
     distances.push_back(energy_norm(problem.flow, away) / orbit.fluctuation);
-    if (!(distances.back() < 1. / 3) || distances.back() < 0.1 * part) break;
+    if (!(distances.back() < watched.highest) || distances.back() < watched.lowest) break;
   }
   return distances;
 }
 
-/// Holds a verdict against a motion beside the orbit, over as many periods as should make its distance four times as
-/// large. One that doubles shows that an undecided orbit repels. One that does not contradicts the verdict "unstable":
-/// where contact only just opens, closes or sticks, the tangent holds in a neighbourhood that no motion stays in.
-/// Where the largest multiplier is hardly above 1, that many periods cost too much.
+/// Holds a verdict against a motion beside the orbit, until its distance has doubled or halved. Doubling shows that an
+/// undecided orbit repels. Where it does not double over periods that should make it four times as large, the verdict
+/// "unstable" is undecided: where contact only just opens, closes or sticks, the tangent holds in a neighbourhood that
+/// no motion stays in. Where the largest multiplier is hardly above 1, that many periods cost too much.
 void hold_against_motion(const Search& search, Attempt& attempt)
 {
-  constexpr double part = 0.01;             // of the fluctuation: above the orbit's tolerance, below its saturation
-  constexpr long few = 10, large_many = 20; // periods; the most of a large model
-  constexpr long many = 80;
+  constexpr double part = 0.01;                 // of the fluctuation: above the orbit's tolerance, below its saturation
+  constexpr long many = 80, many_of_large = 20; // periods
   const auto& [problem, options, log, start] = search;
   Multipliers& multipliers = attempt.floquet.multipliers;
   const double largest = multipliers.values.empty() ? 0 : std::abs(multipliers.values.front());
@@ -154,14 +171,13 @@ void hold_against_motion(const Search& search, Attempt& attempt)
   if (!attempt.floquet.fastest.get() || !(largest > 1) || multipliers.stability == Stability::stable) return;
   PetscInt dofs = 0;
   check(VecGetSize(displacement(attempt.found.orbit.state), &dofs));
-  const double needed = std::ceil(std::log(4) / std::log(largest));
-  if (!(needed <= static_cast<double>(dofs > large_model ? large_many : many))) return;
-  const long count = std::max(few, static_cast<long>(needed));
-  if (log.convergence.periods + count > options.max_periods) return;
-  const std::vector<double> distances = distances_beside(search, attempt, part, count);
-  const bool doubles = !(distances.back() <= 2 * part);
-  if (!unstable) attempt.left = doubles;
-  if (!unstable || doubles) return;
+  const long at_most = dofs > large_model ? many_of_large : many;
+  if (!(std::log(4) / std::log(largest) <= static_cast<double>(at_most))) return;
+  if (log.convergence.periods + at_most > options.max_periods) return;
+  const std::vector<double> distances = distances_beside(search, attempt, {part, 0.5 * part, 2 * part, at_most});
+  if (!(distances.back() < 2 * part)) attempt.beside = Beside::leaves;
+  if (!unstable || attempt.beside == Beside::leaves) return;
+  if (distances.back() > 0.5 * part) attempt.beside = Beside::unclear;
   multipliers.stability = Stability::undecided;
   multipliers.crossing = Crossing::none;
   multipliers.would_decide =
@@ -259,13 +275,15 @@ std::string leaving_time(const Multipliers& multipliers, double period)
 }
 
 /// Integrates beside the orbit and fits the growth of the distance from it. The first quarter is left out, where other
-/// motions decay.
+/// motions decay, and what comes after a third of the fluctuation or a tenth of the first distance: the shift in time
+/// that a motion ends with leaves the flow's direction by its square.
 SeenGrowth watch(const Search& search, const Attempt& attempt)
 {
   constexpr double first = 0.03; // of the fluctuation
   if (!attempt.converged() || !attempt.floquet.fastest.get()) return {};
-  std::vector<double> logarithms = distances_beside(search, attempt, first, search.options.watched_periods);
-  if (!(logarithms.back() < 1. / 3) || logarithms.back() < 0.1 * first) logarithms.pop_back();
+  const Watched watched{first, 0.1 * first, 1. / 3, search.options.watched_periods};
+  std::vector<double> logarithms = distances_beside(search, attempt, watched);
+  if (!(logarithms.back() < watched.highest) || logarithms.back() < watched.lowest) logarithms.pop_back();
   for (double& value : logarithms) value = std::log(value);
   return fit_growth(logarithms);
 }
@@ -329,10 +347,12 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   result.outcome = outcome_of(log.convergence, found.found, goes_on && collapsing(problem, free));
   result.multipliers = std::move(found.floquet.multipliers);
   refuse_repelling(result.multipliers, start.other_unstable.size(), result.outcome);
-  if (found.left && result.outcome.kind == OutcomeKind::converged)
+  if (found.beside != Beside::not_seen && result.outcome.kind == OutcomeKind::converged)
   {
     result.outcome.kind = OutcomeKind::unstable_cycle;
-    result.outcome.reason = "the cycle found repels: integrated beside it, a motion leaves it";
+    result.outcome.reason = found.beside == Beside::leaves
+                                ? "the cycle found repels: integrated beside it, a motion leaves it"
+                                : "whether the cycle found repels is undecided: " + result.multipliers.would_decide;
   }
   if (slow) result.outcome.reason += leaving_time(result.multipliers, found.found.orbit.period);
   if (options.watched_periods > 0) result.multipliers.seen = watch(search, found);
