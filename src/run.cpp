@@ -6,6 +6,7 @@
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/cycle/period_log.hpp"
 #include "squeal/forecast.hpp"
+#include "squeal/modes/modes_checkpoint.hpp"
 #include "squeal/reduction/model_files.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/scene/doubts.hpp"
@@ -128,7 +129,10 @@ Modes run_modes(Chain& chain)
   if (!scene.modes.enabled && !scene.cycle.enabled && !follows_a_mode(scene.transient))
     return not_run<Modes>(OutcomeKind::off, "the scene turns it off");
   chain.linearised = linearise(chain.sliding());
-  return find_modes(chain.sliding(), *chain.linearised, scene.modes, chain.options.modes);
+  if (auto kept = kept_modes(chain.model.structure)) return std::move(*kept);
+  Modes modes = find_modes(chain.sliding(), *chain.linearised, scene.modes, chain.options.modes);
+  if (checkpoint_is_worth_it(comm_of(chain.model.structure.load))) keep_modes(modes, chain.model.structure);
+  return modes;
 }
 
 /// Of every unstable mode, the followed one first; of none, the reason.
@@ -326,6 +330,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
 {
   Report report;
   report.run = results.run();
+  begin_period_log();
   const Model model = timed(report, Stage::model, comm, [&] { return build_model(scene, comm); });
   report.model = summary_with_doubts(model, scene, comm);
   print_model(report.model, comm);
@@ -357,12 +362,12 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   report.cycle = std::move(fitted.cycle);
   report.fidelity = std::move(fitted.fidelity);
   if (has_run(report.cycle.outcome)) save();
+  if (checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
   report.settled = stage(report, Stage::settled, comm, [&] { return run_settled(chain); });
   take_as_answer(report.settled, report.cycle.outcome);
   if (has_run(report.settled.outcome)) save();
   report.attractors = stage(report, Stage::attractors, comm, [&] { return run_attractors(chain); });
   if (has_run(report.attractors.outcome)) save();
-  if (checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
   report.branch = stage(report, Stage::branch, comm, [&] { return run_branch(chain); });
   if (has_run(report.branch.outcome)) save();
   report.sensitivity = stage(report, Stage::sensitivity, comm, [&] { return run_sensitivity(chain); });

@@ -1,9 +1,11 @@
 #include "squeal/attractors/attractors.hpp"
 
+#include "starts.hpp"
+#include "swarm_checkpoint.hpp"
+
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/cycle/fidelity.hpp"
-#include "starts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,18 +16,8 @@ namespace squeal
 namespace
 {
 
-constexpr int block = 50;              // periods between two looks at the energies
-constexpr std::size_t coordinates = 4; // of the least stable modes
-constexpr double at_rest = 1e-4;       // of the least energy of a start
-
-/// What is kept of one trajectory.
-struct Watched
-{
-  std::vector<double> energies; // [J] fluctuating, mean of each period
-  std::array<double, coordinates> last{}, squares{};
-  std::array<std::vector<double>, coordinates> crossings; // [s] upwards through zero
-  double sum = 0;                                         // of the energies of the period at hand
-};
+constexpr int block = 50;        // periods between two looks at the energies
+constexpr double at_rest = 1e-4; // of the least energy of a start
 
 /// Trajectories that are integrated together.
 class Swarm
@@ -46,20 +38,32 @@ public:
       shapes_.push_back(problem.modes[i].real);
     for (NamedStart& start : starts) states_.push_back(std::move(start.state));
     for (State& state : states_) works_.push_back(begin_steps(step_, structure, interface, state));
+    restore_swarm(progress());
   }
 
+  long periods() const { return steps_ / steps_per_period_; }
+
+  /// To the end of the period at hand.
   void integrate_period()
   {
-    for (Watched& watched : watched_) watched.sum = 0;
-    for (int i = 0; i < steps_per_period_; ++i)
+    const MPI_Comm comm = comm_of(problem_.sliding.structure.load);
+    for (const long end = (periods() + 1) * steps_per_period_; steps_ < end;)
     {
       ++steps_;
       const std::vector<StepReport> reports =
           advance(step_, problem_.sliding.structure, problem_.sliding.interface, works_, states_);
       for (std::size_t k = 0; k < states_.size(); ++k) watch(reports[k], k);
-      end_if_asked(comm_of(problem_.sliding.structure.load));
+      if (steps_ == end) note_energies();
+      const Request asked = request(comm);
+      if (asked != Request::none) keep_swarm(progress());
+      if (asked == Request::end) throw Interrupted{};
     }
-    for (Watched& watched : watched_) watched.energies.push_back(watched.sum / steps_per_period_);
+  }
+
+  /// Keeps what the last checkpoint does not hold, where it is worth one. Collective.
+  void end()
+  {
+    if (checkpoint_is_worth_it(comm_of(problem_.sliding.structure.load))) keep_swarm(progress());
   }
 
   std::vector<ReachedMotion> reached() const
@@ -79,6 +83,17 @@ public:
   }
 
 private:
+  SwarmProgress progress() { return {problem_.sliding.structure, step_.h, steps_, states_, works_, watched_}; }
+
+  void note_energies()
+  {
+    for (Watched& watched : watched_)
+    {
+      watched.energies.push_back(watched.sum / steps_per_period_);
+      watched.sum = 0;
+    }
+  }
+
   /// Takes the energy of the fluctuation and the velocities along the modes.
   void watch(const StepReport& report, std::size_t k)
   {
@@ -132,13 +147,17 @@ Attractors find_attractors(const AttractorProblem& problem, const AttractorOptio
   Swarm swarm(problem, std::move(starts));
   Progress progress(comm_of(problem.sliding.structure.load), "attractors", static_cast<double>(options.periods));
   std::vector<ReachedMotion> motions;
-  do
+  long target = block; // of periods, after which the energies are looked at
+  while (target < swarm.periods()) target += block;
+  for (;; target += block)
   {
-    for (int i = 0; i < block; ++i) swarm.integrate_period();
-    found.periods += block;
+    while (swarm.periods() < target) swarm.integrate_period();
+    found.periods = target;
     motions = swarm.reached();
-    progress.update(static_cast<double>(found.periods), format("%ld periods", found.periods));
-  } while (!all_settled(motions) && found.periods + block <= options.periods);
+    progress.update(static_cast<double>(target), format("%ld periods", target));
+    if (all_settled(motions) || target + block > options.periods) break;
+  }
+  swarm.end();
   const bool settled = all_settled(motions);
   found.motions = joined(std::move(motions));
   found.outcome = {

@@ -83,6 +83,11 @@ void stop_reading(PeriodLog& log)
 
 } // namespace
 
+void begin_period_log()
+{
+  period_log() = {};
+}
+
 bool replay_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
 {
   PeriodLog& log = period_log();

@@ -2,6 +2,7 @@
 
 #include "floquet.hpp"
 
+#include "squeal/cycle/period_log.hpp"
 #include "squeal/shooting/multisecant.hpp"
 
 #include <algorithm>
@@ -39,24 +40,74 @@ double observed_order(const CycleAtSteps& coarse, const CycleAtSteps& middle, co
   return order;
 }
 
+/// The flow whose every period is measured, on contact as exact as the accuracy needs.
+struct MeasuredFlow
+{
+  PeriodMap map;
+  Recording recording{};
+  MeasuredPeriod measured{};   // of the last period, unless that is still to be measured
+  ReplayedPeriod unmeasured{}; // the last period, if it was taken from the log of an earlier run
+  Flow flow{};
+};
+
+/// Takes a period from the log, or integrates and logs it.
+void measure_or_replay(MeasuredFlow& flow, double period, Vec from, Vec end, Vec rate)
+{
+  std::vector<double> before = flow.map.reactions;
+  flow.unmeasured = {};
+  if (replay_period(flow.map, period, from, end, rate))
+  {
+    flow.unmeasured = {period, copy_of(from), std::move(before)};
+    return;
+  }
+  flow.measured = measure_period(flow.map, flow.recording, period, from, rate);
+  check(VecCopy(flow.measured.end.u, displacement(end)));
+  check(VecCopy(flow.measured.end.v, velocity(end)));
+  log_period(flow.map, period, from, end, rate);
+}
+
+/// What was measured on the flow's last period.
+MeasuredPeriod& last_measured(MeasuredFlow& flow)
+{
+  if (!flow.unmeasured.start.get()) return flow.measured;
+  const ReplayedPeriod missing = std::exchange(flow.unmeasured, {});
+  const Owned<Vec> rate = zeros_like(missing.start);
+  const long unconverged = flow.map.unconverged;
+  flow.map.reactions = missing.reactions;
+  flow.measured = measure_period(flow.map, flow.recording, missing.period, missing.start, rate);
+  flow.map.unconverged = unconverged;
+  return flow.measured;
+}
+
+void make_flow(const CycleCorrection& correction, MeasuredFlow& result)
+{
+  const CycleProblem& problem = correction.problem;
+  result.map.reactions = problem.sliding.equilibrium.reactions;
+  result.map.options.contact.tolerance =
+      std::min(result.map.options.contact.tolerance, 1e-3 * correction.fidelity.accuracy);
+  result.recording = {problem.probes, correction.options.samples};
+  const auto integrate = [&result](double period, Vec from, Vec end, Vec rate)
+  { measure_or_replay(result, period, from, end, rate); };
+  result.flow = {integrate, problem.sliding.structure.M, problem.sliding.structure.K};
+}
+
 /// The full model's iteration, from one number of steps a period to the next.
 struct FullShooting
 {
   const CycleCorrection& correction;
   const OrbitProblem& problem;
   ConvergenceLog& log;
-  PeriodMap& map;
-  const MeasuredPeriod& measured; // of the last period integrated
+  MeasuredFlow& flow;
   ShootingOptions options;
   Multisecant multisecant{};
   Orbit orbit{};
 
-  CycleAtSteps cycle() const { return {map.steps, orbit.period, measured.mean_fluctuating_energy}; }
+  CycleAtSteps cycle() const { return {flow.map.steps, orbit.period, last_measured(flow).mean_fluctuating_energy}; }
 };
 
 void restart(FullShooting& shooting, Vec state, double period, int steps)
 {
-  shooting.map.steps = steps;
+  shooting.flow.map.steps = steps;
   shooting.orbit = evaluate(shooting.problem, shooting.log, state, period);
   record_full(shooting.log, ShootingStage::full_period, shooting.orbit);
 }
@@ -111,30 +162,6 @@ std::string refine(FullShooting& shooting, CycleAtSteps coarse)
   }
 }
 
-/// The flow whose every period is measured, on contact as exact as the accuracy needs.
-struct MeasuredFlow
-{
-  PeriodMap map;
-  MeasuredPeriod measured{};
-  Flow flow{};
-};
-
-void make_flow(const CycleCorrection& correction, MeasuredFlow& result)
-{
-  const CycleProblem& problem = correction.problem;
-  result.map.reactions = problem.sliding.equilibrium.reactions;
-  result.map.options.contact.tolerance =
-      std::min(result.map.options.contact.tolerance, 1e-3 * correction.fidelity.accuracy);
-  const Recording recording{problem.probes, correction.options.samples};
-  const auto integrate = [&result, recording](double period, Vec from, Vec end, Vec rate)
-  {
-    result.measured = measure_period(result.map, recording, period, from, rate);
-    check(VecCopy(result.measured.end.u, displacement(end)));
-    check(VecCopy(result.measured.end.v, velocity(end)));
-  };
-  result.flow = {integrate, problem.sliding.structure.M, problem.sliding.structure.K};
-}
-
 /// Of no tolerance: the accuracy ends the iteration.
 OrbitProblem orbit_problem(const CycleCorrection& correction, const Flow& flow, double period)
 {
@@ -167,7 +194,7 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
   Progress progress(comm_of(problem.sliding.structure.load), "cycle, finer steps", 20);
   ConvergenceLog log{progress, std::move(cycle.convergence)};
   const OrbitProblem orbit = orbit_problem(correction, flow.flow, cycle.orbit.period);
-  FullShooting shooting{correction, orbit, log, flow.map, flow.measured, correction.options.shooting};
+  FullShooting shooting{correction, orbit, log, flow, correction.options.shooting};
   shooting.options.max_periods = log.convergence.periods + correction.options.reduced.corrections;
   shooting.orbit = copy_of(cycle.orbit);
   const std::string problem_met =
@@ -180,7 +207,7 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
   cycle.outcome.residual = shooting.orbit.residual;
   cycle.steps_per_period = flow.map.steps;
   cycle.orbit = std::move(shooting.orbit);
-  cycle.measured = std::move(flow.measured);
+  cycle.measured = std::move(last_measured(flow));
   cycle.costs = {flow.map.step.factor_seconds, flow.map.step.condensed_seconds};
 }
 
@@ -213,7 +240,7 @@ LimitCycle measure_reduced_cycle(const CycleCorrection& correction, const Shooti
   cycle.theta = flow.map.theta;
   cycle.convergence = std::move(log.convergence);
   correction.fidelity.full_periods = cycle.convergence.periods;
-  cycle.measured = std::move(flow.measured);
+  cycle.measured = std::move(last_measured(flow));
   cycle.costs = {flow.map.step.factor_seconds, flow.map.step.condensed_seconds};
   return cycle;
 }

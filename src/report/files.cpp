@@ -16,6 +16,9 @@ namespace fs = std::filesystem;
 namespace
 {
 
+// Of the superblock of version 0, which HDF5 writes unless it is asked for a later one (HDF5 File Format, II.A).
+constexpr ssize_t consistency_flags = 20, superblock = 96; // [bytes] where the flags are, size
+
 /// Closes an HDF5 object when it goes out of scope.
 class Handle
 {
@@ -66,11 +69,13 @@ void Hdf5File::keep()
 {
   H5Fflush(id_, H5F_SCOPE_GLOBAL);
   const ssize_t size = H5Fget_file_image(id_, nullptr, 0);
-  std::string image(static_cast<std::size_t>(std::max<ssize_t>(size, 0)), ' ');
-  if (size <= 0 || H5Fget_file_image(id_, image.data(), image.size()) != size)
+  void* memory = nullptr; // where the driver keeps the address of the file's bytes: no copy is made
+  if (size < superblock || H5Fget_vfd_handle(id_, H5P_DEFAULT, &memory) < 0)
     throw Error("cannot write " + place_.string() + ": HDF5 does not hand out the file that it made in memory");
+  char* const bytes = *static_cast<char**>(memory);
+  std::fill_n(bytes + consistency_flags, 4, '\0'); // no longer open for writing
+  write_whole_file(place_, {bytes, static_cast<std::size_t>(size)}, Flush::by_system);
   H5Fclose(std::exchange(id_, -1));
-  write_whole_file(place_, image, Flush::by_system);
 }
 
 void Hdf5File::write_data(const std::string& name, const std::vector<hsize_t>& shape, hid_t type, std::size_t size,

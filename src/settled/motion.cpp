@@ -1,6 +1,7 @@
 #include "squeal/settled/motion.hpp"
 
 #include "squeal/base/progress.hpp"
+#include "squeal/base/run_control.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -42,6 +43,48 @@ bool steady(std::span<const double> energies)
   return std::sqrt(squares / static_cast<double>(energies.size())) < 1e-3 * middle && decay.value + decay.error >= 0;
 }
 
+/// Samples the next period. Where the run is asked to end within it, what came before is kept.
+PeriodSample sample_or_keep(const PeriodSampler& sampler, const MotionKeeper& keeper, const MotionProgress& now)
+{
+  try
+  {
+    return sampler(now.state);
+  }
+  catch (const Interrupted&)
+  {
+    keeper.keep(now);
+    throw;
+  }
+}
+
+/// Appends what was seen of a period.
+void append(const PeriodSample& sample, ExaminedMotion& motion)
+{
+  motion.channels.resize(sample.means.size());
+  for (std::size_t i = 0; i < sample.means.size(); ++i) motion.channels[i].push_back(sample.means[i]);
+  motion.coordinate.insert(motion.coordinate.end(), sample.coordinate.begin(), sample.coordinate.end());
+  motion.beside.insert(motion.beside.end(), sample.beside.begin(), sample.beside.end());
+}
+
+/// All that is said of the motion so far.
+void examine(const TangentBundle& bundle, double period, ExaminedMotion& motion)
+{
+  const std::size_t periods = motion.periods();
+  const std::size_t samples = motion.coordinate.size() / periods; // a period
+  motion.discarded = values_before_stationary(motion.channels.front());
+  const std::size_t first = motion.discarded < periods ? motion.discarded : periods / 2;
+  motion.means.clear();
+  for (const auto& channel : motion.channels) motion.means.push_back(batch_mean(std::span(channel).subspan(first)));
+  motion.exponents = exponents_of(bundle, std::max(first, periods / 4));
+  const double step = period / static_cast<double>(std::max<std::size_t>(samples, 1));
+  motion.spectrum = spectrum_of(std::span(motion.coordinate).subspan(first * samples), step);
+  motion.base = base_frequencies(motion.spectrum);
+  if (motion.base.second == 0 && !motion.beside.empty())
+    motion.base =
+        base_frequencies(spectrum_of(std::span(motion.beside).subspan(first * samples), step), motion.base.first);
+  motion.verdict = judge_motion(motion.exponents, std::span(motion.channels.front()).subspan(first), motion.base);
+}
+
 } // namespace
 
 OptionList options_of(SettledOptions& options)
@@ -76,40 +119,31 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
           format("%ld exponents are zero within their bars: ", static_cast<long>(zero)) + more};
 }
 
-ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, Vec state, double period,
-                              const SettledOptions& options)
+ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, const MotionKeeper& keeper, Vec state,
+                              double period, const SettledOptions& options)
 {
   ExaminedMotion motion;
   TangentBundle bundle = make_bundle(flow, state, options.exponents);
+  const MotionProgress now{motion, bundle, state};
+  keeper.restore(now);
   Progress progress(comm_of(displacement(state)), "settled", static_cast<double>(options.periods));
   const auto most = static_cast<std::size_t>(options.periods);
-  std::size_t samples = 0; // a period
-  for (std::size_t target = std::min<std::size_t>(128, most);; target = std::min(2 * target, most))
+  std::size_t target = std::min<std::size_t>(128, most);
+  while (target < motion.periods()) target = std::min(2 * target, most); // undecided there before the restart
+  for (;; target = std::min(2 * target, most))
   {
     while (motion.periods() < target)
     {
-      const PeriodSample sample = sampler(state);
-      motion.channels.resize(sample.means.size());
-      for (std::size_t i = 0; i < sample.means.size(); ++i) motion.channels[i].push_back(sample.means[i]);
-      motion.coordinate.insert(motion.coordinate.end(), sample.coordinate.begin(), sample.coordinate.end());
-      motion.beside.insert(motion.beside.end(), sample.beside.begin(), sample.beside.end());
-      samples = sample.coordinate.size();
+      const PeriodSample sample = sample_or_keep(sampler, keeper, now);
+      append(sample, motion);
       follow_period(flow, bundle);
+      if (checkpoint_is_due()) keeper.keep(now);
       progress.update(static_cast<double>(motion.periods()), format("energy %.4g", sample.means.front()));
     }
-    motion.discarded = values_before_stationary(motion.channels.front());
-    const std::size_t first = motion.discarded < target ? motion.discarded : target / 2;
-    motion.means.clear();
-    for (const auto& channel : motion.channels) motion.means.push_back(batch_mean(std::span(channel).subspan(first)));
-    motion.exponents = exponents_of(bundle, std::max(first, target / 4));
-    const double step = period / static_cast<double>(std::max<std::size_t>(samples, 1));
-    motion.spectrum = spectrum_of(std::span(motion.coordinate).subspan(first * samples), step);
-    motion.base = base_frequencies(motion.spectrum);
-    if (motion.base.second == 0 && !motion.beside.empty())
-      motion.base =
-          base_frequencies(spectrum_of(std::span(motion.beside).subspan(first * samples), step), motion.base.first);
-    motion.verdict = judge_motion(motion.exponents, std::span(motion.channels.front()).subspan(first), motion.base);
-    if (motion.verdict.kind != MotionKind::undecided || target >= most) return motion;
+    examine(bundle, period, motion);
+    if (motion.verdict.kind == MotionKind::undecided && target < most) continue;
+    if (checkpoint_is_worth_it(comm_of(state))) keeper.keep(now);
+    return motion;
   }
 }
 

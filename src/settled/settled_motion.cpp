@@ -1,5 +1,7 @@
 #include "squeal/settled/settled_motion.hpp"
 
+#include "settled_checkpoint.hpp"
+
 #include "squeal/base/mean.hpp"
 #include "squeal/base/run_control.hpp"
 
@@ -153,7 +155,13 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
   motion.period = cycle.free.period;
   Owned<Vec> state = copy_of(cycle.free.state.get());
   const auto sampler = [&](Vec now) { return integrate_period(map, problem.probes, now, motion); };
-  motion.examined = examine_motion(flow, sampler, state, motion.period, options);
+  const MotionKeeper keeper{[&](const MotionProgress& now) {
+                              restore_settled({map, motion, now});
+                            },
+                            [&](const MotionProgress& now) {
+                              keep_settled({map, motion, now});
+                            }};
+  motion.examined = examine_motion(flow, sampler, keeper, state, motion.period, options);
   name_means(motion, problem.sliding.interface.pairs);
   motion.step_error =
       std::abs(energy_by_half_the_steps(problem, motion, cycle.theta, state).value - motion.fluctuating_energy.value);

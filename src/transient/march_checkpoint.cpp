@@ -1,9 +1,8 @@
 #include "march_checkpoint.hpp"
 
 #include "squeal/base/run_control.hpp"
-#include "squeal/equilibrium/file_order.hpp"
+#include "squeal/transient/step_checkpoint.hpp"
 
-#include <array>
 #include <cmath>
 
 namespace squeal
@@ -14,32 +13,6 @@ namespace
 
 constexpr const char* name_of_file = "transient";
 
-/// The vectors that a step leaves for the next one.
-std::array<std::pair<const char*, Vec>, 5> vectors_of(const MarchProgress& progress)
-{
-  return {{{"u", progress.state.u},
-           {"v", progress.state.v},
-           {"Mv", progress.work.Mv},
-           {"Av", progress.work.Av},
-           {"Ku", progress.work.Ku}}};
-}
-
-/// Visits every list of a history by its name.
-template <class Some, class Visit> void for_each_list(Some& history, Visit visit)
-{
-  visit("time", history.time);
-  visit("energy", history.energy);
-  visit("fluctuating_energy", history.fluctuating_energy);
-  visit("damping_power", history.damping_power);
-  visit("contact_power", history.contact_power);
-  visit("load_power", history.load_power);
-  visit("normal_force", history.normal_force);
-  visit("open", history.open);
-  visit("stick", history.stick);
-  visit("slip", history.slip);
-  for (std::size_t i = 0; i < history.probes.size(); ++i) visit("probe " + std::to_string(i), history.probes[i]);
-}
-
 /// By which the structure is recognised.
 std::vector<double> marks_of(const Structure& structure, const MarchPlan& plan)
 {
@@ -47,17 +20,6 @@ std::vector<double> marks_of(const Structure& structure, const MarchPlan& plan)
   check(MatNorm(structure.K, NORM_FROBENIUS, &stiffness));
   check(MatNorm(structure.M, NORM_FROBENIUS, &mass));
   return {static_cast<double>(plan.steps), plan.step_size, plan.theta, stiffness, mass};
-}
-
-/// Of the reactions, on rank 0.
-void read_memory(const Checkpoint& checkpoint, ContactMemory& memory)
-{
-  memory.since_read = static_cast<int>(checkpoint.number("work unread"));
-  for (std::size_t i = 0; checkpoint.has("memory r " + std::to_string(i)); ++i)
-  {
-    memory.r.push_back(checkpoint.list("memory r " + std::to_string(i)));
-    memory.Wr.push_back(checkpoint.list("memory Wr " + std::to_string(i)));
-  }
 }
 
 /// To the rounding of another number of ranks.
@@ -81,8 +43,7 @@ void MarchCheckpoint::keep(const MarchProgress& progress) const
   if (checkpoints_are_kept())
   {
     Checkpoint checkpoint = made(progress);
-    const FileOrder order(structure_);
-    for (const auto& [name, x] : vectors_of(progress)) checkpoint.set(name, order.gather(x));
+    put_trajectory({"", progress.state, progress.work}, FileOrder(structure_), checkpoint);
     if (rank_of(comm_of(structure_.load)) == 0) squeal::keep(checkpoint, name_of_file);
   }
   checkpoint_made();
@@ -92,16 +53,7 @@ Checkpoint MarchCheckpoint::made(const MarchProgress& progress) const
 {
   Checkpoint checkpoint;
   checkpoint.set("marks", marks_of(structure_, plan_));
-  checkpoint.set("ranks", ranks_of(comm_of(structure_.load)));
-  checkpoint.set("state time", progress.state.time);
-  checkpoint.set("reactions", progress.state.reactions);
-  checkpoint.set("work energy", progress.work.energy);
-  checkpoint.set("work unread", progress.work.memory.since_read);
-  for (std::size_t i = 0; i < progress.work.memory.r.size(); ++i)
-  {
-    checkpoint.set("memory r " + std::to_string(i), progress.work.memory.r[i]);
-    checkpoint.set("memory Wr " + std::to_string(i), progress.work.memory.Wr[i]);
-  }
+  put_ranks(comm_of(structure_.load), checkpoint);
   const MarchSummary& summary = progress.summary;
   checkpoint.set("summary",
                  std::vector<double>{static_cast<double>(summary.steps), static_cast<double>(summary.unconverged),
@@ -109,7 +61,7 @@ Checkpoint MarchCheckpoint::made(const MarchProgress& progress) const
                                      progress.iterations, slides_ ? 1. : 0., summary.fall_of_friction_max});
   checkpoint.set("amplitude time", amplitude_.time);
   checkpoint.set("amplitude logarithm", amplitude_.log_modulus);
-  for_each_list(progress.history, [&](const std::string& name, const auto& list) { checkpoint.set(name, list); });
+  put_history(progress.history, checkpoint);
   return checkpoint;
 }
 
@@ -125,17 +77,7 @@ void MarchCheckpoint::restore(const MarchProgress& progress) const
 
 void MarchCheckpoint::read(const Checkpoint& checkpoint, const MarchProgress& progress) const
 {
-  const FileOrder order(structure_);
-  for (const auto& [name, x] : vectors_of(progress)) order.scatter(checkpoint.list(name), x);
-  progress.state.time = checkpoint.number("state time");
-  progress.work.energy = checkpoint.number("work energy");
-  // Pairs are numbered otherwise on other ranks: contact then starts without a memory.
-  if (static_cast<int>(checkpoint.number("ranks")) == ranks_of(comm_of(structure_.load)))
-  {
-    progress.state.reactions = checkpoint.list("reactions");
-    progress.work.memory = {};
-    if (rank_of(comm_of(structure_.load)) == 0) read_memory(checkpoint, progress.work.memory);
-  }
+  take_trajectory(checkpoint, FileOrder(structure_), {"", progress.state, progress.work});
   const std::vector<double>& summary = checkpoint.list("summary");
   progress.summary.steps = static_cast<long>(summary.at(0));
   progress.summary.unconverged = static_cast<long>(summary.at(1));
@@ -147,12 +89,7 @@ void MarchCheckpoint::read(const Checkpoint& checkpoint, const MarchProgress& pr
   progress.summary.fall_of_friction_max = summary.at(7);
   amplitude_.time = checkpoint.list("amplitude time");
   amplitude_.log_modulus = checkpoint.list("amplitude logarithm");
-  for_each_list(progress.history,
-                [&](const std::string& name, auto& list)
-                {
-                  const std::vector<double>& values = checkpoint.list(name);
-                  list.assign(values.begin(), values.end());
-                });
+  take_history(checkpoint, progress.history);
 }
 
 } // namespace squeal

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 from conftest import INPUTS, ROOT
+from test_basin import two_oscillators
 
 OSCILLATOR = INPUTS / "oscillator" / "scene.toml"
 ENDLESS = ["--set", "transient.periods=1e5"]
@@ -18,10 +19,10 @@ TRANSIENT_AND_CYCLE = ["--set", "transient.periods=100", "--set", "fidelity=full
 OF_THE_CLOCK = {"run", "timings", "processor_seconds", "exit_code", "memory_bytes"}
 
 
-def start(output, *arguments, ranks=1, scene=OSCILLATOR):
+def start(output, *arguments, ranks=1, scene=OSCILLATOR, stdout=subprocess.PIPE):
     launcher = [os.environ.get("MPIEXEC", "mpirun"), "-n", ranks] if ranks > 1 else []
     command = [*launcher, os.environ["SQUEAL"], scene, "--output", output, *arguments]
-    return subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    return subprocess.Popen([str(word) for word in command], stdout=stdout, stderr=subprocess.PIPE, text=True,
                             env=os.environ)
 
 
@@ -127,6 +128,38 @@ def test_a_killed_run_goes_on_to_the_straight_runs_numbers(converged, tmp_path, 
     printed, errors = again.communicate(timeout=100)
     assert again.returncode == 0, errors
     assert "goes on from the checkpoint" in printed or run.returncode == 0
+    assert_same_results(straight, output)
+
+
+PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "damping.beta=6e-7"]
+STAGES = {  # scene and arguments, what the log of the run or the checkpoints show when it is killed, what the restart says
+    "modes": ([OSCILLATOR, *TRANSIENT_AND_CYCLE], "transient", "of the checkpoint"),
+    "finer steps": ([*PIN, "--set", "accuracy=1e-4"], "cycle, finer steps", "of the checkpoint"),
+    "settled": (["two oscillators"], "settled", "goes on from the checkpoint after"),
+    "starts": ([OSCILLATOR, "--set", "transient.enabled=false", "--set", "cycle.starts=6", "--set",
+                "cycle.steps_per_period=100"], "attractors", "goes on from the checkpoint after"),
+}
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_each_stage_goes_on(tmp_path, stage):
+    """Killed where the stage is under way; nothing that was kept is computed again, and every bit is that of one run."""
+    (scene, *arguments), sign, word = STAGES[stage]
+    if stage == "settled":
+        scene, *arguments = two_oscillators(tmp_path)
+    straight, output, log = tmp_path / "straight", tmp_path / "killed", tmp_path / "log"
+    whole = start(straight, *arguments, scene=scene)
+    assert whole.communicate(timeout=200)[0] and whole.returncode == 0
+    with open(log, "w") as printed:
+        run = start(output, *arguments, "--checkpoint", "0.05", scene=scene, stdout=printed)
+        wait_for(lambda: (partial(output) / "checkpoint" / sign).exists() or sign in log.read_text(), 60)
+        time.sleep(0.2)
+        run.kill()
+        run.wait()
+    assert run.returncode == -signal.SIGKILL, "it ended before it was killed"
+    again = start(output, *arguments, "--restart", scene=scene)
+    printed, errors = again.communicate(timeout=200)
+    assert again.returncode == 0 and word in printed, errors + printed
     assert_same_results(straight, output)
 
 

@@ -8,6 +8,9 @@
 namespace squeal
 {
 
+/// Begins the log of a run: it reads the periods of the run that is gone on with first. After open_checkpoints.
+void begin_period_log();
+
 /// Sets end, rate and what the map carries on from the log, if it holds this period next. Otherwise returns false. A
 /// start or a length that differs from the log's by more than the rounding of other ranks ends the log here.
 /// Collective.

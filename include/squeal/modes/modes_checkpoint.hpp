@@ -1,0 +1,15 @@
+#pragma once
+/// The modes of a run as a checkpoint: a run that goes on need not find them again, and goes on with the same ones.
+#include "squeal/modes/modes.hpp"
+
+namespace squeal
+{
+
+/// Collective.
+void keep_modes(const Modes& modes, const Structure& structure);
+
+/// Those of the run that is gone on with; nothing where there are none, or where it had another number of ranks.
+/// Collective.
+std::optional<Modes> kept_modes(const Structure& structure);
+
+} // namespace squeal
