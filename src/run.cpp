@@ -110,15 +110,15 @@ std::string no_mode_to_follow(const Report& report)
   return {};
 }
 
-bool starts_from_file(const TransientSettings& settings)
+bool starts_without_a_mode(const TransientSettings& settings)
 {
-  return settings.start.kind == StartKind::file;
+  return settings.start.kind == StartKind::file || settings.start.kind == StartKind::rest;
 }
 
-/// From a state file for a given number of steps, the transient needs no mode.
+/// From a state file or from rest for a given number of steps, the transient needs no mode.
 bool follows_a_mode(const TransientSettings& settings)
 {
-  return settings.enabled && (!starts_from_file(settings) || settings.steps == 0);
+  return settings.enabled && (!starts_without_a_mode(settings) || settings.steps == 0);
 }
 
 Modes run_modes(Chain& chain)
@@ -159,7 +159,7 @@ Trajectory run_transient(const Chain& chain)
   const std::string reason = no_mode_to_follow(chain.report);
   if (!settings.enabled) return not_run<Trajectory>(OutcomeKind::off, "the scene has no [transient], or turns it off");
   if (chain.report.equilibrium.outcome.kind != OutcomeKind::converged ||
-      (!reason.empty() && !starts_from_file(settings)))
+      (!reason.empty() && !starts_without_a_mode(settings)))
     return not_run<Trajectory>(OutcomeKind::skipped, reason);
   const ComplexMode* followed = reason.empty() ? &chain.report.modes.modes.front() : nullptr;
   return integrate(chain.sliding(), followed, settings, chain.options.step,

@@ -23,6 +23,7 @@ void write_group(Hdf5File& file, const std::string& group, const History& histor
   write("damping_power", history.damping_power, "W");
   write("contact_power", history.contact_power, "W");
   write("load_power", history.load_power, "W");
+  write("drive_power", history.drive_power, "W");
   write("normal_force", history.normal_force, "N");
   write("open", history.open, "pairs");
   write("stick", history.stick, "pairs");

@@ -323,6 +323,24 @@ private:
   void read(const toml::node& node, std::vector<double>& target) const { read_numbers(node, target); }
   void read(const toml::node& node, std::vector<int>& target) const { read_numbers(node, target); }
 
+  /// Rows of a time and a factor, the times rising.
+  void read(const toml::node& node, TimeFactor& target) const
+  {
+    const std::string expected = "rows [time in s, factor] such as [[0, 0], [0.1, 1]]";
+    const toml::array* rows = node.as_array();
+    if (!rows || rows->empty()) fail(node, expected);
+    target = {};
+    for (const toml::node& row : *rows)
+    {
+      const std::vector<double> values = numbers(row, expected);
+      if (values.size() != 2) fail(row, expected);
+      if (!target.time.empty() && !(values[0] > target.time.back())) fail(row, "a time after that of the row before");
+      if (key_->rule == Rule::not_negative && values[1] < 0) fail(row, "a factor of zero or above");
+      target.time.push_back(values[0]);
+      target.value.push_back(values[1]);
+    }
+  }
+
   void read(const toml::node& node, std::array<double, 6>& target) const
   {
     const auto values = numbers(node, "a list of three or six numbers");

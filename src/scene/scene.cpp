@@ -2,6 +2,8 @@
 #include "squeal/base/error.hpp"
 #include "toml_values.hpp"
 
+#include <algorithm>
+
 namespace squeal
 {
 
@@ -24,6 +26,23 @@ toml::table parse_file(const std::filesystem::path& file)
 }
 
 } // namespace
+
+double factor_at(const TimeFactor& factor, double time)
+{
+  const auto& [times, values] = factor;
+  if (times.empty()) return 1;
+  const auto next = std::upper_bound(times.begin(), times.end(), time);
+  if (next == times.begin()) return values.front();
+  if (next == times.end()) return values.back();
+  const auto i = static_cast<std::size_t>(next - times.begin());
+  const double part = (time - times[i - 1]) / (times[i] - times[i - 1]);
+  return (1 - part) * values[i - 1] + part * values[i];
+}
+
+bool are_given(const Ramps& ramps)
+{
+  return !ramps.load.time.empty() || !ramps.speed.time.empty() || !ramps.friction.time.empty();
+}
 
 std::string Places::at(const void* member) const
 {

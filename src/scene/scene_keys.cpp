@@ -224,7 +224,7 @@ SceneKeys keys_of(TransientSettings& t)
 {
   return {
       {"enabled", &t.enabled, optional, Rule::any, "switch", "run this stage"},
-      {"start", &t.start, optional, Rule::any, "word", "mode, estimate, or a state file"},
+      {"start", &t.start, optional, Rule::any, "word", "mode, estimate, rest, or a state file"},
       {"amplitude", &t.amplitude, optional, Rule::not_negative, "m",
        "largest displacement at start = \"mode\"; 0: a tenth of first lift-off"},
       {"periods", &t.periods, optional, Rule::positive, "-", "length, in periods of the followed mode"},
@@ -232,6 +232,11 @@ SceneKeys keys_of(TransientSettings& t)
       {"steps", &t.steps, optional, Rule::not_negative, "-", "with step_size, instead of periods"},
       {"step_size", &t.step_size, optional, Rule::not_negative, "s", "with steps, instead of periods"},
       {"theta", &t.theta, optional, Rule::fraction, "-", "of the theta-method; 0.5 conserves energy"},
+      {"load_factor", &t.ramps.load, optional, Rule::any, "table",
+       "on all forces and pressures in time: [[time in s, factor], ...], straight lines between"},
+      {"speed_factor", &t.ramps.speed, optional, Rule::any, "table", "likewise on the drive velocities"},
+      {"friction_factor", &t.ramps.friction, optional, Rule::not_negative, "table",
+       "likewise on the friction coefficients"},
       {"save_state", &t.save_state, optional, Rule::any, "path", "state file written at the end"},
   };
 }

@@ -48,6 +48,7 @@ std::string print(const std::filesystem::path& path)
 }
 
 std::string print(const Vec3& vector);
+std::string print(const std::vector<double>& list);
 
 template <class List> std::string print_list(const List& list)
 {
@@ -119,6 +120,13 @@ std::string print(const std::optional<Orthotropy>& material)
   return "{ young = " + print(material->young) + ", poisson = " + print(material->poisson) +
          ", shear = " + print(material->shear) + ", axis_1 = " + print(material->axis_1) +
          ", axis_2 = " + print(material->axis_2) + " }";
+}
+
+std::string print(const TimeFactor& factor)
+{
+  std::vector<std::vector<double>> rows;
+  for (std::size_t i = 0; i < factor.time.size(); ++i) rows.push_back({factor.time[i], factor.value[i]});
+  return rows.empty() ? "" : print_list(rows);
 }
 
 std::string print(const DampingTarget& target)

@@ -37,6 +37,7 @@ void append(const History& from, History& to)
   join(from.damping_power, to.damping_power);
   join(from.contact_power, to.contact_power);
   join(from.load_power, to.load_power);
+  join(from.drive_power, to.drive_power);
   join(from.normal_force, to.normal_force);
   join(from.open, to.open);
   join(from.stick, to.stick);

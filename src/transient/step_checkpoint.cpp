@@ -27,6 +27,7 @@ template <class Some, class Visit> void for_each_list(Some& history, Visit visit
   visit("damping_power", history.damping_power);
   visit("contact_power", history.contact_power);
   visit("load_power", history.load_power);
+  visit("drive_power", history.drive_power);
   visit("normal_force", history.normal_force);
   visit("open", history.open);
   visit("stick", history.stick);

@@ -19,7 +19,7 @@ namespace
 /// velocities. Collective; both are on rank 0.
 std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t trajectory, std::vector<double> b)
 {
-  const auto& [step, interface, works, states, reports] = batch;
+  const auto& [step, interface, factors, works, states, reports] = batch;
   const State& state = states[trajectory];
   const StepWork& work = works[trajectory];
   check(VecWAXPY(work.v_theta, step.h * (1 - step.theta), state.v, state.u)); // ut, for a moment
@@ -41,7 +41,8 @@ std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t tr
       velocity.normal(i) += gap / step.h;
     else if (gap > rounding)
       velocity.normal(i) = std::numeric_limits<double>::infinity(); // takes no part: r = 0
-    for (std::size_t k = 0; k < drive.of(i).size(); ++k) velocity.tangential(i)[k] -= drive.of(i)[k];
+    for (std::size_t k = 0; k < drive.of(i).size(); ++k)
+      velocity.tangential(i)[k] -= factors.drive_end * drive.of(i)[k];
   }
   return b;
 }
@@ -55,9 +56,12 @@ struct StepProblem
 
 std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector<double>& Bv_free)
 {
-  const auto& [step, interface, works, states, reports] = batch;
+  const auto& [step, interface, factors, works, states, reports] = batch;
   const double weight = step.opposed == Opposed::theta ? (1 - step.theta) / step.theta : 0;
   const auto size = static_cast<std::ptrdiff_t>(Bv_free.size() / states.size());
+  const FrictionLaw law_before = scaled(interface.friction, factors.friction_before);
+  std::vector<double> drive = interface.drive;
+  for (double& velocity : drive) velocity *= factors.drive_start;
   std::vector<StepProblem> problems(states.size());
   for (std::size_t k = 0; k < states.size(); ++k)
   {
@@ -65,8 +69,8 @@ std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector
     problems[k].free = free_contact_velocity(batch, k, {first, first + size});
     const std::vector<double> velocity = relative(interface, states[k].v);
     problems[k].past =
-        past_sliding(PairView(velocity, interface.directions), TangentView(interface.drive, interface.directions),
-                     contact_status(interface, states[k].reactions, states[k].v), weight);
+        past_sliding(PairView(velocity, interface.directions), TangentView<const double>(drive, interface.directions),
+                     status_with(interface, law_before, factors.drive_start, states[k].reactions, states[k].v), weight);
   }
   return problems;
 }
@@ -92,13 +96,13 @@ double fall_at_pairs(const ContactOperator& W, const FrictionLaw& law, const std
 std::vector<std::size_t> solve_once(const StepBatch& batch, std::vector<StepProblem>& problems,
                                     const std::vector<std::size_t>& trajectories)
 {
-  const auto& [step, interface, works, states, reports] = batch;
+  const auto& [step, interface, factors, works, states, reports] = batch;
   std::vector<std::vector<double>> b;
   for (const std::size_t k : trajectories) b.push_back(sum(problems[k].free, problems[k].past));
   std::vector<ContactProblem> unsolved;
   for (std::size_t j = 0; j < trajectories.size(); ++j)
     unsolved.push_back({b[j], states[trajectories[j]].reactions, works[trajectories[j]].memory});
-  const FrictionLaw law = law_of_step(step, interface.friction);
+  const FrictionLaw law = law_of_step(step, scaled(interface.friction, factors.friction));
   const std::vector<ContactResult> results = solve_contacts(step.W, law, step.contact, unsolved);
   std::vector<std::size_t> again;
   for (std::size_t j = 0; j < trajectories.size(); ++j)
@@ -188,6 +192,28 @@ std::string solve_all(const StepBatch& batch, std::vector<StepProblem>& problems
 }
 
 } // namespace
+
+FrictionLaw scaled(FrictionLaw law, double factor)
+{
+  law.coefficient *= factor;
+  law.static_coefficient *= factor;
+  return law;
+}
+
+std::vector<ContactStatus> status_with(const Interface& interface, const FrictionLaw& law, double drive,
+                                       const std::vector<double>& reactions, Vec v)
+{
+  std::vector<double> velocity;
+  if (law.decay_speed > 0)
+  {
+    velocity = relative(interface, v);
+    const PairView w(velocity, interface.directions);
+    const TangentView v_d(interface.drive, interface.directions);
+    for (std::size_t i = 0; i < w.pairs(); ++i)
+      for (std::size_t k = 0; k < v_d.of(i).size(); ++k) w.tangential(i)[k] -= drive * v_d.of(i)[k];
+  }
+  return contact_status(PairView(reactions, interface.directions), PairView(velocity, interface.directions), law);
+}
 
 void find_reactions(const StepBatch& batch, const std::vector<double>& Bv_free)
 {

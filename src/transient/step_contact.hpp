@@ -10,10 +10,18 @@ struct StepBatch
 {
   const ThetaStep& step;
   const Interface& interface;
+  const StepFactors& factors;
   std::span<StepWork> works;
   std::span<State> states;
   std::span<StepReport> reports;
 };
+
+/// The law with its coefficients times a factor.
+FrictionLaw scaled(FrictionLaw law, double factor);
+
+/// Statuses of a step's end, from its reactions, its velocities v, its law and its factor on the drive. Collective.
+std::vector<ContactStatus> status_with(const Interface& interface, const FrictionLaw& law, double drive,
+                                       const std::vector<double>& reactions, Vec v);
 
 /// Reactions at the end of the step, into the states of every rank, and what the reports say of contact. `Bv_free`: B v
 /// of the steps without reactions, one trajectory after the other, on rank 0. Overwrites v_theta. Collective.

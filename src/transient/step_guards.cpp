@@ -71,14 +71,14 @@ void scale_by_roots(const std::vector<double>& reactions, int directions, std::v
 
 /// A step size, below h, with one solution a step; 0 if there is none, as where a pair's nodes have no mass.
 double step_with_one_solution(const SlidingEquilibrium& sliding, double theta, double h, double fall,
-                              const StepOptions& options)
+                              const StepOptions& options, double increase)
 {
   constexpr int attempts = 8;
   for (int attempt = 0; attempt < attempts; ++attempt)
   {
     h *= 0.9 / fall; // W grows as h at most while h is large
     const ThetaStep step = make_theta_step(sliding.structure, sliding.interface, h, theta, options);
-    const double now = fall_of_friction(step, sliding.interface, sliding.equilibrium.reactions);
+    const double now = increase * fall_of_friction(step, sliding.interface, sliding.equilibrium.reactions);
     if (now < 1) return h;
     if (now >= fall) return 0; // W grows as h falls
     fall = std::max(now, 1.5);
@@ -170,16 +170,16 @@ double fall_of_friction(const ThetaStep& step, const Interface& interface, const
 }
 
 std::string friction_refusal(const SlidingEquilibrium& sliding, const ComplexMode* mode, double theta, double h,
-                             const StepOptions& options)
+                             const StepOptions& options, double increase)
 {
   if (!options.refuse || steepest_fall(sliding.interface.friction) == 0) return {};
   const ThetaStep step = make_theta_step(sliding.structure, sliding.interface, h, theta, options);
-  const double fall = fall_of_friction(step, sliding.interface, sliding.equilibrium.reactions);
+  const double fall = increase * fall_of_friction(step, sliding.interface, sliding.equilibrium.reactions);
   if (fall < 1) return {};
   const std::string reason = format("friction falls so steeply with the speed that a step of %.4g s may have several "
                                     "solutions, |mu'| r_n W_t = %.4g: ",
                                     h, fall);
-  const double enough = step_with_one_solution(sliding, theta, h, fall, options);
+  const double enough = step_with_one_solution(sliding, theta, h, fall, options, increase);
   if (enough == 0)
     return reason + "no shorter step would do, since contact nodes have too little mass; raise friction.decay_speed";
   if (!mode) return reason + format("a step of %.4g s would do", enough);

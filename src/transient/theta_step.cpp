@@ -44,10 +44,21 @@ Factors factors_of_works(const ThetaStep& step, const Structure& structure, cons
            {work.v_theta, change}}};
 }
 
-/// Works of each step from the products at both ends; all reductions in one message.
-void account(const ThetaStep& step, const Structure& structure, std::span<const State> states,
-             std::span<StepWork> works, std::span<StepReport> reports)
+/// h v_d . r_t over the pairs, v_d its mean over the step by theta.
+double drive_work(const StepBatch& batch, const State& state)
 {
+  const auto& [step, interface, factors, works, states, reports] = batch;
+  const PairView reactions(state.reactions, interface.directions);
+  const TangentView drive(interface.drive, interface.directions);
+  double sum = 0;
+  for (std::size_t i = 0; i < reactions.pairs(); ++i) sum += dot(drive.of(i), reactions.tangential(i));
+  return step.h * (step.theta * factors.drive_end + (1 - step.theta) * factors.drive_start) * sum;
+}
+
+/// Works of each step from the products at both ends; all reductions in one message.
+void account(const StepBatch& batch, const Structure& structure)
+{
+  const auto& [step, interface, step_factors, works, states, reports] = batch;
   std::vector<Factors> factors;
   std::vector<std::array<double, 7>> products(states.size());
   for (std::size_t k = 0; k < states.size(); ++k)
@@ -62,18 +73,19 @@ void account(const ThetaStep& step, const Structure& structure, std::span<const 
     report.energy = (kinetic + potential) / 2;
     report.damping_work = damping / step.theta;
     report.contact_work = contact;
-    report.load_work = step.h * load;
+    report.load_work = step.h * step_factors.load * load;
+    report.drive_work = drive_work(batch, states[k]);
     report.energy_defect = report.energy - works[k].energy - (0.5 - step.theta) * (dMd + step.h * dKd) +
                            report.damping_work - contact - report.load_work;
   }
 }
 
-/// The start of a step: A v_free = [M v - (1-theta) A v]/theta - h K u + h F, into A v_next.
-void load_free_step(const ThetaStep& step, const Structure& structure, StepWork& work)
+/// The start of a step: A v_free = [M v - (1-theta) A v]/theta - h K u + h F, into A v_next. `factor`: on F.
+void load_free_step(const ThetaStep& step, const Structure& structure, double factor, StepWork& work)
 {
   check(VecCopy(work.Mv, work.Av_next));
   check(VecAXPBYPCZ(work.Av_next, (step.theta - 1) / step.theta, -step.h, 1 / step.theta, work.Av, work.Ku));
-  check(VecAXPY(work.Av_next, step.h, structure.load));
+  check(VecAXPY(work.Av_next, step.h * factor, structure.load));
 }
 
 /// The rates of h, from a step that is complete: `account` left M dv and K du in Mv and Ku.
@@ -181,23 +193,41 @@ StepWork begin_steps(const ThetaStep& step, const Structure& structure, const In
   return work;
 }
 
+StepFactors step_factors(const Ramps& ramps, const ThetaStep& step, double time)
+{
+  const double end = time + step.h, inside = time + step.theta * step.h;
+  StepFactors factors;
+  factors.load = step.theta * factor_at(ramps.load, end) + (1 - step.theta) * factor_at(ramps.load, time);
+  factors.drive_start = factor_at(ramps.speed, time);
+  factors.drive_end = factor_at(ramps.speed, end);
+  factors.friction_before = factor_at(ramps.friction, inside - step.h);
+  factors.friction = factor_at(ramps.friction, inside);
+  return factors;
+}
+
 std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
                                 std::span<StepWork> works, std::span<State> states)
+{
+  return advance(step, structure, interface, {}, works, states);
+}
+
+std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                                const StepFactors& factors, std::span<StepWork> works, std::span<State> states)
 {
   const double h = step.h, theta = step.theta;
   std::vector<StepReport> reports(states.size());
   std::vector<Vec> right, next;
   for (StepWork& work : works)
   {
-    load_free_step(step, structure, work);
+    load_free_step(step, structure, factors.load, work);
     right.push_back(work.Av_next);
     next.push_back(work.v_next);
   }
   const std::vector<double> Bv_free = step.factor.forward(right);
   std::vector<double> lambda;
+  const StepBatch batch{step, interface, factors, works, states, reports};
   if (interface.pairs > 0)
   {
-    const StepBatch batch{step, interface, works, states, reports};
     find_reactions(batch, Bv_free);
     lambda = apply_reactions(batch);
   }
@@ -213,11 +243,12 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
     Ku.push_back(work.Ku_next);
   }
   multiply_mass_and_stiffness(step, structure, {next, u}, {Mv, Ku});
-  account(step, structure, states, works, reports);
+  account(batch, structure);
+  const FrictionLaw law = scaled(interface.friction, factors.friction);
   for (std::size_t k = 0; k < states.size(); ++k)
   {
     StepWork& work = works[k];
-    for (const ContactStatus status : contact_status(interface, states[k].reactions, work.v_next))
+    for (const ContactStatus status : status_with(interface, law, factors.drive_end, states[k].reactions, work.v_next))
       ++(status == ContactStatus::open    ? reports[k].open
          : status == ContactStatus::stick ? reports[k].stick
                                           : reports[k].slip);

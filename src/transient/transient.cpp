@@ -58,6 +58,7 @@ void record(const StepReport& report, double h, const State& state, int directio
   history.damping_power.push_back(report.damping_work / h);
   history.contact_power.push_back(report.contact_work / h);
   history.load_power.push_back(report.load_work / h);
+  history.drive_power.push_back(report.drive_work / h);
   const PairView reactions(state.reactions, directions);
   double normal_force = 0;
   for (std::size_t pair = 0; pair < reactions.pairs(); ++pair) normal_force += reactions.normal(pair);
@@ -85,6 +86,16 @@ bool slides_as_at_equilibrium(const Interface& interface, const Equilibrium& equ
     if (dot(TangentView(drive, interface.directions).of(i), friction) < 0) return false;
   }
   return true;
+}
+
+/// The largest factor on mu r_n at the times of the ramps.
+double largest_friction(const Ramps& ramps)
+{
+  double largest = factor_at(ramps.load, 0) * factor_at(ramps.friction, 0);
+  for (const TimeFactor* factor : {&ramps.load, &ramps.friction})
+    for (const double time : factor->time)
+      largest = std::max(largest, factor_at(ramps.load, time) * factor_at(ramps.friction, time));
+  return largest;
 }
 
 bool counts_steps(const TransientSettings& settings)
@@ -147,7 +158,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
                    const Recorder& recorder)
 {
   const auto& [structure, interface, equilibrium] = sliding;
-  const auto& [probes, history, monitor, records, checkpoint] = recorder;
+  const auto& [probes, history, monitor, records, checkpoint, ramps] = recorder;
   MarchSummary summary;
   Fluctuation fluctuation = about(structure, equilibrium);
   Owned<Vec> probe_values;
@@ -166,7 +177,9 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
   {
     const auto next = static_cast<std::size_t>(summary.steps);
     work.record = next < records.size() ? &records[next] : nullptr;
-    const StepReport report = advance(step, structure, interface, work, state);
+    const StepFactors factors = ramps ? step_factors(*ramps, step, state.time) : StepFactors{};
+    const StepReport report =
+        advance(step, structure, interface, factors, std::span(&work, 1), std::span(&state, 1))[0];
     ++summary.steps;
     if (!report.contact_converged && summary.unconverged++ == 0) summary.first_unconverged = state.time;
     summary.contact_residual_max = std::max(summary.contact_residual_max, report.contact_residual);
@@ -203,6 +216,8 @@ State transient_start(const SlidingEquilibrium& sliding, const UnstableModes& un
                       const TransientSettings& settings)
 {
   if (settings.start.kind == StartKind::file) return read_state(settings.start.file, sliding.structure);
+  if (settings.start.kind == StartKind::rest)
+    return {zeros_like(sliding.structure.load), zeros_like(sliding.structure.load), 0, {}};
   const ComplexMode& followed = unstable.modes.front();
   const Estimate& estimate = unstable.estimates.front();
   if (settings.start.kind == StartKind::mode)
@@ -223,7 +238,8 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   const long steps = plan(trajectory, mode, settings);
   trajectory.outcome.reason = step_refusal(structure, mode, trajectory.theta, trajectory.step_size, options);
   if (trajectory.outcome.reason.empty())
-    trajectory.outcome.reason = friction_refusal(sliding, mode, trajectory.theta, trajectory.step_size, options);
+    trajectory.outcome.reason = friction_refusal(sliding, mode, trajectory.theta, trajectory.step_size, options,
+                                                 largest_friction(settings.ramps));
   if (!trajectory.outcome.reason.empty()) trajectory.outcome.kind = OutcomeKind::refused;
   trajectory.end = std::move(start);
   if (trajectory.outcome.kind == OutcomeKind::refused) return trajectory;
@@ -231,8 +247,9 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   const ThetaStep step = make_theta_step(structure, interface, trajectory.step_size, settings.theta, options);
   const std::vector<double> drive = drive_directions(interface);
   ModeAmplitude amplitude;
-  if (mode) amplitude = follow(structure, equilibrium, *mode);
-  bool slides = mode != nullptr; // so far
+  const bool follows = mode && !are_given(settings.ramps); // a mode belongs to constant load, speed and friction
+  if (follows) amplitude = follow(structure, equilibrium, *mode);
+  bool slides = follows; // so far
   Progress progress(comm_of(structure.load), "transient", static_cast<double>(steps));
   const Monitor watch = [&](const State& state, const StepReport& report, const StepWork& work)
   {
@@ -243,8 +260,8 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   };
   const MarchCheckpoint checkpoint(structure, {steps, step.h, step.theta}, amplitude, slides);
   const double wall = MPI_Wtime();
-  const MarchSummary summary =
-      march(step, sliding, steps, trajectory.end, {probes, trajectory.history, watch, {}, &checkpoint});
+  const MarchSummary summary = march(step, sliding, steps, trajectory.end,
+                                     {probes, trajectory.history, watch, {}, &checkpoint, &settings.ramps});
   trajectory.seconds_per_step = (MPI_Wtime() - wall) / static_cast<double>(std::max(summary.steps, 1L));
   trajectory.factor_seconds = step.factor_seconds;
   trajectory.condensed_seconds = step.condensed_seconds;
@@ -255,7 +272,7 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   if (mode)
   {
     trajectory.periods = static_cast<double>(summary.steps) * step.h * std::abs(mode->lambda.imag()) / two_pi;
-    trajectory.growth_rate_fit = growth_rate(amplitude, two_pi / std::abs(trajectory.predicted.imag()));
+    if (follows) trajectory.growth_rate_fit = growth_rate(amplitude, two_pi / std::abs(trajectory.predicted.imag()));
   }
   conclude(trajectory, summary, steps);
   if (!settings.save_state.empty()) write_state(trajectory.end, structure, settings.save_state);

@@ -42,10 +42,11 @@ enum class StartKind
 {
   mode,     // the unstable mode at a given amplitude
   estimate, // the unstable modes at their estimated amplitudes
+  rest,     // no displacement and no velocity
   file,     // a state file
 };
 
-inline constexpr std::array start_kind_words = {"mode", "estimate", "file"};
+inline constexpr std::array start_kind_words = {"mode", "estimate", "rest", "file"};
 
 inline Words words_of(StartKind)
 {
@@ -96,6 +97,27 @@ struct EstimateSettings
   bool enabled = true;
 };
 
+/// A factor that depends on time: straight lines between the given values, constant before the first and after the
+/// last. Without values it is 1.
+struct TimeFactor
+{
+  std::vector<double> time;  // [s] rising
+  std::vector<double> value; // [-] one a time
+};
+
+double factor_at(const TimeFactor& factor, double time);
+
+/// Factors on what acts on the structure, over the time of a transient.
+struct Ramps
+{
+  TimeFactor load;     // on all forces and pressures
+  TimeFactor speed;    // on all drive velocities
+  TimeFactor friction; // on the coefficients of friction
+};
+
+/// Whether any of them is given.
+bool are_given(const Ramps& ramps);
+
 struct TransientSettings
 {
   bool enabled = false;
@@ -106,6 +128,7 @@ struct TransientSettings
   long steps = 0;                   // [-] number of steps; if > 0, with step_size instead of the two above
   double step_size = 0;             // [s]
   double theta = 0.5;               // [-] of the theta method
+  Ramps ramps;                      // of load, speed and friction
   std::filesystem::path save_state; // state file written at the end; none if empty
 };
 

@@ -9,7 +9,8 @@
 ///   of the mesh. With C = beta K that is h > beta/(1 - 2 theta), or h > 2/((1 - 2 theta) |lambda|) where the mode is
 ///   overdamped, lambda its faster root.
 /// - friction falls with the speed so steeply that a step may have several solutions. The largest eigenvalue of |mu'|
-///   diag(r_n0) W_tt, at rest, is not below 1. W holds h, so that enough steps bring it below.
+///   diag(r_n0) W_tt, at rest, is not below 1. W holds h, so that enough steps bring it below. Ramps raise mu and r_n0 by
+///   the largest product of their factors.
 /// All refusals are lifted by StepOptions::refuse.
 #include "squeal/modes/modes.hpp"
 #include "squeal/transient/theta_step.hpp"
@@ -34,8 +35,8 @@ std::string step_refusal(const Structure& structure, const ComplexMode* mode, do
 double fall_of_friction(const ThetaStep& step, const Interface& interface, const std::vector<double>& reactions);
 
 /// Why a run is refused whose step may have several solutions, with the steps that have one; empty if it is not.
-/// Factors A where mu falls. Collective.
+/// Factors A where mu falls. `increase`: largest factor in time on mu r_n. Collective.
 std::string friction_refusal(const SlidingEquilibrium& sliding, const ComplexMode* mode, double theta, double h,
-                             const StepOptions& options);
+                             const StepOptions& options, double increase);
 
 } // namespace squeal

@@ -66,6 +66,18 @@ struct StepWork
   StepRecord* record = nullptr;         // of the next step, borrowed; null: none is wanted
 };
 
+/// Factors in one step on the scene's load, drive velocities and friction coefficients.
+struct StepFactors
+{
+  double load = 1;                       // mean over the step, by theta
+  double drive_start = 1, drive_end = 1; // at the ends of the step
+  double friction_before = 1;            // in the step before, by which its pairs stuck
+  double friction = 1;                   // in this step
+};
+
+/// The factors of a step that starts at `time` [s] (src/README.md, section 4.15).
+StepFactors step_factors(const Ramps& ramps, const ThetaStep& step, double time);
+
 /// Must be called again after the state was changed by anything but `advance`.
 StepWork begin_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state);
 
@@ -78,6 +90,7 @@ struct StepReport
   double damping_work = 0;           // [J] h v_theta' C v_theta, >= 0
   double contact_work = 0;           // [J] v_theta' B'(impulses)
   double load_work = 0;              // [J] h v_theta' F
+  double drive_work = 0;             // [J] h v_d . r_t, what the rotors' drive gives; less contact_work it is heat
   double energy_defect = 0;          // [J] of the energy identity
   int open = 0, stick = 0, slip = 0; // pairs
   int contact_iterations = 0;
@@ -89,6 +102,10 @@ struct StepReport
 /// One step in place of several trajectories: each reading of the factor and of W serves them all.
 std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
                                 std::span<StepWork> works, std::span<State> states);
+
+/// The same with factors on load, drive and friction.
+std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                                const StepFactors& factors, std::span<StepWork> works, std::span<State> states);
 
 /// Of one.
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,

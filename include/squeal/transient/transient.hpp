@@ -18,6 +18,7 @@ struct History
   std::vector<double> time;                                     // [s]
   std::vector<double> energy, fluctuating_energy;               // [J]; fluctuating: with u - u0
   std::vector<double> damping_power, contact_power, load_power; // [W]
+  std::vector<double> drive_power;                              // [W] v_d . r_t; less contact_power it is heat
   std::vector<double> normal_force;                             // [N] sum of r_n
   std::vector<int> open, stick, slip;
   std::vector<std::vector<double>> probes; // [probe][step] [m]
@@ -47,6 +48,7 @@ struct Recorder
   Monitor monitor;                             // may be empty
   std::span<StepRecord> records{};             // of each step, for its tangent; may be empty
   const MarchCheckpoint* checkpoint = nullptr; // null: none is kept
+  const Ramps* ramps = nullptr;                // null: load, drive and friction are the scene's own
 };
 
 /// Takes `steps` steps from `state`, which becomes the end, and records them. Collective.
