@@ -14,6 +14,7 @@ enum class Stage
   modes,
   estimate,
   transient,
+  coarse, // the chain on the coarse mesh that the cycle starts from
   cycle,
   settled,
   attractors,
@@ -22,8 +23,8 @@ enum class Stage
   sweep,
 };
 
-inline constexpr std::array stage_names = {"model",   "equilibrium", "modes",  "estimate",    "transient", "cycle",
-                                           "settled", "attractors",  "branch", "sensitivity", "sweep"};
+inline constexpr std::array stage_names = {"model", "equilibrium", "modes",      "estimate", "transient",   "coarse",
+                                           "cycle", "settled",     "attractors", "branch",   "sensitivity", "sweep"};
 
 inline Words words_of(Stage)
 {
