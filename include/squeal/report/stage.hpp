@@ -21,10 +21,12 @@ enum class Stage
   branch,
   sensitivity,
   sweep,
+  robustness,
 };
 
-inline constexpr std::array stage_names = {"model", "equilibrium", "modes",      "estimate", "transient",   "coarse",
-                                           "cycle", "settled",     "attractors", "branch",   "sensitivity", "sweep"};
+inline constexpr std::array stage_names = {"model",       "equilibrium", "modes",     "estimate",   "transient",
+                                           "coarse",      "cycle",       "settled",   "attractors", "branch",
+                                           "sensitivity", "sweep",       "robustness"};
 
 inline Words words_of(Stage)
 {
