@@ -337,7 +337,7 @@ Robustness run_robustness(const Chain& chain)
     std::vector<SceneNumber> numbers;
     for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.uncertain[i].key, values[i]});
     Model model = rebuild_model(chain.model, scene_with(scene, numbers), PETSC_COMM_SELF);
-    return BranchModel{std::move(model.structure), std::move(model.interface)};
+    return BrakeModel{std::move(model.structure), std::move(model.interface)};
   };
   return find_robustness({*scene.robustness, scene.uncertain, model_at, scene.friction, scene.modes,
                           chain.options.modes, chain.options.equilibrium, chain.options.robustness},

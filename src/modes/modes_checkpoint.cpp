@@ -103,10 +103,10 @@ void keep_modes(const Modes& modes, const Structure& structure)
                                 static_cast<double>(modes.method), static_cast<double>(modes.shapes), modes.band,
                                 static_cast<double>(modes.unstable_count), static_cast<double>(modes.routes_disagree),
                                 static_cast<double>(modes.beyond_inertia), modes.count.frequency,
-                                static_cast<double>(modes.count.expected), static_cast<double>(modes.count.found)});
+                                static_cast<double>(modes.count.expected), static_cast<double>(modes.count.found),
+                                static_cast<double>(modes.count.certified_by)});
   checkpoint.set("beyond band", modes.beyond_band);
   checkpoint.set("reason", list_of(modes.outcome.reason));
-  checkpoint.set("certified by", list_of(modes.count.certified_by));
   checkpoint.set("count check", list_of(modes.count_check));
   if (rank_of(comm) == 0) keep(checkpoint, name_of_file);
 }
@@ -130,7 +130,7 @@ std::optional<Modes> kept_modes(const Structure& structure)
   modes.unstable_count = static_cast<int>(numbers.at(7));
   modes.routes_disagree = numbers.at(8) != 0;
   modes.beyond_inertia = numbers.at(9) != 0;
-  modes.count = {text_of(checkpoint->list("certified by")), numbers.at(10), static_cast<int>(numbers.at(11)),
+  modes.count = {static_cast<Certificate>(numbers.at(13)), numbers.at(10), static_cast<int>(numbers.at(11)),
                  static_cast<int>(numbers.at(12))};
   modes.beyond_band = checkpoint->list("beyond band");
   modes.count_check = text_of(checkpoint->list("count check"));

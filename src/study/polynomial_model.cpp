@@ -1,6 +1,7 @@
 #include "polynomial_model.hpp"
 
 #include "sliding_basis.hpp"
+#include "squeal/scene/numbers.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -60,7 +61,7 @@ void drop_if_zero(Owned<Mat>& A, Mat reference)
 }
 
 /// The sum of factor times model over a few models, as a term; M, C and K that vanish are dropped.
-ModelTerm sum_of(const std::vector<std::pair<double, const BranchModel*>>& parts, const BranchModel& reference)
+ModelTerm sum_of(const std::vector<std::pair<double, const BrakeModel*>>& parts, const BrakeModel& reference)
 {
   ModelTerm term;
   term.M = copy_of(reference.structure.M);
@@ -108,11 +109,11 @@ PolynomialModel::PolynomialModel(const RobustnessProblem& problem) : problem_(pr
     for (const auto& [place, step] : steps) values[place] += step * scale_[place];
     return problem.model_at(values);
   };
-  std::vector<BranchModel> above;
+  std::vector<BrakeModel> above;
   for (const std::size_t i : places)
   {
     above.push_back(at({{i, 1}}));
-    const BranchModel below = at({{i, -1}});
+    const BrakeModel below = at({{i, -1}});
     terms_.push_back(sum_of({{0.5, &above.back()}, {-0.5, &below}}, reference_));
     terms_.back().factors = {i};
     terms_.push_back(sum_of({{0.5, &above.back()}, {0.5, &below}, {-1, &reference_}}, reference_));
@@ -121,7 +122,7 @@ PolynomialModel::PolynomialModel(const RobustnessProblem& problem) : problem_(pr
   for (std::size_t i = 0; i < places.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
     {
-      const BranchModel both = at({{places[i], 1}, {places[j], 1}});
+      const BrakeModel both = at({{places[i], 1}, {places[j], 1}});
       terms_.push_back(sum_of({{1, &both}, {-1, &above[i]}, {-1, &above[j]}, {1, &reference_}}, reference_));
       // both - above_i - above_j + centre holds the product alone: the squares cancel
       terms_.back().factors = {places[j], places[i]};
@@ -135,7 +136,7 @@ PolynomialModel::PolynomialModel(const RobustnessProblem& problem) : problem_(pr
 
 double PolynomialModel::error_at(const std::vector<double>& values)
 {
-  const BranchModel exact = problem_.model_at(values);
+  const BrakeModel exact = problem_.model_at(values);
   const std::vector<double> x = coefficients(values);
   double error = 0;
   for (const auto& [term, whole] :
@@ -169,13 +170,13 @@ void PolynomialModel::set_friction(const std::vector<double>& values)
   for (std::size_t i = 0; i < values.size(); ++i)
   {
     const std::string& key = problem_.numbers[i].key;
-    if (key == "friction.coefficient") law.coefficient = values[i];
+    if (key == friction_coefficient_key) law.coefficient = values[i];
     if (key == "friction.static_coefficient") law.static_coefficient = values[i];
     if (key == "friction.decay_speed") law.decay_speed = values[i];
   }
 }
 
-const BranchModel& PolynomialModel::at(const std::vector<double>& values)
+const BrakeModel& PolynomialModel::at(const std::vector<double>& values)
 {
   const std::vector<double> x = coefficients(values);
   auto& [structure, interface] = model_;

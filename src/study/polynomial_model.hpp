@@ -27,9 +27,9 @@ public:
   std::vector<double> coefficients(const std::vector<double>& values) const;
 
   /// K, load, gap, drive and friction at these values; M and C stay those of the medians.
-  const BranchModel& at(const std::vector<double>& values);
+  const BrakeModel& at(const std::vector<double>& values);
 
-  const BranchModel& reference() const { return reference_; }
+  const BrakeModel& reference() const { return reference_; }
   bool stiffness_changes() const;
   double error() const { return error_; } // relative, at a corner of the numbers' ranges
 
@@ -39,8 +39,8 @@ private:
 
   const RobustnessProblem& problem_;
   std::vector<double> centre_, scale_; // of the numbers
-  BranchModel reference_;              // at the centre
-  BranchModel model_;
+  BrakeModel reference_;              // at the centre
+  BrakeModel model_;
   std::vector<ModelTerm> terms_;
   double error_ = 0;
 };

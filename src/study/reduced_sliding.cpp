@@ -62,7 +62,7 @@ MatrixXd normal_rows(const MatrixXd& B, const Interface& interface)
 
 } // namespace
 
-PairShapes make_pair_shapes(const BranchModel& model, double omega)
+PairShapes make_pair_shapes(const BrakeModel& model, double omega)
 {
   const auto& [structure, interface] = model;
   const Owned<Mat> energy = energy_of(structure, omega);
@@ -87,7 +87,7 @@ PairShapes make_pair_shapes(const BranchModel& model, double omega)
   return shapes;
 }
 
-ShapeCollection::ShapeCollection(const BranchModel& model, const PairShapes& pairs, double omega)
+ShapeCollection::ShapeCollection(const BrakeModel& model, const PairShapes& pairs, double omega)
     : model_(model), pairs_(pairs), energy_(energy_of(model.structure, omega)),
       shapes_(empty_multivector(model.structure.K)), images_(empty_multivector(model.structure.K))
 {

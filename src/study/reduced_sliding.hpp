@@ -32,14 +32,14 @@ struct PairShapes
   Eigen::MatrixXd BW{};
 };
 
-PairShapes make_pair_shapes(const BranchModel& model, double omega);
+PairShapes make_pair_shapes(const BrakeModel& model, double omega);
 
 /// Shapes that grow while modes bring more than `truncation` of their energy that is new.
 class ShapeCollection
 {
 public:
   /// `omega`: of the energy x'(K + omega^2 M)x.
-  ShapeCollection(const BranchModel& model, const PairShapes& pairs, double omega);
+  ShapeCollection(const BrakeModel& model, const PairShapes& pairs, double omega);
 
   /// The real parts of modes, then the imaginary ones.
   void add(MultiVector vectors, double truncation);
@@ -49,7 +49,7 @@ public:
 private:
   void take_normal_motion_off(MultiVector& vectors) const;
 
-  const BranchModel& model_;
+  const BrakeModel& model_;
   const PairShapes& pairs_;
   Owned<Mat> energy_;
   MultiVector shapes_; // orthonormal in energy

@@ -156,7 +156,7 @@ public:
   /// The reduced matrices at a point; nothing without an equilibrium.
   std::optional<ReducedMatrices> matrices_at(const std::vector<double>& values)
   {
-    const BranchModel& model = model_.at(values);
+    const BrakeModel& model = model_.at(values);
     const auto& [structure, interface] = model;
     if (!compliance_ || model_.stiffness_changes())
     {
@@ -223,8 +223,8 @@ private:
     ShapeCollection shapes(model_.reference(), pairs, omega_);
     for (const std::vector<double>& values : line.points)
     {
-      if (swept.equilibrium_at(values, false).outcome.kind != OutcomeKind::converged) continue;
-      const PointModes modes = swept.modes_at(values, false);
+      if (swept.equilibrium_at({values, false}).outcome.kind != OutcomeKind::converged) continue;
+      const PointModes modes = swept.modes_at({values, false});
       if (modes.outcome.kind != OutcomeKind::converged || modes.pairs.empty()) continue;
       for (const Side side : {Side::right, Side::left})
         shapes.add(swept.vectors(modes, side), problem_.options.truncation);
@@ -248,7 +248,7 @@ private:
 /// The modes of the full problem in the band; nothing where they were not found.
 std::optional<std::vector<Complex>> full_modes(const RobustnessProblem& problem, const std::vector<double>& values)
 {
-  const BranchModel model = problem.model_at(values);
+  const BrakeModel model = problem.model_at(values);
   const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, problem.equilibrium_options);
   if (equilibrium.outcome.kind != OutcomeKind::converged) return std::nullopt;
   const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};

@@ -78,7 +78,7 @@ struct RobustnessProblem
 {
   const RobustnessSettings& settings;
   const std::vector<UncertainNumber>& numbers;
-  std::function<BranchModel(std::span<const double> values)> model_at; // on MPI_COMM_SELF
+  std::function<BrakeModel(std::span<const double> values)> model_at; // on MPI_COMM_SELF
   FrictionLaw friction;                                                // of the scene
   const ModesSettings& modes;
   const ModesOptions& modes_options;
