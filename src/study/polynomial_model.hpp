@@ -39,7 +39,7 @@ private:
 
   const RobustnessProblem& problem_;
   std::vector<double> centre_, scale_; // of the numbers
-  BrakeModel reference_;              // at the centre
+  BrakeModel reference_;               // at the centre
   BrakeModel model_;
   std::vector<ModelTerm> terms_;
   double error_ = 0;

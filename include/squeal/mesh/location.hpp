@@ -1,6 +1,5 @@
 #pragma once
-/// Points of a mesh: the element of a part that holds a point, and its natural coordinates there (src/README.md,
-/// section 6.3).
+/// Points of a mesh: the element of a part that holds a point, and its natural coordinates there.
 #include "squeal/mesh/shape_functions.hpp"
 
 namespace squeal

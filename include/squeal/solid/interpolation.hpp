@@ -1,6 +1,5 @@
 #pragma once
-/// Displacements of one mesh at the nodes of another mesh of the same parts, points and bodies (src/README.md,
-/// section 6.3).
+/// Displacements of one mesh at the nodes of another mesh of the same parts, points and bodies.
 #include "squeal/solid/dofs.hpp"
 #include "squeal/solid/structure.hpp"
 

@@ -79,7 +79,7 @@ struct RobustnessProblem
   const RobustnessSettings& settings;
   const std::vector<UncertainNumber>& numbers;
   std::function<BrakeModel(std::span<const double> values)> model_at; // on MPI_COMM_SELF
-  FrictionLaw friction;                                                // of the scene
+  FrictionLaw friction;                                               // of the scene
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;

@@ -9,8 +9,8 @@
 ///   of the mesh. With C = beta K that is h > beta/(1 - 2 theta), or h > 2/((1 - 2 theta) |lambda|) where the mode is
 ///   overdamped, lambda its faster root.
 /// - friction falls with the speed so steeply that a step may have several solutions. The largest eigenvalue of |mu'|
-///   diag(r_n0) W_tt, at rest, is not below 1. W holds h, so that enough steps bring it below. Ramps raise mu and r_n0 by
-///   the largest product of their factors.
+///   diag(r_n0) W_tt, at rest, is not below 1. W holds h, so that enough steps bring it below. Ramps raise mu and r_n0
+///   by the largest product of their factors.
 /// All refusals are lifted by StepOptions::refuse.
 #include "squeal/modes/modes.hpp"
 #include "squeal/transient/theta_step.hpp"
