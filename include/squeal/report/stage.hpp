@@ -14,7 +14,6 @@ enum class Stage
   modes,
   estimate,
   transient,
-  coarse, // the chain on the coarse mesh that the cycle starts from
   cycle,
   settled,
   attractors,
@@ -24,9 +23,8 @@ enum class Stage
   robustness,
 };
 
-inline constexpr std::array stage_names = {"model",       "equilibrium", "modes",     "estimate",   "transient",
-                                           "coarse",      "cycle",       "settled",   "attractors", "branch",
-                                           "sensitivity", "sweep",       "robustness"};
+inline constexpr std::array stage_names = {"model",   "equilibrium", "modes",  "estimate",    "transient", "cycle",
+                                           "settled", "attractors",  "branch", "sensitivity", "sweep",     "robustness"};
 
 inline Words words_of(Stage)
 {
