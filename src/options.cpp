@@ -38,10 +38,10 @@ std::string problem_of_option_name(const std::string& name)
 OptionList options_of(ProgramOptions& options)
 {
   OptionList all;
-  for (OptionList list :
-       {options_of(options.factor), options_of(options.equilibrium), options_of(options.modes),
-        options_of(options.pencil), options_of(options.estimate), options_of(options.step), options_of(options.cycle),
-        options_of(options.settled), options_of(options.attractors), options_of(options.sweep)})
+  for (OptionList list : {options_of(options.factor), options_of(options.equilibrium), options_of(options.modes),
+                          options_of(options.pencil), options_of(options.estimate), options_of(options.step),
+                          options_of(options.cycle), options_of(options.settled), options_of(options.attractors),
+                          options_of(options.sweep), options_of(options.robustness)})
     all.insert(all.end(), list.begin(), list.end());
   return all;
 }

@@ -8,6 +8,7 @@
 #include "squeal/forecast.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/scene/doubts.hpp"
+#include "squeal/study/robustness.hpp"
 #include "squeal/study/sensitivity.hpp"
 #include "squeal/study/sweep.hpp"
 
@@ -314,6 +315,24 @@ Sweep run_scene_sweep(const Chain& chain)
       {*scene.sweep, model_at, scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.sweep}, comm);
 }
 
+Robustness run_robustness(const Chain& chain)
+{
+  const Scene& scene = chain.scene;
+  if (!scene.robustness) return not_run<Robustness>(OutcomeKind::off, "the scene has no [robustness]");
+  const std::string part = unsymmetric_part(chain.model.structure);
+  if (!part.empty()) return not_run<Robustness>(OutcomeKind::refused, part);
+  const auto model_at = [&](std::span<const double> values)
+  {
+    std::vector<SceneNumber> numbers;
+    for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.uncertain[i].key, values[i]});
+    Model model = rebuild_model(chain.model, scene_with(scene, numbers), PETSC_COMM_SELF);
+    return BranchModel{std::move(model.structure), std::move(model.interface)};
+  };
+  return find_robustness({*scene.robustness, scene.uncertain, model_at, scene.friction, scene.modes,
+                          chain.options.modes, chain.options.equilibrium, chain.options.robustness},
+                         comm_of(chain.model.structure.load));
+}
+
 std::vector<Stage> stages_run(const Report& report)
 {
   std::vector<Stage> stages;
@@ -402,6 +421,8 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   report.sensitivity = stage(report, Stage::sensitivity, comm, [&] { return run_sensitivity(chain); });
   if (has_run(report.sensitivity.outcome)) save();
   report.sweep = stage(report, Stage::sweep, comm, [&] { return run_scene_sweep(chain); });
+  if (has_run(report.sweep.outcome)) save();
+  report.robustness = stage(report, Stage::robustness, comm, [&] { return run_robustness(chain); });
 
   const ExitCode code = exit_code_of(report);
   report.exit_code = static_cast<int>(code);

@@ -3,6 +3,7 @@
 import common
 import plot_contact
 import plot_motion
+import plot_robustness
 import plot_shape
 import plot_spectra
 import plot_stability
@@ -34,6 +35,8 @@ FIGURES = {
     "branch": (plot_stability.draw_branch, True, "The limit cycle along a number of the scene."),
     "sweep": (plot_sweep.draw_sweep, True, "Frequency and growth of the followed modes against a number of the scene; of two "
               "numbers a map of stability. Dotted lines are thresholds."),
+    "robustness": (plot_robustness.draw_robustness, True, "How likely modes are unstable where numbers are random, with the "
+                   "intervals; growth of the samples; which numbers drive it."),
 }
 ANIMATION = "One period, over and over: the whole, and what moves most, exaggerated."
 

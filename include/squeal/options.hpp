@@ -6,7 +6,7 @@
 #include "squeal/cycle/options.hpp"
 #include "squeal/report/stage.hpp"
 #include "squeal/settled/motion.hpp"
-#include "squeal/study/sweep.hpp"
+#include "squeal/study/robustness.hpp"
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/transient.hpp"
 
@@ -26,6 +26,7 @@ struct ProgramOptions
   AttractorOptions attractors;
   SweepOptions sweep;
   bool force = false; // --force: run whatever the forecast says
+  RobustnessOptions robustness;
 };
 
 OptionList options_of(ProgramOptions& options);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 namespace squeal
 {
@@ -218,6 +219,38 @@ SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const MatrixXd& 
   broadcast(pairs.lambda, comm);
   broadcast(pairs.y, comm);
   return pairs;
+}
+
+std::vector<Complex> dense_quadratic_eigenvalues(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
+{
+  std::vector<Complex> result;
+  const double stiffness = K.rows() > 0 ? norm_1(K) : 0, mass = K.rows() > 0 ? norm_1(M) : 0;
+  if (mass == 0 || stiffness == 0) return result;
+  const double omega = std::sqrt(stiffness / mass), shift = 1e-2; // of nu = lambda/omega: any that is no eigenvalue
+  MatrixXd A = companion(omega * omega / stiffness * M, omega / stiffness * C, K / stiffness, shift);
+  VectorXd re(A.rows()), im(A.rows());
+  const int size = to_int(A.rows());
+  if (LAPACKE_dgeev(LAPACK_COL_MAJOR, 'N', 'N', size, A.data(), size, re.data(), im.data(), nullptr, size, nullptr,
+                    size) != 0)
+    throw Error("the QR algorithm did not converge on the dense quadratic eigenproblem");
+  for (Index j = 0; j < A.rows(); ++j)
+    if (const Complex mu(re(j), im(j)); mu.imag() >= 0 && std::abs(mu) >= 1e-12)
+      result.push_back(std::conj(omega * (shift + 1.0 / mu)));
+  return result;
+}
+
+TwoSidedPair two_sided_pair(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, Complex lambda)
+{
+  const Complex near = lambda * (1 + 1e-10); // so that no pivot vanishes
+  const Eigen::MatrixXcd Q = near * near * M.cast<Complex>() + near * C.cast<Complex>() + K.cast<Complex>();
+  const Eigen::PartialPivLU<Eigen::MatrixXcd> factor(Q);
+  TwoSidedPair pair{lambda, Eigen::VectorXcd::Ones(K.rows()), Eigen::VectorXcd::Ones(K.rows())};
+  for (int iteration = 0; iteration < 3; ++iteration)
+  {
+    pair.right = factor.solve(pair.right).normalized();
+    pair.left = factor.transpose().solve(pair.left).normalized();
+  }
+  return pair;
 }
 
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)

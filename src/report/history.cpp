@@ -3,6 +3,7 @@
 #include "branch_results.hpp"
 #include "derived.hpp"
 #include "files.hpp"
+#include "robustness_results.hpp"
 #include "sweep_results.hpp"
 
 #include <algorithm>
@@ -77,6 +78,7 @@ void write_history(const Report& report, const Scene& scene, const std::filesyst
   }
   if (has_run(report.branch.outcome)) write_branch(file, report.branch, scene);
   if (has_run(report.sweep.outcome)) write_sweep(file, report.sweep);
+  if (has_run(report.robustness.outcome)) write_robustness(file, report.robustness);
   file.keep();
 }
 

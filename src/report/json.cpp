@@ -4,6 +4,7 @@
 #include "derived.hpp"
 #include "files.hpp"
 #include "heard.hpp"
+#include "robustness_results.hpp"
 #include "sensitivity_results.hpp"
 #include "sweep_results.hpp"
 #include "warnings.hpp"
@@ -283,6 +284,13 @@ Json sensitivity_entry(const Report& report, const Scene& scene)
   return entry;
 }
 
+Json robustness_entry(const Report& report, const Scene& scene)
+{
+  Json entry = entry_of(report.robustness.outcome);
+  if (has_run(report.robustness.outcome)) add_robustness(report.robustness, scene, entry);
+  return entry;
+}
+
 Json sweep_entry(const Report& report, const Scene& scene)
 {
   Json entry = entry_of(report.sweep.outcome);
@@ -345,6 +353,7 @@ std::string report_json(const Report& report, const Scene& scene)
   json[word(Stage::branch)] = branch_entry(report, scene);
   json[word(Stage::sensitivity)] = sensitivity_entry(report, scene);
   json[word(Stage::sweep)] = sweep_entry(report, scene);
+  json[word(Stage::robustness)] = robustness_entry(report, scene);
   const Warnings warnings = warnings_of(report);
   const auto warn = [&json](Stage stage, const std::vector<std::string>& sentences)
   {

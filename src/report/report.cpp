@@ -1,4 +1,5 @@
 #include "files.hpp"
+#include "robustness_results.hpp"
 #include "squeal/base/whole_file.hpp"
 #include "squeal/report/fields.hpp"
 #include "squeal/report/history.hpp"
@@ -48,7 +49,7 @@ const Estimate& followed_estimate(const Report& report)
   return report.estimates.empty() ? none : report.estimates.front();
 }
 
-std::array<std::pair<Stage, Outcome>, 10> outcomes_of(const Report& report)
+std::array<std::pair<Stage, Outcome>, 11> outcomes_of(const Report& report)
 {
   return {{{Stage::equilibrium, report.equilibrium.outcome},
            {Stage::modes, report.modes.outcome},
@@ -59,7 +60,8 @@ std::array<std::pair<Stage, Outcome>, 10> outcomes_of(const Report& report)
            {Stage::attractors, report.attractors.outcome},
            {Stage::branch, report.branch.outcome},
            {Stage::sensitivity, report.sensitivity.outcome},
-           {Stage::sweep, report.sweep.outcome}}};
+           {Stage::sweep, report.sweep.outcome},
+           {Stage::robustness, report.robustness.outcome}}};
 }
 
 std::vector<std::pair<std::string, std::string>> versions()
@@ -99,6 +101,10 @@ void write_results(const Report& report, const Scene& scene, const FieldNodes& n
   if (has_run(report.sweep.outcome))
     on_rank_zero(comm,
                  [&] { write_whole_file(output / "sweep.csv", sweep_csv(report.sweep, scene), Flush::by_system); });
+  if (has_run(report.robustness.outcome))
+    on_rank_zero(
+        comm, [&]
+        { write_whole_file(output / "robustness.csv", robustness_csv(report.robustness, scene), Flush::by_system); });
   write_fields(report, scene, nodes, output, comm);
   // Last: where there is a report, the rest is there too.
   on_rank_zero(comm, [&] { write_whole_file(output / "report.json", report_json(report, scene), Flush::by_system); });

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 namespace
 {
 
-constexpr std::array result_files = {"report.json", "history.h5",    "sweep.csv",   "fields.h5",
+constexpr std::array result_files = {"report.json", "history.h5",    "sweep.csv",   "robustness.csv", "fields.h5",
                                      "fields.xdmf", "resolved.toml", "options.txt", "checkpoint"};
 constexpr const char* lock_file = "running";
 

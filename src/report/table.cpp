@@ -3,6 +3,7 @@
 #include "branch_results.hpp"
 #include "derived.hpp"
 #include "heard.hpp"
+#include "robustness_results.hpp"
 #include "sensitivity_results.hpp"
 #include "sweep_results.hpp"
 #include "warnings.hpp"
@@ -254,6 +255,8 @@ std::string table(const Report& report, const Scene& scene)
   text += optional_text("sensitivity", report.sensitivity.outcome,
                         [&] { return sensitivity_lines(report.sensitivity, scene); });
   text += optional_text("sweep", report.sweep.outcome, [&] { return sweep_lines(report.sweep, scene); });
+  text += optional_text("robustness", report.robustness.outcome,
+                        [&] { return robustness_lines(report.robustness, scene); });
   return text + timings_text(report);
 }
 

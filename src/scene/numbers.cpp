@@ -1,4 +1,5 @@
 /// Numbers of a scene that a branch follows or a sweep varies, found in the scene's own text and replaced there.
+#include "scene_numbers.hpp"
 #include "squeal/base/error.hpp"
 #include "toml_values.hpp"
 
@@ -27,8 +28,8 @@ toml::table document_of(const Scene& scene)
   return toml::parse(resolved_scene(scene), std::string_view("scene"));
 }
 
-/// The value of a number. `table`: "[branch]" or "[sweep]", for messages. Throws Error if the key is not that of a
-/// number that the structure, its contact or its loads have.
+} // namespace
+
 double number_at(const Scene& scene, const std::string& key, const std::string& table)
 {
   const auto refusal = [&](const std::string& why) { return Error(table + " key = \"" + key + "\" " + why); };
@@ -46,7 +47,6 @@ double number_at(const Scene& scene, const std::string& key, const std::string& 
   return *node->value<double>();
 }
 
-/// Throws Error, with the place of the member, if the scene is none with this value of the number.
 void need_scene(const Scene& scene, const SceneNumber& number, const std::string& place, const std::string& label)
 {
   try
@@ -58,6 +58,9 @@ void need_scene(const Scene& scene, const SceneNumber& number, const std::string
     throw Error(place + ": " + label + error.what());
   }
 }
+
+namespace
+{
 
 /// The checks of a sweep, each of which throws Error with the place of the wrong value.
 class SweepChecker

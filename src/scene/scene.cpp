@@ -43,6 +43,7 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
   resolve_branch(scene, places);
   resolve_sweep(scene, places);
   check_sensitivity(scene, places);
+  resolve_robustness(scene, places);
   return scene;
 }
 

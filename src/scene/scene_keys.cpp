@@ -292,6 +292,28 @@ SceneKeys keys_of(Change& c)
   };
 }
 
+SceneKeys keys_of(RobustnessSettings& r)
+{
+  return {
+      {"samples", &r.samples, optional, Rule::positive, "-", "number of random scenes"},
+      {"checks", &r.checks, optional, Rule::not_negative, "-", "number of them computed by the full problem as well"},
+      {"seed", &r.seed, optional, Rule::not_negative, "-", "of the random numbers"},
+      {"confidence", &r.confidence, optional, Rule::fraction, "-", "of the intervals of the probabilities"},
+  };
+}
+
+SceneKeys keys_of(UncertainNumber& u)
+{
+  return {
+      {"key", &u.key, required, Rule::any, "text", "number of the scene, as --set names it"},
+      {"distribution", choice_of(u.distribution), optional, Rule::any, "word", "normal, lognormal or uniform"},
+      {"mean", &u.mean, optional, Rule::any, "-", "of the number, in its own unit; 0: the scene's value"},
+      {"deviation", &u.deviation, optional, Rule::not_negative, "-", "standard deviation of the number"},
+      {"from", &u.from, optional, Rule::any, "-", "least value of a uniform distribution"},
+      {"to", &u.to, optional, Rule::any, "-", "greatest value of a uniform distribution"},
+  };
+}
+
 SceneKeys keys_of(Probe& p)
 {
   return {

@@ -84,6 +84,8 @@ SceneKeys keys_of(BranchSettings& branch);
 SceneKeys keys_of(SweepSettings& sweep);
 SceneKeys keys_of(SensitivitySettings& sensitivity);
 SceneKeys keys_of(Change& change);
+SceneKeys keys_of(RobustnessSettings& robustness);
+SceneKeys keys_of(UncertainNumber& number);
 SceneKeys keys_of(Probe& probe);
 
 /// Calls visit(key, member, meaning) for each table of a scene file, in the order in which they are written.
@@ -113,6 +115,8 @@ template <class Visit> void for_each_table(Scene& scene, Visit visit)
   visit("sensitivity", scene.sensitivity,
         "derivatives, energies and powers of the unstable modes; runs when the table is present");
   visit("change", scene.changes, "a mass, damper or spring proposed at a probe, predicted and computed");
+  visit("robustness", scene.robustness, "probability of unstable modes; runs when the table is present");
+  visit("uncertain", scene.uncertain, "a number of the scene that is random in [robustness]");
   visit("probe", scene.probes, "a displacement that is recorded in time");
 }
 
@@ -138,5 +142,8 @@ void resolve_sweep(Scene& scene, const Places& places);
 
 /// Throws Error where a number of the sensitivity is none of the scene, or a change is at no probe or changes nothing.
 void check_sensitivity(const Scene& scene, const Places& places);
+
+/// Gives every random number its mean. Throws Error if there is no such number, or its values make no scene.
+void resolve_robustness(Scene& scene, const Places& places);
 
 } // namespace squeal

@@ -72,12 +72,6 @@ VectorXd kept_norms(const MatrixXcd& a, const MatrixXd& kept)
   return (a.conjugate().cwiseProduct(kept * a)).colwise().sum().real().cwiseMax(0).cwiseSqrt();
 }
 
-enum class Side
-{
-  right,
-  left,
-};
-
 /// The vectors of one side, one a column.
 MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, Side side)
 {
@@ -209,13 +203,13 @@ bool correct(ModesBasis& modes, MultiVector residuals)
 }
 
 /// Leaves out what is no mode.
-void finish(PointModes& result, const ProjectedSliding& on_basis, Index shapes)
+void finish(PointModes& result, const ProjectedSliding& on_basis, Index shapes, double tolerance)
 {
   std::vector<TwoSidedPair> pairs;
   std::vector<double> errors;
   for (std::size_t k = 0; k < result.pairs.size(); ++k)
   {
-    if (result.errors[k] > spurious) continue;
+    if (result.errors[k] > std::max(spurious, tolerance)) continue;
     result.outcome.residual = std::max(result.outcome.residual, result.errors[k]);
     pairs.push_back(std::move(result.pairs[k]));
     errors.push_back(result.errors[k]);
@@ -258,6 +252,16 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   move_to(modes.pencil, shift_below_zero(modes.M_z, modes.K_z));
 }
 
+MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, const std::vector<TwoSidedPair>& pairs,
+                     Side side)
+{
+  const MatrixXcd a = vectors_of(pairs, side);
+  MatrixXd parts(a.rows(), 2 * a.cols());
+  parts << a.real(), a.imag();
+  const MultiVector shapes = columns_from(modes.basis.T, modes.basis.sketched);
+  return product(side == Side::right ? contact.Z : contact.Y, combination(kept_rows(shapes, contact), parts));
+}
+
 PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
 {
   const auto& [structure, interface, equilibrium] = problem.sliding;
@@ -292,7 +296,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
     }
     if (correct(modes, std::move(residuals))) continue;
     for (std::size_t k = 0; k < right.size(); ++k) result.errors.push_back(std::max(right[k], left[k]));
-    finish(result, on_basis, modes.basis.shapes());
+    finish(result, on_basis, modes.basis.shapes(), tolerance);
     return result;
   }
 }

@@ -56,6 +56,17 @@ struct PointModes
   Eigen::MatrixXd M{}, C{};        // of the point, on the basis
 };
 
+enum class Side
+{
+  right,
+  left,
+};
+
+/// The vectors of one side in the structure's degrees of freedom: the real parts of all, then the imaginary ones.
+/// `contact`: of the point where they were found last.
+MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, const std::vector<TwoSidedPair>& pairs,
+                     Side side);
+
 /// Error: a closed pair that friction jams. The closed pairs include those of the basis.
 PointModes find_point_modes(ModesBasis& basis, const PointProblem& problem);
 

@@ -130,19 +130,7 @@ Vectors unstable_vectors(const SensitivityProblem& problem, Sensitivity& result)
     result.outcome = {OutcomeKind::not_converged, "the left vectors of the unstable modes were not found", 0, 0};
     return {{}, empty_multivector(structure.K), empty_multivector(structure.K)};
   }
-  const MultiVector kept = kept_rows(columns_from(basis.basis.T, basis.basis.sketched), contact);
-  const auto expand = [&](Eigen::VectorXcd TwoSidedPair::*side, Mat lift)
-  {
-    const auto count = static_cast<Index>(pairs.size());
-    MatrixXd a(kept.columns(), 2 * count);
-    for (Index j = 0; j < count; ++j)
-    {
-      a.col(j) = (pairs[static_cast<std::size_t>(j)].*side).real();
-      a.col(count + j) = (pairs[static_cast<std::size_t>(j)].*side).imag();
-    }
-    return product(lift, combination(kept, a));
-  };
-  Vectors vectors{{}, expand(&TwoSidedPair::right, contact.Z), expand(&TwoSidedPair::left, contact.Y)};
+  Vectors vectors{{}, expanded(basis, contact, pairs, Side::right), expanded(basis, contact, pairs, Side::left)};
   for (std::size_t j = 0; j < wanted; ++j)
   {
     vectors.lambda.push_back(pairs[j].lambda);

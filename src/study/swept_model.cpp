@@ -136,4 +136,11 @@ PointModes SweptModel::modes_at(const std::vector<double>& values, bool reversed
   return modes;
 }
 
+MultiVector SweptModel::vectors(const PointModes& modes, Side side) const
+{
+  const auto& [structure, interface] = *model_;
+  const ClosedContact contact = eliminate_closed_pairs(structure, interface, equilibria_.at(at_).closed);
+  return expanded(*basis_, contact, modes.pairs, side);
+}
+
 } // namespace squeal

@@ -22,6 +22,10 @@ public:
   const Equilibrium& equilibrium_at(const std::vector<double>& values, bool reversed);
   PointModes modes_at(const std::vector<double>& values, bool reversed);
 
+  /// The vectors of modes found at the point visited last, in the structure's degrees of freedom: the real parts of
+  /// all, then the imaginary ones.
+  MultiVector vectors(const PointModes& modes, Side side) const;
+
   Eigen::Index shapes() const { return basis_ ? basis_->basis.shapes() : 0; }
   int passes() const { return basis_ ? basis_->passes : 0; }
 

@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 
 import h5py
 import pytest
@@ -55,6 +57,16 @@ def test_own_model_runs(converged, tmp_path):
     scene.write_text("\n".join(block_of(ROOT / "README.md", "mesh = ")))
     run = converged(scene, "--set", f"mesh.file={INPUTS / 'pin_on_disc' / 'pin.geo'}")
     assert run.report["cycle"]["outcome"] == "converged"
+
+
+def test_the_lock_in_chart_of_the_guide(converged, tmp_path):
+    """The overrides that inputs/README.md gives for one's own mesh, here on the pin, and the picture that it names."""
+    (command,) = [line.split() for line in (INPUTS / "README.md").read_text().splitlines() if line.startswith("    tools/run inputs/mine")
+                  and "sweep.key" in line]
+    run = converged(INPUTS / "pin_on_disc" / "scene.toml", *command[2:], "--set", "mesh.parameters.divisions=2", "--set",
+                    "sweep.to=0.3", "--set", "sweep.points=3", ranks=1)
+    subprocess.run([sys.executable, ROOT / "tools" / "plot", run.output, "--output", tmp_path], check=True)
+    assert (tmp_path / "sweep.png").stat().st_size > 10000
 
 
 def tables(page):

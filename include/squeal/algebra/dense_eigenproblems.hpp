@@ -29,6 +29,14 @@ struct TwoSidedPair
   Eigen::VectorXcd right, left;
 };
 
+/// The eigenvalues of solve_dense_quadratic alone, which take a quarter of the time.
+std::vector<std::complex<double>> dense_quadratic_eigenvalues(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
+                                                              const Eigen::MatrixXd& K);
+
+/// The vectors of a given eigenvalue, by inverse iteration.
+TwoSidedPair two_sided_pair(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C, const Eigen::MatrixXd& K,
+                            std::complex<double> lambda);
+
 /// The pairs of solve_dense_quadratic with their left vectors, from the matrices of rank 0, on every rank. Collective.
 std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
                                                  const Eigen::MatrixXd& K);

@@ -8,6 +8,7 @@
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/report/stage.hpp"
 #include "squeal/settled/settled_motion.hpp"
+#include "squeal/study/robustness.hpp"
 #include "squeal/study/sensitivity.hpp"
 #include "squeal/study/sweep.hpp"
 
@@ -60,13 +61,14 @@ struct Report
   Sensitivity sensitivity;
   Sweep sweep;
   std::vector<Timing> timings; // in order
+  Robustness robustness;
 };
 
 /// The estimate of the followed mode.
 const Estimate& followed_estimate(const Report& report);
 
 /// The outcome of every stage but the model, in the order in which they run.
-std::array<std::pair<Stage, Outcome>, 10> outcomes_of(const Report& report);
+std::array<std::pair<Stage, Outcome>, 11> outcomes_of(const Report& report);
 
 /// Where the nodes of the fields are.
 struct FieldNodes

@@ -20,10 +20,12 @@ enum class Stage
   branch,
   sensitivity,
   sweep,
+  robustness,
 };
 
-inline constexpr std::array stage_names = {"model",   "equilibrium", "modes",  "estimate",    "transient", "cycle",
-                                           "settled", "attractors",  "branch", "sensitivity", "sweep"};
+inline constexpr std::array stage_names = {"model",     "equilibrium", "modes",   "estimate",
+                                           "transient", "cycle",       "settled", "attractors",
+                                           "branch",    "sensitivity", "sweep",   "robustness"};
 
 inline Words words_of(Stage)
 {

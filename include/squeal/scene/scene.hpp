@@ -364,6 +364,42 @@ struct Change
   double stiffness = 0; // [N/m] to the ground
 };
 
+/// How likely modes are unstable where numbers of the scene are random.
+struct RobustnessSettings
+{
+  int samples = 1000;       // [-] number of random scenes
+  int checks = 20;          // [-] number of them that are computed by the full problem as well
+  int seed = 1;             // [-] of the random numbers
+  double confidence = 0.95; // [-] of the intervals of the probabilities
+};
+
+enum class Distribution
+{
+  normal,    // cut off at four deviations
+  lognormal, // likewise, of the logarithm
+  uniform,
+};
+
+inline constexpr std::array distribution_words = {"normal", "lognormal", "uniform"};
+
+inline Words words_of(Distribution)
+{
+  return distribution_words;
+}
+
+/// A random number of the scene, independent of the others.
+struct UncertainNumber
+{
+  std::string key; // as overrides name it
+  Distribution distribution = Distribution::normal;
+  double mean = 0;         // of the number itself, in its unit; 0: the scene's value
+  double deviation = 0;    // standard deviation of the number itself
+  double from = 0, to = 0; // of the uniform distribution
+};
+
+/// The value below which a part of the distribution lies, 0 <= part <= 1.
+double quantile(const UncertainNumber& number, double part);
+
 /// A displacement that is recorded in time: of the node of a point, body or group, along a direction.
 struct Probe
 {
@@ -402,6 +438,8 @@ struct Scene
   std::optional<SensitivitySettings> sensitivity;
   std::vector<Change> changes;
   std::vector<Probe> probes;
+  std::optional<RobustnessSettings> robustness;
+  std::vector<UncertainNumber> uncertain;
 };
 
 /// Returns the scene in a TOML file after the overrides "table.key=value", whose values are TOML or bare words.

@@ -1,0 +1,89 @@
+/// Random numbers of a scene: their distributions, and checks of them.
+#include "scene_numbers.hpp"
+#include "squeal/base/error.hpp"
+
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <cmath>
+#include <set>
+
+namespace squeal
+{
+
+namespace
+{
+
+constexpr double cut_off = 4; // deviations: 6 of 100 000 draws lie beyond
+
+/// The quantile of the normal distribution of mean 0 and deviation 1, cut off.
+double standard_quantile(double part)
+{
+  const boost::math::normal standard;
+  const double least = boost::math::cdf(standard, -cut_off);
+  return boost::math::quantile(standard, least + part * (1 - 2 * least));
+}
+
+void check_form(const UncertainNumber& number, const Places& places)
+{
+  const std::string label = "[[uncertain]] " + number.key + " ";
+  if (number.distribution == Distribution::uniform)
+  {
+    if (number.mean != 0 || number.deviation != 0)
+      throw Error(places.at(&number) + ": " + label + "is uniform: give from and to, not mean and deviation");
+    if (!(number.from < number.to))
+      throw Error(places.at(&number) + ": " + label + "is uniform: give from, and a greater to");
+    return;
+  }
+  if (number.from != 0 || number.to != 0)
+    throw Error(places.at(&number) + ": " + label + "is " + word(number.distribution) +
+                ": give mean and deviation, not from and to");
+  if (number.deviation == 0)
+    throw Error(places.at(&number) + ": " + label + "needs a deviation, in the number's own unit");
+}
+
+} // namespace
+
+double quantile(const UncertainNumber& number, double part)
+{
+  if (number.distribution == Distribution::uniform) return number.from + part * (number.to - number.from);
+  const double normal = standard_quantile(part);
+  if (number.distribution == Distribution::normal) return number.mean + number.deviation * normal;
+  // mean and deviation are those of the number itself: of ln they follow from exp's moments
+  const double variance = std::log1p(std::pow(number.deviation / number.mean, 2));
+  return number.mean * std::exp(std::sqrt(variance) * normal - variance / 2);
+}
+
+void resolve_robustness(Scene& scene, const Places& places)
+{
+  if (!scene.robustness && !scene.uncertain.empty())
+    throw Error(places.at(&scene.uncertain.front()) + ": [[uncertain]] is part of [robustness]: give that table too");
+  if (!scene.robustness) return;
+  RobustnessSettings& settings = *scene.robustness;
+  if (scene.uncertain.empty())
+    throw Error(places.at(&settings) + ": [robustness] has no random number: give [[uncertain]] tables");
+  if (settings.confidence <= 0 || settings.confidence >= 1)
+    throw Error(places.at(&settings.confidence) + ": [robustness] confidence lies between 0 and 1, such as 0.95");
+  if (!places.given.contains(&settings.checks)) settings.checks = std::min(settings.checks, settings.samples);
+  if (settings.checks > settings.samples)
+    throw Error(places.at(&settings.checks) + ": [robustness] checks are some of the samples: give at most as many");
+  std::set<std::string> keys;
+  for (UncertainNumber& number : scene.uncertain) try
+    {
+      if (!keys.insert(number.key).second) throw Error("[[uncertain]] " + number.key + " is there twice: keep one");
+      const double own = number_at(scene, number.key, "[[uncertain]]");
+      if (number.mean == 0 && number.distribution != Distribution::uniform) number.mean = own;
+      check_form(number, places);
+      if (number.distribution == Distribution::lognormal && number.mean <= 0)
+        throw Error("[[uncertain]] " + number.key + " is lognormal: its mean must be positive");
+      for (const double part : {0., 1.})
+        need_scene(scene, {number.key, quantile(number, part)}, places.at(&number),
+                   "[[uncertain]] this end of " + number.key + " is no scene: ");
+    }
+    catch (const Error& error)
+    {
+      const std::string place = places.at(&number), text = error.what();
+      throw Error(text.starts_with(place) ? text : place + ": " + text);
+    }
+}
+
+} // namespace squeal

@@ -1,0 +1,48 @@
+#pragma once
+/// A model whose matrices are polynomials of random numbers (src/README.md, section 12.1): sums of models that were
+/// assembled at a few values. It lives on one rank.
+#include "squeal/study/robustness.hpp"
+
+namespace squeal
+{
+
+/// What a product of numbers contributes. Matrices without a contribution are null.
+struct ModelTerm
+{
+  std::vector<std::size_t> factors{}; // none: the constant; twice the same: its square
+  Owned<Mat> M{}, C{}, K{};
+  Owned<Vec> load{};
+  std::vector<double> gap{}, drive{};
+};
+
+class PolynomialModel
+{
+public:
+  /// Error: a number changes the rows of contact, or the model is no polynomial of second order in it.
+  explicit PolynomialModel(const RobustnessProblem& problem);
+
+  const std::vector<ModelTerm>& terms() const { return terms_; }
+
+  /// The factors of the terms at some values of the numbers.
+  std::vector<double> coefficients(const std::vector<double>& values) const;
+
+  /// K, load, gap, drive and friction at these values; M and C stay those of the medians.
+  const BranchModel& at(const std::vector<double>& values);
+
+  const BranchModel& reference() const { return reference_; }
+  bool stiffness_changes() const;
+  double error() const { return error_; } // relative, at a corner of the numbers' ranges
+
+private:
+  void set_friction(const std::vector<double>& values);
+  double error_at(const std::vector<double>& values);
+
+  const RobustnessProblem& problem_;
+  std::vector<double> centre_, scale_; // of the numbers
+  BranchModel reference_;              // at the centre
+  BranchModel model_;
+  std::vector<ModelTerm> terms_;
+  double error_ = 0;
+};
+
+} // namespace squeal

@@ -1,0 +1,377 @@
+#include "squeal/study/robustness.hpp"
+
+#include "reduced_sliding.hpp"
+#include "robustness_summary.hpp"
+#include "squeal/base/progress.hpp"
+#include "squeal/base/run_control.hpp"
+#include "swept_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::VectorXcd;
+
+constexpr double least_share = 0.1; // of a reference mode in an unstable one, below which it is none of them
+
+/// Points that fill the unit cube evenly: the centre, then Halton's sequence.
+std::vector<std::vector<double>> even_points(std::size_t dimensions, PetscInt count)
+{
+  std::vector<std::vector<double>> points = {std::vector<double>(dimensions, 0.5)};
+  std::vector<int> primes;
+  for (int candidate = 2; primes.size() < dimensions; ++candidate)
+    if (std::ranges::none_of(primes, [&](int prime) { return candidate % prime == 0; })) primes.push_back(candidate);
+  for (PetscInt k = 1; k < count; ++k)
+  {
+    std::vector<double>& point = points.emplace_back();
+    for (const int prime : primes)
+    {
+      double value = 0, digit = 1. / prime;
+      for (PetscInt rest = k; rest > 0; rest /= prime, digit /= prime)
+        value += static_cast<double>(rest % prime) * digit;
+      point.push_back(value);
+    }
+  }
+  return points;
+}
+
+std::vector<double> values_at(const std::vector<UncertainNumber>& numbers, const std::vector<double>& parts)
+{
+  std::vector<double> values;
+  for (std::size_t i = 0; i < numbers.size(); ++i) values.push_back(quantile(numbers[i], parts[i]));
+  return values;
+}
+
+/// The same on every machine.
+std::vector<std::vector<double>> random_values(const RobustnessProblem& problem)
+{
+  std::mt19937_64 generator(static_cast<std::uint64_t>(problem.settings.seed));
+  std::vector<std::vector<double>> samples;
+  for (int k = 0; k < problem.settings.samples; ++k)
+  {
+    std::vector<double> parts;
+    for (std::size_t i = 0; i < problem.numbers.size(); ++i)
+      parts.push_back(static_cast<double>(generator() >> 11) * 0x1p-53); // in [0, 1)
+    samples.push_back(values_at(problem.numbers, parts));
+  }
+  return samples;
+}
+
+/// Points whose modes make the basis: the middle parts of the distributions, stretched to their tails.
+std::vector<std::vector<double>> training_values(const RobustnessProblem& problem)
+{
+  constexpr double tail = 0.01; // quantiles beyond are left to the samples
+  std::vector<std::vector<double>> points;
+  for (std::vector<double>& parts : even_points(problem.numbers.size(), problem.options.training))
+  {
+    for (double& part : parts) part = tail + part * (1 - 2 * tail);
+    points.push_back(values_at(problem.numbers, parts));
+  }
+  return points;
+}
+
+bool in_band(Complex lambda, double band)
+{
+  return lambda.imag() >= 0 && std::abs(lambda) < 2 * std::numbers::pi * band;
+}
+
+/// Modes of the reference, on the reduced model's shapes.
+class Reference
+{
+public:
+  Reference() = default;
+
+  Reference(const ReducedMatrices& at, double band)
+  {
+    for (TwoSidedPair& pair : solve_two_sided_shared(MPI_COMM_SELF, at.M, at.C, at.K))
+      if (in_band(pair.lambda, band)) pairs_.push_back(std::move(pair));
+    for (const TwoSidedPair& pair : pairs_) own_.push_back(form(at, pair, pair));
+  }
+
+  std::vector<Complex> eigenvalues() const
+  {
+    std::vector<Complex> values;
+    for (const TwoSidedPair& pair : pairs_) values.push_back(pair.lambda);
+    return values;
+  }
+
+  /// The mode that an unstable one of a sample shares most with.
+  int nearest(const ReducedMatrices& at, const TwoSidedPair& pair) const
+  {
+    const Complex own = form(at, pair, pair);
+    double most = least_share;
+    int result = unmatched;
+    for (std::size_t i = 0; i < pairs_.size(); ++i)
+    {
+      const double share = std::abs(form(at, pairs_[i], pair) * form(at, pair, pairs_[i]) / (own_[i] * own));
+      const double folded = share > 1 ? 1 / share : share;
+      if (!(folded > most)) continue;
+      most = folded;
+      result = static_cast<int>(i);
+    }
+    return result;
+  }
+
+private:
+  /// left'((lambda + lambda') M + C) right, of T alone: points have different pairs open
+  static Complex form(const ReducedMatrices& at, const TwoSidedPair& a, const TwoSidedPair& b)
+  {
+    const Index n = at.common;
+    const VectorXcd right = b.right.head(n);
+    const VectorXcd image =
+        (a.lambda + b.lambda) * (at.M.topLeftCorner(n, n) * right) + at.C.topLeftCorner(n, n) * right;
+    return (a.left.head(n).array() * image.array()).sum();
+  }
+
+  std::vector<TwoSidedPair> pairs_{};
+  std::vector<Complex> own_{};
+};
+
+/// The reduced model of a scene with random numbers, on one rank.
+class Sampler
+{
+public:
+  explicit Sampler(const RobustnessProblem& problem)
+      : problem_(problem), model_(problem), omega_(0.2 * std::numbers::pi * problem.modes.band),
+        equilibrium_options_(problem.equilibrium_options)
+  {
+    // the independent fixed point is a check of single runs
+    if (equilibrium_options_.check_max_iterations < 0) equilibrium_options_.check_max_iterations = 0;
+    const PairShapes pairs = make_pair_shapes(model_.reference(), omega_);
+    reduced_.emplace(model_, trained_shapes(pairs), pairs);
+    if (const auto at = matrices_at(values_at(problem.numbers, std::vector<double>(problem.numbers.size(), 0.5))))
+      reference_ = Reference(*at, problem.modes.band);
+  }
+
+  /// The reduced matrices at a point; nothing without an equilibrium.
+  std::optional<ReducedMatrices> matrices_at(const std::vector<double>& values)
+  {
+    const BranchModel& model = model_.at(values);
+    const auto& [structure, interface] = model;
+    if (!compliance_ || model_.stiffness_changes())
+    {
+      compliance_.reset();
+      compliance_.emplace(structure, interface, equilibrium_options_);
+    }
+    Equilibrium equilibrium = find_equilibrium(structure, interface, *compliance_, closed_, equilibrium_options_);
+    if (equilibrium.outcome.kind != OutcomeKind::converged) return std::nullopt;
+    closed_ = equilibrium.closed;
+    return reduced_->at(model_.coefficients(values), interface, equilibrium);
+  }
+
+  /// The modes in the band; nothing without an equilibrium.
+  std::vector<Complex> modes_of(const ReducedMatrices& at) const
+  {
+    const auto norm = [](const Eigen::MatrixXd& A) { return A.cwiseAbs().colwise().sum().maxCoeff(); };
+    const double floor = 1e-12 * norm(at.K) / norm(at.M); // of a free body's motion, as in section 3.4
+    std::vector<Complex> modes = dense_quadratic_eigenvalues(at.M, at.C, at.K);
+    std::erase_if(modes,
+                  [&](Complex lambda) { return !in_band(lambda, problem_.modes.band) || std::norm(lambda) < floor; });
+    return modes;
+  }
+
+  /// Sets what is found at the values of a sample; its unstable modes join the list.
+  void evaluate(int place, RobustSample& sample, std::vector<UnstableMode>& unstable)
+  {
+    const std::optional<ReducedMatrices> at = matrices_at(sample.values);
+    if (!at) return;
+    sample.known = true;
+    sample.closed = static_cast<int>(std::ranges::count(closed_, 1));
+    Complex worst;
+    for (const Complex lambda : modes_of(*at))
+    {
+      const bool first = worst == 0. || lambda.real() / std::abs(lambda) > worst.real() / std::abs(worst);
+      if (first) worst = lambda;
+      if (!is_unstable(lambda)) continue;
+      ++sample.unstable;
+      const int mode = reference_.nearest(*at, two_sided_pair(at->M, at->C, at->K, lambda));
+      if (first) sample.mode = mode;
+      unstable.push_back({place, mode, lambda});
+    }
+    sample.growth_rate = worst.real();
+    sample.frequency_hz = frequency_of(worst);
+  }
+
+  const Reference& reference() const { return reference_; }
+  Index shapes() const { return reduced_->shapes(); }
+  double error() const { return model_.error(); }
+  int trained() const { return trained_; }
+
+private:
+  /// The modes of the training points, on a basis that they share.
+  MultiVector trained_shapes(const PairShapes& pairs)
+  {
+    SweepSettings settings;
+    for (const UncertainNumber& number : problem_.numbers) settings.key.push_back(number.key);
+    SweepOptions options;
+    options.tolerance = problem_.options.tolerance;
+    const SweepProblem sweep{settings, problem_.model_at, problem_.modes, problem_.modes_options, equilibrium_options_,
+                             options};
+    SweptModel swept(sweep);
+    const SweepLine line{training_values(problem_), false, false};
+    swept.prepare({line});
+    ShapeCollection shapes(model_.reference(), pairs, omega_);
+    for (const std::vector<double>& values : line.points)
+    {
+      if (swept.equilibrium_at(values, false).outcome.kind != OutcomeKind::converged) continue;
+      const PointModes modes = swept.modes_at(values, false);
+      if (modes.outcome.kind != OutcomeKind::converged || modes.pairs.empty()) continue;
+      for (const Side side : {Side::right, Side::left})
+        shapes.add(swept.vectors(modes, side), problem_.options.truncation);
+      ++trained_;
+    }
+    if (trained_ == 0) throw Error("no point of the random numbers has an equilibrium with modes in the band");
+    return shapes.shapes();
+  }
+
+  const RobustnessProblem& problem_;
+  PolynomialModel model_;
+  double omega_; // of energies, a tenth of the band's
+  EquilibriumOptions equilibrium_options_;
+  std::optional<PairCompliance> compliance_{};
+  std::vector<char> closed_{}; // at the equilibrium found last
+  int trained_ = 0;
+  std::optional<ReducedSliding> reduced_{};
+  Reference reference_{};
+};
+
+/// The modes of the full problem in the band; nothing where they were not found.
+std::optional<std::vector<Complex>> full_modes(const RobustnessProblem& problem, const std::vector<double>& values)
+{
+  const BranchModel model = problem.model_at(values);
+  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, problem.equilibrium_options);
+  if (equilibrium.outcome.kind != OutcomeKind::converged) return std::nullopt;
+  const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
+  ModesSettings settings = problem.modes;
+  settings.method = ModesMethod::full;
+  const Modes modes = find_modes(sliding, linearise(sliding), settings, problem.modes_options);
+  if (modes.outcome.kind != OutcomeKind::converged) return std::nullopt;
+  std::vector<Complex> lambda;
+  for (const ComplexMode& mode : modes.modes) lambda.push_back(mode.lambda);
+  return lambda;
+}
+
+/// The largest errors of what is unstable in one of two lists, against the nearest of the other one.
+void compare(const std::vector<Complex>& reduced, const std::vector<Complex>& full, RobustCheck& check)
+{
+  const auto add = [&](const std::vector<Complex>& from, const std::vector<Complex>& to)
+  {
+    for (const Complex lambda : from)
+    {
+      if (!is_unstable(lambda)) continue;
+      double error = std::numeric_limits<double>::infinity();
+      Complex difference;
+      for (const Complex other : to)
+        if (std::abs(other - lambda) < error)
+        {
+          difference = other - lambda;
+          error = std::abs(difference);
+        }
+      check.growth_error = std::max(check.growth_error, std::abs(difference.real()) / std::abs(lambda));
+      check.frequency_error = std::max(check.frequency_error, std::abs(difference.imag()) / std::abs(lambda));
+    }
+  };
+  add(reduced, full);
+  add(full, reduced);
+  check.unstable_reduced = static_cast<int>(std::ranges::count_if(reduced, is_unstable));
+  check.unstable = static_cast<int>(std::ranges::count_if(full, is_unstable));
+}
+
+/// Runs the work of a sample; what is wrong with it leaves it unknown.
+template <class Work> void attempt(Work work)
+{
+  try
+  {
+    work();
+  }
+  catch (const LibraryError&)
+  {
+    throw;
+  }
+  catch (const Error&)
+  {
+  }
+}
+
+/// Calls work(k) for this rank's share of so many pieces of work, between requests to end.
+template <class Work> void for_own(int count, MPI_Comm comm, Progress& progress, Work work)
+{
+  constexpr int between = 16;
+  const int ranks = ranks_of(comm), rank = rank_of(comm);
+  for (int step = 0; step * ranks < count; ++step)
+  {
+    if (step % between == 0) end_if_asked(comm);
+    if (const int k = step * ranks + rank; k < count) attempt([&] { work(k); });
+    progress.update(std::min(count, (step + 1) * ranks), "");
+  }
+}
+
+} // namespace
+
+OptionList options_of(RobustnessOptions& options)
+{
+  return {
+      {"-robustness_training", &options.training, Range::natural, "points whose modes make the basis"},
+      {"-robustness_tolerance", &options.tolerance, Range::positive, "backward error of the modes of those points"},
+      {"-robustness_truncation", &options.truncation, Range::positive,
+       "part of a mode, in energy norm, that the basis may leave out"},
+  };
+}
+
+Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
+{
+  Robustness result;
+  std::optional<Sampler> sampler;
+  try
+  {
+    on_every_rank(comm, [&] { sampler.emplace(problem); });
+  }
+  catch (const Error& error)
+  {
+    result.outcome = {OutcomeKind::refused, error.what(), 0, 0};
+    return result;
+  }
+  for (std::vector<double>& values : random_values(problem)) result.samples.push_back({std::move(values)});
+  for (int k = 0; k < problem.settings.checks; ++k) result.checks.push_back({k});
+  std::vector<UnstableMode> unstable;
+  {
+    Progress progress(comm, "robustness", problem.settings.samples);
+    for_own(problem.settings.samples, comm, progress,
+            [&](int k) { sampler->evaluate(k, result.samples[static_cast<std::size_t>(k)], unstable); });
+  }
+  {
+    Progress progress(comm, "robustness: checks", problem.settings.checks);
+    for_own(problem.settings.checks, comm, progress,
+            [&](int k)
+            {
+              RobustCheck& check = result.checks[static_cast<std::size_t>(k)];
+              const auto& values = result.samples[static_cast<std::size_t>(k)].values;
+              const auto reduced = sampler->matrices_at(values);
+              const auto full = full_modes(problem, values);
+              check.known = reduced && full;
+              if (check.known) compare(sampler->modes_of(*reduced), *full, check);
+            });
+  }
+  share(result.samples, comm);
+  share(result.checks, comm);
+  share(unstable, comm);
+  find_probabilities(result, unstable, sampler->reference().eigenvalues(), problem.settings.confidence);
+  find_correlations(result, problem.numbers.size());
+  result.trained = sampler->trained();
+  result.basis = static_cast<int>(sampler->shapes());
+  result.model_error = sampler->error();
+  assess(result);
+  return result;
+}
+
+} // namespace squeal

@@ -1,0 +1,168 @@
+#include "robustness_summary.hpp"
+
+#include "squeal/base/integers.hpp"
+
+#include <algorithm>
+#include <boost/math/distributions/binomial.hpp>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Complex = std::complex<double>;
+
+void sum_over_ranks(std::vector<double>& values, MPI_Comm comm)
+{
+  MPI_Allreduce(MPI_IN_PLACE, values.data(), to_int(values.size()), MPI_DOUBLE, MPI_SUM, comm);
+}
+
+/// Places of values in ascending order, from 0.
+std::vector<double> ranks_of_values(const std::vector<double>& values)
+{
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::sort(order, {}, [&](std::size_t i) { return values[i]; });
+  std::vector<double> ranks(values.size());
+  for (std::size_t k = 0; k < order.size(); ++k) ranks[order[k]] = static_cast<double>(k);
+  return ranks;
+}
+
+/// Spearman's coefficient of rank correlation.
+double rank_correlation(const std::vector<double>& a, const std::vector<double>& b)
+{
+  if (a.size() < 2) return 0;
+  const std::vector<double> x = ranks_of_values(a), y = ranks_of_values(b);
+  const double n = static_cast<double>(a.size());
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += (x[i] - y[i]) * (x[i] - y[i]);
+  return 1 - 6 * sum / (n * (n * n - 1));
+}
+
+} // namespace
+
+double frequency_of(Complex lambda)
+{
+  return std::abs(lambda.imag()) / (2 * std::numbers::pi);
+}
+
+Probability probability_of(int count, int samples, double confidence)
+{
+  Probability result{count, samples};
+  if (samples == 0) return result;
+  using Binomial = boost::math::binomial_distribution<>;
+  const double outside = (1 - confidence) / 2;
+  result.lower = Binomial::find_lower_bound_on_p(samples, count, outside);
+  result.upper = Binomial::find_upper_bound_on_p(samples, count, outside);
+  return result;
+}
+
+void share(std::vector<RobustSample>& samples, MPI_Comm comm)
+{
+  std::vector<double> flat;
+  for (const RobustSample& s : samples)
+    flat.insert(flat.end(), {s.known ? 1. : 0., static_cast<double>(s.closed), static_cast<double>(s.unstable),
+                             s.growth_rate, s.frequency_hz, s.mode + 1.});
+  sum_over_ranks(flat, comm);
+  for (std::size_t k = 0; k < samples.size(); ++k)
+  {
+    const double* entry = flat.data() + 6 * k;
+    RobustSample& s = samples[k];
+    s = {s.values, entry[0] != 0, static_cast<int>(entry[1]),    static_cast<int>(entry[2]),
+         entry[3], entry[4],      static_cast<int>(entry[5]) - 1};
+  }
+}
+
+void share(std::vector<RobustCheck>& checks, MPI_Comm comm)
+{
+  std::vector<double> flat;
+  for (const RobustCheck& c : checks)
+    flat.insert(flat.end(), {c.known ? 1. : 0., static_cast<double>(c.unstable),
+                             static_cast<double>(c.unstable_reduced), c.growth_error, c.frequency_error});
+  sum_over_ranks(flat, comm);
+  for (std::size_t k = 0; k < checks.size(); ++k)
+  {
+    const double* entry = flat.data() + 5 * k;
+    checks[k] = {checks[k].sample,           entry[0] != 0, static_cast<int>(entry[1]),
+                 static_cast<int>(entry[2]), entry[3],      entry[4]};
+  }
+}
+
+void share(std::vector<UnstableMode>& modes, MPI_Comm comm)
+{
+  const int ranks = ranks_of(comm), mine = 4 * to_int(modes.size());
+  std::vector<int> counts(static_cast<std::size_t>(ranks)), starts(counts.size());
+  MPI_Allgather(&mine, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
+  std::exclusive_scan(counts.begin(), counts.end(), starts.begin(), 0);
+  std::vector<double> own, all(static_cast<std::size_t>(starts.back() + counts.back()));
+  for (const UnstableMode& mode : modes)
+    own.insert(own.end(), {static_cast<double>(mode.sample), static_cast<double>(mode.mode), mode.lambda.real(),
+                           mode.lambda.imag()});
+  MPI_Allgatherv(own.data(), mine, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, comm);
+  modes.clear();
+  for (std::size_t i = 0; i + 3 < all.size(); i += 4)
+    modes.push_back({static_cast<int>(all[i]), static_cast<int>(all[i + 1]), {all[i + 2], all[i + 3]}});
+  std::ranges::stable_sort(modes, {}, &UnstableMode::sample);
+}
+
+void find_correlations(Robustness& result, std::size_t numbers)
+{
+  std::vector<double> growth;
+  std::vector<std::vector<double>> values(numbers);
+  for (const RobustSample& sample : result.samples)
+  {
+    if (!sample.known || sample.frequency_hz == 0) continue;
+    growth.push_back(sample.growth_rate / sample.frequency_hz);
+    for (std::size_t i = 0; i < numbers; ++i) values[i].push_back(sample.values[i]);
+  }
+  for (const std::vector<double>& of_number : values) result.correlation.push_back(rank_correlation(of_number, growth));
+}
+
+void find_probabilities(Robustness& result, const std::vector<UnstableMode>& unstable,
+                        const std::vector<Complex>& reference, double confidence)
+{
+  const auto known = static_cast<int>(std::ranges::count(result.samples, true, &RobustSample::known));
+  const auto any = std::ranges::count_if(result.samples, [](const RobustSample& s) { return s.unstable > 0; });
+  result.any = probability_of(static_cast<int>(any), known, confidence);
+  for (int mode = unmatched; mode < to_int(reference.size()); ++mode)
+  {
+    RobustMode robust;
+    int count = 0, last = -1;
+    for (const UnstableMode& one : unstable)
+    {
+      if (one.mode != mode) continue;
+      robust.growth_rates.push_back(one.lambda.real());
+      robust.frequencies.push_back(frequency_of(one.lambda));
+      count += one.sample != last;
+      last = one.sample;
+    }
+    if (count == 0) continue;
+    if (mode != unmatched) robust.lambda = reference[static_cast<std::size_t>(mode)];
+    robust.number = mode;
+    robust.unstable = probability_of(count, known, confidence);
+    std::ranges::sort(robust.growth_rates);
+    std::ranges::sort(robust.frequencies);
+    result.modes.push_back(std::move(robust));
+  }
+  std::ranges::stable_sort(result.modes, std::greater{}, [](const RobustMode& mode) { return mode.unstable.count; });
+}
+
+void assess(Robustness& result)
+{
+  const auto unknown = std::ranges::count(result.samples, false, &RobustSample::known);
+  const auto failed = std::ranges::count(result.checks, false, &RobustCheck::known);
+  for (const RobustCheck& check : result.checks)
+    result.outcome.residual = std::max(result.outcome.residual, check.growth_error);
+  result.outcome.iterations = static_cast<int>(result.samples.size());
+  result.outcome.kind = unknown + failed > 0 ? OutcomeKind::not_converged : OutcomeKind::converged;
+  if (unknown + failed > 0)
+    result.outcome.reason =
+        format("%ld of %zu samples have no equilibrium, %ld of %zu checks have no modes", static_cast<long>(unknown),
+               result.samples.size(), static_cast<long>(failed), result.checks.size());
+}
+
+} // namespace squeal

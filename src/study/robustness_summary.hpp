@@ -1,0 +1,37 @@
+#pragma once
+/// What the ranks found of random samples, put together: probabilities and correlations (src/README.md, section 12.3).
+#include "squeal/study/robustness.hpp"
+
+namespace squeal
+{
+
+inline constexpr int unmatched = -1; // a mode that is like none of the reference
+
+/// An unstable mode of a sample.
+struct UnstableMode
+{
+  int sample = 0;
+  int mode = unmatched; // of the reference
+  std::complex<double> lambda{};
+};
+
+double frequency_of(std::complex<double> lambda);
+
+/// Gives every rank the samples that each has computed: the others' entries are zero.
+void share(std::vector<RobustSample>& samples, MPI_Comm comm);
+void share(std::vector<RobustCheck>& checks, MPI_Comm comm);
+
+/// Gives every rank all unstable modes, by samples.
+void share(std::vector<UnstableMode>& modes, MPI_Comm comm);
+
+/// Of so many numbers with the growth of the samples.
+void find_correlations(Robustness& result, std::size_t numbers);
+
+/// Probabilities of the unstable modes that are one of the reference's, and of any.
+void find_probabilities(Robustness& result, const std::vector<UnstableMode>& unstable,
+                        const std::vector<std::complex<double>>& reference, double confidence);
+
+/// Sets the outcome.
+void assess(Robustness& result);
+
+} // namespace squeal

@@ -1,0 +1,139 @@
+"""Random numbers: samples against single runs, the exact threshold, probabilities, ranks and seeds; bad input; the picture."""
+
+import csv
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from conftest import INPUTS, ROOT
+
+OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"]
+PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
+       "--set", "modes.method=full", "--set", "modes.band=20000"]
+HOPF = 0.17649288  # exact: the characteristic polynomial of the sliding oscillator has an imaginary pair
+FRICTION = "{key='friction.coefficient', distribution='uniform', from=0.1, to=0.3}"
+
+
+def random(*numbers, **settings):
+    words = [word for name, value in settings.items() for word in ("--set", f"robustness.{name}={value}")]
+    return [*words, "--set", f"uncertain=[{', '.join(numbers)}]"]
+
+
+def rows_of(run):
+    with open(run.output / "robustness.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def friction(tmp_path_factory):
+    from conftest import Run
+    run = Run([*OSCILLATOR, *random(FRICTION, samples=400, checks=10)], 1, tmp_path_factory.mktemp("friction"))
+    assert run.code == 0, run.printed[-2000:] + run.errors[-2000:]
+    return run
+
+
+def test_samples_are_unstable_beyond_the_exact_threshold(friction):
+    for row in rows_of(friction):
+        assert (int(row["unstable_modes"]) > 0) == (float(row["friction.coefficient"]) > HOPF)
+
+
+def test_the_interval_holds_the_exact_probability(friction):
+    """0.4 of 400 samples at most 99.99 % of the time: 3.9 deviations of sqrt(p (1 - p)/n) = 0.024."""
+    exact = (0.3 - HOPF) / 0.2
+    any_mode = friction.report["robustness"]["any"]
+    assert any_mode["lower"] < any_mode["probability"] < any_mode["upper"]
+    assert abs(any_mode["probability"] - exact) < 3.9 * np.sqrt(exact * (1 - exact) / 400)
+    (mode,) = friction.report["robustness"]["modes"]
+    assert mode["probability"] == any_mode["probability"] and mode["mode"] >= 0
+    (number,) = friction.report["robustness"]["numbers"]
+    assert number["rank_correlation"] > 0.9
+
+
+def test_the_checks_agree(friction):
+    """The oscillator has three shapes: the basis holds them all, and only rounding is left."""
+    robustness = friction.report["robustness"]
+    assert robustness["wrong_verdicts"] == 0 and robustness["growth_error"] < 1e-9 and len(robustness["checks"]) == 10
+
+
+def test_files_hold_the_same(friction):
+    rows = rows_of(friction)
+    with h5py.File(friction.output / "history.h5") as file:
+        assert np.allclose(file["robustness/growth_rate"][()], [float(row["growth_rate"]) for row in rows])
+        assert list(file["robustness/mode"][()]) == [int(row["mode"]) for row in rows]
+    assert sum(int(row["unstable_modes"]) > 0 for row in rows) == friction.report["robustness"]["any"]["unstable_samples"]
+
+
+def test_samples_of_the_pin_are_single_runs(converged):
+    """Friction, moduli, a density, a load, a rate and damping at once: growth within 1e-3 of |lambda|, as it is asked for."""
+    numbers = [FRICTION.replace("0.3", "0.5"), "{key='part.pin.young', distribution='lognormal', deviation=2.5e8}",
+               "{key='part.disc.density', deviation=200}", "{key='damping.beta', deviation=1e-8}",
+               "{key='contact.0.rotation.rate', deviation=1}"]
+    run = converged(*PIN, *random(*numbers, samples=30, checks=12), ranks=1)
+    robustness = run.report["robustness"]
+    assert robustness["growth_error"] < 1e-3 and robustness["wrong_verdicts"] == 0
+    assert all(check["known"] for check in robustness["checks"])
+    assert any(check["unstable_modes"] > 0 for check in robustness["checks"])
+    assert robustness["model_error"] < 1e-9  # all of them enter linearly, or as products of two
+    row = rows_of(run)[0]
+    rate = row["contact.0.rotation.rate"]
+    single = converged(*PIN, *[word for key, value in row.items() if "." in key and "rotation" not in key
+                               for word in ("--set", f"{key}={value}")],
+                       "--set", f"contact.0.rotation={{axis='z', rate={rate}}}", ranks=1).report["modes"]
+    assert single["unstable_count"] == int(row["unstable_modes"])
+
+
+def test_ranks_and_seeds(friction, squeal):
+    two = squeal(*OSCILLATOR, *random(FRICTION, samples=400, checks=10), ranks=2)
+    assert two.code == 0
+    first, second = rows_of(friction), rows_of(two)
+    # each sample starts from the closed pairs of another one: only rounding differs
+    assert np.allclose([float(row["growth_rate"]) for row in first], [float(row["growth_rate"]) for row in second],
+                       rtol=1e-9, atol=1e-9)
+    assert two.report["robustness"]["any"] == friction.report["robustness"]["any"]
+    other = squeal(*OSCILLATOR, *random(FRICTION, samples=400, checks=0, seed=2), ranks=1)
+    assert rows_of(other)[0] != first[0]
+
+
+def test_distributions_have_their_moments(converged):
+    """Means to four standard errors, deviations to a tenth: 2000 samples, and the cut-off takes 0.1 % of the deviation."""
+    run = converged(*OSCILLATOR, *random("{key='friction.coefficient', deviation=0.03}",
+                                         "{key='point.pad.mass', distribution='lognormal', deviation=0.3}",
+                                         samples=2000, checks=0), ranks=1)
+    rows = rows_of(run)
+    for key, mean, deviation in (("friction.coefficient", 0.3, 0.03), ("point.pad.mass", 1.0, 0.3)):
+        values = np.array([float(row[key]) for row in rows])
+        assert abs(values.mean() - mean) < 4 * deviation / np.sqrt(2000), key
+        assert abs(values.std() / deviation - 1) < 0.1, key
+    assert min(float(row["point.pad.mass"]) for row in rows) > 0
+
+
+@pytest.mark.parametrize("ask, message", [
+    (["--set", "robustness.samples=10"], "has no random number"),
+    (["--set", "uncertain=[{key='friction.coefficient', deviation=0.1}]"], "is part of [robustness]"),
+    (random("{key='friction.coefficent', deviation=0.1}", samples=10), "is not in the scene"),
+    (random("{key='friction.coefficient'}", samples=10), "needs a deviation"),
+    (random("{key='friction.coefficient', distribution='uniform'}", samples=10), "give from"),
+    (random("{key='friction.coefficient', deviation=0.2}", samples=10), "is no scene"),
+    (random("{key='friction.coefficient', deviation=0.1, from=0.1}", samples=10), "not from and to"),
+    (random(FRICTION, FRICTION, samples=10), "twice"),
+    (random(FRICTION, samples=10, checks=11), "at most as many"),
+    (random(FRICTION, samples=10, confidence=1), "between 0 and 1"),
+])
+def test_bad_input(ask, message, squeal):
+    run = squeal(*OSCILLATOR, *ask, ranks=1)
+    assert run.code == 1 and message in run.errors, run.errors
+
+
+def test_numbers_that_move_the_contact_are_refused(squeal):
+    run = squeal(*PIN, *random("{key='contact.0.rotation.centre.0', distribution='uniform', from=-0.01, to=0.01}",
+                               samples=10, checks=0), ranks=1)
+    robustness = run.report["robustness"]
+    assert robustness["outcome"] == "refused" and "rows of contact" in robustness["reason"]
+
+
+def test_picture(friction, tmp_path):
+    subprocess.run([sys.executable, ROOT / "tools" / "plot", friction.output, "--only", "robustness", "--output", tmp_path],
+                   check=True)
+    assert (tmp_path / "robustness.png").stat().st_size > 10000

@@ -1,0 +1,75 @@
+"""Picture of random samples: probability of each unstable mode, the damping ratios of all samples, and what drives them."""
+
+import numpy as np
+from plot_basis import heading, plt, those_with
+from plot_sweep import COLOURS
+from squeal import Missing
+
+
+def robustness_of(results):
+    robustness = results.stage("robustness")
+    if robustness["samples"] == 0:
+        raise Missing("the run has no random samples")
+    return robustness
+
+
+def name_of(mode):
+    if mode["mode"] < 0:
+        return "other modes"
+    frequency = mode["median_frequency_hz"]
+    return f"{frequency:.0f} Hz" if frequency >= 10 else f"{frequency:.3g} Hz"
+
+
+def draw_probabilities(axes, robustness):
+    """A bar for any mode and one for each mode, with its interval."""
+    entries = [("any mode", robustness["any"])] + [(name_of(mode), mode) for mode in robustness["modes"][:8]]
+    for place, (_, entry) in enumerate(entries):
+        middle = 100 * entry["probability"]
+        error = [[middle - 100 * entry["lower"]], [100 * entry["upper"] - middle]]
+        axes.barh(place, middle, height=0.6, xerr=error, capsize=4, error_kw={"ecolor": "0.2", "lw": 1.2},
+                  color="0.55" if place == 0 else COLOURS[(place - 1) % len(COLOURS)])
+    axes.set_yticks(range(len(entries)), [name for name, _ in entries])
+    axes.invert_yaxis()
+    axes.set_xlim(0, max(1e-3, min(100, 110 * max(entry["upper"] for _, entry in entries))))
+    axes.set_xlabel(f"probability of instability [%], {100 * robustness['confidence']:.3g} % interval")
+
+
+def draw_growth(axes, table):
+    """Histogram of growth over omega of the mode that grows most; unstable samples in red."""
+    chosen = (table["known"] == 1) & (table["frequency"] > 0)
+    ratio = 100 * table["growth_rate"][chosen] / (2 * np.pi * table["frequency"][chosen])
+    width = max(np.ptp(ratio) / 40, 1e-12)
+    bins = width * np.arange(np.floor(ratio.min() / width), np.ceil(ratio.max() / width) + 1.5)  # zero is an edge
+    axes.hist(ratio[ratio <= 0], bins=bins, color="0.7", label="stable")
+    axes.hist(ratio[ratio > 0], bins=bins, color=COLOURS[0], label="unstable")
+    axes.axvline(0, color="0.2", lw=0.8)
+    axes.set_xlabel("largest growth rate over omega [%]")
+    axes.set_ylabel("samples")
+    axes.legend(fontsize=8)
+
+
+def draw_drivers(axes, robustness):
+    """Rank correlations of the numbers with growth."""
+    numbers = robustness["numbers"]
+    for place, number in enumerate(numbers):
+        value = number["rank_correlation"]
+        axes.barh(place, value, height=0.6, color=COLOURS[0] if value > 0 else COLOURS[1])
+    axes.axvline(0, color="0.2", lw=0.8)
+    axes.set_xlim(-1, 1)
+    axes.set_xticks([-1, -0.5, 0, 0.5, 1])
+    axes.set_yticks(range(len(numbers)), [number["key"] for number in numbers])
+    axes.invert_yaxis()
+    axes.set_xlabel("rank correlation with growth")
+
+
+def draw_robustness(runs):
+    (results, robustness), *_ = those_with(runs, robustness_of)
+    table = {name: results.series("robustness", name) for name in ("known", "growth_rate", "frequency")}
+    rows = max(len(robustness["numbers"]), 1 + min(8, len(robustness["modes"])))
+    figure, axes = plt.subplots(1, 3, figsize=(13.5, 2.4 + 0.35 * rows))
+    draw_probabilities(axes[0], robustness)
+    draw_growth(axes[1], table)
+    draw_drivers(axes[2], robustness)
+    figure.suptitle(heading([results], f"{robustness['samples']} random samples, "
+                            f"growth checked to {robustness['growth_error']:.1e} of the full problem"))
+    return figure
