@@ -127,7 +127,9 @@ RUNS = {
                    "--set", "branch.key=friction.coefficient", "--set", "branch.from=0.28", "--set", "branch.to=0.32",
                    "--set", "branch.points=4", "--set", "cycle.starts=2", "--set", "sweep.key=friction.coefficient", "--set",
                    "sweep.from=0.1", "--set", "sweep.to=0.3", "--set", "sweep.points=3", "--set",
-                   "change=[{probe='pad_y',mass=1e-3}]", "--set", "sensitivity.numbers=friction.coefficient"],
+                   "change=[{probe='pad_y',mass=1e-3}]", "--set", "robustness.samples=10", "--set", "robustness.checks=2",
+                   "--set", "uncertain=[{key='friction.coefficient', deviation=0.01}]", "--set",
+                   "sensitivity.numbers=friction.coefficient"],
     # the reduced model, a rotation, a mesh; coarse, and damped like this, its cycle is found in a second
     "pin_on_disc": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
                     "damping.beta=6e-7", "--set", "cycle.steps_per_period=40", "--set", "fidelity=auto",

@@ -180,29 +180,30 @@ TEST_CASE("a step that may have several solutions under falling friction is refu
         const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, {});
         CHECK(fall_of_friction(step, model.interface, equilibrium.reactions) ==
               doctest::Approx(fall(h, theta)).epsilon(1e-3)); // thirty passes of power iteration
-        CHECK(friction_refusal(sliding, nullptr, theta, h, {}).empty() == (fall(h, theta) < 1));
-        CHECK(friction_refusal(sliding, nullptr, theta, h, {.refuse = false}).empty());
+        CHECK(friction_refusal(sliding, nullptr, theta, h, {}, 1).empty() == (fall(h, theta) < 1));
+        CHECK(friction_refusal(sliding, nullptr, theta, h, {.refuse = false}, 1).empty());
       }
     ComplexMode mode;
     mode.lambda = {0.1, 1};
-    const std::string reason = friction_refusal(sliding, &mode, 0.5, 0.3, {});
+    const std::string reason = friction_refusal(sliding, &mode, 0.5, 0.3, {}, 1);
     const std::size_t end = reason.find(" steps a period would do");
     REQUIRE(end != std::string::npos);
     const double steps = std::stod(reason.substr(reason.rfind(' ', end - 1)));
     const double enough = 2 * std::numbers::pi / steps;
-    CHECK(friction_refusal(sliding, &mode, 0.5, enough, {}).empty());
+    CHECK(friction_refusal(sliding, &mode, 0.5, enough, {}, 1).empty());
     CHECK(fall(enough, 0.5) > 0.5); // not far too many
   }
   const test::SmallModel rising = row_on_belt(1, {0.6, true, 0.2, 0.01}, 2);
   const Equilibrium equilibrium = find_equilibrium(rising.structure, rising.interface, {});
-  CHECK(friction_refusal({rising.structure, rising.interface, equilibrium}, nullptr, 0.5, 1, {}).empty());
+  CHECK(friction_refusal({rising.structure, rising.interface, equilibrium}, nullptr, 0.5, 1, {}, 1).empty());
 }
 
 TEST_CASE("where contact nodes have no mass, no step has one solution under falling friction, and the refusal says so")
 {
   const test::SmallModel model = row_on_belt(1, {0.2, true, 0.6, 0.01}, 0);
   const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
-  const std::string reason = friction_refusal({model.structure, model.interface, equilibrium}, nullptr, 0.5, 0.1, {});
+  const std::string reason =
+      friction_refusal({model.structure, model.interface, equilibrium}, nullptr, 0.5, 0.1, {}, 1);
   CHECK(reason.find("no shorter step would do") != std::string::npos);
 }
 

@@ -23,8 +23,9 @@ enum class Stage
   robustness,
 };
 
-inline constexpr std::array stage_names = {"model",   "equilibrium", "modes",  "estimate",    "transient", "cycle",
-                                           "settled", "attractors",  "branch", "sensitivity", "sweep",     "robustness"};
+inline constexpr std::array stage_names = {"model",     "equilibrium", "modes",   "estimate",
+                                           "transient", "cycle",       "settled", "attractors",
+                                           "branch",    "sensitivity", "sweep",   "robustness"};
 
 inline Words words_of(Stage)
 {
