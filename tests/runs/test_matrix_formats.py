@@ -11,6 +11,7 @@ import scipy.io
 import scipy.linalg
 import scipy.sparse as sparse
 from conftest import ROOT, load_tool
+from output4_files import OP4_FILES
 
 MATRICES = load_tool("matrices")
 NODES = np.array([7, 11, 12, 40, 41, 1000])
@@ -190,37 +191,6 @@ def test_every_format_gives_the_eigenvalues_of_dense_algebra(tmp_path, write):
     again, again_labels, *_ = MATRICES.read_model(tmp_path / "out")
     assert all((again[name] != found[name]).nnz == 0 for name in "MK")
     assert labels is None or (again_labels == labels).all()
-
-
-# What pyyeti's op4.write made of [[4, -1, 0], [-1, 3, 1/3], [0, 1/3, 2]]: an independent writer.
-OP4_TEXT = """       3{rows:8d}       6       2KAA     1P,3E23.16
-       1{first}
- 4.0000000000000000E+00-1.0000000000000000E+00
-       2{second}
--1.0000000000000000E+00 3.0000000000000000E+00 3.3333333333333331E-01
-       3{third}
- 3.3333333333333331E-01 2.0000000000000000E+00
-       4       1       1
- 1.4142135623730951E+00
-"""
-OP4_FILES = {
-    "text dense": OP4_TEXT.format(rows=3, first="       1       2", second="       1       3", third="       2       2"),
-    "text sparse": OP4_TEXT.format(rows=3, first="       0       5\n     327681", second="       0       7\n     458753",
-                                   third="       0       5\n     327682"),
-    "text sparse, many rows": OP4_TEXT.format(rows=-3, first="       0       6\n       5       1",
-                                              second="       0       8\n       7       1",
-                                              third="       0       6\n       5       2"),
-    "binary sparse": bytes.fromhex(
-        "18000000030000000300000006000000020000004b414120202020201800000020000000010000000000000005000000010005000000000000001040"
-        "000000000000f0bf200000002800000002000000000000000700000001000700000000000000f0bf0000000000000840555555555555d53f28000000"
-        "2000000003000000000000000500000002000500555555555555d53f00000000000000402000000014000000040000000100000002000000cd3b7f66"
-        "9ea0f63f14000000"),
-    "binary sparse, many rows": bytes.fromhex(
-        "1800000003000000fdffffff06000000020000004b414120202020201800000024000000010000000000000006000000050000000100000000000000"
-        "00001040000000000000f0bf240000002c0000000200000000000000080000000700000001000000000000000000f0bf000000000000084055555555"
-        "5555d53f2c000000240000000300000000000000060000000500000002000000555555555555d53f0000000000000040240000001400000004000000"
-        "0100000002000000cd3b7f669ea0f63f14000000"),
-}
 
 
 @pytest.mark.parametrize("kind", OP4_FILES)
