@@ -1,5 +1,5 @@
 #pragma once
-/// The corrector of a branch: closed orbits beside a predicted one (src/README.md, section 10.2).
+/// The corrector of a branch: closed orbits beside a predicted one (src/README.md, section 9.2).
 ///
 /// Quasi-Newton on z = (x, T, p) with the rows of phase and arclength. Pairs (dz, P^-1 dF) of earlier steps stand for
 /// the Jacobian. Where they serve no longer, GCR with exact columns of the tangent solves the linear system, and its

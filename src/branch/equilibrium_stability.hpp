@@ -1,5 +1,5 @@
 #pragma once
-/// The stability of the sliding equilibrium along the parameter of a branch (src/README.md, section 10.3).
+/// The stability of the sliding equilibrium along the parameter of a branch (src/README.md, section 9.3).
 #include "brake_family.hpp"
 
 namespace squeal

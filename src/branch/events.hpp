@@ -1,5 +1,5 @@
 #pragma once
-/// Events between two points of a branch, and where they happen (src/README.md, section 10.3).
+/// Events between two points of a branch, and where they happen (src/README.md, section 9.3).
 #include "corrector.hpp"
 
 namespace squeal

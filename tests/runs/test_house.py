@@ -112,6 +112,61 @@ def test_the_reduced_model_knows_no_flow():
     assert files and not {target for _, target in includes} & {"cycle", "shooting"}, includes
 
 
+def numbers_in(text):
+    """The sections that a text cites in the forms "section 2.4", "sections 3.6 and 3.7", "sections 4.1 to 4.3"."""
+    text = re.sub(r"\s*\n\s*///?\s*", " ", text)
+    lists = re.findall(r"src/README\.md, sections? (\d[\d.]*\d|\d)((?:(?:, | and | to )\d[\d.]*\d?)*)", text)
+    return [number for first, rest in lists for number in [first, *re.findall(r"\d+(?:\.\d+)*", rest)]]
+
+
+def method():
+    """The sections of the method, and the chapters that its folder map gives to each room."""
+    text = (ROOT / "src" / "README.md").read_text()
+    rooms = dict(re.findall(r"^\| `(\w+)` \| .* \|([^|]*)\|$", text, re.M))
+    return (
+        set(re.findall(r"^##+ (\d+(?:\.\d+)*) ", text, re.M)),
+        {room: {number.split(".")[0] for number in re.findall(r"\d+(?:\.\d+)?", cell)} for room, cell in rooms.items()},
+    )
+
+
+def test_cited_sections_exist():
+    """Also those that no source cites, but a test, a tool or a page."""
+    sections, rooms = method()
+    assert {"1.2", "4.13", "9"} <= sections and set(ALLOWED) == set(rooms), set(ALLOWED) ^ set(rooms)
+    files = [f for folder in ("src", "include", "tests", "tools", "inputs", "jobs") for f in sorted((ROOT / folder).rglob("*"))
+             if f.suffix in (".cpp", ".hpp", ".py", ".sh", ".md")]
+    wrong = [
+        f"{file.relative_to(ROOT)} cites section {number}"
+        for file in [*files, ROOT / "README.md"]
+        for number in numbers_in(file.read_text())
+        if number not in sections
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_sources_cite_the_chapters_of_their_room():
+    """A file may cite other chapters beside one of its own room's."""
+    _, rooms = method()
+    wrong = []
+    for file in sources("src", "include"):
+        cited = {number.split(".")[0] for number in numbers_in(file.read_text())}
+        chapters = rooms.get(file.parent.name, set())
+        if cited and chapters and not cited & chapters:
+            wrong.append(f"{file.relative_to(ROOT)} cites chapters {sorted(cited)}; its room has {sorted(chapters)}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_every_chapter_of_a_room_is_cited_there():
+    """grep "section N" then leads from each chapter of equations to sources."""
+    _, rooms = method()
+    cited = {room: set() for room in rooms}
+    for file in sources("src", "include"):
+        if file.parent.name in cited:
+            cited[file.parent.name] |= {number.split(".")[0] for number in numbers_in(file.read_text())}
+    missing = {room: sorted(chapters - cited[room]) for room, chapters in rooms.items() if chapters - cited[room]}
+    assert not missing, missing
+
+
 def test_sources_are_formatted():
     files = [str(f) for f in sources("src", "include", "tests")]
     done = subprocess.run(["clang-format", "--dry-run", "--Werror", *files], capture_output=True, text=True)

@@ -1,6 +1,6 @@
 #pragma once
 /// The branch of a brake's limit cycle along a number of its scene, beside the stability of its sliding equilibrium
-/// (src/README.md, section 10).
+/// (src/README.md, section 9).
 ///
 /// States are absolute, so that a change of the parameter changes the step alone.
 #include "squeal/branch/continuation.hpp"

@@ -1,5 +1,5 @@
 #pragma once
-/// Branches of periodic orbits of a family of flows, by pseudo-arclength (src/README.md, section 10):
+/// Branches of periodic orbits of a family of flows, by pseudo-arclength (src/README.md, section 9.1):
 ///     Phi_T(x; p) - x = 0,   <f, dx> = 0,   <t, dz> = 0,   z = (x, T, p).
 /// f is the flow's direction, t the direction of the last step. Steps are measured in the scaled unknowns, x over the
 /// fluctuation, T over itself, p over its range. The family is all that is known of a model.
