@@ -148,7 +148,10 @@ TEST_CASE("an application of the brake from standstill to stop balances its ener
       CHECK(moved.ends_stuck);
       CHECK(std::abs(moved.velocity) < 1e-12);
       CHECK(moved.largest_defect < 1e-14);
-      CHECK(moved.least_heat > -1e-13); // contact tolerance times the reactions' power in a step
+      // A step in which the belt stops may give back what friction does along the sliding that the belt's ramp of
+      // 0.2/15 loses in it.
+      const double h = 70. / steps;
+      CHECK(moved.least_heat > -0.5 * N * (0.2 / 15) * h * h);
       CHECK(moved.drive > 10 * moved.energy);
       if (theta != 0.5) continue; // the scheme itself takes energy
       CHECK(moved.energy == approx(moved.load + moved.contact, 1e-11));
