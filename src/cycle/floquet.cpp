@@ -1,6 +1,7 @@
 #include "floquet.hpp"
 
 #include "reduced_spectrum.hpp"
+#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 
 #include <algorithm>
@@ -112,6 +113,30 @@ bool as_many_above(double limit, const std::vector<Complex>& a, const std::vecto
   const auto above = [](double least, const std::vector<Complex>& values)
   { return std::count_if(values.begin(), values.end(), [&](Complex value) { return std::abs(value) > least; }); };
   return above(limit + margin, a) <= above(limit - margin, b) && above(limit + margin, b) <= above(limit - margin, a);
+}
+
+/// Whether each value of `a` above the limit has one of `b` that is no further from it than 1 is from its modulus: none
+/// can have crossed 1 from the one to the other, and none is missing there.
+bool have_partners(double limit, const std::vector<Complex>& a, const std::vector<Complex>& b)
+{
+  constexpr double margin = 5e-3; // of values next to 1
+  std::vector<Complex> large;
+  for (const Complex value : a)
+    if (std::abs(value) > limit) large.push_back(value);
+  if (large.size() > b.size()) return false;
+  const std::vector<std::size_t> places = nearest_places(large, b);
+  for (std::size_t i = 0; i < large.size(); ++i)
+    if (std::abs(b[places[i]] - large[i]) > std::max(margin, std::abs(1 - std::abs(large[i])))) return false;
+  return true;
+}
+
+/// The same both ways. Lists that are cut off are compared above their smallest values.
+bool alike(double limit, const std::vector<Complex>& a, const std::vector<Complex>& b)
+{
+  for (const std::vector<Complex>* values : {&a, &b}) // a pair that would exceed the number is left out whole
+    if (static_cast<int>(values->size()) >= wanted.at_most - 1)
+      limit = std::max(limit, std::abs(values->back()) + 1e-2);
+  return have_partners(limit, a, b) && have_partners(limit, b, a);
 }
 
 /// Reduced vectors as states of the full model; of left ones those that act on the model's states by the energy
@@ -229,7 +254,17 @@ bool holds_every_motion(const ReducedModel& model, int eliminated, Vec state)
   return model.size() + eliminated == dofs;
 }
 
-/// Whether the model without its highest modes has as many multipliers above 0.95. The attachments stay: friction on
+/// Whether three quarters of the shapes give as many multipliers above 0.95.
+bool confirmed_by_fewer_shapes(const ReducedModel& model, const ReducedMap& map, double period,
+                               std::span<const RecordedContact> contacts, const std::vector<Complex>& values,
+                               MPI_Comm comm)
+{
+  const ReducedModel smaller = truncated(model, (3 * model.size() + 3) / 4);
+  ReducedMap few{smaller, map.steps, map.theta};
+  return as_many_above(0.95, values, large_multipliers(few, period, contacts, wanted, comm).values);
+}
+
+/// Whether the model without its highest modes has the same multipliers above 0.95. The attachments stay: friction on
 /// pairs without their own flexibility is another problem.
 bool confirmed_by_fewer_modes(const ReducedModel& model, const ReducedMap& map, double period,
                               std::span<const RecordedContact> contacts, const std::vector<Complex>& values,
@@ -237,7 +272,7 @@ bool confirmed_by_fewer_modes(const ReducedModel& model, const ReducedMap& map, 
 {
   const ReducedModel smaller = without_modes_apart(model);
   ReducedMap few{smaller, map.steps, map.theta};
-  return as_many_above(0.95, values, large_multipliers(few, period, contacts, wanted, comm).values);
+  return alike(0.95, values, large_multipliers(few, period, contacts, wanted, comm).values);
 }
 
 /// x = (A_r - m)^-1 x: the reduced resolvent on the state's coordinates, -1/m on what those miss.
@@ -292,6 +327,7 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
   }
   set_grid_errors(spectrum, own, other_steps, period, contacts, slow);
   slow.confirmed = holds_every_motion(model, eliminated_pairs(problem, periods), start) ||
+                   confirmed_by_fewer_shapes(model, own, period, recorded, spectrum.values, comm) ||
                    confirmed_by_fewer_modes(model, own, period, recorded, spectrum.values, comm);
   slow.right = lifted(model, spectrum.right, start);
   slow.left = lifted(model, energy_representatives(model, spectrum.left), start);

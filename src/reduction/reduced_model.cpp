@@ -259,8 +259,8 @@ MatrixXd by_falling_period(const MatrixXd& mass, double omega, Index& slow)
   return spectrum.eigenvectors().rowwise().reverse();
 }
 
-/// Replaces the columns by the basis: the modes, the attachments next to them, the modes kept apart, all by falling
-/// period. `E`: K_z + omega^2 M_z; `of_modes`: columns of modes, `apart` of them the last columns of all.
+/// Replaces the columns by the basis: the modes, the attachments next to them, all by falling period. `E`: K_z +
+/// omega^2 M_z; of the modes' columns the last ones are kept apart.
 void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, std::pair<Index, Index> of_modes_and_apart,
                   double threshold)
 {
@@ -269,12 +269,13 @@ void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, std
   Orthonormal basis{energy, MatrixXd(columns.columns(), 0)};
   model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
   model.modes += extend(basis, of_modes - apart - 2, 1e-6);
-  model.attachments = extend(basis, columns.columns() - of_modes, threshold);
-  const int last = extend(basis, apart, threshold);
+  const int before = model.modes;
+  const int last = extend(basis, apart, 1e-6);
   model.modes += last;
+  model.attachments = extend(basis, columns.columns() - of_modes, threshold);
   const MatrixXd mass = basis.T.transpose() * (gram_matrix(M_z, columns) * basis.T);
   const MatrixXd turn = by_falling_period(mass, model.omega, model.slow);
-  model.apart = turn.bottomRows(last).transpose();
+  model.apart = turn.middleRows(before, last).transpose();
   columns = combination(columns, basis.T * turn);
 }
 
@@ -372,10 +373,7 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   ModeColumns of_modes = mode_columns(modes, reduction, contact.Z);
   MultiVector& columns = of_modes.columns;
   const Index modal = columns.columns();
-  const MultiVector last{columns.comm, columns.entries.rightCols(of_modes.apart)};
-  columns.entries.conservativeResize(Eigen::NoChange, modal - of_modes.apart);
   append(columns, attachment_columns(E, forces(BZ), reduction.factor));
-  append(columns, last);
   model.omega = omega;
   choose_basis(model, E, M_z, columns, {modal, of_modes.apart}, reduction.threshold);
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
@@ -406,14 +404,13 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   return model;
 }
 
-ReducedModel without_modes_apart(const ReducedModel& model)
+namespace
 {
-  const Index size = model.size(), apart = model.apart.cols();
-  MatrixXd basis = MatrixXd::Identity(size, size);
-  if (apart > 0) Eigen::HouseholderQR<MatrixXd>(model.apart).householderQ().applyThisOnTheLeft(basis);
-  basis = basis.rightCols(size - apart).eval();
+
+/// The model on fewer shapes, the columns of `basis`, without the shapes themselves.
+ReducedModel on_shapes(const ReducedModel& model, const MatrixXd& basis, Index slow)
+{
   ReducedModel result;
-  basis *= by_falling_period(basis.transpose() * model.M_z * basis, model.omega, result.slow);
   for (MatrixXd ReducedModel::*const part : {&ReducedModel::M, &ReducedModel::C, &ReducedModel::K, &ReducedModel::M_z,
                                              &ReducedModel::C_z, &ReducedModel::K_z})
     result.*part = basis.transpose() * (model.*part * basis);
@@ -426,7 +423,26 @@ ReducedModel without_modes_apart(const ReducedModel& model)
   result.drive = model.drive;
   result.reactions = model.reactions;
   result.omega = model.omega;
+  result.slow = slow;
   return result;
+}
+
+} // namespace
+
+ReducedModel truncated(const ReducedModel& model, Index size)
+{
+  return on_shapes(model, MatrixXd::Identity(model.size(), size), std::min(model.slow, size));
+}
+
+ReducedModel without_modes_apart(const ReducedModel& model)
+{
+  const Index size = model.size(), apart = model.apart.cols();
+  MatrixXd basis = MatrixXd::Identity(size, size);
+  if (apart > 0) Eigen::HouseholderQR<MatrixXd>(model.apart).householderQ().applyThisOnTheLeft(basis);
+  basis = basis.rightCols(size - apart).eval();
+  Index slow = 0;
+  basis *= by_falling_period(basis.transpose() * model.M_z * basis, model.omega, slow);
+  return on_shapes(model, basis, slow);
 }
 
 ReducedState coordinates(const ReducedModel& model, const Structure& structure, Vec du, Vec v)

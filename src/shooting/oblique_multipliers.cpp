@@ -262,8 +262,9 @@ void take_out_shift(Passes& passes)
       passes.rises.push_back(0);
     }
     passes.pairs[other].lambda = 2 * value.real() - 1;
-    passes.bars[other] += passes.shift_distance;
-    passes.rises[other] += passes.shift_distance;
+    // 1 and 2 Re m - 1 have the sum of both; their product is off by |m - 1|^2, and so are the entries behind it
+    passes.bars[other] += passes.shift_distance * passes.shift_distance;
+    passes.rises[other] += passes.shift_distance * passes.shift_distance;
   }
   if (place == count) return;
   passes.pairs.erase(passes.pairs.begin() + static_cast<std::ptrdiff_t>(place));

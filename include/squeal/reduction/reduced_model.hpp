@@ -66,7 +66,7 @@ struct Reduction
   bool sliding = false;    // the active pairs slide along the drive throughout
   const RealModes* real = nullptr; // frictionless ones; those above the complex modes are taken, too. Null: none
   FactorOptions factor{};
-  double apart = 0; // part of the modes, those of highest frequency, that come after the attachments
+  double apart = 0; // part of the modes, those of highest frequency, that `apart` of the model holds
 };
 
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
@@ -82,6 +82,9 @@ struct PairRoles
 
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, const PairRoles& roles,
                     const Reduction& reduction);
+
+/// The model on its first `size` shapes, those of longest period, without the shapes themselves.
+ReducedModel truncated(const ReducedModel& model, Eigen::Index size);
 
 /// The model without what the modes kept apart add to its other shapes, and without the shapes themselves.
 ReducedModel without_modes_apart(const ReducedModel& model);
