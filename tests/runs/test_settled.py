@@ -113,7 +113,7 @@ def test_where_no_cycle_of_the_pin_attracts_the_settled_motion_answers(converged
     another start, agree within both bars."""
     pin = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "modes.method=full", "--set", "friction.coefficient=0.4", "--set",
            "fidelity=full"]
-    run = converged(*pin, "-cycle_free_periods", "40", "-settled_periods", "256", ranks=1)
+    run = converged(*pin, "-cycle_free_periods", "80", "-settled_periods", "256", ranks=1)
     report = run.report
     settled = report["settled"]
     assert report["cycle"]["outcome"] == settled["outcome"] == "settled"
