@@ -1,3 +1,4 @@
+import time
 """The jobs under a real Slurm of one node: they fail with their runs, end in order, and go on when they are queued again."""
 
 import functools
@@ -122,6 +123,7 @@ def test_the_time_limit_queues_a_job_again_which_goes_on(slurm, limited):
     report = report_of(folder / "estimate")
     assert report["exit_code"] == 3 and report["transient"]["outcome"] == "interrupted"
     steps = report["transient"]["steps"]
+    time.sleep(5)  # the credential of the ended start is revoked meanwhile
     slurm.command("scontrol", "update", f"jobid={number}", "starttime=now", "timelimit=60")
     job = slurm.wait_for_state(number, ("RUNNING",))
     one_node.wait_for(lambda: printed(job).count("goes on from the checkpoint") == 1, 30, lambda: printed(job)[-2000:])
