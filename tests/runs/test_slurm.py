@@ -1,9 +1,9 @@
-import time
 """The jobs under a real Slurm of one node: they fail with their runs, end in order, and go on when they are queued again."""
 
 import functools
 import json
 import os
+import time
 
 import pytest
 import slurm as one_node
