@@ -6,13 +6,10 @@
 /// 1975). The largest Ritz values of (1 - V (W'V)^-1 W') A, V = Q y, are sought in a block Arnoldi space. Where
 /// they are below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not
 /// proven.
-#include "monodromy.hpp"
-#include "state_block.hpp"
+#include "deflated_search.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <numeric>
 
 namespace squeal
@@ -25,39 +22,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Complex = std::complex<double>;
 
-constexpr double least_part = 1e-10;      // of a direction, or it is dropped: rounding of the energy product's squares
 constexpr double largest_condition = 1e6; // of W'V: beyond, an error of 1e-10 in Z is one of 1e-4 in mu
 constexpr int passes_at_most = 8;
-constexpr Index block_size = 6; // of the search beside V
-
-/// X -> dPhi_T/dx X
-StateBlock image_of(const Monodromy& monodromy, const StateBlock& X)
-{
-  const std::vector<Owned<Vec>> states = states_of(X, monodromy.orbit.state);
-  multiply(monodromy, states);
-  return block_of(states);
-}
-
-/// V (W'V)^-1 W'
-struct Projector
-{
-  StateBlock V, W; // W holds energy images of left vectors
-  Eigen::ColPivHouseholderQR<MatrixXd> gram{};
-};
-
-/// Makes the projector fit V, which is orthonormal. Returns the condition of W'V.
-double fit(Projector& projector)
-{
-  const MatrixXd gram = inner_products(projector.W, projector.V);
-  const Eigen::VectorXd sizes = Eigen::JacobiSVD<MatrixXd>(gram).singularValues();
-  projector.gram.compute(gram);
-  return sizes.size() == 0 ? 1 : sizes(0) / std::max(sizes(sizes.size() - 1), 1e-300);
-}
-
-MatrixXd coefficients(const Projector& projector, const StateBlock& X)
-{
-  return projector.gram.solve(inner_products(projector.W, X));
-}
 
 std::vector<Complex> values_of(const std::vector<DenseEigenpair>& pairs)
 {
@@ -153,22 +119,17 @@ void project(const Monodromy& monodromy, const SlowMotions& slow, const std::vec
   }
 }
 
-/// The pairs that need another pass: the largest and those whose bars reach across 1, while they change. The first
-/// change is the reduced model's error, and says little of what the projection has.
-std::vector<std::size_t> pairs_to_refine(const Passes& passes, bool first)
+/// The pairs that decide: the largest and those whose bars reach across 1.
+std::vector<std::size_t> deciding_pairs(const Passes& passes)
 {
-  constexpr double settled = 2.5e-7; // what other ranks or starts may add up to: below 1e-6
   double largest = 0;
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
     if (i != passes.shift) largest = std::max(largest, std::abs(passes.pairs[i].lambda));
-  std::vector<std::size_t> refined;
+  std::vector<std::size_t> deciding;
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
-  {
-    const bool matters =
-        i != passes.shift && (reaches_across(passes, i) || std::abs(passes.pairs[i].lambda) > largest - 1e-9);
-    if (matters && (first || passes.changes[i] > settled)) refined.push_back(i);
-  }
-  return refined;
+    if (i != passes.shift && (reaches_across(passes, i) || std::abs(passes.pairs[i].lambda) > largest - 1e-9))
+      deciding.push_back(i);
+  return deciding;
 }
 
 /// (A_r - m)^-1 (A - m) Q y of the pairs, real and imaginary parts.
@@ -224,15 +185,18 @@ bool meaningless(const Passes& passes)
   return false;
 }
 
-/// Two passes or more, until what decides has settled. Returns why the vectors do not serve, or nothing.
+/// Two passes or more, until the pairs that decide have settled. The first change is the reduced model's error, and
+/// says little of what the projection has. Returns why the vectors do not serve, or nothing.
 std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Passes& passes)
 {
   if (std::string refusal = begin_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
+  constexpr double settled = 2.5e-7; // what other ranks or starts may add up to: below 1e-6
   std::vector<std::size_t> refined;
   for (int pass = 1;; ++pass)
   {
     project(monodromy, slow, refined, passes);
-    refined = pairs_to_refine(passes, pass == 1);
+    refined = deciding_pairs(passes);
+    if (pass > 1) std::erase_if(refined, [&](std::size_t i) { return passes.changes[i] <= settled; });
     if (refined.empty() || pass == passes_at_most) break;
     if (extend(monodromy, corrections(monodromy, slow, refined, passes), passes) == 0) break;
   }
@@ -272,90 +236,7 @@ void take_out_shift(Passes& passes)
     bars->erase(bars->begin() + static_cast<std::ptrdiff_t>(place));
 }
 
-/// What the search beside V found.
-struct Search
-{
-  bool bounded = false; // its largest Ritz value is below 1 by more than its residual
-  Complex largest = 0;  // that value
-  double residual = 0;
-  long columns = 0;
-};
-
-/// X without what lies in V.
-void deflate(const Projector& projector, StateBlock& X)
-{
-  subtract(X, projector.V, coefficients(projector, X));
-}
-
-/// The motions that lie least in V, at most a block of them.
-StateBlock start_beside(const Monodromy& monodromy, const Projector& projector, const std::vector<Owned<Vec>>& motions)
-{
-  constexpr double enough = 0.1; // of a motion's norm
-  StateBlock X = block_of(motions);
-  const auto norms = [&](const StateBlock& of)
-  { return Eigen::VectorXd(inner_products(of, energy_images(monodromy.flow, of)).diagonal().cwiseSqrt()); };
-  const Eigen::VectorXd before = norms(X);
-  deflate(projector, X);
-  const Eigen::VectorXd after = norms(X);
-  std::vector<Index> taken;
-  for (Index k = 0; k < X.columns() && static_cast<Index>(taken.size()) < block_size; ++k)
-    if (after(k) > enough * before(k)) taken.push_back(k);
-  return {{X.u.comm, X.u.entries(Eigen::all, taken)}, {X.v.comm, X.v.entries(Eigen::all, taken)}};
-}
-
-/// Judges the largest Ritz pair of H; `remainder`: of the last block's image, whose columns are the last ones of H.
-void judge_ritz(const MatrixXd& H, const MatrixXd& remainder, Search& search)
-{
-  const DenseEigenpair pair = solve_dense_unsymmetric(H).front();
-  search.largest = pair.lambda;
-  search.residual = (remainder * pair.y.tail(remainder.cols())).norm();
-  search.bounded = std::abs(pair.lambda) + search.residual < 1;
-}
-
-/// Block Arnoldi of the deflated matrix, at most so many columns.
-Search search_beside(const Monodromy& monodromy, const Projector& projector, const std::vector<Owned<Vec>>& motions,
-                     Index columns)
-{
-  const Flow& flow = monodromy.flow;
-  Search search;
-  search.bounded = motions.empty(); // V holds every motion that may decay slowly
-  if (motions.empty()) return search;
-  StateBlock block = orthonormal(flow, start_beside(monodromy, projector, motions), 1e-6);
-  search.bounded = block.columns() == 0;
-  if (search.bounded) return search;
-  StateBlock Q = block;
-  MatrixXd H(0, 0);
-  while (search.columns + block.columns() <= columns)
-  {
-    StateBlock image = image_of(monodromy, block);
-    search.columns += static_cast<long>(image.columns());
-    deflate(projector, image);
-    const StateBlock images = energy_images(flow, Q);
-    MatrixXd along = MatrixXd::Zero(Q.columns(), block.columns());
-    for (int pass = 0; pass < 2; ++pass)
-    {
-      const MatrixXd more = inner_products(images, image);
-      subtract(image, Q, more);
-      along += more;
-    }
-    const Index before = H.rows();
-    MatrixXd grown = MatrixXd::Zero(Q.columns(), Q.columns());
-    grown.topLeftCorner(before, before) = H;
-    grown.rightCols(block.columns()) = along;
-    block = orthonormal(flow, image, 1e-8);
-    const MatrixXd remainder = inner_products(block, energy_images(flow, image));
-    H = std::move(grown);
-    judge_ritz(H, remainder, search);
-    if (search.bounded || block.columns() == 0) return search;
-    // the next block's columns see what this one adds to them
-    H.conservativeResizeLike(MatrixXd::Zero(H.rows() + remainder.rows(), H.cols()));
-    H.bottomRightCorner(remainder.rows(), remainder.cols()) = remainder;
-    append(Q, block);
-  }
-  return search;
-}
-
-Coverage coverage_of(const SlowMotions& slow, const Search& search)
+Coverage coverage_of(const SlowMotions& slow, const DeflatedSearch& search)
 {
   if (!slow.confirmed)
     return {false, "the reduced model has another number of large multipliers with fewer modes: more of them "
@@ -394,7 +275,7 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
   if (!refusal.empty()) return std::nullopt;
   take_out_shift(passes);
   multipliers.trivial_error = passes.shift_distance;
-  Search search;
+  DeflatedSearch search;
   if (!repels(passes)) search = search_beside(monodromy, passes.wanted, slow.others, columns > 0 ? columns : 96);
   multipliers.periods = slow.periods + static_cast<long>(passes.image.columns()) + search.columns;
   std::vector<std::size_t> order(passes.pairs.size());

@@ -2,12 +2,12 @@
 
 #include "free_periods.hpp"
 #include "newton_krylov.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/shooting/full_space.hpp"
 #include "subspace_newton.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace squeal
 {
@@ -271,7 +271,7 @@ std::string leaving_time(const Multipliers& multipliers, double period)
   const std::complex<double> fastest = multipliers.values.front();
   const double periods = 1 / std::log(std::abs(fastest));
   return format("; at %.4g Hz it grows e-fold in %.3g periods (%.2g s): a larger -cycle_free_periods follows it",
-                std::abs(std::arg(fastest)) / (2 * std::numbers::pi * period), periods, periods * period);
+                std::abs(std::arg(fastest)) / (two_pi * period), periods, periods * period);
 }
 
 /// Integrates beside the orbit and fits the growth of the distance from it. The first quarter is left out, where other
@@ -288,15 +288,10 @@ SeenGrowth watch(const Search& search, const Attempt& attempt)
   return fit_growth(logarithms);
 }
 
-/// How the search for an orbit ended. `rests`: the free motion decays to the equilibrium.
-Outcome outcome_of(const Convergence& convergence, const StageResult& found, bool rests)
+/// How the search for an orbit ended, in words.
+Outcome outcome_of(const Convergence& convergence, StageEnding ending, double residual)
 {
-  Outcome outcome{OutcomeKind::not_converged, "", convergence.iterations, found.orbit.residual};
-  StageEnding ending = found.ending;
-  if (ending != StageEnding::converged && rests)
-    ending = StageEnding::collapsed;
-  else if (ending == StageEnding::collapsed)
-    ending = StageEnding::stalled; // the correction alone fell there
+  Outcome outcome{OutcomeKind::not_converged, "", convergence.iterations, residual};
   switch (ending)
   {
   case StageEnding::converged:
@@ -342,9 +337,12 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   const bool slow = leaves_too_slowly(search, found, settings.free_periods);
   if (options.finish != Finish::none && !slow) found = search_on(search, std::move(found), settings.free_periods, free);
   const bool goes_on = !slow && std::isfinite(free.residual);
+  StageEnding ending = found.found.ending;
+  if (ending == StageEnding::collapsed) ending = StageEnding::stalled; // unless the free motion decays, too
+  if (!found.converged() && goes_on && collapsing(problem, free)) ending = StageEnding::collapsed;
 
   ShootingResult result;
-  result.outcome = outcome_of(log.convergence, found.found, goes_on && collapsing(problem, free));
+  result.outcome = outcome_of(log.convergence, ending, found.found.orbit.residual);
   result.multipliers = std::move(found.floquet.multipliers);
   refuse_repelling(result.multipliers, start.other_unstable.size(), result.outcome);
   if (found.beside != Beside::not_seen && result.outcome.kind == OutcomeKind::converged)
