@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <numeric>
 
 namespace squeal
 {
@@ -278,18 +279,28 @@ std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)
 std::vector<std::size_t> nearest_places(const std::vector<std::complex<double>>& references,
                                         const std::vector<std::complex<double>>& values)
 {
-  std::vector<std::size_t> places;
-  std::vector<char> taken(values.size(), 0);
-  for (const std::complex<double> reference : references)
+  std::vector<std::size_t> places(values.size());
+  std::iota(places.begin(), places.end(), 0U);
+  const auto distance = [&](std::size_t reference, std::size_t place) // those beyond the references are for nobody
+  { return reference < references.size() ? std::abs(values[place] - references[reference]) : 0; };
+  for (std::size_t i = 0; i < references.size(); ++i)
+    for (std::size_t k = i + 1; k < values.size(); ++k)
+      if (distance(i, places[k]) < distance(i, places[i])) std::swap(places[i], places[k]);
+  // an early reference may have taken what a later one needs more
+  const auto exchange = [&](std::size_t i, std::size_t k)
   {
-    std::size_t nearest = values.size();
-    for (std::size_t i = 0; i < values.size(); ++i)
-      if (!taken[i] &&
-          (nearest == values.size() || std::abs(values[i] - reference) < std::abs(values[nearest] - reference)))
-        nearest = i;
-    taken[nearest] = 1;
-    places.push_back(nearest);
+    const double now = distance(i, places[i]) + distance(k, places[k]);
+    if (!(distance(i, places[k]) + distance(k, places[i]) < now * (1 - 1e-12))) return false;
+    std::swap(places[i], places[k]);
+    return true;
+  };
+  for (bool exchanged = true; exchanged;)
+  {
+    exchanged = false;
+    for (std::size_t i = 0; i < references.size(); ++i)
+      for (std::size_t k = i + 1; k < values.size(); ++k) exchanged = exchange(i, k) || exchanged;
   }
+  places.resize(references.size());
   return places;
 }
 

@@ -1,9 +1,11 @@
 // Multipliers by oblique projection against the whole monodromy matrix, on random frictional oscillators.
 // ranks: 1 2
 #include "../support/cycle_of.hpp"
+#include "squeal/algebra/dense_eigenproblems.hpp"
 
 #include <algorithm>
 #include <doctest/doctest.h>
+#include <numeric>
 #include <random>
 
 using namespace squeal;
@@ -126,4 +128,30 @@ TEST_CASE("a state of the cycle is a start from which its own period is found at
   // at most three corrections of the mode's period, Newton's steps for the rest, and the test of the half period
   CHECK(again.convergence.periods <= 8);
   CHECK(again.orbit.period == doctest::Approx(cycle.orbit.period).epsilon(1e-6));
+}
+
+TEST_CASE("values that an earlier reference needs less go to the later one")
+{
+  // the reduced multipliers of a squealing pin on two grids of time: the first reference is nearest to the complex pair
+  const std::vector<std::complex<double>> references{0.9479, 0.8885, {0.8864, 0.0243}, {0.8864, -0.0243}};
+  const std::vector<std::complex<double>> values{{0.8913, 0.0132}, {0.8913, -0.0132}, 1.0155, 0.7374};
+  CHECK(nearest_places(references, values) == std::vector<std::size_t>{2, 3, 0, 1});
+}
+
+TEST_CASE("values moved by less than half their distances go to their references in any order")
+{
+  std::mt19937 random(3);
+  std::vector<std::complex<double>> references;
+  for (int i = 0; i < 40; ++i) references.emplace_back(i % 8, i / 8);
+  std::vector<std::size_t> order(references.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::uniform_real_distribution<double> part(-0.3, 0.3);
+  for (int trial = 0; trial < 20; ++trial)
+  {
+    std::shuffle(order.begin(), order.end(), random);
+    std::vector<std::complex<double>> values(references.size());
+    for (std::size_t i = 0; i < order.size(); ++i)
+      values[order[i]] = references[i] + std::complex<double>(part(random), part(random));
+    CHECK(nearest_places(references, values) == order);
+  }
 }
