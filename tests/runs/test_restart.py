@@ -135,6 +135,8 @@ def test_a_killed_run_goes_on_to_the_straight_runs_numbers(converged, tmp_path, 
 PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "damping.beta=6e-7"]
 STAGES = {  # scene and arguments, what the log of the run or the checkpoints show when it is killed, what the restart says
     "modes": ([OSCILLATOR, *TRANSIENT_AND_CYCLE], "transient", "of the checkpoint"),
+    "finer steps": ([*PIN, "--set", "cycle.steps_per_period=0", "--set", "accuracy=5e-5"], "cycle, finer steps",
+                    "of the checkpoint"),
     "settled": (["two oscillators"], "settled", "goes on from the checkpoint after"),
     "starts": ([OSCILLATOR, "--set", "transient.enabled=false", "--set", "cycle.starts=6", "--set",
                 "cycle.steps_per_period=100"], "attractors", "goes on from the checkpoint after"),
