@@ -8,11 +8,6 @@ namespace squeal
 namespace
 {
 
-std::size_t at(int number)
-{
-  return static_cast<std::size_t>(number);
-}
-
 /// The product of some rows of E with others, which begin no later, added to the Schur complement.
 void add_tile(const BorderRows& E, std::pair<int, int> rows, std::pair<int, int> columns, int border,
               std::vector<double>& product, double* schur_complement)

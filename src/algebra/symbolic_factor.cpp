@@ -17,11 +17,6 @@ namespace squeal
 namespace
 {
 
-std::size_t at(int number)
-{
-  return static_cast<std::size_t>(number);
-}
-
 /// A graph in compressed form: the neighbours of each node, one list after the other.
 struct Graph
 {

@@ -12,6 +12,13 @@
 namespace squeal
 {
 
+/// A place in a list, from a number as METIS and MPI have them.
+inline std::size_t at(int number)
+{
+  return static_cast<std::size_t>(number);
+}
+
+/// Neighbouring columns of the factor with the same rows below.
 struct Supernode
 {
   int first = 0, columns = 0;   // its pivots, as positions in the order of elimination

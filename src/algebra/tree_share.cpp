@@ -14,11 +14,6 @@ namespace squeal
 namespace
 {
 
-std::size_t at(int number)
-{
-  return static_cast<std::size_t>(number);
-}
-
 void broadcast(std::vector<int>& numbers, MPI_Comm comm)
 {
   int count = to_int(numbers.size());

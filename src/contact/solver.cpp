@@ -71,7 +71,7 @@ constexpr double extrapolation[3][3] = {{1, 0, 0}, {2, -1, 0}, {3, -3, 1}};
 constexpr int unread_at_most = 20; // extrapolated products gather rounding
 
 /// Puts the extrapolation of least residual into r and W r; false if nothing is remembered that belongs to r.
-bool start_warm(ContactWork& work, const ContactMemory& memory, int highest_order)
+bool start_warm(ContactWork& work, const ContactMemory& memory, PetscInt highest_order)
 {
   if (memory.r.empty() || memory.r[0] != work.r || memory.since_read >= unread_at_most) return false;
   std::vector<double> best_r, best_Wr;

@@ -1,0 +1,45 @@
+#pragma once
+/// The shapes that a reduced model is made on (src/README.md, sections 7.1 and 7.2): modes, attachment shapes of the
+/// pairs' forces, and the orthonormal basis of both. All functions that take PETSc's objects are collective.
+#include "squeal/reduction/reduced_model.hpp"
+
+namespace squeal
+{
+
+/// Shapes of modes, and the number of them that come after the attachments.
+struct ModeColumns
+{
+  MultiVector columns;
+  Eigen::Index apart = 0;
+};
+
+/// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts. Then real modes.
+/// Those kept apart are the last ones.
+ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction, Mat Z);
+
+/// The rows of a matrix of few, as columns.
+MultiVector transposed(Mat B);
+
+/// The force of each active pair that slides, B_n' + mu B_t'e: its normal force and the friction that follows it.
+/// `rows`: those of B of the active pairs, as columns.
+MultiVector sliding_forces(const MultiVector& rows, const Interface& interface, const std::vector<int>& active);
+
+/// (K_z + w^2 M_z)^-1 forces. Error: A = K_z + w^2 M_z is not positive definite.
+MultiVector attachment_columns(Mat A, const MultiVector& forces, const FactorOptions& options);
+
+/// Orthonormal combinations of shapes that are orthonormal in the energy, by falling period: u'M u against the energy.
+/// `mass`: of the shapes. Sets `slow` to the number of those that swing by less than four times omega [rad/s].
+Eigen::MatrixXd by_falling_period(const Eigen::MatrixXd& mass, double omega, Eigen::Index& slow);
+
+/// The numbers of columns that are modes, and of those among them that are kept apart, which are the last ones.
+struct ModeCounts
+{
+  Eigen::Index modes = 0, apart = 0;
+};
+
+/// Replaces the columns by the basis: the modes, the attachments next to them, all by falling period. `E`: K_z +
+/// omega^2 M_z. Sets the model's counts, `slow` and `apart`.
+void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, const ModeCounts& counts,
+                  double threshold);
+
+} // namespace squeal

@@ -1,0 +1,24 @@
+#pragma once
+/// Values of a scene file that are no tables: from TOML to the member of a key, by the key's rule.
+#include "toml_values.hpp"
+
+namespace squeal
+{
+
+/// Whether a target is filled from a table within braces.
+template <class T> constexpr bool is_inline_table =
+    std::is_same_v<T, std::optional<Rotation>*> || std::is_same_v<T, std::optional<Orthotropy>*>;
+
+/// The key of a value and what messages and paths need besides.
+struct ValuePlace
+{
+  const SceneKey& key;
+  const std::string& label;            // of the key's table
+  const std::filesystem::path& folder; // that paths are relative to
+};
+
+/// Sets the member of the key; leaves one that is filled from a table. Throws Error for a value that is not of the
+/// key's kind, or outside its rule.
+void read_value(const ValuePlace& value, const toml::node& node);
+
+} // namespace squeal
