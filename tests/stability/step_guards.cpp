@@ -1,5 +1,6 @@
 // Where theta and the step size make growth rates wrong: the boundary from both sides, and the refusals that guard it.
 #include "../support/oscillator_mode.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/transient/growth.hpp"
 #include "squeal/transient/transient.hpp"
 
@@ -17,7 +18,7 @@ const double weak = 0.1785;
 
 double period_of(const ComplexMode& mode)
 {
-  return 2 * std::numbers::pi / mode.lambda.imag();
+  return two_pi / mode.lambda.imag();
 }
 
 /// |theta - 1/2| decides it exactly at this many steps a period.
@@ -109,7 +110,7 @@ TEST_CASE("theta < 1/2: growth that is mostly the step's own is refused")
 
 TEST_CASE("theta < 1/2 with C = beta K blows up beyond beta/(1 - 2 theta), or 2/((1 - 2 theta)|lambda|) if overdamped")
 {
-  const double highest = 2 * std::sin(12 * std::numbers::pi / 26), w2 = highest * highest;
+  const double highest = 2 * std::sin(6 * two_pi / 26), w2 = highest * highest;
   for (const double theta : {0.3, 0.45})
     for (const double beta : {0.1, 0.5, 4.})
     {
@@ -189,7 +190,7 @@ TEST_CASE("a step that may have several solutions under falling friction is refu
     const std::size_t end = reason.find(" steps a period would do");
     REQUIRE(end != std::string::npos);
     const double steps = std::stod(reason.substr(reason.rfind(' ', end - 1)));
-    const double enough = 2 * std::numbers::pi / steps;
+    const double enough = two_pi / steps;
     CHECK(friction_refusal(sliding, &mode, 0.5, enough, {}, 1).empty());
     CHECK(fall(enough, 0.5) > 0.5); // not far too many
   }

@@ -1,10 +1,10 @@
 // ranks: 1
 // What starts lead to: means, trends and which motions are the same, on series with known answers.
 #include "squeal/attractors/attractors.hpp"
+#include "squeal/base/constants.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>
-#include <numbers>
 
 using namespace squeal;
 
@@ -45,7 +45,7 @@ TEST_CASE("a motion that dies out is at rest, one that wanders without a trend i
   CHECK(reached_by(series(200, [](int i) { return std::exp(-i / 10.); }), crossings(50), 1e-4).kind ==
         ReachedKind::rest);
   // 8 slow beats in the window, out of step with its ten parts
-  const auto beat = [](int i) { return 1 + 0.5 * std::sin(2 * std::numbers::pi * i / 25.3); };
+  const auto beat = [](int i) { return 1 + 0.5 * std::sin(two_pi * i / 25.3); };
   const ReachedMotion wandering = reached_by(series(400, beat), crossings(50), 1e-4);
   CHECK(wandering.kind == ReachedKind::varying);
   CHECK(std::abs(wandering.energy.value - 1) <= wandering.energy.error);

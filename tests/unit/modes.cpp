@@ -4,13 +4,13 @@
 #include "../support/sliding_oscillator.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/algebra/quadratic_residual.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <doctest/doctest.h>
-#include <numbers>
 #include <random>
 
 using namespace squeal;
@@ -246,7 +246,7 @@ TEST_CASE("real modes between two frequencies are those of all below the higher 
   const double low = 2, high = 3.5; // [Hz]
   const RealModes all = find_real_modes_below(linearised, high, {}),
                   between = find_real_modes_between(linearised, low, high, sparse);
-  const double least = 2 * std::numbers::pi * low;
+  const double least = two_pi * low;
   const auto first = std::lower_bound(all.omega.begin(), all.omega.end(), least);
   REQUIRE(all.omega.end() - first > 5);
   REQUIRE(static_cast<std::ptrdiff_t>(between.omega.size()) == all.omega.end() - first);

@@ -1,5 +1,6 @@
 // What a motion settles on: means with their bars, spectra, Lyapunov exponents and kinds, on series and smooth flows.
 #include "../support/smooth_flows.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/settled/motion.hpp"
 
 #include <cmath>
@@ -124,7 +125,7 @@ void duffing(double drive, const std::vector<double>& x, std::vector<double>& ra
 /// The largest exponent of the driven oscillator a period, from the growth of a difference of 1e-8 in (x, x') alone.
 double growth_of_a_difference(double drive, int periods)
 {
-  const double w = 1.2, h = 2 * std::numbers::pi / w / 400, apart = 1e-8;
+  const double w = 1.2, h = two_pi / w / 400, apart = 1e-8;
   const auto rate = [&](double t, std::array<double, 2> x) {
     return std::array{x[1], -0.3 * x[1] + x[0] - x[0] * x[0] * x[0] + drive * std::cos(w * t)};
   };
@@ -261,7 +262,7 @@ TEST_CASE("a motion that winds down to a cycle is never called quasi-periodic")
 
 TEST_CASE("the driven double well: closing after two periods at one drive, irregular at another")
 {
-  const double period = 2 * std::numbers::pi / 1.2;
+  const double period = two_pi / 1.2;
   Motion doubled([](const auto& x, auto& rate) { duffing(0.28, x, rate); }, {1, 0}, period);
   const ExaminedMotion two = doubled.examine({1, 1}, 60, 128);
   CHECK(two.verdict.kind == MotionKind::periodic);

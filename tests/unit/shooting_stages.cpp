@@ -1,5 +1,6 @@
 // The parts of the shooting solver, each by itself, on smooth oscillators.
 #include "../support/smooth_flows.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/shooting/full_space.hpp"
 #include "squeal/shooting/multipliers.hpp"
 #include "squeal/shooting/multisecant.hpp"
@@ -87,9 +88,9 @@ TEST_CASE("dependent vectors do not enter the base")
 
 TEST_CASE("one evaluation gives the defect and the rate of a harmonic oscillation")
 {
-  Problem problem(harmonic, {1}, 2 * std::numbers::pi);
+  Problem problem(harmonic, {1}, two_pi);
   const Owned<Vec> state = state_on_first_rank({0.6}, {0.8});
-  const Orbit whole = evaluate(problem.orbit, problem.log, state, 2 * std::numbers::pi);
+  const Orbit whole = evaluate(problem.orbit, problem.log, state, two_pi);
   // 2000 Runge-Kutta steps a period leave about 1e-12
   CHECK(whole.residual < 1e-11);
   CHECK(whole.fluctuation == doctest::Approx(1).epsilon(1e-14));

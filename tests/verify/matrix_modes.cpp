@@ -4,6 +4,7 @@
 // Each wave of the chain, kappa_j = s (2 - 2 cos(j pi/(n + 1))), leaves two motions, exactly:
 //     (lambda^2 + c lambda + kappa + k1) (lambda^2 + c lambda + kappa + k2) + (g lambda + h)^2 = 0.
 #include "../support/linearised.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
@@ -56,7 +57,7 @@ std::vector<Complex> exact_pairs(const Chain& chain, double band)
   for (int j = 1; j <= chain.cells; ++j)
     for (const Complex root :
          roots(polynomial(chain, chain.s * (2 - 2 * std::cos(j * std::numbers::pi / (chain.cells + 1))))))
-      if (std::abs(root) < 2 * std::numbers::pi * band) result.push_back(root);
+      if (std::abs(root) < two_pi * band) result.push_back(root);
   return result;
 }
 
