@@ -12,7 +12,7 @@
 # the unstable mode at AMPLITUDE times the estimate's. Its kind and means are found here, by the table's own script.
 # What is done stays: stop it when you like and start it again.
 # Knobs: SCENE, MU (list), PERIODS (of the direct integration), STEPS (a period, of both), AMPLITUDE, RANKS, LAUNCH,
-# OUTPUT, and # any further arguments for squeal. The small brake: SCENE=inputs/tgv/scene.toml MU="$(seq 0.2 0.02 0.4)" STEPS=64 with
+# OUTPUT, and any further arguments for squeal. The small brake: SCENE=inputs/tgv/scene.toml MU="$(seq 0.2 0.02 0.4)" STEPS=64 with
 # the arguments of src/README.md, section 1.7.
 set -eu
 # Where squeal is: SQUEAL_ROOT, or the folder above this script, of which Slurm runs a copy.

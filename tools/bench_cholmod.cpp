@@ -7,6 +7,7 @@
 ///     bordered: the factor of [A B'; B sigma I] with B's rows last leaves L22 L22' = sigma I - W.
 /// A step with CHOLMOD takes two solves with A, one before contact and one after; squeal takes two halves of one.
 #include "bench_timing.hpp"
+#include "bench_trajectories.hpp"
 #include "cholmod_handles.hpp"
 #include "squeal/transient/transient.hpp"
 
@@ -280,24 +281,26 @@ RightSides right_sides(const std::vector<State>& states, Common& common)
   return sides;
 }
 
-/// `count` trajectories together: a step, its two halves of a solve, one solve with A alone, and one by CHOLMOD.
-void compare_solves(const ThetaStep& step, const Structure& structure, const Interface& interface, const State& start,
-                    int count, int rounds, Figures& figures, Comparison& comparison)
+/// The model whose steps are timed, and where they start.
+struct SteppedModel
 {
+  const ThetaStep& step;
+  const Structure& structure;
+  const Interface& interface;
+  const State& start;
+};
+
+/// `count` trajectories together: a step, its two halves of a solve, one solve with A alone, and one by CHOLMOD.
+void compare_solves(const SteppedModel& model, int count, int rounds, Figures& figures, Comparison& comparison)
+{
+  const auto& [step, structure, interface, start] = model;
   const std::string name = std::to_string(count);
   const Owned<Mat> A = step_matrix(structure, step.h, step.theta);
   const Factor plain(A, nullptr, FactorOptions{.kind = FactorKind::supernodal});
   Common common;
   const Held<cholmod_factor> L =
       factored(upper_triangle(A).to_cholmod(at(rows_of(A)), 1, common).get(), comparison.ordering, nullptr, common);
-  std::vector<State> states;
-  std::vector<StepWork> works;
-  for (int k = 0; k < count; ++k)
-  {
-    states.push_back(copy_of(start));
-    check(VecScale(states.back().v, 1 + k / 1000.));
-    works.push_back(begin_steps(step, structure, interface, states.back()));
-  }
+  auto [states, works] = trajectories_from(start, count, step, structure, interface);
   const RightSides sides = right_sides(states, common);
   const std::vector<Vec> b(sides.b.begin(), sides.b.end()), x(sides.x.begin(), sides.x.end());
   const std::vector<double> no_reactions(interface.size() * at(count), 0.);
@@ -344,7 +347,7 @@ void run(int argc, char** argv)
   read_options(options_of(options));
   const ThetaStep step = make_theta_step(structure, interface, h, 0.5, options);
   for (const int count : {1, 16})
-    compare_solves(step, structure, interface, start, count, 7 * rounds, figures, comparison);
+    compare_solves({step, structure, interface, start}, count, 7 * rounds, figures, comparison);
   std::printf("{\"dofs\": %d, \"border\": %zu, \"ordering\": %d, \"entries\": %.6g, \"CHOLMOD entries\": %.6g, "
               "\"memory\": %.4g, \"CHOLMOD memory\": %.4g, \"CHOLMOD memory W\": %.4g, \"difference W\": %.2g, "
               "\"difference x\": %.2g",
@@ -359,14 +362,5 @@ void run(int argc, char** argv)
 
 int main(int argc, char** argv)
 {
-  Session session(argc, argv, nullptr);
-  try
-  {
-    run(argc, argv);
-  }
-  catch (const std::exception& error)
-  {
-    std::fprintf(stderr, "bench_cholmod: %s\n", error.what());
-    MPI_Abort(PETSC_COMM_WORLD, 1);
-  }
+  return bench_main("bench_cholmod", argc, argv, [&] { run(argc, argv); });
 }

@@ -9,6 +9,7 @@
 /// -bench_write FOLDER writes M, C, K of the quadratic problem and the sizes |lambda| of its pairs, for another solver.
 #include "bench_timing.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/model.hpp"
 #include "squeal/modes/real_modes.hpp"
@@ -19,7 +20,6 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
-#include <numbers>
 
 using namespace squeal;
 
@@ -202,7 +202,7 @@ Answer pairs_by_slices(const Problem& problem, double band)
   const double start = processor_time();
   RealCount real = make_real_count(problem.M, problem.K, large);
   const CountedSolution result = solve_by_slices(problem.quadratic, real, band, {});
-  const double limit = 2 * std::numbers::pi * band;
+  const double limit = two_pi * band;
   const auto& pairs = result.solution.pairs;
   return {static_cast<int>(std::count_if(pairs.begin(), pairs.end(),
                                          [&](const Eigenpair& p) { return std::abs(p.lambda) < limit; })),
@@ -211,7 +211,7 @@ Answer pairs_by_slices(const Problem& problem, double band)
 
 Answer pairs_by_toar(const Problem& problem, double band)
 {
-  const double start = processor_time(), end = 2 * std::numbers::pi * band;
+  const double start = processor_time(), end = two_pi * band;
   RealCount real = make_real_count(problem.M, problem.K, large);
   const QuadraticSolution solution = solve_quadratic(
       problem.quadratic, {band, std::sqrt(-shift_below_zero(problem.M, problem.K)) / end, count_below(real, end), 0});
@@ -232,7 +232,7 @@ void write_problem(const Problem& problem, double band, const std::filesystem::p
   RealCount real = make_real_count(problem.M, problem.K, large);
   std::vector<double> sizes;
   for (const Eigenpair& pair : solve_by_slices(problem.quadratic, real, band, {}).solution.pairs)
-    if (std::abs(pair.lambda) < 2 * std::numbers::pi * band) sizes.push_back(std::abs(pair.lambda));
+    if (std::abs(pair.lambda) < two_pi * band) sizes.push_back(std::abs(pair.lambda));
   std::sort(sizes.begin(), sizes.end());
   std::ofstream file(folder / "pairs.txt");
   file.precision(17);
@@ -244,7 +244,7 @@ void run(int argc, char** argv)
   if (argc < 4) throw Error("bench_slepc SCENE band rounds [key=value …]");
   std::vector<std::string> overrides;
   for (int i = 4; i < argc && argv[i][0] != '-'; ++i) overrides.emplace_back(argv[i]);
-  const double band = std::stod(argv[2]), omega = 2 * std::numbers::pi * band;
+  const double band = std::stod(argv[2]), omega = two_pi * band;
   const int rounds = std::stoi(argv[3]);
   const Problem problem = read_problem(argv[1], overrides);
   PetscInt subspace = 40;
@@ -285,14 +285,5 @@ void run(int argc, char** argv)
 
 int main(int argc, char** argv)
 {
-  Session session(argc, argv, nullptr);
-  try
-  {
-    run(argc, argv);
-  }
-  catch (const std::exception& error)
-  {
-    std::fprintf(stderr, "bench_slepc: %s\n", error.what());
-    MPI_Abort(PETSC_COMM_WORLD, 1);
-  }
+  return bench_main("bench_slepc", argc, argv, [&] { run(argc, argv); });
 }

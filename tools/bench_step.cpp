@@ -5,6 +5,7 @@
 /// every step, raw doubles. Seconds are the processor's, of this rank, waiting included. Contact options as in squeal
 /// (-transient_…).
 #include "bench_timing.hpp"
+#include "bench_trajectories.hpp"
 #include "squeal/transient/transient.hpp"
 
 #include <algorithm>
@@ -114,14 +115,7 @@ void run(const std::vector<std::string>& words)
   const ThetaStep step = make_theta_step(structure, interface, h, 0.5, options);
   const double prepared = processor_time() - begin;
 
-  std::vector<State> states;
-  std::vector<StepWork> works;
-  for (int k = 0; k < count; ++k)
-  {
-    states.push_back(copy_of(start));
-    check(VecScale(states.back().v, 1 + k / 1000.));
-    works.push_back(begin_steps(step, structure, interface, states.back()));
-  }
+  auto [states, works] = trajectories_from(start, count, step, structure, interface);
   const std::vector<double> b = first_problem(step, structure, interface, states[0], works[0]);
   std::ofstream dump;
   if (words.size() > 6 && speaks) dump.open(words[6], std::ios::binary);
@@ -172,14 +166,5 @@ int main(int argc, char** argv)
 {
   std::vector<std::string> words;
   for (int i = 1; i < argc && argv[i][0] != '-'; ++i) words.emplace_back(argv[i]);
-  Session session(argc, argv, nullptr);
-  try
-  {
-    run(words);
-  }
-  catch (const std::exception& error)
-  {
-    std::fprintf(stderr, "bench_step: %s\n", error.what());
-    MPI_Abort(PETSC_COMM_WORLD, 1);
-  }
+  return bench_main("bench_step", argc, argv, [&] { run(words); });
 }

@@ -3,6 +3,7 @@
 #include "squeal/base/petsc.hpp"
 
 #include <algorithm>
+#include <cstdio>
 
 namespace squeal
 {
@@ -28,6 +29,22 @@ template <class Work> double seconds(int times, Work work)
   std::vector<double> all;
   for (int i = 0; i < times; ++i) all.push_back(seconds_of(work));
   return median(all);
+}
+
+/// The main function of a benchmark: `work` within a session, its Error on standard error.
+template <class Work> int bench_main(const char* name, int argc, char** argv, Work work)
+{
+  Session session(argc, argv, nullptr);
+  try
+  {
+    work();
+  }
+  catch (const std::exception& error)
+  {
+    std::fprintf(stderr, "%s: %s\n", name, error.what());
+    MPI_Abort(PETSC_COMM_WORLD, 1);
+  }
+  return 0;
 }
 
 } // namespace squeal
