@@ -1,12 +1,12 @@
 #include "squeal/model.hpp"
 
+#include "squeal/base/constants.hpp"
 #include "squeal/mesh/ties.hpp"
 #include "squeal/solid/matrix_rows.hpp"
 #include "squeal/solid/probes.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace squeal
 {
@@ -169,7 +169,7 @@ ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)
   double stiffness = 0, mass = 0;
   check(MatNorm(model.structure.K, NORM_1, &stiffness));
   check(MatNorm(model.structure.M, NORM_1, &mass));
-  if (mass > 0) summary.rounding_hz = 1e-6 * std::sqrt(stiffness / mass) / (2 * std::numbers::pi);
+  if (mass > 0) summary.rounding_hz = 1e-6 * std::sqrt(stiffness / mass) / two_pi;
   return summary;
 }
 

@@ -22,11 +22,11 @@ struct Forecast
 /// Collective. Analyses K bordered by B and counts steps; solves nothing.
 Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options);
 
-/// The forecast in two lines.
+/// The forecast in two lines. Not collective.
 std::string text_of(const Forecast& forecast);
 
-/// Collective. Why the run is not started without --force: it would take more memory than the machine and this
-/// process's limits leave, or more than a day. Empty if it is.
+/// Collective. Why the run is not started without --force. It would take more than a day, or more memory than the
+/// machine and this process's limits leave. Empty if it is.
 std::string problem_of(const Forecast& forecast, MPI_Comm comm);
 
 /// Why this process may not even take what the libraries need to start; empty if it may. Needs no MPI. Below it, MPI

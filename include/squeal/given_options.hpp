@@ -1,6 +1,6 @@
 #pragma once
-/// The places that PETSc takes options from: files .petscrc of the home and the working folder, petscrc, PETSC_OPTIONS,
-/// and the command line, each with the files of its -options_file.
+/// The places that PETSc takes options from: files .petscrc of the home and the working folder, petscrc,
+/// PETSC_OPTIONS, and the command line. Each may name files by -options_file.
 #include <string>
 #include <vector>
 

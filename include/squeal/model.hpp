@@ -7,6 +7,7 @@
 namespace squeal
 {
 
+/// A model in all its parts.
 struct Model
 {
   Mesh mesh;   // empty on a matrix scene
@@ -17,7 +18,7 @@ struct Model
   Owned<Mat> probes;              // a row per probe of the scene
 };
 
-/// Collective.
+/// Collective. Error: as of the mesh, the structure and the interface; no mass.
 Model build_model(const Scene& scene, MPI_Comm comm);
 
 /// The model of a scene on the same mesh, in the same layout. Collective.
@@ -29,7 +30,7 @@ BrakeModel model_with(const Model& model, const Scene& scene, std::span<const Sc
 /// What the model is, as far as it is known before anything is solved. Collective.
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm);
 
-/// What the probes read of a displacement [m], whole on every rank.
+/// What the probes read of a displacement [m], whole on every rank. Collective.
 std::vector<double> probe_values(Mat probes, Vec u);
 
 } // namespace squeal

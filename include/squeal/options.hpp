@@ -13,6 +13,7 @@
 namespace squeal
 {
 
+/// The options of all stages.
 struct ProgramOptions
 {
   FactorOptions factor; // handed on to equilibrium and step
@@ -31,7 +32,7 @@ struct ProgramOptions
 
 OptionList options_of(ProgramOptions& options);
 
-/// What is wrong with the name of an option, which stands without its dash; empty if squeal, a solver of its stages or
+/// What is wrong with the name of an option, which stands without its dash. Empty if squeal, a solver of its stages or
 /// PETSc's session may know it. Needs no PETSc.
 std::string problem_of_option_name(const std::string& name);
 

@@ -14,10 +14,12 @@ enum class ExitCode : int
   interrupted = 3,   // the run was asked to end, and --restart goes on
 };
 
-/// Runs the chain, writes the results of each stage when it ends, and publishes the whole.
+/// Runs the chain, writes the results of each stage when it ends, and publishes the whole. Collective. Bad input and
+/// failed calls are thrown as Error on every rank; earlier results then stay.
 ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& results, MPI_Comm comm);
 
-/// Checks scene and mesh and prints what the model would be; computes and writes nothing.
+/// Checks scene and mesh and prints what the model would be; computes and writes nothing. Collective. Throws Error as
+/// run does.
 void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm);
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #pragma once
 /// Options of PETSc's session, which PETSc obeys while it starts. They are checked before PETSc starts, because it ends
-/// the process at the first value that it does not take.
+/// the process at the first value that it does not take. Nothing here needs PETSc or MPI.
 #include <string>
 
 namespace squeal

@@ -1,8 +1,9 @@
 #include "starts.hpp"
 
+#include "squeal/base/constants.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <random>
 
 namespace squeal
@@ -40,7 +41,7 @@ State random_start(const AttractorProblem& problem, std::mt19937_64& generator)
   const double reference = reference_amplitude(problem.unstable);
   for (std::size_t i = 0; i < std::min(random_modes, problem.modes.size()); ++i)
   {
-    const double factor = 0.1 * std::pow(20., uniform(generator)), phase = 2 * std::numbers::pi * uniform(generator);
+    const double factor = 0.1 * std::pow(20., uniform(generator)), phase = two_pi * uniform(generator);
     State motion = mode_state(problem.sliding.equilibrium, problem.modes[i], factor * reference, phase);
     check(VecAXPY(motion.u, -1, problem.sliding.equilibrium.u));
     add_motion(motion, 1, start);

@@ -162,7 +162,7 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
     throw Error(B + ": " + std::to_string(size.rows) + " rows for the " + std::to_string(interface.pairs) +
                 " pairs of gap.petsc; each pair has its normal row and one or two tangential rows");
   interface.directions = *directions;
-  if (interface.drive.size() != interface.gap.size() * static_cast<std::size_t>(interface.directions))
+  if (interface.drive.size() != PairRows<std::size_t>(interface.directions).tangential_rows_of(interface.gap.size()))
     throw Error((folder / "drive.petsc").string() + ": length " + std::to_string(interface.drive.size()) + " for " +
                 std::to_string(interface.pairs) + " pairs with " + std::to_string(interface.directions) +
                 " tangential row(s) each in B.petsc");

@@ -215,7 +215,7 @@ ReducedModel model_for(const CycleProblem& problem, const RecordedPeriods& perio
   const PairRoles roles = roles_of(pairs, interface, steps);
   const bool slide =
       std::none_of(pairs.begin(), pairs.end(), [](const PairHistory& pair) { return pair.stuck || pair.turned; });
-  const bool many = roles.active.size() * static_cast<std::size_t>(1 + interface.directions) > 150;
+  const bool many = PairRows<std::size_t>(interface.directions).rows_of(roles.active.size()) > 150;
   const RealModes beyond = modes_beyond_band(problem);
   constexpr double highest = 0.25; // of the modes: what they change says what those beyond them may
   return reduce(problem.sliding, problem.modes, roles,

@@ -2,13 +2,13 @@
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/multivector.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <array>
 #include <cmath>
 #include <Eigen/Dense>
-#include <numbers>
 
 namespace squeal
 {
@@ -89,8 +89,7 @@ MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Eigen::Index siz
 Complex correction(const SlidingModes& modes, std::size_t index, double period)
 {
   Complex lambda = modes.lambda[index];
-  if (lambda.real() > 0)
-    lambda = {-3 * lambda.real(), index == modes.followed ? 2 * std::numbers::pi / period : lambda.imag()};
+  if (lambda.real() > 0) lambda = {-3 * lambda.real(), index == modes.followed ? two_pi / period : lambda.imag()};
   const double h = period / modes.steps, theta = modes.theta;
   const Complex m = std::pow((1. + (1 - theta) * h * lambda) / (1. - theta * h * lambda), modes.steps);
   return std::abs(m - 1.) < 1e-4 ? 0 : 1. / (m - 1.) + 1.;

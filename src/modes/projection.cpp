@@ -2,10 +2,10 @@
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/base/constants.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace squeal
 {
@@ -170,7 +170,7 @@ QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K,
     for (const Owned<Vec>& shape : modes.shapes) append(shapes, shape);
     ShiftInvert stiffness = make_shift_invert(K, M, Symmetry::symmetric, settings.pencil);
     if (settings.passes > 0) move_to(stiffness, shift_below_zero(M, K));
-    const double omega = 2 * std::numbers::pi * settings.band;
+    const double omega = two_pi * settings.band;
     const Window window{vibration_floor(norms_of(problem)), omega * omega};
     result = solve_on_subspace(problem, std::move(shapes), *stiffness.factor,
                                {window, settings.passes, settings.candidates, 1e-15, 1e-15, 0});

@@ -3,10 +3,10 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/quadratic_residual.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/base/constants.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace squeal
 {
@@ -119,8 +119,8 @@ QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSe
     result.outcome.reason.clear();
     if (farthest >= 1 + std::abs(settings.shift) || converged >= 2 * n) return result;
     result.outcome.kind = OutcomeKind::not_converged;
-    result.outcome.reason = std::to_string(converged) + " eigenvalues reach " +
-                            std::to_string(farthest * omega / (2 * std::numbers::pi)) + " Hz only";
+    result.outcome.reason =
+        std::to_string(converged) + " eigenvalues reach " + std::to_string(farthest * omega / two_pi) + " Hz only";
     if (converged < count) break;
     count = std::min<PetscInt>(2 * count, 2 * n);
   }
@@ -140,7 +140,7 @@ QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const Quadrat
   PetscInt n = 0;
   check(MatGetSize(problem.K, &n, nullptr));
   const QuadraticNorms norms = norms_of(problem);
-  const double omega = 2 * std::numbers::pi * settings.band;
+  const double omega = two_pi * settings.band;
   const Window window{vibration_floor(norms), omega * omega};
   QuadraticSolution result =
       n <= settings.dense_limit ? solve_whole(problem, window) : solve_large(problem, settings, window);

@@ -3,6 +3,7 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/callback.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/base/integers.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
@@ -10,7 +11,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 namespace squeal
@@ -309,7 +309,7 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& 
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  const double omega = 2 * std::numbers::pi * band;
+  const double omega = two_pi * band;
   if (n <= options.dense_limit)
   {
     const SymmetricEigenpairs all = solve_whole(M, K);
@@ -333,7 +333,7 @@ RealModes find_real_modes_between(const LinearisedSliding& linearised, double lo
   check(MatGetSize(linearised.K_z, &n, nullptr));
   if (!(low < high)) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (low <= 0 || n <= options.dense_limit) return find_real_modes_below(linearised, high, options);
-  const auto theta = [](double frequency_hz) { return std::pow(2 * std::numbers::pi * frequency_hz, 2); };
+  const auto theta = [](double frequency_hz) { return std::pow(two_pi * frequency_hz, 2); };
   RealModes modes = search_between(linearised.M_z, linearised.K_z, theta(low), theta(high), options.pencil);
   to_structure(modes, linearised.contact.Z);
   return modes;

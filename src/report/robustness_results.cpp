@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 namespace squeal
 {
@@ -30,17 +29,12 @@ double part_of(const std::vector<double>& ascending, double part)
   return ascending[below] + (place - static_cast<double>(below)) * (ascending[above] - ascending[below]);
 }
 
-double frequency_of(const RobustMode& mode)
-{
-  return std::abs(mode.lambda.imag()) / (2 * std::numbers::pi);
-}
-
 Json mode_entry(const RobustMode& mode)
 {
   Json entry = {{"mode", mode.number}};
   if (mode.number >= 0)
   {
-    entry["median_frequency_hz"] = frequency_of(mode);
+    entry["median_frequency_hz"] = frequency_hz_of(mode.lambda);
     entry["median_growth_rate"] = mode.lambda.real();
   }
   entry.update(probability_entry(mode.unstable));
@@ -148,9 +142,10 @@ std::vector<std::string> robustness_lines(const Robustness& robustness, const Sc
              robustness.checks.size(), robustness.outcome.residual, wrong_verdicts(robustness)),
       "probability of squeal " + text_of(robustness.any, confidence)};
   for (const RobustMode& mode : robustness.modes)
-    lines.push_back((mode.number < 0 ? std::string("other modes: ") : format("mode at %.6g Hz: ", frequency_of(mode))) +
-                    text_of(mode.unstable, confidence) +
-                    format(", growth %.4g 1/s in the middle", part_of(mode.growth_rates, 0.5)));
+    lines.push_back(
+        (mode.number < 0 ? std::string("other modes: ") : format("mode at %.6g Hz: ", frequency_hz_of(mode.lambda))) +
+        text_of(mode.unstable, confidence) +
+        format(", growth %.4g 1/s in the middle", part_of(mode.growth_rates, 0.5)));
   for (std::size_t i = 0; i < robustness.correlation.size(); ++i)
     lines.push_back(
         format("rank correlation of growth with %s: %+.2f", scene.uncertain[i].key.c_str(), robustness.correlation[i]));

@@ -1,9 +1,10 @@
 #include "sensitivity_results.hpp"
 
+#include "squeal/base/constants.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 namespace squeal
 {
@@ -15,7 +16,7 @@ using Json = nlohmann::ordered_json;
 
 double in_hz(double omega)
 {
-  return omega / (2 * std::numbers::pi);
+  return omega / two_pi;
 }
 
 /// A change of an eigenvalue as one of growth rate and of frequency.

@@ -1,5 +1,7 @@
 #include "squeal/settled/spectrum.hpp"
 
+#include "squeal/base/constants.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -58,8 +60,7 @@ Spectrum spectrum_of(std::span<const double> samples, double step_size)
   const double mean = std::accumulate(samples.begin(), samples.end(), 0.) / static_cast<double>(samples.size());
   std::vector<double> windowed(size);
   for (std::size_t i = 0; i < size; ++i)
-    windowed[i] =
-        (samples[i] - mean) * (1 - std::cos(2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(size)));
+    windowed[i] = (samples[i] - mean) * (1 - std::cos(two_pi * static_cast<double>(i) / static_cast<double>(size)));
   std::vector<std::complex<double>> transform;
   Eigen::FFT<double> fft;
   fft.fwd(transform, windowed);

@@ -1,6 +1,6 @@
 #include "whole_matrix.hpp"
 
-#include <numbers>
+#include "squeal/base/constants.hpp"
 
 namespace squeal
 {
@@ -24,7 +24,7 @@ Eigen::VectorXd coordinates_of(Vec state, double period)
   const std::vector<double> u = all_entries(displacement(state)), v = all_entries(velocity(state));
   Eigen::VectorXd all(static_cast<Eigen::Index>(u.size() + v.size()));
   all << Eigen::VectorXd::Map(u.data(), static_cast<Eigen::Index>(u.size())),
-      Eigen::VectorXd::Map(v.data(), static_cast<Eigen::Index>(v.size())) * (period / (2 * std::numbers::pi));
+      Eigen::VectorXd::Map(v.data(), static_cast<Eigen::Index>(v.size())) * (period / two_pi);
   return all;
 }
 
@@ -35,7 +35,7 @@ Owned<Vec> state_at(const Eigen::VectorXd& coordinates, const Orbit& orbit)
   for (PetscInt i = 0; i < 2 * dofs; ++i)
     if (coordinates(i) != 0)
       add_entry(i < dofs ? displacement(state) : velocity(state), i % dofs,
-                coordinates(i) * (i < dofs ? 1 : 2 * std::numbers::pi / orbit.period));
+                coordinates(i) * (i < dofs ? 1 : two_pi / orbit.period));
   return state;
 }
 

@@ -8,6 +8,7 @@
 
 #include "loads.hpp"
 #include "matrices.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/solid/binary.hpp"
@@ -15,7 +16,6 @@
 
 #include <algorithm>
 #include <Eigen/Dense>
-#include <numbers>
 
 namespace squeal
 {
@@ -244,7 +244,7 @@ Owned<Mat> empty_matrix(const DofMap& dofs, const RowCounts& counts, MPI_Comm co
 
 double loss_omega(const Scene& scene)
 {
-  return 2 * std::numbers::pi * scene.damping.loss_frequency;
+  return two_pi * scene.damping.loss_frequency;
 }
 
 /// Returns the contribution of an element. Throws std::runtime_error with its part and place if its Jacobian is not

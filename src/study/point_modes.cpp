@@ -1,10 +1,10 @@
 #include "point_modes.hpp"
 
+#include "squeal/base/constants.hpp"
 #include "squeal/modes/real_modes.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace squeal
 {
@@ -268,7 +268,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   set_structure(modes.basis, structure);
   attach(modes, interface, equilibrium.closed);
   const LinearisedPoint point = linearise_point(problem.sliding);
-  const double end = 2 * std::numbers::pi * followed_band * problem.band;
+  const double end = two_pi * followed_band * problem.band;
   const Window window{vibration_floor(modes.norms), end * end};
   PointModes result;
   result.outcome.kind = OutcomeKind::converged;

@@ -2,13 +2,13 @@
 
 #include "reduced_sliding.hpp"
 #include "robustness_summary.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "swept_model.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <random>
 
 namespace squeal
@@ -82,7 +82,7 @@ std::vector<std::vector<double>> training_values(const RobustnessProblem& proble
 
 bool in_band(Complex lambda, double band)
 {
-  return lambda.imag() >= 0 && std::abs(lambda) < 2 * std::numbers::pi * band;
+  return lambda.imag() >= 0 && std::abs(lambda) < two_pi * band;
 }
 
 /// Modes of the reference, on the reduced model's shapes.
@@ -142,7 +142,7 @@ class Sampler
 {
 public:
   explicit Sampler(const RobustnessProblem& problem)
-      : problem_(problem), model_(problem), omega_(0.2 * std::numbers::pi * problem.modes.band),
+      : problem_(problem), model_(problem), omega_(0.1 * two_pi * problem.modes.band),
         equilibrium_options_(problem.equilibrium_options)
   {
     // the independent fixed point is a check of single runs
@@ -199,7 +199,7 @@ public:
       unstable.push_back({place, mode, lambda});
     }
     sample.growth_rate = worst.real();
-    sample.frequency_hz = frequency_of(worst);
+    sample.frequency_hz = frequency_hz_of(worst);
   }
 
   const Reference& reference() const { return reference_; }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 namespace squeal
@@ -44,11 +43,6 @@ double rank_correlation(const std::vector<double>& a, const std::vector<double>&
 }
 
 } // namespace
-
-double frequency_of(Complex lambda)
-{
-  return std::abs(lambda.imag()) / (2 * std::numbers::pi);
-}
 
 Probability probability_of(int count, int samples, double confidence)
 {
@@ -136,7 +130,7 @@ void find_probabilities(Robustness& result, const std::vector<UnstableMode>& uns
     {
       if (one.mode != mode) continue;
       robust.growth_rates.push_back(one.lambda.real());
-      robust.frequencies.push_back(frequency_of(one.lambda));
+      robust.frequencies.push_back(frequency_hz_of(one.lambda));
       count += one.sample != last;
       last = one.sample;
     }

@@ -15,8 +15,6 @@ struct UnstableMode
   std::complex<double> lambda{};
 };
 
-double frequency_of(std::complex<double> lambda);
-
 /// Gives every rank the samples that each has computed: the others' entries are zero.
 void share(std::vector<RobustSample>& samples, MPI_Comm comm);
 void share(std::vector<RobustCheck>& checks, MPI_Comm comm);

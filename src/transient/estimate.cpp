@@ -1,5 +1,6 @@
 #include "squeal/transient/estimate.hpp"
 
+#include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include <algorithm>
@@ -9,7 +10,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numbers>
 
 namespace squeal
 {
@@ -114,7 +114,7 @@ void add_sign_changes(double level, double q, Complex amplitude, std::vector<dou
   if (size <= std::abs(level)) return;
   const double half = std::acos(-level / size), argument = std::arg(amplitude);
   for (const double angle : {half - argument, -half - argument})
-    angles.push_back(angle - 2 * std::numbers::pi * std::floor(angle / (2 * std::numbers::pi)));
+    angles.push_back(angle - two_pi * std::floor(angle / two_pi));
 }
 
 Complex along_drive(const PairMotion& pair)
@@ -125,14 +125,14 @@ Complex along_drive(const PairMotion& pair)
 // Mean power over a period, over q^2. Between its kinks, at lift-off and where the sliding reverses, it is smooth.
 double mean_power(const PairMotion& pair, double q, double tolerance)
 {
-  std::vector<double> angles = {0, 2 * std::numbers::pi};
+  std::vector<double> angles = {0, two_pi};
   add_sign_changes(pair.reaction0, q, pair.reaction, angles);
   add_sign_changes(-std::hypot(pair.drive[0], pair.drive[1]), q, along_drive(pair), angles);
   std::sort(angles.begin(), angles.end());
   double sum = 0;
   for (std::size_t i = 0; i + 1 < angles.size(); ++i)
     if (angles[i + 1] > angles[i]) sum += integrate_between(pair, q, angles[i], angles[i + 1], tolerance);
-  return sum / (2 * std::numbers::pi);
+  return sum / two_pi;
 }
 
 // As q -> 0: mu e rho, and what sliding friction damps of the motion.
@@ -212,12 +212,12 @@ double best_phase(const std::vector<PairMotion>& pairs, double q)
   double best = 0, highest = smallest(0);
   for (int i = 1; i < count; ++i)
   {
-    const double phase = 2 * std::numbers::pi * i / count, height = smallest(phase);
+    const double phase = two_pi * i / count, height = smallest(phase);
     if (height <= highest + 1e-6 * std::abs(highest)) continue; // of equals, as a symmetric brake has, the first
     best = phase;
     highest = height;
   }
-  const double from = best - 2 * std::numbers::pi / count, to = best + 2 * std::numbers::pi / count;
+  const double from = best - two_pi / count, to = best + two_pi / count;
   constexpr int bits = std::numeric_limits<double>::digits;
   return boost::math::tools::brent_find_minima([&](double phase) { return -smallest(phase); }, from, to, bits).first;
 }

@@ -16,6 +16,7 @@
 namespace squeal
 {
 
+/// How a matrix is factored.
 enum class FactorKind
 {
   automatic,  // dense if A is small or full; else supernodal, or mumps where FactorOptions::limit says so
@@ -40,6 +41,7 @@ struct FactorOptions
 
 OptionList options_of(FactorOptions& options);
 
+/// The factor of a bordered matrix. Its members are collective.
 class Factor
 {
 public:
@@ -76,7 +78,7 @@ private:
 /// The largest memory that a Factor of A and B takes, without its Schur complement [bytes]. B may be null. Collective.
 double factor_memory(Mat A, Mat B, const FactorOptions& options);
 
-/// x = A^-1 b.
+/// x = A^-1 b. The factor has no border. Collective.
 void solve(const Factor& factor, Vec b, Vec x);
 
 } // namespace squeal

@@ -1,5 +1,7 @@
 #pragma once
-/// Eigenproblems of dense matrices, solved by Eigen with LAPACK underneath (src/README.md, section 8.8).
+/// Eigenproblems of dense matrices, solved by Eigen with LAPACK underneath (src/README.md, section 8.8). Matrices are
+/// square. Functions whose name ends in _shared are collective; the others work on one rank alone. Where LAPACK does
+/// not converge they throw Error.
 #include "squeal/algebra/dense_matrix.hpp"
 
 #include <complex>
@@ -10,6 +12,7 @@
 namespace squeal
 {
 
+/// An eigenvalue with its vector, of 2-norm 1.
 struct DenseEigenpair
 {
   std::complex<double> lambda;

@@ -12,6 +12,7 @@ Eigen::MatrixXd dense_copy(Mat A);
 
 /// Gives every rank the size and the entries that rank 0 has. Collective.
 void broadcast(Eigen::MatrixXd& A, MPI_Comm comm);
+/// The same of a vector. Collective.
 void broadcast(Eigen::VectorXd& x, MPI_Comm comm);
 
 /// A^-1 B by LU with row interchanges. Throws Error with the text `singular` if a pivot is zero.

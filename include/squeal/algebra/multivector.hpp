@@ -9,6 +9,7 @@
 namespace squeal
 {
 
+/// Vectors as the columns of a matrix.
 struct MultiVector
 {
   MPI_Comm comm = MPI_COMM_NULL;
@@ -26,8 +27,10 @@ MultiVector random_multivector(Mat A, PetscInt columns);
 /// Copies of at least one vector.
 MultiVector columns_of(std::span<const Vec> x);
 
+/// Appends a vector, or all columns of Y, with rows distributed as those of X.
 void append(MultiVector& X, Vec x);
 void append(MultiVector& X, const MultiVector& Y);
+/// x = column j of X.
 void copy_column(const MultiVector& X, Eigen::Index j, Vec x);
 
 /// A X

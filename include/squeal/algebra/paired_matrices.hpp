@@ -26,6 +26,7 @@ struct RowExchange
   std::vector<int> send_counts{}, receive_counts{};
 };
 
+/// The entries of M and K of this rank, and what it exchanges with others for a product.
 struct PairedMatrices
 {
   MPI_Comm comm = MPI_COMM_NULL;

@@ -5,7 +5,8 @@
 /// A panel is cut into strips of eight columns, the last ones of four, two and one. A strip is cut into tiles of eight
 /// rows, the last one filled up with zeros; a tile is stored column by column. A triangle is packed in the same way,
 /// each strip from its own diagonal on. A vector holds `lanes` numbers in each row, one for each right-hand side
-/// (lanes_for says how many); it must have as many rows as fill the last tile, which are read and written unchanged.
+/// (lanes_for says how many). Its rows fill the last tile; those beyond the matrix are read and written unchanged. All
+/// functions are arithmetic of one rank. They check no sizes.
 #include <cstddef>
 
 namespace squeal
@@ -26,7 +27,7 @@ struct Panel
   std::size_t rows, columns;
 };
 
-/// The numbers that a packed panel and a packed triangle take.
+/// The numbers that a packed panel and a packed triangle take. Both arguments count numbers, not bytes.
 std::size_t packed_panel(std::size_t rows, std::size_t columns);
 std::size_t packed_triangle(std::size_t columns);
 

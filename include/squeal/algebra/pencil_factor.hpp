@@ -9,12 +9,14 @@
 namespace squeal
 {
 
+/// The property of the pencil that its factor makes use of.
 enum class Symmetry
 {
   none,      // L U
   symmetric, // L D L', which counts eigenvalues
 };
 
+/// Options of all factors by MUMPS of the modes.
 struct PencilOptions
 {
   PetscInt room = 30; // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
@@ -22,7 +24,8 @@ struct PencilOptions
 
 OptionList options_of(PencilOptions& options);
 
-/// The order of elimination is found once and serves every shift. Borrows K and M.
+/// The order of elimination is found once and serves every shift. Borrows K and M. Members are collective, but for
+/// negative_pivots.
 class PencilFactor
 {
 public:

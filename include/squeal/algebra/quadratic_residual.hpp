@@ -1,5 +1,5 @@
 #pragma once
-/// The residual of the quadratic eigenproblem with distributed matrices and real arithmetic.
+/// The residual of the quadratic eigenproblem with distributed matrices and real arithmetic. Collective.
 #include "squeal/base/petsc.hpp"
 
 #include <complex>

@@ -1,5 +1,5 @@
 #pragma once
-/// A zero of a function of one number between two values of different sign.
+/// A zero of a function of one number between two values of different sign. Arithmetic of one rank.
 #include <functional>
 #include <optional>
 

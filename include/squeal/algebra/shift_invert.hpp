@@ -2,9 +2,9 @@
 /// The eigenvalues theta of K y = theta M y, symmetric or not, nearest a real shift, by a block Krylov space of (K -
 /// shift M)^-1 M (src/README.md, section 8.7).
 ///
-/// Blocks are used for two reasons. Brakes have many nearly equal modes (doublets of a disc, one mode for each pin),
-/// which a space grown from a single vector finds late or never; and MUMPS reads its factor once for a block. There
-/// are no restarts: the caller moves the shift instead.
+/// Blocks are used for two reasons. Brakes have many nearly equal modes (doublets of a disc, one mode for each pin). A
+/// space grown from a single vector finds these late or never. MUMPS reads its factor once for a block. There are no
+/// restarts: the caller moves the shift instead. All functions are collective. Error: memory runs out (LibraryError).
 #include "squeal/algebra/pencil_factor.hpp"
 
 #include <complex>
@@ -40,7 +40,7 @@ struct Nearest
 /// subspace, relative to the smallest |1/(theta - shift)| in it.
 Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, double tolerance);
 
-/// Sets a spectral transformation of SLEPc to shift-and-invert with MUMPS's LU.
+/// Sets a spectral transformation of SLEPc to shift-and-invert with MUMPS's LU, before it is set up.
 void use_mumps(ST transformation);
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #pragma once
-/// The motions that many starts lead to (src/README.md, section 9.4): all unstable modes, their pairs, and random sums
-/// of modes, integrated together until their energies have settled.
+/// The motions that many starts lead to (src/README.md, section 9.4). Starts are all unstable modes, their pairs, and
+/// random sums of modes. They are integrated together until their energies have settled.
 ///
 /// Caveat: motions are distinguished by mean energy and frequency alone, and one that few starts lead to may be missed.
 #include "squeal/attractors/reached.hpp"
@@ -19,6 +19,7 @@ struct Attractors
   long periods = 0;                   // of the followed mode, that each was integrated over
 };
 
+/// Options -attractors_...
 struct AttractorOptions
 {
   PetscInt periods = 400; // at most
@@ -38,7 +39,7 @@ struct AttractorProblem
 };
 
 /// Integrates the motions of all starts together until their energies have settled, for at most as many periods as the
-/// options allow. Collective.
+/// options allow. Collective. Where the run is asked to end it throws Interrupted.
 Attractors find_attractors(const AttractorProblem& problem, const AttractorOptions& options);
 
 } // namespace squeal

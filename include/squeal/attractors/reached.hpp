@@ -1,6 +1,6 @@
 #pragma once
 /// What a motion has settled on (src/README.md, section 9.4): means of a window, their trend, and which motions are the
-/// same.
+/// same. Arithmetic on lists that every rank has; no function throws.
 #include "squeal/base/words.hpp"
 #include "squeal/settled/statistics.hpp"
 
@@ -11,6 +11,7 @@
 namespace squeal
 {
 
+/// What a motion does at the end.
 enum class ReachedKind
 {
   rest,      // the motion decayed

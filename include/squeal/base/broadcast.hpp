@@ -8,7 +8,8 @@
 namespace squeal
 {
 
-/// Copies rank 0's list to every rank. Collective. Messages have at most 2^30 bytes because MPI counts are int.
+/// Copies rank 0's list to every rank. Collective. Messages have at most 2^30 bytes because MPI counts are int. T is
+/// copied by its bytes.
 template <class T> void broadcast(std::vector<T>& list, MPI_Comm comm)
 {
   static_assert(std::is_trivially_copyable_v<T>);

@@ -11,6 +11,7 @@
 namespace squeal
 {
 
+/// Named lists, and their bytes with a check sum.
 class Checkpoint
 {
 public:

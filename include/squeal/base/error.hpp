@@ -13,6 +13,7 @@
 namespace squeal
 {
 
+/// Bad input or a failed call: the text is what the user reads.
 struct Error : std::runtime_error
 {
   using std::runtime_error::runtime_error;
@@ -71,6 +72,7 @@ std::string shortened(const std::string& text);
 
 /// Whether there is a plain file, or a folder, of this name; no name is too long to ask for.
 bool is_file(const std::filesystem::path& name);
+/// The same for a folder.
 bool is_folder(const std::filesystem::path& name);
 
 /// printf into text, for messages and tables.

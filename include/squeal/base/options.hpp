@@ -24,6 +24,7 @@ enum class Range
   below_two,    // 0 <= x < 2
 };
 
+/// An option: its name, the member that it sets, what it may be, and what it means.
 struct Option
 {
   std::string name; // with its dash and prefix: "-transient_contact_tolerance"

@@ -8,6 +8,7 @@
 namespace squeal
 {
 
+/// All ways in which stages end.
 enum class OutcomeKind
 {
   skipped, // a stage before it did not give what it needs

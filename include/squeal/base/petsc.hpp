@@ -124,6 +124,7 @@ public:
   LogStage& operator=(const LogStage&) = delete;
 };
 
+/// The communicator of an object; rank and number of ranks in a communicator. None is collective.
 MPI_Comm comm_of(Vec x);
 MPI_Comm comm_of(Mat A);
 int rank_of(MPI_Comm comm);

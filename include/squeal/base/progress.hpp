@@ -8,6 +8,7 @@
 namespace squeal
 {
 
+/// The progress of one stage.
 class Progress
 {
 public:

@@ -13,6 +13,7 @@ struct Interrupted
 {
 };
 
+/// What ends a run by itself, and how often it makes checkpoints.
 struct RunLimits
 {
   double time_limit = 0;            // [s] from the start of the process; 0: none
@@ -29,6 +30,7 @@ void begin_run_control(const RunLimits& limits);
 /// From here on signals end the process as usual.
 void end_run_control();
 
+/// What is asked of the run.
 enum class Request
 {
   none,
@@ -36,8 +38,8 @@ enum class Request
   end,
 };
 
-/// What is asked of the run, agreed by all ranks. Collective, and cheap enough to be asked after every time step: ranks
-/// talk after each step where steps take longer than a millisecond, else after every sixteenth.
+/// What is asked of the run, agreed by all ranks. Collective, and cheap enough to be asked after every time step.
+/// Ranks talk after each step where steps take longer than a millisecond, else after every sixteenth.
 Request request(MPI_Comm comm);
 
 /// Throws Interrupted if the run is asked to end. Collective.
@@ -49,6 +51,7 @@ bool checkpoint_is_due();
 /// Whether a tenth of the time between checkpoints has passed since the last one: what ends now is then worth one.
 /// Of rank 0's clock; collective.
 bool checkpoint_is_worth_it(MPI_Comm comm);
+/// Notes that a checkpoint was made; the next is due a period later.
 void checkpoint_made();
 
 /// "by SIGTERM" or "by the time limit"; empty while nobody asked. The same on all ranks once request() has said so.

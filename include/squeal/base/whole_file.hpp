@@ -6,6 +6,7 @@
 namespace squeal
 {
 
+/// When the file must be on the disk.
 enum class Flush
 {
   by_system, // the file survives the end of the process

@@ -1,6 +1,6 @@
 #pragma once
-/// Enums and their words. Beside each enum stands one list of its words, in the order of its values, and an overload of
-/// words_of that returns it; scene files, options, the printed table and report.json all use that list.
+/// Enums and their words. Beside each enum stands one list of its words, in the order of its values, and an overload
+/// of words_of that returns it. Scene files, options, the printed table and report.json all use that list.
 #include <cstddef>
 #include <span>
 
@@ -24,6 +24,7 @@ struct Choice
   void (*set)(void* member, std::size_t place) = nullptr;
 };
 
+/// The choice that reads and sets this member, which it borrows.
 template <class Enum> Choice choice_of(Enum& member)
 {
   return {&member, words_of(member),

@@ -38,6 +38,7 @@ struct BrakeBranch
   std::vector<ParameterRange> coexistence;      // of a stable cycle and a stable equilibrium
 };
 
+/// The cycle that is followed, the number that changes, and how each point is computed.
 struct BrakeBranchProblem
 {
   const BranchSettings& settings;
@@ -54,11 +55,11 @@ struct BrakeBranchProblem
   const ShootingOptions& shooting;
 };
 
-/// Why no branch can start from the cycle; empty if it can. `tolerance`: of the residual. [-]
+/// Why no branch can start from the cycle; empty if it can. `tolerance`: of the residual. [-] Not collective.
 std::string no_cycle_to_follow(const LimitCycle& cycle, double tolerance);
 
-/// The number of steps a period along a branch: the scene's, else that of the cycle it starts from, at most 128, since
-/// every point takes several periods.
+/// The number of steps a period along a branch: the scene's, else that of the cycle it starts from. It is at most 128,
+/// since every point takes several periods. Not collective.
 int steps_along_branch(const CycleSettings& settings, const LimitCycle& cycle);
 
 /// Follows the cycle both ways from the scene's own value to the ends of the range, with the equilibrium beside it.

@@ -47,6 +47,7 @@ struct BranchPoint
   PointMeasures measures;
 };
 
+/// What happens along a branch.
 enum class BranchEventKind
 {
   hopf,            // the sliding equilibrium gains or loses an unstable mode
@@ -66,6 +67,7 @@ inline Words words_of(BranchEventKind)
   return branch_event_words;
 }
 
+/// An event and where it is.
 struct BranchEvent
 {
   BranchEventKind kind = BranchEventKind::fold;
@@ -101,6 +103,7 @@ struct BranchSides
   BranchEnding backward = BranchEnding::not_followed, forward = BranchEnding::not_followed;
 };
 
+/// Points and events of a branch, and how its sides ended.
 struct Branch
 {
   std::vector<BranchPoint> points; // along the branch
@@ -109,6 +112,7 @@ struct Branch
   long periods = 0, columns = 0; // integrated; of the tangent, those of the multipliers included
 };
 
+/// How far, how finely and how accurately a branch is followed.
 struct ContinuationSettings
 {
   double least = 0, greatest = 0; // of the parameter
@@ -117,6 +121,7 @@ struct ContinuationSettings
 };
 
 /// The branch through the orbit of the value `parameter` that closes near this one; without points where none does.
+/// Collective. Error: as of the family.
 Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settings, const ShootingOptions& options,
                     const Orbit& start, double parameter);
 

@@ -6,7 +6,7 @@
 /// Status iteration: with the pairs split into closed (g = 0) and open (r = 0) the problem is linear; every pair whose
 /// sign is wrong changes status. When that stops reducing their number, only the last one does. This block principal
 /// pivoting (Judice and Pires 1994) is finite when M is a P-matrix, which too much friction prevents. Beyond, a split
-/// met twice ends it.
+/// met twice ends it. Arithmetic of one rank.
 #include <Eigen/LU>
 #include <optional>
 #include <vector>
@@ -14,6 +14,7 @@
 namespace squeal
 {
 
+/// N g = q + M r over the pairs; matrices are pairs x pairs.
 struct ComplementarityProblem
 {
   Eigen::MatrixXd N, M;  // N empty: identity
@@ -21,6 +22,7 @@ struct ComplementarityProblem
   double compliance = 0; // [m/N] typical of M: reactions times it are compared with gaps
 };
 
+/// Gaps and reactions of a split, one a pair.
 struct SplitSolution
 {
   std::vector<double> gap, reaction; // [m, N], zero by the split where they are not unknown
@@ -42,10 +44,11 @@ private:
   std::optional<Eigen::PartialPivLU<Eigen::MatrixXd>> factors_; // none if a pivot is lost in rounding
 };
 
-/// Of one right-hand side.
+/// Of one right-hand side. Error: an entry is not finite.
 SplitSolution solve_split(const ComplementarityProblem& problem, const std::vector<char>& closed,
                           const std::vector<double>& rhs);
 
+/// How the status iteration ended.
 enum class StatusOutcome
 {
   converged,
@@ -54,6 +57,7 @@ enum class StatusOutcome
   not_converged, // within the iterations allowed
 };
 
+/// The split that the status iteration ended with, one entry a pair.
 struct StatusSolution
 {
   StatusOutcome outcome = StatusOutcome::not_converged;

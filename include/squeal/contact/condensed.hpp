@@ -9,6 +9,7 @@
 namespace squeal
 {
 
+/// W and the factor that it came with.
 struct CondensedOperator
 {
   Factor factor;         // of A bordered by B

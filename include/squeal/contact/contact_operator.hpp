@@ -56,8 +56,8 @@ public:
   bool has_near_field() const { return !near_.runs.empty(); }
   double near_share() const; // entries of the near field over those of W
 
-  /// Gives every rank its part of the columns of a large W, from which products with one vector are formed from now on
-  /// within ServedProducts only. Collective.
+  /// Gives every rank its part of the columns of a large W. From now on products with one vector are formed from
+  /// these, within ServedProducts only. Collective.
   void share_columns(MPI_Comm comm);
 
   /// W on these rows and columns.
@@ -110,7 +110,8 @@ private:
 /// From a dense symmetric W, stored by rows. Error: the number of its entries does not fit.
 ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
 
-/// target += sum of factors[k] row_k over the rows of one pair (1 to 3), `length` long, one after the other.
+/// target += sum of factors[k] row_k over the rows of one pair (1 to 3), `length` long, one after the other. Arithmetic
+/// of one rank.
 void add_rows(const float* rows, std::size_t length, std::size_t number, const PairVector& factors, float* target);
 
 } // namespace squeal

@@ -1,5 +1,5 @@
 #pragma once
-/// What residuals of contact are compared with (src/README.md, section 4.6).
+/// What residuals of contact are compared with (src/README.md, section 4.6). Arithmetic of one rank.
 #include "squeal/contact/pair_law.hpp"
 
 #include <algorithm>

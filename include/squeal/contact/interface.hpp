@@ -35,10 +35,11 @@ struct BrakeModel
 };
 
 /// Rows n, t1, t2 of every pair: n.w and t.w, with w the weighted sum of its nodes' displacements. Tangents: the
-/// scene's, else t1 along the drive. Error: zero drive velocity at a pair where mu > 0.
+/// scene's, else t1 along the drive. Error: zero drive velocity at a pair where mu > 0. Collective.
 Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm);
 
 /// B.petsc gap.petsc drive.petsc of a folder; directions = (rows of B) / pairs - 1. No pairs where none is there.
+/// Collective. Error: a file that is damaged, or whose sizes disagree with the others or with the structure.
 Interface read_interface(const std::filesystem::path& folder, const Structure& structure, const FrictionLaw& friction,
                          MPI_Comm comm);
 
@@ -51,7 +52,7 @@ std::vector<double> relative(const Interface& interface, Vec x);
 /// y += B^T r. Collective; r the same on every rank.
 void add_reactions(const Interface& interface, const std::vector<double>& r, Vec y);
 
-/// |v_d| of a pair [m/s].
+/// |v_d| of a pair [m/s]. Not collective.
 double drive_speed(const Interface& interface, std::size_t pair);
 
 /// Unit drive direction e = v_d/|v_d| of every pair, as TangentView reads it: reactions of steady sliding are
@@ -61,6 +62,7 @@ std::vector<double> drive_directions(const Interface& interface);
 /// mu(|v_d|) of every pair.
 std::vector<double> drive_friction(const Interface& interface);
 
+/// Which rows of a pair are taken.
 enum class RowsTaken
 {
   all,

@@ -13,7 +13,7 @@
 /// unique while |mu'| r_n A_tt < 1. In a step w_t is s_theta/theta: `law_of_step` takes mu at s_theta.
 ///
 /// In a direction in which neither side can move (a zero row of W), r_t opposes the drive while the pair slides along
-/// it although it moves nothing; at rest there, r_t is zero along it.
+/// it, although it moves nothing. At rest there, r_t is zero along it.
 #include "squeal/contact/pairs.hpp"
 #include "squeal/scene/scene.hpp"
 
@@ -139,6 +139,7 @@ inline PairVector velocity_without(const PairBlock& A, const PairVector& r, cons
   return q;
 }
 
+/// What a pair does.
 enum class ContactStatus : char
 {
   open,

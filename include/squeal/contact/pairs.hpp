@@ -1,7 +1,8 @@
 #pragma once
 /// Entries of contact vectors by pairs. A contact vector (reactions, gaps with slidings, velocities) has an entry for
 /// every row of B (src/README.md, section 1.2). Of each pair these are its normal row and its `directions` tangential
-/// ones. Only this header knows that order. How many nodes a pair reads is a matter of its rows of B alone.
+/// ones. Only this header knows that order. How many nodes a pair reads is a matter of its rows of B alone. Views
+/// borrow their numbers and check no sizes.
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -28,6 +29,7 @@ template <class Index> struct PairRows
   Index normal(Index pair) const { return pair * per_pair(); }
   Index tangential(Index pair) const { return normal(pair) + 1; } // the first one
   Index rows_of(Index pairs) const { return pairs * per_pair(); }
+  Index tangential_rows_of(Index pairs) const { return pairs * directions; }
   Index pair_of(Index row) const { return row / per_pair(); }
   Index component_of(Index row) const { return row % per_pair(); } // 0: normal, then the tangential ones
   bool is_normal(Index row) const { return component_of(row) == 0; }
@@ -143,6 +145,7 @@ private:
   std::size_t size_;
 };
 
+/// a . b over the entries of a.
 inline double dot(std::span<const double> a, std::span<const double> b)
 {
   double sum = 0;

@@ -3,7 +3,8 @@
 ///     w_t = s+ + past,   past = (1-theta)/theta s,   so that w_t = s_theta/theta,
 /// s the sliding velocity at the step's start and s+ at its end. The past sliding is left out where friction opposes
 /// s+. These pairs stuck in the step before, so that s is rounding, or are closed and have s+.s < 0 at the solution.
-/// Those would stop or turn back, which friction does not do by itself, and s_theta = 0 is not rest.
+/// Those would stop or turn back, which friction does not do by itself, and s_theta = 0 is not rest. Arithmetic on
+/// contact vectors of one rank.
 #include "squeal/contact/pair_law.hpp"
 
 namespace squeal

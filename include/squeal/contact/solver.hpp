@@ -4,11 +4,11 @@
 /// - rho w)| with rho = 1/W_ii. It is over the largest reaction, or over rho max|b| where that is smaller, and always
 /// of W itself in double precision.
 ///
-/// gauss_seidel: one exact local solve a pair and sweep; w follows each change of a reaction, pairs that no longer move
-/// are passed over. A large W is swept over through its near field, in single precision, and one product with W
-/// between sweeps and the verdict closes the residual; where that does not help, the sweeps read W itself.
+/// gauss_seidel: one exact local solve a pair and sweep. w follows each change of a reaction; pairs that no longer
+/// move are passed over. A large W is swept over through its near field, in single precision. One product with W
+/// between sweeps and the verdict closes the residual. Where that does not help, the sweeps read W itself.
 /// Under-relaxed when 50 sweeps bring nothing.
-/// fixed_point: the paper's r_n <- max(0, r_n - rho w_n), r_t <- proj_disc(mu r_n)(r_t - rho w_t); contracts without
+/// fixed_point: the paper's r_n <- max(0, r_n - rho w_n), r_t <- proj_disc(mu r_n)(r_t - rho w_t). It contracts without
 /// friction for 0 < rho < 2/lambda_max(W), at a rate set by cond(W).
 ///
 /// Problems with the same W are solved together: each row of W that is read serves all of them.
@@ -20,6 +20,7 @@
 namespace squeal
 {
 
+/// The method of the sweeps.
 enum class ContactSolver
 {
   gauss_seidel,
@@ -68,12 +69,12 @@ struct ContactProblem
   ContactMemory& memory;
 };
 
-/// Solves all problems, each from its `r`, which becomes the solution [N]. A problem that does not converge says so in
-/// its result. Not collective: W is one rank's.
+/// Solves all problems, each from its `r`, which becomes the solution [N]. A problem that does not converge says so
+/// in its result. Not collective: W is one rank's.
 std::vector<ContactResult> solve_contacts(const ContactOperator& W, const FrictionLaw& friction,
                                           const ContactSettings& settings, std::span<const ContactProblem> problems);
 
-/// The residual above of reactions r to the free velocities b.
+/// The residual above of reactions r to the free velocities b. On the rank that has W.
 double contact_residual(const ContactOperator& W, const FrictionLaw& friction, const std::vector<double>& b,
                         const std::vector<double>& r);
 

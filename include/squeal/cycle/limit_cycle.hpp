@@ -1,6 +1,7 @@
 #pragma once
 /// The brake's limit cycle by shooting at its period map (src/README.md, section 6). States are compared in the energy
-/// norm sqrt(u'K u + v'M v) only.
+/// norm sqrt(u'K u + v'M v) only. All functions are collective. Those that integrate throw Interrupted where the run is
+/// asked to end.
 #include "squeal/cycle/measured_period.hpp"
 #include "squeal/cycle/options.hpp"
 #include "squeal/shooting/shooting.hpp"
@@ -46,8 +47,8 @@ struct CycleProblem
 /// Those of the unstable modes that are not followed, at their estimated amplitudes, about the equilibrium.
 std::vector<State> other_unstable_motions(const CycleProblem& problem);
 
-/// The state that the scene asks the search to start from: the modes at their estimated amplitudes, the followed one at
-/// an amplitude, or the state given. Nothing where there is no amplitude to start from.
+/// The state that the scene asks the search to start from. It is the modes at their estimated amplitudes, the followed
+/// one at an amplitude, or the state given. Nothing where there is no amplitude to start from.
 std::optional<State> cycle_start(const CycleProblem& problem);
 
 /// The amplitude of the followed mode whose fluctuating energy is the state's. [m]

@@ -5,6 +5,7 @@
 namespace squeal
 {
 
+/// What is measured on one period.
 struct MeasuredPeriod
 {
   State start, end;                                    // with the reactions there
@@ -24,7 +25,8 @@ struct Recording
   PetscInt samples = 0; // of the displacements
 };
 
-/// Integrates a period from the state `start`. `rate`: dPhi/dperiod at its end, or null.
+/// Integrates a period from the state `start`. `rate`: dPhi/dperiod at its end, or null. Collective. Where the run is
+/// asked to end it throws Interrupted.
 MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double period, Vec start, Vec rate);
 
 } // namespace squeal

@@ -5,6 +5,7 @@
 namespace squeal
 {
 
+/// Options -reduced_...
 struct ReducedOptions
 {
   double margin = 1.5;         // pairs that part at this many times the motion's amplitude keep their contact
@@ -15,6 +16,7 @@ struct ReducedOptions
   PetscInt corrections = 40;   // periods of the full model at most, while the steps a period are refined
 };
 
+/// Options -cycle_...
 struct CycleOptions
 {
   ShootingOptions shooting;

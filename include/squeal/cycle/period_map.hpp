@@ -5,7 +5,8 @@
 /// modes included.
 ///
 /// A map that keeps its step integrates a period T near N h with the h at hand. It goes on from N h to T along that
-/// derivative, as long as what this neglects is small (section 6.2). A and W are then those of the period before.
+/// derivative, as long as what this neglects is small (section 6.2). A and W are then those of the period before. All
+/// functions are collective. Those that integrate throw Interrupted where the run is asked to end.
 #include "squeal/shooting/flow.hpp"
 #include "squeal/transient/step_tangent.hpp"
 #include "squeal/transient/transient.hpp"

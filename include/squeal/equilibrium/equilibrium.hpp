@@ -54,6 +54,7 @@ struct Equilibrium
   Uniqueness uniqueness = Uniqueness::not_checked;
 };
 
+/// Options -equilibrium_...
 struct EquilibriumOptions
 {
   PetscInt max_iterations = 100;
@@ -81,10 +82,11 @@ private:
   std::unique_ptr<Parts> parts_;
 };
 
-/// Error: K is singular on a body that contact does not hold either (which body).
+/// Error: K is singular on a body that contact does not hold either (which body). Collective.
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options);
 
 /// The same with a compliance that is at hand, first tried with these closed pairs; empty: none are expected.
+/// Collective.
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const PairCompliance& compliance,
                              const std::vector<char>& expected, const EquilibriumOptions& options);
 

@@ -23,14 +23,14 @@ struct ClosedContact
 };
 
 /// `closed`: by pairs. Error: a closed pair whose normal motion the other closed pairs already fix, or that the
-/// friction coefficient jams (which pair).
+/// friction coefficient jams (which pair). Collective.
 ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface& interface,
                                      const std::vector<char>& closed);
 
-/// Y'A Z
+/// Y'A Z. Collective.
 Owned<Mat> project(Mat A, Mat Y, Mat Z);
 
-/// Z'A Z, marked symmetric.
+/// Z'A Z, marked symmetric. Collective.
 Owned<Mat> project_symmetric(Mat A, Mat Z);
 
 /// The derivative of steady friction in the sliding velocity over the closed pairs [N s/m],
@@ -43,6 +43,7 @@ enum class FrictionDamping
   of_speed,
 };
 
+/// C_f from the reactions of the closed pairs. Collective.
 Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,
                             const std::vector<double>& reactions, FrictionDamping part);
 

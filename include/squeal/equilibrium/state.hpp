@@ -1,5 +1,6 @@
 #pragma once
-/// State of the structure (src/README.md, section 1.5): displacements, velocities and the reactions with them.
+/// State of the structure (src/README.md, section 1.5): displacements, velocities and the reactions with them. All
+/// functions are collective.
 #include "squeal/base/outcome.hpp"
 #include "squeal/contact/interface.hpp"
 
@@ -26,8 +27,8 @@ double potential_energy(const Structure& structure, Vec u); // u'Ku/2 [J]
 /// Vec u, then Vec v, PETSc binary, in the order of files (file_order.hpp). Collective; the file is whole or absent.
 void write_state(const State& state, const Structure& structure, const std::filesystem::path& file);
 
-/// Error: the file is missing, is not two PETSc vectors, is cut short, has another size than the structure, or holds
-/// an entry that is not finite.
+/// Error: the file is missing, is not two PETSc vectors, or is cut short. Error, too: it has another size than the
+/// structure, or holds an entry that is not finite.
 State read_state(const std::filesystem::path& file, const Structure& structure);
 
 } // namespace squeal

@@ -1,5 +1,5 @@
 #pragma once
-/// Extraction of the scene's mesh from the content of a mesh file.
+/// Extraction of the scene's mesh from the content of a mesh file. Not collective.
 #include "squeal/mesh/mesh_file.hpp"
 
 namespace squeal

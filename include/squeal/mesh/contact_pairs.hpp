@@ -35,15 +35,17 @@ struct Coverage
   double offset = 0;            // [m] largest tangential distance of the points where a pair's two forces act
 };
 
+/// The pairs of all contacts.
 struct ContactPairs
 {
   std::vector<ContactPair> pairs;
   std::vector<Coverage> coverage; // one a contact; zeros for points
 };
 
-/// Returns the pairs in the order of the contacts, in each by the rotor's nodes.
-/// Throws Error for: a missing surface or point; surfaces that share nodes, are nowhere within reach of each other,
-/// look the same way or are inside each other; a slave surface that supports or rigid bodies hold.
+/// Returns the pairs in the order of the contacts, in each by the rotor's nodes. Throws Error for a missing surface or
+/// point, and for a slave surface that supports or rigid bodies hold. It does so for surfaces that share nodes, are
+/// nowhere within reach of each other, look the same way or are inside each other. Not collective: the mesh is whole
+/// on every rank.
 ContactPairs make_pairs(const Mesh& mesh, const Scene& scene);
 
 } // namespace squeal

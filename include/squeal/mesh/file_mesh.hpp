@@ -1,6 +1,6 @@
 #pragma once
-/// The content of a mesh file, before the scene's parts and surfaces are extracted from it, and its form on the way
-/// from the mesher to the program. This header knows no MPI, because the mesher knows none.
+/// The content of a mesh file, before the scene's parts and surfaces are extracted from it. In this form it goes from
+/// the mesher to the program. This header knows no MPI, because the mesher knows none. Not collective.
 #include "squeal/base/vec3.hpp"
 #include "squeal/base/words.hpp"
 
@@ -22,6 +22,7 @@ struct ElementBlock
   std::vector<std::string> groups; // physical groups of the entity; a group without a name is named by its number
 };
 
+/// Nodes and elements of a file.
 struct FileMesh
 {
   std::vector<Vec3> nodes; // in the unit of the file

@@ -23,6 +23,7 @@ enum class Shape
   shell3,
 };
 
+/// An element of a part.
 struct Element
 {
   Shape shape{};
@@ -70,9 +71,9 @@ struct Mesh
 
 /// Returns the scene's mesh with its points and reference points; without a mesh file it holds these points only.
 /// Collective: rank 0 reads the file through libgmsh and broadcasts it. Nodes that no element uses are dropped, and
-/// elements numbered inside out are renumbered.
-/// Throws Error for: a missing or unreadable file; a mesh without elements; a shape that has no kernel; solid elements
-/// in no part; a part, group or point that the mesh does not have.
+/// elements numbered inside out are renumbered. Throws Error for a missing or unreadable file, a mesh without
+/// elements, a shape that has no kernel, and solid elements in no part. It does so for a part, group or point that the
+/// mesh does not have.
 Mesh read_mesh(const Scene& scene, MPI_Comm comm);
 
 } // namespace squeal

@@ -1,10 +1,12 @@
 #pragma once
-/// Quadrature rules on the reference elements, each with the shape functions at its points.
+/// Quadrature rules on the reference elements, each with the shape functions at its points. Rules are made once and
+/// live as long as the program.
 #include "squeal/mesh/shape_functions.hpp"
 
 namespace squeal
 {
 
+/// A point of a rule.
 struct QuadraturePoint
 {
   Eigen::Vector3d xi; // [-] natural coordinates

@@ -1,5 +1,6 @@
 #pragma once
-/// What the rows of another code's matrices are, by the text files beside them.
+/// What the rows of another code's matrices are, by the text files beside them. Not collective: the caller reads on
+/// rank 0.
 #include "squeal/base/vec3.hpp"
 
 #include <filesystem>
@@ -19,6 +20,7 @@ struct NodeMotion
 /// motion. Throws Error with the line that is wrong.
 std::vector<NodeMotion> read_row_motions(const std::filesystem::path& file);
 
+/// A node of another code's model and its place.
 struct PlacedNode
 {
   long node = -1; // its number

@@ -1,9 +1,9 @@
 #pragma once
 /// Geometry scripts: what gmsh is allowed to run of them.
 ///
-/// gmsh's language can run commands, write files and read any file, and gmsh takes every file for a script that it does
+/// gmsh's language can run commands, write files and read any file. gmsh takes every file for a script that it does
 /// not recognise. A scene's geometry comes from anywhere. Hence gmsh never sees the file itself but a text made of the
-/// scanned tokens: without comments, with included files in their places, and with listed words only.
+/// scanned tokens. It has no comments, included files in their places, and listed words only. Not collective.
 #include "squeal/scene/scene.hpp"
 
 #include <filesystem>
@@ -13,6 +13,7 @@
 namespace squeal
 {
 
+/// A geometry as gmsh may run it.
 struct Script
 {
   std::string text;                    // on the lines of the file

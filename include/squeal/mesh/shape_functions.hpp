@@ -1,5 +1,5 @@
 #pragma once
-/// Shape functions of elements and faces, and integrals of them over faces.
+/// Shape functions of elements and faces, and integrals of them over faces. Arithmetic of one rank; no function throws.
 #include "squeal/mesh/mesh.hpp"
 
 #include <Eigen/Dense>
@@ -27,6 +27,7 @@ struct ShapeFunctions
 ShapeFunctions shape_functions(Shape shape, const Eigen::Vector3d& xi);
 ShapeFunctions shape_functions(FaceShape shape, const Eigen::Vector3d& xi);
 
+/// The positions as columns.
 NodePositions position_matrix(std::span<const Vec3> x);
 
 /// Returns the consistent nodal weights of a face [m2], the integrals of N_i n dA.

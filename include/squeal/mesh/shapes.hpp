@@ -1,6 +1,6 @@
 #pragma once
-/// Topology of element and face shapes, in gmsh's node order (gmsh reference manual, "Node ordering").
-/// Node numbers count from 0 within the element or face.
+/// Topology of element and face shapes, in gmsh's node order (gmsh reference manual, "Node ordering"). Node numbers
+/// count from 0 within the element or face. Tables of one rank; no function throws.
 #include "squeal/mesh/mesh.hpp"
 
 #include <optional>
@@ -13,6 +13,7 @@ namespace squeal
 std::optional<Shape> element_shape(int gmsh_type);
 std::optional<FaceShape> face_shape(int gmsh_type);
 
+/// Number of nodes, number of corners, and whether it is a shell.
 int node_count(Shape shape);
 int node_count(FaceShape shape);
 int corner_count(Shape shape);

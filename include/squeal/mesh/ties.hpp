@@ -14,15 +14,16 @@ struct TiedNode
   std::vector<PairNode> others;
 };
 
+/// The slave nodes of all ties.
 struct TiedNodes
 {
   std::vector<TiedNode> nodes;
   std::vector<Coverage> coverage; // one a tie
 };
 
-/// A slave node below a tenth of its uncovered area is left free.
-/// Throws Error for: a missing surface; surfaces that share nodes or do not meet; a node that is tied twice; a slave
-/// node that is on the master of a tie.
+/// A slave node below a tenth of its uncovered area is left free. Throws Error for a missing surface and for surfaces
+/// that share nodes or do not meet. It does so for a node that is tied twice, and for a slave node that is on the
+/// master of a tie. Not collective: the mesh is whole on every rank.
 TiedNodes tied_nodes(const Mesh& mesh, const Scene& scene);
 
 } // namespace squeal

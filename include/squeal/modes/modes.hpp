@@ -134,9 +134,11 @@ OptionList options_of(ModesOptions& options);
 bool is_unstable(std::complex<double> lambda);
 
 /// Frictionless undamped modes in the structure's dofs with frequency below `band` [Hz], as many as there are.
+/// Collective. Error: memory runs out.
 RealModes find_real_modes_below(const LinearisedSliding& linearised, double band, const ModesOptions& options);
 
 /// Those from `low` to `high` [Hz], for a basis: a mode may be missed. Small systems, and low = 0: all below `high`.
+/// Collective. Error: memory runs out.
 RealModes find_real_modes_between(const LinearisedSliding& linearised, double low, double high,
                                   const ModesOptions& options);
 

@@ -2,7 +2,8 @@
 /// The quadratic eigenproblem on a small subspace that is corrected by residuals (src/README.md, section 3.7).
 ///
 /// On an orthonormal V, V'(lambda^2 M + lambda C + K) V a = 0 is small and dense. The residual r of a pair y = V a
-/// shows what V lacks: P^-1 r is appended to V, where P is a factor that is at hand, for some passes.
+/// shows what V lacks: P^-1 r is appended to V, where P is a factor that is at hand, for some passes. All functions are
+/// collective. Error: memory runs out, or LAPACK does not converge on the small problem.
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/modes/quadratic.hpp"
 #include "squeal/modes/real_modes.hpp"

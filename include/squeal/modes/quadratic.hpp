@@ -52,10 +52,10 @@ struct QuadraticSolution
 };
 
 /// Motions of a free body (|lambda|^2 below 1e-12 |K|/|M|) are no vibration and are left out, as are real negative
-/// lambda.
+/// lambda. Collective. Error: memory runs out, or LAPACK does not converge on a small problem.
 QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings);
 
-/// Sorts the pairs by falling real part, and sets outcome.residual to the largest backward error.
+/// Sorts the pairs by falling real part, and sets outcome.residual to the largest backward error. Not collective.
 void sort_and_measure(QuadraticSolution& solution);
 
 /// Sizes of M [kg], C [N s/m] and K [N/m], for backward errors.
@@ -67,7 +67,7 @@ struct QuadraticNorms
 /// The norms of the three matrices. Collective.
 QuadraticNorms norms_of(const QuadraticProblem& problem);
 
-/// |lambda|^2 up to which a motion is that of a free body, not a vibration: 1e-12 |K|/|M| [1/s2].
+/// |lambda|^2 up to which a motion is that of a free body, not a vibration: 1e-12 |K|/|M| [1/s2]. Not collective.
 double vibration_floor(const QuadraticNorms& norms);
 
 /// eta = |Q(lambda) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|) [-]. Collective.

@@ -1,7 +1,8 @@
 #pragma once
 /// Real modes, K x = omega^2 M x (src/README.md, section 3.6). Small problems are solved by LAPACK. Large ones are
 /// solved by SLEPc's Krylov-Schur method about one shift just below zero. By Sylvester's law a factor at a second shift
-/// counts the eigenvalues below it, and modes that are missing are sought again.
+/// counts the eigenvalues below it, and modes that are missing are sought again. All functions are collective. Error:
+/// memory runs out, or some motion has neither mass nor stiffness.
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/modes/modes.hpp"
 
@@ -14,8 +15,8 @@ namespace squeal
 /// where a free body leaves K singular.
 double shift_below_zero(Mat M, Mat K);
 
-/// Counts the omega below a limit: of a small problem from all eigenvalues, of a large one by the inertia of a factor,
-/// whose result is kept.
+/// Counts the omega below a limit: of a small problem from all eigenvalues, of a large one by the inertia of a factor.
+/// Counts are kept.
 struct RealCount
 {
   ShiftInvert pencil;          // of a large problem
@@ -23,6 +24,7 @@ struct RealCount
   std::map<double, int> below; // the counts so far
 };
 
+/// A count for K x = omega^2 M x. Borrows M and K.
 RealCount make_real_count(Mat M, Mat K, const ModesOptions& options);
 
 /// The number of eigenvalues below omega [rad/s].

@@ -4,12 +4,12 @@
 /// A slice starts from the undamped problem with friction, K x = theta M x, real and unsymmetric. One real factor of
 /// K - sigma M gives the invariant subspace V of all theta about the slice's middle sigma (shift_invert.hpp). Under
 /// Rayleigh damping, C = alpha M + beta K, the pairs of the quadratic problem are in V: theta (1 + beta lambda) =
-/// -lambda (lambda + alpha). Under other damping the pairs on V leave residuals r, and (K - sigma M)^-1 r is appended
-/// to V until all pairs are exact (projection.hpp).
+/// -lambda (lambda + alpha). Under other damping the pairs on V leave residuals r. (K - sigma M)^-1 r is appended to V
+/// until all pairs are exact (projection.hpp).
 ///
 /// Friction turns theta about zero. A slice holds all theta that are turned by up to 0.06 rad and, where pairs are
 /// missing in the end, by 0.2 rad. Caveat: a pair that is turned further, or that no longer oscillates, is missing in
-/// the count; TOAR (quadratic.hpp) does not use slices.
+/// the count; TOAR (quadratic.hpp) does not use slices. Both functions are collective. Error: memory runs out.
 #include "squeal/modes/quadratic.hpp"
 #include "squeal/modes/real_modes.hpp"
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The brake reduced to the modes of its band and the attachment shapes of all pairs, as a matrix scene that this and
-/// other programs read (src/README.md, section 7.11).
+/// The brake reduced to the modes of its band and the attachment shapes of all pairs (src/README.md, section 7.11).
+/// It is a matrix scene that this and other programs read.
 #include "squeal/equilibrium/state.hpp"
 #include "squeal/modes/modes.hpp"
 

@@ -28,6 +28,7 @@
 namespace squeal
 {
 
+/// Matrices on the shapes V, the active pairs and their law. [size]: number of shapes; [rows]: of the active pairs.
 struct ReducedModel
 {
   Eigen::MatrixXd M, C, K;                        // size x size [of kg, N s/m, N/m]
@@ -52,13 +53,15 @@ struct ReducedModel
 /// The highest of the modes' frequencies [Hz]; 0 without modes.
 double highest_frequency(const std::vector<ComplexMode>& modes);
 
-/// Pairs whose normal reaction in u0 + amplitude Re(phi e^{iwt}) falls below zero, or whose gap does.
+/// Pairs whose normal reaction in u0 + amplitude Re(phi e^{iwt}) falls below zero, or whose gap does. Ascending.
+/// Collective.
 std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
                                        const ComplexMode& mode, double amplitude);
 
-/// Whether no pair comes to rest or turns round in that motion's velocity.
+/// Whether no pair comes to rest or turns round in that motion's velocity. Collective.
 bool slide_throughout(const Interface& interface, const ComplexMode& mode, double amplitude);
 
+/// How a model is reduced.
 struct Reduction
 {
   PetscInt modes = 0;      // complex modes taken, nearest in frequency to the followed one, which is the first of all
@@ -69,6 +72,8 @@ struct Reduction
   double apart = 0; // part of the modes, those of highest frequency, that `apart` of the model holds
 };
 
+/// The model whose other closed pairs slide throughout. Collective. Error: as of eliminate_closed_pairs; K + omega^2 M
+/// is not positive definite with the active pairs open; a shape without mass or stiffness.
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
                     const Reduction& reduction);
 
@@ -80,6 +85,7 @@ struct PairRoles
   std::vector<double> reactions; // [N] a contact vector: means over the motion, which turn the friction of C_f
 };
 
+/// The same with the roles of all pairs given.
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, const PairRoles& roles,
                     const Reduction& reduction);
 
@@ -95,10 +101,10 @@ struct ReducedState
   Eigen::VectorXd q, v;
 };
 
-/// Coordinates of du and v: of the nearest shape in the energy of K + omega^2 M, and in that of M.
+/// Coordinates of du and v: of the nearest shape in the energy of K + omega^2 M, and in that of M. Collective.
 ReducedState coordinates(const ReducedModel& model, const Structure& structure, Vec du, Vec v);
 
-/// target += factor shapes q
+/// target += factor shapes q. Each rank adds to its own entries.
 void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd& q, Vec target);
 
 } // namespace squeal

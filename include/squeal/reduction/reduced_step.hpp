@@ -1,5 +1,6 @@
 #pragma once
-/// The modified theta-method on the reduced model (src/README.md, section 7.4), in few dense products.
+/// The modified theta-method on the reduced model (src/README.md, section 7.4), in few dense products. Every rank does
+/// the same; no function is collective or throws.
 #include "squeal/contact/solver.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
@@ -21,8 +22,8 @@ struct ReducedContact
   Eigen::MatrixXf normal_responses{};
 };
 
-/// The period map of the reduced model by theta steps (src/README.md, section 4), whose matrices are formed
-/// once per step size:  (v, q) -> v_free,  r -> v+ - v_free,  W r.
+/// The period map of the reduced model by theta steps (src/README.md, section 4), with matrices for each step size:
+/// (v, q) -> v_free, r -> v+ - v_free, W r.
 struct ReducedMap
 {
   const ReducedModel& model;
@@ -57,6 +58,7 @@ struct PeriodEnd
   ReducedState end, rate;
 };
 
+/// The end of a period of this length and its derivative in the length.
 PeriodEnd end_of_period(ReducedMap& map, double period, ReducedState state);
 
 } // namespace squeal

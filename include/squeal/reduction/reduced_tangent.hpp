@@ -1,5 +1,6 @@
 #pragma once
-/// The derivative of the reduced period map (src/README.md, sections 4.13 and 7.5).
+/// The derivative of the reduced period map (src/README.md, sections 4.13 and 7.5). Functions that take a communicator
+/// are collective; of the others every rank does the same.
 #include "squeal/reduction/reduced_step.hpp"
 #include "squeal/transient/step_record.hpp"
 

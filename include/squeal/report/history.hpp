@@ -5,7 +5,7 @@
 namespace squeal
 {
 
-/// On rank 0 alone.
+/// On rank 0 alone. Error: the file cannot be written.
 void write_history(const Report& report, const Scene& scene, const std::filesystem::path& file);
 
 } // namespace squeal

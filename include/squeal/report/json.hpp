@@ -1,5 +1,5 @@
 #pragma once
-/// report.json: the run in numbers.
+/// report.json: the run in numbers. On rank 0 alone.
 #include "squeal/report/report.hpp"
 
 namespace squeal

@@ -1,7 +1,6 @@
 #pragma once
-/// All results of a run, and its files: report.json, fields.h5 + fields.xdmf, history.h5, sweep.csv, resolved.toml (the
-/// scene with every default), options.txt, and the printed table. Every number comes with its unit and with what it is
-/// worth (residual, backward error, defect).
+/// All results of a run, and its files (report/result_files.hpp) with the printed table. Every number comes with its
+/// unit and with what it is worth (residual, backward error, defect).
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/contact/resultants.hpp"
@@ -21,6 +20,7 @@
 namespace squeal
 {
 
+/// The size of the model.
 struct ModelSummary
 {
   PetscInt dofs = 0;
@@ -33,6 +33,7 @@ struct ModelSummary
   std::vector<Coverage> coverage;    // one a contact; empty on a matrix scene
 };
 
+/// What a stage took.
 struct Timing
 {
   Stage stage{};

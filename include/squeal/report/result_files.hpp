@@ -7,6 +7,7 @@
 namespace squeal
 {
 
+/// The files of a results folder.
 enum class ResultFile
 {
   report,

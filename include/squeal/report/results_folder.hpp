@@ -1,5 +1,5 @@
 #pragma once
-/// The results of a run as one whole: stages write into a folder beside the results' place, PLACE.partial, which takes
+/// The results of a run as one whole. Stages write into a folder beside the results' place, PLACE.partial. It takes
 /// that place in one move when the run ends. Earlier results stay until then.
 ///
 /// PLACE may be a working folder, a mount point, or a folder whose parent is read-only, or hold other files than
@@ -28,18 +28,21 @@ private:
   int file_ = -1;
 };
 
+/// Whether the run keeps checkpoints.
 enum class Checkpoints
 {
   removed,
   published,
 };
 
+/// Whether the run starts anew.
 enum class Beginning
 {
   afresh,
   from_checkpoints,
 };
 
+/// The place of the results and the folder that takes it.
 class ResultsFolder
 {
 public:

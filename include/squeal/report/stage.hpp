@@ -7,6 +7,7 @@
 namespace squeal
 {
 
+/// A stage of a run.
 enum class Stage
 {
   model,

@@ -5,6 +5,7 @@
 namespace squeal
 {
 
+/// The printed table, line by line. On rank 0 alone.
 std::string table(const Report& report, const Scene& scene);
 
 } // namespace squeal

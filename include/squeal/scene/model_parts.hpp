@@ -106,18 +106,21 @@ struct Support
   Motions fixed{};
 };
 
+/// A force on a node, a body or a group.
 struct Force
 {
   std::string on; // point, rigid body, or node group whose nodes share the force equally
   Vec3 vector{};  // [N] total force
 };
 
+/// A pressure on a surface.
 struct Pressure
 {
   std::string on;   // named surface
   double value = 0; // [Pa] positive towards the solid
 };
 
+/// A rotation about a fixed axis.
 struct Rotation
 {
   Vec3 axis{};     // [-] unit vector
@@ -180,6 +183,7 @@ enum class Statements
   any,    // whatever gmsh runs: commands of the shell among them
 };
 
+/// Where the mesh comes from.
 struct MeshSource
 {
   std::filesystem::path file;               // mesh or geometry that libgmsh reads; absolute

@@ -53,6 +53,7 @@ inline Words words_of(StartKind)
   return start_kind_words;
 }
 
+/// Where a transient starts.
 struct Start
 {
   StartKind kind = StartKind::estimate;
@@ -75,6 +76,7 @@ inline Words words_of(CycleStartKind)
   return cycle_start_kind_words;
 }
 
+/// Where the search for the cycle starts, with its file.
 struct CycleStart
 {
   CycleStartKind kind = CycleStartKind::estimate;
@@ -92,6 +94,7 @@ struct ModesSettings
   bool reduced_matrices = false; // the brake reduced to them and to the pairs' attachments is written as matrices
 };
 
+/// Settings of the energy estimate.
 struct EstimateSettings
 {
   bool enabled = true;
@@ -105,6 +108,7 @@ struct TimeFactor
   std::vector<double> value; // [-] one a time
 };
 
+/// The factor at a time [s].
 double factor_at(const TimeFactor& factor, double time);
 
 /// Factors on what acts on the structure, over the time of a transient.
@@ -118,6 +122,7 @@ struct Ramps
 /// Whether any of them is given.
 bool are_given(const Ramps& ramps);
 
+/// Settings of the transient.
 struct TransientSettings
 {
   bool enabled = false;
@@ -132,6 +137,7 @@ struct TransientSettings
   std::filesystem::path save_state; // state file written at the end; none if empty
 };
 
+/// Settings of the search for the cycle.
 struct CycleSettings
 {
   bool enabled = false;
@@ -219,6 +225,7 @@ struct RobustnessSettings
   double confidence = 0.95; // [-] of the intervals of the probabilities
 };
 
+/// The distribution of a random number.
 enum class Distribution
 {
   normal,    // cut off at four deviations
@@ -255,6 +262,7 @@ struct Probe
   Vec3 direction{};       // [-] unit vector
 };
 
+/// All tables of a scene file.
 struct Scene
 {
   std::string title;

@@ -1,7 +1,7 @@
 #pragma once
 /// The largest Lyapunov exponents of a flow along a motion, from its batched tangent (src/README.md, section 7.10). A
 /// few columns are carried along and made orthonormal again in the energy product after every period. The logarithms of
-/// what they were stretched by are the exponents, per period.
+/// what they were stretched by are the exponents, per period. Functions that take a flow are collective.
 #include "squeal/settled/statistics.hpp"
 #include "squeal/shooting/flow.hpp"
 
@@ -10,6 +10,7 @@
 namespace squeal
 {
 
+/// Columns that are carried along a motion.
 struct TangentBundle
 {
   std::vector<Owned<Vec>> columns;         // energy-orthonormal
@@ -22,8 +23,9 @@ TangentBundle make_bundle(const Flow& flow, Vec like, PetscInt count);
 /// Carries the columns along the period that the flow recorded last.
 void follow_period(const Flow& flow, TangentBundle& bundle);
 
-/// Largest first, per period, from the periods after the first `skipped`. A column that shears without growing, as on a
-/// torus, is stretched in proportion to the time: ln 2 over the last half of the periods, which the bars include.
+/// Largest first, per period, from the periods after the first `skipped`. A column that shears without growing, as on
+/// a torus, is stretched in proportion to the time. That is ln 2 over the last half of the periods, which the bars
+/// include. Not collective.
 std::vector<MeanValue> exponents_of(const TangentBundle& bundle, std::size_t skipped);
 
 } // namespace squeal

@@ -12,6 +12,7 @@
 namespace squeal
 {
 
+/// What attracts a motion.
 enum class MotionKind
 {
   undecided,
@@ -27,6 +28,7 @@ inline Words words_of(MotionKind)
   return motion_kind_words;
 }
 
+/// Options -settled_...
 struct SettledOptions
 {
   PetscInt periods = 512; // integrated at most
@@ -53,6 +55,7 @@ struct PeriodSample
 /// Integrates one period in place, such that the flow's tangent then belongs to it.
 using PeriodSampler = std::function<PeriodSample(Vec state)>;
 
+/// A motion, what is measured on it and its kind.
 struct ExaminedMotion
 {
   std::vector<std::vector<double>> channels; // [channel][period], from the start
@@ -87,7 +90,7 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
                            const BaseFrequencies& base);
 
 /// Integrates 128 periods, and twice as many until the kind is decided or the options' number is reached. The state
-/// goes along. It is kept when a checkpoint is due, and when the sampler throws Interrupted.
+/// goes along. It is kept when a checkpoint is due, and when the sampler throws Interrupted. Collective.
 ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, const MotionKeeper& keeper, Vec state,
                               double period, const SettledOptions& options);
 

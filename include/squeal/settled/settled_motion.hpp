@@ -24,10 +24,10 @@ struct SettledMotion
   History history;                     // of all periods
 };
 
-/// Where the motion answers, the outcome of the search for a cycle becomes "settled".
+/// Where the motion answers, the outcome of the search for a cycle becomes "settled". Not collective.
 void take_as_answer(const SettledMotion& motion, Outcome& of_cycle);
 
-/// Integrates on from the end of the search's free motion.
+/// Integrates on from the end of the search's free motion. Collective. A run that is asked to end throws Interrupted.
 SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, const SettledOptions& options);
 
 } // namespace squeal

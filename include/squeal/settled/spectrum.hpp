@@ -1,6 +1,6 @@
 #pragma once
 /// The amplitude spectrum of a recorded coordinate, its lines, and the base frequencies that they come from
-/// (src/README.md, section 7.10).
+/// (src/README.md, section 7.10). Arithmetic of one rank; no function throws.
 #include <span>
 #include <vector>
 
@@ -14,6 +14,7 @@ struct Line
   double amplitude = 0; // in the signal's unit
 };
 
+/// An amplitude spectrum and its lines.
 struct Spectrum
 {
   std::vector<double> frequency_hz, amplitude; // of the signal less its mean, under a Hann window
@@ -32,6 +33,7 @@ struct BaseFrequencies
   double explained = 0; // part of the power beside the first's multiples that is in lines n f_1 + m f_2
 };
 
+/// The base frequencies of a spectrum, the first one that of its strongest line.
 BaseFrequencies base_frequencies(const Spectrum& spectrum);
 
 /// The same with the first frequency given.

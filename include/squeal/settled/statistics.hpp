@@ -1,5 +1,6 @@
 #pragma once
-/// Means of a series with their error bars, and whether it is stationary (src/README.md, section 7.10).
+/// Means of a series with their error bars, and whether it is stationary (src/README.md, section 7.10). Arithmetic of
+/// one rank; no function throws.
 #include <cstddef>
 #include <span>
 
@@ -20,8 +21,8 @@ MeanValue batch_mean(std::span<const double> series);
 /// (Geweke 1992). The last half gives the bar.
 bool is_stationary(std::span<const double> series);
 
-/// How many values to leave out until the rest is stationary: none, an eighth, a quarter or a half; all where that does
-/// not do either.
+/// The number of values to leave out until the rest is stationary: none, an eighth, a quarter or a half. All where
+/// that does not do either.
 std::size_t values_before_stationary(std::span<const double> series);
 
 /// The rate at which the spread of the series about its mean decays, per value. It is the slope of the logarithm of its

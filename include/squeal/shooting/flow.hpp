@@ -1,7 +1,8 @@
 #pragma once
 /// The flow of an autonomous system x' = f(x) with states x = (u, v), held as VecNest, and their energy product
 ///     <a, b> = a_u'K b_u + a_v'M b_v   [twice J for a = b].
-/// The shooting solver sees nothing else of a model.
+/// The shooting solver sees nothing else of a model. Functions on states are collective, but for the two that lend a
+/// half of one.
 #include "squeal/base/petsc.hpp"
 
 #include <complex>
@@ -54,6 +55,7 @@ Owned<Vec> state_of(Vec u, Vec v);
 
 /// The parts of a state, borrowed.
 Vec displacement(Vec state);
+/// The second half, likewise.
 Vec velocity(Vec state);
 
 /// image = (K u, M v)

@@ -1,5 +1,6 @@
 #pragma once
-/// The full-space finish of a shooting (src/README.md, section 6.8), by the solvers that -cycle_finish names.
+/// The full-space finish of a shooting (src/README.md, section 6.8), by the solvers that -cycle_finish names. Both are
+/// collective. Error: as of the flow.
 #include "squeal/shooting/options.hpp"
 #include "squeal/shooting/orbit.hpp"
 

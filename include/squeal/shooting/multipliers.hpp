@@ -2,9 +2,9 @@
 /// Floquet multipliers: eigenvalues of the monodromy matrix dPhi_T/dx at a periodic orbit (src/README.md, section 6.9).
 ///
 /// A small system's matrix is formed whole. A large one's is projected obliquely on approximate right and left vectors
-/// where the flow knows some, else on an Arnoldi space in the energy product. All use the flow's exact tangent; a flow
-/// without one is left to difference quotients. The shift in time, whose multiplier is 1, is the value near 1 whose
-/// vector is closest to d.
+/// where the flow knows some. Else it is projected on an Arnoldi space in the energy product. All use the flow's exact
+/// tangent; a flow without one is left to difference quotients. The shift in time, whose multiplier is 1, is the value
+/// near 1 whose vector is closest to d.
 ///
 /// Each multiplier has an error bar of its own. The distance of the shift's own multiplier from 1 says nothing about
 /// the others.
@@ -58,6 +58,7 @@ struct SeenGrowth
   double growth = std::numeric_limits<double>::quiet_NaN(), error = growth; // of the distance, a period
 };
 
+/// The multipliers of an orbit, their bars, and what they say of its stability.
 struct Multipliers
 {
   std::vector<std::complex<double>> values; // without that of a shift in time, largest first; empty: not examined
@@ -76,6 +77,7 @@ struct Multipliers
 /// Degrees of freedom beyond which a period costs so much that columns, free periods and steps a period are spared.
 inline constexpr PetscInt large_model = 10000;
 
+/// The multipliers and the motion that grows most.
 struct FloquetAnalysis
 {
   Multipliers multipliers;
@@ -84,7 +86,7 @@ struct FloquetAnalysis
 
 /// All multipliers of a system of up to 100 degrees of freedom, or 25 without an exact tangent. Of a larger one those
 /// of the slow motions, or of as many Arnoldi steps as its leading value needs. These are at most 96, or 24 beyond 10
-/// 000 degrees of freedom. -cycle_multiplier_method forces a method.
+/// 000 degrees of freedom. -cycle_multiplier_method forces a method. Collective. Error: as of the flow.
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable);
 

@@ -38,7 +38,7 @@ struct Multisecant
 };
 
 /// Sets `last_step` to what the next step from the orbit would change. `remaining` is twice that, or half of the step
-/// before if that is more, since the signs of the steps alternate.
+/// before if that is more, since the signs of the steps alternate. Collective.
 void estimate_remaining_change(const OrbitProblem& problem, const ShootingOptions& options, Multisecant& multisecant,
                                const Orbit& orbit);
 

@@ -38,6 +38,7 @@ inline Words words_of(MultiplierMethod)
   return multiplier_method_words;
 }
 
+/// Options -cycle_... of the solver.
 struct ShootingOptions
 {
   Finish finish = Finish::multisecant;

@@ -3,7 +3,7 @@
 ///     F(x, T) = Phi_T(x) - x = 0,   <f, dx> = 0,
 /// where f is the flow's direction. A correction dx along the orbit would only move the time origin.
 ///
-/// "Orbit" is a candidate of the solver, whether it closes or not.
+/// "Orbit" is a candidate of the solver, whether it closes or not. Functions on orbits are collective.
 #include "squeal/base/progress.hpp"
 #include "squeal/base/words.hpp"
 #include "squeal/shooting/flow.hpp"
@@ -26,6 +26,7 @@ struct Orbit
   double residual = 0;    // |defect| / fluctuation
 };
 
+/// A deep copy.
 Orbit copy_of(const Orbit& orbit);
 
 /// What is sought. A stage borrows it and never changes it.
@@ -85,6 +86,7 @@ struct ConvergenceLog
   Convergence convergence{};
 };
 
+/// Why a stage stopped.
 enum class StageEnding
 {
   converged,
@@ -100,7 +102,7 @@ struct StageResult
   StageEnding ending = StageEnding::stalled;
 };
 
-/// One evaluation of the flow.
+/// One evaluation of the flow. Error: as of the flow.
 Orbit evaluate(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period);
 
 /// Adds a record. `unknowns`: of the stage's system; 0 where nothing is solved for.

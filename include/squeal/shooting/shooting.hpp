@@ -1,8 +1,8 @@
 #pragma once
 /// Shooting (src/README.md, section 6): the periodic orbit Phi_T(x) = x of any flow, from a start near it.
 ///
-/// The order of the stages: free periods, the paper's subspace and what it grows by, the full-space finish; then the
-/// multipliers, which say whether motions settle on the orbit found.
+/// The order of the stages: free periods, the paper's subspace and what it grows by, the full-space finish. Then the
+/// multipliers say whether motions settle on the orbit found.
 #include "squeal/base/outcome.hpp"
 #include "squeal/shooting/multipliers.hpp"
 
@@ -23,6 +23,7 @@ struct ShootingStart
       std::numeric_limits<double>::infinity(); // energy norm where a nonlinearity begins to limit growth
 };
 
+/// What a scene asks of the solver.
 struct ShootingSettings
 {
   double tolerance = 0; // on the full-space residual
@@ -41,10 +42,10 @@ struct ShootingResult
   Multipliers multipliers;
 };
 
-/// An orbit that repels is no answer; with other unstable modes the motion need not be periodic at all.
+/// An orbit that repels is no answer; with other unstable modes the motion need not be periodic at all. Not collective.
 void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable, Outcome& outcome);
 
-/// The problem of finding an orbit near the start. Borrows flow and preconditioner.
+/// The problem of finding an orbit near the start. Borrows flow and preconditioner. Collective.
 OrbitProblem problem_of(const Flow& flow, const Preconditioner& preconditioner, const ShootingStart& start,
                         double tolerance);
 

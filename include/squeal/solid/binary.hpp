@@ -14,6 +14,7 @@
 namespace squeal
 {
 
+/// Rows and columns, of a whole matrix or of this rank.
 struct MatrixSize
 {
   PetscInt rows = 0, columns = 0;

@@ -27,6 +27,7 @@ struct DofNames
 /// Returns "part disc, node 12 at (x, y, z), direction ry", or "dof 12 (node 1017, x)" on a matrix scene.
 std::string describe(const DofNames& names, PetscInt dof);
 
+/// An entry of a row of T.
 struct DofTerm
 {
   PetscInt dof = 0;  // free degree of freedom

@@ -14,17 +14,18 @@ struct MatrixRows
 };
 
 /// Returns the rows of the matrices in a folder. `dofs.txt` beside them has a line "node motion" for each row, such as
-/// "1017 rx"; a row that is no motion of a node, such as a modal coordinate, has "-" for the motion. Collective.
+/// "1017 rx". A row that is no motion of a node, such as a modal coordinate, has "-" for the motion. Collective.
 /// Throws Error with the line that is wrong.
 MatrixRows read_matrix_rows(const std::filesystem::path& folder, PetscInt size, MPI_Comm comm);
 
 /// Adds the forces of a scene to the load. Throws Error for a row, node or motion that the matrices do not have.
+/// Collective: all ranks hold the rows, so that all throw.
 void add_forces(const MatrixRows& rows, const std::vector<Force>& forces, Vec load);
 
-/// Returns the rows that the supports of a scene hold, ascending. Throws Error as above.
+/// Returns the rows that the supports of a scene hold, ascending. Throws Error as above. Not collective.
 std::vector<PetscInt> held_rows(const MatrixRows& rows, const std::vector<Support>& supports);
 
-/// Returns the matrix with a row for each probe, on the columns of the files.
+/// Returns the matrix with a row for each probe, on the columns of the files. Throws Error as above. Collective.
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const MatrixRows& rows, PetscInt local_columns, MPI_Comm comm);
 
 /// Takes held rows and columns out of a matrix, or columns alone, and held entries out of a vector. Each keeps its
@@ -43,7 +44,7 @@ private:
   Owned<IS> kept_; // this rank's rows that are free
 };
 
-/// Says in the structure's names which row of the files each free degree of freedom is.
+/// Says in the structure's names which row of the files each free degree of freedom is. Not collective.
 void name_rows(const MatrixRows& rows, const std::vector<PetscInt>& held, DofNames& names);
 
 } // namespace squeal

@@ -5,7 +5,8 @@
 namespace squeal
 {
 
-/// Returns the matrix P with a row for each probe: the values of the probes are P q.
+/// Returns the matrix P with a row for each probe: the values of the probes are P q. Values are displacements [m].
+/// Collective. Throws Error for a node that is not there, is not the only one or cannot move.
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const DofMap& dofs, MPI_Comm comm);
 
 } // namespace squeal

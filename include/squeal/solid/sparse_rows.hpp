@@ -14,7 +14,8 @@ void add_displacement(const DofMap& dofs, int node, const Vec3& direction, Spars
 /// Returns the AIJ matrix with this rank's rows. Collective.
 Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm);
 
-/// Returns this rank's range [first, last) of `count` items that are shared equally among the ranks in order.
+/// Returns this rank's range [first, last) of `count` items that are shared equally among the ranks in order. Not
+/// collective.
 std::pair<PetscInt, PetscInt> local_range(PetscInt count, MPI_Comm comm);
 
 } // namespace squeal

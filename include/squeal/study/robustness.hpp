@@ -1,6 +1,6 @@
 #pragma once
-/// How likely modes are unstable where numbers of the scene are random (src/README.md, section 12): reduced models of
-/// many samples on a basis of sliding modes of a few, and full models of some as a check.
+/// How likely modes are unstable where numbers of the scene are random (src/README.md, section 12). Many samples are
+/// computed by reduced models on a basis of sliding modes of a few. Full models of some are the check.
 #include "squeal/study/sweep.hpp"
 
 namespace squeal
@@ -15,7 +15,7 @@ struct Probability
   double estimate() const { return samples > 0 ? static_cast<double>(count) / samples : 0; }
 };
 
-/// The probability of an event that `count` of the samples show.
+/// The probability of an event that `count` of the samples show. Arithmetic of one rank.
 Probability probability_of(int count, int samples, double confidence);
 
 /// Of all samples. growth_rate and frequency_hz are of the mode that grows most or decays least.
@@ -65,6 +65,7 @@ struct Robustness
   double model_error = 0;          // of the matrices as polynomials of the numbers
 };
 
+/// Options -robustness_...
 struct RobustnessOptions
 {
   PetscInt training = 12;   // points whose modes make the basis
@@ -74,6 +75,7 @@ struct RobustnessOptions
 
 OptionList options_of(RobustnessOptions& options);
 
+/// The scene's random numbers and how a sample is computed.
 struct RobustnessProblem
 {
   const RobustnessSettings& settings;

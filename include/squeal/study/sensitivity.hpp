@@ -52,6 +52,7 @@ struct Sensitivity
   std::vector<ModeCauses> modes; // the unstable ones, falling growth rate
 };
 
+/// The modes and what they are derived by.
 struct SensitivityProblem
 {
   SlidingEquilibrium sliding;

@@ -55,6 +55,7 @@ struct Sweep
   int passes = 0;       // corrections of the basis by residuals
 };
 
+/// Options -sweep_...
 struct SweepOptions
 {
   double tolerance = 1e-10; // backward error of right and left vectors on the basis
@@ -64,6 +65,7 @@ struct SweepOptions
 
 OptionList options_of(SweepOptions& options);
 
+/// The points to visit and how each is computed.
 struct SweepProblem
 {
   const SweepSettings& settings;

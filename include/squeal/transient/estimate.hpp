@@ -8,10 +8,10 @@
 /// of the eliminated degrees of freedom at s = i w. It differs from the mode's own reaction, at lambda, by
 /// Re(lambda)/w.
 ///
-/// E is twice the mean kinetic energy, which is the mean energy of a free vibration (friction makes the mean potential
-/// energy of the mode differ). Then (P_R - P_C)/E -> 2 Re(lambda) as q -> 0, up to that difference of rho, provided the
-/// modes have the damping of the friction direction, which the law above always has.
-/// Caveat: a start for the shooting, not a prediction (src/README.md, section 5.5).
+/// E is twice the mean kinetic energy, which is the mean energy of a free vibration. (Friction makes the mean
+/// potential energy of the mode differ.) Then (P_R - P_C)/E -> 2 Re(lambda) as q -> 0, up to that difference of rho.
+/// It does so if the modes have the damping of the friction direction, which the law above always has. Caveat: a start
+/// for the shooting, not a prediction (src/README.md, section 5.5).
 #include "squeal/modes/modes.hpp"
 
 #include <optional>
@@ -36,6 +36,7 @@ struct Estimate
   std::vector<double> curve_amplitude, curve_rate; // q [m] and P_R/E [1/s]
 };
 
+/// Options -estimate_...
 struct EstimateOptions
 {
   double lift_off_multiple = 2; // of first lift-off: where vibrations start without an energy balance
@@ -43,11 +44,13 @@ struct EstimateOptions
 
 OptionList options_of(EstimateOptions& options);
 
-/// The phase is that of the amplitude found, or of first lift-off without balance.
+/// The phase is that of the amplitude found, or of first lift-off without balance. Collective. A mode without balance
+/// is an outcome.
 Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
                             const ComplexMode& mode, const EstimateOptions& options);
 
-/// State u0 + q Re(phi e^{i phase}), v = q Re(lambda phi e^{i phase}) (paper, eqs. 18-19).
+/// State u0 + q Re(phi e^{i phase}), v = q Re(lambda phi e^{i phase}) (paper, eqs. 18-19). Absolute, with the reactions
+/// of rest. `amplitude` [m], `phase` [rad].
 State mode_state(const Equilibrium& equilibrium, const ComplexMode& mode, double amplitude, double phase);
 
 /// The modes that grow, the followed one first, with an estimate each.

@@ -26,6 +26,7 @@ void take_trajectory(const Checkpoint& checkpoint, const FileOrder& order, const
 void put_ranks(MPI_Comm comm, Checkpoint& checkpoint);
 bool of_these_ranks(const Checkpoint& checkpoint, MPI_Comm comm);
 
+/// Adds the history to the checkpoint.
 void put_history(const History& history, Checkpoint& checkpoint);
 
 /// Replaces the history by the checkpoint's.

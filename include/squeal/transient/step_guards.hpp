@@ -18,7 +18,7 @@
 namespace squeal
 {
 
-/// ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h
+/// ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h [1/s]. lambda in [1/s], h in [s]. Not collective.
 std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h);
 
 /// The asymptotic growth of the energy norm in one step of the structure without load and contact, as a logarithm. It
@@ -26,12 +26,12 @@ std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double the
 double free_growth(const Structure& structure, double theta, double h, const FactorOptions& options);
 
 /// Why a run with this theta and h is refused, in a sentence with the remedy; empty if it is not. `mode`: the followed
-/// one, or null.
+/// one, or null. Collective.
 std::string step_refusal(const Structure& structure, const ComplexMode* mode, double theta, double h,
                          const StepOptions& options);
 
-/// The largest eigenvalue of |mu'| diag(r_n) W_tt with the steepest fall of mu: a step has one solution while it is
-/// below 1. 0 where mu does not fall. Collective.
+/// The largest eigenvalue of |mu'| diag(r_n) W_tt with the steepest fall of mu; 0 where mu does not fall. A step has
+/// one solution while it is below 1. Collective.
 double fall_of_friction(const ThetaStep& step, const Interface& interface, const std::vector<double>& reactions);
 
 /// Why a run is refused whose step may have several solutions, with the steps that have one; empty if it is not.

@@ -35,6 +35,7 @@ inline Words words_of(Opposed)
   return opposed_words;
 }
 
+/// Options -transient_... of the step.
 struct StepOptions
 {
   ContactLaw law = ContactLaw::displacement;

@@ -7,12 +7,14 @@
 namespace squeal
 {
 
+/// What of a step is recorded.
 enum class Recorded
 {
   contact,
   contact_and_rates, // the column of h needs the rates
 };
 
+/// The record of one step.
 struct StepRecord
 {
   Recorded wanted = Recorded::contact;

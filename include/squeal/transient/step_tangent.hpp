@@ -18,7 +18,7 @@ struct TangentColumn
   double friction = 0;  // change of the friction law's coefficient in every step
 };
 
-/// The records of `steps` steps made in place.
+/// The records of `steps` steps made in place. Collective. The state becomes that at their end.
 std::vector<StepRecord> record_steps(const ThetaStep& step, const Structure& structure, const Interface& interface,
                                      State& state, int steps, Recorded wanted);
 

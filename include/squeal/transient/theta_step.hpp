@@ -7,7 +7,7 @@
 /// Friction opposes s_theta = theta s+ + (1-theta) s, the velocity that its work is done with. A step is then of second
 /// order in sliding where friction turns, too, and friction never gives energy. Where that would stop a pair or turn it
 /// back it opposes s+ instead, since s_theta = 0 is not rest. (The paper's s+ everywhere is of first order where
-/// friction turns.)
+/// friction turns.) Functions that take a structure are collective.
 #include "squeal/algebra/paired_matrices.hpp"
 #include "squeal/contact/condensed.hpp"
 #include "squeal/contact/solver.hpp"
@@ -42,7 +42,7 @@ inline FrictionLaw law_of_step(const ThetaStep& step, const FrictionLaw& law)
   return law_of_step(law, step.opposed == Opposed::theta ? step.theta : 1);
 }
 
-/// A
+/// A of a step h [s]. [kg] Collective.
 Owned<Mat> step_matrix(const Structure& structure, double h, double theta);
 
 /// Error: h not above 0, theta not in (0, 1].
@@ -54,8 +54,8 @@ void multiply_mass_and_stiffness(const ThetaStep& step, const Structure& structu
                                  const std::array<std::span<const Vec>, 2>& of,
                                  const std::array<std::span<const Vec>, 2>& to);
 
-/// The products of a state that a step starts from and leaves behind for the next one (two multiplications and one
-/// solve a step), and its work vectors. Belongs to one state and one ThetaStep.
+/// The products of a state that a step starts from and leaves behind for the next one, and its work vectors. A step
+/// takes two multiplications and one solve. Belongs to one state and one ThetaStep.
 struct StepWork
 {
   Owned<Vec> Mv, Av, Ku;                // of the state at hand

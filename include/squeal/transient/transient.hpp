@@ -75,11 +75,11 @@ struct Trajectory
   History history;
 };
 
-/// With the steps and the step size that the periods of the mode mean, if they are not given.
+/// With the steps and the step size that the periods of the mode mean, if they are not given. Not collective.
 TransientSettings planned(TransientSettings settings, const ComplexMode& mode);
 
-/// The state that the scene starts from: a file, the followed mode at an amplitude (0: a tenth of first lift-off), or
-/// all unstable modes at their estimates.
+/// The state that the scene starts from: a file, the followed mode at an amplitude, or all unstable modes at their
+/// estimates. An amplitude of 0 means a tenth of first lift-off. Collective. Error: as of read_state.
 State transient_start(const SlidingEquilibrium& sliding, const UnstableModes& unstable,
                       const TransientSettings& settings);
 
