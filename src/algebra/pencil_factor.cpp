@@ -1,8 +1,13 @@
 #include "squeal/algebra/pencil_factor.hpp"
 
 #include "mumps.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/integers.hpp"
 #include "symbolic_factor.hpp"
+
+/// A factor of moderate size is made whole by every rank, each of which solves its part of the right-hand sides. Shared
+/// by ranks, MUMPS adds up in the order in which messages arrive: results would change in rounding from run to run, and
+/// a restarted run would not give the straight run's numbers. A larger factor is shared.
 
 namespace squeal
 {
@@ -14,24 +19,66 @@ struct PencilFactor::Parts
   Triplets entries; // those of K, then those of M; MUMPS adds up entries of the same place
   std::size_t first_of_M = 0;
   std::vector<double> values; // K - shift M
-  Eigen::MatrixXd right;      // on rank 0
+  Eigen::MatrixXd right;      // the columns that this rank's instance of MUMPS solves
+  bool whole = false;         // whether every rank makes the whole factor
   Mumps mumps;
+
+  /// The rank that solves a column.
+  int solver_of(int column) const { return whole ? column % ranks_of(comm) : 0; }
+  int column_stride() const { return whole ? ranks_of(comm) : 1; }
 };
 
 namespace
 {
 
-/// The position of each degree of freedom in nested dissection, counted from one as MUMPS does; on rank 0.
-std::vector<MUMPS_INT> elimination_order(Mat K, int dofs)
+/// [MB] The largest factor that every rank makes whole: a few seconds of one core, and less than the brake's own
+/// memory.
+constexpr double largest_whole = 200;
+
+struct Ordering
+{
+  std::vector<MUMPS_INT> position; // of each degree of freedom in nested dissection, counted from one as MUMPS does
+  double entries = 0;              // of a symmetric factor
+};
+
+/// On rank 0, but for the entries.
+Ordering elimination_order(Mat K, int dofs)
 {
   const Triplets pattern = gather(lower_triangle(K), TripletContent::pattern, comm_of(K));
-  std::vector<MUMPS_INT> order;
+  Ordering order;
   on_rank_zero(comm_of(K),
                [&]
                {
-                 for (const int position : analyse(pattern, dofs, 0).position) order.push_back(position + 1);
+                 const SymbolicFactor symbolic = analyse(pattern, dofs, 0);
+                 for (const int position : symbolic.position) order.position.push_back(position + 1);
+                 order.entries = symbolic.entries;
                });
+  MPI_Bcast(&order.entries, 1, MPI_DOUBLE, 0, comm_of(K));
   return order;
+}
+
+/// The entries of all ranks on every rank.
+Triplets everywhere(Triplets entries, MPI_Comm comm)
+{
+  Triplets all = gather(std::move(entries), TripletContent::values, comm);
+  broadcast(all.row, comm);
+  broadcast(all.column, comm);
+  broadcast(all.value, comm);
+  return all;
+}
+
+void append(Triplets added, Triplets& entries)
+{
+  entries.row.insert(entries.row.end(), added.row.begin(), added.row.end());
+  entries.column.insert(entries.column.end(), added.column.begin(), added.column.end());
+  entries.value.insert(entries.value.end(), added.value.begin(), added.value.end());
+}
+
+/// Runs what communicates inside of MUMPS only if the ranks share one instance; where each has its own, all agree on
+/// failures.
+template <class Work> void run_together(const MPI_Comm comm, bool whole, Work work)
+{
+  whole ? on_every_rank(comm, work) : work();
 }
 
 } // namespace
@@ -42,20 +89,29 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   Parts& parts = *parts_;
   parts.comm = comm_of(K);
   parts.layout = row_layout(K);
-  const auto append = [&](Mat A)
-  { symmetry == Symmetry::none ? append_rows(A, 0, parts.entries) : append_lower_triangle(A, parts.entries); };
-  append(K);
+  const bool symmetric = symmetry == Symmetry::symmetric;
+  Ordering order = elimination_order(K, parts.layout.total());
+  const double megabytes = (symmetric ? 1 : 2) * order.entries * sizeof(double) / 1e6;
+  parts.whole = ranks_of(parts.comm) > 1 && megabytes <= largest_whole;
+  if (parts.whole) broadcast(order.position, parts.comm);
+  const auto entries_of = [&](Mat A)
+  {
+    Triplets own;
+    symmetric ? append_lower_triangle(A, own) : append_rows(A, 0, own);
+    return parts.whole ? everywhere(std::move(own), parts.comm) : own;
+  };
+  append(entries_of(K), parts.entries);
   parts.first_of_M = parts.entries.value.size();
-  append(M);
+  append(entries_of(M), parts.entries);
   parts.values.resize(parts.entries.value.size());
-  std::vector<MUMPS_INT> order = elimination_order(K, parts.layout.total());
-  parts.mumps = start_mumps(parts.comm, symmetry == Symmetry::none ? MumpsSymmetry::none : MumpsSymmetry::symmetric);
+  parts.mumps =
+      start_mumps(parts.whole ? MPI_COMM_SELF : parts.comm, symmetric ? MumpsSymmetry::symmetric : MumpsSymmetry::none);
   set_entries(parts.mumps, parts.entries, parts.layout.total());
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 14) = to_int(options.room);
   mumps.a_loc = parts.values.data();
-  mumps.perm_in = order.data();
-  run(mumps, MumpsJob::analyse);
+  mumps.perm_in = order.position.data();
+  run_together(parts.comm, parts.whole, [&] { run(mumps, MumpsJob::analyse); });
   mumps.perm_in = nullptr;
 }
 
@@ -66,7 +122,9 @@ bool PencilFactor::factorise(double shift)
   Parts& parts = *parts_;
   for (std::size_t k = 0; k < parts.values.size(); ++k)
     parts.values[k] = (k < parts.first_of_M ? 1 : -shift) * parts.entries.value[k];
-  return squeal::factorise(*parts.mumps);
+  bool regular = false;
+  run_together(parts.comm, parts.whole, [&] { regular = squeal::factorise(*parts.mumps); });
+  return regular;
 }
 
 int PencilFactor::negative_pivots() const
@@ -78,23 +136,30 @@ MultiVector PencilFactor::solve(const MultiVector& X) const
 {
   Parts& parts = *parts_;
   MultiVector Y = X;
-  const bool here = rank_of(parts.comm) == 0;
-  const int rows = to_int(X.entries.rows()), columns = to_int(X.columns());
+  const int rows = to_int(X.entries.rows()), columns = to_int(X.columns()), rank = rank_of(parts.comm);
   if (columns == 0) return Y;
-  if (here) parts.right.resize(parts.layout.total(), columns);
-  const auto whole = [&](int j) { return here ? parts.right.col(j).data() : nullptr; };
+  int own = 0;
+  for (int j = 0; j < columns; ++j)
+    if (parts.solver_of(j) == rank) ++own;
+  parts.right.resize(parts.layout.total(), own);
+  const auto whole = [&](int j)
+  { return parts.solver_of(j) == rank ? parts.right.col(j / parts.column_stride()).data() : nullptr; };
   for (int j = 0; j < columns; ++j)
     MPI_Gatherv(X.entries.col(j).data(), rows, MPI_DOUBLE, whole(j), parts.layout.counts.data(),
-                parts.layout.starts.data(), MPI_DOUBLE, 0, parts.comm);
+                parts.layout.starts.data(), MPI_DOUBLE, parts.solver_of(j), parts.comm);
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 27) = columns; // all of them at each reading of the factor
   mumps.rhs = parts.right.data();
-  mumps.nrhs = columns;
+  mumps.nrhs = parts.whole ? own : columns;
   mumps.lrhs = parts.layout.total();
-  run(mumps, MumpsJob::solve);
+  run_together(parts.comm, parts.whole,
+               [&]
+               {
+                 if (mumps.nrhs > 0) run(mumps, MumpsJob::solve);
+               });
   for (int j = 0; j < columns; ++j)
     MPI_Scatterv(whole(j), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, Y.entries.col(j).data(),
-                 rows, MPI_DOUBLE, 0, parts.comm);
+                 rows, MPI_DOUBLE, parts.solver_of(j), parts.comm);
   return Y;
 }
 
