@@ -3,6 +3,7 @@
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/branch/brake_branch.hpp"
+#include "squeal/coarse.hpp"
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/cycle/period_log.hpp"
 #include "squeal/forecast.hpp"
@@ -33,7 +34,9 @@ struct Chain
   const Model& model;
   Report& report;
   std::optional<LinearisedSliding> linearised; // once there is an equilibrium and a stage needs it
-  std::optional<State> cycle_file{}; // the state that the scene starts the cycle's search from, if it is a file
+  std::optional<State> cycle_file{};     // the state that the scene starts the cycle's search from, if it is a file
+  const CoarseModel* coarse = nullptr;   // of cycle.start = "coarse"
+  std::optional<CarriedCycle> carried{}; // its cycle, on this mesh
 
   SlidingEquilibrium sliding() const { return {model.structure, model.interface, report.equilibrium}; }
   UnstableModes unstable() const { return {report.modes.unstable(), report.estimates}; }
@@ -171,6 +174,7 @@ Trajectory run_transient(const Chain& chain)
 const State* given_start(const Chain& chain)
 {
   if (chain.cycle_file) return &*chain.cycle_file;
+  if (chain.carried) return &chain.carried->state;
   return chain.scene.cycle.start.kind == CycleStartKind::transient ? &chain.report.transient.end : nullptr;
 }
 
@@ -178,6 +182,8 @@ const State* given_start(const Chain& chain)
 std::string no_cycle_start(const Chain& chain)
 {
   const std::string reason = no_mode_to_follow(chain.report);
+  if (reason.empty() && chain.coarse && !chain.carried)
+    return "no cycle to start from was found on the coarse mesh: take a finer one, or start = \"estimate\"";
   if (!reason.empty() || chain.scene.cycle.start.kind != CycleStartKind::transient) return reason;
   const bool ended = chain.report.transient.outcome.kind == OutcomeKind::completed;
   return ended ? "" : "the transient that it starts from the end of was not completed";
@@ -185,8 +191,11 @@ std::string no_cycle_start(const Chain& chain)
 
 CycleProblem cycle_problem(const Chain& chain)
 {
-  return {chain.sliding(),    *chain.linearised,   chain.report.modes.modes, chain.unstable(),  chain.scene.cycle,
-          chain.options.step, chain.options.modes, chain.model.probes,       given_start(chain)};
+  return {chain.sliding(),          *chain.linearised,
+          chain.report.modes.modes, chain.unstable(),
+          chain.scene.cycle,        chain.options.step,
+          chain.options.modes,      chain.model.probes,
+          given_start(chain),       chain.carried ? chain.carried->period : 0};
 }
 
 FittedCycle run_cycle(const Chain& chain)
@@ -201,6 +210,37 @@ FittedCycle run_cycle(const Chain& chain)
   else
     result = find_fitted_cycle(cycle_problem(chain), {scene.fidelity, scene.accuracy}, chain.options.cycle);
   return result;
+}
+
+/// The whole chain on the coarse mesh, to a cycle at the steps a period with which this mesh's search begins.
+CoarseStart run_coarse(Chain& fine)
+{
+  const std::string reason = no_mode_to_follow(fine.report);
+  if (!reason.empty()) return not_run<CoarseStart>(OutcomeKind::skipped, reason);
+  Scene scene = fine.coarse->scene;
+  const CycleSettings chosen = chosen_settings(cycle_problem(fine), scene.fidelity);
+  constexpr double tolerance = 1e-3; // the mesh's own error is larger
+  scene.cycle.steps_per_period = chosen.steps_per_period;
+  scene.cycle.tolerance = std::max(chosen.tolerance, tolerance);
+  ProgramOptions options = fine.options;
+  options.cycle.shooting.multipliers = 0;
+  const Model& model = fine.coarse->model;
+  Report report;
+  Chain chain{scene, options, model, report, {}};
+  report.equilibrium = find_equilibrium(model.structure, model.interface, options.equilibrium);
+  report.modes = run_modes(chain);
+  report.estimates = run_estimates(chain);
+  const LimitCycle cycle = run_cycle(chain).cycle;
+  CoarseStart start{cycle.outcome, model.dofs.size, model.interface.pairs};
+  if (!has_run(cycle.outcome)) start.outcome.kind = OutcomeKind::not_converged;
+  if (start.outcome.kind != OutcomeKind::converged) return start;
+  start.period = cycle.orbit.period;
+  start.mean_fluctuating_energy = cycle.measured.mean_fluctuating_energy;
+  start.periods = cycle.convergence.periods;
+  fine.carried = carried_cycle(
+      *fine.coarse, {report.equilibrium, report.modes.modes.front(), cycle.measured.start, cycle.orbit.period},
+      fine.report.equilibrium, fine.report.modes.modes.front());
+  return start;
 }
 
 /// Whether the search for a cycle ended without one that attracts, on a free motion that goes on.
@@ -334,6 +374,16 @@ void print_end(const Report& report, const ResultsFolder& results, MPI_Comm comm
                 report.ended_by.c_str(), results.place().c_str());
 }
 
+/// The coarse mesh of the scene's start, if it has one. Collective.
+void make_coarse_model(const Scene& scene, const Model& model, MPI_Comm comm, std::optional<CoarseModel>& coarse)
+{
+  if (!scene.cycle.enabled || scene.cycle.start.kind != CycleStartKind::coarse) return;
+  coarse.emplace(scene, model, comm);
+  if (rank_of(comm) == 0)
+    std::printf("  coarse mesh: %lld degrees of freedom, %d contact pairs\n",
+                static_cast<long long>(coarse->model.dofs.size), coarse->model.interface.pairs);
+}
+
 void print_model(const ModelSummary& model, MPI_Comm comm)
 {
   if (rank_of(comm) == 0)
@@ -353,12 +403,15 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   const Model model = timed(report, Stage::model, comm, [&] { return build_model(scene, comm); });
   report.model = summary_with_doubts(model, scene, comm);
   print_model(report.model, comm);
+  std::optional<CoarseModel> coarse;
+  make_coarse_model(scene, model, comm, coarse);
   if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options), comm));
   end_if_asked(comm);
 
   Chain chain{scene, options, model, report, {}};
   if (scene.cycle.enabled && scene.cycle.start.kind == CycleStartKind::file)
     chain.cycle_file = read_state(scene.cycle.start.file, model.structure);
+  if (coarse) chain.coarse = &*coarse;
   const FieldNodes nodes{model.mesh, model.dofs, model.structure, model.interface};
   const auto save = [&] { write_results(report, scene, nodes, results.partial(), comm); };
   report.equilibrium = stage(report, Stage::equilibrium, comm,
@@ -377,6 +430,10 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
                            results.partial() / word(ResultFile::reduced));
   report.transient = stage(report, Stage::transient, comm, [&] { return run_transient(chain); });
   if (has_run(report.transient.outcome)) save();
+  if (coarse)
+    report.coarse = stage(report, Stage::coarse, comm, [&] { return run_coarse(chain); });
+  else
+    report.coarse = not_run<CoarseStart>(OutcomeKind::off, "the scene has no cycle.start = \"coarse\"");
   FittedCycle fitted = stage(report, Stage::cycle, comm, [&] { return run_cycle(chain); });
   report.cycle = std::move(fitted.cycle);
   report.fidelity = std::move(fitted.fidelity);
@@ -412,6 +469,8 @@ void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
   if (rank_of(comm) == 0)
     std::printf("# the scene, every default written out\n%s\n# the model\n", resolved_scene(scene).c_str());
   print_model(summary_with_doubts(model, scene, comm), comm);
+  std::optional<CoarseModel> coarse;
+  make_coarse_model(scene, model, comm, coarse);
   const Forecast forecast = forecast_of(model, scene, options);
   if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());
   const std::string problem = problem_of(forecast, comm);

@@ -32,25 +32,11 @@ std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
   return reason.empty() ? friction_refusal(problem.sliding, &mode, theta, h, problem.step, 1) : reason;
 }
 
-/// The settings, with steps and tolerance where the scene leaves them open.
-CycleSettings with_choices(const CycleProblem& problem, CycleModel model)
-{
-  CycleSettings settings = problem.settings;
-  const bool chooses = model == CycleModel::automatic;
-  if (settings.tolerance == 0) settings.tolerance = plain_tolerance;
-  if (settings.steps_per_period > 0) return settings;
-  settings.steps_per_period = chooses ? first_steps : plain_steps;
-  while (chooses && settings.steps_per_period < most_steps &&
-         !step_refusal_of(problem, settings.steps_per_period).empty())
-    settings.steps_per_period *= 2;
-  return settings;
-}
-
 /// The problem with other settings.
 CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
 {
   return {problem.sliding, problem.linearised,    problem.modes,  problem.unstable, settings,
-          problem.step,    problem.modes_options, problem.probes, problem.given};
+          problem.step,    problem.modes_options, problem.probes, problem.given,    problem.given_period};
 }
 
 /// The full model's cycle from the reduced model's, whose derivative is the preconditioner, and the finer steps that
@@ -86,6 +72,8 @@ std::string find_by_reduced_model(ReducedSearch& search, StepChoice steps, Limit
 {
   if (search.problem.unstable.modes.size() > 1)
     return "several modes are unstable: only the full model's shooting excites them all";
+  if (search.problem.given_period > 0 && search.fidelity.asked == CycleModel::automatic)
+    return "the search starts from the cycle of the coarser mesh, which the full model takes up at once";
   ReducedCycle reduced;
   if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
   const double clock = MPI_Wtime();
@@ -147,11 +135,24 @@ void find_on_model(const CycleProblem& problem, const CycleOptions& options, Ste
 
 } // namespace
 
+CycleSettings chosen_settings(const CycleProblem& problem, CycleModel model)
+{
+  CycleSettings settings = problem.settings;
+  const bool chooses = model == CycleModel::automatic;
+  if (settings.tolerance == 0) settings.tolerance = plain_tolerance;
+  if (settings.steps_per_period > 0) return settings;
+  settings.steps_per_period = chooses ? first_steps : plain_steps;
+  while (chooses && settings.steps_per_period < most_steps &&
+         !step_refusal_of(problem, settings.steps_per_period).empty())
+    settings.steps_per_period *= 2;
+  return settings;
+}
+
 FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options)
 {
   declare_solver_options();
   FittedCycle result;
-  const CycleSettings settings = with_choices(given, request.model);
+  const CycleSettings settings = chosen_settings(given, request.model);
   const CycleProblem problem = with_settings(given, settings);
   if (const std::string refusal = step_refusal_of(problem, settings.steps_per_period); !refusal.empty())
   {

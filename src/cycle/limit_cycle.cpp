@@ -83,7 +83,7 @@ std::vector<State> other_unstable_motions(const CycleProblem& problem)
 std::optional<State> cycle_start(const CycleProblem& problem)
 {
   const CycleStartKind kind = problem.settings.start.kind;
-  if (kind == CycleStartKind::file || kind == CycleStartKind::transient) return copy_of(*problem.given);
+  if (problem.given) return copy_of(*problem.given);
   const ComplexMode& mode = problem.unstable.modes.front();
   const Estimate& estimate = problem.unstable.estimates.front();
   double amplitude = estimate.start_amplitude;
@@ -116,13 +116,18 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
     return skipped;
   }
   const double first_event = std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude) * unit_norm(problem);
-  ShootingStart start{
-      equilibrium.u, first->u, first->v, 1 / mode.frequency_hz(), {mode.real, mode.imaginary, equilibrium.u}, {},
-      first_event};
+  const bool is_cycle = problem.given_period > 0; // of a coarser mesh: it needs no free periods
+  ShootingStart start{equilibrium.u,
+                      first->u,
+                      first->v,
+                      is_cycle ? problem.given_period : 1 / mode.frequency_hz(),
+                      {mode.real, mode.imaginary, equilibrium.u},
+                      {},
+                      first_event};
   for (const State& motion : other_unstable_motions(problem))
     start.other_unstable.push_back(state_of(motion.u, motion.v));
   return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),
-                         problem.settings.free_periods);
+                         is_cycle ? 0 : problem.settings.free_periods);
 }
 
 } // namespace squeal

@@ -271,6 +271,19 @@ Json fidelity_entry(const Fidelity& fidelity)
   return entry;
 }
 
+Json coarse_entry(const CoarseStart& coarse)
+{
+  Json entry = entry_of(coarse.outcome);
+  if (!has_run(coarse.outcome)) return entry;
+  entry["dofs"] = coarse.dofs;
+  entry["pairs"] = coarse.pairs;
+  entry["residual"] = coarse.outcome.residual;
+  entry["frequency_hz"] = 1 / coarse.period; // null where there is no cycle
+  entry["mean_fluctuating_energy"] = coarse.mean_fluctuating_energy;
+  entry["periods"] = coarse.periods;
+  return entry;
+}
+
 Json branch_entry(const Report& report, const Scene& scene)
 {
   Json entry = entry_of(report.branch.outcome);
@@ -347,6 +360,7 @@ std::string report_json(const Report& report, const Scene& scene)
   json[word(Stage::modes)] = modes_entry(report.modes);
   json[word(Stage::estimate)] = estimate_entry(followed_estimate(report));
   json[word(Stage::transient)] = transient_entry(report);
+  json[word(Stage::coarse)] = coarse_entry(report.coarse);
   json[word(Stage::cycle)] = cycle_entry(report, scene);
   json[word(Stage::settled)] = settled_entry(report, scene);
   json["fidelity"] = fidelity_entry(report.fidelity);

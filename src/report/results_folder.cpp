@@ -265,6 +265,7 @@ std::vector<fs::path> inputs_of(const Scene& scene)
     for (const auto& entry : fs::directory_iterator(*scene.matrices)) inputs.push_back(entry.path());
   if (scene.transient.start.kind == StartKind::file) inputs.push_back(scene.transient.start.file);
   if (scene.cycle.start.kind == CycleStartKind::file) inputs.push_back(scene.cycle.start.file);
+  if (!scene.cycle.coarse_mesh.empty()) inputs.push_back(scene.cycle.coarse_mesh);
   return inputs;
 }
 

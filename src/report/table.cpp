@@ -219,6 +219,15 @@ template <class Lines> std::string optional_text(const char* head, const Outcome
   return text;
 }
 
+std::vector<std::string> coarse_lines(const CoarseStart& coarse)
+{
+  if (coarse.outcome.kind != OutcomeKind::converged) return {};
+  return {format("cycle of %lld degrees of freedom and %d contact pairs, frequency %.8g Hz, fluctuating energy %.7g J, "
+                 "%ld periods integrated",
+                 static_cast<long long>(coarse.dofs), coarse.pairs, 1 / coarse.period, coarse.mean_fluctuating_energy,
+                 coarse.periods)};
+}
+
 std::string timings_text(const Report& report)
 {
   double total = 0;
@@ -247,6 +256,7 @@ std::string table(const Report& report, const Scene& scene)
   text += modes_text(report.modes) + warning_rows(warnings.modes);
   text += estimate_text(followed_estimate(report)) + warning_rows(warnings.estimate);
   text += transient_text(report) + warning_rows(warnings.transient);
+  text += optional_text("coarse start", report.coarse.outcome, [&] { return coarse_lines(report.coarse); });
   text += cycle_text(report, scene) + warning_rows(warnings.cycle);
   text += settled_text(report.settled, scene);
   text += fidelity_text(report.fidelity);

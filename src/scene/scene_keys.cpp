@@ -245,9 +245,13 @@ SceneKeys keys_of(CycleSettings& c)
 {
   return {
       {"enabled", &c.enabled, optional, Rule::any, "switch", "run this stage"},
-      {"start", &c.start, optional, Rule::any, "word", "estimate, mode, transient (its end), or a state file"},
+      {"start", &c.start, optional, Rule::any, "word",
+       "estimate, mode, transient (its end), coarse (the cycle on a coarser mesh), or a state file"},
       {"amplitude", &c.amplitude, optional, Rule::not_negative, "m",
        "largest displacement at start = \"mode\"; 0: twice first lift-off"},
+      {"coarse_parameters", &c.coarse_parameters, optional, Rule::any, "table",
+       "of start = \"coarse\": values for the DefineConstant of the geometry that make its mesh coarser"},
+      {"coarse_mesh", &c.coarse_mesh, optional, Rule::file, "path", "or a mesh or geometry of its own, likewise named"},
       {"steps_per_period", &c.steps_per_period, optional, Rule::not_negative, "-", "time steps a period; 0: chosen"},
       {"tolerance", &c.tolerance, optional, Rule::not_negative, "-", "on the full-space residual; 0: chosen"},
       {"free_periods", &c.free_periods, optional, Rule::not_negative, "-", "integrated before the first Newton step"},

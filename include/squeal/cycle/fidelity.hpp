@@ -51,6 +51,9 @@ struct FittedCycle
   Fidelity fidelity;
 };
 
+/// The settings, with steps and tolerance where the scene leaves them open.
+CycleSettings chosen_settings(const CycleProblem& problem, CycleModel model);
+
 /// Finds the cycle on the model that the request names, or for "auto" on the smallest one that its accuracy allows.
 /// Collective. A search that fails has its outcome and reason. Error: a reduced model that was asked for cannot be
 /// made.

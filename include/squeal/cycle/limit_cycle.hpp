@@ -41,7 +41,8 @@ struct CycleProblem
   const StepOptions& step;
   const ModesOptions& modes_options; // of the preconditioner's real modes
   Mat probes = nullptr;
-  const State* given = nullptr; // where CycleStartKind::transient and ::file start
+  const State* given = nullptr; // where CycleStartKind::transient, ::coarse and ::file start
+  double given_period = 0;      // [s] of the cycle that is given; 0: none is, and the mode's is taken
 };
 
 /// Those of the unstable modes that are not followed, at their estimated amplitudes, about the equilibrium.

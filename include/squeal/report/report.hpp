@@ -41,6 +41,17 @@ struct Timing
   double processor_seconds = 0; // of rank 0, its waiting for others included: a busy machine does not stretch it
 };
 
+/// The cycle on the coarser mesh that the search starts from.
+struct CoarseStart
+{
+  Outcome outcome; // of the cycle there
+  PetscInt dofs = 0;
+  int pairs = 0;
+  double period = 0;                  // [s]
+  double mean_fluctuating_energy = 0; // [J]
+  long periods = 0;                   // integrated
+};
+
 /// A stage that did not run has the outcome "off" (by the scene) or "skipped", with the reason.
 struct Report
 {
@@ -54,6 +65,7 @@ struct Report
   Modes modes;
   std::vector<Estimate> estimates; // of the unstable modes, the followed one first; else one that says why not
   Trajectory transient;
+  CoarseStart coarse;
   LimitCycle cycle;
   Fidelity fidelity;     // of the cycle
   SettledMotion settled; // where no cycle attracts
@@ -69,7 +81,7 @@ struct Report
 const Estimate& followed_estimate(const Report& report);
 
 /// The outcome of every stage but the model, in the order in which they run.
-std::array<std::pair<Stage, Outcome>, 11> outcomes_of(const Report& report);
+std::array<std::pair<Stage, Outcome>, 12> outcomes_of(const Report& report);
 
 /// Where the nodes of the fields are.
 struct FieldNodes

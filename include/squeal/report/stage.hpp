@@ -15,6 +15,7 @@ enum class Stage
   modes,
   estimate,
   transient,
+  coarse,
   cycle,
   settled,
   attractors,
@@ -24,9 +25,9 @@ enum class Stage
   robustness,
 };
 
-inline constexpr std::array stage_names = {"model",     "equilibrium", "modes",   "estimate",
-                                           "transient", "cycle",       "settled", "attractors",
-                                           "branch",    "sensitivity", "sweep",   "robustness"};
+inline constexpr std::array stage_names = {"model",       "equilibrium", "modes",     "estimate",   "transient",
+                                           "coarse",      "cycle",       "settled",   "attractors", "branch",
+                                           "sensitivity", "sweep",       "robustness"};
 
 inline Words words_of(Stage)
 {

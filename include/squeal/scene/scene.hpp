@@ -66,10 +66,11 @@ enum class CycleStartKind
   estimate,  // the unstable modes at their estimated amplitudes
   mode,      // the unstable mode at a given amplitude
   transient, // the end of the run's own transient
+  coarse,    // the cycle of the same scene on a coarser mesh
   file,      // a state file
 };
 
-inline constexpr std::array cycle_start_kind_words = {"estimate", "mode", "transient", "file"};
+inline constexpr std::array cycle_start_kind_words = {"estimate", "mode", "transient", "coarse", "file"};
 
 inline Words words_of(CycleStartKind)
 {
@@ -142,13 +143,15 @@ struct CycleSettings
 {
   bool enabled = false;
   CycleStart start;
-  double amplitude = 0;             // [m] largest displacement of the mode at CycleStartKind::mode; 0: twice lift-off
-  int steps_per_period = 0;         // [-] 0: chosen
-  double tolerance = 0;             // [-] on the residual of the full state; 0: chosen
-  int free_periods = 10;            // [-] number of periods integrated before the first Newton step
-  int starts = 0;                   // [-] number of starts whose motions are listed; 0: none
-  double theta = 0.5;               // [-] of the theta method
-  std::filesystem::path save_state; // state file of the start of the cycle; none if empty
+  double amplitude = 0; // [m] largest displacement of the mode at CycleStartKind::mode; 0: twice lift-off
+  std::map<std::string, double> coarse_parameters; // of CycleStartKind::coarse: of the geometry, instead of the mesh's
+  std::filesystem::path coarse_mesh;               // or a mesh or geometry of its own; absolute
+  int steps_per_period = 0;                        // [-] 0: chosen
+  double tolerance = 0;                            // [-] on the residual of the full state; 0: chosen
+  int free_periods = 10;                           // [-] number of periods integrated before the first Newton step
+  int starts = 0;                                  // [-] number of starts whose motions are listed; 0: none
+  double theta = 0.5;                              // [-] of the theta method
+  std::filesystem::path save_state;                // state file of the start of the cycle; none if empty
 };
 
 /// The branch of the limit cycle along a number of the scene.

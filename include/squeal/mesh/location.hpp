@@ -1,0 +1,40 @@
+#pragma once
+/// Points of a mesh: the element of a part that holds a point, and its natural coordinates there.
+#include "squeal/mesh/shape_functions.hpp"
+
+namespace squeal
+{
+
+/// A point in an element.
+struct Location
+{
+  int element = -1;                                   // index in Mesh::elements; -1: none
+  Eigen::Vector3d xi = Eigen::Vector3d::Zero();       // [-] natural coordinates; of shells the first two
+  double excess = std::numeric_limits<double>::max(); // [-] by which xi leaves the element, over its half width
+};
+
+/// Finds points in the elements of one part. Borrows the mesh.
+class ElementLocator
+{
+public:
+  ElementLocator(const Mesh& mesh, int part);
+
+  /// The element that `point` leaves least; points outside of every one have an excess above 0.
+  Location find(const Vec3& point) const;
+
+private:
+  void visit(const Vec3& point, std::span<const int> candidates, Location& best) const;
+
+  const Mesh& mesh_;
+  std::vector<int> elements_; // of the part
+  Vec3 low_{};                // [m] corner of the box around them
+  double side_ = 0;           // [m] of a cell
+  std::array<int, 3> cells_{1, 1, 1};
+  std::vector<std::vector<int>> in_cell_; // elements whose boxes, enlarged by half their size, reach into the cell
+};
+
+/// The natural coordinates of a point of an element, which may lie outside of it, by Newton's method. Of a shell those
+/// of the nearest point of its surface.
+Location located(const Mesh& mesh, int element, const Vec3& point);
+
+} // namespace squeal
