@@ -228,7 +228,11 @@ CoarseStart run_coarse(Chain& fine)
   Report report;
   Chain chain{scene, options, model, report, {}};
   report.equilibrium = find_equilibrium(model.structure, model.interface, options.equilibrium);
-  report.modes = run_modes(chain);
+  if (report.equilibrium.outcome.kind == OutcomeKind::converged)
+  {
+    chain.linearised = linearise(chain.sliding());
+    report.modes = find_modes(chain.sliding(), *chain.linearised, scene.modes, options.modes);
+  }
   report.estimates = run_estimates(chain);
   const LimitCycle cycle = run_cycle(chain).cycle;
   CoarseStart start{cycle.outcome, model.dofs.size, model.interface.pairs};

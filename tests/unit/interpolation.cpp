@@ -30,7 +30,7 @@ Mesh two_blocks(const Cells& low, const Cells& high, int part_of_high, const Sce
     for (std::size_t i = 0; i < 8; ++i) element.nodes[i] += offset;
     mesh.elements.push_back(element);
   }
-  add_strip(mesh, "strip", 2, {3, 0, 0}, {1, 0, 0}, {0, 1, 0}, low[0], low[1]);
+  add_strip(mesh, "strip", 2, {{3, 0, 0}, {1, 0, 0}, {0, 1, 0}, low[0], low[1]});
   add_points(mesh, scene);
   return mesh;
 }
