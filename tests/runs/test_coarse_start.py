@@ -21,7 +21,10 @@ def test_the_cycle_is_that_of_the_default_start(converged):
     one = converged(*scene, *coarse([parameters]), ranks=1).report
     two = converged(*scene, *coarse([file, parameters]), ranks=2).report
     for report in (one, two):
-        assert report["coarse"]["outcome"] == "converged" and report["coarse"]["dofs"] == 2821
+        coarser = report["coarse"]
+        assert coarser["outcome"] == "converged" and coarser["dofs"] == 2821 and coarser["pairs"] == 25
+        assert coarser["residual"] <= 1e-3 and coarser["mean_fluctuating_energy"] > 0 and coarser["periods"] > 10
+        assert coarser["frequency_hz"] == pytest.approx(report["cycle"]["frequency_hz"], rel=0.1)
         assert report["cycle"]["residual_full"] <= TOLERANCE
         assert report["cycle"]["periods_integrated"] <= default["periods_integrated"] - 10  # no free periods
         # cycles of 60 steps differ by where among the steps their events fall: 2.4e-5 and 1.3e-3 seen; the step's own
