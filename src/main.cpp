@@ -207,8 +207,8 @@ bool is_other_rank()
   return false;
 }
 
-/// The scene and the options by which checkpoints are told from those of another run; options of the session, about
-/// logs and memory, do not matter.
+/// The scene and the options by which checkpoints are distinguished from those of another run. Options of the session,
+/// about logs and memory, do not matter.
 std::string request_text(const Scene& scene, ProgramOptions options)
 {
   std::string text = resolved_scene(scene);

@@ -75,8 +75,8 @@ struct BorderRows
   std::span<const int> rows; // of the border, counted from zero
 };
 
-/// Adds E E' to the lower triangle of the Schur complement of `border` rows, tile by tile, of which every `ranks`-th
-/// one is this rank's, from `first` on.
+/// Adds E E' to the lower triangle of the Schur complement of `border` rows, tile by tile. Every `ranks`-th tile is
+/// this rank's, from `first` on.
 void add_to_schur_complement(const BorderRows& E, int border, int first, int ranks, double* schur_complement);
 
 } // namespace squeal

@@ -54,8 +54,8 @@ void broadcast(SymbolicFactor& symbolic, MPI_Comm comm)
   }
 }
 
-/// What a supernode costs [operations]: once to eliminate, with its part of the Schur complement, and an entry as much
-/// as a thousand operations, since hundreds of solves read it, at the speed of memory.
+/// What a supernode costs [operations] to eliminate, with its part of the Schur complement. An entry costs a thousand
+/// operations more, since hundreds of solves read it at the speed of memory.
 struct Cost
 {
   double inner = 0, border = 0; // of pivots and inner rows, of border rows

@@ -1,7 +1,7 @@
 #pragma once
 /// Share of a rank in a supernodal factor (src/README.md, section 8.2): whole subtrees of the elimination tree belong
 /// to single ranks. The supernodes above them are shared: every rank holds their pivots and inner rows, and of their
-/// border rows its own ones. So a rank eliminates and substitutes in its subtrees alone, and what all ranks do side by
+/// border rows its own ones. So a rank eliminates and substitutes in its subtrees alone. What all ranks do side by
 /// side above them has one exchange a half of a solve.
 #include "symbolic_factor.hpp"
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Entries of a distributed matrix as (row, column, value), in MUMPS's format: indices are of type int and count from
-/// one, and entries of the same place are added up.
+/// Entries of a distributed matrix as (row, column, value), in MUMPS's format. Indices are of type int and count from
+/// one; entries of the same place are added up.
 #include "squeal/base/petsc.hpp"
 
 #include <vector>

@@ -11,8 +11,8 @@ namespace squeal
 namespace
 {
 
-/// Whether the output is read on a terminal. mpirun gives every rank a pseudo-terminal whatever becomes of the output,
-/// so the output of the parent process must be a terminal too.
+/// Whether the output is read on a terminal. mpirun gives every rank a pseudo-terminal whatever becomes of the output.
+/// So the output of the parent process must be a terminal too.
 bool writes_to_terminal()
 {
   if (!isatty(STDOUT_FILENO)) return false;

@@ -144,7 +144,7 @@ BranchVector zero_like(const BranchVector& z)
 }
 
 /// The step whose preconditioned change is `wanted`, by the secants at hand; P where they say nothing. A secant whose
-/// step the newer ones hold is left out: what is new in its change is no change of the Jacobian but its error.
+/// step the newer ones hold is left out. What is new in its change is no change of the Jacobian but its error.
 BranchVector step_by_secants(const BranchCorrector& corrector, const BranchBorder& border, BranchVector wanted)
 {
   constexpr double new_step = 1e-4; // smallest part of a step that must be new

@@ -1,5 +1,5 @@
-/// Block Gauss-Seidel for problems that share W. Sweeps are the outer loop, pairs the next, problems the inner one, so
-/// that a pair's rows are read once for all the problems in which it moves.
+/// Block Gauss-Seidel for problems that share W. Sweeps are the outer loop, pairs the next, problems the inner one. So
+/// a pair's rows are read once for all the problems in which it moves.
 ///
 /// Let w = w_0 + dw with w_0 = W r_0 + b from the last product with W, and dw the effect of the changes since. The
 /// sweeps update dw alone. It is small, so the near field and single precision suffice; where they did not lead to

@@ -28,8 +28,8 @@ Vec3 tangential(const Vec3& v, const Vec3& normal)
   return norm(t) > 1e-12 * norm(v) ? t : Vec3{};
 }
 
-/// The scene's tangents made unit and square to the normal; without them along the drive, then square to it; without
-/// a drive along the axis that is farthest from the normal.
+/// The scene's tangents made unit and square to the normal. Without them the first is along the drive, the second
+/// square to it. Without a drive it is along the axis that is farthest from the normal.
 std::vector<Vec3> tangent_axes(const Contact& contact, const Vec3& normal, const Vec3& velocity)
 {
   std::vector<Vec3> wanted = contact.tangents;

@@ -164,8 +164,8 @@ void give_up_rows(const SurfaceContact& c, const HeldMotions& held_motions, Slav
                   "\"");
 }
 
-/// Divides by the area and drops weights that are rounding; the largest one takes what they add up to, so that a common
-/// translation leaves the gap as it is.
+/// Divides by the area and drops weights that are rounding. The largest one takes what they add up to, so that a
+/// common translation leaves the gap as it is.
 std::vector<PairNode> normalised(const std::vector<PairNode>& weighted, double area)
 {
   constexpr double rounding = 1e-13;

@@ -1,4 +1,4 @@
-/// Scanner of gmsh's language, after Gmsh.l of gmsh: the longest symbol wins, texts stand in double or single quotes,
+/// Scanner of gmsh's language, after Gmsh.l of gmsh. The longest symbol wins, texts stand in double or single quotes,
 /// and comments are those of C++. It looks at every character once, so it ends on any input.
 #include "script_tokens.hpp"
 

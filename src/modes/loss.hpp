@@ -1,5 +1,5 @@
 #pragma once
-/// Modes of structures with loss factors (src/README.md, section 3.11): each mode j has the viscous equivalent of the
+/// Modes of structures with loss factors (src/README.md, section 3.11). Each mode j has the viscous equivalent of the
 /// complex stiffness K + i K_loss at its own frequency,
 ///     (lambda^2 M + lambda (C_0 + K_loss/omega_j) + K) y = 0,   omega_j = Im(lambda),
 /// found by fixed point, and its distance to the complex problem (lambda^2 M + lambda C_0 + K + i K_loss) y = 0.

@@ -127,8 +127,8 @@ void sweep_normals(Iterate& iterate, const Eigen::MatrixXf& responses, double en
   }
 }
 
-/// One sweep over the pairs whose defect exceeds `limit`, each solved whole; the local solves see the
-/// symmetric part of W's own blocks, which leaves the fixed point what it is.
+/// One sweep over the pairs whose defect exceeds `limit`, each solved whole. The local solves see the symmetric part
+/// of W's own blocks, which leaves the fixed point what it is.
 void sweep_pairs(Iterate& iterate, double limit)
 {
   const double largest = iterate.r.cwiseAbs().maxCoeff();

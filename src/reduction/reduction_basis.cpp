@@ -66,7 +66,7 @@ struct Orthonormal
   Index seen = 0; // columns of X
 };
 
-/// Takes in what the next `count` columns of X hold that is new: directions of which less than `threshold` of the
+/// Takes in what the next `count` columns of X hold that is new. Directions of which less than `threshold` of the
 /// columns' own size is new are dropped. Returns how many came.
 int extend(Orthonormal& basis, Index count, double threshold)
 {

@@ -143,8 +143,8 @@ private:
   Owned<Vec> whole_;
 };
 
-/// Reactions of the equilibrium at the nodes of the pairs: those of a pair at its own node, and by their weights at the
-/// nodes of the other side. Either side has the sum of all.
+/// Reactions of the equilibrium at the nodes of the pairs. Those of a pair are at its own node, and by their weights
+/// at the nodes of the other side. Either side has the sum of all.
 void write_contact(Hdf5File& file, const Equilibrium& equilibrium, const FieldNodes& nodes, Layout& layout)
 {
   const PairView reactions(equilibrium.reactions, equilibrium.directions);

@@ -15,8 +15,8 @@ namespace squeal
 namespace
 {
 
-/// The line at a local maximum of the transform. Under a Hann window the larger neighbour over the maximum, r, tells
-/// how far between the two the line lies: (2 r - 1)/(r + 1); its height there is sin(pi d)/(pi d (1 - d^2)).
+/// The line at a local maximum of the transform. Under a Hann window the larger neighbour over the maximum, r, gives
+/// the line's place between the two: (2 r - 1)/(r + 1). Its height there is sin(pi d)/(pi d (1 - d^2)).
 Line line_at(const Spectrum& spectrum, std::size_t place)
 {
   const double before = spectrum.amplitude[place - 1], here = spectrum.amplitude[place],

@@ -1,6 +1,6 @@
 #pragma once
-/// Full-space solution by Newton with a line search on the bordered system, GMRES on directional differences,
-/// preconditioned from the right (src/README.md, section 6.8; options -cycle_full_snes_..., -cycle_full_ksp_...).
+/// Full-space solution by Newton with a line search on the bordered system (src/README.md, section 6.8). GMRES works
+/// on directional differences, preconditioned from the right (options -cycle_full_snes_..., -cycle_full_ksp_...).
 ///
 /// The unknown is one Vec z = (omega sqrt(m) u, sqrt(m) v, speed T) with m the diagonal of M. Its plain norm, which
 /// PETSc's solvers take, then stands for the energy norm. Convergence is decided in the energy norm itself.

@@ -162,7 +162,7 @@ void check_mass_diagonal(Mat M, const std::filesystem::path& file, MPI_Comm comm
 }
 
 /// Throws Error if M has a negative eigenvalue. They are counted for D^-1 M, D the diagonal of M, so that units of
-/// rotations do not matter; rounding of an exported M moves them by about symmetry_tolerance.
+/// rotations do not matter. Rounding of an exported M moves them by about symmetry_tolerance.
 void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
 {
   Owned<Mat> D;

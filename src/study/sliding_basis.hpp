@@ -3,7 +3,7 @@
 ///
 /// The shapes T are kept in the structure's degrees of freedom. At a point with the bases Z and Y of its closed pairs,
 /// T is lifted. Its pivots are replaced by what Z or Y gives from the other degrees of freedom. Lifts change the rows
-/// of the pivots alone, so that the projected matrices follow from T'A T and from the rows of A T at the contact:
+/// of the pivots alone. So the projected matrices follow from T'A T and from the rows of A T at the contact:
 ///     (T + D_Y)'A(T + D_Z) = T'A T + D_Y'(A T) + (A T)'D_Z + D_Y'A D_Z
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"

@@ -1,6 +1,7 @@
 #pragma once
-/// A finite element program of a page, to hold the kernels to exact answers: meshes by formula, one material, sparse
-/// matrices on one process, prescribed displacements by elimination, eigenpairs by subspace iteration.
+/// A finite element program of a page, to hold the kernels to exact answers. Meshes are by formula, of one material;
+/// sparse matrices on one process. Displacements are prescribed by elimination, eigenpairs found by subspace
+/// iteration.
 #include "../support/approx.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 #include "squeal/solid/element.hpp"
