@@ -39,6 +39,16 @@ void warn(const std::string& reason)
     std::fprintf(stderr, "squeal: warning: no checkpoint is kept: %s\n", reason.c_str());
 }
 
+/// Why these bytes are better not written: the last space of a disk is for the results. Empty if there is enough.
+std::string lack_of_room(std::size_t bytes)
+{
+  constexpr double left_for_results = 16e6; // [byte]
+  std::error_code unknown;
+  const fs::space_info space = fs::space(place().folder.parent_path(), unknown);
+  if (unknown || static_cast<double>(space.available) >= static_cast<double>(bytes) + left_for_results) return {};
+  return "less than 16 MB would be free in " + place().folder.parent_path().string();
+}
+
 /// FNV-1a, 64 bits.
 std::uint64_t check_sum(std::string_view bytes)
 {
@@ -152,10 +162,12 @@ void keep(const Checkpoint& checkpoint, const std::string& name)
   if (!checkpoints_are_kept()) return;
   try
   {
+    const std::string bytes = checkpoint.bytes();
+    if (const std::string lack = lack_of_room(bytes.size()); !lack.empty()) throw Error(lack);
     fs::create_directories(place().folder);
     if (!fs::exists(place().folder / request_file))
       write_whole_file(place().folder / request_file, place().request, Flush::now);
-    write_whole_file(place().folder / name, checkpoint.bytes(), Flush::now);
+    write_whole_file(place().folder / name, bytes, Flush::now);
   }
   catch (const std::exception& error)
   {

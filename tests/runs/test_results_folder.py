@@ -138,23 +138,39 @@ def test_no_room_for_a_file_is_one_message_and_leaves_the_folder_as_it_was(conve
     assert files_below(tmp_path) == before
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
-@pytest.mark.parametrize("kilobytes", [4, 32, 64])
-def test_a_full_file_system_too(tmp_path, kilobytes):
-    """HDF5 fails neither when it closes its file nor when MPI ends."""
+@pytest.fixture
+def small_disk(tmp_path):
+    """A function that mounts a disk of this size."""
     disk = tmp_path / "disk"
     disk.mkdir()
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", disk], capture_output=True)
-    if mounted.returncode != 0:
-        pytest.skip("no right to mount here")
-    try:
-        done = subprocess.run(["mpirun", "-n", "2", os.environ["SQUEAL"], SCENE, "--set", "cycle.enabled=false", "--output",
-                               disk / "results"], capture_output=True, text=True)
-        messages = [line for line in done.stderr.splitlines() if line.startswith("squeal: ")]
-        assert done.returncode == 1 and len(messages) == 1, done.stderr
-        assert "No space left" in messages[0] and "MB are free" in messages[0] and "--output" in messages[0]
-        assert not list(disk.iterdir())
-    finally:
-        subprocess.run(["umount", disk], check=True)
+
+    def mount(kilobytes):
+        command = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", disk]
+        if os.geteuid() != 0 or subprocess.run(command, capture_output=True).returncode != 0:
+            pytest.skip("no right to mount here")
+        return disk
+
+    yield mount
+    subprocess.run(["umount", disk], capture_output=True)
+
+
+@pytest.mark.parametrize("kilobytes", [4, 32, 64])
+def test_a_full_file_system_too(small_disk, kilobytes):
+    """HDF5 fails neither when it closes its file nor when MPI ends."""
+    disk = small_disk(kilobytes)
+    done = subprocess.run(["mpirun", "-n", "2", os.environ["SQUEAL"], SCENE, "--set", "cycle.enabled=false", "--output",
+                           disk / "results"], capture_output=True, text=True)
+    messages = [line for line in done.stderr.splitlines() if line.startswith("squeal: ")]
+    assert done.returncode == 1 and len(messages) == 1, done.stderr
+    assert "No space left" in messages[0] and "MB are free" in messages[0] and "--output" in messages[0]
+    assert not list(disk.iterdir())
+
+
+def test_checkpoints_leave_the_last_space_to_results(small_disk):
+    output = small_disk(10000) / "results"
+    done = subprocess.run([os.environ["SQUEAL"], SCENE, "--set", "cycle.enabled=false", "--set", "transient.periods=50",
+                           "--output", output, "--checkpoint", "0.01"], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stderr.count("no checkpoint is kept") == 1, done.stderr
+    assert (output / "report.json").exists() and not (output / "checkpoint").exists()
 
 
