@@ -1,6 +1,7 @@
 #include "squeal/reduction/reduced_model.hpp"
 
 #include "reduction_basis.hpp"
+#include "squeal/base/integers.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include <algorithm>
@@ -54,6 +55,51 @@ void project(ReducedModel& model, const Structure& structure, const ClosedContac
     *symmetric = symmetric_inner_products(X, image);
     *unsymmetric = *symmetric + inner_products(more, rows_of(image, follow));
   }
+}
+
+/// B X, whole on every rank.
+MatrixXd whole_product(Mat B, const MultiVector& X)
+{
+  PetscInt rows = 0, first = 0;
+  check(MatGetSize(B, &rows, nullptr));
+  check(MatGetOwnershipRange(B, &first, nullptr));
+  const MultiVector own = product(B, X);
+  MatrixXd whole = MatrixXd::Zero(rows, X.columns());
+  whole.middleRows(first, own.entries.rows()) = own.entries;
+  MPI_Allreduce(MPI_IN_PLACE, whole.data(), to_int(whole.size()), MPI_DOUBLE, MPI_SUM, X.comm);
+  return whole;
+}
+
+Eigen::SparseMatrix<double> identity_of_rows(Mat A)
+{
+  PetscInt rows = 0;
+  check(MatGetSize(A, &rows, nullptr));
+  Eigen::SparseMatrix<double> result(rows, rows);
+  result.setIdentity();
+  return result;
+}
+
+/// X'E X of modes and attachments X = [modes, E^-1 F]. `of_modes`: that of the modes. `on_forces`: F'X, the other
+/// blocks: no product with all columns is needed.
+MatrixXd energies(const MatrixXd& of_modes, const MatrixXd& on_forces)
+{
+  const Index modes = of_modes.rows(), forces = on_forces.rows();
+  MatrixXd result(modes + forces, modes + forces);
+  result.topLeftCorner(modes, modes) = of_modes;
+  result.bottomLeftCorner(forces, modes) = on_forces.leftCols(modes);
+  result.topRightCorner(modes, forces) = on_forces.leftCols(modes).transpose();
+  const MatrixXd among = on_forces.rightCols(forces);
+  result.bottomRightCorner(forces, forces) = (among + among.transpose()) / 2;
+  return result;
+}
+
+/// The pairs' normal rows of a matrix with all of their rows.
+MatrixXd normal_rows(const MatrixXd& of_pairs, int directions)
+{
+  const PairRows<Index> rows(directions);
+  MatrixXd result(of_pairs.rows() / rows.per_pair(), of_pairs.cols());
+  for (Index i = 0; i < result.rows(); ++i) result.row(i) = of_pairs.row(rows.normal(i));
+  return result;
 }
 
 } // namespace
@@ -138,14 +184,19 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   check(MatSetOption(E, MAT_SYMMETRIC, PETSC_TRUE));
   const Owned<Mat> B = rows_of(interface, active, RowsTaken::all);
   check(MatMatMult(B, contact.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
-  const auto forces = [&](Mat rows)
-  { return reduction.sliding ? sliding_forces(transposed(rows), interface, active) : transposed(rows); };
+  Eigen::SparseMatrix<double> forces;
+  if (reduction.sliding)
+    forces = sliding_forces(interface, active);
+  else
+    forces = identity_of_rows(BZ);
   ModeColumns of_modes = mode_columns(modes, reduction, contact.Z);
   MultiVector& columns = of_modes.columns;
   const Index modal = columns.columns();
-  append(columns, attachment_columns(E, forces(BZ), reduction.factor));
+  const MatrixXd of_modes_alone = symmetric_inner_products(columns, product(E, columns));
+  append(columns, attachment_columns(E, BZ, forces, reduction.factor));
   model.omega = omega;
-  choose_basis(model, E, M_z, columns, {modal, of_modes.apart}, reduction.threshold);
+  const MatrixXd energy = energies(of_modes_alone, forces.transpose() * whole_product(BZ, columns));
+  choose_basis(model, energy, M_z, columns, {modal, of_modes.apart}, reduction.threshold);
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
   MultiVector X = product(contact.Z, columns);
   project(model, structure, contact, columns, X);
@@ -159,9 +210,9 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
     const std::vector<PetscInt> turns = own_rows(turning);
     model.C += inner_products(rows_of(left, turns), rows_of(product(turning, X), turns));
   }
-  model.H = inner_products(left, forces(B));
-  const Owned<Mat> read = rows_of(interface, active, reduction.sliding ? RowsTaken::normal : RowsTaken::all);
-  model.G = inner_products(transposed(read), X);
+  model.H = (forces.transpose() * whole_product(B, left)).transpose();
+  model.G = whole_product(B, X);
+  if (reduction.sliding) model.G = normal_rows(model.G, interface.directions);
 
   model.E_factor.compute(model.K_z + omega * omega * model.M_z);
   model.M_factor.compute(model.M_z);

@@ -13,7 +13,6 @@ namespace
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 /// y of du = Z y: Z is the identity on the kept degrees of freedom, found by a row of a single one. (A pivot's row may
 /// look the same; du is the same there.)
@@ -91,12 +90,6 @@ int extend(Orthonormal& basis, Index count, double threshold)
   return static_cast<int>(kept);
 }
 
-/// The symmetric X'AX.
-MatrixXd gram_matrix(Mat A, const MultiVector& X)
-{
-  return symmetric_inner_products(X, product(A, X));
-}
-
 } // namespace
 
 double highest_frequency(const std::vector<ComplexMode>& modes)
@@ -143,58 +136,45 @@ ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction&
   return result;
 }
 
-MultiVector transposed(Mat B)
-{
-  MultiVector result = empty_multivector(B);
-  Owned<Vec> row, unit;
-  check(MatCreateVecs(B, row.put(), unit.put()));
-  PetscInt rows = 0;
-  check(MatGetSize(B, &rows, nullptr));
-  for (PetscInt i = 0; i < rows; ++i)
-  {
-    check(VecSet(unit, 0));
-    if (rank_of(result.comm) == 0) check(VecSetValue(unit, i, 1, INSERT_VALUES));
-    check(VecAssemblyBegin(unit));
-    check(VecAssemblyEnd(unit));
-    check(MatMultTranspose(B, unit, row));
-    append(result, row);
-  }
-  return result;
-}
-
-MultiVector sliding_forces(const MultiVector& rows, const Interface& interface, const std::vector<int>& active)
+Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std::vector<int>& active)
 {
   const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
   const TangentView e(directions, interface.directions);
-  const PairRows<Index> columns(interface.directions);
-  MultiVector result{rows.comm, MatrixXd(rows.entries.rows(), static_cast<Index>(active.size()))};
-  for (Index i = 0; i < result.columns(); ++i)
+  const PairRows<Index> rows(interface.directions);
+  const auto count = static_cast<Index>(active.size());
+  Eigen::SparseMatrix<double> forces(count * rows.per_pair(), count);
+  forces.reserve(Eigen::VectorXi::Constant(count, rows.per_pair()));
+  for (Index i = 0; i < count; ++i)
   {
     const auto pair = static_cast<std::size_t>(active[static_cast<std::size_t>(i)]);
-    const Eigen::Map<const VectorXd> direction(e.of(pair).data(), interface.directions);
-    result.entries.col(i) =
-        rows.entries.col(columns.normal(i)) +
-        rows.entries.middleCols(columns.tangential(i), interface.directions) * (mu[pair] * direction);
+    forces.insert(rows.normal(i), i) = 1;
+    for (int k = 0; k < interface.directions; ++k)
+      forces.insert(rows.tangential(i) + k, i) = mu[pair] * e.of(pair)[static_cast<std::size_t>(k)];
   }
-  return result;
+  return forces;
 }
 
-MultiVector attachment_columns(Mat A, const MultiVector& forces, const FactorOptions& options)
+MultiVector attachment_columns(Mat A, Mat rows, const Eigen::SparseMatrix<double>& forces, const FactorOptions& options)
 {
   const Factor factor(A, nullptr, options);
   if (factor.failed()) throw Error("reduced model: K + omega^2 M is not positive definite with the active pairs open");
-  Owned<Vec> pattern;
-  check(MatCreateVecs(A, pattern.put(), nullptr));
+  Owned<Vec> pattern, on_rows;
+  check(MatCreateVecs(rows, pattern.put(), on_rows.put()));
   MultiVector result = empty_multivector(A);
   constexpr Index at_once = 64;
-  for (Index begin = 0; begin < forces.columns(); begin += at_once)
+  for (Index begin = 0; begin < forces.cols(); begin += at_once)
   {
     std::vector<Owned<Vec>> force, shape;
-    for (Index i = begin; i < std::min(begin + at_once, forces.columns()); ++i)
+    for (Index i = begin; i < std::min(begin + at_once, forces.cols()); ++i)
     {
+      check(VecSet(on_rows, 0));
+      for (Eigen::SparseMatrix<double>::InnerIterator entry(forces, i); entry && rank_of(result.comm) == 0; ++entry)
+        check(VecSetValue(on_rows, static_cast<PetscInt>(entry.row()), entry.value(), INSERT_VALUES));
+      check(VecAssemblyBegin(on_rows));
+      check(VecAssemblyEnd(on_rows));
       force.push_back(zeros_like(pattern));
       shape.push_back(zeros_like(pattern));
-      copy_column(forces, i, force.back());
+      check(MatMultTranspose(rows, on_rows, force.back()));
     }
     (void)factor.forward(std::vector<Vec>(force.begin(), force.end()));
     factor.backward({}, std::vector<Vec>(shape.begin(), shape.end()));
@@ -211,10 +191,10 @@ MatrixXd by_falling_period(const MatrixXd& mass, double omega, Index& slow)
   return spectrum.eigenvectors().rowwise().reverse();
 }
 
-void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, const ModeCounts& counts, double threshold)
+void choose_basis(ReducedModel& model, const MatrixXd& energy, Mat M_z, MultiVector& columns, const ModeCounts& counts,
+                  double threshold)
 {
   const auto [of_modes, apart] = counts;
-  const MatrixXd energy = gram_matrix(E, columns);
   Orthonormal basis{energy, MatrixXd(columns.columns(), 0)};
   model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
   model.modes += extend(basis, of_modes - apart - 2, 1e-6);
@@ -222,10 +202,11 @@ void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, con
   const int last = extend(basis, apart, 1e-6);
   model.modes += last;
   model.attachments = extend(basis, columns.columns() - of_modes, threshold);
-  const MatrixXd mass = basis.T.transpose() * (gram_matrix(M_z, columns) * basis.T);
-  const MatrixXd turn = by_falling_period(mass, model.omega, model.slow);
+  columns = combination(columns, basis.T);
+  const MatrixXd turn =
+      by_falling_period(symmetric_inner_products(columns, product(M_z, columns)), model.omega, model.slow);
   model.apart = turn.middleRows(before, last).transpose();
-  columns = combination(columns, basis.T * turn);
+  columns = combination(columns, turn);
 }
 
 } // namespace squeal

@@ -3,6 +3,8 @@
 /// pairs' forces, and the orthonormal basis of both. All functions that take PETSc's objects are collective.
 #include "squeal/reduction/reduced_model.hpp"
 
+#include <Eigen/SparseCore>
+
 namespace squeal
 {
 
@@ -17,15 +19,14 @@ struct ModeColumns
 /// Those kept apart are the last ones.
 ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction, Mat Z);
 
-/// The rows of a matrix of few, as columns.
-MultiVector transposed(Mat B);
+/// The force of each active pair that slides, one column each: its normal force and the friction that follows it, on
+/// the active pairs' rows of B.
+Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std::vector<int>& active);
 
-/// The force of each active pair that slides, B_n' + mu B_t'e: its normal force and the friction that follows it.
-/// `rows`: those of B of the active pairs, as columns.
-MultiVector sliding_forces(const MultiVector& rows, const Interface& interface, const std::vector<int>& active);
-
-/// (K_z + w^2 M_z)^-1 forces. Error: A = K_z + w^2 M_z is not positive definite.
-MultiVector attachment_columns(Mat A, const MultiVector& forces, const FactorOptions& options);
+/// (K_z + w^2 M_z)^-1 (rows)' forces; `rows`: B Z of the active pairs. Error: A = K_z + w^2 M_z is not positive
+/// definite.
+MultiVector attachment_columns(Mat A, Mat rows, const Eigen::SparseMatrix<double>& forces,
+                               const FactorOptions& options);
 
 /// Orthonormal combinations of shapes that are orthonormal in the energy, by falling period: u'M u against the energy.
 /// `mass`: of the shapes. Sets `slow` to the number of those that swing by less than four times omega [rad/s].
@@ -37,9 +38,9 @@ struct ModeCounts
   Eigen::Index modes = 0, apart = 0;
 };
 
-/// Replaces the columns by the basis: the modes, the attachments next to them, all by falling period. `E`: K_z +
-/// omega^2 M_z. Sets the model's counts, `slow` and `apart`.
-void choose_basis(ReducedModel& model, Mat E, Mat M_z, MultiVector& columns, const ModeCounts& counts,
-                  double threshold);
+/// Replaces the columns by the basis: the modes, the attachments next to them, all by falling period. `energy`: X'E X
+/// of the columns X, E = K_z + omega^2 M_z. Sets the model's counts, `slow` and `apart`.
+void choose_basis(ReducedModel& model, const Eigen::MatrixXd& energy, Mat M_z, MultiVector& columns,
+                  const ModeCounts& counts, double threshold);
 
 } // namespace squeal
