@@ -1,15 +1,12 @@
 #include "squeal/run.hpp"
 
-#include "squeal/attractors/attractors.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/branch/brake_branch.hpp"
-#include "squeal/coarse.hpp"
+#include "squeal/chain.hpp"
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/cycle/period_log.hpp"
 #include "squeal/forecast.hpp"
-#include "squeal/modes/modes_checkpoint.hpp"
 #include "squeal/reduction/model_files.hpp"
-#include "squeal/report/report.hpp"
 #include "squeal/scene/doubts.hpp"
 #include "squeal/study/robustness.hpp"
 #include "squeal/study/sensitivity.hpp"
@@ -25,22 +22,6 @@ namespace squeal
 
 namespace
 {
-
-/// The chain so far. Stages never call the next one: what they hand on stands here.
-struct Chain
-{
-  const Scene& scene;
-  const ProgramOptions& options;
-  const Model& model;
-  Report& report;
-  std::optional<LinearisedSliding> linearised; // once there is an equilibrium and a stage needs it
-  std::optional<State> cycle_file{};     // the state that the scene starts the cycle's search from, if it is a file
-  const CoarseModel* coarse = nullptr;   // of cycle.start = "coarse"
-  std::optional<CarriedCycle> carried{}; // its cycle, on this mesh
-
-  SlidingEquilibrium sliding() const { return {model.structure, model.interface, report.equilibrium}; }
-  UnstableModes unstable() const { return {report.modes.unstable(), report.estimates}; }
-};
 
 /// Runs one stage under its -log_view name, times it, and prints which one is at work.
 template <class Work> auto timed(Report& report, Stage which, MPI_Comm comm, Work work)
@@ -95,183 +76,6 @@ template <class Work> auto stage(Report& report, Stage which, MPI_Comm comm, Wor
     leave_out(" in this stage");
   }
   return result;
-}
-
-template <class Result> Result not_run(OutcomeKind kind, const std::string& reason)
-{
-  Result result;
-  result.outcome = {kind, reason, 0, 0};
-  return result;
-}
-
-/// Why a stage that follows an unstable mode cannot run; empty if it can.
-std::string no_mode_to_follow(const Report& report)
-{
-  if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "there is no equilibrium to start from";
-  if (report.modes.modes.empty()) return "no mode was found in the band";
-  if (report.modes.unstable_count == 0) return "the equilibrium is stable: no mode grows in the band";
-  if (report.modes.modes.front().frequency_hz() == 0) return "the equilibrium diverges without oscillating";
-  return {};
-}
-
-bool starts_without_a_mode(const TransientSettings& settings)
-{
-  return settings.start.kind == StartKind::file || settings.start.kind == StartKind::rest;
-}
-
-/// From a state file or from rest for a given number of steps, the transient needs no mode.
-bool follows_a_mode(const TransientSettings& settings)
-{
-  return settings.enabled && (!starts_without_a_mode(settings) || settings.steps == 0);
-}
-
-Modes run_modes(Chain& chain)
-{
-  const Scene& scene = chain.scene;
-  if (chain.report.equilibrium.outcome.kind != OutcomeKind::converged)
-    return not_run<Modes>(OutcomeKind::skipped, "there is no equilibrium to linearise about");
-  if (!scene.modes.enabled && !scene.cycle.enabled && !follows_a_mode(scene.transient))
-    return not_run<Modes>(OutcomeKind::off, "the scene turns it off");
-  chain.linearised = linearise(chain.sliding());
-  if (auto kept = kept_modes(chain.model.structure)) return std::move(*kept);
-  Modes modes = find_modes(chain.sliding(), *chain.linearised, scene.modes, chain.options.modes);
-  if (checkpoint_is_worth_it(comm_of(chain.model.structure.load))) keep_modes(modes, chain.model.structure);
-  return modes;
-}
-
-/// Of every unstable mode, the followed one first; of none, the reason.
-std::vector<Estimate> run_estimates(const Chain& chain)
-{
-  const Scene& scene = chain.scene;
-  std::vector<Estimate> estimates;
-  const std::string reason = no_mode_to_follow(chain.report);
-  if (!scene.estimate.enabled && !scene.cycle.enabled && !follows_a_mode(scene.transient))
-    estimates.push_back(not_run<Estimate>(OutcomeKind::off, "the scene turns it off"));
-  else if (!reason.empty())
-    estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, reason));
-  else if (chain.model.interface.pairs == 0)
-    estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, "there is no contact that would limit the growth"));
-  else
-    for (const ComplexMode& mode : chain.report.modes.unstable())
-      estimates.push_back(estimate_amplitude(chain.sliding(), *chain.linearised, mode, chain.options.estimate));
-  return estimates;
-}
-
-Trajectory run_transient(const Chain& chain)
-{
-  const TransientSettings& settings = chain.scene.transient;
-  const std::string reason = no_mode_to_follow(chain.report);
-  if (!settings.enabled) return not_run<Trajectory>(OutcomeKind::off, "the scene has no [transient], or turns it off");
-  if (chain.report.equilibrium.outcome.kind != OutcomeKind::converged ||
-      (!reason.empty() && !starts_without_a_mode(settings)))
-    return not_run<Trajectory>(OutcomeKind::skipped, reason);
-  const ComplexMode* followed = reason.empty() ? &chain.report.modes.modes.front() : nullptr;
-  return integrate(chain.sliding(), followed, settings, chain.options.step,
-                   transient_start(chain.sliding(), chain.unstable(), settings), chain.model.probes);
-}
-
-/// The state that the cycle's search starts from, where it is none of the modes'.
-const State* given_start(const Chain& chain)
-{
-  if (chain.cycle_file) return &*chain.cycle_file;
-  if (chain.carried) return &chain.carried->state;
-  return chain.scene.cycle.start.kind == CycleStartKind::transient ? &chain.report.transient.end : nullptr;
-}
-
-/// Why the search for the cycle cannot run; empty if it can.
-std::string no_cycle_start(const Chain& chain)
-{
-  const std::string reason = no_mode_to_follow(chain.report);
-  if (reason.empty() && chain.coarse && !chain.carried)
-    return "no cycle to start from was found on the coarse mesh: take a finer one, or start = \"estimate\"";
-  if (!reason.empty() || chain.scene.cycle.start.kind != CycleStartKind::transient) return reason;
-  const bool ended = chain.report.transient.outcome.kind == OutcomeKind::completed;
-  return ended ? "" : "the transient that it starts from the end of was not completed";
-}
-
-CycleProblem cycle_problem(const Chain& chain)
-{
-  return {chain.sliding(),          *chain.linearised,
-          chain.report.modes.modes, chain.unstable(),
-          chain.scene.cycle,        chain.options.step,
-          chain.options.modes,      chain.model.probes,
-          given_start(chain),       chain.carried ? chain.carried->period : 0};
-}
-
-FittedCycle run_cycle(const Chain& chain)
-{
-  const Scene& scene = chain.scene;
-  FittedCycle result;
-  const std::string reason = no_cycle_start(chain);
-  if (!scene.cycle.enabled)
-    result.cycle = not_run<LimitCycle>(OutcomeKind::off, "the scene has no [cycle], or turns it off");
-  else if (!reason.empty())
-    result.cycle = not_run<LimitCycle>(OutcomeKind::skipped, reason);
-  else
-    result = find_fitted_cycle(cycle_problem(chain), {scene.fidelity, scene.accuracy}, chain.options.cycle);
-  return result;
-}
-
-/// The whole chain on the coarse mesh, to a cycle at the steps a period with which this mesh's search begins.
-CoarseStart run_coarse(Chain& fine)
-{
-  const std::string reason = no_mode_to_follow(fine.report);
-  if (!reason.empty()) return not_run<CoarseStart>(OutcomeKind::skipped, reason);
-  Scene scene = fine.coarse->scene;
-  const CycleSettings chosen = chosen_settings(cycle_problem(fine), scene.fidelity);
-  constexpr double tolerance = 1e-3; // the mesh's own error is larger
-  scene.cycle.steps_per_period = chosen.steps_per_period;
-  scene.cycle.tolerance = std::max(chosen.tolerance, tolerance);
-  ProgramOptions options = fine.options;
-  options.cycle.shooting.multipliers = 0;
-  const Model& model = fine.coarse->model;
-  Report report;
-  Chain chain{scene, options, model, report, {}};
-  report.equilibrium = find_equilibrium(model.structure, model.interface, options.equilibrium);
-  if (report.equilibrium.outcome.kind == OutcomeKind::converged)
-  {
-    chain.linearised = linearise(chain.sliding());
-    report.modes = find_modes(chain.sliding(), *chain.linearised, scene.modes, options.modes);
-  }
-  report.estimates = run_estimates(chain);
-  const LimitCycle cycle = run_cycle(chain).cycle;
-  CoarseStart start{cycle.outcome, model.dofs.size, model.interface.pairs};
-  if (!has_run(cycle.outcome)) start.outcome.kind = OutcomeKind::not_converged;
-  if (start.outcome.kind != OutcomeKind::converged) return start;
-  start.period = cycle.orbit.period;
-  start.mean_fluctuating_energy = cycle.measured.mean_fluctuating_energy;
-  start.periods = cycle.convergence.periods;
-  fine.carried = carried_cycle(
-      *fine.coarse, {report.equilibrium, report.modes.modes.front(), cycle.measured.start, cycle.orbit.period},
-      fine.report.equilibrium, fine.report.modes.modes.front());
-  return start;
-}
-
-/// Whether the search for a cycle ended without one that attracts, on a free motion that goes on.
-bool motion_goes_on(const LimitCycle& cycle)
-{
-  return cycle.outcome.kind != OutcomeKind::collapsed_to_equilibrium && cycle.free.state.get();
-}
-
-/// What the motion settles on where no cycle attracts.
-SettledMotion run_settled(const Chain& chain)
-{
-  const LimitCycle& cycle = chain.report.cycle;
-  if (!has_run(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::off, "no cycle was sought");
-  if (succeeded(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::skipped, "the cycle is the answer");
-  if (!motion_goes_on(cycle)) return not_run<SettledMotion>(OutcomeKind::skipped, "there is no motion to go on from");
-  return find_settled_motion(cycle_problem(chain), cycle, chain.options.settled);
-}
-
-Attractors run_attractors(const Chain& chain)
-{
-  const CycleSettings& settings = chain.scene.cycle;
-  if (!settings.enabled || settings.starts == 0)
-    return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
-  const std::string reason = no_mode_to_follow(chain.report);
-  if (!reason.empty()) return not_run<Attractors>(OutcomeKind::skipped, reason);
-  return find_attractors({chain.sliding(), chain.report.modes.modes, chain.unstable(), settings, chain.options.step},
-                         chain.options.attractors);
 }
 
 BrakeBranch run_branch(const Chain& chain)

@@ -284,31 +284,12 @@ Json coarse_entry(const CoarseStart& coarse)
   return entry;
 }
 
-Json branch_entry(const Report& report, const Scene& scene)
+/// The outcome of a study and, where it ran, what it found.
+template <class Study>
+Json study_entry(const Study& study, const Scene& scene, void (*add)(const Study&, const Scene&, Json&))
 {
-  Json entry = entry_of(report.branch.outcome);
-  if (has_run(report.branch.outcome)) add_branch(report.branch, scene, entry);
-  return entry;
-}
-
-Json sensitivity_entry(const Report& report, const Scene& scene)
-{
-  Json entry = entry_of(report.sensitivity.outcome);
-  if (has_run(report.sensitivity.outcome)) add_sensitivity(report.sensitivity, scene, entry);
-  return entry;
-}
-
-Json robustness_entry(const Report& report, const Scene& scene)
-{
-  Json entry = entry_of(report.robustness.outcome);
-  if (has_run(report.robustness.outcome)) add_robustness(report.robustness, scene, entry);
-  return entry;
-}
-
-Json sweep_entry(const Report& report, const Scene& scene)
-{
-  Json entry = entry_of(report.sweep.outcome);
-  if (has_run(report.sweep.outcome)) add_sweep(report.sweep, scene, entry);
+  Json entry = entry_of(study.outcome);
+  if (has_run(study.outcome)) add(study, scene, entry);
   return entry;
 }
 
@@ -365,10 +346,10 @@ std::string report_json(const Report& report, const Scene& scene)
   json[word(Stage::settled)] = settled_entry(report, scene);
   json["fidelity"] = fidelity_entry(report.fidelity);
   json[word(Stage::attractors)] = attractors_entry(report);
-  json[word(Stage::branch)] = branch_entry(report, scene);
-  json[word(Stage::sensitivity)] = sensitivity_entry(report, scene);
-  json[word(Stage::sweep)] = sweep_entry(report, scene);
-  json[word(Stage::robustness)] = robustness_entry(report, scene);
+  json[word(Stage::branch)] = study_entry(report.branch, scene, add_branch);
+  json[word(Stage::sensitivity)] = study_entry(report.sensitivity, scene, add_sensitivity);
+  json[word(Stage::sweep)] = study_entry(report.sweep, scene, add_sweep);
+  json[word(Stage::robustness)] = study_entry(report.robustness, scene, add_robustness);
   const Warnings warnings = warnings_of(report);
   const auto warn = [&json](Stage stage, const std::vector<std::string>& sentences)
   {

@@ -1,0 +1,59 @@
+#pragma once
+/// The chain of stages on one model: modes, estimate, transient, cycle, settled motion, motions of many starts. Each
+/// stage takes what the ones before it left, and says why it does not run. All of them are collective.
+#include "squeal/coarse.hpp"
+#include "squeal/options.hpp"
+#include "squeal/report/report.hpp"
+
+namespace squeal
+{
+
+/// The chain so far. Stages never call the next one: what they hand on stands here.
+struct Chain
+{
+  const Scene& scene;
+  const ProgramOptions& options;
+  const Model& model;
+  Report& report;
+  std::optional<LinearisedSliding> linearised; // once there is an equilibrium and a stage needs it
+  std::optional<State> cycle_file{};     // the state that the scene starts the cycle's search from, if it is a file
+  const CoarseModel* coarse = nullptr;   // of cycle.start = "coarse"
+  std::optional<CarriedCycle> carried{}; // its cycle, on this mesh
+
+  SlidingEquilibrium sliding() const { return {model.structure, model.interface, report.equilibrium}; }
+  UnstableModes unstable() const { return {report.modes.unstable(), report.estimates}; }
+};
+
+/// The result of a stage that did not run, with the reason.
+template <class Result> Result not_run(OutcomeKind kind, const std::string& reason)
+{
+  Result result;
+  result.outcome = {kind, reason, 0, 0};
+  return result;
+}
+
+/// Why a stage that follows an unstable mode cannot run; empty if it can.
+std::string no_mode_to_follow(const Report& report);
+
+/// Linearises about the equilibrium, and finds the modes or takes those of the run that is gone on with.
+Modes run_modes(Chain& chain);
+
+/// Of every unstable mode, the followed one first; of none, the reason.
+std::vector<Estimate> run_estimates(const Chain& chain);
+
+/// The theta steps that the scene asks for, from its start.
+Trajectory run_transient(const Chain& chain);
+
+/// The whole chain on the coarse mesh, to a cycle at the steps a period with which this mesh's search begins.
+CoarseStart run_coarse(Chain& fine);
+
+/// The cycle on the model that the scene's accuracy allows.
+FittedCycle run_cycle(const Chain& chain);
+
+/// What the motion settles on where no cycle attracts.
+SettledMotion run_settled(const Chain& chain);
+
+/// The motions that the scene's starts lead to.
+Attractors run_attractors(const Chain& chain);
+
+} // namespace squeal
