@@ -142,43 +142,44 @@ subtract_transposed_strip(const double* L, std::size_t rows, std::size_t lanes, 
 /// The right-hand sides in a Vector; of a single right-hand side, the vector registers hold rows.
 template <class Vector> constexpr std::size_t taken = sizeof(Vector) / sizeof(double);
 
-/// y -= L x for a panel.
-template <class Vector> SQUEAL_INLINE void product(const Panel& L, std::size_t lanes, const double* x, double* y)
+/// work(strip, its first column, its width) for each strip of a panel; the width is a constant of its type.
+template <class Work> SQUEAL_INLINE void for_each_strip(const Panel& L, Work work)
 {
   const double* strip = L.values;
   for (std::size_t j = 0; j < L.columns; j += width_from(j, L.columns))
   {
     const std::size_t some = width_from(j, L.columns);
-    with_width(some,
-               [&](auto width) SQUEAL_INLINE_LAMBDA
-               {
-                 if constexpr (std::is_same_v<Vector, double>)
-                   subtract_strip<width>(strip, L.rows, x + j, y);
-                 else
-                   for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
-                     subtract_strip<Vector, width>(strip, L.rows, lanes, x + j * lanes + lane, y + lane);
-               });
+    with_width(some, [&](auto width) SQUEAL_INLINE_LAMBDA { work(strip, j, width); });
     strip += some * padded(L.rows);
   }
 }
 
+/// y -= L x for a panel.
+template <class Vector> SQUEAL_INLINE void product(const Panel& L, std::size_t lanes, const double* x, double* y)
+{
+  for_each_strip(L,
+                 [&](const double* strip, std::size_t j, auto width) SQUEAL_INLINE_LAMBDA
+                 {
+                   if constexpr (std::is_same_v<Vector, double>)
+                     subtract_strip<width>(strip, L.rows, x + j, y);
+                   else
+                     for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+                       subtract_strip<Vector, width>(strip, L.rows, lanes, x + j * lanes + lane, y + lane);
+                 });
+}
+
+/// y -= L' x for a panel.
 template <class Vector> SQUEAL_INLINE void transposed(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
-  const double* strip = L.values;
-  for (std::size_t j = 0; j < L.columns; j += width_from(j, L.columns))
-  {
-    const std::size_t some = width_from(j, L.columns);
-    with_width(some,
-               [&](auto width) SQUEAL_INLINE_LAMBDA
-               {
-                 if constexpr (std::is_same_v<Vector, double>)
-                   subtract_transposed_strip<width>(strip, L.rows, x, y + j);
-                 else
-                   for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
-                     subtract_transposed_strip<Vector, width>(strip, L.rows, lanes, x + lane, y + j * lanes + lane);
-               });
-    strip += some * padded(L.rows);
-  }
+  for_each_strip(L,
+                 [&](const double* strip, std::size_t j, auto width) SQUEAL_INLINE_LAMBDA
+                 {
+                   if constexpr (std::is_same_v<Vector, double>)
+                     subtract_transposed_strip<width>(strip, L.rows, x, y + j);
+                   else
+                     for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
+                       subtract_transposed_strip<Vector, width>(strip, L.rows, lanes, x + lane, y + j * lanes + lane);
+                 });
 }
 
 /// Solves with the tile on the diagonal of a strip `width` wide, and subtracts its product from the tile's own rows.
