@@ -37,7 +37,7 @@ double steps_of(const Scene& scene, const ProgramOptions& options)
   double steps = steps_of_transient(scene.transient);
   if (!scene.cycle.enabled) return steps;
   const double a_period = scene.cycle.steps_per_period > 0 ? scene.cycle.steps_per_period : usual_steps;
-  const double cycle = a_period * std::min<double>(periods_to_a_cycle, options.cycle.shooting.max_periods);
+  const double cycle = a_period * std::min(periods_to_a_cycle, static_cast<double>(options.cycle.shooting.max_periods));
   const double starts = scene.cycle.starts, points = scene.branch ? scene.branch->points : 0;
   return steps + cycle * (1 + starts + points) + a_period * scene.cycle.free_periods;
 }

@@ -128,6 +128,14 @@ inline Field rigid_motion(const Vec3& translation, const Vec3& rotation)
   };
 }
 
+/// Unit translations along x, y, z for k = 0 to 2, unit rotations about them for k = 3 to 5.
+inline Field unit_rigid_motion(int k)
+{
+  Vec3 translation{}, rotation{};
+  (k < 3 ? translation : rotation)[static_cast<std::size_t>(k % 3)] = 1;
+  return rigid_motion(translation, rotation);
+}
+
 /// The field's values on the free degrees of freedom.
 inline Owned<Vec> sample(const Structure& structure, const Field& field)
 {
@@ -142,6 +150,16 @@ inline Owned<Vec> sample(const Structure& structure, const Field& field)
   check(VecAssemblyBegin(u));
   check(VecAssemblyEnd(u));
   return u;
+}
+
+/// The largest entry of A x.
+inline double largest_of_product(Mat A, Vec x)
+{
+  const Owned<Vec> product = zeros_like(x);
+  check(MatMult(A, x, product));
+  double largest = 0;
+  check(VecNorm(product, NORM_INFINITY, &largest));
+  return largest;
 }
 
 /// x' A y
