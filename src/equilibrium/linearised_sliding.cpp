@@ -258,6 +258,7 @@ Owned<Mat> project(Mat A, Mat Y, Mat Z)
   Owned<Mat> AZ, result;
   check(MatMatMult(A, Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, AZ.put()));
   check(MatTransposeMatMult(Y, AZ, MAT_INITIAL_MATRIX, PETSC_DEFAULT, result.put()));
+  check(MatProductClear(result)); // else it keeps A Z and the work of the product
   return result;
 }
 
