@@ -1,8 +1,10 @@
-/// Forecasts from the analysis of the factor. The constants are fitted to measured runs of the TGV brake at two sizes
-/// (tools/README.md, "Cost against size"), where they are right to 30 %.
+/// Memory by what each stage holds at its peak: what is resident after the model is made, by the system's own count,
+/// and copies of matrices, factors by their symbolic analysis, dense operators and vectors (src/README.md,
+/// section 8.9). Time by the speed at which memory is read; its constants are fitted to runs of the TGV brake at two
+/// sizes.
 #include "squeal/forecast.hpp"
 
-#include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/base/available_memory.hpp"
 
 #include <algorithm>
@@ -17,14 +19,18 @@ namespace squeal
 namespace
 {
 
-constexpr double modes_per_factor = 3;    // bytes of an unsymmetric factor with its room over those of the factor
-constexpr double vectors_of_modes = 2000; // in the spaces of the slices; with both, 0.13 and 0.93 GB for 0.13 and 1.28
 constexpr double seconds_per_byte = 1.4e-10;   // of a step, which reads factor and W: 1.45e-10 and 1.4e-10
 constexpr double seconds_of_no_model = 2.5e-5; // a step of inputs/oscillator, which is all overhead
 constexpr double periods_to_a_cycle = 50;      // of shooting from the estimate: 41 to 47
 constexpr int usual_steps = 128;               // a period, where they are chosen
 constexpr double day = 86400;                  // [s]
-constexpr double start_of_libraries = 400e6;   // [byte] OpenBLAS's buffer of 128 MB, those of MPI and of PETSc
+constexpr double dense_copies = 24; // of n x n numbers in a dense quadratic problem: a pencil of size 2 n, six times
+// A slice takes at most 100 pairs and half as many again, and a pass appends two directions a pair at most. So V has
+// up to 250 columns; with its products, a copy while it grows, shapes, residuals and three right sides of a solve:
+constexpr double vectors_of_modes = 4 * 250 + 250 + 200 + 200 + 300;
+constexpr double vectors_of_modes_kept = 200; // of the same 100 pairs
+constexpr double vectors_of_shooting = 100;   // pairs of differences, work of a step, columns of the multipliers
+constexpr double start_of_libraries = 400e6;  // [byte] OpenBLAS's buffer of 128 MB, those of MPI and of PETSc
 
 double steps_of_transient(const TransientSettings& transient)
 {
@@ -45,6 +51,22 @@ double steps_of(const Scene& scene, const ProgramOptions& options)
 bool seeks_modes(const Scene& scene)
 {
   return scene.modes.enabled || scene.cycle.enabled || scene.transient.enabled;
+}
+
+/// The resident memory of this process [bytes]; 0 where the system does not say.
+double resident_memory()
+{
+  std::ifstream status("/proc/self/status");
+  double kilobytes = 0;
+  for (std::string word; status >> word;)
+    if (word == "VmRSS:" && status >> kilobytes) return 1024 * kilobytes;
+  return 0;
+}
+
+double sum_of_ranks(double value, MPI_Comm comm)
+{
+  MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_SUM, comm);
+  return value;
 }
 
 /// What the node and the limits of its control group leave [byte].
@@ -100,39 +122,111 @@ std::string duration(double seconds)
 
 } // namespace
 
+namespace
+{
+
+constexpr double number = sizeof(double);                               // [bytes]
+constexpr double matrix_entry = sizeof(PetscScalar) + sizeof(PetscInt); // in PETSc's rows
+constexpr double triplet = sizeof(PetscScalar) + 2 * sizeof(int);       // of what a factor is made from
+
+/// What the stages' parts are counted by, of all ranks together.
+struct Sizes
+{
+  double dofs = 0, entries = 0;  // of K
+  double pairs = 0, contact = 0; // rows of B
+  FactorForecast factor{};
+
+  double condensed_operator() const { return number * contact * contact; }
+};
+
+Sizes sizes_of(const Model& model, const FactorOptions& options)
+{
+  Sizes sizes;
+  const Mat K = model.structure.K;
+  PetscInt dofs = 0;
+  MatInfo info;
+  check(MatGetSize(K, &dofs, nullptr));
+  check(MatGetInfo(K, MAT_GLOBAL_SUM, &info)); // info.memory is 0 in most builds
+  sizes.dofs = static_cast<double>(dofs);
+  sizes.entries = info.nz_used;
+  sizes.pairs = model.interface.pairs;
+  sizes.contact = static_cast<double>(model.interface.size());
+  sizes.factor = forecast_factor(K, model.interface.pairs > 0 ? model.interface.B.get() : nullptr, options);
+  return sizes;
+}
+
+/// The factor, its condensed operator, and half of the matrix as triplets and by columns.
+double memory_of_factor(const Sizes& sizes)
+{
+  return sizes.factor.bytes + sizes.condensed_operator() + 2 * triplet * sizes.entries / 2;
+}
+
+/// K with springs at the pairs, its factor and condensed operator D, and three matrices of pairs: D's normal part, the
+/// same with friction, and a factor of that.
+double memory_of_equilibrium(const Sizes& sizes)
+{
+  return matrix_entry * sizes.entries + memory_of_factor(sizes) + 3 * number * sizes.pairs * sizes.pairs;
+}
+
+/// Six matrices: M and K of the frictionless problem, M, C and K of the sliding one, and C with friction. Two pencils:
+/// that of the count, and that of the search. The vectors: the largest subspace of a slice, and its products with M, C
+/// and K.
+double memory_of_modes(const Sizes& sizes, const ModesSettings& settings, PetscInt dense_limit, MPI_Comm comm)
+{
+  if (sizes.dofs <= static_cast<double>(dense_limit)) return dense_copies * number * sizes.dofs * sizes.dofs;
+  const Symmetry search = settings.method == ModesMethod::projection ? Symmetry::symmetric : Symmetry::none;
+  return 6 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, Symmetry::symmetric, comm) +
+         forecast_pencil(sizes.factor, sizes.entries, search, comm) + number * vectors_of_modes * sizes.dofs;
+}
+
+/// M and K together, the factor, W, and its near field in single precision, which may be all of it.
+double memory_of_step(const Sizes& sizes)
+{
+  return (2 * number + sizeof(PetscInt)) * sizes.entries / 2 + matrix_entry * sizes.entries + memory_of_factor(sizes) +
+         sizes.condensed_operator() / 2 + number * vectors_of_modes_kept * sizes.dofs;
+}
+
+/// A reduced model has at most a shape for each pair, and those of the modes. They are held four times at its making.
+double memory_of_cycle(const Sizes& sizes, CycleModel fidelity)
+{
+  const double shapes = fidelity == CycleModel::full ? 0 : sizes.pairs + vectors_of_modes_kept;
+  return memory_of_step(sizes) + number * (4 * shapes + vectors_of_shooting) * sizes.dofs;
+}
+
+} // namespace
+
+double Forecast::bytes() const
+{
+  double most = held;
+  for (const StageMemory& stage : stages) most = std::max(most, stage.bytes);
+  return most;
+}
+
 Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options)
 {
   Forecast forecast;
-  const Structure& structure = model.structure;
-  for (Mat matrix : {structure.M.get(), structure.C.get(), structure.K.get()})
-  {
-    MatInfo info;
-    check(MatGetInfo(matrix, MAT_GLOBAL_SUM, &info));
-    forecast.matrices += info.nz_used * (sizeof(PetscScalar) + sizeof(PetscInt)); // info.memory is 0 in most builds
-  }
-  forecast.factor =
-      factor_memory(structure.K, model.interface.pairs > 0 ? model.interface.B.get() : nullptr, options.factor);
-  const double contact_size = static_cast<double>(model.interface.size());
-  forecast.condensed_operator = 8 * contact_size * contact_size;
-  if (seeks_modes(scene))
-  {
-    PetscInt dofs = 0;
-    check(MatGetSize(structure.K, &dofs, nullptr));
-    forecast.modes = modes_per_factor * forecast.factor + 8 * vectors_of_modes * static_cast<double>(dofs);
-  }
+  const Sizes sizes = sizes_of(model, options.factor);
+  const MPI_Comm comm = comm_of(model.structure.K);
+  forecast.held = sum_of_ranks(resident_memory(), comm);
+  forecast.on_rank_zero = 1.5 * sizes.condensed_operator();
+  const auto add = [&](Stage stage, double bytes) { forecast.stages.push_back({stage, forecast.held + bytes}); };
+  add(Stage::equilibrium, memory_of_equilibrium(sizes));
+  if (seeks_modes(scene)) add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes.dense_limit, comm));
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
-  forecast.history = 8 * entries * steps_of_transient(scene.transient);
+  if (scene.transient.enabled)
+    add(Stage::transient, memory_of_step(sizes) + number * entries * steps_of_transient(scene.transient));
+  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity));
   forecast.steps = steps_of(scene, options);
-  forecast.step_seconds = seconds_of_no_model + seconds_per_byte * (forecast.factor + forecast.condensed_operator);
+  forecast.step_seconds = seconds_of_no_model + seconds_per_byte * (sizes.factor.bytes + sizes.condensed_operator());
   return forecast;
 }
 
 std::string text_of(const Forecast& forecast)
 {
-  std::string text = format("  memory forecast, all ranks together: matrices %.3g MB, one factorisation %.3g MB, "
-                            "condensed contact operator %.3g MB, modes %.3g MB, history %.3g MB\n",
-                            1e-6 * forecast.matrices, 1e-6 * forecast.factor, 1e-6 * forecast.condensed_operator,
-                            1e-6 * forecast.modes, 1e-6 * forecast.history);
+  std::string text = format("  memory forecast, all ranks together: model %.3g MB", 1e-6 * forecast.held);
+  for (const StageMemory& stage : forecast.stages)
+    text += format(", %s %.3g MB", word(stage.stage), 1e-6 * stage.bytes);
+  text += format("; at most %.3g MB\n", 1e-6 * forecast.bytes());
   if (forecast.steps > 0)
     text += format("  time forecast: about %.3g time steps of %.2g s, %s\n", forecast.steps, forecast.step_seconds,
                    duration(forecast.seconds()).c_str());
@@ -141,13 +235,13 @@ std::string text_of(const Forecast& forecast)
 
 std::string problem_of(const Forecast& forecast, MPI_Comm comm)
 {
-  const double available = free_memory(comm);
+  const double available = free_memory(comm), more = forecast.bytes() - forecast.held;
   std::string problem;
-  if (forecast.bytes() > available)
-    problem = format("the run would take about %.3g GB of memory, and %.3g GB are free", 1e-9 * forecast.bytes(),
-                     1e-9 * available);
-  else if (const double share = forecast.bytes() - forecast.matrices * (1 - 1. / ranks_of(comm));
-           rank_of(comm) == 0 && !can_take(share)) // rank 0 holds all but its part of the matrices
+  if (more > available)
+    problem = format("the run would take about %.3g GB of memory beyond what the model has, and %.3g GB are free",
+                     1e-9 * more, 1e-9 * available);
+  else if (const double share = std::max(forecast.on_rank_zero, more / ranks_of(comm));
+           rank_of(comm) == 0 && !can_take(share))
     problem = "memory: " + limit_text(share);
   else if (forecast.seconds() > day)
     problem = format("the run would make about %.3g time steps of %.2g s, which take %s", forecast.steps,

@@ -3,6 +3,7 @@
 #include "cholesky.hpp"
 #include "dense_factor.hpp"
 #include "mumps_factor.hpp"
+#include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
@@ -95,6 +96,28 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   const bool too_large = ranks_of(comm) > 1 && plan.memory / ranks_of(comm) > options.limit * gigabyte;
   if (kind == FactorKind::automatic) plan.kind = too_large ? FactorKind::mumps : FactorKind::supernodal;
   return plan;
+}
+
+/// All but the bytes. MUMPS keeps the square of a front's pivots, and waiting updates and fronts are squares.
+FactorForecast multifrontal_forecast(const SymbolicFactor& symbolic)
+{
+  FactorForecast forecast;
+  double waiting = 0, symmetric = 0, not_symmetric = 0;
+  const auto square = [](double x) { return x * x; };
+  for (const Supernode& supernode : symbolic.supernodes)
+  {
+    const double columns = supernode.columns, inner = supernode.inner();
+    const double front = square(columns + inner);
+    forecast.symmetric = std::max(forecast.symmetric, symmetric + waiting + front);
+    forecast.not_symmetric = std::max(forecast.not_symmetric, not_symmetric + waiting + front);
+    for (const int child : supernode.children)
+      waiting -= square(symbolic.supernodes[static_cast<std::size_t>(child)].inner());
+    waiting += square(inner);
+    symmetric += columns * (columns + inner);
+    forecast.entries += columns * ((columns + 1) / 2 + inner);
+    not_symmetric += columns * (columns + 2 * inner);
+  }
+  return forecast;
 }
 
 /// Multiplies the lower triangle, stored by columns, by `factor` and copies it to the upper one, by tiles that fit the
@@ -228,14 +251,31 @@ OptionList options_of(FactorOptions& options)
   };
 }
 
-double factor_memory(Mat A, Mat B, const FactorOptions& options)
+FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
 {
   const int dofs = rows_of(A), border = rows_of(B);
-  const Plan plan = make_plan(A, B, options);
+  const MPI_Comm comm = comm_of(A);
+  Plan plan = make_plan(A, B, options);
   if (plan.kind == FactorKind::dense)
-    return sizeof(double) * static_cast<double>(dofs) * (static_cast<double>(dofs) + border);
-  if (plan.kind == FactorKind::supernodal) return plan.memory;
-  return mumps_factor_memory({bordered(A, B), plan.symbolic.position, dofs, border, comm_of(A)});
+  {
+    const double n = dofs, rows = n + border;
+    return {sizeof(double) * n * rows, n * n, n * n, n * n / 2};
+  }
+  FactorForecast forecast = multifrontal_forecast(plan.symbolic);
+  MPI_Bcast(&forecast, sizeof forecast, MPI_BYTE, 0, comm);
+  if (plan.kind == FactorKind::mumps)
+    forecast.bytes = mumps_factor_memory({std::move(plan.entries), plan.symbolic.position, dofs, border, comm});
+  else
+  {
+    forecast.bytes = cholesky_memory(share_tree(std::move(plan.symbolic), comm));
+    MPI_Allreduce(MPI_IN_PLACE, &forecast.bytes, 1, MPI_DOUBLE, MPI_SUM, comm);
+  }
+  return forecast;
+}
+
+double factor_memory(Mat A, Mat B, const FactorOptions& options)
+{
+  return forecast_factor(A, B, options).bytes;
 }
 
 void solve(const Factor& factor, Vec b, Vec x)

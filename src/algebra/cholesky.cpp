@@ -16,11 +16,12 @@ namespace squeal
 namespace
 {
 
-/// The largest sizes of the stack of updates that wait for their parents, and of a front, of the first supernodes.
-std::pair<std::size_t, std::size_t> largest_sizes(const SymbolicFactor& symbolic, std::size_t count)
+/// The largest sizes of the stack of updates that wait for their parents, and of a front, of supernodes from `begin` to
+/// `end`.
+std::pair<std::size_t, std::size_t> largest_sizes(const SymbolicFactor& symbolic, std::size_t begin, std::size_t end)
 {
   std::size_t waiting = 0, most = 0, front = 0;
-  for (std::size_t k = 0; k < count; ++k)
+  for (std::size_t k = begin; k < end; ++k)
   {
     const Supernode& supernode = symbolic.supernodes[k];
     for (const int child : supernode.children) waiting -= update_size(symbolic.supernodes[at(child)]);
@@ -160,7 +161,7 @@ void Cholesky::factorise(Triplets own)
   double* const sum = first ? schur_complement_.data() : part.get();
   values_ = vector_on_large_pages(symbolic.values);
   // Updates form a stack, since children come before parents. Its memory is not touched before it is needed.
-  const auto waiting = std::make_unique_for_overwrite<double[]>(largest_sizes(symbolic, share_.own).first);
+  const auto waiting = std::make_unique_for_overwrite<double[]>(largest_sizes(symbolic, 0, share_.own).first);
   int failed = !eliminate_own(A, waiting.get(), sum);
   if (ranks_of(comm_) > 1)
   {
@@ -187,7 +188,7 @@ void Cholesky::pack(const Supernode& supernode, const double* front, std::size_t
 bool Cholesky::eliminate_own(const Columns& A, double* waiting, double* schur_complement)
 {
   const SymbolicFactor& symbolic = share_.symbolic;
-  const auto values = std::make_unique_for_overwrite<double[]>(largest_sizes(symbolic, share_.own).second);
+  const auto values = std::make_unique_for_overwrite<double[]>(largest_sizes(symbolic, 0, share_.own).second);
   std::vector<int> local(at(symbolic.dofs + symbolic.border)), border;
   left_.assign(share_.own, nullptr);
   double* top = waiting;
@@ -266,8 +267,17 @@ bool Cholesky::eliminate_shared(const Columns& A, double* schur_complement)
 
 double cholesky_memory(const SymbolicFactor& symbolic)
 {
-  const auto [waiting, front] = largest_sizes(symbolic, symbolic.supernodes.size());
+  const auto [waiting, front] = largest_sizes(symbolic, 0, symbolic.supernodes.size());
   return sizeof(double) * static_cast<double>(symbolic.values + waiting + front) +
+         sizeof(int) * static_cast<double>(symbolic.rows.size());
+}
+
+double cholesky_memory(const TreeShare& share)
+{
+  const SymbolicFactor& symbolic = share.symbolic;
+  const auto [own, front] = largest_sizes(symbolic, 0, share.own);
+  const auto [shared, shared_front] = largest_sizes(symbolic, share.own, symbolic.supernodes.size());
+  return sizeof(double) * static_cast<double>(symbolic.values + own + shared + std::max(front, shared_front)) +
          sizeof(int) * static_cast<double>(symbolic.rows.size());
 }
 

@@ -59,4 +59,7 @@ private:
 /// The largest memory that a Cholesky takes on one rank, without its Schur complement [bytes].
 double cholesky_memory(const SymbolicFactor& symbolic);
 
+/// The same of this rank's share.
+double cholesky_memory(const TreeShare& share);
+
 } // namespace squeal

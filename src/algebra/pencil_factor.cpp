@@ -1,6 +1,7 @@
 #include "squeal/algebra/pencil_factor.hpp"
 
 #include "mumps.hpp"
+#include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/integers.hpp"
 #include "symbolic_factor.hpp"
@@ -34,6 +35,13 @@ namespace
 /// [MB] The largest factor that every rank makes whole: a few seconds of one core, and less than the brake's own
 /// memory.
 constexpr double largest_whole = 200;
+
+/// By the entries of a symmetric factor.
+bool is_made_whole(double entries, Symmetry symmetry, MPI_Comm comm)
+{
+  const double megabytes = (symmetry == Symmetry::symmetric ? 1 : 2) * entries * sizeof(double) / 1e6;
+  return ranks_of(comm) > 1 && megabytes <= largest_whole;
+}
 
 struct Ordering
 {
@@ -91,8 +99,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   parts.layout = row_layout(K);
   const bool symmetric = symmetry == Symmetry::symmetric;
   Ordering order = elimination_order(K, parts.layout.total());
-  const double megabytes = (symmetric ? 1 : 2) * order.entries * sizeof(double) / 1e6;
-  parts.whole = ranks_of(parts.comm) > 1 && megabytes <= largest_whole;
+  parts.whole = is_made_whole(order.entries, symmetry, parts.comm);
   if (parts.whole) broadcast(order.position, parts.comm);
   const auto entries_of = [&](Mat A)
   {
@@ -116,6 +123,17 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
 }
 
 PencilFactor::~PencilFactor() = default;
+
+double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Symmetry symmetry, MPI_Comm comm)
+{
+  const bool symmetric = symmetry == Symmetry::symmetric;
+  // a triplet, K - shift M, and the entry once more in MUMPS's order
+  constexpr double an_entry = sizeof(PetscScalar) + 2 * sizeof(int) + 2 * sizeof(double) + sizeof(MUMPS_INT);
+  const double entries = (symmetric ? 1 : 2) * entries_of_K; // of K and M, whole or by their lower halves
+  const double numbers = symmetric ? forecast.symmetric : forecast.not_symmetric;
+  const double copies = is_made_whole(forecast.entries, symmetry, comm) ? ranks_of(comm) : 1;
+  return copies * (an_entry * entries + sizeof(double) * numbers);
+}
 
 bool PencilFactor::factorise(double shift)
 {

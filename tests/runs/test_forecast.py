@@ -1,0 +1,33 @@
+"""The memory that --dry-run forecasts, against what the run takes."""
+
+import re
+
+import pytest
+from conftest import INPUTS
+
+STAGES = {
+    "equilibrium": ["--set", "modes.enabled=false", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"],
+    "modes": ["--set", "transient.enabled=false", "--set", "cycle.enabled=false"],
+}
+MODELS = {
+    "pin": [INPUTS / "pin_on_disc", "--set", "modes.method=full"],
+    "brake": [INPUTS / "tgv", "--set", "modes.method=full", "--set", "mesh.parameters.size=4000"],
+}
+
+
+def forecast(printed):
+    """MB by stages, and the most."""
+    line = next(line for line in printed.splitlines() if "memory forecast" in line)
+    stages = {name: float(number) for name, number in re.findall(r"(\w+) (\S+) MB", line)}
+    return stages, float(re.search(r"at most (\S+) MB", line)[1])
+
+
+@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_the_memory_of_a_run_is_its_forecast(converged, model, ranks, stage):
+    arguments = [*MODELS[model], *STAGES[stage]]
+    stages, most = forecast(converged(*arguments, "--dry-run", ranks=ranks).printed)
+    taken = 1e-6 * converged(*arguments, ranks=ranks).report["model"]["memory_bytes"]
+    assert stage in stages and most == max(stages.values())
+    assert taken / 1.3 < most < 1.3 * taken
