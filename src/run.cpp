@@ -95,11 +95,17 @@ BrakeBranch run_branch(const Chain& chain)
                       chain.options.cycle.shooting});
 }
 
+/// Why left vectors and sweeps are refused; empty if they are not.
+std::string part_beyond_sweeps(const Model& model)
+{
+  return model.interface.compliance.empty() ? unsymmetric_part(model.structure) : "contacts have a compliance";
+}
+
 Sensitivity run_sensitivity(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   if (!scene.sensitivity) return not_run<Sensitivity>(OutcomeKind::off, "the scene has no [sensitivity]");
-  const std::string reason = no_mode_to_follow(chain.report), part = unsymmetric_part(chain.model.structure);
+  const std::string reason = no_mode_to_follow(chain.report), part = part_beyond_sweeps(chain.model);
   if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
   if (!part.empty()) return not_run<Sensitivity>(OutcomeKind::refused, part);
   const auto model_at = [&](const SceneNumber& number)
@@ -117,7 +123,7 @@ Sweep run_scene_sweep(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   if (!scene.sweep) return not_run<Sweep>(OutcomeKind::off, "the scene has no [sweep]");
-  const std::string part = unsymmetric_part(chain.model.structure);
+  const std::string part = part_beyond_sweeps(chain.model);
   if (!part.empty()) return not_run<Sweep>(OutcomeKind::refused, part);
   const auto model_at = [&](std::span<const double> values)
   {
@@ -134,7 +140,7 @@ Robustness run_robustness(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   if (!scene.robustness) return not_run<Robustness>(OutcomeKind::off, "the scene has no [robustness]");
-  const std::string part = unsymmetric_part(chain.model.structure);
+  const std::string part = part_beyond_sweeps(chain.model);
   if (!part.empty()) return not_run<Robustness>(OutcomeKind::refused, part);
   const auto model_at = [&](std::span<const double> values)
   {
@@ -209,6 +215,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   report.run = results.run();
   begin_period_log();
   const Model model = timed(report, Stage::model, comm, [&] { return build_model(scene, comm); });
+  check_step_law(options.step, model.interface);
   report.model = summary_with_doubts(model, scene, comm);
   print_model(report.model, comm);
   std::optional<CoarseModel> coarse;
@@ -274,6 +281,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
 void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
 {
   const Model model = build_model(scene, comm);
+  check_step_law(options.step, model.interface);
   if (rank_of(comm) == 0)
     std::printf("# the scene, every default written out\n%s\n# the model\n", resolved_scene(scene).c_str());
   print_model(summary_with_doubts(model, scene, comm), comm);

@@ -73,6 +73,23 @@ bool has_no_pairs(const std::filesystem::path& folder, MPI_Comm comm)
   return found == 0;
 }
 
+/// Of a file that need not be there.
+void read_compliance(const std::filesystem::path& file, Interface& interface, MPI_Comm comm)
+{
+  int found = 0;
+  on_rank_zero(comm, [&] { found = is_file(file) ? 1 : 0; });
+  MPI_Bcast(&found, 1, MPI_INT, 0, comm);
+  if (!found) return;
+  interface.compliance = read_vector(file, comm);
+  if (interface.compliance.size() != interface.gap.size())
+    throw Error(file.string() + ": length " + std::to_string(interface.compliance.size()) + " for the " +
+                std::to_string(interface.pairs) + " pairs of gap.petsc; give each pair its m/N, 0 where it is rigid");
+  for (std::size_t i = 0; i < interface.compliance.size(); ++i)
+    if (!(interface.compliance[i] >= 0))
+      throw Error(file.string() + ": entry " + std::to_string(i) + " is " + std::to_string(interface.compliance[i]) +
+                  "; a compliance must not be negative");
+}
+
 } // namespace
 
 void check_interface(const Interface& interface, const std::string& source, MPI_Comm comm)
@@ -106,8 +123,12 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
   interface.pairs = static_cast<int>(pairs.size());
   interface.friction = scene.friction;
   interface.directions = 1;
+  bool compliant = false;
   for (const Contact& contact : scene.contacts)
+  {
     if (contact.tangents.size() != 1) interface.directions = 2;
+    compliant = compliant || contact.compliance > 0;
+  }
   std::vector<SparseRow> rows;
   const auto [first, last] = local_range(interface.pairs, comm);
   for (PetscInt i = 0; i < interface.pairs; ++i)
@@ -122,6 +143,7 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
     interface.geometry.push_back(pair);
     interface.tangents.push_back({axes[0], axes.size() > 1 ? axes[1] : Vec3{}});
     interface.gap.push_back(contact.gap + pair.gap);
+    if (compliant) interface.compliance.push_back(contact.compliance / (pair.area > 0 ? pair.area : 1));
     if (i < first || i >= last) continue;
     axes.insert(axes.begin(), pair.normal);
     for (const Vec3& axis : axes)
@@ -166,6 +188,7 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
     throw Error((folder / "drive.petsc").string() + ": length " + std::to_string(interface.drive.size()) + " for " +
                 std::to_string(interface.pairs) + " pairs with " + std::to_string(interface.directions) +
                 " tangential row(s) each in B.petsc");
+  read_compliance(folder / "compliance.petsc", interface, comm);
   const auto [first, last] = local_range(interface.pairs, comm);
   interface.B =
       load_matrix(B, size, {PairRows<PetscInt>(interface.directions).rows_of(last - first), local_dofs}, comm);

@@ -153,7 +153,8 @@ Preconditioner sliding_preconditioner(const CycleProblem& problem, const RealMod
   const MatrixXd friction = friction_of(problem.sliding.interface, modes.shapes);
   const auto on_shapes = [&](Mat X) { return on_modes(modes.shapes, friction, problem.linearised.contact, X); };
   const std::vector<DenseEigenpair> sliding = solve_dense_quadratic_shared(
-      comm_of(structure.load), on_shapes(structure.M), on_shapes(problem.linearised.C), on_shapes(structure.K));
+      comm_of(structure.load), on_shapes(structure.M), on_shapes(problem.linearised.C),
+      on_shapes(problem.linearised.K.get() ? problem.linearised.K.get() : structure.K.get()));
   SlidingModes inside = make_sliding_modes(sliding, modes.shapes, problem.settings);
   return [inside = std::move(inside), M = structure.M.get()](double period, Vec x, Vec y)
   { apply_inverse(inside, M, period, x, y); };

@@ -81,18 +81,25 @@ Eigen::MatrixXd normal_compliance(const PairMatrixView& D, const Interface& inte
   return result;
 }
 
+/// `c`: compliances of the pairs. The unknown gap is then g + c r.
 ComplementarityProblem problem_of(const Eigen::MatrixXd& D_nn, Eigen::MatrixXd with_friction, double kappa,
-                                  const std::vector<double>& q)
+                                  const std::vector<double>& q, const Eigen::VectorXd& c)
 {
   ComplementarityProblem problem;
   problem.q = q;
   problem.M = std::move(with_friction);
   problem.compliance = std::max(0., D_nn.diagonal().maxCoeff());
-  if (kappa == 0) return problem;
-  problem.N = -kappa * D_nn;
-  problem.N.diagonal().array() += 1;
-  // rounding of 1 - 1: the pair alone holds its body
-  problem.N = (problem.N.array().abs() < 1e-12).select(0, problem.N);
+  if (kappa > 0)
+  {
+    problem.N = -kappa * D_nn;
+    problem.N.diagonal().array() += 1;
+    // rounding of 1 - 1: the pair alone holds its body
+    problem.N = (problem.N.array().abs() < 1e-12).select(0, problem.N);
+    problem.M += problem.N * c.asDiagonal();
+  }
+  else
+    problem.M += c.asDiagonal();
+  if (c.size() > 0) problem.compliance = std::max(problem.compliance, c.maxCoeff());
   return problem;
 }
 
@@ -143,6 +150,14 @@ bool balances(const Structure& structure, const Interface& interface, Equilibriu
   return equilibrium.force_residual <= 1e-9 || defect <= 4 * PETSC_MACHINE_EPSILON * stiffness * motion;
 }
 
+/// sign c r added to the gaps: of a pair with a compliance c the law holds for g + c r.
+std::vector<double> add_compliance(const Interface& interface, double sign, const std::vector<double>& reaction,
+                                   std::vector<double> gap)
+{
+  for (std::size_t i = 0; i < gap.size(); ++i) gap[i] += sign * compliance_of(interface, i) * reaction[i];
+  return gap;
+}
+
 /// What the search shares between ranks; D and the problem live on rank 0.
 struct Search
 {
@@ -160,9 +175,10 @@ void settle(const Held& held, const Structure& structure, const Interface& inter
   std::optional<SplitSolver> solver; // on rank 0
   for (int pass = 0;; ++pass)
   {
-    displace(held, structure, interface, pair_forces(interface, reaction, gap, held.kappa), equilibrium.u);
+    const std::vector<double> geometric = add_compliance(interface, -1, reaction, gap);
+    displace(held, structure, interface, pair_forces(interface, reaction, geometric, held.kappa), equilibrium.u);
     if (pass == 2 || interface.pairs == 0) break;
-    std::vector<double> error = gaps_of(interface, equilibrium.u);
+    std::vector<double> error = add_compliance(interface, 1, reaction, gaps_of(interface, equilibrium.u));
     for (std::size_t i = 0; i < error.size(); ++i) error[i] -= gap[i];
     on_rank_zero_with_lent_cores(comm, static_cast<std::size_t>(interface.pairs),
                                  [&]
@@ -217,7 +233,7 @@ void check_solution(const Structure& structure, const Interface& interface, cons
 {
   const MPI_Comm comm = comm_of(structure.load);
   const bool balanced = balances(structure, interface, equilibrium);
-  const auto gap = gaps_of(interface, equilibrium.u);
+  const auto gap = add_compliance(interface, 1, search.solution.reaction, gaps_of(interface, equilibrium.u));
   Checks checks;
   on_rank_zero_with_lent_cores(comm, static_cast<std::size_t>(interface.pairs),
                                [&] { checks = check_reactions(search, gap, options); });
@@ -336,8 +352,11 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
         {
           const PairMatrixView view(D, pairs, interface.directions);
           search.D_nn = normal_compliance(view, interface, std::vector<double>(pairs, 0.));
+          Eigen::VectorXd c(search.D_nn.rows());
+          for (std::size_t i = 0; i < pairs; ++i) c(static_cast<Eigen::Index>(i)) = compliance_of(interface, i);
           search.problem =
-              problem_of(search.D_nn, normal_compliance(view, interface, drive_friction(interface)), held.kappa, q);
+              problem_of(search.D_nn, normal_compliance(view, interface, drive_friction(interface)), held.kappa, q, c);
+          search.D_nn += c.asDiagonal();
           search.rho = 1 / largest_eigenvalue(search.D_nn, 30);
           search.solution = find_split(search.problem, interface, options.max_iterations, 1.5 * search.rho, expected);
         });

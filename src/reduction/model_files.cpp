@@ -72,10 +72,11 @@ void write_reduced_matrices(const SlidingEquilibrium& sliding, const std::vector
         -model.G.transpose() *
         Eigen::Map<const Eigen::VectorXd>(model.reactions.data(), static_cast<Index>(model.reactions.size()));
     const std::vector<double> F(load.begin(), load.end());
-    for (const auto& [name, vector] :
-         {std::pair{"F", &F}, std::pair{"gap", &model.gap}, std::pair{"drive", &model.drive}})
+    for (const auto& [name, vector] : {std::pair{"F", &F}, std::pair{"gap", &model.gap},
+                                       std::pair{"drive", &model.drive}, std::pair{"compliance", &model.compliance}})
     {
       if (model.active.empty() && vector != &F) continue;
+      if (vector == &model.compliance && sliding.interface.compliance.empty()) continue;
       std::string bytes;
       append_vector(*vector, bytes);
       file(name, bytes);

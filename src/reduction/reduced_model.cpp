@@ -150,12 +150,38 @@ void set_active_pairs(ReducedModel& model, const Interface& interface, const Equ
   for (const int pair : model.active)
   {
     const auto i = static_cast<std::size_t>(pair);
-    model.gap.push_back(equilibrium.closed[i] ? 0 : interface.gap[i] + still.normal(i));
+    const double c = compliance_of(interface, i);
+    model.compliance.push_back(c);
+    model.gap.push_back(equilibrium.closed[i] ? -c * reactions.normal(i) : interface.gap[i] + still.normal(i));
     model.reactions.push_back(reactions.normal(i));
     if (reduction.sliding) continue;
     for (const double friction : reactions.tangential(i)) model.reactions.push_back(friction);
     for (const double velocity : drive.of(i)) model.drive.push_back(velocity);
   }
+}
+
+/// Pairs by what they do in the motion that a model is made for.
+struct ClosedPairs
+{
+  const std::vector<char>& sliding;     // closed throughout
+  const std::vector<char>& follows;     // those whose friction follows their normal force
+  const std::vector<double>& reactions; // [N] a contact vector
+};
+
+/// Adds to K the springs of pairs with a compliance, with the friction that follows, and to C friction that turns.
+void add_forces_of_pairs(ReducedModel& model, const Interface& interface, const ClosedPairs& pairs,
+                         const MultiVector& left, const MultiVector& X)
+{
+  const auto add = [&](Mat A, MatrixXd& reduced)
+  {
+    const std::vector<PetscInt> rows = own_rows(A);
+    reduced += inner_products(rows_of(left, rows), rows_of(product(A, X), rows));
+  };
+  if (const Owned<Mat> forces = contact_stiffness(interface, pairs.sliding, PairForces::with_friction); forces.get())
+    add(forces, model.K);
+  if (const Owned<Mat> turning = friction_damping(interface, pairs.follows, pairs.reactions, FrictionDamping::whole);
+      turning.get())
+    add(turning, model.C);
 }
 
 } // namespace
@@ -178,7 +204,9 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   const double omega = modes.front().lambda.imag();
 
   // the modes and the shapes of the pairs' forces, as they come
-  Owned<Mat> E = project_symmetric(structure.K, contact.Z), BZ;
+  const Owned<Mat> springs = contact_stiffness(interface, roles.sliding, PairForces::normal);
+  const Owned<Mat> K = springs.get() ? stiffened(structure.K, springs) : Owned<Mat>();
+  Owned<Mat> E = project_symmetric(K.get() ? K.get() : structure.K.get(), contact.Z), BZ;
   const Owned<Mat> M_z = project_symmetric(structure.M, contact.Z);
   check(MatAXPY(E, omega * omega, M_z, UNKNOWN_NONZERO_PATTERN));
   check(MatSetOption(E, MAT_SYMMETRIC, PETSC_TRUE));
@@ -204,12 +232,7 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
   if (reduction.sliding)
     for (const int pair : active) follows[static_cast<std::size_t>(pair)] = 1; // no reaction while open
-  if (const Owned<Mat> turning = friction_damping(interface, follows, roles.reactions, FrictionDamping::whole);
-      turning.get())
-  {
-    const std::vector<PetscInt> turns = own_rows(turning);
-    model.C += inner_products(rows_of(left, turns), rows_of(product(turning, X), turns));
-  }
+  add_forces_of_pairs(model, interface, {roles.sliding, follows, roles.reactions}, left, X);
   model.H = (forces.transpose() * whole_product(B, left)).transpose();
   model.G = whole_product(B, X);
   if (reduction.sliding) model.G = normal_rows(model.G, interface.directions);
@@ -241,6 +264,7 @@ ReducedModel on_shapes(const ReducedModel& model, const MatrixXd& basis, Index s
   result.directions = model.directions;
   result.friction = model.friction;
   result.gap = model.gap;
+  result.compliance = model.compliance;
   result.drive = model.drive;
   result.reactions = model.reactions;
   result.omega = model.omega;

@@ -40,6 +40,12 @@ std::vector<PairBlock> own_blocks(const MatrixXd& W, const ReducedModel& model)
 
 } // namespace
 
+CompliantGap gap_law(const ReducedMap& map, std::size_t pair)
+{
+  const double c = map.model.compliance[pair];
+  return c > 0 ? compliant_gap(c, map.theta, map.h) : CompliantGap{1 / map.h, 1 - map.theta, 0};
+}
+
 void prepare(ReducedMap& map, double period)
 {
   const double h = period / map.steps;
@@ -51,16 +57,17 @@ void prepare(ReducedMap& map, double period)
   right << model.M - h * (1 - theta) * model.C - h * h * theta * (1 - theta) * model.K, -h * model.K, h * model.H;
   right = solve_dense(model.M + h * theta * model.C + h * h * theta * theta * model.K, right,
                       "reduced model: a motion has neither mass nor stiffness");
+  map.h = h;
   map.from_state = right.leftCols(2 * n);
   map.from_reactions = right.rightCols(rows);
   map.from_equilibrium = -map.from_reactions * VectorXd::Map(model.reactions.data(), rows);
   map.W = model.G * map.from_reactions;
   const std::vector<Eigen::Index> normal = normal_rows(model);
+  for (std::size_t i = 0; i < normal.size(); ++i) map.W(normal[i], normal[i]) += gap_law(map, i).by_reaction;
   map.G_n = model.G(normal, Eigen::all);
   map.W_single = map.W.cast<float>();
   map.W_n = map.W_single(normal, Eigen::all);
   map.own = own_blocks(map.W, model);
-  map.h = h;
 }
 
 namespace
@@ -77,8 +84,9 @@ VectorXd free_contact_velocity(const ReducedMap& map, const ReducedState& state,
   const TangentView drive(model.drive, model.directions);
   for (std::size_t i = 0; i < model.gap.size(); ++i)
   {
-    velocity.normal(i) += (model.gap[i] + position(static_cast<Eigen::Index>(i))) / map.h +
-                          (1 - map.theta) * PairView(before, model.directions).normal(i);
+    const double gap = model.gap[i] + position(static_cast<Eigen::Index>(i));
+    const CompliantGap law = gap_law(map, i);
+    velocity.normal(i) += law.by_gap * gap + law.by_rate * PairView(before, model.directions).normal(i);
     for (std::size_t k = 0; k < drive.of(i).size(); ++k) velocity.tangential(i)[k] -= drive.of(i)[k];
   }
   return b;

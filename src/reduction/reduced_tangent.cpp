@@ -94,8 +94,9 @@ MatrixXd free_rates(const ReducedMap& map)
   for (Index pair = 0; pair < static_cast<Index>(model.active.size()); ++pair)
   {
     const auto normal = model.G.row(rows.normal(pair));
-    rates.row(rows.normal(pair)).head(n) += (1 - map.theta) * normal;
-    rates.row(rows.normal(pair)).tail(n) += normal / map.h;
+    const CompliantGap law = gap_law(map, static_cast<std::size_t>(pair));
+    rates.row(rows.normal(pair)).head(n) += law.by_rate * normal;
+    rates.row(rows.normal(pair)).tail(n) += law.by_gap * normal;
   }
   return rates;
 }

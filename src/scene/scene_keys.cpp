@@ -159,6 +159,8 @@ SceneKeys keys_of(Contact& c)
        "largest distance of the surfaces along the normal, which adds to the gap"},
       {"normal", &c.normal, optional, Rule::direction, "-",
        "out of the rotor; required for points, else that of the slave surface at each node"},
+      {"compliance", &c.compliance, optional, Rule::not_negative, "m3/N",
+       "approach of the surfaces over pressure, in series with the pairs; of points m/N; 0: rigid"},
       {"slave", choice_of(c.slave), optional, Rule::any, "word",
        "side whose nodes have the pairs: the finer or softer one"},
       {"tangents", &c.tangents, optional, Rule::direction, "-", "one direction: plane friction along it; or two"},

@@ -15,8 +15,8 @@ namespace squeal
 namespace
 {
 
-/// From B v_free of a trajectory: normal rows become gap rates (g0 + B_n ut)/h + B_n v_free, tangential ones sliding
-/// velocities. Collective; both are on rank 0.
+/// From B v_free of a trajectory: normal rows become gap rates (g0 + B_n ut)/h + B_n v_free, of pairs with a compliance
+/// those of section 4.16, tangential ones sliding velocities. Collective; both are on rank 0.
 std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t trajectory, std::vector<double> b)
 {
   const auto& [step, interface, factors, works, states, reports] = batch;
@@ -24,6 +24,7 @@ std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t tr
   const StepWork& work = works[trajectory];
   check(VecWAXPY(work.v_theta, step.h * (1 - step.theta), state.v, state.u)); // ut, for a moment
   const std::vector<double> position = relative(interface, work.v_theta);
+  const std::vector<double> rates = interface.compliance.empty() ? std::vector<double>{} : relative(interface, state.v);
   double rounding = 0;
   if (step.law == ContactLaw::velocity) check(VecNorm(work.v_theta, NORM_INFINITY, &rounding));
   if (b.empty()) return b;
@@ -37,7 +38,13 @@ std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t tr
   for (std::size_t i = 0; i < velocity.pairs(); ++i)
   {
     const double gap = interface.gap[i] + moved.normal(i);
-    if (step.law == ContactLaw::displacement)
+    if (const double c = compliance_of(interface, i); c > 0)
+    {
+      const CompliantGap law = compliant_gap(c, step.theta, step.h);
+      const double rate = PairView(rates, interface.directions).normal(i);
+      velocity.normal(i) += law.by_gap * (gap - step.h * (1 - step.theta) * rate) + law.by_rate * rate;
+    }
+    else if (step.law == ContactLaw::displacement)
       velocity.normal(i) += gap / step.h;
     else if (gap > rounding)
       velocity.normal(i) = std::numeric_limits<double>::infinity(); // takes no part: r = 0

@@ -56,6 +56,34 @@ TangentWork begin_tangents(const ThetaStep& step, const Structure& structure, st
   return work;
 }
 
+/// Changes of the start of a step that a pair sees.
+struct NormalChange
+{
+  double moved = 0;     // [m] of the gap at ut
+  double rate = 0;      // [m/s] of B_n v
+  double step_size = 0; // [s]
+};
+
+/// db_n of a pair but B_n dv_f.
+double change_of_gap_rate(const ThetaStep& step, const Interface& interface, const StepRecord& record, std::size_t pair,
+                          const NormalChange& change)
+{
+  const double h = step.h, c = compliance_of(interface, pair);
+  if (c == 0)
+  {
+    if (step.law == ContactLaw::velocity) return 0;
+    return change.moved / h - (change.step_size != 0 ? change.step_size * record.gap[pair] / (h * h) : 0);
+  }
+  const CompliantGap law = compliant_gap(c, step.theta, h);
+  const double moved = change.moved - h * (1 - step.theta) * change.rate; // at u
+  double result = law.by_gap * moved + law.by_rate * change.rate;
+  if (change.step_size != 0)
+    result -= change.step_size / h *
+              (law.by_gap * record.gap[pair] +
+               law.by_reaction * PairView(record.reactions, interface.directions).normal(pair));
+  return result;
+}
+
 /// db of every column but B dv_f, on every rank.
 MatrixXd contact_of_start(const ThetaStep& step, const Interface& interface, const StepRecord& record,
                           std::span<const TangentColumn> columns, const TangentWork& work)
@@ -72,9 +100,8 @@ MatrixXd contact_of_start(const ThetaStep& step, const Interface& interface, con
     const PairView<double> change(column, interface.directions);
     for (std::size_t pair = 0; pair < change.pairs(); ++pair)
     {
-      if (step.law == ContactLaw::displacement) change.normal(pair) = moved.normal(pair) / step.h;
-      if (step.law == ContactLaw::displacement && columns[k].step_size != 0)
-        change.normal(pair) -= columns[k].step_size * record.gap[pair] / (step.h * step.h);
+      change.normal(pair) =
+          change_of_gap_rate(step, interface, record, pair, {moved.normal(pair), s.normal(pair), columns[k].step_size});
       if (!record.opposes_theta[pair]) continue;
       for (std::size_t d = 0; d < s.tangential(pair).size(); ++d)
         change.tangential(pair)[d] = past * s.tangential(pair)[d];

@@ -116,6 +116,13 @@ std::vector<double> apply_reactions(const StepBatch& batch)
 
 } // namespace
 
+void check_step_law(const StepOptions& options, const Interface& interface)
+{
+  if (!interface.compliance.empty() && options.law == ContactLaw::velocity)
+    throw Error("-transient_contact_law velocity needs rigid pairs: leave it at displacement, or take the compliance "
+                "of the pairs out");
+}
+
 OptionList options_of(StepOptions& options)
 {
   OptionList list = {
@@ -157,7 +164,14 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.factor = std::move(condensed.factor);
   step.factor_seconds = MPI_Wtime() - start;
   if (rank_of(comm_of(structure.load)) == 0)
+  {
+    for (std::size_t i = 0; i < interface.gap.size(); ++i)
+    {
+      const std::size_t row = PairRows<std::size_t>(interface.directions).normal(i);
+      condensed.W[row * interface.size() + row] += compliant_gap(compliance_of(interface, i), theta, h).by_reaction;
+    }
     step.W = make_contact_operator(std::move(condensed.W), interface.pairs, interface.directions);
+  }
   step.W.share_columns(comm_of(structure.load));
   step.matrices = pair_matrices(structure.M, structure.K);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;

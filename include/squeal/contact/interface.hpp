@@ -21,6 +21,7 @@ struct Interface
   std::vector<double> drive;                 // [m/s] per pair and direction, as TangentView reads it: v_d
   std::vector<ContactPair> geometry;         // per pair; empty on a matrix scene
   std::vector<std::array<Vec3, 2>> tangents; // [-] t1 and t2 per pair; t2 is zero where there is one direction
+  std::vector<double> compliance;            // [m/N] per pair, in series with it; empty: all pairs are rigid
   FrictionLaw friction;
 
   /// Of a contact vector.
@@ -51,6 +52,12 @@ std::vector<double> relative(const Interface& interface, Vec x);
 
 /// y += B^T r. Collective; r the same on every rank.
 void add_reactions(const Interface& interface, const std::vector<double>& r, Vec y);
+
+/// c of a pair [m/N]; 0: it is rigid. Not collective.
+inline double compliance_of(const Interface& interface, std::size_t pair)
+{
+  return interface.compliance.empty() ? 0 : interface.compliance[pair];
+}
 
 /// |v_d| of a pair [m/s]. Not collective.
 double drive_speed(const Interface& interface, std::size_t pair);

@@ -156,4 +156,18 @@ ContactStatus contact_status(const PairVector& r, const PairVector& w, const Fri
 std::vector<ContactStatus> contact_status(PairView<const double> reactions, PairView<const double> w,
                                           const FrictionLaw& law);
 
+/// The normal law of a step for a pair with a compliance c > 0 (src/README.md, section 4.16):
+/// w_n = by_gap g + by_rate B_n v + B_n v+ + by_reaction r_n.
+struct CompliantGap
+{
+  double by_gap = 0;      // [1/s]
+  double by_rate = 0;     // [-]
+  double by_reaction = 0; // [m/(N s)]
+};
+
+inline CompliantGap compliant_gap(double c, double theta, double h)
+{
+  return {1 / (theta * theta * h), (1 - theta) / theta, c / (theta * theta * h)};
+}
+
 } // namespace squeal

@@ -22,8 +22,9 @@ struct ClosedContact
   std::vector<PetscInt> pivots; // the degrees of freedom that are eliminated, ascending
 };
 
-/// `closed`: by pairs. Error: a closed pair whose normal motion the other closed pairs already fix, or that the
-/// friction coefficient jams (which pair). Collective.
+/// `closed`: by pairs; those with a compliance are not eliminated, contact_stiffness stands for them. Error: a closed
+/// pair whose normal motion the other closed pairs already fix, or that the friction coefficient jams (which pair).
+/// Collective.
 ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface& interface,
                                      const std::vector<char>& closed);
 
@@ -47,6 +48,19 @@ enum class FrictionDamping
 Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,
                             const std::vector<double>& reactions, FrictionDamping part);
 
+/// The stiffness of the closed pairs with a compliance c: sum B_n' B_n/c, or with the friction that follows the normal
+/// reactions, sum R' B_n/c. Null without such pairs.
+enum class PairForces
+{
+  normal,
+  with_friction,
+};
+
+Owned<Mat> contact_stiffness(const Interface& interface, const std::vector<char>& closed, PairForces part);
+
+/// K plus a stiffness of contact_stiffness that is not null.
+Owned<Mat> stiffened(Mat K, const Owned<Mat>& added);
+
 /// Normal reactions lambda_n per pair that a motion phi e^{s t} takes are (s^2 M + s C + K) phi, from the pivots' rows
 /// of (s^2 M + s C + K) phi = R' lambda_n; 0 on open pairs. Every choice of rows agrees if s and phi are an eigenpair.
 struct ReactionOperator
@@ -63,7 +77,7 @@ struct LinearisedSliding
 {
   ClosedContact contact;
   Owned<Mat> C; // with G, and with C_f where the interface has it on
-  Owned<Mat> K; // with H; null: the structure's
+  Owned<Mat> K; // with H and with pairs that have a compliance; null: the structure's
   ReactionOperator reaction;
   Owned<Mat> M_z, K_z; // Z'M Z, Z'K Z, symmetric: the frictionless bilateral problem
 };

@@ -39,6 +39,7 @@ struct ReducedModel
   int directions = 2;                             // tangential ones of an active pair; 0: friction follows
   FrictionLaw friction;
   std::vector<double> gap;        // [m] at equilibrium, per active pair
+  std::vector<double> compliance; // [m/N] per active pair; 0: rigid
   std::vector<double> drive;      // [m/s] as TangentView reads it
   std::vector<double> reactions;  // [N] r0, a contact vector
   MultiVector shapes;             // Z V, dofs x size: u = u0 + shapes q

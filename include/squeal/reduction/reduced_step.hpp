@@ -42,6 +42,9 @@ struct ReducedMap
   long unconverged = 0;
 };
 
+/// Of an active pair, rigid ones included.
+CompliantGap gap_law(const ReducedMap& map, std::size_t pair);
+
 /// The matrices of the period's step size, unless they are those already.
 void prepare(ReducedMap& map, double period);
 

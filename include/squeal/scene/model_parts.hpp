@@ -156,6 +156,7 @@ struct Contact
   Vec3 velocity{};                  // [m/s] of the rotor's surface if there is no rotation
   double reach = 0;                 // [m] largest distance of the surfaces along the normal
   SlaveSide slave{};                // has one pair a node
+  double compliance = 0;            // [m3/N] approach over pressure, in series with the pairs; [m/N] of points
 };
 
 /// Two surfaces of parts meshed apart that move as one; nodes of the slave follow the master.

@@ -1,6 +1,7 @@
 #pragma once
 /// Which variant of the theta step is marched (src/README.md, section 4.2), of the transient and of the cycle.
 #include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/contact/interface.hpp"
 #include "squeal/contact/solver.hpp"
 
 namespace squeal
@@ -46,5 +47,8 @@ struct StepOptions
 };
 
 OptionList options_of(StepOptions& options);
+
+/// Throws Error where pairs with a compliance meet the velocity law, which has none.
+void check_step_law(const StepOptions& options, const Interface& interface);
 
 } // namespace squeal
