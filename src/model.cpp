@@ -72,17 +72,15 @@ void hold(Model& model, const Elimination& elimination)
   model.probes = elimination.columns(model.probes);
 }
 
-/// Throws Error where a stage cannot take the gyroscopic or circulatory part of given matrices.
-void check_skew_parts(const Scene& scene, const Model& model)
+/// Throws Error where a stage cannot take the circulatory part of given matrices.
+void check_circulatory_part(const Scene& scene, const Model& model)
 {
   const Structure& structure = model.structure;
-  if (!structure.G.get() && !structure.H.get()) return;
+  if (!structure.H.get()) return;
   const std::string folder = scene.matrices->string();
   if (scene.transient.enabled || scene.cycle.enabled)
-    throw Error(folder +
-                ": its gyroscopic or circulatory part (G.petsc, H.petsc, or an unsymmetric C.petsc or K.petsc) "
-                "is for the modes; time steps need symmetric matrices: take [transient] and [cycle] out");
-  if (!structure.H.get()) return;
+    throw Error(folder + ": its circulatory part (H.petsc, or an unsymmetric K.petsc) is for the modes; time steps "
+                         "need a symmetric stiffness: take [transient] and [cycle] out");
   double load = 0;
   check(VecNorm(structure.load, NORM_INFINITY, &load));
   if (model.interface.pairs > 0 || load > 0)
@@ -106,7 +104,7 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   model.probes = probe_rows(scene.probes, rows, local_size, comm);
   const auto held = held_rows(rows, scene.supports);
   name_rows(rows, held, structure.names);
-  check_skew_parts(scene, model);
+  check_circulatory_part(scene, model);
   if (held.empty()) return model;
   hold(model, Elimination(held, structure.load));
   check_interface(model.interface, scene.matrices->string(), comm);

@@ -1,5 +1,6 @@
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
+#include "contact_stiffness.hpp"
 #include "squeal/algebra/quadratic_residual.hpp"
 
 #include <algorithm>
@@ -311,80 +312,6 @@ Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>&
   return project(damping, interface.B, interface.B);
 }
 
-namespace
-{
-
-/// 1/c of the closed pairs on the rows of B, and mu e/c from normal to tangential ones; null without such pairs.
-Owned<Mat> stiffness_of_pairs(const Interface& interface, const std::vector<char>& closed, PairForces part)
-{
-  const PairRows<PetscInt> rows(interface.directions);
-  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
-  const TangentView e(directions, interface.directions);
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(interface.B, &first, &last));
-  Owned<Mat> result;
-  check(MatCreateAIJ(comm_of(interface.B), last - first, last - first, PETSC_DETERMINE, PETSC_DETERMINE, 1, nullptr, 1,
-                     nullptr, result.put()));
-  bool any = false; // alike on every rank
-  for (std::size_t i = 0; i < closed.size(); ++i)
-  {
-    const double c = compliance_of(interface, i);
-    if (!closed[i] || c == 0) continue;
-    any = true;
-    const PetscInt normal = rows.normal(static_cast<PetscInt>(i));
-    for (PetscInt k = 0; k < rows.per_pair(); ++k)
-    {
-      if (normal + k < first || normal + k >= last || (k > 0 && part == PairForces::normal)) continue;
-      const double force = k == 0 ? 1 : mu[i] * e.of(i)[static_cast<std::size_t>(k - 1)];
-      check(MatSetValue(result, normal + k, normal, force / c, INSERT_VALUES));
-    }
-  }
-  if (!any) return {};
-  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
-  return result;
-}
-
-/// Rows -B_n/c of the closed pairs with a compliance, which give their reactions; null without such pairs.
-Owned<Mat> compliant_reactions(const Interface& interface, const std::vector<char>& closed)
-{
-  const PairRows<PetscInt> rows(interface.directions);
-  if (interface.compliance.empty()) return {};
-  PetscInt own_rows = 0, first = 0, last = 0;
-  check(MatGetLocalSize(interface.B, &own_rows, nullptr));
-  Owned<Mat> choice, result;
-  check(MatCreateAIJ(comm_of(interface.B), PETSC_DECIDE, own_rows, interface.pairs, PETSC_DETERMINE, 1, nullptr, 1,
-                     nullptr, choice.put()));
-  check(MatGetOwnershipRange(choice, &first, &last));
-  for (PetscInt pair = first; pair < last; ++pair)
-  {
-    const auto i = static_cast<std::size_t>(pair);
-    if (closed[i] && compliance_of(interface, i) > 0)
-      check(MatSetValue(choice, pair, rows.normal(pair), -1 / compliance_of(interface, i), INSERT_VALUES));
-  }
-  check(MatAssemblyBegin(choice, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(choice, MAT_FINAL_ASSEMBLY));
-  check(MatMatMult(choice, interface.B, MAT_INITIAL_MATRIX, PETSC_DEFAULT, result.put()));
-  return result;
-}
-
-} // namespace
-
-Owned<Mat> contact_stiffness(const Interface& interface, const std::vector<char>& closed, PairForces part)
-{
-  const Owned<Mat> stiffness = stiffness_of_pairs(interface, closed, part);
-  if (!stiffness.get()) return {};
-  return project(stiffness, interface.B, interface.B);
-}
-
-Owned<Mat> stiffened(Mat K, const Owned<Mat>& added)
-{
-  Owned<Mat> result;
-  check(MatDuplicate(added, MAT_COPY_VALUES, result.put()));
-  check(MatAXPY(result, 1, K, DIFFERENT_NONZERO_PATTERN));
-  return result;
-}
-
 std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
                                                    Vec imaginary)
 {
@@ -398,10 +325,6 @@ std::vector<std::complex<double>> normal_reactions(const ReactionOperator& react
   return result;
 }
 
-namespace
-{
-
-/// A + B of any symmetry.
 Owned<Mat> sum_of(Mat A, Mat B)
 {
   Owned<Mat> result;
@@ -409,8 +332,6 @@ Owned<Mat> sum_of(Mat A, Mat B)
   check(MatAXPY(result, 1, A, DIFFERENT_NONZERO_PATTERN));
   return result;
 }
-
-} // namespace
 
 LinearisedSliding linearise(const SlidingEquilibrium& sliding)
 {
@@ -425,7 +346,7 @@ LinearisedSliding linearise(const SlidingEquilibrium& sliding)
   if (structure.H.get()) result.K = sum_of(structure.K, structure.H);
   if (const auto stiffness = contact_stiffness(interface, equilibrium.closed, PairForces::with_friction);
       stiffness.get())
-    result.K = stiffened(result.K.get() ? result.K.get() : structure.K.get(), stiffness);
+    result.K = sum_of(result.K.get() ? result.K.get() : structure.K.get(), stiffness);
   for (const auto& [A, rows] : {std::pair{structure.M.get(), &result.reaction.M},
                                 {result.C.get(), &result.reaction.C},
                                 {result.K.get() ? result.K.get() : structure.K.get(), &result.reaction.K}})
@@ -434,7 +355,7 @@ LinearisedSliding linearise(const SlidingEquilibrium& sliding)
     check(MatAXPY(result.reaction.K, 1, own, DIFFERENT_NONZERO_PATTERN));
   result.M_z = project_symmetric(structure.M, result.contact.Z);
   const auto springs = contact_stiffness(interface, equilibrium.closed, PairForces::normal);
-  const Owned<Mat> K = springs.get() ? stiffened(structure.K, springs) : Owned<Mat>();
+  const Owned<Mat> K = springs.get() ? sum_of(structure.K, springs) : Owned<Mat>();
   result.K_z = project_symmetric(K.get() ? K.get() : structure.K.get(), result.contact.Z);
   return result;
 }

@@ -46,6 +46,14 @@ std::string lift_back(const SlidingEquilibrium& sliding, const MultiVector& shap
   return bytes;
 }
 
+/// On the shapes, skew to the last bit; empty without one.
+MatrixXd gyroscopic_part(Mat G, const MultiVector& shapes)
+{
+  if (!G) return {};
+  const MatrixXd whole = inner_products(shapes, product(G, shapes));
+  return 0.5 * (whole - whole.transpose());
+}
+
 } // namespace
 
 void write_reduced_matrices(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes,
@@ -54,15 +62,17 @@ void write_reduced_matrices(const SlidingEquilibrium& sliding, const std::vector
   const ReducedModel model = whole_model(sliding, modes, factor);
   std::string rest;
   const std::string shapes = lift_back(sliding, model.shapes, rest);
+  const MatrixXd gyroscopic = gyroscopic_part(sliding.structure.G, model.shapes);
   const auto write = [&]
   {
     std::filesystem::create_directories(folder);
     const auto file = [&](const char* name, const std::string& bytes)
     { write_whole_file(folder / (std::string(name) + ".petsc"), bytes, Flush::by_system); };
     for (const auto& [name, matrix] :
-         {std::pair{"M", &model.M_z}, std::pair{"C", &model.C_z}, std::pair{"K", &model.K_z}, std::pair{"B", &model.G}})
+         {std::pair{"M", &model.M_z}, std::pair{"C", &model.C_z}, std::pair{"K", &model.K_z}, std::pair{"B", &model.G},
+          std::pair{"G", &gyroscopic}})
     {
-      if (matrix->rows() == 0) continue; // no pairs
+      if (matrix->rows() == 0) continue; // no pairs, or no gyroscopic part
       std::string bytes;
       append_matrix(*matrix, bytes);
       file(name, bytes);

@@ -168,15 +168,18 @@ struct ClosedPairs
   const std::vector<double>& reactions; // [N] a contact vector
 };
 
-/// Adds to K the springs of pairs with a compliance, with the friction that follows, and to C friction that turns.
-void add_forces_of_pairs(ReducedModel& model, const Interface& interface, const ClosedPairs& pairs,
-                         const MultiVector& left, const MultiVector& X)
+/// Adds to K the springs of pairs with a compliance, with the friction that follows. Adds to C friction that turns and
+/// the gyroscopic part.
+void add_unsymmetric_parts(ReducedModel& model, const SlidingEquilibrium& sliding, const ClosedPairs& pairs,
+                           const MultiVector& left, const MultiVector& X)
 {
+  const Interface& interface = sliding.interface;
   const auto add = [&](Mat A, MatrixXd& reduced)
   {
     const std::vector<PetscInt> rows = own_rows(A);
     reduced += inner_products(rows_of(left, rows), rows_of(product(A, X), rows));
   };
+  if (sliding.structure.G.get()) add(sliding.structure.G, model.C);
   if (const Owned<Mat> forces = contact_stiffness(interface, pairs.sliding, PairForces::with_friction); forces.get())
     add(forces, model.K);
   if (const Owned<Mat> turning = friction_damping(interface, pairs.follows, pairs.reactions, FrictionDamping::whole);
@@ -205,7 +208,7 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
 
   // the modes and the shapes of the pairs' forces, as they come
   const Owned<Mat> springs = contact_stiffness(interface, roles.sliding, PairForces::normal);
-  const Owned<Mat> K = springs.get() ? stiffened(structure.K, springs) : Owned<Mat>();
+  const Owned<Mat> K = springs.get() ? sum_of(structure.K, springs) : Owned<Mat>();
   Owned<Mat> E = project_symmetric(K.get() ? K.get() : structure.K.get(), contact.Z), BZ;
   const Owned<Mat> M_z = project_symmetric(structure.M, contact.Z);
   check(MatAXPY(E, omega * omega, M_z, UNKNOWN_NONZERO_PATTERN));
@@ -232,7 +235,7 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
   if (reduction.sliding)
     for (const int pair : active) follows[static_cast<std::size_t>(pair)] = 1; // no reaction while open
-  add_forces_of_pairs(model, interface, {roles.sliding, follows, roles.reactions}, left, X);
+  add_unsymmetric_parts(model, sliding, {roles.sliding, follows, roles.reactions}, left, X);
   model.H = (forces.transpose() * whole_product(B, left)).transpose();
   model.G = whole_product(B, X);
   if (reduction.sliding) model.G = normal_rows(model.G, interface.directions);

@@ -150,6 +150,11 @@ private:
   {
     const Material& material = part.material;
     const std::string label = "[[part]] " + part.name + " ";
+    if (part.rotation && part.thickness > 0)
+      fail(&*part.rotation, label + "rotation is for solids: mesh the shell by solids, or take the rotation out");
+    if (part.rotation && material.orthotropy)
+      fail(&*part.rotation, label + "rotation needs a material that is alike in all directions: the axes of an "
+                                    "orthotropic one would turn; give young and poisson");
     if (!material.orthotropy)
     {
       if (!(material.young > 0)) fail(&material.young, label + "needs the key 'young' [Pa] above 0, or 'orthotropic'");

@@ -55,6 +55,8 @@ SceneKeys keys_of(Part& p)
       {"thickness", &p.thickness, optional, Rule::not_negative, "m", "of a shell; 0 is a solid"},
       {"loss_factor", &p.loss_factor, optional, Rule::not_negative, "-",
        "eta of the stiffness K (1 + i eta); with damping.loss_frequency"},
+      {"rotation", &p.rotation, optional, Rule::any, "table",
+       "of a solid of revolution that spins: {axis, centre, rate}"},
       {"alpha", DampingTarget{&p.damping, &RayleighDamping::alpha}, optional, Rule::not_negative, "1/s",
        "own Rayleigh damping, mass part"},
       {"beta", DampingTarget{&p.damping, &RayleighDamping::beta}, optional, Rule::not_negative, "s",

@@ -251,7 +251,7 @@ std::string scene_reference()
   std::string text = "Keys of a scene file (TOML, SI units) [unit, default]:\n" + reference_text(keys_of(scene));
   for_each_table(scene, ReferenceWriter{text});
   Orthotropy orthotropy;
-  return text + "rotation = { ... } of a contact\n" + reference_text(keys_of(rotation)) +
+  return text + "rotation = { ... } of a contact or a part\n" + reference_text(keys_of(rotation)) +
          "orthotropic = { ... } of a part\n" + reference_text(keys_of(orthotropy));
 }
 

@@ -87,16 +87,26 @@ template <int columns> Strains<columns> strains_of(const Gradients<columns>& g)
   return B;
 }
 
-/// Returns the natural gradients of the incompatible modes, one a column, less their mean over the reference element.
+/// Returns the natural gradients of the incompatible modes, one a column.
 template <int modes> Gradients<modes> mode_gradients(const Eigen::Vector3d& xi)
 {
   Gradients<modes> g;
-  const double r = xi(0) - 1. / 3, s = xi(1) - 1. / 3;
   if constexpr (modes == 3)
     g = (-2 * xi).asDiagonal();
   else
-    g << 2 * r, 0, s, 0, /**/ 0, 2 * s, r, 0, /**/ 0, 0, 0, -2 * xi(2);
+    g << 2 * xi(0) - 1, 0, xi(1), 0, /**/ 0, 2 * xi(1) - 1, xi(0), 0, /**/ 0, 0, 0, -2 * xi(2);
   return g;
+}
+
+template <int modes> Eigen::Vector3d centre_of_reference()
+{
+  return modes == 4 ? Eigen::Vector3d(1. / 3, 1. / 3, 0) : Eigen::Vector3d(0, 0, 0);
+}
+
+/// Less their mean over the reference element, which is their value at its centre.
+template <int modes> Gradients<modes> mode_gradients_without_mean(const Eigen::Vector3d& xi)
+{
+  return mode_gradients<modes>(xi) - mode_gradients<modes>(centre_of_reference<modes>());
 }
 
 /// Returns the values of the same modes, which vanish at the nodes.
@@ -123,8 +133,7 @@ template <int n, int modes> Kinematics<n, modes> kinematics(Shape shape, const N
   Eigen::Matrix3d J0;
   if constexpr (modes > 0)
   {
-    const Eigen::Vector3d centre = modes == 4 ? Eigen::Vector3d(1. / 3, 1. / 3, 0) : Eigen::Vector3d(0, 0, 0);
-    J0 = shape_functions(shape, centre).dN * X.transpose();
+    J0 = shape_functions(shape, centre_of_reference<modes>()).dN * X.transpose();
   }
   for (const auto& [xi, weight, at] : rule)
   {
@@ -133,7 +142,7 @@ template <int n, int modes> Kinematics<n, modes> kinematics(Shape shape, const N
     result.points.push_back({strains_of<n>(J.inverse() * at.dN), determinant * weight});
     if constexpr (modes > 0)
       mode_strains.push_back(
-          strains_of<modes>(J0.determinant() / determinant * J0.inverse() * mode_gradients<modes>(xi)));
+          strains_of<modes>(J0.determinant() / determinant * J0.inverse() * mode_gradients_without_mean<modes>(xi)));
   }
   if constexpr (modes > 0) result.amplitudes = condense_parameters(result.points, mode_strains, D);
   return result;
@@ -177,6 +186,43 @@ mass_matrix(Shape shape, const NodePositions& X, const Kinematics<n, modes>& kin
   return M;
 }
 
+/// Returns G, K_c and the force of src/README.md, section 1.10. The incompatible modes take part in G, as in the mass.
+/// K_c and the force leave them out, as the stiffness of the stress does: rigid motions then keep no stiffness.
+template <int n, int modes> SpinMatrices spin(Shape shape, const NodePositions& X,
+                                              const Kinematics<n, modes>& kinematics, double density,
+                                              const Rotation& rotation)
+{
+  const Eigen::Vector3d axis(rotation.axis.data()), centre(rotation.centre.data());
+  Eigen::Matrix<double, n + modes, n + modes> S = Eigen::Matrix<double, n + modes, n + modes>::Zero();
+  Eigen::Matrix<double, n, n> centrifugal = Eigen::Matrix<double, n, n>::Zero();
+  SpinMatrices result{{}, {}, Eigen::VectorXd::Zero(3 * n)};
+  std::size_t point = 0;
+  for (const auto& [xi, weight, at] : mass_rule(shape))
+  {
+    const Eigen::Matrix3d J = at.dN * X.transpose();
+    const double mass = density * weight * positive_jacobian(J.determinant(), point++);
+    const Eigen::Vector3d velocity = rotation.rate * axis.cross(X * at.N - centre);
+    Eigen::Vector<double, n + modes> f, df; // values, and derivatives along the velocity
+    f.template head<n>() = at.N;
+    df.template head<n>() = (J.inverse() * at.dN).transpose() * velocity;
+    if constexpr (modes > 0)
+    {
+      f.template tail<modes>() = mode_values<modes>(xi);
+      df.template tail<modes>() = (J.inverse() * mode_gradients<modes>(xi)).transpose() * velocity;
+    }
+    S += mass * (f * df.transpose() - df * f.transpose());
+    const Eigen::Vector<double, n> along = df.template head<n>();
+    centrifugal -= mass * along * along.transpose();
+    for (Eigen::Index i = 0; i < n; ++i) result.force.template segment<3>(3 * i) += mass * along(i) * velocity;
+  }
+  Eigen::Matrix<double, 3 * (n + modes), 3 * n> motion; // of the functions f, of unit nodal displacements
+  motion.template topRows<3 * n>().setIdentity();
+  if constexpr (modes > 0) motion.template bottomRows<3 * modes>() = kinematics.amplitudes;
+  result.gyroscopic = motion.transpose() * in_three_directions<n + modes, n + modes>(S) * motion;
+  result.centrifugal = in_three_directions<n, n>(centrifugal);
+  return result;
+}
+
 /// Calls visit.operator()<n, modes>() with the number of nodes and of incompatible modes of a solid.
 template <class Visit> auto visit_solid(Shape shape, Visit visit)
 {
@@ -205,6 +251,41 @@ ElementMatrices solid_matrices(Shape shape, const NodePositions& X, const Materi
                      {
                        const auto k = kinematics<n, modes>(shape, X, D);
                        return {stiffness_matrix(k.points, D), mass_matrix(shape, X, k, material.density)};
+                     });
+}
+
+SpinMatrices spin_matrices(Shape shape, std::span<const Vec3> x, const Material& material, const Rotation& rotation)
+{
+  const Matrix6 D = elasticity(material);
+  const NodePositions X = position_matrix(x);
+  return visit_solid(shape,
+                     [&]<int n, int modes>()
+                     {
+                       const auto k = kinematics<n, modes>(shape, X, D);
+                       return spin<n, modes>(shape, X, k, material.density, rotation);
+                     });
+}
+
+Eigen::MatrixXd stress_stiffness(Shape shape, std::span<const Vec3> x, const Material& material,
+                                 std::span<const double> u)
+{
+  const NodePositions X = position_matrix(x);
+  const std::vector<std::array<double, 6>> stress = solid_stress(shape, x, material, u);
+  return visit_solid(shape,
+                     [&]<int n, int modes>() -> Eigen::MatrixXd
+                     {
+                       Eigen::Matrix<double, n, n> S = Eigen::Matrix<double, n, n>::Zero();
+                       std::size_t point = 0;
+                       for (const auto& [xi, weight, at] : stiffness_rule(shape))
+                       {
+                         const Eigen::Matrix3d J = at.dN * X.transpose();
+                         const Gradients<n> g = J.inverse() * at.dN;
+                         const auto& [xx, yy, zz, xy, yz, zx] = stress[point];
+                         Eigen::Matrix3d sigma;
+                         sigma << xx, xy, zx, xy, yy, yz, zx, yz, zz;
+                         S += weight * positive_jacobian(J.determinant(), point++) * g.transpose() * sigma * g;
+                       }
+                       return in_three_directions<n, n>(S);
                      });
 }
 

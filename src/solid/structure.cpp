@@ -7,7 +7,9 @@
 #include "squeal/solid/structure.hpp"
 
 #include "loads.hpp"
+#include "local_dofs.hpp"
 #include "matrices.hpp"
+#include "spin.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
@@ -30,20 +32,6 @@ struct Contribution
   Eigen::MatrixXd M, C, K; // units as in Structure
   double loss_factor = 0;  // [-]
 };
-
-/// The first `components` degrees of freedom of each node.
-std::vector<PetscInt> nodal_dofs_of(std::span<const int> nodes, int components)
-{
-  std::vector<PetscInt> result;
-  for (const int node : nodes)
-    for (int c = 0; c < components; ++c) result.push_back(6 * PetscInt{node} + c);
-  return result;
-}
-
-std::vector<PetscInt> nodal_dofs_of(const Element& element)
-{
-  return nodal_dofs_of(nodes_of(element), dofs_per_node(element.shape));
-}
 
 /// `inertia` is xx yy zz xy yz zx [kg m2].
 Contribution mass_contribution(int node, double mass, const std::array<double, 6>& inertia)
@@ -130,62 +118,13 @@ std::vector<Contribution> superelement_contributions(const Mesh& mesh, const Sce
   return result;
 }
 
-/// Returns the free degrees of freedom on which the nodal ones depend, ascending.
-std::vector<PetscInt> free_dofs(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs)
-{
-  std::vector<PetscInt> result;
-  for (const PetscInt nodal_dof : nodal_dofs)
-    for (const DofTerm& term : dofs.terms_of(nodal_dof)) result.push_back(term.dof);
-  std::sort(result.begin(), result.end());
-  result.erase(std::unique(result.begin(), result.end()), result.end());
-  return result;
-}
-
-/// An entry of T_e.
-struct LocalTerm
-{
-  Eigen::Index nodal = 0; // position in the nodal degrees of freedom
-  Eigen::Index free = 0;  // position in the free ones
-  double factor = 0;
-};
-
-std::vector<LocalTerm> local_terms(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs,
-                                   const std::vector<PetscInt>& free)
-{
-  std::vector<LocalTerm> terms;
-  for (std::size_t i = 0; i < nodal_dofs.size(); ++i)
-    for (const DofTerm& term : dofs.terms_of(nodal_dofs[i]))
-    {
-      const auto place = std::lower_bound(free.begin(), free.end(), term.dof) - free.begin();
-      terms.push_back({static_cast<Eigen::Index>(i), place, term.factor});
-    }
-  return terms;
-}
-
-/// Returns T_e' A T_e.
-Eigen::MatrixXd constrained(const std::vector<LocalTerm>& terms, const Eigen::MatrixXd& A, Eigen::Index free)
-{
-  Eigen::MatrixXd AT = Eigen::MatrixXd::Zero(A.rows(), free), result = Eigen::MatrixXd::Zero(free, free);
-  for (const LocalTerm& t : terms) AT.col(t.free) += t.factor * A.col(t.nodal);
-  for (const LocalTerm& t : terms) result.row(t.free) += t.factor * AT.row(t.nodal);
-  return result;
-}
-
 void add_contribution(const Structure& structure, const DofMap& dofs, const Contribution& contribution)
 {
-  const auto free = free_dofs(dofs, contribution.nodal_dofs);
-  const auto terms = local_terms(dofs, contribution.nodal_dofs, free);
-  const auto count = static_cast<PetscInt>(free.size());
-  const auto add = [&](Mat matrix, const Eigen::MatrixXd& A)
-  {
-    // Column-major order serves as row-major order because A is symmetric.
-    check(
-        MatSetValues(matrix, count, free.data(), count, free.data(), constrained(terms, A, count).data(), ADD_VALUES));
-  };
-  add(structure.M, contribution.M);
-  add(structure.C, contribution.C);
-  add(structure.K, contribution.K);
-  if (structure.K_loss.get()) add(structure.K_loss, contribution.loss_factor * contribution.K);
+  const LocalDofs local = local_dofs(dofs, contribution.nodal_dofs);
+  add_matrix(structure.M, local, contribution.M);
+  add_matrix(structure.C, local, contribution.C);
+  add_matrix(structure.K, local, contribution.K);
+  if (structure.K_loss.get()) add_matrix(structure.K_loss, local, contribution.loss_factor * contribution.K);
 }
 
 /// Number of entries of each of this rank's rows, in the columns it owns and in the others.
@@ -302,6 +241,7 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
     check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
     mark_symmetric(A);
   }
+  add_spin(structure, mesh, scene, partition, dofs);
   structure.load = assemble_load(mesh, scene, partition, dofs, comm);
   return structure;
 }

@@ -131,23 +131,26 @@ MatrixXd reactions(const ThetaStep& step, const Interface& interface, const Step
   return dr;
 }
 
-void one_step(const ThetaStep& step, const Structure& structure, const Interface& interface, const StepRecord& record,
-              std::span<TangentColumn> columns, TangentWork& work)
+/// The step whose tangent is taken.
+struct RecordedStep
 {
-  const double h = step.h, theta = step.theta;
-  const std::vector<Vec> Av = handles(work.Av), v_next = handles(work.v_next);
-  MatrixXd db, dr = MatrixXd::Zero(0, 0);
-  if (interface.pairs > 0) db = contact_of_start(step, interface, record, columns, work);
-  for (std::size_t k = 0; k < columns.size(); ++k)
-  {
-    check(VecAXPBYPCZ(Av[k], 1 / theta, -h, (theta - 1) / theta, work.Mv[k], work.Ku[k]));
-    if (columns[k].step_size != 0) check(VecAXPY(Av[k], columns[k].step_size, record.force));
-  }
+  const ThetaStep& step;
+  const Structure& structure;
+  const Interface& interface;
+  const StepRecord& record;
+};
+
+/// dv+ of every column from A dv_f in Av, with the contact that `db` starts from; Av becomes A dv+.
+void solve_columns(const RecordedStep& of, std::span<const TangentColumn> columns, MatrixXd db, TangentWork& work)
+{
+  const auto& [step, structure, interface, record] = of;
+  const std::vector<Vec> Av = handles(work.Av);
+  MatrixXd dr = MatrixXd::Zero(0, 0);
   const std::vector<double> Bv_free = step.factor.forward(Av);
   std::vector<double> lambda;
   if (interface.pairs > 0)
   {
-    dr = h * reactions(step, interface, record, columns, std::move(db), Bv_free);
+    dr = step.h * reactions(step, interface, record, columns, std::move(db), Bv_free);
     for (std::size_t k = 0; k < columns.size(); ++k)
     {
       const double* const impulse = dr.col(static_cast<Index>(k)).data();
@@ -156,7 +159,55 @@ void one_step(const ThetaStep& step, const Structure& structure, const Interface
     dr = -dr;
     lambda.assign(dr.data(), dr.data() + dr.size());
   }
-  step.factor.backward(lambda, v_next);
+  step.factor.backward(lambda, handles(work.v_next));
+}
+
+/// The same with - h G dv_theta on the right, by the passes of the step itself.
+void solve_columns_with_gyroscopic_part(const RecordedStep& of, std::span<const TangentColumn> columns,
+                                        const MatrixXd& db, TangentWork& work)
+{
+  const double h = of.step.h, theta = of.step.theta;
+  std::vector<Owned<Vec>> right, v_theta, Gv, before;
+  for (std::size_t k = 0; k < columns.size(); ++k)
+  {
+    right.push_back(copy_of(work.Av[k].get()));
+    v_theta.push_back(copy_of(columns[k].v.get()));
+    Gv.push_back(zeros_like(columns[k].v));
+    before.push_back(zeros_like(columns[k].v));
+  }
+  product(of.structure.G, handles(v_theta), handles(Gv));
+  GyroscopicPasses passes;
+  double change = HUGE_VAL;
+  while (passes.go_on(change, h))
+  {
+    for (std::size_t k = 0; k < columns.size(); ++k) check(VecWAXPY(work.Av[k], -h, Gv[k], right[k]));
+    solve_columns(of, columns, db, work);
+    std::swap(Gv, before);
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      check(VecAXPBYPCZ(v_theta[k], theta, 1 - theta, 0, work.v_next[k], columns[k].v));
+    product(of.structure.G, handles(v_theta), handles(Gv));
+    change = 0;
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      change = std::max(change, h * relative_change(Gv[k], before[k], work.Av[k]));
+  }
+}
+
+void one_step(const RecordedStep& of, std::span<TangentColumn> columns, TangentWork& work)
+{
+  const auto& [step, structure, interface, record] = of;
+  const double h = step.h, theta = step.theta;
+  const std::vector<Vec> Av = handles(work.Av), v_next = handles(work.v_next);
+  MatrixXd db;
+  if (interface.pairs > 0) db = contact_of_start(step, interface, record, columns, work);
+  for (std::size_t k = 0; k < columns.size(); ++k)
+  {
+    check(VecAXPBYPCZ(Av[k], 1 / theta, -h, (theta - 1) / theta, work.Mv[k], work.Ku[k]));
+    if (columns[k].step_size != 0) check(VecAXPY(Av[k], columns[k].step_size, record.force));
+  }
+  if (structure.G.get())
+    solve_columns_with_gyroscopic_part(of, columns, db, work);
+  else
+    solve_columns(of, columns, std::move(db), work);
   std::vector<Vec> u;
   for (std::size_t k = 0; k < columns.size(); ++k)
   {
@@ -195,7 +246,7 @@ void advance_tangents(const ThetaStep& step, const Structure& structure, const I
     TangentWork work = begin_tangents(step, structure, batch);
     for (const StepRecord& record : records)
     {
-      one_step(step, structure, interface, record, batch, work);
+      one_step({step, structure, interface, record}, batch, work);
       end_if_asked(comm_of(structure.load));
     }
   }

@@ -114,7 +114,94 @@ std::vector<double> apply_reactions(const StepBatch& batch)
   return lambda;
 }
 
+/// v+ and v_theta of every trajectory from A v_free in Av_next, with contact; Av_next becomes A v+.
+void solve_step(const StepBatch& batch)
+{
+  const auto& [step, interface, factors, works, states, reports] = batch;
+  std::vector<Vec> right, next;
+  for (StepWork& work : works)
+  {
+    right.push_back(work.Av_next);
+    next.push_back(work.v_next);
+  }
+  const std::vector<double> Bv_free = step.factor.forward(right);
+  std::vector<double> lambda;
+  if (interface.pairs > 0)
+  {
+    find_reactions(batch, Bv_free);
+    lambda = apply_reactions(batch);
+  }
+  step.factor.backward(lambda, next);
+  for (std::size_t k = 0; k < states.size(); ++k)
+    check(VecAXPBYPCZ(works[k].v_theta, step.theta, 1 - step.theta, 0, works[k].v_next, states[k].v));
+}
+
+/// What a trajectory is before its contact is solved, and G v_theta of the last pass.
+struct BeforeContact
+{
+  Owned<Vec> right, Gv, Gv_before;
+  std::vector<double> reactions;
+  ContactMemory memory;
+};
+
+/// The same with - h G v_theta on the right (src/README.md, section 4.17): passes with G v_theta of the pass before,
+/// each with contact solved from where the step began.
+void solve_step_with_gyroscopic_part(const StepBatch& batch, Mat G)
+{
+  const auto& [step, interface, factors, works, states, reports] = batch;
+  std::vector<BeforeContact> before;
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    before.push_back({copy_of(works[k].Av_next.get()), zeros_like(states[k].v), zeros_like(states[k].v),
+                      states[k].reactions, works[k].memory});
+    check(MatMult(G, states[k].v, before[k].Gv));
+  }
+  GyroscopicPasses passes;
+  double change = HUGE_VAL;
+  while (passes.go_on(change, step.h))
+  {
+    for (std::size_t k = 0; k < states.size(); ++k)
+    {
+      check(VecWAXPY(works[k].Av_next, -step.h, before[k].Gv, before[k].right));
+      states[k].reactions = before[k].reactions;
+      works[k].memory = before[k].memory;
+    }
+    solve_step(batch);
+    change = 0;
+    for (std::size_t k = 0; k < states.size(); ++k)
+    {
+      BeforeContact& own = before[k];
+      std::swap(own.Gv, own.Gv_before);
+      check(MatMult(G, works[k].v_theta, own.Gv));
+      change = std::max(change, step.h * relative_change(own.Gv, own.Gv_before, works[k].Av_next));
+    }
+  }
+}
+
 } // namespace
+
+bool GyroscopicPasses::go_on(double change, double h)
+{
+  constexpr double enough = 1e-15, rounding = 1e-9; // of contact's tolerance; what stays at it does not fall further
+  constexpr int most = 60;
+  const bool falls = change <= 0.9 * last_;
+  if (count_ > 1 && (change <= enough || (!falls && change <= rounding))) return false;
+  if (++count_ > most || (count_ > 10 && !falls && change > 1))
+    throw Error(format("a step of %g s is too long for the gyroscopic part: its passes do not converge; take more "
+                       "steps a period",
+                       h));
+  last_ = change;
+  return true;
+}
+
+double relative_change(Vec x, Vec before, Vec scale)
+{
+  double size = 0, change = 0;
+  check(VecAXPY(before, -1, x));
+  check(VecNorm(before, NORM_2, &change));
+  check(VecNorm(scale, NORM_2, &size));
+  return change == 0 ? 0 : change / size;
+}
 
 void check_step_law(const StepOptions& options, const Interface& interface)
 {
@@ -228,29 +315,23 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
 std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
                                 const StepFactors& factors, std::span<StepWork> works, std::span<State> states)
 {
-  const double h = step.h, theta = step.theta;
+  const double h = step.h;
   std::vector<StepReport> reports(states.size());
-  std::vector<Vec> right, next;
+  std::vector<Vec> next;
   for (StepWork& work : works)
   {
     load_free_step(step, structure, factors.load, work);
-    right.push_back(work.Av_next);
     next.push_back(work.v_next);
   }
-  const std::vector<double> Bv_free = step.factor.forward(right);
-  std::vector<double> lambda;
   const StepBatch batch{step, interface, factors, works, states, reports};
-  if (interface.pairs > 0)
-  {
-    find_reactions(batch, Bv_free);
-    lambda = apply_reactions(batch);
-  }
-  step.factor.backward(lambda, next);
+  if (structure.G.get())
+    solve_step_with_gyroscopic_part(batch, structure.G);
+  else
+    solve_step(batch);
   std::vector<Vec> u, Mv, Ku;
   for (std::size_t k = 0; k < states.size(); ++k)
   {
     StepWork& work = works[k];
-    check(VecAXPBYPCZ(work.v_theta, theta, 1 - theta, 0, work.v_next, states[k].v));
     check(VecAXPY(states[k].u, h, work.v_theta));
     u.push_back(states[k].u);
     Mv.push_back(work.Mv_next);

@@ -198,7 +198,7 @@ CASES = {
     "gyroscopic part that is not skew": (matrix_scene(with_entries("G", 1, 1)), ["G.petsc", "not skew", "C.petsc"]),
     "circulatory part with pairs": (matrix_scene(with_entries("H", 1, -1)), ["H.petsc", "take B, gap, drive and F out"]),
     "circulatory part with a load": (matrix_scene(without_pairs), ["H.petsc", "take B, gap, drive and F out"]),
-    "gyroscopic part in time": (in_time(matrix_scene(with_entries("G", 1, -1))), ["G.petsc", "take [transient] and [cycle] out"]),
+    "circulatory part in time": (in_time(matrix_scene(with_entries("H", 1, -1))), ["H.petsc", "take [transient] and [cycle] out"]),
     "truncated matrix": (matrix_scene(truncate), ["K.petsc"]),
     "not a PETSc file": (matrix_scene(not_petsc), ["M.petsc"]),
     "sizes that disagree": (matrix_scene(wrong_size), ["F.petsc", "2", "3"]),

@@ -58,8 +58,8 @@ enum class PairForces
 
 Owned<Mat> contact_stiffness(const Interface& interface, const std::vector<char>& closed, PairForces part);
 
-/// K plus a stiffness of contact_stiffness that is not null.
-Owned<Mat> stiffened(Mat K, const Owned<Mat>& added);
+/// A + B of any symmetry.
+Owned<Mat> sum_of(Mat A, Mat B);
 
 /// Normal reactions lambda_n per pair that a motion phi e^{s t} takes are (s^2 M + s C + K) phi, from the pivots' rows
 /// of (s^2 M + s C + K) phi = R' lambda_n; 0 on open pairs. Every choice of rows agrees if s and phi are an eigenpair.

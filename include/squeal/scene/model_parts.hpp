@@ -48,6 +48,14 @@ struct RayleighDamping
   double loss_frequency = 0; // [Hz] at which loss factors have their viscous equivalent in time; of the scene alone
 };
 
+/// A rotation about a fixed axis.
+struct Rotation
+{
+  Vec3 axis{};     // [-] unit vector
+  Vec3 centre{};   // [m] a point of the axis
+  double rate = 0; // [rad/s]
+};
+
 /// A named volume of the mesh, or a named surface if it has a thickness (shell).
 struct Part
 {
@@ -56,6 +64,7 @@ struct Part
   double thickness = 0;                   // [m] of a shell; 0 for a solid
   std::optional<RayleighDamping> damping; // if absent, the scene's
   double loss_factor = 0;                 // [-] eta of the stiffness K (1 + i eta)
+  std::optional<Rotation> rotation{};     // of a solid of revolution that spins; if absent, it is at rest
 };
 
 /// A node of its own: a point mass, or an end of springs.
@@ -118,14 +127,6 @@ struct Pressure
 {
   std::string on;   // named surface
   double value = 0; // [Pa] positive towards the solid
-};
-
-/// A rotation about a fixed axis.
-struct Rotation
-{
-  Vec3 axis{};     // [-] unit vector
-  Vec3 centre{};   // [m] a point of the axis
-  double rate = 0; // [rad/s]
 };
 
 /// The side of a contact whose nodes have the pairs.

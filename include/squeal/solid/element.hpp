@@ -36,6 +36,20 @@ ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Mat
 std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec3> x, const Material& material,
                                                 std::span<const double> u);
 
+/// Of a solid that spins, in the frame at rest (src/README.md, section 1.10); in the order of ElementMatrices.
+struct SpinMatrices
+{
+  Eigen::MatrixXd gyroscopic;  // [N s/m] skew
+  Eigen::MatrixXd centrifugal; // [N/m] symmetric, negative semidefinite
+  Eigen::VectorXd force;       // [N] centrifugal
+};
+
+SpinMatrices spin_matrices(Shape shape, std::span<const Vec3> x, const Material& material, const Rotation& rotation);
+
+/// Returns the stiffness [N/m] that the stress under the nodal displacements u [m] gives a solid.
+Eigen::MatrixXd stress_stiffness(Shape shape, std::span<const Vec3> x, const Material& material,
+                                 std::span<const double> u);
+
 /// Returns resultants at the integration points of a shell under the nodal displacements u [m, rad], 6 a node. They are
 /// membrane forces Nx Ny Nxy = int stress dz [N/m] and moments Mx My Mxy = int z stress dz [N]. Their x is along axis1
 /// projected on the element, their z along its normal (its nodes are counter-clockwise). Throws std::runtime_error if

@@ -15,6 +15,7 @@
 #include "squeal/transient/step_options.hpp"
 #include "squeal/transient/step_record.hpp"
 
+#include <cmath>
 #include <optional>
 #include <span>
 
@@ -77,6 +78,22 @@ struct StepFactors
 
 /// The factors of a step that starts at `time` [s] (src/README.md, section 4.15).
 StepFactors step_factors(const Ramps& ramps, const ThetaStep& step, double time);
+
+/// The passes of a step, or of its tangent, over - h G v_theta on the right (src/README.md, section 4.17).
+class GyroscopicPasses
+{
+public:
+  /// Whether another one is needed; `change`: h G v_theta's in the last one over A v+. Throws Error where they do not
+  /// converge.
+  bool go_on(double change, double h);
+
+private:
+  double last_ = HUGE_VAL;
+  int count_ = 0;
+};
+
+/// |x - before| over |scale|; overwrites `before`.
+double relative_change(Vec x, Vec before, Vec scale);
 
 /// Must be called again after the state was changed by anything but `advance`.
 StepWork begin_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state);
