@@ -252,6 +252,21 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   return static_cast<int>(run(scene, options, results, comm));
 }
 
+/// Ends all ranks after a failure that may be this rank's alone: the others would wait for ever. The lowest failing
+/// rank reports first. A single rank ends by itself, without the text of MPI_Abort.
+void end_all(int rank, const char* kind, const char* text)
+{
+  if (ranks_of(PETSC_COMM_WORLD) == 1)
+  {
+    std::fprintf(stderr, "squeal: %s: %.3000s\n", kind, text);
+    std::fflush(nullptr);
+    std::_Exit(1);
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(300 * rank));
+  std::fprintf(stderr, "squeal: %s on rank %d: %.3000s\n", kind, rank, text);
+  MPI_Abort(PETSC_COMM_WORLD, 1);
+}
+
 } // namespace
 
 int main(int argc, char** argv)
@@ -290,10 +305,7 @@ int main(int argc, char** argv)
   }
   catch (const LibraryError& error)
   {
-    // Perhaps this rank's alone: the others would wait for ever. The lowest failing rank reports first and ends all.
-    std::this_thread::sleep_for(std::chrono::milliseconds(300 * rank));
-    std::fprintf(stderr, "squeal: error on rank %d: %s\n", rank, error.what());
-    MPI_Abort(PETSC_COMM_WORLD, 1);
+    end_all(rank, "error", error.what());
   }
   catch (const Error& error)
   {
@@ -302,15 +314,11 @@ int main(int argc, char** argv)
   }
   catch (const std::bad_alloc&)
   {
-    std::this_thread::sleep_for(std::chrono::milliseconds(300 * rank));
-    std::fprintf(stderr, "squeal: error on rank %d: memory ran out; --dry-run prints a forecast\n", rank);
-    MPI_Abort(PETSC_COMM_WORLD, 1);
+    end_all(rank, "error", "memory ran out; --dry-run prints a forecast");
   }
   catch (const std::exception& error)
   {
-    std::this_thread::sleep_for(std::chrono::milliseconds(300 * rank));
-    std::fprintf(stderr, "squeal: failure on rank %d: %s\n", rank, error.what());
-    MPI_Abort(PETSC_COMM_WORLD, 1);
+    end_all(rank, "failure", error.what());
   }
   return 1;
 }

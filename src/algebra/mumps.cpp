@@ -12,6 +12,7 @@ namespace
 {
 
 constexpr int singular = -10;          // INFOG(1)
+constexpr int out_of_memory = -13;     // INFOG(1)
 constexpr int largest_increase = 2000; // [%] beyond MUMPS's estimate of its memory
 
 /// Whether INFOG(1) says that delayed pivots or messages between ranks need more memory than was estimated.
@@ -39,9 +40,12 @@ int outcome_of(DMUMPS_STRUC_C& mumps, MumpsJob job)
 
 [[noreturn]] void throw_failure(const DMUMPS_STRUC_C& mumps)
 {
-  throw LibraryError(
-      "MUMPS, job " + std::to_string(mumps.job) + ": INFOG(1) = " + std::to_string(information(mumps, 1)) +
-      ", INFOG(2) = " + std::to_string(information(mumps, 2)) + "; its manual lists them (-13: out of memory)");
+  if (information(mumps, 1) == out_of_memory)
+    throw LibraryError(
+        "memory ran out in MUMPS: take a smaller model, or raise the limit; --dry-run prints a forecast");
+  throw LibraryError("MUMPS, job " + std::to_string(mumps.job) +
+                     ": INFOG(1) = " + std::to_string(information(mumps, 1)) +
+                     ", INFOG(2) = " + std::to_string(information(mumps, 2)) + "; its manual lists them");
 }
 
 } // namespace

@@ -3,6 +3,7 @@
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/mesh/build.hpp"
 #include "squeal/mesh/names.hpp"
 #include "superelements.hpp"
@@ -69,13 +70,27 @@ void check_names(const Mesh& mesh, const Scene& scene)
   for (const Probe& probe : scene.probes) named_nodes(mesh, probe.on, "probe '" + probe.name + "'");
 }
 
+/// A signal to the run reaches its mesher as well, which ends by it: the mesh is no error then.
+Mesh read_unless_ended(const Scene& scene, MPI_Comm comm)
+{
+  try
+  {
+    return read_on_rank_zero(scene, comm);
+  }
+  catch (const Error&)
+  {
+    end_if_asked(comm);
+    throw;
+  }
+}
+
 } // namespace
 
 Mesh read_mesh(const Scene& scene, MPI_Comm comm)
 {
   Mesh mesh;
   if (scene.mesh)
-    mesh = read_on_rank_zero(scene, comm);
+    mesh = read_unless_ended(scene, comm);
   else if (!scene.parts.empty())
     throw Error("part '" + scene.parts.front().name + "' needs a mesh: add [mesh] file = \"...\"");
   for (const Point& point : scene.points) add_point(point.name, point.at, mesh);

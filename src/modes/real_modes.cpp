@@ -131,7 +131,7 @@ int append_nearest(MultiVector& X, const ShiftInvert& pencil, PetscInt count)
   check(EPSGetConverged(eps, &converged));
   for (PetscInt i = 0; i < converged; ++i)
   {
-    check(EPSGetEigenvector(eps, i, x, nullptr));
+    check_after_callbacks(EPSGetEigenvector(eps, i, x, nullptr), inverse.failure); // it may apply the inverse
     append(X, x);
   }
   return static_cast<int>(iterations);

@@ -338,6 +338,7 @@ Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
   }
   catch (const Error& error)
   {
+    end_if_asked(comm); // an interruption on every rank is an error by now
     result.outcome = {OutcomeKind::refused, error.what(), 0, 0};
     return result;
   }

@@ -88,6 +88,30 @@ def test_a_signal_ends_the_run_in_order(tmp_path, ranks, number):
     assert not partial(output).exists()
 
 
+MODES_ONLY = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
+              "--set", "modes.method=full", "--set", "friction.coefficient=0.5"]
+UNDER_WAY = {  # where a library or another process is at work: ranks, scene and arguments, what the log shows
+    "mesher": (2, [*MODES_ONLY, "--set", "mesh.parameters.divisions=6"], "model …"),
+    "sensitivity": (1, [*MODES_ONLY, "--set", "sensitivity.numbers=['friction.coefficient','part.pin.young']"], "sensitivity …"),
+    "basis of the samples": (1, [*MODES_ONLY, "--set", "robustness.samples=1000", "--set", "uncertain=[{key='friction.coefficient', "
+                                 "distribution='uniform', from=0.4, to=0.6}]"], "robustness …"),
+}
+
+
+@pytest.mark.parametrize("where", UNDER_WAY)
+def test_a_signal_is_no_error_of_what_is_under_way(tmp_path, where):
+    ranks, (scene, *arguments), sign = UNDER_WAY[where]
+    log = tmp_path / "log"
+    with open(log, "w") as printed:
+        run = start(tmp_path / "results", *arguments, ranks=ranks, scene=scene, stdout=printed)
+        wait_for(lambda: sign in log.read_text(), 60)
+        time.sleep(0.1)
+        run.send_signal(signal.SIGUSR1)
+        errors = run.communicate(timeout=100)[1]
+    assert run.returncode == 3 and "squeal" not in errors, errors + log.read_text()[-500:]
+    assert "ended by SIGUSR1" in log.read_text().splitlines()[-1]
+
+
 def test_the_wrapper_passes_signals_on(tmp_path):
     """mpirun itself kills its ranks soon after a TERM; launch of tools/environment makes it a USR1."""
     output = tmp_path / "results"
