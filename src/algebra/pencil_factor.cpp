@@ -27,6 +27,10 @@ struct PencilFactor::Parts
   /// The rank that solves a column.
   int solver_of(int column) const { return whole ? column % ranks_of(comm) : 0; }
   int column_stride() const { return whole ? ranks_of(comm) : 1; }
+
+  /// Runs what communicates inside of MUMPS only if the ranks share one instance. Where each has its own, all agree on
+  /// failures.
+  template <class Work> void run_together(Work work) const { whole ? on_every_rank(comm, work) : work(); }
 };
 
 namespace
@@ -82,13 +86,6 @@ void append(Triplets added, Triplets& entries)
   entries.value.insert(entries.value.end(), added.value.begin(), added.value.end());
 }
 
-/// Runs what communicates inside of MUMPS only if the ranks share one instance; where each has its own, all agree on
-/// failures.
-template <class Work> void run_together(const MPI_Comm comm, bool whole, Work work)
-{
-  whole ? on_every_rank(comm, work) : work();
-}
-
 } // namespace
 
 PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options)
@@ -118,7 +115,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   control(mumps, 14) = to_int(options.room);
   mumps.a_loc = parts.values.data();
   mumps.perm_in = order.position.data();
-  run_together(parts.comm, parts.whole, [&] { run(mumps, MumpsJob::analyse); });
+  parts.run_together([&] { run(mumps, MumpsJob::analyse); });
   mumps.perm_in = nullptr;
 }
 
@@ -141,7 +138,7 @@ bool PencilFactor::factorise(double shift)
   for (std::size_t k = 0; k < parts.values.size(); ++k)
     parts.values[k] = (k < parts.first_of_M ? 1 : -shift) * parts.entries.value[k];
   bool regular = false;
-  run_together(parts.comm, parts.whole, [&] { regular = squeal::factorise(*parts.mumps); });
+  parts.run_together([&] { regular = squeal::factorise(*parts.mumps); });
   return regular;
 }
 
@@ -170,11 +167,11 @@ MultiVector PencilFactor::solve(const MultiVector& X) const
   mumps.rhs = parts.right.data();
   mumps.nrhs = parts.whole ? own : columns;
   mumps.lrhs = parts.layout.total();
-  run_together(parts.comm, parts.whole,
-               [&]
-               {
-                 if (mumps.nrhs > 0) run(mumps, MumpsJob::solve);
-               });
+  parts.run_together(
+      [&]
+      {
+        if (mumps.nrhs > 0) run(mumps, MumpsJob::solve);
+      });
   for (int j = 0; j < columns; ++j)
     MPI_Scatterv(whole(j), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, Y.entries.col(j).data(),
                  rows, MPI_DOUBLE, parts.solver_of(j), parts.comm);
