@@ -134,6 +134,7 @@ struct Sizes
 {
   double dofs = 0, entries = 0;  // of K
   double pairs = 0, contact = 0; // rows of B
+  double ranks = 1;
   FactorForecast factor{};
 
   double condensed_operator() const { return number * contact * contact; }
@@ -150,15 +151,16 @@ Sizes sizes_of(const Model& model, const FactorOptions& options)
   sizes.dofs = static_cast<double>(dofs);
   sizes.entries = info.nz_used;
   sizes.pairs = model.interface.pairs;
+  sizes.ranks = ranks_of(comm_of(K));
   sizes.contact = static_cast<double>(model.interface.size());
   sizes.factor = forecast_factor(K, model.interface.pairs > 0 ? model.interface.B.get() : nullptr, options);
   return sizes;
 }
 
-/// The factor, its condensed operator, and half of the matrix as triplets and by columns.
+/// The factor, each rank's part of the condensed operator, and half of the matrix as triplets and by columns.
 double memory_of_factor(const Sizes& sizes)
 {
-  return sizes.factor.bytes + sizes.condensed_operator() + 2 * triplet * sizes.entries / 2;
+  return sizes.factor.bytes + sizes.ranks * sizes.condensed_operator() + 2 * triplet * sizes.entries / 2;
 }
 
 /// K with springs at the pairs, its factor and condensed operator D, and three matrices of pairs: D's normal part, the
