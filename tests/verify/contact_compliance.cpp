@@ -5,6 +5,7 @@
 #include "../support/approx.hpp"
 #include "../support/linearised.hpp"
 #include "../support/step_checks.hpp"
+#include "squeal/reduction/reduced_model.hpp"
 
 #include <Eigen/Dense>
 #include <numbers>
@@ -111,6 +112,32 @@ TEST_CASE("sliding on a spring has the eigenvalues of K + R'B_n/c, and the rigid
                fine = std::abs(exact_eigenvalue(0.3, 1e-4) - limit);
   CHECK(fine < 1e-3);
   CHECK(coarse / fine == approx(10, 0.05)); // of first order in c
+}
+
+TEST_CASE("the reduced model of a spring that stays closed, and of one that may open, has the modes' eigenvalues")
+{
+  const SmallModel model = oscillator(0.3, 1, 0.1);
+  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
+  const Modes modes = full_modes(model, equilibrium);
+  for (const bool active : {false, true})
+  {
+    Reduction reduction;
+    reduction.modes = static_cast<PetscInt>(modes.modes.size());
+    ReducedModel reduced = reduce({model.structure, model.interface, equilibrium}, modes.modes,
+                                  active ? std::vector<int>{0} : std::vector<int>{}, reduction);
+    const Eigen::Index n = reduced.size();
+    REQUIRE(n == 3);
+    if (active) // while it is closed and slides: its normal force, with friction along the drive
+      reduced.K += (reduced.H.col(0) + 0.3 * reduced.H.col(1)) * reduced.G.row(0) / reduced.compliance[0];
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(2 * n, 2 * n);
+    A.topRightCorner(n, n).setIdentity();
+    A.bottomLeftCorner(n, n) = -reduced.M.inverse() * reduced.K;
+    A.bottomRightCorner(n, n) = -reduced.M.inverse() * reduced.C;
+    const Eigen::VectorXcd lambda = A.eigenvalues();
+    for (const ComplexMode& mode : modes.modes)
+      CHECK((lambda.array() - mode.lambda).abs().minCoeff() < 1e-10 * std::abs(mode.lambda));
+    if (active) CHECK(reduced.gap[0] == approx(-0.1 * equilibrium.reactions[0], 1e-12));
+  }
 }
 
 TEST_CASE("a step multiplies a small sliding motion by the discrete eigenvalue")
