@@ -11,14 +11,14 @@ namespace
 {
 
 /// Entries that depend on their place and the column alone.
-void fill(Vec part, int column, double shift)
+void fill(Vec part, PetscInt column, double shift)
 {
   PetscInt first = 0, last = 0;
   double* entries = nullptr;
   check(VecGetOwnershipRange(part, &first, &last));
   check(VecGetArray(part, &entries));
   for (PetscInt i = first; i < last; ++i)
-    entries[i - first] = std::sin(shift + (1.7 + 0.61 * column) * static_cast<double>(i + 1));
+    entries[i - first] = std::sin(shift + (1.7 + 0.61 * static_cast<double>(column)) * static_cast<double>(i + 1));
   check(VecRestoreArray(part, &entries));
 }
 
@@ -53,7 +53,8 @@ TangentBundle make_bundle(const Flow& flow, Vec like, PetscInt count)
     double of_u = 0, of_v = 0;
     check(VecDot(displacement(column), displacement(image), &of_u));
     check(VecDot(velocity(column), velocity(image), &of_v));
-    if (of_u > 0 && of_v > 0) check(VecScale(velocity(column), (1 + 0.37 * k) * std::sqrt(of_u / of_v)));
+    if (of_u > 0 && of_v > 0)
+      check(VecScale(velocity(column), (1 + 0.37 * static_cast<double>(k)) * std::sqrt(of_u / of_v)));
     bundle.columns.push_back(std::move(column));
   }
   orthonormalise(flow, bundle.columns);
