@@ -70,6 +70,7 @@ public:
   bool take(void* target, std::size_t size)
   {
     if (size > rest_.size()) return false;
+    if (size == 0) return true; // the target of an empty list is null, which memcpy must not be given
     std::memcpy(target, rest_.data(), size);
     rest_.remove_prefix(size);
     return true;
