@@ -25,6 +25,11 @@ PetscErrorCode try_snes(const char* prefix, MPI_Comm comm)
   PetscErrorCode code = SNESCreate(comm, &snes);
   if (!code) code = SNESSetOptionsPrefix(snes, prefix);
   if (!code) code = SNESSetFromOptions(snes);
+  PetscInt iterations = 0; // looked at by PETSc in the solve only
+  if (!code) code = SNESGetTolerances(snes, nullptr, nullptr, nullptr, &iterations, nullptr);
+  if (!code && iterations < 0)
+    code = PetscError(comm, __LINE__, __func__, __FILE__, PETSC_ERR_ARG_OUTOFRANGE, PETSC_ERROR_INITIAL,
+                      "%ssnes_max_it is %" PetscInt_FMT ", it must be at least 0", prefix, iterations);
   (void)SNESDestroy(&snes);
   return code;
 }

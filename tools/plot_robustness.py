@@ -40,8 +40,9 @@ def draw_growth(axes, table):
     ratio = 100 * table["growth_rate"][chosen] / (2 * np.pi * table["frequency"][chosen])
     width = max(np.ptp(ratio) / 40, 1e-12)
     bins = width * np.arange(np.floor(ratio.min() / width), np.ceil(ratio.max() / width) + 1.5)  # zero is an edge
-    axes.hist(ratio[ratio <= 0], bins=bins, color="0.7", label="stable")
-    axes.hist(ratio[ratio > 0], bins=bins, color=COLOURS[0], label="unstable")
+    unstable = table["unstable_modes"][chosen] > 0
+    axes.hist(ratio[~unstable], bins=bins, color="0.7", label="stable")
+    axes.hist(ratio[unstable], bins=bins, color=COLOURS[0], label="unstable")
     axes.axvline(0, color="0.2", lw=0.8)
     axes.set_xlabel("largest growth rate over omega [%]")
     axes.set_ylabel("samples")
@@ -64,7 +65,7 @@ def draw_drivers(axes, robustness):
 
 def draw_robustness(runs):
     (results, robustness), *_ = those_with(runs, robustness_of)
-    table = {name: results.series("robustness", name) for name in ("known", "growth_rate", "frequency")}
+    table = {name: results.series("robustness", name) for name in ("known", "growth_rate", "frequency", "unstable_modes")}
     rows = max(len(robustness["numbers"]), 1 + min(8, len(robustness["modes"])))
     figure, axes = plt.subplots(1, 3, figsize=(13.5, 2.4 + 0.35 * rows))
     draw_probabilities(axes[0], robustness)

@@ -97,7 +97,7 @@ def draw_map(results, sweep, table):
         rows = np.flatnonzero(table["direction"] == direction)
         first, second, level = table["value"][rows, 0], table["value"][rows, 1], np.clip(growth[rows], 0, limit)
         shade = ax.tripcolor(first, second, level, cmap="YlOrRd", vmin=0, vmax=limit, shading="gouraud")
-        stable = growth[rows] <= 0
+        stable = table["unstable_modes"][rows] == 0
         ax.plot(first[stable], second[stable], "o", ms=3, mfc="white", mec="0.5", label="stable")
         ax.plot(first[~stable], second[~stable], "o", ms=3, color="0.2", label="unstable")
         for place, track in enumerate(tracks):

@@ -237,7 +237,7 @@ bool Cholesky::eliminate_shared(const Columns& A, double* schur_complement)
     for (const int row : shared.border)
       if (holder_of(row - symbolic.dofs, ranks) != me) local[at(row)] = -1;
     assemble(front, A, local);
-    for (const Branch& branch : shared.branches)
+    for (const Subtree& branch : shared.branches)
     {
       const std::size_t size = branch.inner * branch.below.size();
       received.resize(std::max(received.size(), size));

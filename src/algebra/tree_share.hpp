@@ -11,7 +11,7 @@ namespace squeal
 {
 
 /// A subtree below a shared supernode: what its root leaves to be added there.
-struct Branch
+struct Subtree
 {
   int owner = 0;            // rank
   std::size_t root = 0;     // in TreeShare::symbolic, on the owner only
@@ -22,7 +22,7 @@ struct Branch
 /// Of a shared supernode.
 struct SharedSupernode
 {
-  std::vector<Branch> branches{};
+  std::vector<Subtree> branches{};
   std::vector<int> border{}; // positions of its border rows on all ranks
 };
 

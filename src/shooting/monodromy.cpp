@@ -48,7 +48,7 @@ std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::Ve
   return place;
 }
 
-void decide(Multipliers& multipliers, const Coverage& coverage, std::size_t converged)
+void decide(Multipliers& multipliers, const Completeness& coverage, std::size_t converged)
 {
   multipliers.stability = coverage.complete ? Stability::stable : Stability::undecided;
   multipliers.would_decide = coverage.complete ? "" : coverage.would_decide;

@@ -27,7 +27,7 @@ Eigen::VectorXd real_part(Eigen::VectorXcd y);
 std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::VectorXd& flow);
 
 /// Whether larger multipliers than those found are to be expected, and how to find out.
-struct Coverage
+struct Completeness
 {
   bool complete = false;
   std::string would_decide; // of one that is not
@@ -35,7 +35,7 @@ struct Coverage
 
 /// Says what the bars allow. Only the `converged` largest values can leave it undecided: an Arnoldi space always holds
 /// smaller ones that have not converged.
-void decide(Multipliers& multipliers, const Coverage& coverage, std::size_t converged);
+void decide(Multipliers& multipliers, const Completeness& coverage, std::size_t converged);
 
 /// By oblique projection on approximate right and left vectors (src/README.md, section 6.9). `columns`: at most for the
 /// search beside them. Nothing, with the reason in `refusal`, where these vectors do not serve.

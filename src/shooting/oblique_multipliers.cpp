@@ -236,7 +236,7 @@ void take_out_shift(Passes& passes)
     bars->erase(bars->begin() + static_cast<std::ptrdiff_t>(place));
 }
 
-Coverage coverage_of(const SlowMotions& slow, const DeflatedSearch& search)
+Completeness coverage_of(const SlowMotions& slow, const DeflatedSearch& search)
 {
   if (!slow.confirmed)
     return {false, "the reduced model has another number of large multipliers with fewer modes: more of them "
