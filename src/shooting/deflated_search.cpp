@@ -66,9 +66,8 @@ DeflatedSearch search_beside(const Monodromy& monodromy, const Projector& projec
       subtract(image, Q, more);
       along += more;
     }
-    const Index before = H.rows();
     MatrixXd grown = MatrixXd::Zero(Q.columns(), Q.columns());
-    grown.topLeftCorner(before, before) = H;
+    grown.topLeftCorner(H.rows(), H.cols()) = H;
     grown.rightCols(block.columns()) = along;
     block = orthonormal(flow, image, 1e-8);
     const MatrixXd remainder = inner_products(block, energy_images(flow, image));

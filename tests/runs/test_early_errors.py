@@ -35,6 +35,8 @@ OPTIONS = {
     "a solver that the equilibrium has not": (["-equilibrium_ksp_rtol", "1"], ["-equilibrium_ksp_rtol"]),
     "a solver inside another": (["-cycle_ksp_rtol", "1"], ["-cycle_ksp_rtol"]),
     "a solver that slices leave out": (["-modes_pep_tol", "1e-9"], ["-modes_pep_tol", "toar"]),
+    "fewer iterations than none": (["-cycle_snes_max_it", "-7"], ["-cycle_", "max_it", "-7"]),
+    "fewer iterations of the finish than none": (["-cycle_full_snes_max_it", "-7"], ["-cycle_full_", "max_it", "-7"]),
     "no option of the eigensolver": (["-modes_solver", "toar", "-modes_pep_tool", "1"], ["-modes_pep_tool"]),
     "no option of the linear solver": (["-cycle_full_ksp_rtoll", "1"], ["-cycle_full_ksp_rtoll"]),
     "no file of options": (["-options_file", "missing"], ["-options_file", "missing"]),
