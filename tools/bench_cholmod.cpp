@@ -9,6 +9,7 @@
 #include "bench_timing.hpp"
 #include "bench_trajectories.hpp"
 #include "cholmod_handles.hpp"
+#include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/transient/transient.hpp"
 
 #include <cmath>
@@ -256,7 +257,7 @@ void compare_factors(Mat A, Mat B, int rounds, Figures& figures, Comparison& com
     time_cholmod(A, B, W, figures, comparison);
   }
   comparison.own_entries = Factor(A, nullptr, FactorOptions{.kind = FactorKind::supernodal}).entries();
-  comparison.own_memory = factor_memory(A, B, {}) + 8. * std::pow(rows_of(B), 2);
+  comparison.own_memory = forecast_factor(A, B, {}).bytes + 8. * std::pow(rows_of(B), 2);
 }
 
 /// Right-hand sides of several trajectories, for either library, and their solutions.

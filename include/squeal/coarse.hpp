@@ -34,7 +34,7 @@ struct CarriedCycle
 };
 
 /// The cycle of the coarse mesh about the equilibrium of the fine one. Its time is scaled by the frequencies of the two
-/// meshes' followed modes where these lie within a tenth: a coarse mesh is too stiff. Collective.
+/// meshes' followed modes where these differ by at most a tenth: a coarse mesh is too stiff. Collective.
 CarriedCycle carried_cycle(const CoarseModel& coarse, const CycleOfMesh& cycle, const Equilibrium& fine,
                            const ComplexMode& followed);
 

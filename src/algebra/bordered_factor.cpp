@@ -273,11 +273,6 @@ FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
   return forecast;
 }
 
-double factor_memory(Mat A, Mat B, const FactorOptions& options)
-{
-  return forecast_factor(A, B, options).bytes;
-}
-
 void solve(const Factor& factor, Vec b, Vec x)
 {
   const std::vector<double> no_forces(factor.forward(std::span(&b, 1)).size(), 0.);

@@ -129,6 +129,18 @@ MultiVector product(Mat A, const MultiVector& X)
   return Y;
 }
 
+MatrixXd whole_product(Mat A, const MultiVector& X)
+{
+  PetscInt rows = 0, first = 0;
+  check(MatGetSize(A, &rows, nullptr));
+  check(MatGetOwnershipRange(A, &first, nullptr));
+  const MultiVector own = product(A, X);
+  MatrixXd whole = MatrixXd::Zero(rows, X.columns());
+  whole.middleRows(first, own.entries.rows()) = own.entries;
+  add_up(whole, X.comm);
+  return whole;
+}
+
 void product(Mat A, std::span<const Vec> x, std::span<const Vec> y)
 {
   if (x.size() == 1)

@@ -5,6 +5,8 @@
 #include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>
+#include <boost/geometry.hpp>
+#include <boost/geometry/index/rtree.hpp>
 #include <cmath>
 
 namespace squeal
@@ -13,33 +15,22 @@ namespace squeal
 namespace
 {
 
-constexpr double margin = 0.5; // of an element's size, by which its box is enlarged
+namespace geometry = boost::geometry;
+using Corner = geometry::model::point<double, 3, geometry::cs::cartesian>;
+using Box = geometry::model::box<Corner>;
 
-struct Box
+double diagonal(const NodePositions& x)
 {
-  Vec3 low{}, high{};
-
-  double size() const { return norm(high - low); }
-};
-
-Box box_of(const Mesh& mesh, const Element& element)
-{
-  const auto nodes = nodes_of(element);
-  Box box{mesh.nodes[nodes[0]], mesh.nodes[nodes[0]]};
-  for (const int node : nodes)
-    for (std::size_t c = 0; c < 3; ++c)
-    {
-      box.low[c] = std::min(box.low[c], mesh.nodes[node][c]);
-      box.high[c] = std::max(box.high[c], mesh.nodes[node][c]);
-    }
-  return box;
+  return (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).norm();
 }
 
-NodePositions positions_of(const Mesh& mesh, const Element& element)
+/// The box round an element, enlarged by so much of its diagonal.
+Box box_of(const Mesh& mesh, const Element& element, double margin)
 {
-  std::vector<Vec3> x;
-  for (const int node : nodes_of(element)) x.push_back(mesh.nodes[node]);
-  return position_matrix(x);
+  const NodePositions x = position_matrix(positions_of(mesh, element));
+  const double more = margin * diagonal(x);
+  const Eigen::Vector3d low = x.rowwise().minCoeff().array() - more, high = x.rowwise().maxCoeff().array() + more;
+  return {Corner(low(0), low(1), low(2)), Corner(high(0), high(1), high(2))};
 }
 
 /// Of the simplices' barycentric coordinates the smallest may be negative; along an axis of a box |xi| may exceed 1.
@@ -72,7 +63,7 @@ Location located(const Mesh& mesh, int element, const Vec3& point)
   constexpr int most = 20;       // Newton steps; a mildly distorted brick takes 3 to 5
   constexpr double near = 1e-13; // [-] last step
   const Element& of = mesh.elements[static_cast<std::size_t>(element)];
-  const NodePositions x = positions_of(mesh, of);
+  const NodePositions x = position_matrix(positions_of(mesh, of));
   const Eigen::Vector3d p(point[0], point[1], point[2]);
   const Eigen::Index axes = is_shell(of.shape) ? 2 : 3;
   const bool simplex = of.shape == Shape::tet4 || of.shape == Shape::tet10 || of.shape == Shape::shell3;
@@ -92,73 +83,40 @@ Location located(const Mesh& mesh, int element, const Vec3& point)
     if (!(step.norm() > near)) break;
   }
   at.excess = excess_of(of.shape, at.xi);
-  if (axes == 2) at.excess = std::max(at.excess, 2 * away / box_of(mesh, of).size());
+  if (axes == 2) at.excess = std::max(at.excess, 2 * away / diagonal(x));
   if (!std::isfinite(at.excess)) at.excess = std::numeric_limits<double>::max();
   return at;
 }
 
-ElementLocator::ElementLocator(const Mesh& mesh, int part) : mesh_(mesh)
+struct ElementLocator::Tree
 {
-  Box all;
-  double size = 0;
+  geometry::index::rtree<std::pair<Box, int>, geometry::index::quadratic<16>> boxes;
+};
+
+ElementLocator::ElementLocator(const Mesh& mesh, int part) : mesh_(mesh), tree_(std::make_unique<Tree>())
+{
+  constexpr double margin = 0.5; // of an element's size
+  std::vector<std::pair<Box, int>> boxes;
   for (std::size_t i = 0; i < mesh.elements.size(); ++i)
-  {
-    if (mesh.elements[i].part != part) continue;
-    const Box box = box_of(mesh, mesh.elements[i]);
-    if (elements_.empty()) all = box;
-    for (std::size_t c = 0; c < 3; ++c)
-    {
-      all.low[c] = std::min(all.low[c], box.low[c]);
-      all.high[c] = std::max(all.high[c], box.high[c]);
-    }
-    size += box.size();
-    elements_.push_back(static_cast<int>(i));
-  }
-  if (elements_.empty()) return;
-  low_ = all.low;
-  side_ = size / static_cast<double>(elements_.size());
-  constexpr int most = 100; // cells along an axis
-  for (std::size_t c = 0; c < 3; ++c) side_ = std::max(side_, (all.high[c] - all.low[c]) / most);
-  for (std::size_t c = 0; c < 3; ++c) cells_[c] = static_cast<int>((all.high[c] - all.low[c]) / side_) + 1;
-  in_cell_.resize(static_cast<std::size_t>(cells_[0]) * cells_[1] * cells_[2]);
-  const auto cell = [&](double x, std::size_t c)
-  { return std::clamp(static_cast<int>(std::floor((x - low_[c]) / side_)), 0, cells_[c] - 1); };
-  for (const int element : elements_)
-  {
-    const Box box = box_of(mesh, mesh.elements[static_cast<std::size_t>(element)]);
-    const double more = margin * box.size();
-    std::array<std::array<int, 2>, 3> range{};
-    for (std::size_t c = 0; c < 3; ++c) range[c] = {cell(box.low[c] - more, c), cell(box.high[c] + more, c)};
-    for (int i = range[0][0]; i <= range[0][1]; ++i)
-      for (int j = range[1][0]; j <= range[1][1]; ++j)
-        for (int k = range[2][0]; k <= range[2][1]; ++k)
-          in_cell_[static_cast<std::size_t>((i * cells_[1] + j) * cells_[2] + k)].push_back(element);
-  }
+    if (mesh.elements[i].part == part) boxes.emplace_back(box_of(mesh, mesh.elements[i], margin), static_cast<int>(i));
+  tree_->boxes = {boxes.begin(), boxes.end()};
 }
 
-void ElementLocator::visit(const Vec3& point, std::span<const int> candidates, Location& best) const
-{
-  for (const int element : candidates)
-  {
-    const Box box = box_of(mesh_, mesh_.elements[static_cast<std::size_t>(element)]);
-    const double more = margin * box.size();
-    bool outside = false;
-    for (std::size_t c = 0; c < 3; ++c)
-      outside = outside || point[c] < box.low[c] - more || point[c] > box.high[c] + more;
-    if (outside) continue;
-    if (const Location at = located(mesh_, element, point); at.excess < best.excess) best = at;
-    if (best.excess <= 0) return;
-  }
-}
+ElementLocator::~ElementLocator() = default;
 
 Location ElementLocator::find(const Vec3& point) const
 {
+  std::vector<int> candidates; // ascending, so that the first of two that share the point is found
+  const Corner at(point[0], point[1], point[2]);
+  for (auto it = tree_->boxes.qbegin(geometry::index::intersects(at)); it != tree_->boxes.qend(); ++it)
+    candidates.push_back(it->second);
+  std::sort(candidates.begin(), candidates.end());
   Location best;
-  if (elements_.empty()) return best;
-  std::array<int, 3> at{};
-  for (std::size_t c = 0; c < 3; ++c)
-    at[c] = std::clamp(static_cast<int>(std::floor((point[c] - low_[c]) / side_)), 0, cells_[c] - 1);
-  visit(point, in_cell_[static_cast<std::size_t>((at[0] * cells_[1] + at[1]) * cells_[2] + at[2])], best);
+  for (const int element : candidates)
+  {
+    if (const Location in = located(mesh_, element, point); in.excess < best.excess) best = in;
+    if (best.excess <= 0) break;
+  }
   return best;
 }
 

@@ -118,6 +118,13 @@ std::span<const int> nodes_of(const Face& face)
   return std::span(face.nodes).first(node_count(face.shape));
 }
 
+std::vector<Vec3> positions_of(const Mesh& mesh, const Element& element)
+{
+  std::vector<Vec3> x;
+  for (const int node : nodes_of(element)) x.push_back(mesh.nodes[static_cast<std::size_t>(node)]);
+  return x;
+}
+
 std::span<const std::array<int, 2>> mid_sides(Shape shape)
 {
   return topology(shape).mid_sides;

@@ -1,7 +1,6 @@
 #include "squeal/reduction/reduced_model.hpp"
 
 #include "reduction_basis.hpp"
-#include "squeal/base/integers.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include <algorithm>
@@ -55,19 +54,6 @@ void project(ReducedModel& model, const Structure& structure, const ClosedContac
     *symmetric = symmetric_inner_products(X, image);
     *unsymmetric = *symmetric + inner_products(more, rows_of(image, follow));
   }
-}
-
-/// B X, whole on every rank.
-MatrixXd whole_product(Mat B, const MultiVector& X)
-{
-  PetscInt rows = 0, first = 0;
-  check(MatGetSize(B, &rows, nullptr));
-  check(MatGetOwnershipRange(B, &first, nullptr));
-  const MultiVector own = product(B, X);
-  MatrixXd whole = MatrixXd::Zero(rows, X.columns());
-  whole.middleRows(first, own.entries.rows()) = own.entries;
-  MPI_Allreduce(MPI_IN_PLACE, whole.data(), to_int(whole.size()), MPI_DOUBLE, MPI_SUM, X.comm);
-  return whole;
 }
 
 Eigen::SparseMatrix<double> identity_of_rows(Mat A)

@@ -135,9 +135,7 @@ std::vector<Spinning> spinning_elements(const Mesh& mesh, const Scene& scene, co
     const Element& element = mesh.elements[i];
     const Part& part = scene.parts[static_cast<std::size_t>(element.part)];
     if (!spins(part) || partition.element_rank[i] != rank) continue;
-    std::vector<Vec3> x;
-    for (const int node : nodes_of(element)) x.push_back(mesh.nodes[static_cast<std::size_t>(node)]);
-    result.push_back({element, part, std::move(x), local_dofs(dofs, nodal_dofs_of(element))});
+    result.push_back({element, part, positions_of(mesh, element), local_dofs(dofs, nodal_dofs_of(element))});
   }
   return result;
 }

@@ -192,8 +192,7 @@ Contribution element_contribution(const Mesh& mesh, const Scene& scene, std::siz
 {
   const Element& element = mesh.elements[index];
   const Part& part = scene.parts[element.part];
-  std::vector<Vec3> x;
-  for (const int node : nodes_of(element)) x.push_back(mesh.nodes[node]);
+  const std::vector<Vec3> x = positions_of(mesh, element);
   try
   {
     ElementMatrices matrices = element_matrices(element.shape, x, part.material, part.thickness);

@@ -1,6 +1,7 @@
 // ranks: 1 2 3 4
 #include "../support/option.hpp"
 #include "../support/small_models.hpp"
+#include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/contact/condensed.hpp"
 
 #include <array>
@@ -297,11 +298,12 @@ TEST_CASE("the memory foreseen for a factor holds its entries, and more with a b
       test::make_interface(B, 1, std::vector<double>(150, 0.), std::vector<double>(150, 1.), 0.3, structure.K);
   const auto entries = [&](const FactorOptions& options)
   { return Factor(structure.K, interface.B, options).entries(); };
-  const auto foreseen = [&](const FactorOptions& options) { return factor_memory(structure.K, interface.B, options); };
+  const auto foreseen = [&](const FactorOptions& options)
+  { return forecast_factor(structure.K, interface.B, options).bytes; };
   const FactorOptions automatic, supernodal{.kind = FactorKind::supernodal}, mumps{.kind = FactorKind::mumps};
   const double bordered = foreseen(automatic);
   CHECK(bordered >= 8 * entries(automatic));
-  CHECK(bordered > factor_memory(structure.K, nullptr, automatic));
+  CHECK(bordered > forecast_factor(structure.K, nullptr, automatic).bytes);
   CHECK(entries(automatic) == entries(supernodal));
 
   const FactorOptions small{.limit = 0}; // several ranks share it then

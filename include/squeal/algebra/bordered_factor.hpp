@@ -75,9 +75,6 @@ private:
   std::unique_ptr<Parts> parts_;
 };
 
-/// The largest memory that a Factor of A and B takes, without its Schur complement [bytes]. B may be null. Collective.
-double factor_memory(Mat A, Mat B, const FactorOptions& options);
-
 /// x = A^-1 b. The factor has no border. Collective.
 void solve(const Factor& factor, Vec b, Vec x);
 

@@ -36,6 +36,9 @@ void copy_column(const MultiVector& X, Eigen::Index j, Vec x);
 /// A X
 MultiVector product(Mat A, const MultiVector& X);
 
+/// A X of a matrix of few rows, whole on every rank.
+Eigen::MatrixXd whole_product(Mat A, const MultiVector& X);
+
 /// y_k = A x_k for all k at one reading of A.
 void product(Mat A, std::span<const Vec> x, std::span<const Vec> y);
 

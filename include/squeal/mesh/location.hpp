@@ -2,6 +2,8 @@
 /// Points of a mesh: the element of a part that holds a point, and its natural coordinates there.
 #include "squeal/mesh/shape_functions.hpp"
 
+#include <memory>
+
 namespace squeal
 {
 
@@ -18,22 +20,18 @@ class ElementLocator
 {
 public:
   ElementLocator(const Mesh& mesh, int part);
+  ~ElementLocator();
 
   /// The element that `point` leaves least; points outside of every one have an excess above 0.
   Location find(const Vec3& point) const;
 
 private:
-  void visit(const Vec3& point, std::span<const int> candidates, Location& best) const;
-
+  struct Tree; // of the elements' boxes, enlarged by half their size
   const Mesh& mesh_;
-  std::vector<int> elements_; // of the part
-  Vec3 low_{};                // [m] corner of the box around them
-  double side_ = 0;           // [m] of a cell
-  std::array<int, 3> cells_{1, 1, 1};
-  std::vector<std::vector<int>> in_cell_; // elements whose boxes, enlarged by half their size, reach into the cell
+  std::unique_ptr<Tree> tree_;
 };
 
-/// The natural coordinates of a point of an element, which may lie outside of it, by Newton's method. Of a shell those
+/// The natural coordinates of a point of an element, which may be outside of it, by Newton's method. Of a shell those
 /// of the nearest point of its surface.
 Location located(const Mesh& mesh, int element, const Vec3& point);
 

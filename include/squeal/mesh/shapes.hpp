@@ -24,6 +24,9 @@ bool is_shell(Shape shape);
 std::span<const int> nodes_of(const Element& element);
 std::span<const int> nodes_of(const Face& face);
 
+/// Returns where the element's nodes are [m].
+std::vector<Vec3> positions_of(const Mesh& mesh, const Element& element);
+
 /// Returns the two end nodes of the side of each mid-side node, in the order of the mid-side nodes.
 std::span<const std::array<int, 2>> mid_sides(Shape shape);
 

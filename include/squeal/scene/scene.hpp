@@ -253,7 +253,7 @@ struct UncertainNumber
   double from = 0, to = 0; // of the uniform distribution
 };
 
-/// The value below which a part of the distribution lies, 0 <= part <= 1.
+/// The value that a part of the distribution is below, 0 <= part <= 1.
 double quantile(const UncertainNumber& number, double part);
 
 /// A displacement that is recorded in time: of the node of a point, body or group, along a direction.

@@ -18,7 +18,7 @@ struct NumberedMesh
 class Interpolation
 {
 public:
-  /// Collective. Throws Error where a node of `to` lies more than half an element outside of its part in `from`.
+  /// Collective. Throws Error where a node of `to` is more than half an element outside of its part in `from`.
   Interpolation(const NumberedMesh& from, const NumberedMesh& to, const Scene& scene, MPI_Comm comm);
 
   /// Sets the free degrees of freedom of `fine`, in the layout of `to`, from those of `coarse`. Collective.
