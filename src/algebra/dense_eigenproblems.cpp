@@ -193,6 +193,15 @@ std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Ma
   return pairs;
 }
 
+SymmetricEigenpairs solve_dense_symmetric(MatrixXd A)
+{
+  VectorXd lambda(A.rows());
+  const int size = to_int(A.rows());
+  if (size > 0 && LAPACKE_dsyevd(LAPACK_COL_MAJOR, 'V', 'L', size, A.data(), size, lambda.data()) != 0)
+    throw Error("the eigenvalues of a symmetric matrix did not converge");
+  return {std::move(lambda), std::move(A)};
+}
+
 SymmetricEigenpairs solve_dense_symmetric(const MatrixXd& M, const MatrixXd& K, double shift)
 {
   // M y = theta (K - shift M) y with theta = 1/(lambda - shift) allows a singular M. With K - shift M = L L' it is
@@ -203,13 +212,12 @@ SymmetricEigenpairs solve_dense_symmetric(const MatrixXd& M, const MatrixXd& K, 
     throw Error("the real modes fail: stiffness is not positive semidefinite, or some motion has neither "
                 "mass nor stiffness");
   const MatrixXd half = factor.matrixL().solve(M);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(factor.matrixL().solve(half.transpose()));
-  if (solver.info() != Eigen::Success) throw Error("the eigenvalues of the real modes did not converge");
-  const VectorXd theta = solver.eigenvalues().reverse();
+  const SymmetricEigenpairs pairs = solve_dense_symmetric(factor.matrixL().solve(half.transpose()));
+  const VectorXd theta = pairs.lambda.reverse();
   const Index finite = (theta.array() > 1e-14 * theta(0)).count();
   const VectorXd kept = theta.head(finite);
   return {(shift + kept.array().inverse()).matrix(),
-          factor.matrixU().solve(solver.eigenvectors().rowwise().reverse().leftCols(finite)) *
+          factor.matrixU().solve(pairs.y.rowwise().reverse().leftCols(finite)) *
               kept.cwiseSqrt().cwiseInverse().asDiagonal()};
 }
 

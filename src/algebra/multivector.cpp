@@ -1,10 +1,10 @@
 #include "squeal/algebra/multivector.hpp"
 
 #include "splitmix.hpp"
+#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
-#include <Eigen/Eigenvalues>
 
 namespace squeal
 {
@@ -195,12 +195,10 @@ VectorXd column_norms(const MultiVector& X)
 void orthonormalise(MultiVector& X, double least)
 {
   if (X.columns() == 0) return;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> gram(inner_products(X, X));
-  if (gram.info() != Eigen::Success) throw Error("the eigenvalues of an inner product did not converge");
-  const VectorXd& values = gram.eigenvalues(); // ascending
+  const auto [values, vectors] = solve_dense_symmetric(inner_products(X, X));
   const Index kept = (values.array() > least * values(values.size() - 1)).count();
   const VectorXd scale = values.tail(kept).cwiseSqrt().cwiseInverse();
-  X = combination(X, gram.eigenvectors().rightCols(kept) * scale.asDiagonal());
+  X = combination(X, vectors.rightCols(kept) * scale.asDiagonal());
 }
 
 Index extend_orthonormal(MultiVector& V, MultiVector X)

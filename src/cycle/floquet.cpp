@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
 
 namespace squeal
 {
@@ -255,22 +256,20 @@ bool holds_every_motion(const ReducedModel& model, int eliminated, Vec state)
 }
 
 /// Whether three quarters of the shapes give as many multipliers above 0.95.
-bool confirmed_by_fewer_shapes(const ReducedModel& model, const ReducedMap& map, double period,
-                               std::span<const RecordedContact> contacts, const std::vector<Complex>& values,
-                               MPI_Comm comm)
+bool confirmed_by_fewer_shapes(const ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+                               const std::vector<Complex>& values, MPI_Comm comm)
 {
-  const ReducedModel smaller = truncated(model, (3 * model.size() + 3) / 4);
+  const ReducedModel smaller = truncated(map.model, (3 * map.model.size() + 3) / 4);
   ReducedMap few{smaller, map.steps, map.theta};
   return as_many_above(0.95, values, large_multipliers(few, period, contacts, wanted, comm).values);
 }
 
 /// Whether the model without its highest modes has the same multipliers above 0.95. The attachments stay: friction on
 /// pairs without their own flexibility is another problem.
-bool confirmed_by_fewer_modes(const ReducedModel& model, const ReducedMap& map, double period,
-                              std::span<const RecordedContact> contacts, const std::vector<Complex>& values,
-                              MPI_Comm comm)
+bool confirmed_by_fewer_modes(const ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+                              const std::vector<Complex>& values, MPI_Comm comm)
 {
-  const ReducedModel smaller = without_modes_apart(model);
+  const ReducedModel smaller = without_modes_apart(map.model);
   ReducedMap few{smaller, map.steps, map.theta};
   return alike(0.95, values, large_multipliers(few, period, contacts, wanted, comm).values);
 }
@@ -309,14 +308,14 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
   const RecordedPeriods periods = record_periods(map, other_steps, period, start);
   SlowMotions slow;
   slow.periods = other_steps > 0 ? 3 : 2;
-  ReducedModel model = model_for(problem, periods);
+  const auto model = std::make_shared<const ReducedModel>(model_for(problem, periods));
   const auto contacts = [&](int which)
   {
-    return recorded_contacts(model, problem.sliding.interface.directions,
+    return recorded_contacts(*model, problem.sliding.interface.directions,
                              periods.records[static_cast<std::size_t>(which)]);
   };
-  ReducedMap own{model, map.steps, map.theta};
-  const auto recorded = contacts(RecordedPeriods::own);
+  ReducedMap own{*model, map.steps, map.theta};
+  auto recorded = contacts(RecordedPeriods::own);
   ReducedSpectrum spectrum = large_multipliers(own, period, recorded, wanted, comm);
   slow.values = spectrum.values;
   // no motion beside a cycle that shooting finds doubles in a period: shapes that do not fit friction do
@@ -326,15 +325,18 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
     return slow;
   }
   set_grid_errors(spectrum, own, other_steps, period, contacts, slow);
-  slow.confirmed = holds_every_motion(model, eliminated_pairs(problem, periods), start) ||
-                   confirmed_by_fewer_shapes(model, own, period, recorded, spectrum.values, comm) ||
-                   confirmed_by_fewer_modes(model, own, period, recorded, spectrum.values, comm);
-  slow.right = lifted(model, spectrum.right, start);
-  slow.left = lifted(model, energy_representatives(model, spectrum.left), start);
+  slow.right = lifted(*model, spectrum.right, start);
+  slow.left = lifted(*model, energy_representatives(*model, spectrum.left), start);
   slow.others = slow_sliding_motions(problem.modes, start);
-  slow.correct = [model = std::move(model), columns = std::move(spectrum.columns),
-                  &structure = problem.sliding.structure](Complex m, Vec real, Vec imaginary)
-  { correct(model, structure, columns, m, real, imaginary); };
+  const bool whole = holds_every_motion(*model, eliminated_pairs(problem, periods), start);
+  slow.confirmed = [=, steps = map.steps, theta = map.theta, recorded = std::move(recorded), values = spectrum.values]
+  {
+    const ReducedMap along{*model, steps, theta};
+    return whole || confirmed_by_fewer_shapes(along, period, recorded, values, comm) ||
+           confirmed_by_fewer_modes(along, period, recorded, values, comm);
+  };
+  slow.correct = [model, columns = std::move(spectrum.columns), &structure = problem.sliding.structure](
+                     Complex m, Vec real, Vec imaginary) { correct(*model, structure, columns, m, real, imaginary); };
   return slow;
 }
 

@@ -1,5 +1,6 @@
 #include "reduction_basis.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/base/constants.hpp"
 
 #include <algorithm>
@@ -81,11 +82,11 @@ int extend(Orthonormal& basis, Index count, double threshold)
   }
   image.noalias() = E * columns;
   const MatrixXd fresh = columns.transpose() * image;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((fresh + fresh.transpose()) / 2);
-  const auto kept = (spectrum.eigenvalues().array() > threshold * threshold).count();
+  const auto [sizes, directions] = solve_dense_symmetric((fresh + fresh.transpose()) / 2);
+  const auto kept = (sizes.array() > threshold * threshold).count();
   basis.T.conservativeResize(Eigen::NoChange, basis.T.cols() + kept);
-  basis.T.rightCols(kept) = columns * spectrum.eigenvectors().rightCols(kept) *
-                            spectrum.eigenvalues().tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+  basis.T.rightCols(kept) =
+      columns * (directions.rightCols(kept) * sizes.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal());
   basis.seen += count;
   return static_cast<int>(kept);
 }
@@ -185,10 +186,10 @@ MultiVector attachment_columns(Mat A, Mat rows, const Eigen::SparseMatrix<double
 
 MatrixXd by_falling_period(const MatrixXd& mass, double omega, Index& slow)
 {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((mass + mass.transpose()) / 2);
+  const SymmetricEigenpairs spectrum = solve_dense_symmetric((mass + mass.transpose()) / 2);
   constexpr double fastest = 4; // times omega
-  slow = (spectrum.eigenvalues().array() * (1 + fastest * fastest) * omega * omega > 1).count();
-  return spectrum.eigenvectors().rowwise().reverse();
+  slow = (spectrum.lambda.array() * (1 + fastest * fastest) * omega * omega > 1).count();
+  return spectrum.y.rowwise().reverse();
 }
 
 void choose_basis(ReducedModel& model, const MatrixXd& energy, Mat M_z, MultiVector& columns, const ModeCounts& counts,

@@ -119,15 +119,25 @@ void project(const Monodromy& monodromy, const SlowMotions& slow, const std::vec
   }
 }
 
-/// The pairs that decide: the largest and those whose bars reach across 1.
+/// Whether some value is above 1 by more than its bar.
+bool repels(const Passes& passes)
+{
+  for (std::size_t i = 0; i < passes.pairs.size(); ++i)
+    if (i != passes.shift && std::abs(passes.pairs[i].lambda) - passes.bars[i] > 1) return true;
+  return false;
+}
+
+/// The pairs that decide: the largest, and those whose bars reach across 1 unless another one is above it for sure.
 std::vector<std::size_t> deciding_pairs(const Passes& passes)
 {
+  const bool decided = repels(passes);
   double largest = 0;
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
     if (i != passes.shift) largest = std::max(largest, std::abs(passes.pairs[i].lambda));
   std::vector<std::size_t> deciding;
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
-    if (i != passes.shift && (reaches_across(passes, i) || std::abs(passes.pairs[i].lambda) > largest - 1e-9))
+    if (i != passes.shift &&
+        ((!decided && reaches_across(passes, i)) || std::abs(passes.pairs[i].lambda) > largest - 1e-9))
       deciding.push_back(i);
   return deciding;
 }
@@ -168,14 +178,6 @@ MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Index size)
   return result;
 }
 
-/// Whether some value is above 1 by more than its bar.
-bool repels(const Passes& passes)
-{
-  for (std::size_t i = 0; i < passes.pairs.size(); ++i)
-    if (i != passes.shift && std::abs(passes.pairs[i].lambda) - passes.bars[i] > 1) return true;
-  return false;
-}
-
 /// Whether values that matter still change so much that they cannot be taken for multipliers.
 bool meaningless(const Passes& passes)
 {
@@ -191,12 +193,20 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
 {
   if (std::string refusal = begin_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
   constexpr double settled = 2.5e-7; // what other ranks or starts may add up to: below 1e-6
+  const auto is_settled = [&](std::size_t i)
+  {
+    const double beyond = std::abs(passes.pairs[i].lambda) - 1;
+    if (beyond > passes.bars[i] && 2 * passes.changes[i] <= 0.1 * beyond) return true;
+    // of the grid's error, which the bar holds as well: as much as that, where the verdict stands already
+    const double part = reaches_across(passes, i) ? 0.05 : 0.5;
+    return passes.changes[i] <= std::max(settled, part * slow.errors[i]);
+  };
   std::vector<std::size_t> refined;
   for (int pass = 1;; ++pass)
   {
     project(monodromy, slow, refined, passes);
     refined = deciding_pairs(passes);
-    if (pass > 1) std::erase_if(refined, [&](std::size_t i) { return passes.changes[i] <= settled; });
+    if (pass > 1) std::erase_if(refined, is_settled);
     if (refined.empty() || pass == passes_at_most) break;
     if (extend(monodromy, corrections(monodromy, slow, refined, passes), passes) == 0) break;
   }
@@ -238,7 +248,7 @@ void take_out_shift(Passes& passes)
 
 Completeness coverage_of(const SlowMotions& slow, const DeflatedSearch& search)
 {
-  if (!slow.confirmed)
+  if (!slow.confirmed())
     return {false, "the reduced model has another number of large multipliers with fewer modes: more of them "
                    "(modes.band) would decide"};
   if (search.bounded) return {true, ""};
@@ -276,7 +286,12 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
   take_out_shift(passes);
   multipliers.trivial_error = passes.shift_distance;
   DeflatedSearch search;
-  if (!repels(passes)) search = search_beside(monodromy, passes.wanted, slow.others, columns > 0 ? columns : 96);
+  Completeness coverage{true, ""}; // a multiplier above 1 needs no other
+  if (!repels(passes))
+  {
+    search = search_beside(monodromy, passes.wanted, slow.others, columns > 0 ? columns : 96);
+    coverage = coverage_of(slow, search);
+  }
   multipliers.periods = slow.periods + static_cast<long>(passes.image.columns()) + search.columns;
   std::vector<std::size_t> order(passes.pairs.size());
   std::iota(order.begin(), order.end(), 0U);
@@ -290,7 +305,7 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
     multipliers.upper.push_back(std::abs(passes.pairs[i].lambda) + passes.rises[i]);
   }
   if (std::abs(search.largest) - 2 * search.residual > 1) add_value(multipliers, search.largest, 2 * search.residual);
-  decide(multipliers, coverage_of(slow, search), multipliers.values.size());
+  decide(multipliers, coverage, multipliers.values.size());
   if (passes.pairs.empty()) return result;
   const MatrixXd fastest = real_part(passes.pairs[order.front()].y);
   result.fastest = std::move(states_of(combination(passes.space.V, fastest), orbit.state).front());

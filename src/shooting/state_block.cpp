@@ -1,7 +1,8 @@
 #include "state_block.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
+
 #include <cmath>
-#include <Eigen/Eigenvalues>
 
 namespace squeal
 {
@@ -65,10 +66,9 @@ StateBlock orthonormal(const Flow& flow, StateBlock X, double least)
     const MatrixXd gram = inner_products(X, energy_images(flow, X));
     const Eigen::VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     const MatrixXd scaled = scale.asDiagonal() * gram * scale.asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum((scaled + scaled.transpose()) / 2);
-    const Eigen::VectorXd& values = spectrum.eigenvalues();
+    const auto [values, vectors] = solve_dense_symmetric((scaled + scaled.transpose()) / 2);
     const auto kept = (values.array() > least * least * values.maxCoeff()).count();
-    X = combination(X, scale.asDiagonal() * spectrum.eigenvectors().rightCols(kept) *
+    X = combination(X, scale.asDiagonal() * vectors.rightCols(kept) *
                            values.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal());
   }
   return X;

@@ -2,9 +2,8 @@
 
 #include "sliding_basis.hpp"
 #include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
-
-#include <Eigen/Eigenvalues>
 
 namespace squeal
 {
@@ -116,11 +115,10 @@ void ShapeCollection::add(MultiVector vectors, double truncation)
   for (int pass = 0; pass < 2 && shapes_.columns() > 0; ++pass) // twice: what is left is small
     vectors.entries -= shapes_.entries * inner_products(images_, vectors);
   const MatrixXd left = inner_products(vectors, product(energy_, vectors));
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver((left + left.transpose()) / 2);
-  const Index gained = (solver.eigenvalues().array() > truncation * truncation).count();
-  const VectorXd sizes = solver.eigenvalues().tail(gained).cwiseSqrt();
-  const MultiVector news =
-      combination(vectors, solver.eigenvectors().rightCols(gained) * sizes.cwiseInverse().asDiagonal());
+  const auto [squares, directions] = solve_dense_symmetric((left + left.transpose()) / 2);
+  const Index gained = (squares.array() > truncation * truncation).count();
+  const VectorXd sizes = squares.tail(gained).cwiseSqrt();
+  const MultiVector news = combination(vectors, directions.rightCols(gained) * sizes.cwiseInverse().asDiagonal());
   append(images_, product(energy_, news));
   append(shapes_, news);
 }

@@ -25,9 +25,9 @@ struct SlowMotions
   std::vector<Owned<Vec>> others;           // more motions that decay slowly, the slowest first
   /// x = (A - m)^-1 x of a complex x, A that approximation of dPhi_T/dx.
   std::function<void(std::complex<double> m, Vec real, Vec imaginary)> correct;
-  bool confirmed = false; // another approximation has as many large values
-  std::string missing;    // why there are none
-  long periods = 0;       // integrated to find them
+  std::function<bool()> confirmed; // whether another approximation has as many large values
+  std::string missing;             // why there are none
+  long periods = 0;                // integrated to find them
 };
 
 /// The period map Phi_T: the state a time T after a start.
