@@ -31,6 +31,19 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
                  decay.value, decay.error, 3 / std::max({decay.value, decay.error, 1e-6}))};
 }
 
+/// Of an exponent above zero. Batches of a mean's bar are independent where they hold several correlation times: 32
+/// batches, 1.5 each.
+MotionVerdict judge_irregular(std::span<const double> energies)
+{
+  constexpr double enough = 50; // correlation times, Sokal's number as well
+  const double needed = enough * correlation_time(energies);
+  if (static_cast<double>(energies.size()) >= needed) return {MotionKind::irregular, "", ""};
+  return {MotionKind::undecided, "an irregular motion and one that still changes",
+          format("its energy wanders slowly, and means may be off by more than their bars: %.2g periods would decide "
+                 "(-settled_periods)",
+                 needed)};
+}
+
 /// Whether the periods' energies are one value within what is asked of a cycle's energy by default (accuracy), and do
 /// not part from it.
 bool steady(std::span<const double> energies)
@@ -109,7 +122,7 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
                                       [](const MeanValue& one) { return one.value > together * one.error; });
   const auto zero = std::count_if(exponents.begin(), exponents.end(),
                                   [](const MeanValue& one) { return std::abs(one.value) <= together * one.error; });
-  if (positive > 0) return {MotionKind::irregular, "", ""};
+  if (positive > 0) return judge_irregular(energies);
   if (zero == 1) return {MotionKind::periodic, "", ""};
   // slow motions that die out have exponents within their bars of zero, too
   if (zero > 1 && steady(energies)) return {MotionKind::periodic, "", ""};

@@ -63,6 +63,24 @@ bool is_stationary(std::span<const double> series)
   return std::abs(early - late.value) <= std::max(std::sqrt(3.) * late.error, 1e-3 * std::abs(late.value));
 }
 
+double correlation_time(std::span<const double> series)
+{
+  const double middle = mean(series);
+  const auto covariance = [&](std::size_t lag)
+  {
+    double sum = 0;
+    for (std::size_t i = lag; i < series.size(); ++i) sum += (series[i] - middle) * (series[i - lag] - middle);
+    return sum;
+  };
+  const double variance = covariance(0);
+  double time = 1;
+  if (!(variance > 0)) return time;
+  constexpr double window = 5; // times: of what decays exponentially, e^-5 is left out
+  for (std::size_t lag = 1; lag < series.size() && static_cast<double>(lag) <= window * time; ++lag)
+    time += 2 * covariance(lag) / variance;
+  return std::max(time, 1.);
+}
+
 std::size_t values_before_stationary(std::span<const double> series)
 {
   for (const std::size_t left_out : {std::size_t{0}, series.size() / 8, series.size() / 4, series.size() / 2})

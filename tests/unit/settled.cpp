@@ -174,6 +174,20 @@ TEST_CASE("bars of batch means hold the true mean in nine series of ten or more"
   }
 }
 
+TEST_CASE(
+    "the correlation time of noise with memory a is (1 + a)/(1 - a); an irregular motion that wanders is undecided")
+{
+  std::mt19937 random(11);
+  double sum = 0;
+  for (int i = 0; i < 400; ++i) sum += correlation_time(noise_with_memory(random, 0.7));
+  CHECK(sum / 400 == doctest::Approx(1.7 / 0.3).epsilon(0.15)); // taking the mean off costs 2 M tau/n = 12 %
+  const std::vector<MeanValue> exponents{{0.1, 0.01}};
+  const BaseFrequencies base;
+  CHECK(judge_motion(exponents, noise_with_memory(random, 0), base).kind == MotionKind::irregular);
+  const MotionVerdict wandering = judge_motion(exponents, noise_with_memory(random, 0.97), base);
+  CHECK(wandering.kind == MotionKind::undecided);
+}
+
 TEST_CASE("a drift is not stationary, a beat is; what comes before the motion has settled is left out")
 {
   std::mt19937 random(3);

@@ -21,6 +21,10 @@ MeanValue batch_mean(std::span<const double> series);
 /// (Geweke 1992). The last half gives the bar.
 bool is_stationary(std::span<const double> series);
 
+/// Integrated correlation time of a stationary series, in values: 1 + 2 sum of the autocorrelation, summed up to five
+/// times itself (Sokal 1997); 1 where values are independent.
+double correlation_time(std::span<const double> series);
+
 /// The number of values to leave out until the rest is stationary: none, an eighth, a quarter or a half. All where
 /// that does not do either.
 std::size_t values_before_stationary(std::span<const double> series);
