@@ -115,7 +115,7 @@ void add_shared_to_schur_complement(const SymbolicFactor& symbolic, const Shared
   {
     const std::size_t width = std::min(together, pivots - first);
     std::vector<double> part(mine * width), all(at(rows) * width), E(all.size());
-    for (std::size_t j = 0; j < width; ++j) std::copy_n(own + (first + j) * height, mine, &part[j * mine]);
+    for (std::size_t j = 0; j < width; ++j) std::copy_n(own + (first + j) * height, mine, part.data() + j * mine);
     std::vector<int> counts(count), starts(count.size(), 0);
     for (std::size_t p = 0; p < counts.size(); ++p)
     {

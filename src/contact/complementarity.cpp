@@ -143,7 +143,7 @@ StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vecto
 bool has_one_solution(const ComplementarityProblem& problem)
 {
   const MatrixXd symmetric = (problem.M + problem.M.transpose()) / 2;
-  return symmetric.llt().info() == Eigen::Success;
+  return symmetric.rows() == 0 || symmetric.llt().info() == Eigen::Success;
 }
 
 double unilateral_residual(const std::vector<double>& reaction, const std::vector<double>& gap,

@@ -95,6 +95,11 @@ TEST_CASE("much friction: a converged status iteration is one of the solutions, 
   CHECK(std::min(none, several) > 10); // both were met
 }
 
+TEST_CASE("without pairs there is one solution")
+{
+  CHECK(has_one_solution(ComplementarityProblem{}));
+}
+
 TEST_CASE("a gap at rounding counts as closed, whatever the unit of force")
 {
   for (const double factor : {1., 1e-6, 1e6})
