@@ -187,8 +187,16 @@ void hold_against_motion(const Search& search, Attempt& attempt)
              largest, 100 * part, 100 * distances.back(), distances.size());
 }
 
-/// Shoots from the end of the free motion.
-Attempt attempt_from(const Search& search, const Orbit& free)
+/// Whether shooting has found the orbit again. Each is known up to its residual, which slow motions multiply.
+bool is_again(const Orbit& orbit, const Orbit& known)
+{
+  constexpr double of_period = 1e-4, of_fluctuation = 1e-2;
+  return std::abs(orbit.period / known.period - 1) < of_period &&
+         std::abs(orbit.fluctuation / known.fluctuation - 1) < of_fluctuation;
+}
+
+/// Shoots from the end of the free motion. Where that leads to the `known` attempt's orbit again, its verdict stands.
+Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* known)
 {
   const auto& [problem, options, log, start] = search;
   Orbit orbit = copy_of(free);
@@ -200,6 +208,13 @@ Attempt attempt_from(const Search& search, const Orbit& free)
   Attempt attempt{shoot_once(problem, options, log, std::move(orbit)), {}, first_return};
   if (!attempt.converged()) return attempt;
   attempt.found = prefer_half_period(problem, options, log, std::move(attempt.found));
+  if (known && known->converged() && is_again(attempt.found.orbit, known->found.orbit))
+  {
+    attempt.floquet.multipliers = known->floquet.multipliers;
+    if (const Vec fastest = known->floquet.fastest.get()) attempt.floquet.fastest = copy_of(fastest);
+    attempt.beside = known->beside;
+    return attempt;
+  }
   attempt.floquet = find_multipliers(problem, options, attempt.found.orbit, start.other_unstable);
   hold_against_motion(search, attempt);
   return attempt;
@@ -258,7 +273,7 @@ Attempt search_on(const Search& search, Attempt best, int done, Orbit& free)
       if (free.fluctuation < before && ++collapses > 1) break;
       continue;
     }
-    Attempt next = attempt_from(search, free);
+    Attempt next = attempt_from(search, free, &best);
     last_return = next.first_return;
     if (better(best, next)) best = std::move(next);
   }
@@ -333,7 +348,7 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   // Below the first event nothing limits a motion; above it a start may be ten times too large and still find one.
   problem.least_fluctuation = std::min(free.fluctuation, start.first_event) * std::sqrt(0.1);
   const Search search{problem, options, log, start};
-  Attempt found = attempt_from(search, free);
+  Attempt found = attempt_from(search, free, nullptr);
   const bool slow = leaves_too_slowly(search, found, settings.free_periods);
   if (options.finish != Finish::none && !slow) found = search_on(search, std::move(found), settings.free_periods, free);
   const bool goes_on = !slow && std::isfinite(free.residual);
