@@ -263,12 +263,10 @@ RealModes search_between(Mat M, Mat K, double low, double high, const PencilOpti
 {
   ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
   const Inertia first = inertia_at(low, pencil), last = inertia_at(high, pencil);
-  RealPairs found{.x = empty_multivector(K)};
   RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (last.below <= first.below) return modes;
   move_to(pencil, (low + high) / 2);
-  modes.outcome.iterations = append_nearest(found.x, shifted(pencil), last.below - first.below);
-  found = ritz_pairs(found.x, M, K);
+  const RealPairs found = ritz_pairs(solve_nearest(pencil, last.below - first.below, 0, 1e-4).space, M, K);
   for (Index k = 0; k < found.theta.size(); ++k)
   {
     if (!(found.theta[k] >= low && found.theta[k] < high)) continue;

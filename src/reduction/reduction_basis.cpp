@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace squeal
 {
@@ -63,7 +64,8 @@ struct Orthonormal
 {
   const MatrixXd& E;
   MatrixXd T;
-  Index seen = 0; // columns of X
+  Index seen = 0;      // columns of X
+  double smallest = 1; // part of a direction that was new when it came, squared: rounding is larger by its inverse
 };
 
 /// Takes in what the next `count` columns of X hold that is new. Directions of which less than `threshold` of the
@@ -83,7 +85,10 @@ int extend(Orthonormal& basis, Index count, double threshold)
   image.noalias() = E * columns;
   const MatrixXd fresh = columns.transpose() * image;
   const auto [sizes, directions] = solve_dense_symmetric((fresh + fresh.transpose()) / 2);
-  const auto kept = (sizes.array() > threshold * threshold).count();
+  // a part that is negative, or below what the directions before were rounded by, is nothing new
+  const double rounding = std::max(-sizes.minCoeff(), std::numeric_limits<double>::epsilon() / basis.smallest);
+  const auto kept = (sizes.array() > std::max(threshold * threshold, rounding)).count();
+  if (kept > 0) basis.smallest = std::min(basis.smallest, sizes(sizes.size() - kept));
   basis.T.conservativeResize(Eigen::NoChange, basis.T.cols() + kept);
   basis.T.rightCols(kept) =
       columns * (directions.rightCols(kept) * sizes.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal());
