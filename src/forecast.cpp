@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
+#include <numeric>
 #include <sys/mman.h>
 #include <sys/resource.h>
 
@@ -195,6 +197,21 @@ double memory_of_cycle(const Sizes& sizes, CycleModel fidelity)
   return memory_of_step(sizes) + number * (4 * shapes + vectors_of_shooting) * sizes.dofs;
 }
 
+/// What the points of a sweep and the samples of a robustness study are laid out in. Their modes come on top.
+double memory_of_points(double points)
+{
+  constexpr double numbers_of_point = 16;
+  return number * numbers_of_point * points;
+}
+
+double points_of(const SweepSettings& sweep)
+{
+  if (sweep.samples > 0) return sweep.samples;
+  double points = static_cast<double>(sweep.values.size());
+  if (points == 0) points = std::accumulate(sweep.points.begin(), sweep.points.end(), 1., std::multiplies<>());
+  return points;
+}
+
 } // namespace
 
 double Forecast::bytes() const
@@ -218,6 +235,8 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   if (scene.transient.enabled)
     add(Stage::transient, memory_of_step(sizes) + number * entries * steps_of_transient(scene.transient));
   if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity));
+  if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)));
+  if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
   forecast.steps = steps_of(scene, options);
   forecast.step_seconds = seconds_of_no_model + seconds_per_byte * (sizes.factor.bytes + sizes.condensed_operator());
   return forecast;

@@ -146,6 +146,12 @@ Request request(MPI_Comm comm)
   return own.checkpoint_due ? Request::checkpoint : Request::none;
 }
 
+bool is_asked_here()
+{
+  const Control& own = control();
+  return signal_received != 0 || (own.limits.time_limit > 0 && seconds_since(own.begun) > own.limits.time_limit);
+}
+
 void end_if_asked(MPI_Comm comm)
 {
   if (request(comm) == Request::end) throw Interrupted{};

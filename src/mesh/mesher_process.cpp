@@ -5,6 +5,7 @@
 #include "mesher_process.hpp"
 
 #include "squeal/base/error.hpp"
+#include "squeal/base/run_control.hpp"
 
 #include <array>
 #include <chrono>
@@ -124,7 +125,7 @@ pid_t start(const MesherTask& task, int answer, int script)
   return child;
 }
 
-/// Reads until the mesher closes its end. Returns nothing if it took too long.
+/// Reads until the mesher closes its end. Returns nothing if it took too long, or the run is asked to end.
 std::string read_answer(int pipe, const std::string& file)
 {
   const auto began = std::chrono::steady_clock::now();
@@ -136,7 +137,7 @@ std::string read_answer(int pipe, const std::string& file)
     pollfd waiting{pipe, POLLIN, 0};
     const int ready = poll(&waiting, 1, 1000);
     const auto now = std::chrono::steady_clock::now();
-    if (now - began > longest_wait) return {};
+    if (now - began > longest_wait || is_asked_here()) return {};
     if (now - reported > report_after)
     {
       reported = now;

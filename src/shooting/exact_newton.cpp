@@ -3,6 +3,7 @@
 #include "whole_matrix.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace squeal
 {
@@ -23,7 +24,8 @@ struct Correction
   double period = 0; // [s]
 };
 
-/// The solution of [dPhi/dx - I, d; f', 0] (dx, dT) = (-F, 0), clamped.
+/// The solution of [dPhi/dx - I, d; f', 0] (dx, dT) = (-F, 0), clamped. Its period is NaN where the matrix is not
+/// finite.
 Correction newton_step(const OrbitProblem& problem, double clamp, const Orbit& orbit)
 {
   const Flow& flow = problem.flow;
@@ -46,6 +48,7 @@ Correction newton_step(const OrbitProblem& problem, double clamp, const Orbit& o
   VectorXd rhs = VectorXd::Zero(n + 1);
   rhs.head(n) = -coordinates_of(orbit.defect, orbit.period);
   J.row(n) /= std::max(J.row(n).norm(), 1e-300);
+  if (!J.allFinite() || !rhs.allFinite()) return {zeros_like(orbit.rate), std::nan("")}; // Eigen would never end
   const VectorXd step = J.completeOrthogonalDecomposition().solve(rhs);
   Correction correction{state_at(step.head(n), orbit), step(n) / rate_norm};
   const double length = std::max(energy_norm(flow, correction.state), std::abs(correction.period) * speed);

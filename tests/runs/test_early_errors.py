@@ -111,6 +111,29 @@ def test_the_forecast_is_printed_and_forced(squeal):
     assert run.code == 0, run.errors
 
 
+@pytest.mark.parametrize("points", [["sweep.key=friction.coefficient", "sweep.from=0.1", "sweep.to=0.5", "sweep.points=2000000000"],
+                                    ["robustness.samples=2000000000",
+                                     "uncertain=[{key='friction.coefficient', distribution='uniform', from=0.1, to=0.3}]"]], ids=["sweep", "robustness"])
+def test_points_beyond_the_memory_are_refused(squeal, points):
+    run = squeal(OSCILLATOR, *[word for point in points for word in ("--set", point)], ranks=1)
+    assert run.code == 1 and len(run.messages) == 1 and "GB of memory" in run.messages[0], run.errors
+
+
+def test_a_key_of_very_many_parts_is_refused(squeal, tmp_path):
+    """The parser's recursion ended the stack at 50 000."""
+    scene = tmp_path / "deep.toml"
+    scene.write_text(".".join(["a"] * 50000) + " = 1\n" + OSCILLATOR.read_text())
+    refused(squeal(scene, ranks=1), "deep.toml, line 1", "64 parts")
+    scene.write_text("# " + "." * 200 + " e.g. this. " * 80 + "\n" + OSCILLATOR.read_text())  # a comment may
+    assert squeal(scene, "--dry-run", ranks=1).code == 0
+
+
+def test_a_load_beyond_all_bounds_ends(squeal):
+    """Newton's matrix was not finite, and its decomposition did not end."""
+    run = squeal(OSCILLATOR, "--set", "force.0.vector.1=-1e16", "--set", "transient.enabled=false", ranks=1)
+    assert run.code in (0, 2), run.errors
+
+
 @pytest.mark.parametrize("megabytes", [300, 500, 600, 700, 800, 900, 1000, 1200, 2000, 4000])
 def test_a_limit_of_memory_ends_the_run_or_leaves_it_alone(tmp_path, megabytes):
     """OpenBLAS tries for ever to allocate its buffer."""

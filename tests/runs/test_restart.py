@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from conftest import INPUTS, ROOT
 from test_basin import two_oscillators
+from test_mesher import brick_scene
 
 OSCILLATOR = INPUTS / "oscillator" / "scene.toml"
 ENDLESS = ["--set", "transient.periods=1e5"]
@@ -67,6 +68,15 @@ def assert_same_results(one, other):
 def test_repeats_are_bitwise_equal(converged, ranks):
     one, other = (converged(*PIN, ranks=ranks).output for _ in range(2))
     assert_same_results(one, other)
+
+
+def test_the_time_limit_ends_a_mesher_that_does_not(tmp_path):
+    scene = brick_scene(tmp_path)
+    (tmp_path / "endless.geo").write_text("For i In {0:1e18}\nEndFor\n")
+    scene.write_text(scene.read_text().replace("bar.msh", "endless.geo"))
+    run = subprocess.run([os.environ["SQUEAL"], scene, "--time-limit", "2", "--output", tmp_path / "out"],
+                         capture_output=True, text=True, timeout=30)
+    assert run.returncode == 3 and "by the time limit before the first stage" in run.stdout, run.stdout + run.stderr
 
 
 @pytest.mark.parametrize("ranks,number", [(1, signal.SIGTERM), (1, signal.SIGINT), (2, signal.SIGUSR1)])

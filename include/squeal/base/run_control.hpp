@@ -42,6 +42,10 @@ enum class Request
 /// Ranks talk after each step where steps take longer than a millisecond, else after every sixteenth.
 Request request(MPI_Comm comm);
 
+/// Whether this rank knows of a request to end: a signal, or the time limit by its own clock. For waiting that other
+/// ranks have no part in.
+bool is_asked_here();
+
 /// Throws Interrupted if the run is asked to end. Collective.
 void end_if_asked(MPI_Comm comm);
 
