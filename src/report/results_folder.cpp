@@ -273,6 +273,9 @@ std::vector<fs::path> inputs_of(const Scene& scene)
 
 void check_outputs(const Scene& scene, const fs::path& place)
 {
+  std::error_code failed;
+  if (!fs::exists(place, failed) && failed) // a name that is too long, a link to itself
+    throw Error("the output " + shortened(place) + ": " + failed.message() + ": name another folder with --output DIR");
   std::vector<fs::path> results;
   for (const char* name : result_file_names) results.push_back(place / name);
   const std::vector<fs::path> inputs = inputs_of(scene);

@@ -52,13 +52,15 @@ std::vector<double> values_at(const std::vector<UncertainNumber>& numbers, const
   return values;
 }
 
-/// The same on every machine.
-std::vector<std::vector<double>> random_values(const RobustnessProblem& problem)
+/// The same on every machine. Collective: it ends where the run is asked to.
+std::vector<std::vector<double>> random_values(const RobustnessProblem& problem, MPI_Comm comm)
 {
+  constexpr int between = 1 << 14; // samples, a few milliseconds
   std::mt19937_64 generator(static_cast<std::uint64_t>(problem.settings.seed));
   std::vector<std::vector<double>> samples;
   for (int k = 0; k < problem.settings.samples; ++k)
   {
+    if (k % between == 0) end_if_asked(comm);
     std::vector<double> parts;
     for (std::size_t i = 0; i < problem.numbers.size(); ++i)
       parts.push_back(static_cast<double>(generator() >> 11) * 0x1p-53); // in [0, 1)
@@ -342,7 +344,7 @@ Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
     result.outcome = {OutcomeKind::refused, error.what(), 0, 0};
     return result;
   }
-  for (std::vector<double>& values : random_values(problem)) result.samples.push_back({std::move(values)});
+  for (std::vector<double>& values : random_values(problem, comm)) result.samples.push_back({std::move(values)});
   for (int k = 0; k < problem.settings.checks; ++k) result.checks.push_back({k});
   std::vector<UnstableMode> unstable;
   {

@@ -128,6 +128,14 @@ def test_a_key_of_very_many_parts_is_refused(squeal, tmp_path):
     assert squeal(scene, "--dry-run", ranks=1).code == 0
 
 
+@pytest.mark.parametrize("name", ["a" * 300, "loop"])
+def test_an_output_that_no_folder_can_have_is_refused(tmp_path, name):
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    done = subprocess.run([os.environ["SQUEAL"], OSCILLATOR, "--output", tmp_path / name], capture_output=True, text=True,
+                          timeout=30, cwd=tmp_path)
+    assert done.returncode == 1 and "--output DIR" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+
+
 def test_a_load_beyond_all_bounds_ends(squeal):
     """Newton's matrix was not finite, and its decomposition did not end."""
     run = squeal(OSCILLATOR, "--set", "force.0.vector.1=-1e16", "--set", "transient.enabled=false", ranks=1)
