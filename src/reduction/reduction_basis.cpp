@@ -85,9 +85,11 @@ int extend(Orthonormal& basis, Index count, double threshold)
   image.noalias() = E * columns;
   const MatrixXd fresh = columns.transpose() * image;
   const auto [sizes, directions] = solve_dense_symmetric((fresh + fresh.transpose()) / 2);
-  // a part that is negative, or below what the directions before were rounded by, is nothing new
+  // a part that is negative, or below what the directions before were rounded by, is nothing new; that bound is far
+  // too wide where such a direction came with hardly anything
+  constexpr double widest = 1e-9;
   const double of_sums = static_cast<double>(E.rows()) * std::numeric_limits<double>::epsilon();
-  const double rounding = std::max(-sizes.minCoeff(), of_sums / basis.smallest);
+  const double rounding = std::max(-sizes.minCoeff(), std::min(of_sums / basis.smallest, widest));
   const auto kept = (sizes.array() > std::max(threshold * threshold, rounding)).count();
   if (kept > 0) basis.smallest = std::min(basis.smallest, sizes(sizes.size() - kept));
   basis.T.conservativeResize(Eigen::NoChange, basis.T.cols() + kept);
