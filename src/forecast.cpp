@@ -206,10 +206,10 @@ double memory_of_points(double points)
 
 double points_of(const SweepSettings& sweep)
 {
-  if (sweep.samples > 0) return sweep.samples;
   double points = static_cast<double>(sweep.values.size());
   if (points == 0) points = std::accumulate(sweep.points.begin(), sweep.points.end(), 1., std::multiplies<>());
-  return points;
+  if (sweep.samples > 0) points = sweep.samples;
+  return sweep.directions == SweepDirections::both ? 2 * points : points;
 }
 
 } // namespace

@@ -88,7 +88,7 @@ private:
     if (problem.empty()) problem = problem_of_session_option(name, value);
     if (!problem.empty())
       given.problem = problem + source;
-    else if (name == "options_file")
+    else if (names_options_file(name))
       examine_file(value);
   }
 

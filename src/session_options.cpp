@@ -18,11 +18,11 @@ namespace
 /// What an option of the session takes.
 enum class Value
 {
-  flag,       // nothing, or true or false
-  read_file,  // a file that exists
-  write_file, // nothing, or a file that can be written
-  viewer,     // [ascii][:file[:format]]
-  info,       // nothing, or file[:classes]
+  flag,         // nothing, or true or false
+  options_file, // a file that exists, and holds options
+  write_file,   // nothing, or a file that can be written
+  viewer,       // [ascii][:file[:format]]
+  info,         // nothing, or file[:classes]
   text,
 };
 
@@ -41,7 +41,7 @@ constexpr std::array session_options = {
     SessionOption{"log_exclude", Value::text, "CLASSES  leaves events out"},
     SessionOption{"info", Value::info, "[FILE[:CLASSES]]  PETSc's own messages"},
     SessionOption{"history", Value::write_file, "[FILE]  keeps what PETSc prints"},
-    SessionOption{"options_file", Value::read_file, "FILE  more options"},
+    SessionOption{"options_file", Value::options_file, "FILE  more options"},
     SessionOption{"options_left", Value::flag, "  lists options that were not used"},
     SessionOption{"options_view", Value::flag, "  lists options"},
     SessionOption{"skip_petscrc", Value::flag, "  leaves files .petscrc out"},
@@ -96,12 +96,12 @@ std::string problem_of_viewer(const std::string& value)
 
 std::string problem_of_value(const SessionOption& option, const std::string& value)
 {
-  if (value.empty()) return option.value == Value::read_file ? "it needs the name of a file" : "";
+  if (value.empty()) return option.value == Value::options_file ? "it needs the name of a file" : "";
   switch (option.value)
   {
   case Value::flag:
     return is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"}) ? "" : "it is true or false";
-  case Value::read_file:
+  case Value::options_file:
     return is_file(value) && access(value.c_str(), R_OK) == 0 ? "" : "there is no such file, or it cannot be read";
   case Value::write_file:
     return problem_of_new_file(value);
@@ -127,6 +127,12 @@ std::string problem_of_session_option(const std::string& name, const std::string
   const SessionOption* option = find_option(name);
   const std::string problem = option ? problem_of_value(*option, value) : "";
   return problem.empty() ? "" : "option -" + name + " " + shortened(value) + ": " + problem;
+}
+
+bool names_options_file(const std::string& name)
+{
+  const SessionOption* option = find_option(name);
+  return option && option->value == Value::options_file;
 }
 
 std::string session_option_reference()

@@ -95,6 +95,12 @@ double seconds_since(Clock::time_point time)
   return std::chrono::duration<double>(Clock::now() - time).count();
 }
 
+bool time_is_up()
+{
+  const double limit = control().limits.time_limit;
+  return limit > 0 && seconds_since(control().begun) > limit;
+}
+
 /// All ranks take what any of them knows, and rank 0's clock.
 void agree_on_requests(MPI_Comm comm)
 {
@@ -104,8 +110,7 @@ void agree_on_requests(MPI_Comm comm)
   std::array<int, 3> known = {signal_received, 0, 1};
   if (rank == 0)
   {
-    const double limit = own.limits.time_limit;
-    if (known[0] == 0 && limit > 0 && seconds_since(own.begun) > limit) known[0] = by_time_limit;
+    if (known[0] == 0 && time_is_up()) known[0] = by_time_limit;
     known[1] = seconds_since(own.last_checkpoint) >= own.limits.checkpoint_interval;
     known[2] = seconds_since(own.last_agreed) < 1e-3 * std::max(own.since, 1) ? 16 : 1;
     own.last_agreed = Clock::now();
@@ -148,8 +153,7 @@ Request request(MPI_Comm comm)
 
 bool is_asked_here()
 {
-  const Control& own = control();
-  return signal_received != 0 || (own.limits.time_limit > 0 && seconds_since(own.begun) > own.limits.time_limit);
+  return signal_received != 0 || time_is_up();
 }
 
 void end_if_asked(MPI_Comm comm)

@@ -250,9 +250,7 @@ void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, int other
 /// Whether the model has as many shapes as the structure has motions.
 bool holds_every_motion(const ReducedModel& model, int eliminated, Vec state)
 {
-  PetscInt dofs = 0;
-  check(VecGetSize(displacement(state), &dofs));
-  return model.size() + eliminated == dofs;
+  return model.size() + eliminated == dofs_of(state);
 }
 
 /// Whether three quarters of the shapes give as many multipliers above 0.95.

@@ -92,26 +92,20 @@ struct ShiftedPencil
   Solve solve{};
 };
 
-ShiftedPencil shifted(const ShiftInvert& pencil)
-{
-  const auto solve = [&factor = *pencil.factor](Vec b, Vec x)
-  { copy_column(factor.solve(columns_of(std::span<const Vec>(&b, 1))), 0, x); };
-  return {pencil.K, pencil.M, pencil.shift, solve};
-}
-
-/// By the factor of the steps, which solves for one vector three times as fast as MUMPS. Where K - shift M is not
-/// positive definite, by MUMPS.
-ShiftedPencil shifted_below_zero(Mat K, Mat M, double shift, const PencilOptions& options)
+/// By the factor of the steps, which solves for one vector faster than MUMPS. Where K - shift M is not positive
+/// definite, by MUMPS.
+ShiftedPencil shifted_below_zero(Mat K, Mat M, double shift, const ModesOptions& options)
 {
   Owned<Mat> A;
   check(MatDuplicate(K, MAT_COPY_VALUES, A.put()));
   check(MatAXPY(A, -shift, M, UNKNOWN_NONZERO_PATTERN));
-  const auto factor = std::make_shared<const Factor>(A, nullptr, FactorOptions{});
+  const auto factor = std::make_shared<const Factor>(A, nullptr, options.factor);
   if (!factor->failed()) return {K, M, shift, [factor](Vec b, Vec x) { solve(*factor, b, x); }};
-  const auto pencil = std::make_shared<ShiftInvert>(make_shift_invert(K, M, Symmetry::symmetric, options));
+  const auto pencil = std::make_shared<ShiftInvert>(make_shift_invert(K, M, Symmetry::symmetric, options.pencil));
   move_to(*pencil, shift);
-  const auto solve = shifted(*pencil).solve;
-  return {K, M, pencil->shift, [pencil, solve](Vec b, Vec x) { solve(b, x); }};
+  const auto solve = [pencil](Vec b, Vec x)
+  { copy_column(pencil->factor->solve(columns_of(std::span<const Vec>(&b, 1))), 0, x); };
+  return {K, M, pencil->shift, solve};
 }
 
 /// Krylov-Schur for the `count` theta nearest the pencil's shift.
@@ -218,13 +212,13 @@ Inertia inertia_at(double limit, Mat K, Mat M, const PencilOptions& options)
 
 /// The modes with theta < limit, at most `count` of them. One factor just below zero finds them, and one above the last
 /// of them counts them. A space grown from one vector may miss copies of multiple modes; those are sought again.
-RealModes search_from_below_zero(Mat M, Mat K, double limit, PetscInt count, const PencilOptions& options)
+RealModes search_from_below_zero(Mat M, Mat K, double limit, PetscInt count, const ModesOptions& options)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
   const double shift = shift_below_zero(M, K);
   std::optional<Inertia> inertia;
-  if (std::isfinite(limit)) inertia = inertia_at(limit, K, M, options);
+  if (std::isfinite(limit)) inertia = inertia_at(limit, K, M, options.pencil);
   RealPairs found{.x = empty_multivector(K)};
   RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
   PetscInt missing = inertia ? inertia->below : count;
@@ -237,7 +231,7 @@ RealModes search_from_below_zero(Mat M, Mat K, double limit, PetscInt count, con
     found = ritz_pairs(found.x, M, K);
     // The count lies above the last mode by 1e-6 of its distance from the shift, far above the error of theta.
     if (!inertia && found.theta.size() >= count)
-      inertia = inertia_at(found.theta[count - 1] + 1e-6 * (found.theta[count - 1] - shift), K, M, options);
+      inertia = inertia_at(found.theta[count - 1] + 1e-6 * (found.theta[count - 1] - shift), K, M, options.pencil);
     missing = inertia ? inertia->below - found.number_below(inertia->limit)
                       : count - static_cast<PetscInt>(found.theta.size());
   }
@@ -342,7 +336,7 @@ RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& opt
   check(MatGetSize(K, &n, nullptr));
   if (count <= 0) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (n <= options.dense_limit) return first_of(solve_whole(M, K), K, count);
-  return search_from_below_zero(M, K, HUGE_VAL, std::min(count, n), options.pencil);
+  return search_from_below_zero(M, K, HUGE_VAL, std::min(count, n), options);
 }
 
 RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options)
@@ -356,7 +350,7 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& 
     const auto below = std::lower_bound(all.lambda.begin(), all.lambda.end(), omega * omega);
     return first_of(all, K, below - all.lambda.begin());
   }
-  return search_from_below_zero(M, K, omega * omega, to_int(n), options.pencil);
+  return search_from_below_zero(M, K, omega * omega, to_int(n), options);
 }
 
 RealModes find_real_modes_below(const LinearisedSliding& linearised, double band, const ModesOptions& options)

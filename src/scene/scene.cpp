@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <string_view>
 
 namespace squeal
 {
@@ -12,44 +11,13 @@ namespace squeal
 namespace
 {
 
-/// The most parts that a key in the line can have: names with single dots between them, before a comment.
-int most_parts(std::string_view line)
-{
-  constexpr std::string_view ends = ",=[]{}";
-  int most = 1, parts = 1;
-  char last = 0, quote = 0;
-  for (const char c : line)
-  {
-    if (quote == 0 && c == '#') break;
-    if (c == ' ' || c == '\t') continue;
-    if (c == quote)
-      quote = 0;
-    else if (quote == 0 && (c == '"' || c == '\''))
-      quote = c;
-    if (ends.find(c) != std::string_view::npos) parts = 1;
-    parts += c == '.' && last != '.';
-    most = std::max(most, parts);
-    last = c;
-  }
-  return most;
-}
-
-/// Refuses keys of very many parts: toml++ makes a table in a table of each, and its recursion ends the stack.
-void refuse_deep_keys(const std::filesystem::path& file)
-{
-  constexpr int deepest = 64; // parts; a scene's keys have three
-  std::ifstream stream(file);
-  int number = 0;
-  for (std::string line; std::getline(stream, line);)
-    if (++number; most_parts(line) > deepest)
-      throw Error(file.string() + ", line " + std::to_string(number) + ": a key of more than " +
-                  std::to_string(deepest) + " parts: leave it out");
-}
-
 toml::table parse_file(const std::filesystem::path& file)
 {
   if (!is_file(file)) throw Error("there is no scene file " + shortened(file));
-  refuse_deep_keys(file);
+  std::ifstream stream(file);
+  int number = 0;
+  for (std::string line; std::getline(stream, line);)
+    refuse_deep_key(line, file.string() + ", line " + std::to_string(++number));
   try
   {
     return toml::parse_file(file.string());

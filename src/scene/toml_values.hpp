@@ -25,6 +25,10 @@ std::string joined(const std::vector<std::string>& words);
 /// Returns "; did you mean 'x'?", or the list of known words if none is near.
 std::string hint_or_list(const std::string& word, const std::vector<std::string>& known);
 
+/// Refuses a line of TOML with a key of more than 64 parts: toml++ makes a table in a table of each part, and its
+/// recursion ends the stack. A scene's keys have three.
+void refuse_deep_key(std::string_view line, const std::string& place);
+
 /// Applies "table.key=value" to the tables of a scene.
 void apply_override(toml::table& root, const std::string& text);
 

@@ -31,11 +31,11 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
                  decay.value, decay.error, 3 / std::max({decay.value, decay.error, 1e-6}))};
 }
 
-/// Of an exponent above zero. Batches of a mean's bar are independent where they hold several correlation times: 32
-/// batches, 1.5 each.
+/// Of an exponent above zero. A mean's bar comes from batches, and a series shorter than some 50 correlation times has
+/// no batches that are independent (Sokal 1997).
 MotionVerdict judge_irregular(std::span<const double> energies)
 {
-  constexpr double enough = 50; // correlation times, Sokal's number as well
+  constexpr double enough = 50; // correlation times
   const double needed = enough * correlation_time(energies);
   if (static_cast<double>(energies.size()) >= needed) return {MotionKind::irregular, "", ""};
   return {MotionKind::undecided, "an irregular motion and one that still changes",

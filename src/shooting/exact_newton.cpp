@@ -62,9 +62,7 @@ Correction newton_step(const OrbitProblem& problem, double clamp, const Orbit& o
 
 bool has_small_tangent(const OrbitProblem& problem)
 {
-  PetscInt dofs = 0;
-  check(VecGetSize(displacement(problem.equilibrium), &dofs));
-  return problem.flow.apply_tangent && dofs <= largest;
+  return problem.flow.apply_tangent && dofs_of(problem.equilibrium) <= largest;
 }
 
 StageResult shoot_by_exact_newton(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,

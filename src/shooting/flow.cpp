@@ -37,6 +37,13 @@ Vec velocity(Vec state)
   return part(state, 1);
 }
 
+PetscInt dofs_of(Vec state)
+{
+  PetscInt dofs = 0;
+  check(VecGetSize(displacement(state), &dofs));
+  return dofs;
+}
+
 void energy_image(const Flow& flow, Vec x, Vec image)
 {
   check(MatMult(flow.K, displacement(x), displacement(image)));

@@ -80,8 +80,7 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
                                  const std::vector<Owned<Vec>>& other_unstable)
 {
   if (options.multipliers == 0) return {};
-  PetscInt dofs = 0;
-  check(VecGetSize(displacement(orbit.state), &dofs));
+  const PetscInt dofs = dofs_of(orbit.state);
   Monodromy monodromy{problem.flow, orbit, options.difference * orbit.fluctuation};
   const MultiplierMethod method = chosen_method(options, problem.flow, dofs);
   if (method == MultiplierMethod::whole) return from_whole_matrix(monodromy, dofs);

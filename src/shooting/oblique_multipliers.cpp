@@ -193,8 +193,7 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
 {
   if (std::string refusal = begin_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
   constexpr double settled = 2.5e-7; // what other ranks or starts may add up to: below 1e-6
-  PetscInt dofs = 0;
-  check(VecGetSize(displacement(monodromy.orbit.state), &dofs));
+  const PetscInt dofs = dofs_of(monodromy.orbit.state);
   const auto is_settled = [&](std::size_t i)
   {
     if (dofs <= large_model) return passes.changes[i] <= settled;

@@ -37,9 +37,7 @@ void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, PetscI
 
 void record_full(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit)
 {
-  PetscInt dofs = 0;
-  check(VecGetSize(displacement(orbit.state), &dofs));
-  record(log, stage, orbit, 2 * dofs + 1, std::nan(""));
+  record(log, stage, orbit, 2 * dofs_of(orbit.state) + 1, std::nan(""));
 }
 
 bool admissible_period(const OrbitProblem& problem, double period)

@@ -169,8 +169,7 @@ void hold_against_motion(const Search& search, Attempt& attempt)
   const double largest = multipliers.values.empty() ? 0 : std::abs(multipliers.values.front());
   const bool unstable = multipliers.stability == Stability::unstable;
   if (!attempt.floquet.fastest.get() || !(largest > 1) || multipliers.stability == Stability::stable) return;
-  PetscInt dofs = 0;
-  check(VecGetSize(displacement(attempt.found.orbit.state), &dofs));
+  const PetscInt dofs = dofs_of(attempt.found.orbit.state);
   const long at_most = dofs > large_model ? many_of_large : many;
   if (!(std::log(4) / std::log(largest) <= static_cast<double>(at_most))) return;
   if (log.convergence.periods + at_most > options.max_periods) return;
@@ -211,7 +210,6 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
   if (known && known->converged() && is_again(attempt.found.orbit, known->found.orbit))
   {
     attempt.floquet.multipliers = known->floquet.multipliers;
-    if (const Vec fastest = known->floquet.fastest.get()) attempt.floquet.fastest = copy_of(fastest);
     attempt.beside = known->beside;
     return attempt;
   }
@@ -231,8 +229,7 @@ bool better(const Attempt& first, const Attempt& second)
 /// from a tenth of the fluctuation to all of it. A small model is searched all the same: its periods cost little.
 bool leaves_too_slowly(const Search& search, const Attempt& attempt, int done)
 {
-  PetscInt dofs = 0;
-  check(VecGetSize(displacement(attempt.found.orbit.state), &dofs));
+  const PetscInt dofs = dofs_of(attempt.found.orbit.state);
   if (dofs <= large_model || !attempt.repels() || attempt.floquet.multipliers.values.empty()) return false;
   const double largest = std::abs(attempt.floquet.multipliers.values.front());
   return std::log(10) > (search.options.free_periods - done) * std::log(std::max(largest, 1.));

@@ -41,8 +41,7 @@ Owned<Vec> state_at(const Eigen::VectorXd& coordinates, const Orbit& orbit)
 
 Eigen::MatrixXd whole_matrix(const Orbit& orbit, const std::function<void(std::span<const Owned<Vec>>)>& multiply)
 {
-  PetscInt dofs = 0;
-  check(VecGetSize(displacement(orbit.state), &dofs));
+  const PetscInt dofs = dofs_of(orbit.state);
   Eigen::MatrixXd M(2 * dofs, 2 * dofs);
   std::vector<Owned<Vec>> columns;
   for (PetscInt k = 0; k < 2 * dofs; ++k) columns.push_back(state_at(Eigen::VectorXd::Unit(2 * dofs, k), orbit));

@@ -124,6 +124,7 @@ def test_a_key_of_very_many_parts_is_refused(squeal, tmp_path):
     scene = tmp_path / "deep.toml"
     scene.write_text(".".join(["a"] * 50000) + " = 1\n" + OSCILLATOR.read_text())
     refused(squeal(scene, ranks=1), "deep.toml, line 1", "64 parts")
+    refused(squeal(OSCILLATOR, "--set", ".".join(["a"] * 60000) + "=1", ranks=1), "--set a.a", "64 parts")
     scene.write_text("# " + "." * 200 + " e.g. this. " * 80 + "\n" + OSCILLATOR.read_text())  # a comment may
     assert squeal(scene, "--dry-run", ranks=1).code == 0
 

@@ -3,6 +3,7 @@
 ///     (lambda^2 Y'M Z + lambda Y'(C + C_f) Z + Y'K Z) phi = 0,   u(t) ~ phi exp(lambda t),   Re(lambda) > 0:
 ///     squeal may start.
 /// Z keeps closed pairs closed, Y removes their normal reactions; all three matrices are unsymmetric.
+#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
@@ -124,7 +125,8 @@ struct ModesOptions
   ModesSolver solver = ModesSolver::slices;
   PetscInt candidates = 20; // pairs that each residual pass of the projection corrects
   ModeShapes shapes = ModeShapes::unstable;
-  PencilOptions pencil{}; // listed by itself
+  FactorOptions factor{}; // both listed by themselves
+  PencilOptions pencil{};
 };
 
 OptionList options_of(ModesOptions& options);

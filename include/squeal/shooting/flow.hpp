@@ -58,6 +58,9 @@ Vec displacement(Vec state);
 /// The second half, likewise.
 Vec velocity(Vec state);
 
+/// The degrees of freedom: half of the state's entries.
+PetscInt dofs_of(Vec state);
+
 /// image = (K u, M v)
 void energy_image(const Flow& flow, Vec x, Vec image);
 
