@@ -249,7 +249,22 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   write_request(scene, results.run(), results.partial(), comm);
   scene.transient.save_state = results.meanwhile(scene.transient.save_state);
   scene.cycle.save_state = results.meanwhile(scene.cycle.save_state);
-  return static_cast<int>(run(scene, options, results, comm));
+  try
+  {
+    return static_cast<int>(run(scene, options, results, comm));
+  }
+  catch (const OutOfMemory& error)
+  {
+    throw OutOfMemory(error.what() + results.keep_finished());
+  }
+  catch (const LibraryError& error)
+  {
+    throw LibraryError(error.what() + results.keep_finished());
+  }
+  catch (const std::bad_alloc&)
+  {
+    throw LibraryError(out_of_memory_text + results.keep_finished());
+  }
 }
 
 /// Ends all ranks after a failure that may be this rank's alone: the others would wait for ever. The lowest failing
@@ -314,7 +329,7 @@ int main(int argc, char** argv)
   }
   catch (const std::bad_alloc&)
   {
-    end_all(rank, "error", "memory ran out; --dry-run prints a forecast");
+    end_all(rank, "error", out_of_memory_text);
   }
   catch (const std::exception& error)
   {

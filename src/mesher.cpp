@@ -117,10 +117,10 @@ FileMesh read_or_generate(const std::string& file)
 MesherAnswer answer_of(int argc, char** argv)
 {
   MesherAnswer answer;
+  const bool script = std::string(argv[1]) == word(MesherInput::script);
   try
   {
     initialise(argc, argv);
-    const bool script = std::string(argv[1]) == word(MesherInput::script);
     answer.mesh = read_or_generate(script ? "/proc/self/fd/" + std::to_string(script_descriptor) : argv[2]);
   }
   catch (const std::string& text) // libgmsh before 4.9 throws strings
@@ -129,7 +129,9 @@ MesherAnswer answer_of(int argc, char** argv)
   }
   catch (const std::bad_alloc&)
   {
-    answer = {{}, "memory ran out: make the mesh coarser"};
+    answer = {{},
+              script ? "memory ran out: make the mesh coarser"
+                     : "memory ran out: the mesh is larger than this machine holds, or the file is corrupt"};
   }
   catch (const std::exception& error)
   {

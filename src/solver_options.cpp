@@ -48,6 +48,35 @@ PetscErrorCode try_pep(const char* prefix, MPI_Comm comm)
   return code;
 }
 
+/// What an option that ends so chooses among: the types that the library knows.
+struct TypeOption
+{
+  const char* ending;
+  PetscFunctionList* types;
+};
+
+const std::array type_options = {
+    TypeOption{"_snes_type", &SNESList}, TypeOption{"_linesearch_type", &SNESLineSearchList},
+    TypeOption{"_ksp_type", &KSPList},   TypeOption{"_pc_type", &PCList},
+    TypeOption{"_pep_type", &PEPList},   TypeOption{"_st_type", &STList}};
+
+/// What is wrong with an option that names a type; empty if nothing is.
+std::string problem_of_type(const std::string& name, const std::string& value)
+{
+  const auto option =
+      std::ranges::find_if(type_options, [&](const TypeOption& one) { return name.ends_with(one.ending); });
+  if (option == type_options.end()) return {};
+  const char** known = nullptr;
+  int count = 0;
+  check(PetscFunctionListGet(*option->types, &known, &count));
+  const std::vector<std::string> words(known, std::find(known, known + count, nullptr)); // the last one is null
+  check(PetscFree(known));
+  if (std::ranges::find(words, value) != words.end()) return {};
+  std::string list;
+  for (const std::string& word : words) list += " " + word;
+  return "option -" + shortened(name) + " " + shortened(value) + ": it is one of" + list;
+}
+
 struct Trial
 {
   const char* object;
@@ -64,28 +93,35 @@ bool is_asked_later(const std::string& name)
   return std::ranges::any_of(asked_later, [&](const char* part) { return name.find(part) != std::string::npos; });
 }
 
+struct GivenOption
+{
+  std::string name, value;
+};
+
 /// The options of solvers in the database that no one has asked for yet.
-std::vector<std::string> unused_solver_options()
+std::vector<GivenOption> unused_solver_options()
 {
   PetscInt count = 0;
   char **names = nullptr, **values = nullptr;
-  std::vector<std::string> unused;
+  std::vector<GivenOption> unused;
   check(PetscOptionsLeftGet(nullptr, &count, &names, &values));
   for (PetscInt i = 0; i < count; ++i)
-    if (solver_prefix_of(names[i])) unused.emplace_back(names[i]);
+    if (solver_prefix_of(names[i])) unused.push_back({names[i], values[i] ? values[i] : ""});
   check(PetscOptionsLeftRestore(nullptr, &count, &names, &values));
   return unused;
 }
 
-void run_trial(const Trial& trial, MPI_Comm comm)
+void run_trial(const Trial& trial, const std::vector<GivenOption>& given, MPI_Comm comm)
 {
   std::string message;
   check(PetscPushErrorHandler(keep_message, &message));
   const PetscErrorCode code = trial.run(trial.object, comm);
   check(PetscPopErrorHandler());
-  if (code != PETSC_SUCCESS)
-    throw Error(std::string("options -") + trial.object +
-                "…, of PETSc's solvers: " + (message.empty() ? "a value that they do not take" : message));
+  if (code == PETSC_SUCCESS) return;
+  for (const auto& [name, value] : given)
+    if (const std::string problem = problem_of_type(name, value); !problem.empty()) throw Error(problem);
+  throw Error(std::string("options -") + trial.object +
+              "…, of PETSc's solvers: " + (message.empty() ? "a value that they do not take" : message));
 }
 
 /// Whether the run's options leave out the solver of a prefix, whatever the run finds.
@@ -105,14 +141,14 @@ const SolverPrefix* solver_prefix_of(const std::string& name)
 
 void check_solver_options(const ProgramOptions& options, MPI_Comm comm)
 {
-  const std::vector<std::string> given = unused_solver_options();
-  for (const Trial& trial : trials) run_trial(trial, comm);
+  const std::vector<GivenOption> given = unused_solver_options();
   std::string problem;
-  for (const std::string& name : given)
+  for (const Trial& trial : trials) run_trial(trial, given, comm);
+  for (const auto& [name, value] : given)
     if (leaves_out(options, *solver_prefix_of(name)))
       problem = "option -" + shortened(name) +
                 ": no solver of this run takes it; leave it out, or give -modes_solver toar as well";
-  for (const std::string& name : unused_solver_options())
+  for (const auto& [name, value] : unused_solver_options())
     if (!is_asked_later(name))
       problem = "unknown option -" + shortened(name) + ": the solver behind -" + solver_prefix_of(name)->text +
                 "… has none of this name";

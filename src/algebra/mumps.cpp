@@ -40,9 +40,7 @@ int outcome_of(DMUMPS_STRUC_C& mumps, MumpsJob job)
 
 [[noreturn]] void throw_failure(const DMUMPS_STRUC_C& mumps)
 {
-  if (information(mumps, 1) == out_of_memory)
-    throw LibraryError(
-        "memory ran out in MUMPS: take a smaller model, or raise the limit; --dry-run prints a forecast");
+  if (information(mumps, 1) == out_of_memory) throw LibraryError(out_of_memory_text);
   throw LibraryError("MUMPS, job " + std::to_string(mumps.job) +
                      ": INFOG(1) = " + std::to_string(information(mumps, 1)) +
                      ", INFOG(2) = " + std::to_string(information(mumps, 2)) + "; its manual lists them");

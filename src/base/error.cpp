@@ -1,6 +1,8 @@
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cstdarg>
 #include <cstdio>
 #include <new>
@@ -11,22 +13,72 @@
 namespace squeal
 {
 
-void agree(MPI_Comm comm, const std::string& problem)
+namespace
+{
+
+/// Failed work: its text, and whether memory ran out.
+struct Problem
+{
+  std::string text;
+  int no_memory = 0;
+};
+
+Problem problem_of(const std::exception_ptr& failure)
+{
+  if (!failure) return {};
+  try
+  {
+    std::rethrow_exception(failure);
+  }
+  catch (const std::bad_alloc&)
+  {
+    return {out_of_memory_text, 1};
+  }
+  catch (const OutOfMemory& error)
+  {
+    return {error.what(), 1};
+  }
+  catch (const std::exception& error)
+  {
+    return {*error.what() ? error.what() : "unknown failure"};
+  }
+  catch (const std::string& text) // libgmsh before 4.9 throws strings
+  {
+    return {text.empty() ? "unknown failure" : text};
+  }
+  catch (...)
+  {
+    return {"unknown failure"};
+  }
+}
+
+void agree_on(MPI_Comm comm, Problem problem)
 {
   int rank = 0, ranks = 1;
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &ranks);
-  const int mine = problem.empty() ? ranks : rank;
+  const int mine = problem.text.empty() ? ranks : rank;
   int first = ranks;
   MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm);
   if (first == ranks) return;
-  const bool no_memory = problem == std::bad_alloc().what();
-  std::string text = no_memory ? "memory ran out; --dry-run prints a forecast of what a run takes" : problem;
-  int length = static_cast<int>(text.size());
-  MPI_Bcast(&length, 1, MPI_INT, first, comm);
-  text.resize(static_cast<std::size_t>(length));
-  MPI_Bcast(text.data(), length, MPI_CHAR, first, comm);
-  throw Error(text);
+  std::array<int, 2> known = {static_cast<int>(problem.text.size()), problem.no_memory};
+  MPI_Bcast(known.data(), 2, MPI_INT, first, comm);
+  problem.text.resize(static_cast<std::size_t>(known[0]));
+  MPI_Bcast(problem.text.data(), known[0], MPI_CHAR, first, comm);
+  if (known[1] != 0) throw OutOfMemory(problem.text);
+  throw Error(problem.text);
+}
+
+} // namespace
+
+void agree(MPI_Comm comm, const std::string& problem)
+{
+  agree_on(comm, {problem});
+}
+
+void agree(MPI_Comm comm, const std::exception_ptr& failure)
+{
+  agree_on(comm, problem_of(failure));
 }
 
 std::vector<std::string> words_in(const std::string& text)
@@ -40,8 +92,10 @@ std::vector<std::string> words_in(const std::string& text)
 std::string shortened(const std::string& text)
 {
   constexpr std::size_t longest = 300;
-  return text.size() <= longest ? text
-                                : text.substr(0, longest) + "... (" + std::to_string(text.size()) + " characters)";
+  std::string shown = text.substr(0, longest);
+  const auto is_control = [](unsigned char c) { return std::iscntrl(c) != 0; };
+  std::ranges::replace_if(shown, is_control, '?');
+  return text.size() <= longest ? shown : shown + "... (" + std::to_string(text.size()) + " characters)";
 }
 
 bool is_file(const std::filesystem::path& name)
@@ -54,6 +108,17 @@ bool is_folder(const std::filesystem::path& name)
 {
   std::error_code failed;
   return std::filesystem::is_directory(name, failed);
+}
+
+std::string problem_of_file(const std::filesystem::path& name)
+{
+  std::error_code failed;
+  if (is_file(name)) return {};
+  if (is_folder(name)) return shortened(name) + " is a folder";
+  if (std::filesystem::exists(name, failed)) return shortened(name) + " is no plain file";
+  if (std::filesystem::is_symlink(std::filesystem::symlink_status(name, failed)))
+    return shortened(name) + " is a link to a file that does not exist, or to itself";
+  return "there is no file " + shortened(name);
 }
 
 std::string format(const char* pattern, ...)

@@ -62,7 +62,7 @@ void check(PetscErrorCode code, std::source_location where)
 {
   if (code == PETSC_SUCCESS) return;
   const char* kind = nullptr;
-  if (code == PETSC_ERR_MEM) throw LibraryError("memory ran out; --dry-run prints a forecast of what a run takes");
+  if (code == PETSC_ERR_MEM) throw LibraryError(out_of_memory_text);
   (void)PetscErrorMessage(code, &kind, nullptr);
   std::string text = std::exchange(last_failure(), {});
   if (text.empty()) text = "no detail given";

@@ -70,7 +70,9 @@ SplitSolution SplitSolver::solve(const std::vector<double>& rhs) const
   solution.gap.assign(n, 0.);
   solution.reaction.assign(n, 0.);
   if (n == 0) return solution;
-  if (!as_vector(rhs).allFinite()) throw Error("contact at rest: the compliance of the pairs is not a finite number");
+  if (!as_vector(rhs).allFinite())
+    throw Error(
+        "contact at rest: the gaps under the loads are not finite numbers: are forces in N and pressures in Pa?");
   const VectorXd x = factors_ ? VectorXd(factors_->solve(as_vector(rhs))) : shortest_solution(matrix_, as_vector(rhs));
   solution.defect = relative_defect(matrix_, x, as_vector(rhs));
   for (std::size_t i = 0; i < n; ++i)

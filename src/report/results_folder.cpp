@@ -181,7 +181,7 @@ void ResultsFolder::make(Beginning beginning)
 
 ResultsFolder::~ResultsFolder()
 {
-  if (!published_) undo();
+  if (!published_ && !kept_) undo();
 }
 
 void ResultsFolder::undo()
@@ -190,6 +190,14 @@ void ResultsFolder::undo()
   if (!partial_.empty() && fs::exists(checkpoints(), ignored)) return; // --restart goes on from them
   if (!partial_.empty()) fs::remove_all(partial_, ignored);
   for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder) fs::remove(*folder, ignored);
+}
+
+std::string ResultsFolder::keep_finished()
+{
+  kept_ = is_file(partial_ / word(ResultFile::report));
+  return kept_ ? "; the stages that finished left their results in " + partial_.string() +
+                     ", which the next run into this place removes"
+               : "";
 }
 
 fs::path ResultsFolder::meanwhile(const fs::path& file) const

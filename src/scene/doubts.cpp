@@ -1,6 +1,7 @@
 /// Bounds of solids (Ashby, Materials Selection in Mechanical Design, charts of moduli and densities). Densities go
 /// from 20 kg/m3 (foams) to 22 590 (osmium), Young's moduli from 1e4 Pa (gels) to 1.3e12 (diamond). Speeds of
-/// sound sqrt(E/rho) go from 10 m/s (soft rubber has 30) to 20 000 (diamond has 18 000).
+/// sound sqrt(E/rho) go from 10 m/s (soft rubber has 30) to 20 000 (diamond has 18 000). A grain of dust of 10 um
+/// weighs 1e-12 kg.
 #include "squeal/scene/doubts.hpp"
 
 #include "squeal/base/error.hpp"
@@ -32,6 +33,28 @@ std::string doubt_about(const Material& material, double young)
   return {};
 }
 
+/// Bodies whose mass is there but can move nothing.
+template <class Body> void doubt_masses(const std::vector<Body>& bodies, std::vector<std::string>& doubts)
+{
+  constexpr double dust = 1e-12; // [kg]
+  for (const Body& body : bodies)
+    if (body.mass > 0 && body.mass < dust)
+      doubts.push_back(format("'%s': a mass of %g kg is less than a grain of dust's. Is its unit kg?",
+                              shortened(body.name).c_str(), body.mass));
+}
+
+/// Loads that do nothing or pull.
+void doubt_loads(const Scene& scene, std::vector<std::string>& doubts)
+{
+  for (const Force& force : scene.forces)
+    if (force.vector == Vec3{}) doubts.push_back("the force on '" + shortened(force.on) + "' is 0 N");
+  for (const Pressure& pressure : scene.pressures)
+    if (pressure.value == 0) doubts.push_back("the pressure on '" + shortened(pressure.on) + "' is 0 Pa");
+  const std::vector<double>& factors = scene.transient.ramps.load.value;
+  if (std::ranges::any_of(factors, [](double factor) { return factor < 0; }))
+    doubts.push_back("[transient] load_factor falls below 0: all loads then act the other way round");
+}
+
 } // namespace
 
 std::vector<std::string> doubts_about(const Scene& scene)
@@ -44,6 +67,9 @@ std::vector<std::string> doubts_about(const Scene& scene)
     if (const std::string doubt = doubt_about(material, young); !doubt.empty())
       doubts.push_back("part '" + part.name + "': " + doubt + ". Are its units Pa and kg/m3?");
   }
+  doubt_masses(scene.points, doubts);
+  doubt_masses(scene.rigid_bodies, doubts);
+  doubt_loads(scene, doubts);
   return doubts;
 }
 

@@ -57,7 +57,7 @@ private:
       const toml::node& entry = *array->get(i);
       std::string label = "[[" + key + "]] ";
       if (const toml::table* table = entry.as_table(); table && (*table)["name"].is_string())
-        label += (*table)["name"].template value_or<std::string>("") + " ";
+        label += shortened((*table)["name"].template value_or<std::string>("")) + " ";
       read_table(entry, list[i], label);
     }
   }

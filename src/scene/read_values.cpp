@@ -3,6 +3,7 @@
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -80,13 +81,14 @@ public:
   void read(const toml::node& node, std::filesystem::path& target) const
   {
     target = absolute(text(node));
-    const std::string what = value_.key.rule == Rule::folder ? "folder" : "file";
-    const bool exists = value_.key.rule == Rule::folder ? is_folder(target)
-                        : value_.key.rule == Rule::file ? is_file(target)
-                                                        : true;
-    if (!exists)
-      throw Error(place_of(node) + ": " + value_.label + value_.key.name + " = " + text_of(node) + ": there is no " +
-                  what + " " + target.string() + " (paths are relative to the scene file)");
+    std::string problem;
+    if (value_.key.rule == Rule::folder && !is_folder(target))
+      problem = "there is no folder " + target.string();
+    else if (value_.key.rule == Rule::file)
+      problem = problem_of_file(target);
+    if (!problem.empty())
+      throw Error(place_of(node) + ": " + value_.label + value_.key.name + " = " + text_of(node) + ": " + problem +
+                  " (paths are relative to the scene file)");
   }
 
   void read(const toml::node& node, std::vector<Vec3>& target) const
@@ -206,7 +208,10 @@ private:
   std::string text(const toml::node& node) const
   {
     if (!node.is_string()) fail(node, "text in quotes, not " + kind_of(node));
-    return *node.value<std::string>();
+    const std::string value = *node.value<std::string>();
+    const auto is_control = [](unsigned char c) { return std::iscntrl(c) != 0 && c != '\n' && c != '\t'; };
+    if (std::ranges::any_of(value, is_control)) fail(node, "text without control characters");
+    return value;
   }
 
   std::vector<double> numbers(const toml::node& node, const std::string& expected) const

@@ -26,7 +26,7 @@ toml::table parse_file(const std::filesystem::path& file)
   {
     const auto& begin = error.source().begin;
     throw Error(file.string() + ", line " + std::to_string(begin.line) + ", column " + std::to_string(begin.column) +
-                ": " + std::string(error.description()));
+                ": " + text_of(error));
   }
 }
 

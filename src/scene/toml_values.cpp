@@ -62,7 +62,7 @@ toml::table parse_override(const std::string& text)
   }
   catch (const toml::parse_error& error)
   {
-    throw Error(source + ": " + std::string(error.description()) + "; expected KEY=VALUE, KEY such as part.disc.young");
+    throw Error(source + ": " + text_of(error) + "; expected KEY=VALUE, KEY such as part.disc.young");
   }
 }
 
@@ -130,6 +130,12 @@ std::vector<std::string> names_of(const toml::table& change)
 }
 
 } // namespace
+
+std::string text_of(const toml::parse_error& error)
+{
+  const std::string text(error.description());
+  return text.substr(0, text.find(" (TOML_"));
+}
 
 void refuse_deep_key(std::string_view line, const std::string& place)
 {

@@ -220,10 +220,10 @@ private:
     const SweepProblem sweep{settings, problem_.model_at, problem_.modes, problem_.modes_options, equilibrium_options_,
                              options};
     SweptModel swept(sweep);
-    const SweepLine line{training_values(problem_), false, false};
-    swept.prepare({line});
+    const std::vector<std::vector<double>> points = training_values(problem_);
+    for (const std::vector<double>& values : points) swept.prepare({values, false});
     ShapeCollection shapes(model_.reference(), pairs, omega_);
-    for (const std::vector<double>& values : line.points)
+    for (const std::vector<double>& values : points)
     {
       if (swept.equilibrium_at({values, false}).outcome.kind != OutcomeKind::converged) continue;
       const PointModes modes = swept.modes_at({values, false});

@@ -59,7 +59,12 @@ public:
     for (const SweepLine& line : lines) total += line.points.size();
     Progress progress(comm_, "sweep", static_cast<double>(total));
     progress_ = &progress;
-    model_.prepare(lines);
+    for (const SweepLine& line : lines)
+      for (const std::vector<double>& values : line.points)
+      {
+        end_if_asked(comm_);
+        model_.prepare({values, line.reversed});
+      }
     for (const SweepLine& line : lines) run_line(line);
     assess(total);
     return std::move(sweep_);

@@ -91,17 +91,13 @@ const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
   return equilibria_[place] = std::move(equilibrium);
 }
 
-void SweptModel::prepare(const std::vector<SweepLine>& lines)
+void SweptModel::prepare(const SweptPlace& place)
 {
-  for (const SweepLine& line : lines)
-    for (const std::vector<double>& values : line.points)
-    {
-      const Equilibrium& equilibrium = equilibrium_at({values, line.reversed});
-      if (equilibrium.outcome.kind != OutcomeKind::converged) continue;
-      if (at_every_.empty()) at_every_ = equilibrium.closed;
-      for (std::size_t i = 0; i < at_every_.size(); ++i)
-        at_every_[i] = at_every_[i] && i < equilibrium.closed.size() && equilibrium.closed[i];
-    }
+  const Equilibrium& equilibrium = equilibrium_at(place);
+  if (equilibrium.outcome.kind != OutcomeKind::converged) return;
+  if (at_every_.empty()) at_every_ = equilibrium.closed;
+  for (std::size_t i = 0; i < at_every_.size(); ++i)
+    at_every_[i] = at_every_[i] && i < equilibrium.closed.size() && equilibrium.closed[i];
 }
 
 BasisProblem SweptModel::basis_problem() const

@@ -24,8 +24,8 @@ class SweptModel
 public:
   explicit SweptModel(const SweepProblem& problem);
 
-  /// Finds the equilibria of all points. The pairs that are closed at every one of them are those of the basis.
-  void prepare(const std::vector<SweepLine>& lines);
+  /// Finds the equilibrium of a point. The pairs that are closed at all points prepared are those of the basis.
+  void prepare(const SweptPlace& place);
 
   /// What cannot be computed at a point, for whatever reason, is in the outcome.
   const Equilibrium& equilibrium_at(const SweptPlace& place);

@@ -1,7 +1,9 @@
 """What can be refused is refused before the first stage: by one message, with exit code 1, in a second."""
 
+import json
 import os
 import resource
+import signal
 import subprocess
 
 import pytest
@@ -29,7 +31,12 @@ OPTIONS = {
     "infinite": (["-cycle_difference", "inf"], ["-cycle_difference", "finite"]),
     "a number that overflows": (["-cycle_samples", "4294967297"], ["-cycle_samples", "2147483647"]),
     "an object of PETSc's that squeal has not": (["-mat_type", "magic"], ["-mat_type"]),
-    "no type of solver": (["-cycle_snes_type", "magic"], ["-cycle_", "magic"]),
+    "no type of solver": (["-cycle_snes_type", "magic"], ["-cycle_snes_type magic", "newtonls"]),
+    "no type of eigensolver": (["-modes_solver", "toar", "-modes_pep_type", "magic"], ["-modes_pep_type magic", "toar"]),
+    "no type of linear solver": (["-cycle_full_ksp_type", "magic"], ["-cycle_full_ksp_type magic", "gmres"]),
+    "a mesh that is a folder": (["--set", "mesh.file=."], ["is a folder"]),
+    "a mesh that is a device": (["--set", "mesh.file=/dev/zero"], ["no plain file"]),
+    "a name that ends a line of C": (["--set", 'probe.0.name="a\\u0000b"'], ["probe", "control characters"]),
     "no number for a solver": (["-modes_pep_tol", "magic"], ["-modes_", "magic"]),
     "a solver that its stage has not": (["-reduced_ksp_rtol", "1"], ["-reduced_ksp_rtol"]),
     "a solver that the equilibrium has not": (["-equilibrium_ksp_rtol", "1"], ["-equilibrium_ksp_rtol"]),
@@ -80,6 +87,32 @@ def test_an_option_that_turns_out_unused_leaves_earlier_results(squeal):
     assert run.code == 1 and len(run.messages) == 1 and "-modes_pep_view_vectorz" in run.messages[0], run.errors
     assert first.report == before
     assert not first.output.with_name(first.output.name + ".partial").exists()
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_stage_that_fails_leaves_what_finished(squeal, tmp_path, ranks):
+    """The eigensolver's linear solver has no factor to work with, which shows after the equilibrium. The next run removes it."""
+    given = [OSCILLATOR, "--output", tmp_path / "results", "--set", "cycle.enabled=false", "--set", "transient.enabled=false"]
+    run = squeal(*given, "-modes_solver", "toar", "-modes_dense_limit", "1", "-modes_st_pc_type", "lsc", ranks=ranks)
+    partial = tmp_path / "results.partial"
+    assert run.code == 1 and f"results in {partial}" in run.errors, run.errors
+    report = json.loads((partial / "report.json").read_text())
+    assert report["equilibrium"]["outcome"] == "converged"
+    assert squeal(*given, ranks=ranks).code == 0
+    assert not partial.exists()
+
+
+def test_a_signal_ends_a_sweep_while_its_equilibria_are_sought(tmp_path):
+    """A million of them take minutes, and no mode is sought before."""
+    command = [os.environ["SQUEAL"], OSCILLATOR, "--output", tmp_path / "results", "--set", "sweep.key=friction.coefficient", "--set",
+               "sweep.from=0.1", "--set", "sweep.to=0.5", "--set", "sweep.points=1000000", "--set", "cycle.enabled=false", "--set",
+               "transient.enabled=false"]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    for line in run.stdout:
+        if line.startswith("sweep"):
+            break
+    run.send_signal(signal.SIGTERM)
+    assert "ended by SIGTERM" in run.communicate(timeout=60)[0] and run.returncode == 3
 
 
 def run_here(folder, *arguments, **environment):

@@ -58,6 +58,13 @@ def test_a_slip_of_units_is_warned_of(converged, tmp_path, key, value, words):
     assert "WARNING" not in converged(brick_scene(tmp_path), "--dry-run", ranks=1).printed
 
 
+@pytest.mark.parametrize("setting, words", [("force.0.vector=[0,0,0]", "is 0 N"), ("rigid_body.0.mass=1e-300", "grain of dust"),
+                                            ("transient.load_factor=[[0,1],[0.1,-1]]", "the other way round")])
+def test_a_load_or_mass_that_does_nothing_is_warned_of(converged, setting, words):
+    warnings = converged(INPUTS / "pin_on_disc", "--dry-run", "--set", setting, ranks=1).printed
+    assert "WARNING" in warnings and words in warnings
+
+
 def test_an_element_that_is_there_twice_is_refused(squeal, tmp_path):
     mesh = Mesh()
     nodes = mesh.add_nodes(lattice((2, 1, 1), lambda x, y, z: (x, y, z)))

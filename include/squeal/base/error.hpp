@@ -4,6 +4,7 @@
 /// Bad input and failed calls are exceptions whose text names the place, the value and the remedy. What may fail on one
 /// rank only (reading a file on rank 0, say) is agreed by all ranks before anyone throws. No rank is then left waiting
 /// in a collective call. A stage that does not converge is a result, never an exception.
+#include <exception>
 #include <filesystem>
 #include <mpi.h>
 #include <stdexcept>
@@ -25,30 +26,34 @@ struct LibraryError : Error
   using Error::Error;
 };
 
+/// Memory ran out on some rank, and every rank throws.
+struct OutOfMemory : Error
+{
+  using Error::Error;
+};
+
+inline constexpr const char* out_of_memory_text = "memory ran out; --dry-run prints a forecast of what a run takes";
+
 /// Collective. Throws Error on every rank, with the text of the lowest rank that brings one, unless all are empty.
 void agree(MPI_Comm comm, const std::string& problem);
+
+/// Collective. Throws Error with the text of the lowest rank's failure on every rank, or OutOfMemory if that is what
+/// failed there, unless none failed.
+void agree(MPI_Comm comm, const std::exception_ptr& failure);
 
 /// Collective. Runs `work`, which must not communicate, on every rank; if it throws on any, all throw Error together.
 template <class Work> void on_every_rank(MPI_Comm comm, Work work)
 {
-  std::string problem;
+  std::exception_ptr failure;
   try
   {
     work();
   }
-  catch (const std::exception& error)
-  {
-    problem = *error.what() ? error.what() : "unknown failure";
-  }
-  catch (const std::string& text) // libgmsh before 4.9 throws strings
-  {
-    problem = text.empty() ? "unknown failure" : text;
-  }
   catch (...)
   {
-    problem = "unknown failure";
+    failure = std::current_exception();
   }
-  agree(comm, problem);
+  agree(comm, failure);
 }
 
 /// Collective. Runs `work` on rank 0 alone; an exception it throws there becomes an Error with the same text
@@ -67,13 +72,16 @@ template <class Work> void on_rank_zero(MPI_Comm comm, Work work)
 /// The words of a text, which blanks and ends of lines separate.
 std::vector<std::string> words_in(const std::string& text);
 
-/// Returns the text, or its beginning if it has more than 300 characters, for messages.
+/// Returns the text, or its beginning if it has more than 300 characters, for messages. Control characters become '?'.
 std::string shortened(const std::string& text);
 
 /// Whether there is a plain file, or a folder, of this name; no name is too long to ask for.
 bool is_file(const std::filesystem::path& name);
 /// The same for a folder.
 bool is_folder(const std::filesystem::path& name);
+
+/// Why the name is not that of a plain file; empty if it is.
+std::string problem_of_file(const std::filesystem::path& name);
 
 /// printf into text, for messages and tables.
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);

@@ -51,7 +51,7 @@ public:
   /// be written, or another run is at work in it.
   ResultsFolder(const std::filesystem::path& place, Beginning beginning, MPI_Comm comm);
 
-  /// Without publish, leaves everything as it was before, but for checkpoints.
+  /// Without publish, leaves everything as it was before, but for checkpoints and what keep_finished keeps.
   ~ResultsFolder();
   ResultsFolder(const ResultsFolder&) = delete;
   ResultsFolder& operator=(const ResultsFolder&) = delete;
@@ -68,6 +68,10 @@ public:
   /// Moves the results to their place, with their checkpoints if the run can go on. Collective.
   void publish(Checkpoints checkpoints);
 
+  /// Leaves the partial folder where it is if a stage has written its results. Returns the end of a sentence that says
+  /// so, or nothing.
+  std::string keep_finished();
+
 private:
   void make(Beginning beginning); // on rank 0
   void move_whole();              // on rank 0
@@ -79,7 +83,7 @@ private:
   std::string run_;
   std::vector<std::filesystem::path> made_; // folders above the partial one, outermost first
   FolderLock lock_;
-  bool published_ = false;
+  bool published_ = false, kept_ = false;
 };
 
 /// Error: an output of the scene, or a result in this place, would fall on a file that the run reads.
