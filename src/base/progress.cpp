@@ -58,7 +58,8 @@ void Progress::update(double done, const std::string& note)
   else
   {
     if (tenth == tenth_ && now - last_ < std::chrono::seconds(30)) return;
-    std::printf("  %-11s %3.0f %%  %6.1f s  %s\n", stage_.c_str(), 100 * fraction, elapsed, note.c_str());
+    std::printf("  %-11s %3.0f %%  %6.1f s  %4.0f s left  %s\n", stage_.c_str(), 100 * fraction, elapsed, remaining,
+                note.c_str());
   }
   tenth_ = tenth;
   last_ = now;

@@ -6,6 +6,7 @@
 #include "squeal/base/callback.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/integers.hpp"
+#include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
@@ -108,6 +109,15 @@ ShiftedPencil shifted_below_zero(Mat K, Mat M, double shift, const ModesOptions&
   return {K, M, pencil->shift, solve};
 }
 
+/// What SLEPc calls after each restart.
+PetscErrorCode report_converged(EPS, PetscInt, PetscInt converged, PetscScalar*, PetscScalar*, PetscReal*, PetscInt,
+                                void* progress)
+{
+  static_cast<Progress*>(progress)->update(static_cast<double>(converged),
+                                           format("%d found", static_cast<int>(converged)));
+  return PETSC_SUCCESS;
+}
+
 /// Krylov-Schur for the `count` theta nearest the pencil's shift.
 Owned<EPS> make_solver(const ShiftedPencil& pencil, PetscInt count, Inverse& inverse)
 {
@@ -155,6 +165,8 @@ int append_nearest(MultiVector& X, const ShiftedPencil& pencil, PetscInt count)
   const Owned<Vec> start = vector(random_multivector(pencil.K, 1), 0), x = zeros_like(start);
   Vec initial = start;
   check(EPSSetInitialSpace(eps, 1, &initial));
+  Progress progress(comm_of(pencil.K), "real modes", count);
+  check(EPSMonitorSet(eps, report_converged, &progress, nullptr));
   check_after_callbacks(EPSSolve(eps), inverse.failure);
   PetscInt iterations = 0, converged = 0;
   check(EPSGetIterationNumber(eps, &iterations));

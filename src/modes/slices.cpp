@@ -2,6 +2,7 @@
 
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/progress.hpp"
 #include "squeal/modes/projection.hpp"
 
 #include <algorithm>
@@ -113,6 +114,8 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
   std::vector<Slice> slices = make_slices(real, floor, reach);
   ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
   CountedSolution result;
+  const int all = count_below(real, reach);
+  Progress progress(comm_of(problem.K), "modes", all);
   const auto search = [&](double angle)
   {
     bool rigid = false; // a body may be free
@@ -120,6 +123,7 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
     {
       if (angle == usual_angle || static_cast<int>(slice.pairs.size()) < slice.expected)
         find_pairs(slice, problem, pencil, angle);
+      progress.update(count_below(real, slice.upper), format("below %.4g Hz", slice.upper / two_pi));
       rigid = rigid || slice.smallest < rigid_share * reach * reach;
     }
     result.solution = join(slices);

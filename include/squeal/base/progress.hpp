@@ -1,6 +1,6 @@
 #pragma once
-/// Progress of a long stage, printed by rank 0. On a terminal it is a bar with the remaining time, otherwise a line at
-/// every tenth of the work or every half minute.
+/// Progress of a long stage, printed by rank 0 with the remaining time, as if all parts of the work took as long. On a
+/// terminal it is a bar, otherwise a line at every tenth of the work or every half minute.
 #include <chrono>
 #include <mpi.h>
 #include <string>
