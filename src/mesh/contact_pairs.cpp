@@ -73,17 +73,7 @@ OverlapLimits limits_of(const SurfaceContact& c)
 void turn_shells(SurfaceContact& c)
 {
   ContactSurface &rotor = c.stator_is_slave() ? c.master : c.slave, &stator = c.stator_is_slave() ? c.slave : c.master;
-  const auto is_two_sided = [](const ContactSurface& surface) { return surface.placed.front().two_sided; };
-  if (!is_two_sided(rotor) && !is_two_sided(stator)) return;
-  ContactSurface& turned = is_two_sided(stator) ? stator : rotor;
-  const ContactSurface& other = is_two_sided(stator) ? rotor : stator;
-  const Eigen::Vector3d at = turned.placed.front().x.rowwise().mean();
-  const auto distance = [&](const PlacedFace& face) { return (face.x.rowwise().mean() - at).norm(); };
-  const auto near = std::min_element(other.placed.begin(), other.placed.end(),
-                                     [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
-  if (near->normal.dot(turned.placed.front().normal) < 0) return;
-  for (PlacedFace& face : turned.placed) face.normal = -face.normal;
-  for (Vec3& normal : turned.normals) normal = -1 * normal;
+  if (!turn_shell(stator, rotor)) (void)turn_shell(rotor, stator);
 }
 
 /// Throws Error if the surfaces are joined.

@@ -206,6 +206,19 @@ std::size_t shared_nodes(const ContactSurface& a, const ContactSurface& b)
   return shared.size();
 }
 
+bool turn_shell(ContactSurface& turned, const ContactSurface& other)
+{
+  if (!turned.placed.front().two_sided) return false;
+  const Eigen::Vector3d at = turned.placed.front().x.rowwise().mean();
+  const auto distance = [&](const PlacedFace& face) { return (face.x.rowwise().mean() - at).norm(); };
+  const auto near = std::min_element(other.placed.begin(), other.placed.end(),
+                                     [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+  if (near->normal.dot(turned.placed.front().normal) < 0) return true;
+  for (PlacedFace& face : turned.placed) face.normal = -face.normal;
+  for (Vec3& normal : turned.normals) normal = -1 * normal;
+  return true;
+}
+
 SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits)
 {
   constexpr double sliver = 1e-8; // share of a face: the rounding of its inverse Gram matrix is 1e-16 over this share

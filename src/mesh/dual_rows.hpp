@@ -45,6 +45,9 @@ struct SlaveRows
 /// The number of nodes that two surfaces share.
 std::size_t shared_nodes(const ContactSurface& a, const ContactSurface& b);
 
+/// Turns the faces of a shell, which may look to either side, to oppose the other surface. Returns false for a solid's.
+bool turn_shell(ContactSurface& turned, const ContactSurface& other);
+
 /// Returns the rows of all slave nodes, light ones included.
 /// Throws Error where master faces lie above each other.
 SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits);

@@ -56,6 +56,40 @@ double excess_of(Shape shape, const Eigen::Vector3d& xi)
   return 0;
 }
 
+/// The natural coordinates of the element that are nearest to these.
+Eigen::Vector3d inside(Shape shape, const Eigen::Vector3d& xi)
+{
+  Eigen::Vector3d result = xi;
+  const auto clamp = [&](Eigen::Index axis) { result(axis) = std::clamp(xi(axis), -1., 1.); };
+  const auto clamp_simplex = [&](Eigen::Index count)
+  {
+    result.head(count) = xi.head(count).cwiseMax(0);
+    result.head(count) /= std::max(1., result.head(count).sum());
+  };
+  switch (shape)
+  {
+  case Shape::hex8:
+  case Shape::hex20:
+    clamp(2);
+    [[fallthrough]];
+  case Shape::shell4:
+    clamp(0);
+    clamp(1);
+    break;
+  case Shape::tet4:
+  case Shape::tet10:
+    clamp_simplex(3);
+    break;
+  case Shape::wedge6:
+    clamp(2);
+    [[fallthrough]];
+  case Shape::shell3:
+    clamp_simplex(2);
+    break;
+  }
+  return result;
+}
+
 } // namespace
 
 Location located(const Mesh& mesh, int element, const Vec3& point)
@@ -86,6 +120,15 @@ Location located(const Mesh& mesh, int element, const Vec3& point)
   if (axes == 2) at.excess = std::max(at.excess, 2 * away / diagonal(x));
   if (!std::isfinite(at.excess)) at.excess = std::numeric_limits<double>::max();
   return at;
+}
+
+double distance_outside(const Mesh& mesh, const Location& location)
+{
+  const Element& element = mesh.elements[static_cast<std::size_t>(location.element)];
+  const NodePositions x = position_matrix(positions_of(mesh, element));
+  return (x * shape_functions(element.shape, location.xi).N -
+          x * shape_functions(element.shape, inside(element.shape, location.xi)).N)
+      .norm();
 }
 
 struct ElementLocator::Tree

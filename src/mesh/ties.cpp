@@ -2,7 +2,9 @@
 
 #include "dual_rows.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/mesh/location.hpp"
 #include "squeal/mesh/names.hpp"
+#include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +15,8 @@ namespace squeal
 
 namespace
 {
+
+constexpr double light = 0.1, coincident = 1e-6; // as of contact pairs
 
 std::string name_of(const Tie& tie)
 {
@@ -40,7 +44,7 @@ void check_meeting(const Tie& tie, const SlaveRows& rows)
 
 /// The row of a slave node solved for its own motion. The weights of the others add up to 1, so that a translation is
 /// kept to rounding.
-TiedNode solved(const SlaveRow& row, int node, int tie)
+TiedNode solved(const Mesh& mesh, const SlaveRow& row, int node, int tie)
 {
   TiedNode result{node, tie, {}};
   double own = 0, sum = 0;
@@ -56,14 +60,88 @@ TiedNode solved(const SlaveRow& row, int node, int tie)
       std::max_element(result.others.begin(), result.others.end(),
                        [](const auto& a, const auto& b) { return std::abs(a.weight) < std::abs(b.weight); });
   largest->weight += 1 - sum;
+  result.arm = mesh.nodes[node];
+  for (const auto& [other, weight] : result.others) result.arm = result.arm - weight * mesh.nodes[other];
   return result;
+}
+
+/// Whether the slave is a curve: the edge of a shell.
+bool is_edge(const Mesh& mesh, const std::string& name)
+{
+  return !mesh.surfaces.contains(name) && mesh.node_groups.contains(name);
+}
+
+/// The solid elements that have a face on the surface, as one part.
+Mesh solids_behind(const Mesh& mesh, const ContactSurface& master)
+{
+  const auto is_on = [&](int node) { return std::ranges::binary_search(master.nodes, node); };
+  Mesh behind;
+  behind.nodes = mesh.nodes;
+  for (Element element : mesh.elements)
+  {
+    const auto on_surface = [&](const std::array<int, 4>& face)
+    { return std::ranges::all_of(face, [&](int corner) { return corner < 0 || is_on(element.nodes[corner]); }); };
+    if (!std::ranges::any_of(corner_faces(element.shape), on_surface)) continue;
+    element.part = 0;
+    behind.elements.push_back(element);
+  }
+  return behind;
+}
+
+/// The motion of the solid at a place in one of its elements, or slightly outside: x is linear in the shape functions,
+/// so that rigid motions are exact.
+TiedNode on_solid(const Mesh& mesh, const Location& at, int node, int tie)
+{
+  const Element& element = mesh.elements[static_cast<std::size_t>(at.element)];
+  const ShapeFunctions N = shape_functions(element.shape, at.xi);
+  const Eigen::Matrix3d J = position_matrix(positions_of(mesh, element)) * N.dN.transpose();
+  const NodeGradients gradients = J.transpose().partialPivLu().solve(N.dN);
+  TiedNode result{node, tie, {}};
+  for (const int k : nodes_of(element))
+  {
+    const auto column = static_cast<Eigen::Index>(result.others.size());
+    result.others.push_back({k, N.N(column)});
+    result.gradients.push_back({gradients(0, column), gradients(1, column), gradients(2, column)});
+  }
+  return result;
+}
+
+void add_edge(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
+{
+  const ContactSurface master = contact_surface(mesh, tie.master);
+  if (master.placed.front().two_sided)
+    throw Error(name_of(tie) + "an edge follows solids, and '" + tie.master +
+                "' is a shell: let both share their nodes");
+  const Mesh behind = solids_behind(mesh, master);
+  const ElementLocator locator(behind, 0);
+  double limit = coincident * master.size; // and the chords of curved faces
+  for (const PlacedFace& face : master.placed) limit = std::max(limit, coincident * master.size + face.slack);
+  limit = std::max(limit, tie.reach);
+  for (const int node : mesh.node_groups.at(tie.slave))
+  {
+    const std::string place = node_text(node, mesh.nodes[node]);
+    const Location at = locator.find(mesh.nodes[node]);
+    if (at.element < 0) throw Error(name_of(tie) + place + " is far from the master: correct the names or the mesh");
+    if (std::ranges::count(nodes_of(behind.elements[static_cast<std::size_t>(at.element)]), node) > 0)
+      throw Error(name_of(tie) + place + " is the master's too, so that the parts are joined there: take the tie out");
+    if (const double away = distance_outside(behind, at); away > limit)
+      throw Error(name_of(tie) + place +
+                  format(" is %.4g m from the master: give the tie a reach above that, or "
+                         "correct the mesh",
+                         away));
+    result.nodes.push_back(on_solid(behind, at, node, index));
+  }
+  result.coverage.emplace_back();
 }
 
 void add_tie(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
 {
-  constexpr double light = 0.1, coincident = 1e-6; // as of contact pairs
-  const ContactSurface slave = contact_surface(mesh, tie.slave), master = contact_surface(mesh, tie.master);
+  if (is_edge(mesh, tie.slave)) return add_edge(mesh, tie, index, result);
+  ContactSurface slave = contact_surface(mesh, tie.slave), master = contact_surface(mesh, tie.master);
   check_apart(tie, slave, master);
+  if (!turn_shell(slave, master) && turn_shell(master, slave) && tie.reach > 0)
+    throw Error(name_of(tie) +
+                "with a reach the shell must be the slave, whose nodes rotate: exchange slave and master");
   const double rounding = coincident * std::max(slave.size, master.size);
   OverlapLimits limits{tie.reach, tie.reach == 0 ? rounding : std::max(rounding, tie.reach), tie.reach == 0,
                        Eigen::Vector3d::Zero()};
@@ -76,7 +154,7 @@ void add_tie(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
   check_meeting(tie, rows);
   for (std::size_t i = 0; i < rows.rows.size(); ++i)
     if (const SlaveRow& row = rows.rows[i]; row.is_covered() && row.area >= light * row.whole)
-      result.nodes.push_back(solved(row, slave.nodes[i], index));
+      result.nodes.push_back(solved(mesh, row, slave.nodes[i], index));
   result.coverage.push_back(rows.coverage);
 }
 

@@ -174,7 +174,8 @@ SceneKeys keys_of(Contact& c)
 SceneKeys keys_of(Tie& t)
 {
   return {
-      {"slave", &t.slave, required, Rule::any, "text", "named surface whose nodes follow: the finer or softer side"},
+      {"slave", &t.slave, required, Rule::any, "text",
+       "named surface whose nodes follow, the finer or softer side, or curve, a shell's edge"},
       {"master", &t.master, required, Rule::any, "text", "named surface that they follow"},
       {"reach", &t.reach, optional, Rule::not_negative, "m",
        "largest distance of the surfaces along the normal; 0: they coincide"},

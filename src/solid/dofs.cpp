@@ -1,7 +1,8 @@
 /// Free degrees of freedom q and the constraints u = T q on the nodal degrees of freedom u.
 ///
 /// Rigid body:       u = u_ref + theta x (x - x_ref); the rotations of a shell node are theta.
-/// Tie:              a slave node follows nodes of the master (squeal/mesh/ties.hpp).
+/// Tie:              a slave node follows nodes of the master, a shell's edge with its rotations
+///                   (squeal/mesh/ties.hpp).
 /// Shell on a solid: a node of both rotates with the solid nodes around it, those of the solid elements that hold it,
 /// by
 ///                   their least-squares rotation
@@ -174,10 +175,22 @@ void add_supports(Constraints& constraints, const Mesh& mesh, const Scene& scene
                      { check_supported_dependent(constraints, mesh, scene, support, nodal_dof); });
 }
 
-/// Makes the translations of tied nodes follow the others. What a support holds stays held.
+/// The rotation of a tied node, about `axis`, by the curl of the others' motion.
+std::vector<ConstraintTerm> rotation_terms(const TiedNode& tied, int axis)
+{
+  std::vector<ConstraintTerm> terms;
+  for (std::size_t k = 0; k < tied.others.size(); ++k)
+    for (int c = 0; c < 3; ++c)
+      terms.push_back({6 * PetscInt{tied.others[k].node} + c, cross(tied.gradients[k], unit(c))[axis] / 2});
+  return terms;
+}
+
+/// Makes tied nodes follow the others. What a support holds stays held.
 void add_ties(Constraints& constraints, const Mesh& mesh, const Scene& scene)
 {
   for (const TiedNode& tied : tied_nodes(mesh, scene).nodes)
+  {
+    const PetscInt first = 6 * PetscInt{tied.node};
     for (int c = 0; c < 3; ++c)
     {
       const DofKind kind = constraints.kind_of(tied.node, c);
@@ -188,8 +201,15 @@ void add_ties(Constraints& constraints, const Mesh& mesh, const Scene& scene)
       if (kind != DofKind::free) continue;
       std::vector<ConstraintTerm> terms;
       for (const auto& [node, weight] : tied.others) terms.push_back({6 * PetscInt{node} + c, weight});
-      make_dependent(constraints, 6 * PetscInt{tied.node} + c, std::move(terms));
+      for (int axis = 0; axis < 3; ++axis)
+        if (constraints.kind_of(tied.node, 3 + axis) != DofKind::absent)
+          terms.push_back({first + 3 + axis, cross(unit(axis), tied.arm)[c]});
+      make_dependent(constraints, first + c, std::move(terms));
     }
+    for (int axis = 0; axis < 3; ++axis)
+      if (!tied.gradients.empty() && constraints.kind_of(tied.node, 3 + axis) == DofKind::free)
+        make_dependent(constraints, first + 3 + axis, rotation_terms(tied, axis));
+  }
 }
 
 /// Returns the solid nodes around each joint, a node that shells and solids share and that has a free rotation.

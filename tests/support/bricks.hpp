@@ -89,6 +89,26 @@ inline void add_strip(Mesh& mesh, const std::string& name, int part, const Strip
     }
 }
 
+/// Appends a mesh with nodes of its own.
+inline void append(Mesh& mesh, const Mesh& other)
+{
+  const int first = static_cast<int>(mesh.nodes.size());
+  mesh.nodes.insert(mesh.nodes.end(), other.nodes.begin(), other.nodes.end());
+  for (Element element : other.elements)
+  {
+    for (int& node : element.nodes) node += first;
+    mesh.elements.push_back(element);
+  }
+  for (const auto& [name, faces] : other.surfaces)
+    for (Face face : faces)
+    {
+      for (int& node : face.nodes) node += first;
+      mesh.surfaces[name].push_back(face);
+    }
+  for (const auto& [name, nodes] : other.node_groups)
+    for (const int node : nodes) mesh.node_groups[name].push_back(first + node);
+}
+
 /// The nodes of the scene's points and rigid bodies, as read_mesh adds them.
 inline void add_points(Mesh& mesh, const Scene& scene)
 {

@@ -35,4 +35,7 @@ private:
 /// of the nearest point of its surface.
 Location located(const Mesh& mesh, int element, const Vec3& point);
 
+/// How far the point that was located is outside of its element [m], from the natural coordinates nearest to its own.
+double distance_outside(const Mesh& mesh, const Location& location);
+
 } // namespace squeal

@@ -1,17 +1,20 @@
 #pragma once
 /// Ties of surfaces whose meshes need not match: the bilateral form of the pairs' rows (src/README.md, section 1.9).
 /// The row of slave node i,  sum of slave weights u = sum of c_ij u_j,  is solved for u_i, so that a tie is an exact
-/// constraint.
+/// constraint. The nodes of a shell's edge follow the solid element behind the master that they touch.
 #include "squeal/mesh/contact_pairs.hpp"
 
 namespace squeal
 {
 
-/// A node that follows others: u = sum of weight u_node. Others may be tied themselves, mid-sides to their corners.
+/// A node that follows others: u = sum of weight u_node + theta x arm, theta its own rotation if it has one. Others may
+/// be tied themselves, mid-sides to their corners.
 struct TiedNode
 {
   int node = 0, tie = 0; // tie: index in Scene::ties
   std::vector<PairNode> others;
+  Vec3 arm{};                    // [m] from the mean of the others' places to the node's
+  std::vector<Vec3> gradients{}; // [1/m] of the weights: theta = 1/2 sum of gradient x u_node; empty: theta is its own
 };
 
 /// The slave nodes of all ties.
@@ -21,9 +24,10 @@ struct TiedNodes
   std::vector<Coverage> coverage; // one a tie
 };
 
-/// A slave node below a tenth of its uncovered area is left free. Throws Error for a missing surface and for surfaces
-/// that share nodes or do not meet. It does so for a node that is tied twice, and for a slave node that is on the
-/// master of a tie. Not collective: the mesh is whole on every rank.
+/// A slave node of a surface below a tenth of its uncovered area is left free. Throws Error for a missing surface and
+/// for surfaces that share nodes or do not meet, and for a node of an edge that is beyond the reach. It does so for a
+/// node that is tied twice, and for a slave node that is on the master of a tie. Not collective: the mesh is whole on
+/// every rank.
 TiedNodes tied_nodes(const Mesh& mesh, const Scene& scene);
 
 } // namespace squeal

@@ -163,7 +163,7 @@ struct Contact
 /// Two surfaces of parts meshed apart that move as one; nodes of the slave follow the master.
 struct Tie
 {
-  std::string slave;  // named surface, the finer or softer one
+  std::string slave;  // named surface, the finer or softer one, or curve, the edge of a shell
   std::string master; // named surface
   double reach = 0;   // [m] largest distance of the surfaces along the normal
 };
