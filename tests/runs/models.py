@@ -8,7 +8,7 @@ import numpy as np
 STEEL = {"young": 210e9, "poisson": 0.3, "density": 7850}
 
 # gmsh's element types: number and dimension
-KINDS = {"point": (15, 0), "triangle": (2, 2), "quad": (3, 2), "brick": (5, 3), "wedge": (6, 3), "brick20": (17, 3),
+KINDS = {"point": (15, 0), "line": (1, 1), "triangle": (2, 2), "quad": (3, 2), "brick": (5, 3), "wedge": (6, 3), "brick20": (17, 3),
          "quad8": (16, 2), "tetrahedron": (4, 3)}
 
 
