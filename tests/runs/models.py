@@ -2,14 +2,15 @@
 
 import json
 import struct
+from itertools import permutations
 
 import numpy as np
 
 STEEL = {"young": 210e9, "poisson": 0.3, "density": 7850}
 
 # gmsh's element types: number and dimension
-KINDS = {"point": (15, 0), "line": (1, 1), "triangle": (2, 2), "quad": (3, 2), "brick": (5, 3), "wedge": (6, 3), "brick20": (17, 3),
-         "quad8": (16, 2), "tetrahedron": (4, 3)}
+KINDS = {"point": (15, 0), "line": (1, 1), "triangle": (2, 2), "quad": (3, 2), "brick": (5, 3), "wedge": (6, 3),
+         "brick20": (17, 3), "quad8": (16, 2), "tetrahedron": (4, 3), "triangle6": (9, 2), "tetrahedron10": (11, 3)}
 
 
 class Mesh:
@@ -72,6 +73,31 @@ def bricks20(nodes):
     places = corners + [tuple((np.array(corners[a]) + corners[b]) // 2) for a, b in edges]
     n = [size - 2 for size in nodes.shape]
     return np.stack([nodes[i:n[0] + i:2, j:n[1] + j:2, k:n[2] + k:2].ravel() for i, j, k in places], axis=-1)
+
+
+def _simplices(nodes, edges):
+    """Cells of two nodes a side, each cut into simplices along the diagonal from its first corner to its last: corners,
+    then the middles of `edges`. Neighbours share their diagonals."""
+    n, axes = [size - 2 for size in nodes.shape], np.eye(nodes.ndim, dtype=int)
+    cells = []
+    for order in permutations(range(nodes.ndim)):
+        corners = 2 * np.cumsum([0 * axes[0], *axes[list(order)]], axis=0)
+        if np.linalg.det(axes[list(order)]) < 0:
+            corners[[-2, -1]] = corners[[-1, -2]]
+        places = np.concatenate([corners, [(corners[a] + corners[b]) // 2 for a, b in edges]])
+        cells.append(np.stack([nodes[tuple(slice(i, k + i, 2) for i, k in zip(place, n))].ravel() for place in places],
+                              axis=-1))
+    return np.concatenate(cells)
+
+
+def tetrahedra10(nodes):
+    """10-node tetrahedra in gmsh's order, six a cell, of a lattice of twice as many divisions."""
+    return _simplices(nodes, ((0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)))
+
+
+def triangles6(nodes):
+    """6-node triangles, two a cell, of a lattice of twice as many divisions: the faces of tetrahedra10."""
+    return _simplices(nodes, ((0, 1), (1, 2), (2, 0)))
 
 
 def closed(nodes):
