@@ -282,6 +282,12 @@ void end_all(int rank, const char* kind, const char* text)
   MPI_Abort(PETSC_COMM_WORLD, 1);
 }
 
+/// Of a failure that all ranks share; a name of any length may be in it.
+void print_error(int rank, const Error& error)
+{
+  if (rank == 0) std::fprintf(stderr, "squeal: error: %.3000s\n", error.what());
+}
+
 } // namespace
 
 int main(int argc, char** argv)
@@ -318,14 +324,17 @@ int main(int argc, char** argv)
     end_run_control();
     return static_cast<int>(ExitCode::interrupted);
   }
+  catch (const OutOfMemory& error)
+  {
+    print_error(rank, error);
+  }
   catch (const LibraryError& error)
   {
     end_all(rank, "error", error.what());
   }
   catch (const Error& error)
   {
-    // a name of any length may be in it
-    if (rank == 0) std::fprintf(stderr, "squeal: error: %.3000s\n", error.what());
+    print_error(rank, error);
   }
   catch (const std::bad_alloc&)
   {

@@ -114,9 +114,9 @@ void add_edge(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
                 "' is a shell: let both share their nodes");
   const Mesh behind = solids_behind(mesh, master);
   const ElementLocator locator(behind, 0);
-  double limit = coincident * master.size; // and the chords of curved faces
-  for (const PlacedFace& face : master.placed) limit = std::max(limit, coincident * master.size + face.slack);
-  limit = std::max(limit, tie.reach);
+  double chord = 0; // of curved faces, from their surface
+  for (const PlacedFace& face : master.placed) chord = std::max(chord, face.slack);
+  const double limit = std::max(tie.reach, coincident * master.size + chord);
   for (const int node : mesh.node_groups.at(tie.slave))
   {
     const std::string place = node_text(node, mesh.nodes[node]);
@@ -126,9 +126,7 @@ void add_edge(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
       throw Error(name_of(tie) + place + " is the master's too, so that the parts are joined there: take the tie out");
     if (const double away = distance_outside(behind, at); away > limit)
       throw Error(name_of(tie) + place +
-                  format(" is %.4g m from the master: give the tie a reach above that, or "
-                         "correct the mesh",
-                         away));
+                  format(" is %.4g m from the master: give the tie a reach above that, or correct the mesh", away));
     result.nodes.push_back(on_solid(behind, at, node, index));
   }
   result.coverage.emplace_back();

@@ -27,9 +27,9 @@ struct LibraryError : Error
 };
 
 /// Memory ran out on some rank, and every rank throws.
-struct OutOfMemory : Error
+struct OutOfMemory : LibraryError
 {
-  using Error::Error;
+  using LibraryError::LibraryError;
 };
 
 inline constexpr const char* out_of_memory_text = "memory ran out; --dry-run prints a forecast of what a run takes";
