@@ -46,7 +46,7 @@ void check_doubles(const Mesh& mesh, const Scene& scene)
               ": the body would count twice there. Remove one from the mesh");
 }
 
-/// An edge of an element, between two corners.
+/// An edge of a solid element, between two corners. Mid-sides on edges of shells follow them (squeal/mesh/ties.hpp).
 struct Edge
 {
   int low, high; // its corners
@@ -63,8 +63,6 @@ void add_edges(const Mesh& mesh, int index, std::vector<Edge>& edges)
   for (std::size_t k = 0; k < sides.size(); ++k)
     add(element.nodes[sides[k][0]], element.nodes[sides[k][1]], element.nodes[corners + k]);
   if (!sides.empty()) return;
-  if (is_shell(element.shape))
-    for (int i = 0; i < corners; ++i) add(element.nodes[i], element.nodes[(i + 1) % corners], -1);
   for (const auto& face : corner_faces(element.shape))
   {
     const int count = face[3] < 0 ? 3 : 4;

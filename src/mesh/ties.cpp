@@ -23,6 +23,11 @@ std::string name_of(const Tie& tie)
   return "tie of '" + tie.slave + "' to '" + tie.master + "': ";
 }
 
+std::string name_of(const Scene& scene, int tie)
+{
+  return tie < 0 ? "edge of a shell: " : name_of(scene.ties[static_cast<std::size_t>(tie)]);
+}
+
 void check_apart(const Tie& tie, const ContactSurface& slave, const ContactSurface& master)
 {
   if (const std::size_t shared = shared_nodes(slave, master); shared > 0)
@@ -156,21 +161,41 @@ void add_tie(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
   result.coverage.push_back(rows.coverage);
 }
 
+void add_mid_sides(const Mesh& mesh, TiedNodes& result)
+{
+  using Ends = std::pair<int, int>; // ascending
+  const auto ends_of = [](int a, int b) { return Ends(std::min(a, b), std::max(a, b)); };
+  std::set<Ends> edges; // of shells
+  for (const Element& element : mesh.elements)
+    for (int i = 0, n = corner_count(element.shape); i < n && is_shell(element.shape); ++i)
+      edges.insert(ends_of(element.nodes[i], element.nodes[(i + 1) % n]));
+  if (edges.empty()) return;
+  std::set<int> found;
+  for (const Element& element : mesh.elements)
+    for (std::size_t k = 0; const auto& [first, second] : mid_sides(element.shape))
+    {
+      const int a = element.nodes[first], b = element.nodes[second];
+      const int middle = element.nodes[corner_count(element.shape) + k++];
+      if (edges.contains(ends_of(a, b)) && found.insert(middle).second)
+        result.nodes.push_back({middle, -1, {{a, 0.5}, {b, 0.5}}});
+    }
+}
+
 /// Throws Error for nodes that several ties move, or that one moves and another follows.
 void check_order(const Mesh& mesh, const Scene& scene, const TiedNodes& tied)
 {
   std::map<int, int> tie_of;
   for (const TiedNode& t : tied.nodes)
     if (const auto [other, is_new] = tie_of.emplace(t.node, t.tie); !is_new)
-      throw Error(name_of(scene.ties[static_cast<std::size_t>(t.tie)]) + node_text(t.node, mesh.nodes[t.node]) +
-                  " is a slave of the " + name_of(scene.ties[static_cast<std::size_t>(other->second)]) +
-                  "too: give each tie a slave surface of its own");
+      throw Error(name_of(scene, t.tie) + node_text(t.node, mesh.nodes[t.node]) + " is a slave of the " +
+                  name_of(scene, other->second) + "too: give each tie a slave surface of its own");
   for (const TiedNode& t : tied.nodes)
     for (const PairNode& other : t.others)
-      if (const auto found = tie_of.find(other.node); found != tie_of.end() && found->second != t.tie)
-        throw Error(name_of(scene.ties[static_cast<std::size_t>(t.tie)]) +
-                    node_text(other.node, mesh.nodes[other.node]) + " of its master is a slave of the " +
-                    name_of(scene.ties[static_cast<std::size_t>(found->second)]) + "exchange slave and master of one");
+      if (const auto found = tie_of.find(other.node);
+          found != tie_of.end() && found->second != t.tie && found->second >= 0 && t.tie >= 0)
+        throw Error(name_of(scene, t.tie) + node_text(other.node, mesh.nodes[other.node]) +
+                    " of its master is a slave of the " + name_of(scene, found->second) +
+                    "exchange slave and master of one");
 }
 
 } // namespace
@@ -179,6 +204,7 @@ TiedNodes tied_nodes(const Mesh& mesh, const Scene& scene)
 {
   TiedNodes result;
   for (std::size_t i = 0; i < scene.ties.size(); ++i) add_tie(mesh, scene.ties[i], static_cast<int>(i), result);
+  add_mid_sides(mesh, result);
   check_order(mesh, scene, result);
   return result;
 }

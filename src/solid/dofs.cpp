@@ -185,7 +185,7 @@ std::vector<ConstraintTerm> rotation_terms(const TiedNode& tied, int axis)
   return terms;
 }
 
-/// Makes tied nodes follow the others. What a support holds stays held.
+/// Makes tied nodes follow the others. What a support holds stays held, and a mid-side of a rigid body stays on it.
 void add_ties(Constraints& constraints, const Mesh& mesh, const Scene& scene)
 {
   for (const TiedNode& tied : tied_nodes(mesh, scene).nodes)
@@ -194,7 +194,7 @@ void add_ties(Constraints& constraints, const Mesh& mesh, const Scene& scene)
     for (int c = 0; c < 3; ++c)
     {
       const DofKind kind = constraints.kind_of(tied.node, c);
-      if (kind == DofKind::dependent)
+      if (kind == DofKind::dependent && tied.tie >= 0)
         throw Error("tie of '" + scene.ties[static_cast<std::size_t>(tied.tie)].slave +
                     "': " + node_text(tied.node, mesh.nodes[tied.node]) +
                     " belongs to a rigid body, which moves it: exchange slave and master");

@@ -1,7 +1,8 @@
 #pragma once
 /// Ties of surfaces whose meshes need not match: the bilateral form of the pairs' rows (src/README.md, section 1.9).
 /// The row of slave node i,  sum of slave weights u = sum of c_ij u_j,  is solved for u_i, so that a tie is an exact
-/// constraint. The nodes of a shell's edge follow the solid element behind the master that they touch.
+/// constraint. The nodes of a shell's edge follow the solid element behind the master that they touch. A mid-side of a
+/// solid on an edge that a shell shares follows the edge's ends, between which the shell is linear.
 #include "squeal/mesh/contact_pairs.hpp"
 
 namespace squeal
@@ -11,13 +12,13 @@ namespace squeal
 /// be tied themselves, mid-sides to their corners.
 struct TiedNode
 {
-  int node = 0, tie = 0; // tie: index in Scene::ties
+  int node = 0, tie = 0; // tie: index in Scene::ties; -1 of a mid-side on the edge of a shell
   std::vector<PairNode> others;
   Vec3 arm{};                    // [m] from the mean of the others' places to the node's
   std::vector<Vec3> gradients{}; // [1/m] of the weights: theta = 1/2 sum of gradient x u_node; empty: theta is its own
 };
 
-/// The slave nodes of all ties.
+/// The slave nodes of all ties, and the mid-sides on edges of shells.
 struct TiedNodes
 {
   std::vector<TiedNode> nodes;
