@@ -1,9 +1,12 @@
 """Contact of meshes that do not match: Hertz's line contact, the disc brake meshed apart, pads finer than the disc."""
 
+import subprocess
+import sys
+
 import h5py
 import numpy as np
 import pytest
-from conftest import INPUTS
+from conftest import INPUTS, ROOT
 from models import Mesh, bricks, bricks20, lattice, quads, tetrahedra10, triangles6, write_scene
 
 OFF = {"enabled": False}
@@ -144,3 +147,26 @@ def test_what_faces_nothing_is_told(converged, tmp_path):
     assert uncovered.startswith("25 % of the area of 'upper:bottom' does not face 'lower:top'")
     assert report["model"]["contacts"][0]["covered_area"] == pytest.approx(0.75, rel=1e-12)
     assert report["equilibrium"]["normal_force_sum"] == pytest.approx(1e6, rel=1e-9)
+
+
+def test_bricks_become_tetrahedra_that_still_match(converged, tmp_path):
+    """Two stacked blocks of 2 x 2 x 2 bricks by jobs/tetrahedra.py: a pair at each of 5 x 5 corners and mid-sides, and a
+    uniform pressure through them to 1e-10."""
+    mesh = Mesh()
+    for name, low in (("lower", 0), ("upper", 1)):
+        nodes = mesh.add_nodes(lattice((2, 2, 2), lambda x, y, z: (x + 0.2 * x * y, y - 0.1 * x, low + z)))
+        mesh.add(name, "brick", bricks(nodes))
+        for face, k in (("bottom", 0), ("top", -1)):
+            mesh.add(f"{name}:{face}", "quad", quads(nodes[:, :, k]))
+    mesh.write(tmp_path / "bricks.msh")
+    subprocess.run([sys.executable, ROOT / "jobs" / "tetrahedra.py", tmp_path / "bricks.msh", tmp_path / "bodies.msh"], check=True)
+    scene = write_scene(tmp_path, title="split", mesh={"file": "bodies.msh"}, modes=OFF, estimate=OFF,
+                        friction={"coefficient": 0.0},
+                        part=[{"name": name, "young": 1e9, "poisson": 0.0, "density": 1} for name in ("lower", "upper")],
+                        contact=[{"rotor": "lower:top", "stator": "upper:bottom"}],
+                        pressure=[{"on": "upper:top", "value": 1e6}],
+                        support=[{"on": "lower:bottom", "fixed": "all"}, {"on": "upper:top", "fixed": "x y"}])
+    run = converged(scene, ranks=1)
+    assert run.report["model"]["elements"] == 2 * 8 * 6
+    with h5py.File(run.output / "fields.h5") as fields:
+        assert fields["pairs/pressure"][:] == pytest.approx(np.full(25, 1e6), rel=1e-10)
