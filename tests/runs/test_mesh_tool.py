@@ -1,16 +1,14 @@
 """tools/mesh: decks of other codes give the eigenvalues of the same mesh in gmsh's format, and skeletons that squeal reads."""
 
-import itertools
 import sys
 import tomllib
 
 import numpy as np
 import pytest
 from conftest import load_tool
-from models import KINDS, STEEL, Mesh, bricks, bricks20, lattice, write_scene
+from models import KINDS, STEEL, Mesh, bricks, bricks20, lattice, tetrahedra10, write_scene
 
 KINDS.setdefault("tet10", (11, 3))
-KINDS.setdefault("triangle6", (9, 2))
 LINING = {"young": 5e9, "poisson": 0.25, "density": 2500}
 # Where the other code's nodes stand in gmsh's order, as these codes' manuals draw them.
 ORDERS = {
@@ -19,17 +17,6 @@ ORDERS = {
 }
 
 TOOL = load_tool("mesh")
-
-
-def tetrahedra10(nodes):
-    """Six 10-node tetrahedra a cell, gmsh's order, of a lattice of twice as many divisions: their mid-sides lie on it."""
-    cells = []
-    for i, j, k in itertools.product(*(range(0, size - 2, 2) for size in nodes.shape)):
-        for path in itertools.permutations(np.eye(3, dtype=int) * 2):
-            corners = np.cumsum([(i, j, k), *path], axis=0)
-            places = [*corners, *((corners[a] + corners[b]) // 2 for a, b in [(0, 1), (1, 2), (2, 0), (3, 0), (3, 2), (3, 1)])]
-            cells.append([nodes[tuple(place)] for place in places])
-    return np.array(cells)
 
 
 class TwoBlocks:
