@@ -81,6 +81,21 @@ Modes run_modes(Chain& chain)
   return modes;
 }
 
+Response run_response(Chain& chain)
+{
+  const Scene& scene = chain.scene;
+  if (!scene.response) return not_run<Response>(OutcomeKind::off, "the scene has no [response]");
+  if (chain.report.equilibrium.outcome.kind != OutcomeKind::converged)
+    return not_run<Response>(OutcomeKind::skipped, "there is no equilibrium to linearise about");
+  if (!chain.linearised) chain.linearised = linearise(chain.sliding());
+  std::vector<int> excitations;
+  for (std::size_t i = 0; i < scene.probes.size(); ++i)
+    if (scene.response->excitation.empty() || std::ranges::count(scene.response->excitation, scene.probes[i].name) > 0)
+      excitations.push_back(static_cast<int>(i));
+  return find_response({chain.model.structure, *chain.linearised, chain.model.probes, excitations,
+                        frequencies_of(*scene.response), chain.options.response, chain.options.pencil});
+}
+
 std::vector<Estimate> run_estimates(const Chain& chain)
 {
   const Scene& scene = chain.scene;

@@ -32,7 +32,9 @@ constexpr double dense_copies = 24; // of n x n numbers in a dense quadratic pro
 constexpr double vectors_of_modes = 4 * 250 + 250 + 200 + 200 + 300;
 constexpr double vectors_of_modes_kept = 200; // of the same 100 pairs
 constexpr double vectors_of_shooting = 100;   // pairs of differences, work of a step, columns of the multipliers
-constexpr double start_of_libraries = 400e6;  // [byte] OpenBLAS's buffer of 128 MB, those of MPI and of PETSc
+// A basis grows beyond its limit by what one pass adds; with it its copy while it grows, and the random vectors:
+constexpr double passes_of_response = 40;
+constexpr double start_of_libraries = 400e6; // [byte] OpenBLAS's buffer of 128 MB, those of MPI and of PETSc
 
 double steps_of_transient(const TransientSettings& transient)
 {
@@ -183,6 +185,19 @@ double memory_of_modes(const Sizes& sizes, const ModesSettings& settings, PetscI
          forecast_pencil(sizes.factor, sizes.entries, search, comm) + number * vectors_of_modes * sizes.dofs;
 }
 
+/// Eight matrices: M, C and K of the sliding problem, that of loss factors, and their transposes. The pencil, the
+/// basis with its copy while it grows, and the responses with those of the basis before.
+double memory_of_response(const Sizes& sizes, const Scene& scene, const ResponseOptions& options, MPI_Comm comm)
+{
+  const double driven = static_cast<double>(scene.response->excitation.size()),
+               read = static_cast<double>(scene.probes.size());
+  const double pairs = (driven > 0 ? driven : read) * read;
+  const double shapes = std::min(sizes.dofs, static_cast<double>(options.shapes) + passes_of_response);
+  return 8 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, Symmetry::none, comm) +
+         number * (2 * shapes + passes_of_response) * sizes.dofs +
+         3 * 2 * number * sizes.ranks * pairs * scene.response->count;
+}
+
 /// M and K together, the factor, W, and its near field in single precision, which may be all of it.
 double memory_of_step(const Sizes& sizes)
 {
@@ -231,6 +246,7 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const auto add = [&](Stage stage, double bytes) { forecast.stages.push_back({stage, forecast.held + bytes}); };
   add(Stage::equilibrium, memory_of_equilibrium(sizes));
   if (seeks_modes(scene)) add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes.dense_limit, comm));
+  if (scene.response) add(Stage::response, memory_of_response(sizes, scene, options.response, comm));
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
     add(Stage::transient, memory_of_step(sizes) + number * entries * steps_of_transient(scene.transient));

@@ -41,7 +41,7 @@ OptionList options_of(ProgramOptions& options)
   for (OptionList list : {options_of(options.factor), options_of(options.equilibrium), options_of(options.modes),
                           options_of(options.pencil), options_of(options.estimate), options_of(options.step),
                           options_of(options.cycle), options_of(options.settled), options_of(options.attractors),
-                          options_of(options.sweep), options_of(options.robustness)})
+                          options_of(options.sweep), options_of(options.robustness), options_of(options.response)})
     all.insert(all.end(), list.begin(), list.end());
   return all;
 }

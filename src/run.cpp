@@ -239,7 +239,8 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   save();
   report.modes = stage(report, Stage::modes, comm, [&] { return run_modes(chain); });
   report.estimates = stage(report, Stage::estimate, comm, [&] { return run_estimates(chain); });
-  if (has_run(report.modes.outcome)) save();
+  report.response = stage(report, Stage::response, comm, [&] { return run_response(chain); });
+  if (has_run(report.modes.outcome) || has_run(report.response.outcome)) save();
   if (scene.modes.reduced_matrices && !report.modes.modes.empty())
     write_reduced_matrices(chain.sliding(), report.modes.modes, options.step.factor,
                            results.partial() / word(ResultFile::reduced));

@@ -38,6 +38,9 @@ std::string no_mode_to_follow(const Report& report);
 /// Linearises about the equilibrium, and finds the modes or takes those of the run that is gone on with.
 Modes run_modes(Chain& chain);
 
+/// Frequency responses of the scene's probes about the equilibrium.
+Response run_response(Chain& chain);
+
 /// Of every unstable mode, the followed one first; of none, the reason.
 std::vector<Estimate> run_estimates(const Chain& chain);
 

@@ -6,6 +6,7 @@
 #include "squeal/cycle/options.hpp"
 #include "squeal/report/stage.hpp"
 #include "squeal/settled/motion.hpp"
+#include "squeal/study/response.hpp"
 #include "squeal/study/robustness.hpp"
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/transient.hpp"
@@ -28,6 +29,7 @@ struct ProgramOptions
   SweepOptions sweep;
   bool force = false; // --force: run whatever the forecast says
   RobustnessOptions robustness;
+  ResponseOptions response;
 };
 
 OptionList options_of(ProgramOptions& options);

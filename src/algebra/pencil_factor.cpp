@@ -149,7 +149,20 @@ int PencilFactor::negative_pivots() const
 
 MultiVector PencilFactor::solve(const MultiVector& X) const
 {
-  Parts& parts = *parts_;
+  constexpr MUMPS_INT as_it_is = 1;
+  control(*parts_->mumps, 9) = as_it_is;
+  return solve_with(*parts_, X);
+}
+
+MultiVector PencilFactor::solve_transposed(const MultiVector& X) const
+{
+  constexpr MUMPS_INT transposed = 0;
+  control(*parts_->mumps, 9) = transposed;
+  return solve_with(*parts_, X);
+}
+
+MultiVector PencilFactor::solve_with(Parts& parts, const MultiVector& X)
+{
   MultiVector Y = X;
   const int rows = to_int(X.entries.rows()), columns = to_int(X.columns()), rank = rank_of(parts.comm);
   if (columns == 0) return Y;

@@ -119,15 +119,6 @@ std::vector<ComplexMode> modes_of(QuadraticSolution& solution, const ModesProble
   return modes;
 }
 
-/// C without the viscous equivalent of loss factors, under which modes would be overdamped far above its frequency.
-Owned<Mat> without_loss(Mat C, const Structure& structure)
-{
-  Owned<Mat> result;
-  check(MatDuplicate(C, MAT_COPY_VALUES, result.put()));
-  check(MatAXPY(result, -1 / structure.loss_omega, structure.K_loss, UNKNOWN_NONZERO_PATTERN));
-  return result;
-}
-
 /// Counts in the band, or up to an edge a little below if friction moves a pair across the end of the band.
 PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution& solution, RealCount& real,
                         double band)
@@ -295,11 +286,8 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
     return modes;
   }
   const Mat Y = linearised.contact.Y, Z = linearised.contact.Z;
-  const Owned<Mat> C_0 = sliding.structure.K_loss.get() ? without_loss(linearised.C, sliding.structure) : Owned<Mat>{};
   const ModesProblem problem{linearised,
-                             {project(sliding.structure.M, Y, Z),
-                              project(C_0.get() ? C_0.get() : linearised.C.get(), Y, Z),
-                              project(linearised.K.get() ? linearised.K.get() : sliding.structure.K.get(), Y, Z)},
+                             sliding_problem(sliding.structure, linearised),
                              settings,
                              options,
                              sliding.structure,

@@ -55,6 +55,15 @@ QuadraticSolution solve_whole(const QuadraticProblem& problem, const Window& win
   return result;
 }
 
+/// C without the viscous equivalent of loss factors, under which modes would be overdamped far above its frequency.
+Owned<Mat> without_loss(Mat C, const Structure& structure)
+{
+  Owned<Mat> result;
+  check(MatDuplicate(C, MAT_COPY_VALUES, result.put()));
+  check(MatAXPY(result, -1 / structure.loss_omega, structure.K_loss, UNKNOWN_NONZERO_PATTERN));
+  return result;
+}
+
 Owned<PEP> make_solver(Mat M, Mat C, Mat K, PetscInt count, double shift)
 {
   Owned<PEP> pep;
@@ -128,6 +137,14 @@ QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSe
 }
 
 } // namespace
+
+QuadraticProblem sliding_problem(const Structure& structure, const LinearisedSliding& linearised)
+{
+  const Mat Y = linearised.contact.Y, Z = linearised.contact.Z;
+  const Owned<Mat> C_0 = structure.K_loss.get() ? without_loss(linearised.C, structure) : Owned<Mat>{};
+  return {project(structure.M, Y, Z), project(C_0.get() ? C_0.get() : linearised.C.get(), Y, Z),
+          project(linearised.K.get() ? linearised.K.get() : structure.K.get(), Y, Z)};
+}
 
 bool Window::holds(std::complex<double> lambda) const
 {

@@ -3,6 +3,7 @@
 #include "branch_results.hpp"
 #include "derived.hpp"
 #include "files.hpp"
+#include "response_results.hpp"
 #include "robustness_results.hpp"
 #include "sweep_results.hpp"
 
@@ -77,6 +78,7 @@ void write_history(const Report& report, const Scene& scene, const std::filesyst
     write_group(file, "settled", report.settled.history, scene);
     write_spectrum(file, report.settled.examined.spectrum, report.settled.spectrum_probe < 0 ? "N" : "m");
   }
+  if (has_run(report.response.outcome)) write_response(file, report.response, scene);
   if (has_run(report.branch.outcome)) write_branch(file, report.branch, scene);
   if (has_run(report.sweep.outcome)) write_sweep(file, report.sweep);
   if (has_run(report.robustness.outcome)) write_robustness(file, report.robustness);

@@ -4,6 +4,7 @@
 #include "derived.hpp"
 #include "files.hpp"
 #include "heard.hpp"
+#include "response_results.hpp"
 #include "robustness_results.hpp"
 #include "sensitivity_results.hpp"
 #include "sweep_results.hpp"
@@ -340,6 +341,7 @@ std::string report_json(const Report& report, const Scene& scene)
   json[word(Stage::equilibrium)] = equilibrium_entry(report, scene);
   json[word(Stage::modes)] = modes_entry(report.modes);
   json[word(Stage::estimate)] = estimate_entry(followed_estimate(report));
+  json[word(Stage::response)] = study_entry(report.response, scene, add_response);
   json[word(Stage::transient)] = transient_entry(report);
   json[word(Stage::coarse)] = coarse_entry(report.coarse);
   json[word(Stage::cycle)] = cycle_entry(report, scene);
@@ -359,6 +361,7 @@ std::string report_json(const Report& report, const Scene& scene)
   warn(Stage::equilibrium, warnings.equilibrium);
   warn(Stage::modes, warnings.modes);
   warn(Stage::estimate, warnings.estimate);
+  warn(Stage::response, warnings.response);
   warn(Stage::transient, warnings.transient);
   warn(Stage::cycle, warnings.cycle);
   for (const auto& [stage, seconds, processor_seconds] : report.timings)

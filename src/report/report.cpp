@@ -50,11 +50,12 @@ const Estimate& followed_estimate(const Report& report)
   return report.estimates.empty() ? none : report.estimates.front();
 }
 
-std::array<std::pair<Stage, Outcome>, 12> outcomes_of(const Report& report)
+std::array<std::pair<Stage, Outcome>, 13> outcomes_of(const Report& report)
 {
   return {{{Stage::equilibrium, report.equilibrium.outcome},
            {Stage::modes, report.modes.outcome},
            {Stage::estimate, followed_estimate(report).outcome},
+           {Stage::response, report.response.outcome},
            {Stage::transient, report.transient.outcome},
            {Stage::coarse, report.coarse.outcome},
            {Stage::cycle, report.cycle.outcome},

@@ -3,6 +3,7 @@
 #include "branch_results.hpp"
 #include "derived.hpp"
 #include "heard.hpp"
+#include "response_results.hpp"
 #include "robustness_results.hpp"
 #include "sensitivity_results.hpp"
 #include "sweep_results.hpp"
@@ -255,6 +256,8 @@ std::string table(const Report& report, const Scene& scene)
   text += equilibrium_text(report.equilibrium, model.pairs) + warning_rows(warnings.equilibrium);
   text += modes_text(report.modes) + warning_rows(warnings.modes);
   text += estimate_text(followed_estimate(report)) + warning_rows(warnings.estimate);
+  text += optional_text("response", report.response.outcome, [&] { return response_lines(report.response, scene); }) +
+          warning_rows(warnings.response);
   text += transient_text(report) + warning_rows(warnings.transient);
   text += optional_text("coarse start", report.coarse.outcome, [&] { return coarse_lines(report.coarse); });
   text += cycle_text(report, scene) + warning_rows(warnings.cycle);

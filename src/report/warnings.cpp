@@ -81,6 +81,18 @@ Sentences of_estimate(const Report& report)
   return sentences;
 }
 
+Sentences of_response(const Report& report)
+{
+  const Modes& modes = report.modes;
+  if (modes.unstable_count > 0)
+    return {format("%d of the modes are unstable: no vibration settles on these responses, and no rig measures them",
+                   modes.unstable_count)};
+  if (modes.outcome.kind != OutcomeKind::converged || modes.band < report.response.frequency_hz.back())
+    return {"whether all modes of this band are stable is not known, without which no rig measures these responses: "
+            "give modes.band its highest frequency"};
+  return {};
+}
+
 void add_chatter(const History& history, Sentences& sentences)
 {
   const double share = chatter(history);
@@ -137,6 +149,7 @@ Warnings warnings_of(const Report& report)
   if (has_run(report.equilibrium.outcome)) warnings.equilibrium = of_equilibrium(report);
   if (has_run(report.modes.outcome)) warnings.modes = of_modes(report);
   if (has_run(followed_estimate(report).outcome)) warnings.estimate = of_estimate(report);
+  if (has_run(report.response.outcome)) warnings.response = of_response(report);
   if (has_run(report.transient.outcome) && report.transient.outcome.kind != OutcomeKind::refused)
     warnings.transient = of_transient(report);
   if (has_run(report.cycle.outcome)) warnings.cycle = of_cycle(report);

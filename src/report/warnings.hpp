@@ -8,7 +8,7 @@ namespace squeal
 /// By stages; most runs have none.
 struct Warnings
 {
-  std::vector<std::string> equilibrium, modes, estimate, transient, cycle;
+  std::vector<std::string> equilibrium, modes, response, estimate, transient, cycle;
 };
 
 Warnings warnings_of(const Report& report);

@@ -46,6 +46,7 @@ public:
     check_loss();
     check_transient();
     check_cycle();
+    if (scene_.response) check_response(*scene_.response);
   }
 
 private:
@@ -312,6 +313,26 @@ private:
       fail(&c.start,
            "[cycle] start = \"coarse\" needs a coarser mesh: give coarse_parameters = { NAME = VALUE } of the "
            "scene's .geo, or coarse_mesh = a file of the same parts and groups");
+  }
+
+  void check_response(const ResponseSettings& r) const
+  {
+    constexpr int most = 100000; // frequencies: ten times what a rig's analyser takes
+    std::vector<std::string> probes;
+    for (const Probe& probe : scene_.probes) probes.push_back(probe.name);
+    if (probes.empty()) fail(&r, "[response] needs a [[probe]] where the structure is driven and read");
+    for (std::size_t i = 0; i < r.excitation.size(); ++i)
+    {
+      const std::string& name = r.excitation[i];
+      need_known(name, probes, &r.excitation, "[response] excitation");
+      if (std::find(r.excitation.begin(), r.excitation.begin() + static_cast<long>(i), name) !=
+          r.excitation.begin() + static_cast<long>(i))
+        fail(&r.excitation, "[response] excitation names \"" + name + "\" twice; keep one");
+    }
+    if (r.count < 2 || r.count > most)
+      fail(&r.count, "[response] count = " + std::to_string(r.count) + ": give from 2 to " + std::to_string(most));
+    if (!(r.from < r.to))
+      fail(&r.to, format("[response] goes from %g to %g Hz: give a 'to' above 'from'", r.from, r.to));
   }
 
   static constexpr double largest_cosine = 1e-6; // unit vectors written by hand have a few digits

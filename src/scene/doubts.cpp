@@ -55,6 +55,19 @@ void doubt_loads(const Scene& scene, std::vector<std::string>& doubts)
     doubts.push_back("[transient] load_factor falls below 0: all loads then act the other way round");
 }
 
+void doubt_damping(const RayleighDamping& damping, std::vector<std::string>& doubts)
+{
+  for (const auto& [frequency_hz, measured] : damping.measured)
+  {
+    constexpr double repeated = 1.5; // measured ratios of one brake differ by this much from one assembly to the next
+    const double used = damping_ratio_at(damping, frequency_hz);
+    if (std::max(used / measured, measured / used) > repeated)
+      doubts.push_back(format("the damping ratio measured at %g Hz is %.3g %%, and Rayleigh damping fitted to all of "
+                              "them has %.3g %% there",
+                              frequency_hz, 100 * measured, 100 * used));
+  }
+}
+
 } // namespace
 
 std::vector<std::string> doubts_about(const Scene& scene)
@@ -70,6 +83,7 @@ std::vector<std::string> doubts_about(const Scene& scene)
   doubt_masses(scene.points, doubts);
   doubt_masses(scene.rigid_bodies, doubts);
   doubt_loads(scene, doubts);
+  doubt_damping(scene.damping, doubts);
   return doubts;
 }
 

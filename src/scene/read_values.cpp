@@ -119,19 +119,25 @@ public:
   /// Rows of a time and a factor, the times rising.
   void read(const toml::node& node, TimeFactor& target) const
   {
-    const std::string expected = "rows [time in s, factor] such as [[0, 0], [0.1, 1]]";
-    const toml::array* rows = node.as_array();
-    if (!rows || rows->empty()) fail(node, expected);
     target = {};
-    for (const toml::node& row : *rows)
+    for (const auto& [time, factor] : rows_of_two(node, "rows [time in s, factor] such as [[0, 0], [0.1, 1]]"))
     {
-      const std::vector<double> values = numbers(row, expected);
-      if (values.size() != 2) fail(row, expected);
-      if (!target.time.empty() && !(values[0] > target.time.back())) fail(row, "a time after that of the row before");
-      if (value_.key.rule == Rule::not_negative && values[1] < 0) fail(row, "a factor of zero or above");
-      target.time.push_back(values[0]);
-      target.value.push_back(values[1]);
+      if (value_.key.rule == Rule::not_negative && factor < 0) fail(node, "factors of zero or above");
+      target.time.push_back(time);
+      target.value.push_back(factor);
     }
+  }
+
+  void read(const toml::node& node, std::vector<MeasuredRatio>& target) const
+  {
+    target.clear();
+    for (const auto& [frequency, ratio] :
+         rows_of_two(node, "at least two rows [frequency in Hz, damping ratio] such as [[800, 0.004], [2500, 0.006]]"))
+    {
+      if (!(frequency > 0 && ratio > 0 && ratio < 1)) fail(node, "frequencies above 0 and ratios between 0 and 1");
+      target.push_back({frequency, ratio});
+    }
+    if (target.size() < 2) fail(node, "at least two rows [frequency in Hz, damping ratio]");
   }
 
   void read(const toml::node& node, std::array<double, 6>& target) const
@@ -225,6 +231,23 @@ private:
       values.push_back(*entry.value<double>());
     }
     return values;
+  }
+
+  /// Rows of two numbers, of which the first rises.
+  std::vector<std::pair<double, double>> rows_of_two(const toml::node& node, const std::string& expected) const
+  {
+    const toml::array* rows = node.as_array();
+    if (!rows || rows->empty()) fail(node, expected);
+    std::vector<std::pair<double, double>> result;
+    for (const toml::node& row : *rows)
+    {
+      const std::vector<double> values = numbers(row, expected);
+      if (values.size() != 2) fail(row, expected);
+      if (!result.empty() && !(values[0] > result.back().first))
+        fail(row, "a first number above that of the row before");
+      result.emplace_back(values[0], values[1]);
+    }
+    return result;
   }
 
   /// Returns a list of three numbers, or of a direction its unit vector, which may be given as "x", "-y" and so on.

@@ -32,6 +32,14 @@ toml::table parse_file(const std::filesystem::path& file)
 
 } // namespace
 
+std::vector<double> frequencies_of(const ResponseSettings& response)
+{
+  std::vector<double> frequencies;
+  for (int i = 0; i < response.count; ++i)
+    frequencies.push_back(response.from + i * (response.to - response.from) / (response.count - 1));
+  return frequencies;
+}
+
 double factor_at(const TimeFactor& factor, double time)
 {
   const auto& [times, values] = factor;
@@ -64,6 +72,7 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
   Places places{file.string(), {}};
   read_tables(root, scene, places);
   check_scene(scene, places);
+  fit_damping(scene, places);
   resolve_branch(scene, places);
   resolve_sweep(scene, places);
   check_sensitivity(scene, places);

@@ -202,6 +202,8 @@ SceneKeys keys_of(RayleighDamping& d)
       {"beta", &d.beta, optional, Rule::not_negative, "s", "stiffness part"},
       {"loss_frequency", &d.loss_frequency, optional, Rule::not_negative, "Hz",
        "where loss factors have their viscous equivalent in time; modes take it at their own frequency"},
+      {"measured", &d.measured, optional, Rule::positive, "table",
+       "instead of alpha and beta, which are fitted to [[frequency in Hz, damping ratio], ...] of modes"},
   };
 }
 
@@ -305,6 +307,17 @@ SceneKeys keys_of(Change& c)
       {"mass", &c.mass, optional, Rule::not_negative, "kg", "added mass"},
       {"damping", &c.damping, optional, Rule::not_negative, "N s/m", "dashpot to the ground"},
       {"stiffness", &c.stiffness, optional, Rule::not_negative, "N/m", "spring to the ground, relaxed at equilibrium"},
+  };
+}
+
+SceneKeys keys_of(ResponseSettings& r)
+{
+  return {
+      {"excitation", &r.excitation, optional, Rule::any, "texts",
+       "names of the probes that are driven, along their directions; without it all are"},
+      {"from", &r.from, required, Rule::positive, "Hz", "lowest frequency"},
+      {"to", &r.to, required, Rule::positive, "Hz", "highest frequency"},
+      {"count", &r.count, optional, Rule::positive, "-", "number of frequencies, evenly spread"},
   };
 }
 

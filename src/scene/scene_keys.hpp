@@ -21,7 +21,7 @@ using Target =
     std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*, std::optional<Vec3>*,
                  std::vector<Vec3>*, std::vector<std::string>*, std::vector<double>*, std::vector<int>*,
                  std::array<double, 6>*, Motions*, std::map<std::string, double>*, std::optional<Rotation>*,
-                 std::optional<Orthotropy>*, TimeFactor*, DampingTarget, Start*, CycleStart*, Choice>;
+                 std::optional<Orthotropy>*, TimeFactor*, DampingTarget, Start*, CycleStart*, std::vector<MeasuredRatio>*, Choice>;
 
 /// Whether a key must be given.
 enum class Need
@@ -84,6 +84,7 @@ SceneKeys keys_of(BranchSettings& branch);
 SceneKeys keys_of(SweepSettings& sweep);
 SceneKeys keys_of(SensitivitySettings& sensitivity);
 SceneKeys keys_of(Change& change);
+SceneKeys keys_of(ResponseSettings& response);
 SceneKeys keys_of(RobustnessSettings& robustness);
 SceneKeys keys_of(UncertainNumber& number);
 SceneKeys keys_of(Probe& probe);
@@ -115,6 +116,7 @@ template <class Visit> void for_each_table(Scene& scene, Visit visit)
   visit("sensitivity", scene.sensitivity,
         "derivatives, energies and powers of the unstable modes; runs when the table is present");
   visit("change", scene.changes, "a mass, damper or spring proposed at a probe, predicted and computed");
+  visit("response", scene.response, "frequency responses about steady sliding; runs when the table is present");
   visit("robustness", scene.robustness, "probability of unstable modes; runs when the table is present");
   visit("uncertain", scene.uncertain, "a number of the scene that is random in [robustness]");
   visit("probe", scene.probes, "a displacement that is recorded in time");
@@ -142,6 +144,9 @@ void resolve_sweep(Scene& scene, const Places& places);
 
 /// Throws Error where a number of the sensitivity is none of the scene, or a change is at no probe or changes nothing.
 void check_sensitivity(const Scene& scene, const Places& places);
+
+/// Fits the scene's Rayleigh damping to the measured ratios, where there are some. Throws Error where it is given too.
+void fit_damping(Scene& scene, const Places& places);
 
 /// Gives every random number its mean. Throws Error if there is no such number, or its values make no scene.
 void resolve_robustness(Scene& scene, const Places& places);

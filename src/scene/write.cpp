@@ -122,6 +122,13 @@ std::string print(const std::optional<Orthotropy>& material)
          ", axis_2 = " + print(material->axis_2) + " }";
 }
 
+std::string print(const std::vector<MeasuredRatio>& measured)
+{
+  std::vector<std::vector<double>> rows;
+  for (const auto& [frequency_hz, ratio] : measured) rows.push_back({frequency_hz, ratio});
+  return rows.empty() ? "" : print_list(rows);
+}
+
 std::string print(const TimeFactor& factor)
 {
   std::vector<std::vector<double>> rows;

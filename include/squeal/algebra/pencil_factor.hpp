@@ -41,8 +41,12 @@ public:
   /// (K - shift M)^-1 X
   MultiVector solve(const MultiVector& X) const;
 
+  /// (K - shift M)'^-1 X
+  MultiVector solve_transposed(const MultiVector& X) const;
+
 private:
   struct Parts;
+  static MultiVector solve_with(Parts& parts, const MultiVector& X);
   std::unique_ptr<Parts> parts_;
 };
 

@@ -7,7 +7,7 @@
 ///
 /// Backward error of a pair (Tisseur 2000), in 1-norms of the matrices and 2-norms of the vectors:
 ///     eta = |(lambda^2 M + lambda C + K) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|)
-#include "squeal/equilibrium/state.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include <complex>
 
@@ -19,6 +19,9 @@ struct QuadraticProblem
 {
   Owned<Mat> M, C, K; // AIJ, of one layout
 };
+
+/// That of small motions about sliding, Y'.Z, with C without the viscous equivalent of loss factors. Collective.
+QuadraticProblem sliding_problem(const Structure& structure, const LinearisedSliding& linearised);
 
 /// An eigenvalue with its vector.
 struct Eigenpair

@@ -7,6 +7,7 @@
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/report/stage.hpp"
 #include "squeal/settled/settled_motion.hpp"
+#include "squeal/study/response.hpp"
 #include "squeal/study/robustness.hpp"
 #include "squeal/study/sensitivity.hpp"
 #include "squeal/study/sweep.hpp"
@@ -64,6 +65,7 @@ struct Report
   std::vector<double> equilibrium_probes; // [m] at the equilibrium, one a probe
   Modes modes;
   std::vector<Estimate> estimates; // of the unstable modes, the followed one first; else one that says why not
+  Response response;
   Trajectory transient;
   CoarseStart coarse;
   LimitCycle cycle;
@@ -81,7 +83,7 @@ struct Report
 const Estimate& followed_estimate(const Report& report);
 
 /// The outcome of every stage but the model, in the order in which they run.
-std::array<std::pair<Stage, Outcome>, 12> outcomes_of(const Report& report);
+std::array<std::pair<Stage, Outcome>, 13> outcomes_of(const Report& report);
 
 /// Where the nodes of the fields are.
 struct FieldNodes

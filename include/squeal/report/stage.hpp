@@ -14,6 +14,7 @@ enum class Stage
   equilibrium,
   modes,
   estimate,
+  response,
   transient,
   coarse,
   cycle,
@@ -25,9 +26,9 @@ enum class Stage
   robustness,
 };
 
-inline constexpr std::array stage_names = {"model",       "equilibrium", "modes",     "estimate",   "transient",
-                                           "coarse",      "cycle",       "settled",   "attractors", "branch",
-                                           "sensitivity", "sweep",       "robustness"};
+inline constexpr std::array stage_names = {"model",     "equilibrium", "modes", "estimate",  "response",
+                                           "transient", "coarse",      "cycle", "settled",   "attractors",
+                                           "branch",    "sensitivity", "sweep", "robustness"};
 
 inline Words words_of(Stage)
 {

@@ -256,6 +256,17 @@ struct UncertainNumber
 /// The value that a part of the distribution is below, 0 <= part <= 1.
 double quantile(const UncertainNumber& number, double part);
 
+/// Frequency responses about steady sliding, of every probe to a unit force at others.
+struct ResponseSettings
+{
+  std::vector<std::string> excitation; // names of the probes that are driven, along their directions; empty: all
+  double from = 0, to = 0;             // [Hz]
+  int count = 1000;                    // [-] number of frequencies, evenly spread
+};
+
+/// The frequencies of a response [Hz].
+std::vector<double> frequencies_of(const ResponseSettings& response);
+
 /// A displacement that is recorded in time: of the node of a point, body or group, along a direction.
 struct Probe
 {
@@ -294,6 +305,7 @@ struct Scene
   std::optional<SweepSettings> sweep;
   std::optional<SensitivitySettings> sensitivity;
   std::vector<Change> changes;
+  std::optional<ResponseSettings> response;
   std::vector<Probe> probes;
   std::optional<RobustnessSettings> robustness;
   std::vector<UncertainNumber> uncertain;

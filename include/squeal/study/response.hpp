@@ -1,0 +1,54 @@
+#pragma once
+/// Frequency responses about steady sliding (src/README.md, section 13): displacements at probes under a harmonic unit
+/// force at a probe, along its direction. With p_i the row of probe i and Q of section 13,
+///     H_ji(omega) = p_j'Z q_i,     Q(omega) q_i = Y'p_i.
+///
+/// All frequencies of a part of the band are solved on one basis. Residuals of the full problem and of its transpose
+/// extend it until all are small. So the error of H is the product of both. Where modes are unstable, H is formal: no
+/// vibration settles on it.
+#include "squeal/algebra/pencil_factor.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
+
+#include <complex>
+
+namespace squeal
+{
+
+/// outcome: "converged", "not converged" (a residual stays above the tolerance), "skipped", "off".
+/// residual: the largest |Q q - Y'p| of unit forces and of the transposed problem [-].
+struct Response
+{
+  Outcome outcome;
+  std::vector<double> frequency_hz;                                       // ascending
+  std::vector<int> excitations;                                           // the probes that are driven
+  std::vector<std::vector<std::vector<std::complex<double>>>> receptance; // [m/N] [excitation][probe][frequency]
+  double change = 0; // of H by the last extension of the basis: over |H|, or 1e-4 of the largest |H| at the frequency
+  int parts = 0;     // of the band, each with a basis of its own
+  int shapes = 0;    // of the largest basis
+};
+
+/// Options -response_...
+struct ResponseOptions
+{
+  double tolerance = 1e-5; // of the residuals, over a unit force
+  PetscInt shapes = 150;   // of a basis; where more are needed the band is parted
+};
+
+OptionList options_of(ResponseOptions& options);
+
+/// What is driven and read, and at which frequencies.
+struct ResponseProblem
+{
+  const Structure& structure;
+  const LinearisedSliding& linearised;
+  Mat probes = nullptr;         // a row a probe
+  std::vector<int> excitations; // their rows
+  std::vector<double> frequency_hz;
+  const ResponseOptions& options;
+  const PencilOptions& pencil;
+};
+
+/// Responses of all probes to every excitation. Collective. Error: memory runs out.
+Response find_response(const ResponseProblem& problem);
+
+} // namespace squeal
