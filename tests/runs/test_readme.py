@@ -128,7 +128,8 @@ RUNS = {
                    "--set", "branch.points=4", "--set", "cycle.starts=2", "--set", "sweep.key=friction.coefficient", "--set",
                    "sweep.from=0.1", "--set", "sweep.to=0.3", "--set", "sweep.points=3", "--set",
                    "change=[{probe='pad_y',mass=1e-3}]", "--set", "robustness.samples=10", "--set", "robustness.checks=2",
-                   "--set", "uncertain=[{key='friction.coefficient', deviation=0.01}]", "--set",
+                   "--set", "uncertain=[{key='friction.coefficient', deviation=0.01}]", "--set", "response.from=0.01",
+                   "--set", "response.to=1", "--set", "response.count=20", "--set",
                    "sensitivity.numbers=friction.coefficient"],
     # the reduced model, a rotation, a mesh; coarse, and damped like this, its cycle is found in a second
     "pin_on_disc": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",

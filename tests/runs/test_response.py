@@ -1,0 +1,119 @@
+"""Frequency responses of whole runs, and damping ratios that were measured."""
+
+import h5py
+import numpy as np
+import pytest
+from conftest import INPUTS
+from scipy.optimize import nnls
+
+OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"]
+PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
+       "--set", "modes.method=full", "--set", "response.from=500", "--set", "response.to=12000", "--set", "response.count=150"]
+PROBES = ("holder", "pin")
+
+
+def receptances(output):
+    """Frequencies, and H by the probe that is driven and the one that is read."""
+    with h5py.File(output / "history.h5") as file:
+        group = file["response"]
+        pairs = {(i, j): group[i][j][()] for i in group if i != "frequency" for j in group[i]}
+        return group["frequency"][()], {key: value[:, 0] + 1j * value[:, 1] for key, value in pairs.items()}
+
+
+def test_responses_are_reciprocal_without_friction_alone(converged):
+    """Without friction the problem is symmetric: what is left is rounding at a condition number of 1e6."""
+    for friction, least, greatest in ((0, 0, 1e-10), (0.3, 1e-2, 2)):
+        run = converged(*PIN, "--set", f"friction.coefficient={friction}", ranks=1)
+        _, h = receptances(run.output)
+        size = np.abs(h["holder", "pin"]).max()
+        assert least <= np.abs(h["holder", "pin"] - h["pin", "holder"]).max() / size <= greatest
+        entry = run.report["response"]
+        assert entry["outcome"] == "converged" and entry["residual"] <= 1e-5 and entry["change"] < 1e-3
+        unstable = run.report["modes"]["unstable_count"]
+        assert ("unstable" in " ".join(entry.get("warnings", []))) == (unstable > 0) == (friction > 0)
+
+
+def test_ranks_agree(converged):
+    """Residuals of 1e-5 on both sides leave 1e-10 times a compliance; ranks differ in rounding and in the order of passes."""
+    answers = [receptances(converged(*PIN, ranks=ranks).output) for ranks in (1, 2, 3)]
+    for frequency, h in answers[1:]:
+        assert np.array_equal(frequency, answers[0][0])
+        for key, value in h.items():
+            assert np.abs(value - answers[0][1][key]).max() <= 1e-8 * np.abs(answers[0][1][key]).max(), key
+
+
+def test_near_a_mode_the_response_is_its_share(converged):
+    """With nothing else near, H is c/(i omega - lambda): 1/H is a straight line in omega that vanishes at -i lambda."""
+    scene = [*OSCILLATOR, "--set", "friction.coefficient=0.05"]
+    modes = converged(*scene, ranks=1).report["modes"]["modes"]
+    # a tenth of the damping about the resonance: the other modes are a thousand times as far and bend 1/H by 1e-4 of it
+    for mode in modes:
+        f, width = mode["frequency_hz"], -mode["growth_rate"] / (2 * np.pi)
+        run = converged(*scene, "--set", f"response.from={f - width / 10}", "--set", f"response.to={f + width / 10}", "--set",
+                        "response.count=3", "--set", "response.excitation=pad_x", ranks=1)
+        frequency, h = receptances(run.output)
+        assert set(h) == {("pad_x", "pad_x"), ("pad_x", "pad_y")}
+        inverse = 1 / h["pad_x", "pad_x"]
+        slope = (inverse[2] - inverse[0]) / (2j * np.pi * (frequency[2] - frequency[0]))
+        found = 2j * np.pi * frequency[1] - inverse[1] / slope
+        assert abs(found - complex(mode["growth_rate"], 2 * np.pi * f)) < 0.05 * abs(mode["growth_rate"])
+
+
+@pytest.mark.parametrize("words, message", [
+    (["response.from=1", "response.to=2", "response.excitation=pad_z"], "pad_z"),
+    (["response.from=1", "response.to=2", "response.excitation=['pad_x','pad_x']"], "twice"),
+    (["response.from=2", "response.to=1"], "above 'from'"),
+    (["response.from=0", "response.to=1"], "positive"),
+    (["response.from=1"], "'to'"),
+    (["response.from=1", "response.to=2", "response.count=0"], "positive"),
+    (["response.from=1", "response.to=2", "response.count=1"], "from 2 to 100000"),
+    (["response.from=1", "response.to=2", "response.count=1000000000"], "from 2 to 100000"),
+    (["response.from=1", "response.to=2", "probe=[]"], "[[probe]]"),
+    (["damping.measured=[[100, 0.01]]"], "two rows"),
+    (["damping.measured=[[200, 0.01], [100, 0.01]]"], "row before"),
+    (["damping.measured=[[100, 0.01], [200, -0.01]]"], "between 0 and 1"),
+    (["damping.measured=[[100, 0.01], [200, 0.01]]", "damping.beta=1e-3"], "excludes 'measured'"),
+])
+def test_bad_input_is_one_message(squeal, words, message):
+    run = squeal(*OSCILLATOR, *[word for pair in words for word in ("--set", pair)], ranks=1)
+    assert run.code == 1 and len(run.messages) == 1 and message in run.messages[0], run.errors
+
+
+def resolved(run):
+    """alpha and beta of the scene that a run wrote out."""
+    text = (run.output / "resolved.toml").read_text().split("[damping]")[1]
+    return [float(text.split(f"{key} = ")[1].split()[0]) for key in ("alpha", "beta")]
+
+
+# The oscillator's frequencies are near 0.17 Hz; its points have no mass or stiffness of a part, so that only the scene counts.
+@pytest.mark.parametrize("measured", [
+    [[0.1, 0.01], [0.4, 0.008]],              # met by both
+    [[0.1, 0.002], [0.2, 0.004], [0.4, 0.008]],  # beta alone: in a line
+    [[0.1, 0.001], [0.4, 0.02]],              # alpha would be negative
+    [[0.1, 0.05], [0.4, 0.001]],              # beta would be negative
+    [[0.1, 0.01], [0.2, 0.03], [0.4, 0.005]],    # no fit: a warning
+])
+def test_measured_ratios_are_fitted(converged, measured, tmp_path):
+    run = converged(*OSCILLATOR, "--set", f"damping.measured={measured}", ranks=1)
+    omega, ratio = 2 * np.pi * np.array(measured).T[0], np.array(measured).T[1]
+    rows = np.column_stack([1 / (2 * omega), omega / 2]) / ratio[:, None]
+    wanted, _ = nnls(rows, np.ones(len(ratio)))
+    assert resolved(run) == pytest.approx(wanted, rel=1e-12, abs=1e-14)
+    misfit = rows @ wanted
+    missed = np.maximum(misfit, 1 / misfit) > 1.5
+    warnings = run.report["model"].get("warnings", [])
+    assert sum("measured" in text for text in warnings) == missed.sum()
+    again = converged(run.output / "resolved.toml", ranks=1)  # which holds all three keys
+    assert resolved(again) == resolved(run)
+
+
+def test_measured_ratios_are_those_of_the_modes(converged):
+    """Without friction two ratios at two modes' own frequencies are these modes' damping ratios. The pin's holder has a dashpot
+    of its own, which is taken out; damping of 1 % shifts frequencies by 1e-4."""
+    scene = [*PIN[:6], "--set", "friction.coefficient=0", "--set", "spring.0.damping=0", "--set", "modes.band=6000",
+             "--set", "modes.method=full", "--set", "damping.alpha=0", "--set", "damping.beta=0"]
+    modes = sorted(mode["frequency_hz"] for mode in converged(*scene, ranks=1).report["modes"]["modes"])
+    low, high = modes[0], modes[-1]
+    fitted = converged(*scene[:-4], "--set", f"damping={{measured=[[{low}, 0.004], [{high}, 0.01]]}}", ranks=1)
+    found = sorted((mode["frequency_hz"], mode["damping_ratio"]) for mode in fitted.report["modes"]["modes"])
+    assert found[0][1] == pytest.approx(0.004, rel=1e-3) and found[-1][1] == pytest.approx(0.01, rel=1e-3)
