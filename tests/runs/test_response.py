@@ -9,7 +9,6 @@ from scipy.optimize import nnls
 OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"]
 PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
        "--set", "modes.method=full", "--set", "response.from=500", "--set", "response.to=12000", "--set", "response.count=150"]
-PROBES = ("holder", "pin")
 
 
 def receptances(output):
@@ -21,11 +20,12 @@ def receptances(output):
 
 
 def test_responses_are_reciprocal_without_friction_alone(converged):
-    """Without friction the problem is symmetric: what is left is rounding at a condition number of 1e6."""
+    """Without friction the problem is symmetric: what is left is rounding at a condition number of 1e6. The holder's motion along
+    the disc's axis and the pin's across it then hardly know each other, by the disc's symmetry."""
     for friction, least, greatest in ((0, 0, 1e-10), (0.3, 1e-2, 2)):
         run = converged(*PIN, "--set", f"friction.coefficient={friction}", ranks=1)
         _, h = receptances(run.output)
-        size = np.abs(h["holder", "pin"]).max()
+        size = np.sqrt(np.abs(h["holder", "holder"]).max() * np.abs(h["pin", "pin"]).max())
         assert least <= np.abs(h["holder", "pin"] - h["pin", "holder"]).max() / size <= greatest
         entry = run.report["response"]
         assert entry["outcome"] == "converged" and entry["residual"] <= 1e-5 and entry["change"] < 1e-3
