@@ -3,6 +3,7 @@
 import common
 import plot_contact
 import plot_motion
+import plot_response
 import plot_robustness
 import plot_shape
 import plot_spectra
@@ -19,6 +20,8 @@ FIGURES = {
     "modes": (plot_stability.draw_modes, False, "Every mode of the sliding brake. Those above zero grow and may squeal."),
     "estimate": (plot_stability.draw_estimate, False, "Power of friction and of damping against amplitude: where they are equal "
                  "the vibration is estimated to settle."),
+    "response": (plot_response.draw_response, False, "Displacement of the probes under a unit force at one of them, about "
+                 "sliding, as a test rig measures it: magnitude and phase."),
     "energy": (plot_motion.draw_energy, False, "Energy against time, as means over a period, beside that of the limit cycle."),
     "spectrum": (plot_spectra.draw_spectrum, False, "Levels of the probes' velocities."),
     "spectrogram": (plot_spectra.draw_spectrogram, False, "How the spectrum changes with time: harmonics come with lift-off."),

@@ -200,6 +200,13 @@ class Results:
         """Displacements of the probes [m], by name."""
         return {name: self.series(run, f"probes/{name}") for name in self._names("history.h5", f"{run}/probes")}
 
+    def responses(self):
+        """Frequencies [Hz], and complex receptances [m/N] by the names of the probe that is driven and the one that is read."""
+        driven = dict.fromkeys(peak["excitation"] for peak in self.stage("response")["peaks"])
+        read = dict.fromkeys(peak["probe"] for peak in self.stage("response")["peaks"])
+        values = {(i, j): self.series("response", f"receptance/{i}/{j}") for i in driven for j in read}
+        return self.series("response", "frequency"), {pair: h[:, 0] + 1j * h[:, 1] for pair, h in values.items()}
+
     @property
     def nodes(self):
         """Positions [m], one node a row."""

@@ -65,7 +65,8 @@ void write_response(Hdf5File& file, const Response& response, const Scene& scene
       std::vector<double> flat;
       for (const std::complex<double>& value : response.receptance[i][j])
         flat.insert(flat.end(), {value.real(), value.imag()});
-      file.write("response/" + without_slash(name_of(response, i, scene)) + "/" + without_slash(scene.probes[j].name),
+      file.write("response/receptance/" + without_slash(name_of(response, i, scene)) + "/" +
+                     without_slash(scene.probes[j].name),
                  {flat.size() / 2, 2}, flat, "m/N");
     }
 }

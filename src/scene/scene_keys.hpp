@@ -17,11 +17,11 @@ struct DampingTarget
 
 /// The member that a key fills.
 
-using Target =
-    std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*, std::optional<Vec3>*,
-                 std::vector<Vec3>*, std::vector<std::string>*, std::vector<double>*, std::vector<int>*,
-                 std::array<double, 6>*, Motions*, std::map<std::string, double>*, std::optional<Rotation>*,
-                 std::optional<Orthotropy>*, TimeFactor*, DampingTarget, Start*, CycleStart*, std::vector<MeasuredRatio>*, Choice>;
+using Target = std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*,
+                            std::optional<Vec3>*, std::vector<Vec3>*, std::vector<std::string>*, std::vector<double>*,
+                            std::vector<int>*, std::array<double, 6>*, Motions*, std::map<std::string, double>*,
+                            std::optional<Rotation>*, std::optional<Orthotropy>*, TimeFactor*, DampingTarget, Start*,
+                            CycleStart*, std::vector<MeasuredRatio>*, Choice>;
 
 /// Whether a key must be given.
 enum class Need

@@ -14,9 +14,9 @@ PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.division
 def receptances(output):
     """Frequencies, and H by the probe that is driven and the one that is read."""
     with h5py.File(output / "history.h5") as file:
-        group = file["response"]
-        pairs = {(i, j): group[i][j][()] for i in group if i != "frequency" for j in group[i]}
-        return group["frequency"][()], {key: value[:, 0] + 1j * value[:, 1] for key, value in pairs.items()}
+        group = file["response/receptance"]
+        pairs = {(i, j): group[i][j][()] for i in group for j in group[i]}
+        return file["response/frequency"][()], {key: value[:, 0] + 1j * value[:, 1] for key, value in pairs.items()}
 
 
 def test_responses_are_reciprocal_without_friction_alone(converged):

@@ -67,3 +67,57 @@ def test_a_file_without_modes_is_refused(run, tmp_path):
                      "\n  0.0000000000000000D+00\n    -1\n")
     done = uff(run.folder, "--measured", empty)
     assert done.returncode == 1 and "dataset 55" in done.stderr and "Traceback" not in done.stderr
+
+
+@pytest.fixture(scope="module")
+def responses(tmp_path_factory):
+    """Responses of the oscillator, and their file."""
+    values = {"transient.enabled": False, "cycle.enabled": False, "response.from": 0.02, "response.to": 0.6, "response.count": 59,
+              "friction.coefficient": 0.1}
+    run = squeal.run(INPUTS / "oscillator", values, output=tmp_path_factory.mktemp("responses") / "run")
+    assert uff(run.folder).returncode == 0
+    return run
+
+
+def test_responses_are_written_by_their_columns(responses):
+    """Of dataset 58 line 6 says what it is, lines 7 and 8 the lines and units, and complex numbers stand two a line."""
+    frequency, table = responses.responses()
+    sets = [lines for number, lines in data_sets(responses.folder / "squeal.uff") if number == 58]
+    assert len(sets) == len(table) == 4
+    for lines, h in zip(sets, table.values()):
+        assert int(lines[5][:5]) == 4
+        kind, count, _ = (int(lines[6][10 * k:10 * k + 10]) for k in range(3))
+        assert (kind, count) == (6, len(frequency))
+        numbers = np.array([float(word) for line in lines[11:] for word in line.replace("D", "E").split()])
+        assert numbers[0::2] + 1j * numbers[1::2] == pytest.approx(h, rel=1e-10)
+
+
+def table_of(text):
+    return [line.split() for line in text.splitlines()[1:]]
+
+
+def test_responses_read_back_are_the_same(responses, tmp_path):
+    """Twice as much is 6.02 dB, and accelerations are made displacements."""
+    done = uff(responses.folder, "--measured", responses.folder / "squeal.uff")
+    assert done.returncode == 0, done.stderr
+    rows = table_of(done.stdout)
+    assert [(float(row[3]), float(row[4])) for row in rows] == [(1, 0)] * 4
+    script = ("import sys, numpy as np, pyuff\n"
+              "sets = [s for s in pyuff.UFF(sys.argv[1]).read_sets() if s['type'] == 58]\n"
+              "for s in sets:\n"
+              "    s['data'] = 2 * s['data'] * (2j * np.pi * s['x']) ** 2\n"
+              "    s['ordinate_spec_data_type'] = 12\n"
+              "pyuff.UFF(sys.argv[2]).write_sets(sets[:1], 'overwrite')\n")
+    done = subprocess.run([PYTHON, "-c", script, responses.folder / "squeal.uff", tmp_path / "test.uff"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    done = uff(responses.folder, "--measured", tmp_path / "test.uff")
+    assert done.returncode == 0, done.stderr
+    (row,) = table_of(done.stdout)
+    assert float(row[3]) == 1 and float(row[4]) == pytest.approx(20 * np.log10(2), abs=1e-3)
+
+
+def test_responses_of_other_probes_are_refused(responses, tmp_path):
+    text = (responses.folder / "squeal.uff").read_text()
+    (tmp_path / "other.uff").write_text(text.replace("pad_x", "other"))
+    done = uff(responses.folder, "--measured", tmp_path / "other.uff")
+    assert done.returncode == 1 and "other" in done.stderr and "Traceback" not in done.stderr
