@@ -62,8 +62,8 @@ void fit_damping(Scene& scene, const Places& places)
   const RayleighDamping given = damping;
   fit(damping);
   for (const auto& [key, member] : {std::pair{"alpha", &RayleighDamping::alpha}, {"beta", &RayleighDamping::beta}})
-    if (places.given.contains(&(damping.*member)) && given.*member != damping.*member)
-      throw Error(places.at(&(damping.*member)) + ": [damping] " + key +
+    if (given.*member != 0 && given.*member != damping.*member) // a resolved scene holds what was fitted
+      throw Error(places.at(&damping.measured) + ": [damping] " + key +
                   format(" = %g excludes 'measured', from which it follows as %.17g: keep one of them", given.*member,
                          damping.*member));
 }
