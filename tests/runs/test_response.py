@@ -104,15 +104,3 @@ def test_measured_ratios_are_fitted(converged, measured, tmp_path):
     assert sum("measured" in text for text in warnings) == missed.sum()
     again = converged(run.output / "resolved.toml", ranks=1)  # which holds all three keys
     assert resolved(again) == resolved(run)
-
-
-def test_measured_ratios_are_those_of_the_modes(converged):
-    """Without friction two ratios at two modes' own frequencies are these modes' damping ratios. The pin's holder has a dashpot
-    of its own, which is taken out; damping of 1 % shifts frequencies by 1e-4."""
-    scene = [*PIN[:7], "--set", "friction.coefficient=0", "--set", "spring.0.damping=0", "--set", "modes.band=6000",
-             "--set", "damping.beta=0"]
-    modes = sorted(mode["frequency_hz"] for mode in converged(*scene, ranks=1).report["modes"]["modes"])
-    low, high = modes[0], modes[-1]
-    fitted = converged(*scene, "--set", f"damping.measured=[[{low}, 0.004], [{high}, 0.01]]", ranks=1)
-    found = sorted((mode["frequency_hz"], mode["damping_ratio"]) for mode in fitted.report["modes"]["modes"])
-    assert found[0][1] == pytest.approx(0.004, rel=1e-3) and found[-1][1] == pytest.approx(0.01, rel=1e-3)
