@@ -86,6 +86,7 @@ private:
   {
     std::string problem = problem_of_option_name(name);
     if (problem.empty()) problem = problem_of_session_option(name, value);
+    if (const std::string file = file_written_by(name, value); !file.empty()) given.written.push_back(file);
     if (!problem.empty())
       given.problem = problem + source;
     else if (names_options_file(name))

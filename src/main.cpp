@@ -59,7 +59,7 @@ const std::array known_arguments = {
              [](Arguments& arguments, const std::string& value) { arguments.overrides.push_back(value); }},
     Argument{"--output", "DIR", "where results go (results/<scene>)",
              [](Arguments& arguments, const std::string& value) { arguments.output = value; }},
-    Argument{"--time-limit", "S", "ends the run in order after S seconds, as SIGTERM, SIGINT and SIGUSR1 do",
+    Argument{"--time-limit", "S", "ends the run in order after S seconds, as SIGTERM, SIGINT, SIGHUP and SIGUSR1 do",
              [](Arguments& arguments, const std::string& value)
              { read_seconds("--time-limit", value, arguments.limits.time_limit, arguments.problem); }},
     Argument{"--checkpoint", "S", "seconds between checkpoints [600]",
@@ -116,12 +116,33 @@ Arguments take_arguments(int& argc, char** argv)
   return arguments;
 }
 
+/// The default place of the results: named after the scene's folder when the file is called scene.toml.
+std::filesystem::path default_output(const std::filesystem::path& scene)
+{
+  const auto whole = std::filesystem::absolute(scene).lexically_normal();
+  return std::filesystem::path("results") / (scene.stem() == "scene" ? whole.parent_path().filename() : whole.stem());
+}
+
+/// Why a file that PETSc would write may not be written: it is the scene or a result. Empty: it may.
+std::string problem_of_written(const std::vector<std::string>& files, const Arguments& arguments)
+{
+  if (arguments.scene.empty()) return {};
+  std::vector<std::filesystem::path> taken = {arguments.scene};
+  const auto place = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;
+  for (const char* name : result_file_names) taken.push_back(place / name);
+  for (const std::string& file : files)
+    if (std::ranges::any_of(taken, [&](const auto& other) { return is_same_file(file, other); }))
+      return "the output " + shortened(file) + " of PETSc's would fall on the scene or a result: name another file";
+  return {};
+}
+
 /// Checks what PETSc obeys while it starts. Where something is wrong, PETSc starts without any option.
 void examine_options(Arguments& arguments, std::vector<char*>& words)
 {
   static char skip[] = "-skip_petscrc";
   GivenOptions given = given_options(static_cast<int>(words.size()), words.data());
   arguments.option_sources = std::move(given.sources);
+  if (given.problem.empty()) given.problem = problem_of_written(given.written, arguments);
   if (given.problem.empty()) return;
   if (arguments.problem.empty()) arguments.problem = given.problem;
   unsetenv("PETSC_OPTIONS");
@@ -158,13 +179,6 @@ void print_help()
               prefixes.c_str(), session_option_reference().c_str());
 }
 
-/// The default place of the results: named after the scene's folder when the file is called scene.toml.
-std::filesystem::path default_output(const std::filesystem::path& scene)
-{
-  const auto name = scene.stem() == "scene" ? std::filesystem::absolute(scene).parent_path().filename() : scene.stem();
-  return std::filesystem::path("results") / name;
-}
-
 void print_versions()
 {
   for (const auto& [name, version] : versions()) std::printf("%-7s %s\n", name.c_str(), version.c_str());
@@ -193,6 +207,8 @@ void check_state_file(const std::string& key, const std::filesystem::path& file,
   const auto folder = file.parent_path(), results = std::filesystem::absolute(output).lexically_normal();
   const std::string label = key + " = " + shortened(file) + ": ";
   if (is_folder(file)) throw Error(label + "it is a folder; name a file");
+  if (std::error_code failed; !is_file(file) && std::filesystem::exists(file, failed))
+    throw Error(label + "it is a device or a pipe, which the state would replace; name a file");
   if (folder == results || folder / "" == results) return;
   if (!is_folder(folder)) throw Error(label + "there is no folder " + shortened(folder) + "; make it first");
   if (access((is_file(file) ? file : folder).c_str(), W_OK) != 0 || access(folder.c_str(), W_OK) != 0)

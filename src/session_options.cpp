@@ -78,12 +78,18 @@ std::string problem_of_new_file(const std::string& name)
   return {};
 }
 
-/// [ascii][:file[:format[:append]]]
-std::string problem_of_viewer(const std::string& value)
+std::vector<std::string> parts_of(const std::string& value)
 {
   std::vector<std::string> parts;
   std::istringstream stream(value);
   for (std::string part; std::getline(stream, part, ':');) parts.push_back(part);
+  return parts;
+}
+
+/// [ascii][:file[:format[:append]]]
+std::string problem_of_viewer(const std::string& value)
+{
+  const std::vector<std::string> parts = parts_of(value);
   if (!parts.empty() && !is_one_of(parts[0], {"", "ascii"}))
     return "no viewer is called '" + shortened(parts[0]) + "'; write :FILE, :FILE:FORMAT or nothing";
   if (parts.size() > 2 && !is_one_of(parts[2], {"", "default", "ascii_info", "ascii_info_detail", "ascii_xml",
@@ -127,6 +133,24 @@ std::string problem_of_session_option(const std::string& name, const std::string
   const SessionOption* option = find_option(name);
   const std::string problem = option ? problem_of_value(*option, value) : "";
   return problem.empty() ? "" : "option -" + name + " " + shortened(value) + ": " + problem;
+}
+
+std::string file_written_by(const std::string& name, const std::string& value)
+{
+  const SessionOption* option = find_option(name);
+  if (!option) return {};
+  const std::vector<std::string> parts = parts_of(value);
+  switch (option->value)
+  {
+  case Value::write_file:
+    return value;
+  case Value::viewer:
+    return parts.size() > 1 ? parts[1] : "";
+  case Value::info:
+    return parts.empty() ? "" : parts[0];
+  default:
+    return {};
+  }
 }
 
 bool names_options_file(const std::string& name)

@@ -12,6 +12,7 @@ struct GivenOptions
 {
   std::vector<std::string> sources; // other than the command line: "PETSC_OPTIONS", "file .petscrc"
   std::string problem;              // empty, or why PETSc must not see them
+  std::vector<std::string> written; // files that PETSc will write
 };
 
 /// Looks through the command line, PETSC_OPTIONS, the files .petscrc and those of -options_file. Needs no PETSc.

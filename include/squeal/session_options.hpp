@@ -12,6 +12,9 @@ bool is_session_option(const std::string& name);
 /// What is wrong with the value of a session option; empty if nothing is.
 std::string problem_of_session_option(const std::string& name, const std::string& value);
 
+/// The file that a session option writes; empty if it writes none.
+std::string file_written_by(const std::string& name, const std::string& value);
+
 /// Whether its value is a file of more options.
 bool names_options_file(const std::string& name);
 

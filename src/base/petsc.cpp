@@ -50,12 +50,14 @@ Session::Session(int& argc, char**& argv, const char* help)
   if (SlepcInitialize(&argc, &argv, nullptr, help)) throw Error("PETSc and SLEPc could not be initialised");
   check(PetscPushErrorHandler(keep_failure, nullptr));
   std::signal(SIGXFSZ, SIG_IGN); // a file beyond ulimit -f is an error of the writing call
+  std::signal(SIGPIPE, SIG_IGN); // a reader that is gone, such as head, is no reason to lose results
 }
 
 Session::~Session()
 {
   (void)PetscPopErrorHandler();
   (void)SlepcFinalize();
+  std::signal(SIGPIPE, SIG_IGN); // PETSc took it back, and the last of the output is written at the exit
 }
 
 void check(PetscErrorCode code, std::source_location where)

@@ -19,6 +19,14 @@ namespace
 using Clock = std::chrono::steady_clock;
 
 constexpr int by_time_limit = 1000; // beside the numbers of signals
+/// As under nohup. PETSc replaces it when it starts.
+const bool ignores_hangup = []
+{
+  struct sigaction given = {};
+  return sigaction(SIGHUP, nullptr, &given) == 0 && given.sa_handler == SIG_IGN;
+}();
+
+constexpr std::array ending_signals = {SIGTERM, SIGINT, SIGHUP, SIGUSR1};
 
 /// The control of this process; a signal handler can be given nothing.
 struct Control
@@ -134,13 +142,15 @@ void begin_run_control(const RunLimits& limits)
 {
   control().limits = limits;
   handle(SIGALRM, look_for_peers);
-  for (const int number : {SIGTERM, SIGINT, SIGUSR1}) handle(number, note_signal);
+  for (const int number : ending_signals) handle(number, note_signal);
+  if (ignores_hangup) handle(SIGHUP, SIG_IGN);
 }
 
 void end_run_control()
 {
   alarm(0);
-  for (const int number : {SIGALRM, SIGTERM, SIGINT, SIGUSR1}) std::signal(number, SIG_DFL);
+  std::signal(SIGALRM, SIG_DFL);
+  for (const int number : ending_signals) std::signal(number, SIG_DFL);
 }
 
 Request request(MPI_Comm comm)
@@ -191,6 +201,8 @@ std::string who_asked_to_end()
     return "by SIGTERM";
   case SIGINT:
     return "by SIGINT";
+  case SIGHUP:
+    return "by SIGHUP";
   default:
     return "by SIGUSR1";
   }

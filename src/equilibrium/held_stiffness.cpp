@@ -46,7 +46,7 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
     check(MatAXPY(held.augmented, held.kappa, normal_springs(interface), DIFFERENT_NONZERO_PATTERN));
     check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
     Factored second = factor_positive(held.augmented, interface, options);
-    if (!second.loose && second.resistance > 10 * first.resistance)
+    if (!second.loose && (first.loose || second.resistance > 10 * first.resistance))
     {
       held.factor = std::move(second.factor);
       return held;

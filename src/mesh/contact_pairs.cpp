@@ -215,7 +215,8 @@ ContactPair pair_of(const SurfaceContact& c, std::size_t i, const SlaveRow& row,
 void add_surface_pairs(const Mesh& mesh, const Scene& scene, int index, ContactPairs& result)
 {
   const Contact& contact = scene.contacts[index];
-  const ContactSurface rotor = contact_surface(mesh, contact.rotor), stator = contact_surface(mesh, contact.stator);
+  const ContactSurface rotor = contact_surface(mesh, contact.rotor, "contact"),
+                       stator = contact_surface(mesh, contact.stator, "contact");
   const bool stator_is_slave = contact.slave == SlaveSide::stator;
   SurfaceContact c{mesh, contact, stator_is_slave ? stator : rotor, stator_is_slave ? rotor : stator};
   check_apart(c);

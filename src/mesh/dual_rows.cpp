@@ -174,9 +174,9 @@ std::size_t ContactSurface::place_of(int node) const
   return static_cast<std::size_t>(std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin());
 }
 
-ContactSurface contact_surface(const Mesh& mesh, const std::string& name)
+ContactSurface contact_surface(const Mesh& mesh, const std::string& name, const std::string& user)
 {
-  ContactSurface surface{name, named_faces(mesh, name, "contact"), {}, {}, {}, 0};
+  ContactSurface surface{name, named_faces(mesh, name, user), {}, {}, {}, 0};
   surface.nodes = nodes_of_faces(surface.faces);
   for (const Face& face : surface.faces)
   {

@@ -20,8 +20,8 @@ struct ContactSurface
   std::size_t place_of(int node) const;
 };
 
-/// Throws Error for a missing surface and for 9-node faces.
-ContactSurface contact_surface(const Mesh& mesh, const std::string& name);
+/// `user` says in messages what asks for it. Throws Error for a missing surface and for 9-node faces.
+ContactSurface contact_surface(const Mesh& mesh, const std::string& name, const std::string& user);
 
 /// A row of the gap operator: weights are multiplied by the area.
 struct SlaveRow

@@ -113,7 +113,7 @@ TiedNode on_solid(const Mesh& mesh, const Location& at, int node, int tie)
 
 void add_edge(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
 {
-  const ContactSurface master = contact_surface(mesh, tie.master);
+  const ContactSurface master = contact_surface(mesh, tie.master, "tie");
   if (master.placed.front().two_sided)
     throw Error(name_of(tie) + "an edge follows solids, and '" + tie.master +
                 "' is a shell: let both share their nodes");
@@ -140,7 +140,7 @@ void add_edge(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
 void add_tie(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
 {
   if (is_edge(mesh, tie.slave)) return add_edge(mesh, tie, index, result);
-  ContactSurface slave = contact_surface(mesh, tie.slave), master = contact_surface(mesh, tie.master);
+  ContactSurface slave = contact_surface(mesh, tie.slave, "tie"), master = contact_surface(mesh, tie.master, "tie");
   check_apart(tie, slave, master);
   if (!turn_shell(slave, master) && turn_shell(master, slave) && tie.reach > 0)
     throw Error(name_of(tie) +

@@ -76,6 +76,16 @@ bool holds_only_results(const fs::path& folder)
                      [](const fs::directory_entry& entry) { return is_result(entry.path().filename()); });
 }
 
+/// Refuses a partial folder that no run has made: what it holds would be removed.
+void refuse_foreign(const fs::path& partial)
+{
+  if (fs::is_symlink(partial)) refuse_folder(partial, "it is a link, and runs work in a folder of this name");
+  if (!fs::exists(partial) || fs::exists(partial / lock_file)) return;
+  if (!fs::is_directory(partial)) refuse_folder(partial, "it is no folder, and runs work in one of this name");
+  if (!holds_only_results(partial))
+    refuse_folder(partial, "runs work in a folder of this name, and it holds files of another origin");
+}
+
 /// The absolute path without links, dots and a slash at its end.
 fs::path resolved(const fs::path& path)
 {
@@ -162,12 +172,25 @@ void ResultsFolder::make(Beginning beginning)
   run_ = new_identity();
   if (fs::exists(place_) && (!fs::is_directory(place_) || access(place_.c_str(), W_OK) != 0))
     refuse_folder(place_, fs::is_directory(place_) ? std::strerror(EACCES) : std::strerror(ENOTDIR));
+  if (const fs::path ending = place_.extension(); ending == ".partial" || ending == ".old")
+    refuse_folder(place_, "runs into a folder without " + ending.string() + " use this name meanwhile");
   const fs::path partial = can_be_replaced(place_) ? fs::path(place_.string() + ".partial") : place_ / "partial";
   for (fs::path above = partial.parent_path(); !fs::exists(above); above = above.parent_path())
     made_.insert(made_.begin(), above);
   for (const fs::path& folder : made_) fs::create_directory(folder);
-  fs::create_directory(partial);
-  if (const std::string holder = lock_.take(partial, run_); !holder.empty())
+  refuse_foreign(partial);
+  const bool is_new = fs::create_directory(partial);
+  std::string holder;
+  try
+  {
+    holder = lock_.take(partial, run_);
+  }
+  catch (...)
+  {
+    if (is_new) partial_ = partial; // to be removed
+    throw;
+  }
+  if (!holder.empty())
     throw Error("another run writes into " + place_.string() + " (" + holder +
                 ": its start, machine and process); wait for its end, or name another folder with --output DIR");
   partial_ = partial; // from here on it is ours to remove
@@ -255,14 +278,14 @@ void ResultsFolder::publish(Checkpoints checkpoints)
   published_ = true;
 }
 
-namespace
-{
-
-bool same_file(const fs::path& a, const fs::path& b)
+bool is_same_file(const fs::path& a, const fs::path& b)
 {
   std::error_code none;
   return fs::equivalent(a, b, none) || resolved(a) == resolved(b);
 }
+
+namespace
+{
 
 /// The files that the scene names as input.
 std::vector<fs::path> inputs_of(const Scene& scene)
@@ -285,12 +308,15 @@ void check_outputs(const Scene& scene, const fs::path& place)
   if (!fs::exists(place, failed) && failed) // a name that is too long, a link to itself
     throw Error("the output " + shortened(place) + ": " + failed.message() + ": name another folder with --output DIR");
   std::vector<fs::path> results;
-  for (const char* name : result_file_names) results.push_back(place / name);
+  for (const char* name : result_file_names)
+    if (results.push_back(place / name); results.back().has_extension() && is_folder(results.back()))
+      throw Error("the output " + results.back().string() +
+                  " is a folder, which the result would replace: name another folder with --output DIR");
   const std::vector<fs::path> inputs = inputs_of(scene);
   const auto refuse_on = [](const fs::path& output, const std::vector<fs::path>& others, const std::string& remedy)
   {
     for (const fs::path& other : others)
-      if (same_file(output, other))
+      if (is_same_file(output, other))
         throw Error("the output " + output.string() + " would fall on " + other.string() + ": " + remedy);
   };
   for (const fs::path& result : results)

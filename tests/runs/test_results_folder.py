@@ -118,6 +118,58 @@ def test_no_output_falls_on_an_input(squeal, tmp_path, output):
     assert {file.name for file in tmp_path.iterdir()} == {scene.name}
 
 
+def make_device(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    return ["--set", f"transient.save_state={tmp_path}/pipe"]
+
+
+def make_folder_of_a_file(tmp_path):
+    (tmp_path / "out" / "history.h5").mkdir()
+    (tmp_path / "out" / "history.h5" / "mine.txt").write_text("precious")
+    return []
+
+
+def make_link(tmp_path):
+    (tmp_path / "victim").mkdir()
+    (tmp_path / "victim" / "report.json").write_text("mine")
+    (tmp_path / "out.partial").symlink_to(tmp_path / "victim")
+    return []
+
+
+def make_foreign_partial(tmp_path):
+    (tmp_path / "out.partial").mkdir()
+    (tmp_path / "out.partial" / "mine.txt").write_text("precious")
+    return []
+
+
+REFUSED = {"a pipe": (make_device, "pipe"), "a folder of a file's name": (make_folder_of_a_file, "history.h5 is a folder"),
+           "a link": (make_link, "it is a link"), "a folder of another origin": (make_foreign_partial, "another origin"),
+           "another run's meantime": (lambda tmp_path: ["--output", tmp_path / "x.partial"], "use this name meanwhile"),
+           "a log on the scene": (lambda tmp_path: ["-log_view", f":{SCENE}"], "fall on the scene"),
+           "a log on a result": (lambda tmp_path: ["-history", tmp_path / "out" / "report.json"], "report.json")}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_nothing_of_the_users_is_replaced(squeal, tmp_path, name):
+    """Each was removed or written over, with exit code 0."""
+    make, words = REFUSED[name]
+    (tmp_path / "out").mkdir()
+    given = make(tmp_path)
+    before = sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes()
+    run = squeal(SCENE, *([] if "--output" in given else ["--output", tmp_path / "out"]), *given, ranks=1)
+    assert run.code == 1 and len(run.messages) == 1 and words in run.messages[0], run.errors
+    assert before == (sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes())
+
+
+def test_a_reader_that_is_gone_costs_no_results(tmp_path):
+    read, write = os.pipe()
+    os.close(read)
+    output = tmp_path / "results"
+    run = subprocess.run([os.environ["SQUEAL"], SCENE, *SHORT, "--output", output], stdout=write, stderr=subprocess.DEVNULL)
+    os.close(write)
+    assert run.returncode == 0 and (output / "report.json").exists()
+
+
 def files_below(folder):
     return {file.relative_to(folder): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
 

@@ -86,6 +86,9 @@ private:
   bool published_ = false, kept_ = false;
 };
 
+/// Whether two names are of one file, which may not exist yet.
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b);
+
 /// Error: an output of the scene, or a result in this place, would fall on a file that the run reads.
 void check_outputs(const Scene& scene, const std::filesystem::path& place);
 
