@@ -1,7 +1,10 @@
 #include "squeal/base/petsc.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
+#include <cstdio>
+#include <cstring>
 #include <ctime>
 #include <fstream>
 #include <string>
@@ -47,17 +50,25 @@ RowLayout row_layout(const PetscInt* ranges, MPI_Comm comm)
 
 Session::Session(int& argc, char**& argv, const char* help)
 {
+  sigset_t blocked; // a reader that is gone, such as head, is no reason to lose results; PETSc resets what is ignored
+  sigemptyset(&blocked);
+  sigaddset(&blocked, SIGPIPE);
+  sigprocmask(SIG_BLOCK, &blocked, nullptr);
   if (SlepcInitialize(&argc, &argv, nullptr, help)) throw Error("PETSc and SLEPc could not be initialised");
   check(PetscPushErrorHandler(keep_failure, nullptr));
   std::signal(SIGXFSZ, SIG_IGN); // a file beyond ulimit -f is an error of the writing call
-  std::signal(SIGPIPE, SIG_IGN); // a reader that is gone, such as head, is no reason to lose results
 }
 
 Session::~Session()
 {
+  if (std::fflush(stdout) != 0) // PETSc would try again, and fail in a text of its own
+  {
+    if (errno != EPIPE)
+      std::fprintf(stderr, "squeal: what was printed could not be written: %s\n", std::strerror(errno));
+    if (!std::freopen("/dev/null", "w", stdout)) std::fclose(stdout);
+  }
   (void)PetscPopErrorHandler();
   (void)SlepcFinalize();
-  std::signal(SIGPIPE, SIG_IGN); // PETSc took it back, and the last of the output is written at the exit
 }
 
 void check(PetscErrorCode code, std::source_location where)
