@@ -304,11 +304,19 @@ void print_error(int rank, const Error& error)
   if (rank == 0) std::fprintf(stderr, "squeal: error: %.3000s\n", error.what());
 }
 
+/// What keeps MPI and PETSc from starting; empty if nothing does.
+std::string problem_of_surroundings()
+{
+  std::error_code failed;
+  if (std::filesystem::current_path(failed).empty()) return "the working folder no longer exists: change to another";
+  return problem_of_address_space();
+}
+
 } // namespace
 
 int main(int argc, char** argv)
 {
-  if (const std::string problem = problem_of_address_space(); !problem.empty())
+  if (const std::string problem = problem_of_surroundings(); !problem.empty())
   {
     if (!is_other_rank()) std::fprintf(stderr, "squeal: error: %s\n", problem.c_str());
     return 1;

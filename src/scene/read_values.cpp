@@ -34,7 +34,7 @@ Bounds bounds_of(Rule rule)
   case Rule::poisson:
     return {-1, 0.5, true, "a number above -1 and below 0.5"};
   case Rule::fraction:
-    return {0, 1, false, "a number from 0 to 1"};
+    return {std::numeric_limits<double>::min(), 1, false, "a number above 0 and at most 1"};
   default:
     return {-infinity, infinity, false, "a finite number"};
   }
@@ -171,7 +171,8 @@ public:
     if (!table) fail(node, "a table of numbers, such as { size = 4000 }");
     for (const auto& [key, value] : *table)
     {
-      if (!value.is_number() || !std::isfinite(*value.value<double>())) fail(value, "finite numbers in the table");
+      if (!value.is_number()) fail(value, "finite numbers in the table");
+      need_computable(value, *value.value<double>(), "finite numbers in the table");
       target[std::string(key.str())] = *value.value<double>();
     }
   }
@@ -191,6 +192,14 @@ private:
                 expected + unit);
   }
 
+  /// Throws Error for what is not finite, and where the third power would not be.
+  void need_computable(const toml::node& node, double value, const std::string& expected) const
+  {
+    constexpr double largest = 1e100;
+    if (!std::isfinite(value)) fail(node, expected);
+    if (std::abs(value) > largest) fail(node, "a number of at most 1e100 in size, so that powers of it are finite");
+  }
+
   double number(const toml::node& node) const
   {
     const Bounds bounds = bounds_of(value_.key.rule);
@@ -198,7 +207,8 @@ private:
     const double value = *node.value<double>();
     const bool inside = bounds.open ? value > bounds.least && value < bounds.greatest
                                     : value >= bounds.least && value <= bounds.greatest;
-    if (!inside || !std::isfinite(value)) fail(node, bounds.text);
+    if (!inside) fail(node, bounds.text);
+    need_computable(node, value, bounds.text);
     return value;
   }
 
@@ -227,7 +237,8 @@ private:
     std::vector<double> values;
     for (const toml::node& entry : *array)
     {
-      if (!entry.is_number() || !std::isfinite(*entry.value<double>())) fail(entry, "finite numbers in the list");
+      if (!entry.is_number()) fail(entry, "finite numbers in the list");
+      need_computable(entry, *entry.value<double>(), "finite numbers in the list");
       values.push_back(*entry.value<double>());
     }
     return values;

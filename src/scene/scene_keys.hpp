@@ -37,7 +37,7 @@ enum class Rule
   positive,
   not_negative,
   poisson,   // in (-1, 0.5)
-  fraction,  // in [0, 1]
+  fraction,  // in (0, 1]
   direction, // a vector that is normalised, or "x", "-y" and so on
   file,      // an existing file
   folder,    // an existing folder

@@ -56,6 +56,9 @@ OPTIONS = {
     "a state where there is no folder": (["--set", "transient.save_state=no/such/x"], ["save_state", "no/such"]),
     "a state that is a folder": (["--set", "transient.save_state=matrices"], ["save_state", "folder"]),
     "a probe without a name": (["--set", "probe.0.name=."], ["probe", "name"]),
+    "a number whose square is infinite": (["--set", "force.0.vector=[0,0,1e300]"], ["force", "1e100"]),
+    "a number that is too large": (["--set", "modes.band=1e300"], ["band", "1e100"]),
+    "an explicit scheme": (["--set", "transient.theta=0"], ["theta", "above 0"]),
     "samples that overflow": (["-cycle_samples", "3000000000"], ["-cycle_samples", "2147483647"]),
     "more steps than a day holds": (["--set", "transient.steps=1000000000000000", "--set", "transient.step_size=1e-3",
                                      "--set", "cycle.enabled=false"], ["--force"]),
@@ -118,6 +121,14 @@ def test_a_signal_ends_a_sweep_while_its_equilibria_are_sought(tmp_path):
 def run_here(folder, *arguments, **environment):
     return subprocess.run([os.environ["SQUEAL"], OSCILLATOR, "--dry-run", *arguments], cwd=folder, capture_output=True,
                           text=True, timeout=100, env=os.environ | environment)
+
+
+def test_a_working_folder_that_is_gone_is_one_message(tmp_path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    script = 'cd "$1"; rmdir "$1"; exec "$2" "$3"'
+    done = subprocess.run(["bash", "-c", script, "-", gone, os.environ["SQUEAL"], OSCILLATOR], capture_output=True, text=True)
+    assert done.returncode == 1 and "working folder" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
 
 
 def test_options_say_where_they_come_from(tmp_path):

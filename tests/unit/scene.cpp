@@ -292,7 +292,7 @@ TEST_CASE("wrong types, signs and ranges are refused with key, value and what is
       {"steps = 10", "steps = -1", "steps = -1"},
       {"method = \"full\"", "method = \"fulll\"", "did you mean 'full'"},
       {"tolerance = 1e-8", "tolerance = -1e-8", "zero or a positive number"},
-      {"tolerance = 1e-8", "theta = 1.5", "from 0 to 1"},
+      {"tolerance = 1e-8", "theta = 1.5", "at most 1"},
       {"direction = [0, 0, -2]", "direction = [0, 0, 0]", "zero vector"},
       {"direction = [0, 0, -2]", "direction = \"w\"", "x, y, z"},
       {"vector = [0, 0, -500]", "vector = [0, -500]", "three numbers"},
