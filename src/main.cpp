@@ -32,9 +32,11 @@ struct Arguments
   std::vector<std::string> option_sources; // beside the command line
 };
 
+constexpr const char* scene_file = "scene.toml"; // of a scene that is a folder
+
 bool is_scene_folder(const std::string& word)
 {
-  return is_file(std::filesystem::path(word) / "scene.toml");
+  return is_file(std::filesystem::path(word) / scene_file);
 }
 
 /// A number of seconds above 0; otherwise sets the problem.
@@ -107,7 +109,7 @@ Arguments take_arguments(int& argc, char** argv)
       arguments.problem = unknown_argument(word);
     else if (arguments.scene.empty() && word[0] != '-' && (word.ends_with(".toml") || is_scene_folder(word)))
       arguments.scene =
-          word.ends_with(".toml") ? std::filesystem::path(word) : std::filesystem::path(word) / "scene.toml";
+          word.ends_with(".toml") ? std::filesystem::path(word) : std::filesystem::path(word) / scene_file;
     else
       argv[kept++] = argv[i];
   }
@@ -120,7 +122,8 @@ Arguments take_arguments(int& argc, char** argv)
 std::filesystem::path default_output(const std::filesystem::path& scene)
 {
   const auto whole = std::filesystem::absolute(scene).lexically_normal();
-  return std::filesystem::path("results") / (scene.stem() == "scene" ? whole.parent_path().filename() : whole.stem());
+  return std::filesystem::path("results") /
+         (scene.filename() == scene_file ? whole.parent_path().filename() : whole.stem());
 }
 
 /// Why a file that PETSc would write may not be written: it is the scene or a result. Empty: it may.

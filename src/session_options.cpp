@@ -86,6 +86,23 @@ std::vector<std::string> parts_of(const std::string& value)
   return parts;
 }
 
+/// The file that the option writes; empty if it writes none.
+std::string file_of(const SessionOption& option, const std::string& value)
+{
+  const std::vector<std::string> parts = parts_of(value);
+  switch (option.value)
+  {
+  case Value::write_file:
+    return value;
+  case Value::viewer:
+    return parts.size() > 1 ? parts[1] : "";
+  case Value::info:
+    return parts.empty() ? "" : parts[0];
+  default:
+    return {};
+  }
+}
+
 /// [ascii][:file[:format[:append]]]
 std::string problem_of_viewer(const std::string& value)
 {
@@ -96,29 +113,20 @@ std::string problem_of_viewer(const std::string& value)
                                                 "ascii_csv", "ascii_flamegraph"}))
     return "no format is called '" + shortened(parts[2]) +
            "'; known: ascii_info, ascii_info_detail, ascii_xml, ascii_csv, ascii_flamegraph";
-  if (parts.size() > 4 || (parts.size() > 3 && parts[3] != "append")) return "it has too many parts";
-  return parts.size() > 1 && !parts[1].empty() ? problem_of_new_file(parts[1]) : "";
+  return parts.size() > 4 || (parts.size() > 3 && parts[3] != "append") ? "it has too many parts" : "";
 }
 
 std::string problem_of_value(const SessionOption& option, const std::string& value)
 {
   if (value.empty()) return option.value == Value::options_file ? "it needs the name of a file" : "";
-  switch (option.value)
-  {
-  case Value::flag:
+  if (option.value == Value::flag)
     return is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"}) ? "" : "it is true or false";
-  case Value::options_file:
+  if (option.value == Value::options_file)
     return is_file(value) && access(value.c_str(), R_OK) == 0 ? "" : "there is no such file, or it cannot be read";
-  case Value::write_file:
-    return problem_of_new_file(value);
-  case Value::viewer:
-    return problem_of_viewer(value);
-  case Value::info:
-    return value.front() == ':' ? "" : problem_of_new_file(value.substr(0, value.find(':')));
-  case Value::text:
-    break;
-  }
-  return {};
+  const std::string file = file_of(option, value);
+  std::string problem = option.value == Value::viewer ? problem_of_viewer(value) : "";
+  if (problem.empty() && !file.empty()) problem = problem_of_new_file(file);
+  return problem;
 }
 
 } // namespace
@@ -138,19 +146,7 @@ std::string problem_of_session_option(const std::string& name, const std::string
 std::string file_written_by(const std::string& name, const std::string& value)
 {
   const SessionOption* option = find_option(name);
-  if (!option) return {};
-  const std::vector<std::string> parts = parts_of(value);
-  switch (option->value)
-  {
-  case Value::write_file:
-    return value;
-  case Value::viewer:
-    return parts.size() > 1 ? parts[1] : "";
-  case Value::info:
-    return parts.empty() ? "" : parts[0];
-  default:
-    return {};
-  }
+  return option ? file_of(*option, value) : "";
 }
 
 bool names_options_file(const std::string& name)

@@ -36,7 +36,7 @@ MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const R
 /// P^-1 x = -x + D x on the reduced model. Borrows D.
 Preconditioner preconditioner_of(const MonodromyCorrection& correction);
 
-/// P^-1 x = -x + V D R x on the full model: V the shapes, R the coordinates in them. What lies outside is taken as
+/// P^-1 x = -x + V D R x on the full model: V the shapes, R the coordinates in them. What they miss is taken as
 /// damped out within a period. Borrows all three.
 Preconditioner preconditioner_of(const MonodromyCorrection& correction, const ReducedModel& model,
                                  const Structure& structure);

@@ -142,7 +142,7 @@ void read_elements(const FileMesh& file, const Scene& scene, Mesh& mesh)
               "): name their physical volume in a [[part]]");
 }
 
-/// A side of an element on which a surface face may lie.
+/// A side of an element, which a face of a surface may coincide with.
 struct ElementSide
 {
   std::vector<int> corners; // counter-clockwise seen from outside the solid

@@ -105,7 +105,7 @@ void check_apart(const SurfaceContact& c)
   throw Error(surfaces + "no face of one lies opposite a face of the other: correct the names or the mesh");
 }
 
-/// Throws Error for surfaces that do not meet or lie inside each other.
+/// Throws Error for surfaces that do not meet or that penetrate each other.
 void check_meeting(const SurfaceContact& c, const SlaveRows& rows)
 {
   const OverlapFindings& findings = rows.findings;

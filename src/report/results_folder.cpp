@@ -23,6 +23,7 @@ namespace
 {
 
 constexpr const char* lock_file = "running";
+constexpr const char *partial_ending = ".partial", *old_ending = ".old"; // of folders beside the place
 
 bool is_result(const fs::path& name)
 {
@@ -172,9 +173,9 @@ void ResultsFolder::make(Beginning beginning)
   run_ = new_identity();
   if (fs::exists(place_) && (!fs::is_directory(place_) || access(place_.c_str(), W_OK) != 0))
     refuse_folder(place_, fs::is_directory(place_) ? std::strerror(EACCES) : std::strerror(ENOTDIR));
-  if (const fs::path ending = place_.extension(); ending == ".partial" || ending == ".old")
+  if (const fs::path ending = place_.extension(); ending == partial_ending || ending == old_ending)
     refuse_folder(place_, "runs into a folder without " + ending.string() + " use this name meanwhile");
-  const fs::path partial = can_be_replaced(place_) ? fs::path(place_.string() + ".partial") : place_ / "partial";
+  const fs::path partial = can_be_replaced(place_) ? fs::path(place_.string() + partial_ending) : place_ / "partial";
   for (fs::path above = partial.parent_path(); !fs::exists(above); above = above.parent_path())
     made_.insert(made_.begin(), above);
   for (const fs::path& folder : made_) fs::create_directory(folder);
@@ -232,7 +233,7 @@ fs::path ResultsFolder::meanwhile(const fs::path& file) const
 
 void ResultsFolder::move_whole()
 {
-  const fs::path old = place_.string() + ".old";
+  const fs::path old = place_.string() + old_ending;
   if (renameat2(AT_FDCWD, partial_.c_str(), AT_FDCWD, place_.c_str(), RENAME_EXCHANGE) == 0)
   {
     std::error_code ignored;

@@ -57,8 +57,8 @@ void append_rows(MatrixXd& A, const MatrixXd& rows)
 }
 
 /// Residuals of one side at omega in the first column of `residuals`, over what is allowed in that of `defects`.
-void estimate_residuals(const HarmonicBasis& basis, Side side, double omega, const MatrixXcd& a, double tolerance,
-                        Eigen::Ref<Eigen::VectorXd> residuals, Eigen::Ref<Eigen::VectorXd> defects)
+void estimate_residuals(const HarmonicBasis& basis, ResponseEnd side, double omega, const MatrixXcd& a,
+                        double tolerance, Eigen::Ref<Eigen::VectorXd> residuals, Eigen::Ref<Eigen::VectorXd> defects)
 {
   const auto which = static_cast<std::size_t>(side);
   const HarmonicSide& own = basis.problem.of(side);
@@ -120,9 +120,9 @@ HarmonicScan scan(const HarmonicBasis& basis, std::span<const double> omega, Ind
     const double at = omega[static_cast<std::size_t>(f)];
     const auto [a, d] = solve_at(at, basis, size);
     result.receptance.col(f) = (basis.forces[1].topRows(size).transpose() * a).reshaped();
-    estimate_residuals(basis, Side::driven, at, a, tolerance, result.residuals.col(f).head(b),
+    estimate_residuals(basis, ResponseEnd::driven, at, a, tolerance, result.residuals.col(f).head(b),
                        result.defects.col(f).head(b));
-    estimate_residuals(basis, Side::read, at, d, tolerance, result.residuals.col(f).tail(c),
+    estimate_residuals(basis, ResponseEnd::read, at, d, tolerance, result.residuals.col(f).tail(c),
                        result.defects.col(f).tail(c));
   }
   for (MatrixXd* part : {&result.residuals, &result.defects}) // zeros but on one rank: the sums are exact
@@ -132,7 +132,7 @@ HarmonicScan scan(const HarmonicBasis& basis, std::span<const double> omega, Ind
   return result;
 }
 
-MultiVector residual_at(const HarmonicBasis& basis, Side side, Index force, double omega)
+MultiVector residual_at(const HarmonicBasis& basis, ResponseEnd side, Index force, double omega)
 {
   const auto which = static_cast<std::size_t>(side);
   const HarmonicSide& own = basis.problem.of(side);

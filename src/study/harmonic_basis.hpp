@@ -13,8 +13,8 @@
 namespace squeal
 {
 
-/// The two problems that share a basis.
-enum class Side
+/// The end of a response at which the force of either problem acts.
+enum class ResponseEnd
 {
   driven, // Q x = b
   read,   // Q'w = c
@@ -23,7 +23,7 @@ enum class Side
 /// What belongs to one of the two problems.
 struct HarmonicSide
 {
-  std::vector<Mat> matrices{}; // M, C, K and, with loss factors, K_loss; borrowed. Of Side::read the transposes
+  std::vector<Mat> matrices{}; // M, C, K and, with loss factors, K_loss; borrowed. Of ResponseEnd::read the transposes
   MultiVector forces;          // b or c, in columns
   std::vector<double> sizes{}; // of the unit forces that the columns come from [N]
 };
@@ -34,7 +34,7 @@ struct HarmonicProblem
   std::array<HarmonicSide, 2> sides{};
   std::vector<double> norms{}; // in the order of the matrices
 
-  const HarmonicSide& of(Side side) const { return sides[static_cast<std::size_t>(side)]; }
+  const HarmonicSide& of(ResponseEnd side) const { return sides[static_cast<std::size_t>(side)]; }
 };
 
 /// A basis with what it makes of both problems.
@@ -68,6 +68,6 @@ struct HarmonicScan
 HarmonicScan scan(const HarmonicBasis& basis, std::span<const double> omega, Eigen::Index size, double tolerance);
 
 /// The residual of one force at omega, real and imaginary part. Collective.
-MultiVector residual_at(const HarmonicBasis& basis, Side side, Eigen::Index force, double omega);
+MultiVector residual_at(const HarmonicBasis& basis, ResponseEnd side, Eigen::Index force, double omega);
 
 } // namespace squeal

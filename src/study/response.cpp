@@ -104,16 +104,16 @@ MultiVector corrections(const HarmonicBasis& basis, const std::vector<double>& o
                         const PencilFactor& P)
 {
   const bool all_small = found.defects.maxCoeff() <= 1;
-  const Index driven = basis.problem.of(Side::driven).forces.columns();
+  const Index driven = basis.problem.of(ResponseEnd::driven).forces.columns();
   std::array<MultiVector, 2> residuals = {basis.V, basis.V};
   for (MultiVector& part : residuals) part.entries.resize(Eigen::NoChange, 0);
   for (Index force = 0; force < found.defects.rows(); ++force)
   {
     Index worst = 0;
     if (found.defects.row(force).maxCoeff(&worst) <= 1 && !all_small) continue;
-    const Side side = force < driven ? Side::driven : Side::read;
+    const ResponseEnd side = force < driven ? ResponseEnd::driven : ResponseEnd::read;
     append(residuals[static_cast<std::size_t>(side)],
-           residual_at(basis, side, side == Side::driven ? force : force - driven,
+           residual_at(basis, side, side == ResponseEnd::driven ? force : force - driven,
                        omega[static_cast<std::size_t>(worst)]));
   }
   MultiVector result = P.solve(residuals[0]);
@@ -215,8 +215,9 @@ void solve_band(const ResponseProblem& problem, const Equations& equations, Resp
     }
     const auto& [found, before, shapes] = *solved;
     store(found.receptance, part.first, response);
-    response.change = std::max(
-        response.change, largest_change(before, found.receptance, equations.harmonic.of(Side::read).forces.columns()));
+    response.change =
+        std::max(response.change,
+                 largest_change(before, found.receptance, equations.harmonic.of(ResponseEnd::read).forces.columns()));
     response.outcome.residual = std::max(response.outcome.residual, found.residuals.maxCoeff());
     if (found.defects.maxCoeff() > 1) response.outcome.kind = OutcomeKind::not_converged;
     response.parts += 1;
