@@ -61,7 +61,8 @@ const std::array known_arguments = {
              [](Arguments& arguments, const std::string& value) { arguments.overrides.push_back(value); }},
     Argument{"--output", "DIR", "where results go (results/<scene>)",
              [](Arguments& arguments, const std::string& value) { arguments.output = value; }},
-    Argument{"--time-limit", "S", "ends the run in order after S seconds, as SIGTERM, SIGINT, SIGHUP and SIGUSR1 do",
+    Argument{"--time-limit", "S",
+             "ends the run in order after S seconds, as SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU do",
              [](Arguments& arguments, const std::string& value)
              { read_seconds("--time-limit", value, arguments.limits.time_limit, arguments.problem); }},
     Argument{"--checkpoint", "S", "seconds between checkpoints [600]",
@@ -209,7 +210,7 @@ void check_state_file(const std::string& key, const std::filesystem::path& file,
   if (file.empty()) return;
   const auto folder = file.parent_path(), results = std::filesystem::absolute(output).lexically_normal();
   const std::string label = key + " = " + shortened(file) + ": ";
-  if (is_folder(file)) throw Error(label + "it is a folder; name a file");
+  if (is_folder(file) || file == results || file / "" == results) throw Error(label + "it is a folder; name a file");
   if (std::error_code failed; !is_file(file) && std::filesystem::exists(file, failed))
     throw Error(label + "it is a device or a pipe, which the state would replace; name a file");
   if (folder == results || folder / "" == results) return;

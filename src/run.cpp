@@ -174,7 +174,7 @@ ExitCode exit_code_of(const Report& report)
 ModelSummary summary_with_doubts(const Model& model, const Scene& scene, MPI_Comm comm)
 {
   ModelSummary summary = summary_of(model, scene, comm);
-  for (const std::string& doubt : doubts_about(scene)) summary.warnings.push_back(doubt);
+  for (const std::string& doubt : doubts_about(scene, summary.length)) summary.warnings.push_back(doubt);
   return summary;
 }
 
@@ -196,6 +196,15 @@ void make_coarse_model(const Scene& scene, const Model& model, MPI_Comm comm, st
   if (rank_of(comm) == 0)
     std::printf("  coarse mesh: %lld degrees of freedom, %d contact pairs\n",
                 static_cast<long long>(coarse->model.dofs.size), coarse->model.interface.pairs);
+}
+
+/// Throws Error if a state that a later stage starts from cannot be read. Collective.
+void check_start_files(const Scene& scene, const Structure& structure)
+{
+  if (scene.transient.enabled && scene.transient.start.kind == StartKind::file)
+    (void)read_state(scene.transient.start.file, structure);
+  if (scene.cycle.enabled && scene.cycle.start.kind == CycleStartKind::file)
+    (void)read_state(scene.cycle.start.file, structure);
 }
 
 void print_model(const ModelSummary& model, MPI_Comm comm)
@@ -220,6 +229,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   print_model(report.model, comm);
   std::optional<CoarseModel> coarse;
   make_coarse_model(scene, model, comm, coarse);
+  check_start_files(scene, model.structure);
   if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options), comm));
   end_if_asked(comm);
 
@@ -288,6 +298,7 @@ void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
   print_model(summary_with_doubts(model, scene, comm), comm);
   std::optional<CoarseModel> coarse;
   make_coarse_model(scene, model, comm, coarse);
+  check_start_files(scene, model.structure);
   const Forecast forecast = forecast_of(model, scene, options);
   if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());
   const std::string problem = problem_of(forecast, comm);

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <sys/prctl.h>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 namespace squeal
@@ -26,7 +27,13 @@ const bool ignores_hangup = []
   return sigaction(SIGHUP, nullptr, &given) == 0 && given.sa_handler == SIG_IGN;
 }();
 
-constexpr std::array ending_signals = {SIGTERM, SIGINT, SIGHUP, SIGUSR1};
+/// Those of terminals, and those by which schedulers announce a limit.
+constexpr std::array<std::pair<int, const char*>, 6> ending_signals = {{{SIGTERM, "SIGTERM"},
+                                                                        {SIGINT, "SIGINT"},
+                                                                        {SIGHUP, "SIGHUP"},
+                                                                        {SIGUSR1, "SIGUSR1"},
+                                                                        {SIGUSR2, "SIGUSR2"},
+                                                                        {SIGXCPU, "SIGXCPU"}}};
 
 /// The control of this process; a signal handler can be given nothing.
 struct Control
@@ -142,7 +149,7 @@ void begin_run_control(const RunLimits& limits)
 {
   control().limits = limits;
   handle(SIGALRM, look_for_peers);
-  for (const int number : ending_signals) handle(number, note_signal);
+  for (const auto& [number, name] : ending_signals) handle(number, note_signal);
   if (ignores_hangup) handle(SIGHUP, SIG_IGN);
 }
 
@@ -150,7 +157,7 @@ void end_run_control()
 {
   alarm(0);
   std::signal(SIGALRM, SIG_DFL);
-  for (const int number : ending_signals) std::signal(number, SIG_DFL);
+  for (const auto& [number, name] : ending_signals) std::signal(number, SIG_DFL);
 }
 
 Request request(MPI_Comm comm)
@@ -191,21 +198,11 @@ void checkpoint_made()
 
 std::string who_asked_to_end()
 {
-  switch (control().ended_by)
-  {
-  case 0:
-    return {};
-  case by_time_limit:
-    return "by the time limit";
-  case SIGTERM:
-    return "by SIGTERM";
-  case SIGINT:
-    return "by SIGINT";
-  case SIGHUP:
-    return "by SIGHUP";
-  default:
-    return "by SIGUSR1";
-  }
+  const int cause = control().ended_by;
+  if (cause == 0) return {};
+  if (cause == by_time_limit) return "by the time limit";
+  const auto* const found = std::ranges::find(ending_signals, cause, &std::pair<int, const char*>::first);
+  return std::string("by ") + found->second;
 }
 
 } // namespace squeal

@@ -29,7 +29,7 @@ void check_state_file(const std::filesystem::path& file, PetscInt size)
   const std::string name = "state file " + file.string();
   std::ifstream stream(file, std::ios::binary);
   if (!is_file(file) || !stream)
-    throw Error(name + " cannot be read: write one with save_state, or correct the path of transient.start");
+    throw Error(name + " cannot be read: write one with save_state, or correct the path of start");
 
   const auto header = static_cast<std::streamoff>(vector_header_size);
   const auto bytes = static_cast<std::streamoff>(std::filesystem::file_size(file));

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <set>
 
 namespace squeal
@@ -33,6 +34,7 @@ public:
       if (starts_statement(i)) statement_ = i;
       if (list_[i].kind == Token::Kind::word) check_word(i);
       if (list_[i].kind == Token::Kind::text) check_text(i);
+      if (starts_statement(i)) check_call(i);
     }
   }
 
@@ -176,6 +178,33 @@ private:
       refuse(i, "must be followed by (...); and by no file");
   }
 
+  /// A macro that calls itself, perhaps through others, may never end, and fills the memory meanwhile.
+  void check_call(std::size_t i)
+  {
+    const std::string& name = at(i + 1).text;
+    if (at(i).is("Macro") || at(i).is("Function")) macro_ = name;
+    if (at(i).is("Return")) macro_.clear();
+    if (macro_.empty() || !at(i).is("Call")) return;
+    if (!at(i + 2).is(";")) refuse(i, "must name the macro outright within another one");
+    if (calls(name, macro_)) refuse(i, "makes the macro call itself");
+    called_[macro_].insert(name);
+  }
+
+  /// Whether one macro is the other or calls it, perhaps through others.
+  bool calls(const std::string& caller, const std::string& other) const
+  {
+    std::set<std::string> reached = {caller};
+    for (std::vector<std::string> next = {caller}; !next.empty();)
+    {
+      const auto found = called_.find(next.back());
+      next.pop_back();
+      if (found == called_.end()) continue;
+      for (const std::string& name : found->second)
+        if (reached.insert(name).second) next.push_back(name);
+    }
+    return reached.contains(other);
+  }
+
   [[noreturn]] void refuse(std::size_t i, const std::string& why) const
   {
     std::string statement;
@@ -197,7 +226,9 @@ private:
   const std::vector<Token>& list_;
   std::vector<std::size_t> partner_;
   std::set<std::string> defined_;
-  std::size_t statement_ = 0; // the first token of the statement at work
+  std::size_t statement_ = 0;                           // the first token of the statement at work
+  std::string macro_;                                   // the macro at work; empty outside
+  std::map<std::string, std::set<std::string>> called_; // the macros that each one calls
 };
 
 } // namespace

@@ -15,6 +15,8 @@ namespace squeal
 namespace
 {
 
+constexpr double softest = 1e4; // Young's modulus of gels [Pa]
+
 bool is_outside(double value, double least, double greatest)
 {
   return value < least || value > greatest;
@@ -26,7 +28,7 @@ std::string doubt_about(const Material& material, double young)
   const double speed = std::sqrt(young / material.density);
   if (is_outside(material.density, 20, 23000))
     return format("a density of %g kg/m3 is that of no solid; steel has 7850", material.density);
-  if (is_outside(young, 1e4, 1.3e12))
+  if (is_outside(young, softest, 1.3e12))
     return format("a Young's modulus of %g Pa is that of no solid; steel has 2.1e11", young);
   if (is_outside(speed, 10, 20000))
     return format("sound would travel at %.3g m/s by its modulus and density; in steel it does at 5200", speed);
@@ -55,6 +57,23 @@ void doubt_loads(const Scene& scene, std::vector<std::string>& doubts)
     doubts.push_back("[transient] load_factor falls below 0: all loads then act the other way round");
 }
 
+/// Gaps longer than the model, and layers softer than one of the softest gel that is as thick as the model is long.
+void doubt_contacts(const Scene& scene, double length, std::vector<std::string>& doubts)
+{
+  for (const Contact& contact : scene.contacts)
+  {
+    const std::string label =
+        "the contact of '" + shortened(contact.rotor) + "' and '" + shortened(contact.stator) + "': ";
+    if (std::abs(contact.gap) > length)
+      doubts.push_back(label + format("a gap of %g m is longer than the model, which has %.3g m. Is its unit m?",
+                                      contact.gap, length));
+    if (contact.compliance * softest > length)
+      doubts.push_back(
+          label + format("a compliance of %g m3/N is that of no layer: steel 1 mm thick has 4.8e-15. Is its unit m3/N?",
+                         contact.compliance));
+  }
+}
+
 void doubt_damping(const RayleighDamping& damping, std::vector<std::string>& doubts)
 {
   for (const auto& [frequency_hz, measured] : damping.measured)
@@ -70,7 +89,7 @@ void doubt_damping(const RayleighDamping& damping, std::vector<std::string>& dou
 
 } // namespace
 
-std::vector<std::string> doubts_about(const Scene& scene)
+std::vector<std::string> doubts_about(const Scene& scene, double length)
 {
   std::vector<std::string> doubts;
   for (const Part& part : scene.parts)
@@ -83,6 +102,7 @@ std::vector<std::string> doubts_about(const Scene& scene)
   doubt_masses(scene.points, doubts);
   doubt_masses(scene.rigid_bodies, doubts);
   doubt_loads(scene, doubts);
+  if (length > 0) doubt_contacts(scene, length, doubts);
   doubt_damping(scene.damping, doubts);
   return doubts;
 }

@@ -195,9 +195,9 @@ private:
   /// Throws Error for what is not finite, and where the third power would not be.
   void need_computable(const toml::node& node, double value, const std::string& expected) const
   {
-    constexpr double largest = 1e100;
     if (!std::isfinite(value)) fail(node, expected);
-    if (std::abs(value) > largest) fail(node, "a number of at most 1e100 in size, so that powers of it are finite");
+    if (std::abs(value) > largest_number)
+      fail(node, "a number of at most 1e100 in size, so that powers of it are finite");
   }
 
   double number(const toml::node& node) const

@@ -2,6 +2,7 @@
 #include "squeal/solid/binary.hpp"
 
 #include "squeal/base/broadcast.hpp"
+#include "squeal/base/constants.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -114,6 +115,13 @@ MatrixSize checked_size(const std::filesystem::path& file)
   return {static_cast<PetscInt>(rows), static_cast<PetscInt>(columns)};
 }
 
+constexpr const char* entries_expected = "entries must be at most 1e100 in size, so that powers of them are finite";
+
+bool is_computable(double value)
+{
+  return std::abs(value) <= largest_number; // false of NaN
+}
+
 /// Returns the entries of a vector after all checks of its file.
 std::vector<double> checked_vector(const std::filesystem::path& file)
 {
@@ -122,23 +130,23 @@ std::vector<double> checked_vector(const std::filesystem::path& file)
   if (length < 0) throw Error(file.string() + ": a vector of " + std::to_string(length));
   check_length(file, static_cast<std::int64_t>(vector_header_size) + length * 8);
   std::vector<double> values = read_big_endian<double>(stream, length);
-  const auto bad = std::find_if_not(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  const auto bad = std::ranges::find_if_not(values, is_computable);
   if (bad != values.end())
-    throw Error(file.string() + ": entry " + std::to_string(bad - values.begin()) + " is " + std::to_string(*bad));
+    throw Error(format("%s: entry %td is %g; %s", file.c_str(), bad - values.begin(), *bad, entries_expected));
   return values;
 }
 
-/// Returns the message on the first entry of this rank's rows that is not finite; empty if there is none.
-std::string not_finite(Mat A, const std::filesystem::path& file)
+/// Returns the message on the first entry of this rank's rows that is not computable; empty if there is none.
+std::string problem_of_entries(Mat A, const std::filesystem::path& file)
 {
   std::string problem;
   for_each_row(A,
                [&](PetscInt row, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
                {
                  for (std::size_t k = 0; k < columns.size() && problem.empty(); ++k)
-                   if (!std::isfinite(values[k]))
-                     problem = file.string() + ": entry (" + std::to_string(row) + ", " + std::to_string(columns[k]) +
-                               ") is " + std::to_string(values[k]);
+                   if (!is_computable(values[k]))
+                     problem = format("%s: entry (%d, %d) is %g; %s", file.c_str(), static_cast<int>(row),
+                                      static_cast<int>(columns[k]), values[k], entries_expected);
                });
   return problem;
 }
@@ -163,7 +171,7 @@ Owned<Mat> load_matrix(const std::filesystem::path& file, MatrixSize size, Matri
   check(MatSetSizes(A, local.rows, local.columns, size.rows, size.columns));
   check(MatSetType(A, MATAIJ));
   check(MatLoad(A, viewer));
-  agree(comm, not_finite(A, file));
+  agree(comm, problem_of_entries(A, file));
   return A;
 }
 

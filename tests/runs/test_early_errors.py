@@ -71,6 +71,20 @@ def test_one_message_before_the_first_stage(squeal, name):
     refused(squeal(OSCILLATOR, *given, ranks=1), *words)
 
 
+def test_a_state_that_is_the_results_is_refused(squeal, tmp_path):
+    refused(squeal(OSCILLATOR, "--set", f"transient.save_state={tmp_path}/out", "--output", tmp_path / "out", ranks=1),
+            "save_state", "a folder")
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("key", ["transient", "cycle"])
+def test_a_state_to_start_from_is_read_before_the_first_stage(squeal, tmp_path, key, ranks):
+    (tmp_path / "short.state").write_bytes(b"no vector")
+    for arguments in ([], ["--dry-run"]):
+        refused(squeal(OSCILLATOR, "--set", f"{key}.enabled=true", "--set", f"{key}.start={tmp_path}/short.state", *arguments,
+                       ranks=ranks), "short.state", "not a PETSc binary vector")
+
+
 def test_options_of_solvers_are_taken(squeal):
     """Also where the run finds out only later whether it needs the solver, and where a part of it asks for the option."""
     run = squeal(OSCILLATOR, "--dry-run", "-modes_solver", "toar", "-modes_pep_tol", "1e-9", "-modes_st_pc_type", "lu",

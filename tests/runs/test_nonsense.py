@@ -65,6 +65,12 @@ def test_a_load_or_mass_that_does_nothing_is_warned_of(converged, setting, words
     assert "WARNING" in warnings and words in warnings
 
 
+@pytest.mark.parametrize("setting, words", [("contact.0.gap=-1", "longer than the model"), ("contact.0.compliance=1e-3", "no layer")])
+def test_a_gap_or_compliance_of_another_unit_is_warned_of(converged, setting, words):
+    warnings = converged(INPUTS / "pin_on_disc", "--dry-run", "--set", setting, ranks=1).printed
+    assert "WARNING: the contact of" in warnings and words in warnings
+
+
 def test_an_element_that_is_there_twice_is_refused(squeal, tmp_path):
     mesh = Mesh()
     nodes = mesh.add_nodes(lattice((2, 1, 1), lambda x, y, z: (x, y, z)))

@@ -79,7 +79,8 @@ def test_the_time_limit_ends_a_mesher_that_does_not(tmp_path):
     assert run.returncode == 3 and "by the time limit before the first stage" in run.stdout, run.stdout + run.stderr
 
 
-@pytest.mark.parametrize("ranks,number", [(1, signal.SIGTERM), (1, signal.SIGINT), (2, signal.SIGUSR1)])
+@pytest.mark.parametrize("ranks,number", [(1, signal.SIGTERM), (1, signal.SIGINT), (1, signal.SIGHUP), (1, signal.SIGXCPU),
+                                          (2, signal.SIGUSR1), (2, signal.SIGUSR2)])
 def test_a_signal_ends_the_run_in_order(tmp_path, ranks, number):
     output = tmp_path / "results"
     run = start(output, *ENDLESS, "--set", f"transient.save_state={output}/end.state", ranks=ranks)

@@ -250,6 +250,8 @@ TEST_CASE("files that contradict each other are one message on every rank")
   {
     write(path / "K.petsc", Dense{{5, -1, 0, 0}, {-1, 6, 0, -2}, {0, 0, std::nan(""), 0}, {0, -2, 0, 8}});
     says("K.petsc: entry (2, 2) is nan");
+    write(path / "K.petsc", Dense{{5, -1, 0, 0}, {-1, 6e200, 0, -2}, {0, 0, 7, 0}, {0, -2, 0, 8}});
+    says("K.petsc: entry (1, 1) is 6e+200; entries must be at most 1e100");
     write(path / "gap.petsc", std::vector<double>{0, std::numeric_limits<double>::infinity()});
     says("gap.petsc: entry 1 is inf");
     write(path / "K.petsc", Dense{{5, -1, 0, 0}, {-1, 6, 0, -2}, {0, 0, 7, 0}, {0, -1.9, 0, 8}});

@@ -56,6 +56,7 @@ TEST_CASE("statements of geometry, sizes, groups, constants and loops may be run
       "bb() = BoundingBox Surface { 1 }; Extrude { Surface{1}; } Using Wire {1}; Rotate {{0, 0, 1}, {0, 0, 0}, -Pi/4} "
       "{ Point{3}; }",
       "Function Hole x[t] = newreg; Surface Loop(x[t]) = {1}; Return t = 1; Call Hole; Physical Volume (t) = x[0];",
+      "Macro A x = 1; Return Macro B Call A; Call A; Return Call B;",
       "OptimizeMesh \"Gmsh\"; SetOrder 2; Coherence Mesh; Show {Volume{1};} Hide {:}; Recursive Delete { Volume{2}; }",
       "Error(\"n is %g\", 3); Printf(\"a > b\"); // SystemCall \"x\"\n/* Save \"y\"; */",
   };
@@ -102,6 +103,10 @@ TEST_CASE("a statement that reaches a file, a process or the environment is name
       "Macro Unheard x = 1; Return Unheard \"of\";",
       "DefineConstant[ SystemCall = 1 ]; SystemCall \"id\";",
       "Include Str(\"a\", \"b\");",
+      // macros that would never end
+      "Macro A Call A; Return Call A;",
+      "Macro A x = 1; Call B; Return Function B If (x) Call A; EndIf Return Call A;",
+      "Macro A Call Str(\"A\"); Return",
       // the ends of comments and texts as gmsh sees them
       "// x \r /*\n SystemCall \"id\"; // */",
       "x = 1; /* */ SystemCall \"id\"; /* */",
