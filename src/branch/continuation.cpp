@@ -127,6 +127,15 @@ ExaminedOrbit copy_of(const ExaminedOrbit& orbit)
   return {{squeal::copy_of(orbit.corrected.orbit), orbit.corrected.parameter, 0}, orbit.multipliers, orbit.measures};
 }
 
+/// The part of the range that the branch has passed, of which the way down comes first.
+double range_passed(const BranchCorrector& corrector, const BranchSide& side, bool upwards)
+{
+  const double start = side.orbits.front().corrected.parameter;
+  double passed = 0; // folds lead back
+  for (const ExaminedOrbit& orbit : side.orbits) passed = std::max(passed, std::abs(orbit.corrected.parameter - start));
+  return upwards ? start - corrector.settings.least + passed : passed;
+}
+
 /// Follows the branch from its start in the direction of the tangent.
 BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, BranchVector tangent)
 {
@@ -135,6 +144,7 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Branch
   side.orbits.push_back(copy_of(start));
   refer_to(corrector, side.orbits.back().corrected);
   Walk walk{std::move(tangent), 1. / points, 2e-3 / points, 6. / points};
+  const bool upwards = walk.tangent.parameter > 0;
   if (!inside(corrector.settings,
               start.corrected.parameter + std::copysign(1e-9 * corrector.scales.parameter, walk.tangent.parameter)))
   {
@@ -143,6 +153,7 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Branch
   }
   while (static_cast<int>(side.orbits.size()) <= 8 * points)
   {
+    corrector.log.done = range_passed(corrector, side, upwards);
     const double length = limited(corrector, walk);
     std::optional<CorrectedOrbit> next = step_on(corrector, side.orbits.back().corrected, walk, length);
     if (!next)
@@ -208,8 +219,8 @@ Branch without_start(long periods)
 Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settings, const ShootingOptions& options,
                     const Orbit& start, double parameter)
 {
-  Progress progress(comm_of(displacement(start.state)), "branch", 10. * settings.points);
-  ConvergenceLog log{progress};
+  Progress progress(comm_of(displacement(start.state)), "branch", settings.greatest - settings.least);
+  ConvergenceLog log{progress, {}, 0.};
   BranchCorrector corrector{family, settings, options, log};
   corrector.scales.parameter = settings.greatest - settings.least;
   CorrectedOrbit first{squeal::copy_of(start), parameter, 0};

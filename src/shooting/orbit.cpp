@@ -30,7 +30,7 @@ void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, PetscI
   Convergence& convergence = log.convergence;
   convergence.records.push_back(
       {stage, unknowns, convergence.periods, orbit.period, residual_projected, orbit.residual});
-  log.progress.update(static_cast<double>(convergence.periods),
+  log.progress.update(log.done.value_or(static_cast<double>(convergence.periods)),
                       format("%s, %ld periods, T %.6g s, residual %.1e", word(stage), convergence.periods, orbit.period,
                              orbit.residual));
 }

@@ -10,6 +10,7 @@
 
 #include <array>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace squeal
@@ -84,6 +85,7 @@ struct ConvergenceLog
 {
   Progress& progress;
   Convergence convergence{};
+  std::optional<double> done{}; // of the progress's total, where the number of periods does not tell
 };
 
 /// Why a stage stopped.
