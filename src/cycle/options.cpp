@@ -17,7 +17,7 @@ OptionList options_of(CycleOptions& options)
        "an attachment shape is dropped when less than this part of it is new"},
       {"-reduced_band_factor", &reduced.band_factor, Range::any,
        "frictionless modes above the band reach this many times the mode's frequency; 0: none; negative: 4.5, and 3 "
-       "beyond 10 000 degrees of freedom"},
+       "beyond 10 000 degrees of freedom at fewer than 128 steps a period"},
       {"-reduced_modes", &reduced.modes, Range::natural,
        "complex modes taken, the followed one and the nearest in frequency"},
       {"-reduced_free_periods", &reduced.free_periods, Range::not_negative,
