@@ -1,5 +1,6 @@
 #include "read_values.hpp"
 
+#include "squeal/base/constants.hpp"
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
