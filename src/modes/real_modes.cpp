@@ -263,6 +263,21 @@ RealModes search_from_below_zero(Mat M, Mat K, double limit, PetscInt count, con
   return modes;
 }
 
+/// The modes with low <= theta < high, of which there are `count`, found from the middle.
+void append_between(double low, double high, int count, ShiftInvert& pencil, RealModes& modes)
+{
+  if (count <= 0) return;
+  move_to(pencil, (low + high) / 2);
+  const RealPairs found = ritz_pairs(solve_nearest(pencil, count, 0, 1e-4).space, pencil.M, pencil.K);
+  for (Index k = 0; k < found.theta.size(); ++k)
+  {
+    if (!(found.theta[k] >= low && found.theta[k] < high)) continue;
+    modes.omega.push_back(std::sqrt(std::max(0.0, found.theta[k])));
+    check(MatCreateVecs(pencil.K, modes.shapes.emplace_back().put(), nullptr));
+    copy_column(found.x, k, modes.shapes.back());
+  }
+}
+
 /// The modes with low <= theta < high, found from the middle by what the counts at both ends leave. A basis can do
 /// without one that is missed.
 RealModes search_between(Mat M, Mat K, double low, double high, const PencilOptions& options)
@@ -270,15 +285,25 @@ RealModes search_between(Mat M, Mat K, double low, double high, const PencilOpti
   ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
   const Inertia first = inertia_at(low, pencil), last = inertia_at(high, pencil);
   RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
-  if (last.below <= first.below) return modes;
-  move_to(pencil, (low + high) / 2);
-  const RealPairs found = ritz_pairs(solve_nearest(pencil, last.below - first.below, 0, 1e-4).space, M, K);
-  for (Index k = 0; k < found.theta.size(); ++k)
+  append_between(low, high, last.below - first.below, pencil, modes);
+  return modes;
+}
+
+/// Slices of equal width in frequency, so many that one holds about `slice` modes: the work of a slice grows by the
+/// square of their number.
+RealModes search_in_slices(Mat M, Mat K, double omega, const PencilOptions& options)
+{
+  constexpr int slice = 70;
+  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
+  Inertia high = inertia_at(omega * omega, pencil);
+  const int slices = (high.below + slice - 1) / slice;
+  RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
+  for (int k = slices - 1; k >= 0; --k)
   {
-    if (!(found.theta[k] >= low && found.theta[k] < high)) continue;
-    modes.omega.push_back(std::sqrt(found.theta[k]));
-    check(MatCreateVecs(K, modes.shapes.emplace_back().put(), nullptr));
-    copy_column(found.x, k, modes.shapes.back());
+    const double edge = k == 0 ? shift_below_zero(M, K) : std::pow(omega * k / slices, 2);
+    const Inertia low = k == 0 ? Inertia{edge, 0} : inertia_at(edge, pencil);
+    append_between(low.limit, high.limit, high.below - low.below, pencil, modes);
+    high = low;
   }
   return modes;
 }
@@ -363,6 +388,14 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& 
     return first_of(all, K, below - all.lambda.begin());
   }
   return search_from_below_zero(M, K, omega * omega, to_int(n), options);
+}
+
+RealModes solve_most_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options)
+{
+  PetscInt n = 0;
+  check(MatGetSize(K, &n, nullptr));
+  if (n <= options.dense_limit) return solve_real_modes_below(M, K, band, options);
+  return search_in_slices(M, K, two_pi * band, options.pencil);
 }
 
 RealModes find_real_modes_below(const LinearisedSliding& linearised, double band, const ModesOptions& options)

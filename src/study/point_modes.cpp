@@ -18,12 +18,13 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index sketched = 32;      // random vectors: their mean square is off by 25 % (one standard deviation)
-constexpr double basis_band = 1.25; // of the real modes, over the band
-constexpr std::size_t fewest = 20;  // real modes
-constexpr double share = 0.02;      // directions of corrections below this part of the largest wait for the next pass
-constexpr Index small_basis = 120;  // shapes: such a problem is solved whole at once
+constexpr Index sketched = 32;     // random vectors: their mean square is off by 25 % (one standard deviation)
+constexpr double basis_band = 1.1; // of the real modes, over the band
+constexpr std::size_t fewest = 20; // real modes
+constexpr double share = 0.02;     // directions of corrections below this part of the largest wait for the next pass
+constexpr Index small_basis = 120; // shapes: such a problem is solved whole at once
 constexpr double undamped_reach = 1.2; // undamped modes on which a large basis is solved first, over the window
+constexpr double slow = 0.8;           // ratio of errors before and after a correction that did not help
 constexpr double spurious = 1e-8;      // backward error of what is no mode
 
 /// The closed pairs taken out, and the damping of the friction direction; null where there is none.
@@ -82,6 +83,22 @@ MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, Side side)
   return a;
 }
 
+/// Pairs of the projected problem, and how exact they are in the full one.
+struct SolvedPairs
+{
+  std::vector<TwoSidedPair> pairs; // falling growth rate
+  std::vector<double> right, left; // backward errors of the vectors
+
+  double backward_error(std::size_t k) const { return std::max(right[k], left[k]); }
+};
+
+/// w^2 |M| + w |C| + |K|, w = |lambda|
+double scale_of(const ModesBasis& modes, Complex lambda)
+{
+  const double w = std::abs(lambda);
+  return w * w * modes.norms.M + w * modes.norms.C + modes.norms.K;
+}
+
 /// Backward errors in the full problem, estimated by the random vectors. Left vectors solve the transposed problem.
 std::vector<double> backward_errors(const ModesBasis& modes, const ProjectedSliding& on_basis,
                                     const std::vector<TwoSidedPair>& pairs, Side side)
@@ -100,11 +117,10 @@ std::vector<double> backward_errors(const ModesBasis& modes, const ProjectedSlid
   for (Index k = 0; k < a.cols(); ++k)
   {
     const Complex lambda = pairs[static_cast<std::size_t>(k)].lambda;
-    const double w = std::abs(lambda), scale = w * w * modes.norms.M + w * modes.norms.C + modes.norms.K;
     // the random entries lie evenly in (-1, 1): their mean square is 1/3
     const double residual =
         (lambda * (lambda * M.col(k) + C.col(k)) + K.col(k)).norm() * std::sqrt(3. / static_cast<double>(tests));
-    errors.push_back(residual / (scale * sizes(k)));
+    errors.push_back(residual / (scale_of(modes, lambda) * sizes(k)));
   }
   return errors;
 }
@@ -132,7 +148,7 @@ void append_residuals(const ModesBasis& modes, const PointProblem& problem, cons
   for (Index k = 0; k < count; ++k)
   {
     const Complex lambda = pairs[static_cast<std::size_t>(k)].lambda, square = lambda * lambda;
-    const double w = std::abs(lambda), scale = w * w * modes.norms.M + w * modes.norms.C + modes.norms.K;
+    const double scale = scale_of(modes, lambda);
     const Index re = k, im = count + k;
     const auto& m = Mx.entries;
     const auto& c = Cx.entries;
@@ -146,13 +162,31 @@ void append_residuals(const ModesBasis& modes, const PointProblem& problem, cons
   append(residuals, with_zero_pivots(product(test, force), point.contact));
 }
 
-/// Those pairs whose error of a side exceeds the tolerance.
-std::vector<TwoSidedPair> inexact(const std::vector<TwoSidedPair>& pairs, const std::vector<double>& errors,
-                                  double tolerance)
+/// The backward error that a pair may have. Near the limit of stability it is a hundredth: of the error of lambda, the
+/// product of both sides, that is 1e-4.
+double tolerance_of(const TwoSidedPair& pair, const PointProblem& problem)
 {
+  constexpr double near_limit = 1e-4; // of |lambda|
+  const bool near = std::abs(pair.lambda.real()) < near_limit * std::abs(pair.lambda);
+  return near ? std::min(problem.tolerance, std::max(exact_tolerance, 0.01 * problem.tolerance)) : problem.tolerance;
+}
+
+/// The largest backward error over its tolerance.
+double largest_excess(const SolvedPairs& solved, const PointProblem& problem)
+{
+  double largest = 0;
+  for (std::size_t k = 0; k < solved.pairs.size(); ++k)
+    largest = std::max(largest, solved.backward_error(k) / tolerance_of(solved.pairs[k], problem));
+  return largest;
+}
+
+/// Those pairs whose error of a side exceeds the tolerance.
+std::vector<TwoSidedPair> inexact(const SolvedPairs& solved, const PointProblem& problem, Side side)
+{
+  const std::vector<double>& errors = side == Side::right ? solved.right : solved.left;
   std::vector<TwoSidedPair> chosen;
-  for (std::size_t k = 0; k < pairs.size(); ++k)
-    if (errors[k] > tolerance) chosen.push_back(pairs[k]);
+  for (std::size_t k = 0; k < solved.pairs.size(); ++k)
+    if (errors[k] > tolerance_of(solved.pairs[k], problem)) chosen.push_back(solved.pairs[k]);
   return chosen;
 }
 
@@ -164,8 +198,8 @@ enum class Extent
 };
 
 /// The pairs of the projected problem in the window, falling growth rate.
-std::vector<TwoSidedPair> solve_projected(const ModesBasis& modes, const ProjectedSliding& on_basis,
-                                          const Window& window, Extent extent)
+SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_basis, const Window& window,
+                            Extent extent)
 {
   const Index shapes = modes.basis.shapes();
   const MPI_Comm comm = modes.basis.T.comm;
@@ -187,7 +221,10 @@ std::vector<TwoSidedPair> solve_projected(const ModesBasis& modes, const Project
     }
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const TwoSidedPair& a, const TwoSidedPair& b) { return a.lambda.real() > b.lambda.real(); });
-  return pairs;
+  SolvedPairs solved{std::move(pairs), {}, {}};
+  solved.right = backward_errors(modes, on_basis, solved.pairs, Side::right);
+  solved.left = backward_errors(modes, on_basis, solved.pairs, Side::left);
+  return solved;
 }
 
 /// The corrections (K_z - tau M_z)^-1 r of residuals join the basis. Returns whether they add anything.
@@ -202,22 +239,22 @@ bool correct(ModesBasis& modes, MultiVector residuals)
   return extend(modes.basis, product(modes.contact.Z, responses)) > 0;
 }
 
-/// Leaves out what is no mode.
-void finish(PointModes& result, const ProjectedSliding& on_basis, Index shapes, double tolerance)
+/// The result of a point, without what is no mode.
+PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const ProjectedSliding& on_basis, Index shapes)
 {
-  std::vector<TwoSidedPair> pairs;
-  std::vector<double> errors;
-  for (std::size_t k = 0; k < result.pairs.size(); ++k)
+  PointModes result;
+  result.outcome.kind = OutcomeKind::converged;
+  for (std::size_t k = 0; k < solved.pairs.size(); ++k)
   {
-    if (result.errors[k] > std::max(spurious, tolerance)) continue;
-    result.outcome.residual = std::max(result.outcome.residual, result.errors[k]);
-    pairs.push_back(std::move(result.pairs[k]));
-    errors.push_back(result.errors[k]);
+    const double error = solved.backward_error(k);
+    if (error > std::max(spurious, problem.tolerance)) continue;
+    result.outcome.residual = std::max(result.outcome.residual, error);
+    result.pairs.push_back(std::move(solved.pairs[k]));
+    result.errors.push_back(error);
   }
-  result.pairs = std::move(pairs);
-  result.errors = std::move(errors);
   result.M = on_basis.M.bottomRightCorner(shapes, shapes);
   result.C = on_basis.C.bottomRightCorner(shapes, shapes);
+  return result;
 }
 
 } // namespace
@@ -243,7 +280,7 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   check(MatNorm(modes.M_z, NORM_1, &modes.norms.M));
   check(MatNorm(C_z, NORM_1, &modes.norms.C));
   check(MatNorm(modes.K_z, NORM_1, &modes.norms.K));
-  RealModes real = solve_real_modes_below(modes.M_z, modes.K_z, basis_band * problem.band, problem.options);
+  RealModes real = solve_most_real_modes_below(modes.M_z, modes.K_z, basis_band * problem.band, problem.options);
   if (real.omega.size() < fewest) real = solve_real_modes(modes.M_z, modes.K_z, fewest, problem.options);
   MultiVector shapes = empty_multivector(modes.K_z);
   for (const Owned<Vec>& shape : real.shapes) append(shapes, shape);
@@ -270,33 +307,31 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   const LinearisedPoint point = linearise_point(problem.sliding);
   const double end = two_pi * followed_band * problem.band;
   const Window window{vibration_floor(modes.norms), end * end};
-  PointModes result;
-  result.outcome.kind = OutcomeKind::converged;
+  Extent extent = modes.whole || modes.basis.shapes() <= small_basis ? Extent::whole : Extent::near_band;
+  double before = HUGE_VAL;
   for (PetscInt pass = 0;; ++pass)
   {
     const ProjectedSliding on_basis = project(modes.basis, point.contact, point.Cf);
-    std::vector<double> right, left;
-    const auto solve = [&](Extent extent)
+    SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
+    double now = largest_excess(solved, problem);
+    if (extent == Extent::near_band && now > 1 && now > slow * before)
     {
-      result.pairs = solve_projected(modes, on_basis, window, extent);
-      right = backward_errors(modes, on_basis, result.pairs, Side::right);
-      left = backward_errors(modes, on_basis, result.pairs, Side::left);
-    };
-    const bool small = modes.basis.shapes() <= small_basis;
-    solve(small ? Extent::whole : Extent::near_band);
-    const auto exact = [&](double error) { return error <= problem.options.tolerance; };
-    if (!small && !(std::ranges::all_of(right, exact) && std::ranges::all_of(left, exact))) solve(Extent::whole);
-    result.outcome.iterations = static_cast<int>(pass);
-    MultiVector residuals{modes.basis.T.comm, MatrixXd(modes.basis.T.entries.rows(), 0)};
-    const double tolerance = problem.options.tolerance;
-    if (pass < problem.options.passes)
-    {
-      append_residuals(modes, problem, point, inexact(result.pairs, right, tolerance), Side::right, residuals);
-      append_residuals(modes, problem, point, inexact(result.pairs, left, tolerance), Side::left, residuals);
+      SolvedPairs whole = solve_projected(modes, on_basis, window, Extent::whole);
+      const double of_whole = largest_excess(whole, problem);
+      modes.whole = of_whole < slow * now; // the undamped modes leave out more than the basis does
+      extent = Extent::whole;
+      solved = std::move(whole);
+      now = of_whole;
     }
+    before = now;
+    MultiVector residuals{modes.basis.T.comm, MatrixXd(modes.basis.T.entries.rows(), 0)};
+    if (pass < problem.passes)
+      for (const Side side : {Side::right, Side::left})
+        append_residuals(modes, problem, point, inexact(solved, problem, side), side, residuals);
     if (correct(modes, std::move(residuals))) continue;
-    for (std::size_t k = 0; k < right.size(); ++k) result.errors.push_back(std::max(right[k], left[k]));
-    finish(result, on_basis, modes.basis.shapes(), tolerance);
+    if (extent == Extent::near_band && now > 1) solved = solve_projected(modes, on_basis, window, Extent::whole);
+    PointModes result = modes_of(solved, problem, on_basis, modes.basis.shapes());
+    result.outcome.iterations = static_cast<int>(pass);
     return result;
   }
 }

@@ -23,6 +23,7 @@ struct ModesBasis
   ShiftInvert pencil{};   // of K_z, M_z just below zero
   QuadraticNorms norms{}; // of M_z, C_z and K_z
   int passes = 0;         // corrections so far
+  bool whole = false;     // undamped modes in and near the band were not enough to solve on
 };
 
 /// The structure on which a basis is made, and the band of its modes [Hz].
@@ -43,8 +44,9 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
 struct PointProblem
 {
   const SlidingEquilibrium& sliding;
-  double band = 0; // [Hz]
-  const SweepOptions& options;
+  double band = 0;      // [Hz]
+  double tolerance = 0; // on the backward error of right and left vectors
+  PetscInt passes = 0;  // corrections of the basis, at most
 };
 
 /// Vectors are coefficients of the basis; those of earlier points lack the shapes that came later.
@@ -66,6 +68,9 @@ enum class Side
 /// `contact`: of the point where they were found last.
 MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, const std::vector<TwoSidedPair>& pairs,
                      Side side);
+
+/// The backward error of vectors that are exact.
+inline constexpr double exact_tolerance = 1e-10;
 
 /// Error: a closed pair that friction jams. The closed pairs include those of the basis.
 PointModes find_point_modes(ModesBasis& basis, const PointProblem& problem);

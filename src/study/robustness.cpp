@@ -215,8 +215,7 @@ private:
   {
     SweepSettings settings;
     for (const UncertainNumber& number : problem_.numbers) settings.key.push_back(number.key);
-    SweepOptions options;
-    options.tolerance = problem_.options.tolerance;
+    const SweepOptions options;
     const SweepProblem sweep{settings, problem_.model_at, problem_.modes, problem_.modes_options, equilibrium_options_,
                              options};
     SweptModel swept(sweep);
@@ -226,7 +225,7 @@ private:
     for (const std::vector<double>& values : points)
     {
       if (swept.equilibrium_at({values, false}).outcome.kind != OutcomeKind::converged) continue;
-      const PointModes modes = swept.modes_at({values, false});
+      const PointModes modes = swept.modes_at({values, false}, problem_.options.tolerance);
       if (modes.outcome.kind != OutcomeKind::converged || modes.pairs.empty()) continue;
       for (const Side side : {Side::right, Side::left})
         shapes.add(swept.vectors(modes, side), problem_.options.truncation);

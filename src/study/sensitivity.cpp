@@ -109,10 +109,9 @@ Vectors unstable_vectors(const SensitivityProblem& problem, Sensitivity& result)
   const auto& [structure, interface, equilibrium] = problem.sliding;
   const ClosedContact& contact = problem.linearised.contact;
   const double band = problem.modes_settings.band;
-  SweepOptions exact;
-  exact.tolerance = 1e-13; // derivatives are off by the vectors' errors to first order
+  constexpr double exact = 1e-13; // derivatives are off by the vectors' errors to first order
   ModesBasis basis = make_modes_basis({structure, interface, band, problem.modes_options}, equilibrium.closed);
-  const PointModes point = find_point_modes(basis, {problem.sliding, band, exact});
+  const PointModes point = find_point_modes(basis, {problem.sliding, band, exact, SweepOptions{}.passes});
   const std::size_t wanted = problem.modes.unstable().size();
   std::vector<TwoSidedPair> pairs;
   for (std::size_t k = 0; k < point.pairs.size(); ++k)

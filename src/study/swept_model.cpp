@@ -1,6 +1,7 @@
 #include "swept_model.hpp"
 
 #include "squeal/scene/numbers.hpp"
+#include "squeal/shooting/multipliers.hpp"
 
 #include <algorithm>
 
@@ -105,7 +106,7 @@ BasisProblem SweptModel::basis_problem() const
   return {model_->structure, model_->interface, problem_.modes.band, problem_.modes_options};
 }
 
-PointModes SweptModel::modes_at(const SweptPlace& place)
+PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
 {
   const Equilibrium& equilibrium = equilibrium_at(place);
   PointModes modes;
@@ -120,7 +121,8 @@ PointModes SweptModel::modes_at(const SweptPlace& place)
     if (!basis_) basis_ = make_modes_basis(basis_problem(), common);
     if (common != basis_->closed) rebase(*basis_, basis_problem(), common);
     modes = find_point_modes(
-        *basis_, {{model_->structure, model_->interface, equilibrium}, problem_.modes.band, problem_.options});
+        *basis_,
+        {{model_->structure, model_->interface, equilibrium}, problem_.modes.band, tolerance, problem_.options.passes});
   }
   catch (const LibraryError&)
   {
@@ -131,6 +133,13 @@ PointModes SweptModel::modes_at(const SweptPlace& place)
     modes.outcome = {OutcomeKind::not_converged, error.what(), 0, 0};
   }
   return modes;
+}
+
+bool SweptModel::is_large() const
+{
+  PetscInt dofs = 0;
+  if (model_) check(VecGetSize(model_->structure.load, &dofs));
+  return dofs > large_model;
 }
 
 MultiVector SweptModel::vectors(const PointModes& modes, Side side) const

@@ -29,11 +29,14 @@ public:
 
   /// What cannot be computed at a point, for whatever reason, is in the outcome.
   const Equilibrium& equilibrium_at(const SweptPlace& place);
-  PointModes modes_at(const SweptPlace& place);
+  PointModes modes_at(const SweptPlace& place, double tolerance);
 
   /// The vectors of modes found at the point visited last, in the structure's degrees of freedom: the real parts of
   /// all, then the imaginary ones.
   MultiVector vectors(const PointModes& modes, Side side) const;
+
+  /// Beyond 10 000 degrees of freedom (large_model); of the model visited last.
+  bool is_large() const;
 
   Eigen::Index shapes() const { return basis_ ? basis_->basis.shapes() : 0; }
   int passes() const { return basis_ ? basis_->passes : 0; }

@@ -95,6 +95,17 @@ def test_thresholds_of_the_pin_are_where_single_runs_change(pin, converged):
     assert counts[1] - counts[0] == change
 
 
+def test_a_large_tolerance_keeps_the_threshold(pin, converged):
+    """As on large models, with real modes in slices. Near the limit of stability pairs are a hundred times as exact."""
+    run = converged(*PIN, *sweep_of(end=0.35, points=4), "-sweep_tolerance", "1e-6", "-modes_dense_limit", "100", ranks=1)
+    assert run.report["sweep"]["lost_modes"] == 0 and run.report["sweep"]["residual"] <= 1e-6
+    found, wanted = (r.report["sweep"]["thresholds"] for r in (run, pin))
+    assert found[0]["values"][0] == pytest.approx(wanted[0]["values"][0], rel=1e-4)
+    rows, exact = rows_of(run.output), rows_of(pin.output)
+    for mu in (0.05, 0.15, 0.35):  # the product of both errors, times at most 1e9 here
+        same_modes(modes_at(rows, mu), modes_at(exact, mu), 1e-3)
+
+
 @pytest.mark.parametrize("points", [2, 3, 12])
 def test_the_exact_threshold_of_the_oscillator(points, converged):
     """Whatever the points: lock-in lies between two of them, and the growth rate is flat before it."""

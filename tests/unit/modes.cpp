@@ -254,3 +254,20 @@ TEST_CASE("real modes between two frequencies are those of all below the higher 
     CHECK(between.omega[k] == doctest::Approx(first[static_cast<std::ptrdiff_t>(k)]).epsilon(1e-8));
   CHECK(find_real_modes_between(linearised, high, low, sparse).shapes.empty());
 }
+
+TEST_CASE("real modes in slices are those of one search")
+{
+  const SmallModel model = crowded_model(60, 3);
+  const Equilibrium equilibrium = all_closed(model);
+  const LinearisedSliding linearised = linearise({model.structure, model.interface, equilibrium});
+  ModesOptions sparse;
+  sparse.dense_limit = 10; // below the model's size
+  const double band = 4.5; // [Hz]
+  const RealModes all = solve_real_modes_below(linearised.M_z, linearised.K_z, band, {});
+  RealModes sliced = solve_most_real_modes_below(linearised.M_z, linearised.K_z, band, sparse);
+  REQUIRE(all.omega.size() > 70); // more than one slice
+  std::sort(sliced.omega.begin(), sliced.omega.end());
+  REQUIRE(sliced.omega.size() == all.omega.size());
+  for (std::size_t k = 0; k < all.omega.size(); ++k)
+    CHECK(sliced.omega[k] == doctest::Approx(all.omega[k]).epsilon(1e-7)); // half of what a slice's tolerance leaves
+}

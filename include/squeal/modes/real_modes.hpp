@@ -40,4 +40,7 @@ RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& opt
 /// All modes with frequency below `band` [Hz]. Shapes are x, in the rows of K.
 RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options);
 
+/// The same for a basis, which can do without one that is missed, in less time. In no order.
+RealModes solve_most_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options);
+
 } // namespace squeal

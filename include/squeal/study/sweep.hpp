@@ -58,9 +58,9 @@ struct Sweep
 /// Options -sweep_...
 struct SweepOptions
 {
-  double tolerance = 1e-10; // backward error of right and left vectors on the basis
-  PetscInt passes = 8;      // corrections at a point, at most
-  PetscInt depth = 6;       // times that a step is halved, at most
+  double tolerance = -1; // backward error of right and left vectors on the basis; negative: chosen
+  PetscInt passes = 8;   // corrections at a point, at most
+  PetscInt depth = 6;    // times that a step is halved, at most
 };
 
 OptionList options_of(SweepOptions& options);
