@@ -7,6 +7,7 @@
 #include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
+#include "squeal/modes/real_modes.hpp"
 
 #include <algorithm>
 #include <cmath>
