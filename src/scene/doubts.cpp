@@ -67,7 +67,9 @@ void doubt_contacts(const Scene& scene, double length, std::vector<std::string>&
     if (std::abs(contact.gap) > length)
       doubts.push_back(label + format("a gap of %g m is longer than the model, which has %.3g m. Is its unit m?",
                                       contact.gap, length));
-    if (contact.compliance * softest > length)
+    const bool of_points =
+        std::ranges::any_of(scene.points, [&](const Point& point) { return point.name == contact.rotor; });
+    if (!of_points && contact.compliance * softest > length)
       doubts.push_back(
           label + format("a compliance of %g m3/N is that of no layer: steel 1 mm thick has 4.8e-15. Is its unit m3/N?",
                          contact.compliance));
