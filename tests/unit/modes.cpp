@@ -258,7 +258,7 @@ TEST_CASE("real modes between two frequencies are those of all below the higher 
 
 TEST_CASE("real modes in slices are those of one search")
 {
-  const SmallModel model = crowded_model(60, 3);
+  const SmallModel model = crowded_model(90, 3);
   const Equilibrium equilibrium = all_closed(model);
   const LinearisedSliding linearised = linearise({model.structure, model.interface, equilibrium});
   ModesOptions sparse;
