@@ -210,10 +210,11 @@ void check_state_file(const std::string& key, const std::filesystem::path& file,
   if (file.empty()) return;
   const auto folder = file.parent_path(), results = std::filesystem::absolute(output).lexically_normal();
   const std::string label = key + " = " + shortened(file) + ": ";
-  if (is_folder(file) || file == results || file / "" == results) throw Error(label + "it is a folder; name a file");
+  const auto is_results = [&](const std::filesystem::path& path) { return path == results || path / "" == results; };
+  if (is_folder(file) || is_results(file)) throw Error(label + "it is a folder; name a file");
   if (std::error_code failed; !is_file(file) && std::filesystem::exists(file, failed))
     throw Error(label + "it is a device or a pipe, which the state would replace; name a file");
-  if (folder == results || folder / "" == results) return;
+  if (is_results(folder)) return;
   if (!is_folder(folder)) throw Error(label + "there is no folder " + shortened(folder) + "; make it first");
   if (access((is_file(file) ? file : folder).c_str(), W_OK) != 0 || access(folder.c_str(), W_OK) != 0)
     throw Error(label + "it cannot be written; name a file where you may write");

@@ -198,13 +198,14 @@ void make_coarse_model(const Scene& scene, const Model& model, MPI_Comm comm, st
                 static_cast<long long>(coarse->model.dofs.size), coarse->model.interface.pairs);
 }
 
-/// Throws Error if a state that a later stage starts from cannot be read. Collective.
-void check_start_files(const Scene& scene, const Structure& structure)
+/// The state that the search for the cycle starts from, if it is a file. That of the transient is read for its errors
+/// alone. Collective.
+std::optional<State> read_start_files(const Scene& scene, const Structure& structure)
 {
   if (scene.transient.enabled && scene.transient.start.kind == StartKind::file)
     (void)read_state(scene.transient.start.file, structure);
-  if (scene.cycle.enabled && scene.cycle.start.kind == CycleStartKind::file)
-    (void)read_state(scene.cycle.start.file, structure);
+  if (!scene.cycle.enabled || scene.cycle.start.kind != CycleStartKind::file) return {};
+  return read_state(scene.cycle.start.file, structure);
 }
 
 void print_model(const ModelSummary& model, MPI_Comm comm)
@@ -229,13 +230,12 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   print_model(report.model, comm);
   std::optional<CoarseModel> coarse;
   make_coarse_model(scene, model, comm, coarse);
-  check_start_files(scene, model.structure);
+  std::optional<State> cycle_file = read_start_files(scene, model.structure);
   if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options), comm));
   end_if_asked(comm);
 
   Chain chain{scene, options, model, report, {}};
-  if (scene.cycle.enabled && scene.cycle.start.kind == CycleStartKind::file)
-    chain.cycle_file = read_state(scene.cycle.start.file, model.structure);
+  chain.cycle_file = std::move(cycle_file);
   if (coarse) chain.coarse = &*coarse;
   const FieldNodes nodes{model.mesh, model.dofs, model.structure, model.interface};
   const auto save = [&] { write_results(report, scene, nodes, results.partial(), comm); };
@@ -298,7 +298,7 @@ void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
   print_model(summary_with_doubts(model, scene, comm), comm);
   std::optional<CoarseModel> coarse;
   make_coarse_model(scene, model, comm, coarse);
-  check_start_files(scene, model.structure);
+  (void)read_start_files(scene, model.structure);
   const Forecast forecast = forecast_of(model, scene, options);
   if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());
   const std::string problem = problem_of(forecast, comm);

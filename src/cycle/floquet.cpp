@@ -346,13 +346,6 @@ void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_ste
   { return slow_motions_of(problem, map, other_steps, period, start); };
 }
 
-bool is_large(const Structure& structure)
-{
-  PetscInt dofs = 0;
-  check(VecGetSize(structure.load, &dofs));
-  return dofs > large_model;
-}
-
 int steps_to_compare(const Structure& structure, int steps)
 {
   return is_large(structure) && steps <= enough_steps ? 2 * steps : 0;

@@ -10,9 +10,6 @@ namespace squeal
 /// compared. Borrows problem and map.
 void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_steps, Flow& flow);
 
-/// Beyond 10 000 degrees of freedom (large_model).
-bool is_large(const Structure& structure);
-
 /// The number of steps a period that tells the error of another: twice as many of a large model with few, else 0.
 int steps_to_compare(const Structure& structure, int steps);
 

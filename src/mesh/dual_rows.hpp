@@ -49,7 +49,7 @@ std::size_t shared_nodes(const ContactSurface& a, const ContactSurface& b);
 bool turn_shell(ContactSurface& turned, const ContactSurface& other);
 
 /// Returns the rows of all slave nodes, light ones included.
-/// Throws Error where master faces lie above each other.
+/// Throws Error where master faces cover each other.
 SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits);
 
 /// What becomes of a slave node's row.

@@ -39,7 +39,7 @@ struct CoveredFace
   std::vector<Master> masters;
 };
 
-/// What overlaps were left out, or lie inside each other. Places are on the slave face.
+/// What overlaps were left out, or contain each other. Places are on the slave face.
 struct OverlapFindings
 {
   double nearest = 0; // [m] distance of the nearest one beyond the limit; 0: none

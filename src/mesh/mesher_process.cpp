@@ -51,7 +51,7 @@ private:
   int number_;
 };
 
-/// The mesher beside the program, or one folder up for programs that lie in a folder of the build.
+/// The mesher beside the program, or one folder up for programs in a folder of the build.
 fs::path mesher_program()
 {
   std::error_code code;

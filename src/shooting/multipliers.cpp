@@ -1,6 +1,7 @@
 #include "squeal/shooting/multipliers.hpp"
 
 #include "arnoldi_multipliers.hpp"
+#include "squeal/base/constants.hpp"
 #include "whole_matrix.hpp"
 
 #include <algorithm>

@@ -7,6 +7,7 @@
 /// they are below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not
 /// proven.
 #include "deflated_search.hpp"
+#include "squeal/base/constants.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -245,6 +245,13 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
   return structure;
 }
 
+bool is_large(const Structure& structure)
+{
+  PetscInt dofs = 0;
+  check(VecGetSize(structure.load, &dofs));
+  return dofs > large_model;
+}
+
 std::string unsymmetric_part(const Structure& structure)
 {
   if (structure.G.get() || structure.H.get()) return "the structure has gyroscopic or circulatory parts";

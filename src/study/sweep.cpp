@@ -68,8 +68,8 @@ public:
         end_if_asked(comm_);
         model_.prepare({values, line.reversed});
       }
-    if (model_.is_large()) tolerance_ = large_tolerance;
-    if (problem_.options.tolerance >= 0) tolerance_ = problem_.options.tolerance;
+    if (model_.model() && is_large(model_.model()->structure)) tolerance_ = large_tolerance;
+    if (problem_.options.tolerance > 0) tolerance_ = problem_.options.tolerance;
     if (problem_.settings.stages == SweepStages::modes)
     {
       train(lines.front());
@@ -81,9 +81,11 @@ public:
   }
 
 private:
-  /// Makes the basis by the ends and the middle of a line: the points between then need few corrections.
+  /// Makes the basis by the ends and the middle of a line that has points between them, which then need few
+  /// corrections.
   void train(const SweepLine& line)
   {
+    if (line.points.size() < 4) return;
     const std::size_t last = line.points.size() - 1;
     for (const std::size_t place : {last, std::size_t{0}, last / 2})
     {
@@ -339,8 +341,8 @@ private:
 OptionList options_of(SweepOptions& options)
 {
   return {
-      {"-sweep_tolerance", &options.tolerance, Range::any,
-       "backward error of right and left vectors above which the basis is corrected; negative: 1e-10, and 1e-6 beyond "
+      {"-sweep_tolerance", &options.tolerance, Range::not_negative,
+       "backward error of right and left vectors above which the basis is corrected; 0: 1e-10, and 1e-6 beyond "
        "10 000 degrees of freedom"},
       {"-sweep_passes", &options.passes, Range::not_negative, "corrections of the basis at a point, at most"},
       {"-sweep_depth", &options.depth, Range::not_negative,

@@ -1,7 +1,6 @@
 #include "swept_model.hpp"
 
 #include "squeal/scene/numbers.hpp"
-#include "squeal/shooting/multipliers.hpp"
 
 #include <algorithm>
 
@@ -133,13 +132,6 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
     modes.outcome = {OutcomeKind::not_converged, error.what(), 0, 0};
   }
   return modes;
-}
-
-bool SweptModel::is_large() const
-{
-  PetscInt dofs = 0;
-  if (model_) check(VecGetSize(model_->structure.load, &dofs));
-  return dofs > large_model;
 }
 
 MultiVector SweptModel::vectors(const PointModes& modes, Side side) const

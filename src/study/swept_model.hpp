@@ -35,8 +35,8 @@ public:
   /// all, then the imaginary ones.
   MultiVector vectors(const PointModes& modes, Side side) const;
 
-  /// Beyond 10 000 degrees of freedom (large_model); of the model visited last.
-  bool is_large() const;
+  /// At the point visited last; null: at none.
+  const BrakeModel* model() const { return model_ ? &*model_ : nullptr; }
 
   Eigen::Index shapes() const { return basis_ ? basis_->basis.shapes() : 0; }
   int passes() const { return basis_ ? basis_->passes : 0; }

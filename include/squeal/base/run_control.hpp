@@ -23,8 +23,8 @@ struct RunLimits
 /// Notes the ranks of this machine; from here on a rank whose launcher dies ends with it. Collective, before all else.
 void note_ranks();
 
-/// From here on SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU are requests to end. A rank
-/// that is asked to end while another rank of its machine is gone ends at once: it would wait for that one for ever.
+/// From here on SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU are requests to end. A rank that is asked to end
+/// while another rank of its machine is gone ends at once: it would wait for that one for ever.
 void begin_run_control(const RunLimits& limits);
 
 /// From here on signals end the process as usual.

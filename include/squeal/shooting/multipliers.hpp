@@ -74,9 +74,6 @@ struct Multipliers
   SeenGrowth seen{};
 };
 
-/// Degrees of freedom beyond which a period costs so much that columns, free periods and steps a period are spared.
-inline constexpr PetscInt large_model = 10000;
-
 /// The multipliers and the motion that grows most.
 struct FloquetAnalysis
 {

@@ -31,9 +31,12 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
 /// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder, and of G.petsc and H.petsc where
 /// they are there. C and F are zero without their files. Without a B.petsc C and K may be unsymmetric: their skew
 /// parts join G and H. Collective. Throws Error for a file that is missing, truncated or not PETSc binary, and for
-/// sizes that disagree. It does so for entries that are not finite, for an unsymmetric M, C or K, and for a G or H
-/// that is not skew.
+/// sizes that disagree. It does so for entries that are not finite or beyond 1e100, for an unsymmetric M, C or K, and
+/// for a G or H that is not skew.
 Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm);
+
+/// Whether the structure has more than 10 000 degrees of freedom (large_model). Not collective.
+bool is_large(const Structure& structure);
 
 /// What keeps the matrices without contact from being those of a real symmetric problem, in a sentence; empty if
 /// nothing does. Not collective.

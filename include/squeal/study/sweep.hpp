@@ -58,9 +58,9 @@ struct Sweep
 /// Options -sweep_...
 struct SweepOptions
 {
-  double tolerance = -1; // backward error of right and left vectors on the basis; negative: chosen
-  PetscInt passes = 8;   // corrections at a point, at most
-  PetscInt depth = 6;    // times that a step is halved, at most
+  double tolerance = 0; // backward error of right and left vectors on the basis; 0: chosen
+  PetscInt passes = 8;  // corrections at a point, at most
+  PetscInt depth = 6;   // times that a step is halved, at most
 };
 
 OptionList options_of(SweepOptions& options);
