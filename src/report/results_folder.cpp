@@ -94,11 +94,15 @@ fs::path resolved(const fs::path& path)
   return whole.has_filename() ? whole : whole.parent_path();
 }
 
+[[noreturn]] void refuse_move(const fs::path& from, const fs::path& to, const std::string& reason)
+{
+  throw Error("cannot move " + from.string() + " to " + to.string() + ": " + reason +
+              "; the results stay where they are");
+}
+
 void rename_or_throw(const fs::path& from, const fs::path& to)
 {
-  if (std::rename(from.c_str(), to.c_str()) != 0)
-    throw Error("cannot move " + from.string() + " to " + to.string() + ": " + std::strerror(errno) +
-                "; the results stay where they are");
+  if (std::rename(from.c_str(), to.c_str()) != 0) refuse_move(from, to, std::strerror(errno));
 }
 
 } // namespace
@@ -241,8 +245,7 @@ void ResultsFolder::move_whole()
     return;
   }
   if (errno != ENOENT && errno != EINVAL && errno != ENOSYS && errno != ENOTSUP)
-    throw Error("cannot move " + partial_.string() + " to " + place_.string() + ": " + std::strerror(errno) +
-                "; the results stay where they are");
+    refuse_move(partial_, place_, std::strerror(errno));
   if (fs::exists(place_)) rename_or_throw(place_, old); // a file system that cannot exchange
   rename_or_throw(partial_, place_);
   std::error_code ignored;
@@ -268,11 +271,18 @@ void ResultsFolder::publish(Checkpoints checkpoints)
                [&]
                {
                  published_ = true; // whatever happens: the results are whole
-                 if (checkpoints == Checkpoints::removed) fs::remove_all(this->checkpoints());
-                 if (partial_.parent_path() != place_ && (!fs::exists(place_) || holds_only_results(place_)))
-                   move_whole();
-                 else
-                   move_by_file();
+                 try
+                 {
+                   if (checkpoints == Checkpoints::removed) fs::remove_all(this->checkpoints());
+                   if (partial_.parent_path() != place_ && (!fs::exists(place_) || holds_only_results(place_)))
+                     move_whole();
+                   else
+                     move_by_file();
+                 }
+                 catch (const fs::filesystem_error& error) // such as a file that has come into the place meanwhile
+                 {
+                   refuse_move(partial_, place_, error.code().message());
+                 }
                  std::error_code ignored;
                  fs::remove(place_ / lock_file, ignored);
                });

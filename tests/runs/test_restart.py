@@ -134,6 +134,19 @@ def test_the_wrapper_passes_signals_on(tmp_path):
     assert json.loads((output / "report.json").read_text())["exit_code"] == 3
 
 
+def test_a_terminal_that_closes_ends_two_ranks_in_order(tmp_path):
+    """It sends HUP to the shell, to mpirun and to the ranks at once."""
+    output = tmp_path / "results"
+    command = f". {ROOT}/tools/environment; launch mpirun -n 2 $SQUEAL {OSCILLATOR} --output {output} {' '.join(ENDLESS)}"
+    shell = subprocess.Popen(["bash", "-c", command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    wait_for(lambda: (partial(output) / "history.h5").exists())
+    time.sleep(0.5)
+    os.killpg(shell.pid, signal.SIGHUP)
+    wait_for(lambda: (output / "report.json").exists(), 60)
+    assert json.loads((output / "report.json").read_text())["exit_code"] == 3
+    assert shell.wait(timeout=60) != 0
+
+
 def test_the_time_limit_ends_a_cycle_and_restart_ends_it(converged, tmp_path):
     """Whatever it had reached by then."""
     straight = converged(OSCILLATOR, *TRANSIENT_AND_CYCLE, ranks=1).output

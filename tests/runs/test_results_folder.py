@@ -1,5 +1,6 @@
 """Results are one whole: a folder holds the files of one run, whatever happens to the runs that write into it."""
 
+import json
 import os
 import resource
 import shutil
@@ -161,13 +162,26 @@ def test_nothing_of_the_users_is_replaced(squeal, tmp_path, name):
     assert before == (sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes())
 
 
-def test_a_reader_that_is_gone_costs_no_results(tmp_path):
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_reader_that_is_gone_costs_no_results(tmp_path, ranks):
+    """mpirun itself asks its ranks to end then, and its exit code is its own."""
     read, write = os.pipe()
     os.close(read)
     output = tmp_path / "results"
-    run = subprocess.run([os.environ["SQUEAL"], SCENE, *SHORT, "--output", output], stdout=write, stderr=subprocess.DEVNULL)
+    launcher = [os.environ.get("MPIEXEC", "mpirun"), "-n", "2"] if ranks == 2 else []
+    run = subprocess.run([*launcher, os.environ["SQUEAL"], SCENE, *SHORT, "--output", output], stdout=write, stderr=subprocess.DEVNULL)
     os.close(write)
-    assert run.returncode == 0 and (output / "report.json").exists()
+    assert json.loads((output / "report.json").read_text())["exit_code"] in (0, 3)
+    assert run.returncode == 0 or ranks == 2
+
+
+def test_a_file_that_comes_into_the_place_meanwhile_stays_and_so_do_the_results(endless, tmp_path):
+    run = endless(tmp_path / "results")
+    (tmp_path / "results").write_text("mine")
+    run.send_signal(signal.SIGTERM)
+    errors = run.communicate(timeout=60)[1]
+    assert run.returncode == 1 and "the results stay where they are" in errors and len(errors.splitlines()) == 1, errors
+    assert (tmp_path / "results").read_text() == "mine" and (tmp_path / "results.partial" / "report.json").exists()
 
 
 def files_below(folder):
