@@ -48,7 +48,8 @@ std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& red
   const Preconditioner preconditioner = preconditioner_of(search.correction, search.model, problem.sliding.structure);
   const Owned<Vec> state = full_motion(search, reduced.state);
   check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
-  const ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
+  ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
+  start.is_cycle = true;
   const CycleCorrection correction{problem, search.options, preconditioner, search.fidelity};
   if (search.fidelity.asked == CycleModel::reduced)
   {

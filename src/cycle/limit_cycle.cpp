@@ -123,7 +123,8 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
                       is_cycle ? problem.given_period : 1 / mode.frequency_hz(),
                       {mode.real, mode.imaginary, equilibrium.u},
                       {},
-                      first_event};
+                      first_event,
+                      is_cycle};
   for (const State& motion : other_unstable_motions(problem))
     start.other_unstable.push_back(state_of(motion.u, motion.v));
   return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),

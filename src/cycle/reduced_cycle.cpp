@@ -223,7 +223,10 @@ ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start
   OrbitProblem problem{flow, preconditioner, zeros_like(first), start.period, search.tolerance, 0};
   Orbit begin = evaluate(problem, log, first, start.period);
   problem.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
-  const StageResult found = shoot_in_full_space(problem, search.options.shooting, log, std::move(begin));
+  const ShootingOptions& shooting = search.options.shooting;
+  StageResult found = shoot_in_full_space(problem, shooting, log, std::move(begin));
+  if (found.ending == StageEnding::converged)
+    found = prefer_half_period(problem, shooting, log, std::move(found)); // which spares the full model that test
   ReducedCycle cycle{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0};
   cycle.energy = mean_energy(map, cycle.period, cycle.state);
   search.fidelity.reduced_periods += log.convergence.periods + 1;

@@ -38,4 +38,13 @@ StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptio
   return result;
 }
 
+StageResult prefer_half_period(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
+                               StageResult found)
+{
+  Orbit half = evaluate(problem, log, found.orbit.state, found.orbit.period / 2);
+  if (!(half.residual < 1e-2)) return found;
+  StageResult once = shoot_in_full_space(problem, options, log, std::move(half));
+  return once.ending == StageEnding::converged ? std::move(once) : std::move(found);
+}
+
 } // namespace squeal

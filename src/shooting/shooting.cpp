@@ -49,16 +49,6 @@ Orbit shoot_on_subspaces(const OrbitProblem& problem, const ShootingOptions& opt
   return best;
 }
 
-/// An orbit gone round twice is a solution, too. Where half the period nearly closes it, that solution is taken.
-StageResult prefer_half_period(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
-                               StageResult found)
-{
-  Orbit half = evaluate(problem, log, found.orbit.state, found.orbit.period / 2);
-  if (!(half.residual < 1e-2)) return found;
-  StageResult once = shoot_in_full_space(problem, options, log, std::move(half));
-  return once.ending == StageEnding::converged ? std::move(once) : std::move(found);
-}
-
 /// A search for an orbit that attracts.
 struct Search
 {
@@ -194,6 +184,13 @@ bool is_again(const Orbit& orbit, const Orbit& known)
          std::abs(orbit.fluctuation / known.fluctuation - 1) < of_fluctuation;
 }
 
+/// Whether the orbit is that of a cheaper model, which has seen that half the period does not close it.
+bool repeats_start(const Search& search, const Orbit& orbit)
+{
+  constexpr double of_period = 0.1; // far from half of it
+  return search.start.is_cycle && std::abs(orbit.period / search.start.period - 1) < of_period;
+}
+
 /// Shoots from the end of the free motion. Where that leads to the `known` attempt's orbit again, its verdict stands.
 Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* known)
 {
@@ -206,7 +203,8 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
     orbit = shoot_on_subspaces(problem, options, log, std::move(orbit), start.shapes);
   Attempt attempt{shoot_once(problem, options, log, std::move(orbit)), {}, first_return};
   if (!attempt.converged()) return attempt;
-  attempt.found = prefer_half_period(problem, options, log, std::move(attempt.found));
+  if (!repeats_start(search, attempt.found.orbit))
+    attempt.found = prefer_half_period(problem, options, log, std::move(attempt.found));
   if (known && known->converged() && is_again(attempt.found.orbit, known->found.orbit))
   {
     attempt.floquet.multipliers = known->floquet.multipliers;

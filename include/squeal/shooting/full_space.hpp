@@ -14,4 +14,9 @@ StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& optio
 StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
                                 Orbit start);
 
+/// An orbit gone round twice is a solution, too. Where half the period nearly closes the one found, that solution is
+/// returned, else `found`. Takes a period.
+StageResult prefer_half_period(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
+                               StageResult found);
+
 } // namespace squeal

@@ -21,6 +21,7 @@ struct ShootingStart
       other_unstable{}; // motions (u, v) of other unstable modes, which an orbit may leave unexcited
   double first_event =
       std::numeric_limits<double>::infinity(); // energy norm where a nonlinearity begins to limit growth
+  bool is_cycle = false;                       // that of a cheaper model, gone round once
 };
 
 /// What a scene asks of the solver.
