@@ -23,11 +23,11 @@ mkdir -p "$output"
 # one_run HOST VALUE: on one rank of that host. Its start and its end go to times.txt.
 one_run() {
   local folder=$output/value_$2 start
-  ! ended_run "$folder" || return 0
+  local arguments=("${SCENE:-inputs/pin_on_disc/scene.toml}" --set "${KEY:-friction.coefficient}=$2" "${@:3}")
+  ! is_done "$folder" "${arguments[@]}" || return 0
   start=$(date +%s.%N)
-  RANKS=1 LAUNCH="mpirun --bind-to none --host $1" squeal_run "$folder" "${SCENE:-inputs/pin_on_disc/scene.toml}" \
-    --set "${KEY:-friction.coefficient}=$2" "${@:3}" >"$folder.txt" 2>&1
-  ! ended_run "$folder" || echo "$2 $start $(date +%s.%N)" >>"$output/times.txt"
+  RANKS=1 LAUNCH="mpirun --bind-to none --host $1" squeal_run "$folder" "${arguments[@]}" >"$folder.txt" 2>&1
+  ! is_done "$folder" "${arguments[@]}" || echo "$2 $start $(date +%s.%N)" >>"$output/times.txt"
   [ "$failed" = 0 ] || echo "see $folder.txt" >&2
 }
 

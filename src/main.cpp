@@ -1,3 +1,4 @@
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/checkpoint.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/forecast.hpp"
@@ -10,8 +11,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cinttypes>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <new>
 #include <thread>
 #include <unistd.h>
@@ -208,12 +212,17 @@ void print_sources(const std::vector<std::string>& sources, MPI_Comm comm)
 void check_state_file(const std::string& key, const std::filesystem::path& file, const std::filesystem::path& output)
 {
   if (file.empty()) return;
-  const auto folder = file.parent_path(), results = std::filesystem::absolute(output).lexically_normal();
+  const auto folder = file.parent_path(),
+             results = (std::filesystem::absolute(output) / ".").lexically_normal().parent_path();
   const std::string label = key + " = " + shortened(file) + ": ";
   const auto is_results = [&](const std::filesystem::path& path) { return path == results || path / "" == results; };
   if (is_folder(file) || is_results(file)) throw Error(label + "it is a folder; name a file");
   if (std::error_code failed; !is_file(file) && std::filesystem::exists(file, failed))
     throw Error(label + "it is a device or a pipe, which the state would replace; name a file");
+  const std::string name = file.filename();
+  if (is_results(folder) ? name == "running" || file.extension() == ".part"
+                         : file == results.string() + ".partial" || file == results.string() + ".old")
+    throw Error(label + "the run uses this name meanwhile; give the state another one");
   if (is_results(folder)) return;
   if (!is_folder(folder)) throw Error(label + "there is no folder " + shortened(folder) + "; make it first");
   if (access((is_file(file) ? file : folder).c_str(), W_OK) != 0 || access(folder.c_str(), W_OK) != 0)
@@ -228,12 +237,19 @@ bool is_other_rank()
   return false;
 }
 
-/// The scene and the options by which checkpoints are distinguished from those of another run. Options of the session,
-/// about logs and memory, do not matter.
+/// The scene, the options and the contents of input files, by which checkpoints are distinguished from those of another
+/// run. Options of the session, about logs and memory, do not matter. Of one rank.
 std::string request_text(const Scene& scene, ProgramOptions options)
 {
   std::string text = resolved_scene(scene);
   for (const Option& option : options_of(options)) text += option.name + " " + value_of(option) + "\n";
+  for (const std::filesystem::path& file : inputs_of(scene))
+  {
+    if (file == scene.file || !is_file(file)) continue;
+    std::ifstream stream(file, std::ios::binary);
+    const std::string content{std::istreambuf_iterator<char>(stream), {}};
+    text += format("file %s %zu %016" PRIx64 "\n", file.filename().c_str(), content.size(), check_sum(content));
+  }
   return text;
 }
 
@@ -266,7 +282,11 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   on_rank_zero(comm, [&] { check_outputs(scene, output); });
   ResultsFolder results(output, arguments.beginning, comm);
   const bool restart = arguments.beginning == Beginning::from_checkpoints;
-  on_every_rank(comm, [&] { open_checkpoints({results.checkpoints(), request_text(scene, options), restart}); });
+  std::string request;
+  on_rank_zero(comm, [&] { request = request_text(scene, options); });
+  broadcast(request, comm);
+  on_every_rank(comm, [&] { open_checkpoints({results.checkpoints(), request, restart}); });
+  results.accept_checkpoints();
   write_request(scene, results.run(), results.partial(), comm);
   scene.transient.save_state = results.meanwhile(scene.transient.save_state);
   scene.cycle.save_state = results.meanwhile(scene.cycle.save_state);

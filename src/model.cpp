@@ -1,12 +1,15 @@
 #include "squeal/model.hpp"
 
 #include "squeal/base/constants.hpp"
+#include "squeal/base/run_control.hpp"
+#include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/ties.hpp"
 #include "squeal/solid/matrix_rows.hpp"
 #include "squeal/solid/probes.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace squeal
 {
@@ -47,6 +50,23 @@ std::vector<std::string> warnings_of(const Model& model, const Scene& scene)
                       stator_is_slave ? contact.rotor : contact.stator, "no contact force acts there", sentences);
   }
   return sentences;
+}
+
+/// The longest edge of the box round all elements [m]. Points are where the scene puts them, whatever its mesh's unit.
+double length_of(const Mesh& mesh)
+{
+  Vec3 low, high;
+  low.fill(std::numeric_limits<double>::infinity());
+  high.fill(-std::numeric_limits<double>::infinity());
+  for (const Element& element : mesh.elements)
+    for (const int node : nodes_of(element))
+      for (std::size_t c = 0; c < 3; ++c)
+      {
+        const double x = mesh.nodes[static_cast<std::size_t>(node)][c];
+        low[c] = std::min(low[c], x);
+        high[c] = std::max(high[c], x);
+      }
+  return mesh.elements.empty() ? 0 : std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
 }
 
 /// C += alpha M + beta K.
@@ -115,9 +135,13 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
 {
   Model model;
   model.mesh = std::move(mesh);
+  end_if_asked(comm);
   const ContactPairs contact = make_pairs(model.mesh, scene);
+  end_if_asked(comm);
   const Partition partition = partition_mesh(model.mesh, contact.pairs, comm);
+  end_if_asked(comm);
   model.dofs = number_dofs(model.mesh, scene, partition, comm);
+  end_if_asked(comm);
   model.structure = assemble(model.mesh, scene, partition, model.dofs, comm);
   model.interface = make_interface(contact.pairs, scene, model.dofs, comm);
   model.coverage = contact.coverage;
@@ -158,12 +182,7 @@ ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)
   summary.coverage = model.coverage;
   summary.warnings = warnings_of(model, scene);
   summary.ranks = ranks_of(comm);
-  for (int c = 0; c < 3 && !model.mesh.nodes.empty(); ++c)
-  {
-    const auto below = [c](const Vec3& a, const Vec3& b) { return a[c] < b[c]; };
-    const auto [low, high] = std::minmax_element(model.mesh.nodes.begin(), model.mesh.nodes.end(), below);
-    summary.length = std::max(summary.length, (*high)[c] - (*low)[c]);
-  }
+  summary.length = length_of(model.mesh);
   double stiffness = 0, mass = 0;
   check(MatNorm(model.structure.K, NORM_1, &stiffness));
   check(MatNorm(model.structure.M, NORM_1, &mass));

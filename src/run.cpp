@@ -231,8 +231,8 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   std::optional<CoarseModel> coarse;
   make_coarse_model(scene, model, comm, coarse);
   std::optional<State> cycle_file = read_start_files(scene, model.structure);
-  if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options), comm));
   end_if_asked(comm);
+  if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options), comm));
 
   Chain chain{scene, options, model, report, {}};
   chain.cycle_file = std::move(cycle_file);

@@ -11,6 +11,7 @@ namespace squeal
 {
 
 namespace fs = std::filesystem;
+using Strings = std::vector<std::string>;
 
 namespace
 {
@@ -22,6 +23,7 @@ enum class Value
   options_file, // a file that exists, and holds options
   write_file,   // nothing, or a file that can be written
   viewer,       // [ascii][:file[:format]]
+  solver_view,  // the same, or true or false
   info,         // nothing, or file[:classes]
   text,
 };
@@ -55,6 +57,14 @@ constexpr std::array session_options = {
     SessionOption{"citations", Value::write_file, "[FILE]  what to cite of PETSc"},
 };
 
+constexpr SessionOption solver_view{"", Value::solver_view, ""};
+
+// How options end by which solvers print.
+constexpr std::array views = {"_view",           "_view_pre",       "_view_solution",  "_view_mat",
+                              "_view_pmat",      "_view_rhs",       "_view_values",    "_view_vectors",
+                              "_error_relative", "_error_absolute", "_error_backward", "_converged_reason",
+                              "_converged_rate"};
+
 const SessionOption* find_option(const std::string& name)
 {
   const auto found = std::find_if(session_options.begin(), session_options.end(),
@@ -86,6 +96,13 @@ std::vector<std::string> parts_of(const std::string& value)
   return parts;
 }
 
+/// The option of the session, or the one by which a solver prints; null if it is neither.
+const SessionOption* find_printing_option(const std::string& name)
+{
+  const SessionOption* option = find_option(name);
+  return option || !is_solver_view(name) ? option : &solver_view;
+}
+
 /// The file that the option writes; empty if it writes none.
 std::string file_of(const SessionOption& option, const std::string& value)
 {
@@ -95,6 +112,7 @@ std::string file_of(const SessionOption& option, const std::string& value)
   case Value::write_file:
     return value;
   case Value::viewer:
+  case Value::solver_view:
     return parts.size() > 1 ? parts[1] : "";
   case Value::info:
     return parts.empty() ? "" : parts[0];
@@ -104,27 +122,36 @@ std::string file_of(const SessionOption& option, const std::string& value)
 }
 
 /// [ascii][:file[:format[:append]]]
-std::string problem_of_viewer(const std::string& value)
+std::string problem_of_viewer(const SessionOption& option, const std::string& value)
 {
   const std::vector<std::string> parts = parts_of(value);
   if (!parts.empty() && !is_one_of(parts[0], {"", "ascii"}))
     return "no viewer is called '" + shortened(parts[0]) + "'; write :FILE, :FILE:FORMAT or nothing";
-  if (parts.size() > 2 && !is_one_of(parts[2], {"", "default", "ascii_info", "ascii_info_detail", "ascii_xml",
-                                                "ascii_csv", "ascii_flamegraph"}))
-    return "no format is called '" + shortened(parts[2]) +
-           "'; known: ascii_info, ascii_info_detail, ascii_xml, ascii_csv, ascii_flamegraph";
+  const Strings formats =
+      option.value == Value::solver_view
+          ? Strings{"ascii_info", "ascii_info_detail", "ascii_matlab"}
+          : Strings{"ascii_info", "ascii_info_detail", "ascii_xml", "ascii_csv", "ascii_flamegraph"};
+  if (parts.size() > 2 && !is_one_of(parts[2], {"", "default"}) &&
+      std::ranges::find(formats, parts[2]) == formats.end())
+  {
+    std::string list;
+    for (const std::string& format : formats) list += (list.empty() ? "" : ", ") + format;
+    return "no format is called '" + shortened(parts[2]) + "'; known: " + list;
+  }
   return parts.size() > 4 || (parts.size() > 3 && parts[3] != "append") ? "it has too many parts" : "";
 }
 
 std::string problem_of_value(const SessionOption& option, const std::string& value)
 {
   if (value.empty()) return option.value == Value::options_file ? "it needs the name of a file" : "";
-  if (option.value == Value::flag)
-    return is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"}) ? "" : "it is true or false";
+  const bool is_flag = is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"});
+  if (option.value == Value::flag) return is_flag ? "" : "it is true or false";
+  if (option.value == Value::solver_view && is_flag) return {};
   if (option.value == Value::options_file)
     return is_file(value) && access(value.c_str(), R_OK) == 0 ? "" : "there is no such file, or it cannot be read";
   const std::string file = file_of(option, value);
-  std::string problem = option.value == Value::viewer ? problem_of_viewer(value) : "";
+  const bool is_viewer = option.value == Value::viewer || option.value == Value::solver_view;
+  std::string problem = is_viewer ? problem_of_viewer(option, value) : "";
   if (problem.empty() && !file.empty()) problem = problem_of_new_file(file);
   return problem;
 }
@@ -136,16 +163,22 @@ bool is_session_option(const std::string& name)
   return find_option(name) != nullptr;
 }
 
+bool is_solver_view(const std::string& name)
+{
+  return name.find("_monitor") != std::string::npos ||
+         std::ranges::any_of(views, [&](const char* ending) { return name.ends_with(ending); });
+}
+
 std::string problem_of_session_option(const std::string& name, const std::string& value)
 {
-  const SessionOption* option = find_option(name);
+  const SessionOption* option = find_printing_option(name);
   const std::string problem = option ? problem_of_value(*option, value) : "";
   return problem.empty() ? "" : "option -" + name + " " + shortened(value) + ": " + problem;
 }
 
 std::string file_written_by(const std::string& name, const std::string& value)
 {
-  const SessionOption* option = find_option(name);
+  const SessionOption* option = find_printing_option(name);
   return option ? file_of(*option, value) : "";
 }
 

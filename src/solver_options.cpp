@@ -1,9 +1,11 @@
 #include "squeal/solver_options.hpp"
 
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/session_options.hpp"
 
 #include <algorithm>
 #include <slepcpep.h>
+#include <string_view>
 
 namespace squeal
 {
@@ -19,33 +21,143 @@ PetscErrorCode keep_message(MPI_Comm, int, const char*, const char*, PetscErrorC
   return code;
 }
 
-PetscErrorCode try_snes(const char* prefix, MPI_Comm comm)
+/// A solver of a stage, with the options of that database; null: the program's own. A rehearsal solves x = 1, or 24
+/// eigenvalues, as the stage would solve its problem.
+struct Trial
 {
-  SNES snes = nullptr;
-  PetscErrorCode code = SNESCreate(comm, &snes);
-  if (!code) code = SNESSetOptionsPrefix(snes, prefix);
-  if (!code) code = SNESSetFromOptions(snes);
+  const char* object; // the prefix that it has
+  PetscErrorCode (*run)(const Trial& trial, MPI_Comm comm, PetscOptions database);
+};
+
+PetscErrorCode residual_of_ones(SNES, Vec x, Vec residual, void*)
+{
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(x, residual));
+  PetscCall(VecShift(residual, -1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode keep_jacobian(SNES, Vec, Mat, Mat, void*)
+{
+  return PETSC_SUCCESS;
+}
+
+PetscErrorCode copy_vector(Mat, Vec x, Vec product)
+{
+  return VecCopy(x, product);
+}
+
+PetscErrorCode copy_through(PC, Vec x, Vec product)
+{
+  return VecCopy(x, product);
+}
+
+/// The identity: as stored entries for the Newton iteration on a subspace, else as a product alone.
+PetscErrorCode make_identity(bool is_stored, MPI_Comm comm, Mat* identity)
+{
+  constexpr PetscInt size = 8;
+  PetscFunctionBeginUser;
+  if (is_stored)
+  {
+    PetscCall(MatCreateSeqDense(comm, size, size, nullptr, identity));
+    PetscCall(MatShift(*identity, 1));
+  }
+  else
+  {
+    PetscCall(MatCreateShell(comm, PETSC_DECIDE, PETSC_DECIDE, size, size, nullptr, identity));
+    PetscCall(MatShellSetOperation(*identity, MATOP_MULT, reinterpret_cast<void (*)(void)>(copy_vector)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode rehearse_snes(SNES snes, bool on_subspace, MPI_Comm comm)
+{
+  Owned<Mat> identity;
+  Owned<Vec> x, residual;
+  KSP ksp = nullptr;
+  PC pc = nullptr;
+  PetscFunctionBeginUser;
+  PetscCall(make_identity(on_subspace, comm, identity.put()));
+  PetscCall(MatCreateVecs(identity, x.put(), residual.put()));
+  PetscCall(SNESSetFunction(snes, residual, residual_of_ones, nullptr));
+  PetscCall(SNESSetJacobian(snes, identity, identity, keep_jacobian, nullptr));
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  if (!on_subspace)
+  {
+    PetscCall(KSPSetPCSide(ksp, PC_RIGHT));
+    PetscCall(PCSetType(pc, PCSHELL));
+    PetscCall(PCShellSetApply(pc, copy_through));
+  }
+  PetscCall(SNESSetFromOptions(snes));
+  PetscCall(SNESSolve(snes, nullptr, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode try_snes(const Trial& trial, MPI_Comm comm, PetscOptions database)
+{
+  const bool on_subspace = std::string_view(trial.object) == "cycle_";
+  Owned<SNES> snes;
   PetscInt iterations = 0; // looked at by PETSc in the solve only
-  if (!code) code = SNESGetTolerances(snes, nullptr, nullptr, nullptr, &iterations, nullptr);
-  if (!code && iterations < 0)
-    code = PetscError(comm, __LINE__, __func__, __FILE__, PETSC_ERR_ARG_OUTOFRANGE, PETSC_ERROR_INITIAL,
-                      "%ssnes_max_it is %" PetscInt_FMT ", it must be at least 0", prefix, iterations);
-  (void)SNESDestroy(&snes);
-  return code;
+  PetscFunctionBeginUser;
+  if (on_subspace && database) comm = PETSC_COMM_SELF;
+  PetscCall(SNESCreate(comm, snes.put()));
+  PetscCall(PetscObjectSetOptions(reinterpret_cast<PetscObject>(snes.get()), database));
+  PetscCall(SNESSetOptionsPrefix(snes, trial.object));
+  if (database)
+    PetscCall(rehearse_snes(snes, on_subspace, comm));
+  else
+    PetscCall(SNESSetFromOptions(snes));
+  PetscCall(SNESGetTolerances(snes, nullptr, nullptr, nullptr, &iterations, nullptr));
+  PetscCheck(iterations >= 0, comm, PETSC_ERR_ARG_OUTOFRANGE,
+             "%ssnes_max_it is %" PetscInt_FMT ", it must be at least 0", trial.object, iterations);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/// The diagonal matrix of first, first + step, …
+PetscErrorCode make_diagonal(double first, double step, MPI_Comm comm, Mat* A)
+{
+  constexpr PetscInt size = 24;
+  PetscInt begin = 0, end = 0;
+  PetscFunctionBeginUser;
+  PetscCall(MatCreateAIJ(comm, PETSC_DECIDE, PETSC_DECIDE, size, size, 1, nullptr, 0, nullptr, A));
+  PetscCall(MatGetOwnershipRange(*A, &begin, &end));
+  for (PetscInt row = begin; row < end; ++row)
+    PetscCall(MatSetValue(*A, row, row, first + step * static_cast<double>(row), INSERT_VALUES));
+  PetscCall(MatAssemblyBegin(*A, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*A, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /// With the spectral transformation of the modes, which has a linear solver of its own.
-PetscErrorCode try_pep(const char* prefix, MPI_Comm comm)
+PetscErrorCode try_pep(const Trial& trial, MPI_Comm comm, PetscOptions database)
 {
-  PEP pep = nullptr;
+  Owned<PEP> pep;
+  Owned<Mat> K, C, M;
   ST transformation = nullptr;
-  PetscErrorCode code = PEPCreate(comm, &pep);
-  if (!code) code = PEPGetST(pep, &transformation);
-  if (!code) use_mumps(transformation);
-  if (!code) code = PEPSetOptionsPrefix(pep, prefix);
-  if (!code) code = PEPSetFromOptions(pep);
-  (void)PEPDestroy(&pep);
-  return code;
+  PetscFunctionBeginUser;
+  PetscCall(PEPCreate(comm, pep.put()));
+  PetscCall(PetscObjectSetOptions(reinterpret_cast<PetscObject>(pep.get()), database));
+  PetscCall(PEPGetST(pep, &transformation));
+  PetscCall(PetscObjectSetOptions(reinterpret_cast<PetscObject>(transformation), database));
+  use_mumps(transformation);
+  PetscCall(PEPSetOptionsPrefix(pep, trial.object));
+  if (database)
+  {
+    PetscCall(make_diagonal(1, 1, comm, K.put()));
+    PetscCall(make_diagonal(0.01, 0, comm, C.put()));
+    PetscCall(make_diagonal(1, 0, comm, M.put()));
+    Mat coefficients[3] = {K, C, M};
+    PetscCall(PEPSetOperators(pep, 3, coefficients));
+    PetscCall(PEPSetProblemType(pep, PEP_GENERAL));
+    PetscCall(PEPSetType(pep, PEPTOAR));
+    PetscCall(PEPSetWhichEigenpairs(pep, PEP_TARGET_MAGNITUDE));
+    PetscCall(PEPSetTarget(pep, 0.5));
+    PetscCall(PEPSetDimensions(pep, 4, PETSC_DEFAULT, PETSC_DEFAULT));
+  }
+  PetscCall(PEPSetFromOptions(pep));
+  if (database) PetscCall(PEPSolve(pep));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /// What an option that ends so chooses among: the types that the library knows.
@@ -60,7 +172,8 @@ const std::array type_options = {
     TypeOption{"_ksp_type", &KSPList},   TypeOption{"_pc_type", &PCList},
     TypeOption{"_pep_type", &PEPList},   TypeOption{"_st_type", &STList}};
 
-/// What is wrong with an option that names a type; empty if nothing is.
+/// What is wrong with an option that names a type; empty if nothing is. Two types end the process here, since they need
+/// more than an operator: they are not among those that may be given.
 std::string problem_of_type(const std::string& name, const std::string& value)
 {
   const auto option =
@@ -69,28 +182,24 @@ std::string problem_of_type(const std::string& name, const std::string& value)
   const char** known = nullptr;
   int count = 0;
   check(PetscFunctionListGet(*option->types, &known, &count));
-  const std::vector<std::string> words(known, std::find(known, known + count, nullptr)); // the last one is null
+  std::vector<std::string> words(known, std::find(known, known + count, nullptr)); // the last one is null
   check(PetscFree(known));
+  std::erase_if(words, [](const std::string& word) { return word == PEPJD || word == SNESASPIN; });
   if (std::ranges::find(words, value) != words.end()) return {};
   std::string list;
   for (const std::string& word : words) list += " " + word;
   return "option -" + shortened(name) + " " + shortened(value) + ": it is one of" + list;
 }
 
-struct Trial
-{
-  const char* object;
-  PetscErrorCode (*run)(const char* prefix, MPI_Comm comm);
-};
-
 constexpr std::array trials = {Trial{"cycle_full_", try_snes}, Trial{"cycle_", try_snes}, Trial{"modes_", try_pep}};
 
 // Parts of names that objects ask for only while they are set up or solve; a trial does not get there.
-constexpr std::array asked_later = {"_view", "_converged_reason", "_test_", "_compare_", "_mat_"};
+constexpr std::array asked_later = {"_test_", "_compare_", "_mat_"};
 
 bool is_asked_later(const std::string& name)
 {
-  return std::ranges::any_of(asked_later, [&](const char* part) { return name.find(part) != std::string::npos; });
+  return is_solver_view(name) ||
+         std::ranges::any_of(asked_later, [&](const char* part) { return name.find(part) != std::string::npos; });
 }
 
 struct GivenOption
@@ -111,17 +220,39 @@ std::vector<GivenOption> unused_solver_options()
   return unused;
 }
 
-void run_trial(const Trial& trial, const std::vector<GivenOption>& given, MPI_Comm comm)
+void run_trial(const Trial& trial, PetscOptions database, MPI_Comm comm)
 {
   std::string message;
   check(PetscPushErrorHandler(keep_message, &message));
-  const PetscErrorCode code = trial.run(trial.object, comm);
+  const PetscErrorCode code = trial.run(trial, comm, database);
   check(PetscPopErrorHandler());
   if (code == PETSC_SUCCESS) return;
-  for (const auto& [name, value] : given)
-    if (const std::string problem = problem_of_type(name, value); !problem.empty()) throw Error(problem);
   throw Error(std::string("options -") + trial.object +
               "…, of PETSc's solvers: " + (message.empty() ? "a value that they do not take" : message));
+}
+
+/// Solves a small problem with the options of one solver, but for those that print. Some values fail in a solve only.
+void rehearse(const Trial& trial, const std::vector<GivenOption>& given, MPI_Comm comm)
+{
+  std::vector<GivenOption> own;
+  for (const GivenOption& option : given)
+    if (solver_prefix_of(option.name)->object == std::string_view(trial.object) && !is_solver_view(option.name))
+      own.push_back(option);
+  if (own.empty()) return;
+  PetscOptions database = nullptr;
+  check(PetscOptionsCreate(&database));
+  for (const auto& [name, value] : own)
+    check(PetscOptionsSetValue(database, ("-" + name).c_str(), value.empty() ? nullptr : value.c_str()));
+  try
+  {
+    run_trial(trial, database, comm);
+  }
+  catch (...)
+  {
+    check(PetscOptionsDestroy(&database));
+    throw;
+  }
+  check(PetscOptionsDestroy(&database));
 }
 
 /// Whether the run's options leave out the solver of a prefix, whatever the run finds.
@@ -143,7 +274,12 @@ void check_solver_options(const ProgramOptions& options, MPI_Comm comm)
 {
   const std::vector<GivenOption> given = unused_solver_options();
   std::string problem;
-  for (const Trial& trial : trials) run_trial(trial, given, comm);
+  for (PetscErrorCode (*make_types_known)() :
+       {SNESInitializePackage, KSPInitializePackage, PCInitializePackage, STInitializePackage, PEPInitializePackage})
+    check(make_types_known());
+  for (const auto& [name, value] : given)
+    if (const std::string wrong = problem_of_type(name, value); !wrong.empty()) throw Error(wrong);
+  for (const Trial& trial : trials) run_trial(trial, nullptr, comm);
   for (const auto& [name, value] : given)
     if (leaves_out(options, *solver_prefix_of(name)))
       problem = "option -" + shortened(name) +
@@ -153,6 +289,7 @@ void check_solver_options(const ProgramOptions& options, MPI_Comm comm)
       problem = "unknown option -" + shortened(name) + ": the solver behind -" + solver_prefix_of(name)->text +
                 "… has none of this name";
   agree(comm, problem);
+  for (const Trial& trial : trials) rehearse(trial, given, comm);
 }
 
 } // namespace squeal

@@ -9,10 +9,13 @@ namespace squeal
 /// Whether this is an option of the session that squeal passes on; `name` without its dash.
 bool is_session_option(const std::string& name);
 
-/// What is wrong with the value of a session option; empty if nothing is.
+/// Whether by an option of this name a solver prints, where it solves: modes_pep_view, cycle_snes_monitor.
+bool is_solver_view(const std::string& name);
+
+/// What is wrong with the value of a session option, or of one by which a solver prints; empty if nothing is.
 std::string problem_of_session_option(const std::string& name, const std::string& value);
 
-/// The file that a session option writes; empty if it writes none.
+/// The file that such an option writes; empty if it writes none.
 std::string file_written_by(const std::string& name, const std::string& value);
 
 /// Whether its value is a file of more options.

@@ -4,7 +4,6 @@
 #include "squeal/base/error.hpp"
 #include "squeal/base/whole_file.hpp"
 
-#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -49,14 +48,6 @@ std::string lack_of_room(std::size_t bytes)
   return "less than 16 MB would be free in " + place().folder.parent_path().string();
 }
 
-/// FNV-1a, 64 bits.
-std::uint64_t check_sum(std::string_view bytes)
-{
-  std::uint64_t sum = 14695981039346656037ull;
-  for (const char byte : bytes) sum = (sum ^ static_cast<unsigned char>(byte)) * 1099511628211ull;
-  return sum;
-}
-
 void append(std::uint64_t number, std::string& bytes)
 {
   bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
@@ -82,6 +73,13 @@ private:
 };
 
 } // namespace
+
+std::uint64_t check_sum(std::string_view bytes)
+{
+  std::uint64_t sum = 14695981039346656037ull;
+  for (const char byte : bytes) sum = (sum ^ static_cast<unsigned char>(byte)) * 1099511628211ull;
+  return sum;
+}
 
 const std::vector<double>& Checkpoint::list(const std::string& name) const
 {
@@ -149,8 +147,9 @@ void open_checkpoints(const CheckpointPlace& given)
   if (!given.restart || !stream) return;
   const std::string theirs{std::istreambuf_iterator<char>(stream), {}};
   if (theirs != given.request)
-    throw Error("the checkpoints in " + given.folder.string() + " are of another scene or of other options (" +
-                file.string() + "): give those, or begin again without --restart");
+    throw Error("the checkpoints in " + given.folder.string() +
+                " are of another scene, of other input files or of other options (" + file.string() +
+                "): give those, or begin again without --restart");
 }
 
 bool checkpoints_are_kept()
@@ -206,10 +205,9 @@ std::optional<Checkpoint> kept_everywhere(const std::string& name, MPI_Comm comm
   if (!place().restart) return {};
   int rank = 0;
   MPI_Comm_rank(comm, &rank);
-  const std::string own = rank == 0 ? bytes_kept(name) : std::string();
-  std::vector<char> bytes(own.begin(), own.end());
+  std::string bytes = rank == 0 ? bytes_kept(name) : std::string();
   broadcast(bytes, comm);
-  return Checkpoint::from({bytes.begin(), bytes.end()});
+  return Checkpoint::from(bytes);
 }
 
 } // namespace squeal

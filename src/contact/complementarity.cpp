@@ -1,6 +1,7 @@
 #include "squeal/contact/complementarity.hpp"
 
 #include "squeal/base/error.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/contact/pair_law.hpp"
 
 #include <algorithm>
@@ -175,7 +176,8 @@ ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, do
     VectorXd::Map(g.data(), static_cast<Index>(n)) = as_vector(problem.q) + problem.M * as_vector(result.reaction);
     result.residual = unilateral_residual(result.reaction, g, scale, problem.q);
     best = std::min(best, result.residual);
-    if (result.residual <= tolerance || !std::isfinite(result.residual) || result.iterations >= max_iterations)
+    if (result.residual <= tolerance || !std::isfinite(result.residual) || result.iterations >= max_iterations ||
+        is_asked_here())
       return result;
     if (result.iterations % 50 == 49 && result.residual > 10 * best) rho /= 2;
     for (std::size_t i = 0; i < n; ++i) result.reaction[i] = std::max(0., result.reaction[i] - rho * g[i]);

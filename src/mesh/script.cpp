@@ -59,6 +59,14 @@ public:
 
   const Tokens& tokens() const { return tokens_; }
 
+  /// The scripts, then the meshes and shapes that they merge.
+  std::vector<fs::path> files() const
+  {
+    std::vector<fs::path> all = tokens_.files;
+    all.insert(all.end(), merged_.begin(), merged_.end());
+    return all;
+  }
+
 private:
   void add(std::vector<Token> tokens, const fs::path& file)
   {
@@ -92,7 +100,11 @@ private:
   {
     try
     {
-      if (!statement.is("Include") && !is_script(target)) return false;
+      if (!statement.is("Include") && !is_script(target))
+      {
+        merged_.push_back(target);
+        return false;
+      }
       if (statement.is("ShapeFromFile")) throw Error("it is no shape");
       read(target);
     }
@@ -106,7 +118,8 @@ private:
 
   Statements statements_;
   Tokens tokens_;
-  std::vector<fs::path> open_; // files that are being read
+  std::vector<fs::path> open_;   // files that are being read
+  std::vector<fs::path> merged_; // that are no scripts
 };
 
 /// Names in the lists of DefineConstant, outside of braces: after "[" or ",".
@@ -212,7 +225,7 @@ Script read_script(const fs::path& file, Statements statements)
 {
   ScriptReader reader(statements);
   reader.read(file);
-  Script script{{}, parameters_in(reader.tokens().list)};
+  Script script{{}, parameters_in(reader.tokens().list), reader.files()};
   if (statements == Statements::any) return script;
   check_statements(reader.tokens(), script.parameters);
   script.text = text_of(reader.tokens());

@@ -2,6 +2,7 @@
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/mesh/script.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -43,14 +44,6 @@ std::string new_identity()
   return format("%04d-%02d-%02dT%02d:%02d:%02d.%06dZ %s %d", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday,
                 utc.tm_hour, utc.tm_min, utc.tm_sec, static_cast<int>(micros % 1000000), host.data(),
                 static_cast<int>(getpid()));
-}
-
-/// Copies the text of rank 0 to every rank.
-void share(std::string& text, MPI_Comm comm)
-{
-  std::vector<char> bytes(text.begin(), text.end());
-  broadcast(bytes, comm);
-  text.assign(bytes.begin(), bytes.end());
 }
 
 [[noreturn]] void refuse_folder(const fs::path& folder, const std::string& reason)
@@ -165,9 +158,7 @@ ResultsFolder::ResultsFolder(const fs::path& place, Beginning beginning, MPI_Com
                  }
                });
   std::string place_text = place_.string(), partial_text = partial_.string();
-  share(place_text, comm);
-  share(partial_text, comm);
-  share(run_, comm);
+  for (std::string* text : {&place_text, &partial_text, &run_}) broadcast(*text, comm);
   place_ = place_text;
   partial_ = partial_text;
 }
@@ -179,6 +170,10 @@ void ResultsFolder::make(Beginning beginning)
     refuse_folder(place_, fs::is_directory(place_) ? std::strerror(EACCES) : std::strerror(ENOTDIR));
   if (const fs::path ending = place_.extension(); ending == partial_ending || ending == old_ending)
     refuse_folder(place_, "runs into a folder without " + ending.string() + " use this name meanwhile");
+  if (fs::is_symlink(place_)) refuse_folder(place_, "it is a link to what does not exist");
+  for (fs::path above = place_.parent_path(); above.has_relative_path(); above = above.parent_path())
+    if (above.extension() == partial_ending && fs::exists(above / lock_file))
+      refuse_folder(place_, "a run works in " + above.string());
   const fs::path partial = can_be_replaced(place_) ? fs::path(place_.string() + partial_ending) : place_ / "partial";
   for (fs::path above = partial.parent_path(); !fs::exists(above); above = above.parent_path())
     made_.insert(made_.begin(), above);
@@ -203,8 +198,8 @@ void ResultsFolder::make(Beginning beginning)
   for (const auto& entry : fs::directory_iterator(partial_))
     if (entry.path().filename() != lock_file && !(goes_on && entry.path() == checkpoints()))
       fs::remove_all(entry.path());
-  if (goes_on && !fs::exists(checkpoints()) && fs::exists(place_ / checkpoints().filename()))
-    fs::copy(place_ / checkpoints().filename(), checkpoints(), fs::copy_options::recursive);
+  copied_ = goes_on && !fs::exists(checkpoints()) && fs::exists(place_ / checkpoints().filename());
+  if (copied_) fs::copy(place_ / checkpoints().filename(), checkpoints(), fs::copy_options::recursive);
 }
 
 ResultsFolder::~ResultsFolder()
@@ -215,7 +210,7 @@ ResultsFolder::~ResultsFolder()
 void ResultsFolder::undo()
 {
   std::error_code ignored;
-  if (!partial_.empty() && fs::exists(checkpoints(), ignored)) return; // --restart goes on from them
+  if (!partial_.empty() && !copied_ && fs::exists(checkpoints(), ignored)) return; // --restart goes on from them
   if (!partial_.empty()) fs::remove_all(partial_, ignored);
   for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder) fs::remove(*folder, ignored);
 }
@@ -235,17 +230,28 @@ fs::path ResultsFolder::meanwhile(const fs::path& file) const
   return inside.empty() || *inside.begin() == ".." || inside.has_parent_path() ? file : partial_ / inside;
 }
 
+/// Takes files of another origin, such as pictures, along from the earlier results, which are in the partial folder
+/// now. A run that is killed here leaves them there, where no other run removes them.
+void ResultsFolder::keep_foreign()
+{
+  for (const auto& entry : fs::directory_iterator(partial_))
+    if (const fs::path name = entry.path().filename(); !is_result(name) && !fs::exists(place_ / name))
+      rename_or_throw(entry.path(), place_ / name);
+}
+
 void ResultsFolder::move_whole()
 {
   const fs::path old = place_.string() + old_ending;
   if (renameat2(AT_FDCWD, partial_.c_str(), AT_FDCWD, place_.c_str(), RENAME_EXCHANGE) == 0)
   {
+    keep_foreign();
     std::error_code ignored;
     fs::remove_all(partial_, ignored); // now the earlier results
     return;
   }
   if (errno != ENOENT && errno != EINVAL && errno != ENOSYS && errno != ENOTSUP)
     refuse_move(partial_, place_, std::strerror(errno));
+  if (fs::exists(place_) && !holds_only_results(place_)) return move_by_file();
   if (fs::exists(place_)) rename_or_throw(place_, old); // a file system that cannot exchange
   rename_or_throw(partial_, place_);
   std::error_code ignored;
@@ -273,13 +279,15 @@ void ResultsFolder::publish(Checkpoints checkpoints)
                  published_ = true; // whatever happens: the results are whole
                  try
                  {
+                   if (fs::exists(place_) && !fs::is_directory(place_))
+                     refuse_move(partial_, place_, std::strerror(ENOTDIR)); // it has come there meanwhile
                    if (checkpoints == Checkpoints::removed) fs::remove_all(this->checkpoints());
-                   if (partial_.parent_path() != place_ && (!fs::exists(place_) || holds_only_results(place_)))
+                   if (partial_.parent_path() != place_)
                      move_whole();
                    else
                      move_by_file();
                  }
-                 catch (const fs::filesystem_error& error) // such as a file that has come into the place meanwhile
+                 catch (const fs::filesystem_error& error)
                  {
                    refuse_move(partial_, place_, error.code().message());
                  }
@@ -298,20 +306,34 @@ bool is_same_file(const fs::path& a, const fs::path& b)
 namespace
 {
 
-/// The files that the scene names as input.
-std::vector<fs::path> inputs_of(const Scene& scene)
+/// Appends a mesh file; of a geometry the files that it includes, too.
+void append_mesh(const fs::path& file, Statements statements, std::vector<fs::path>& inputs)
 {
-  std::vector<fs::path> inputs = {scene.file};
-  if (scene.mesh) inputs.push_back(scene.mesh->file);
-  if (scene.matrices)
-    for (const auto& entry : fs::directory_iterator(*scene.matrices)) inputs.push_back(entry.path());
-  if (scene.transient.start.kind == StartKind::file) inputs.push_back(scene.transient.start.file);
-  if (scene.cycle.start.kind == CycleStartKind::file) inputs.push_back(scene.cycle.start.file);
-  if (!scene.cycle.coarse_mesh.empty()) inputs.push_back(scene.cycle.coarse_mesh);
-  return inputs;
+  if (!is_script(file)) return inputs.push_back(file);
+  const std::vector<fs::path> files = read_script(file, statements).files;
+  inputs.insert(inputs.end(), files.begin(), files.end());
+}
+
+void append_folder(const fs::path& folder, std::vector<fs::path>& inputs)
+{
+  inputs.push_back(folder);
+  for (const auto& entry : fs::directory_iterator(folder)) inputs.push_back(entry.path());
 }
 
 } // namespace
+
+std::vector<fs::path> inputs_of(const Scene& scene)
+{
+  std::vector<fs::path> inputs = {scene.file};
+  if (scene.mesh) append_mesh(scene.mesh->file, scene.mesh->statements, inputs);
+  if (scene.mesh && !scene.cycle.coarse_mesh.empty())
+    append_mesh(scene.cycle.coarse_mesh, scene.mesh->statements, inputs);
+  if (scene.matrices) append_folder(*scene.matrices, inputs);
+  for (const Superelement& superelement : scene.superelements) append_folder(superelement.folder, inputs);
+  if (scene.transient.start.kind == StartKind::file) inputs.push_back(scene.transient.start.file);
+  if (scene.cycle.start.kind == CycleStartKind::file) inputs.push_back(scene.cycle.start.file);
+  return inputs;
+}
 
 void check_outputs(const Scene& scene, const fs::path& place)
 {
@@ -323,6 +345,10 @@ void check_outputs(const Scene& scene, const fs::path& place)
     if (results.push_back(place / name); results.back().has_extension() && is_folder(results.back()))
       throw Error("the output " + results.back().string() +
                   " is a folder, which the result would replace: name another folder with --output DIR");
+  for (const ResultFile folder : {ResultFile::reduced, ResultFile::checkpoints})
+    if (is_folder(place / word(folder)) && !is_file(place / word(ResultFile::options)))
+      throw Error("the output " + place.string() + " holds a folder '" + word(folder) +
+                  "' that no run has made: name another folder with --output DIR");
   const std::vector<fs::path> inputs = inputs_of(scene);
   const auto refuse_on = [](const fs::path& output, const std::vector<fs::path>& others, const std::string& remedy)
   {

@@ -280,6 +280,8 @@ private:
     if ((t.steps > 0) != (t.step_size > 0))
       fail(t.steps > 0 ? static_cast<const void*>(&t.steps) : &t.step_size,
            "[transient] steps and step_size go together: give both, or periods and steps_per_period");
+    if (t.enabled && t.steps == 0 && t.periods * t.steps_per_period < 0.5)
+      fail(&t.periods, "[transient] periods x steps_per_period is less than one time step");
     if (t.enabled && t.start.kind == StartKind::rest && factor_at(t.ramps.load, 0) != 0)
       fail(t.ramps.load.time.empty() ? static_cast<const void*>(&t.start) : &t.ramps.load,
            "[transient] start = \"rest\" is a structure without displacements, which a load would move at once: let "

@@ -1,3 +1,4 @@
+/// A model is 1 cm to 1 km long: what squeals goes from a bicycle's brake pad to a rail.
 /// Bounds of solids (Ashby, Materials Selection in Mechanical Design, charts of moduli and densities). Densities go
 /// from 20 kg/m3 (foams) to 22 590 (osmium), Young's moduli from 1e4 Pa (gels) to 1.3e12 (diamond). Speeds of
 /// sound sqrt(E/rho) go from 10 m/s (soft rubber has 30) to 20 000 (diamond has 18 000). A grain of dust of 10 um
@@ -104,6 +105,8 @@ std::vector<std::string> doubts_about(const Scene& scene, double length)
   doubt_masses(scene.points, doubts);
   doubt_masses(scene.rigid_bodies, doubts);
   doubt_loads(scene, doubts);
+  if (scene.mesh && length > 0 && is_outside(length, 0.01, 1000))
+    doubts.push_back(format("the model is %.3g m long: is mesh.scale right?", length));
   if (length > 0) doubt_contacts(scene, length, doubts);
   doubt_damping(scene.damping, doubts);
   return doubts;

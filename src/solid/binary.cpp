@@ -165,7 +165,12 @@ MatrixSize check_matrix_file(const std::filesystem::path& file, MPI_Comm comm)
 Owned<Mat> load_matrix(const std::filesystem::path& file, MatrixSize size, MatrixSize local, MPI_Comm comm)
 {
   Owned<PetscViewer> viewer;
-  check(PetscViewerBinaryOpen(comm, file.c_str(), FILE_MODE_READ, viewer.put()));
+  check(PetscViewerCreate(comm, viewer.put()));
+  check(PetscViewerSetType(viewer, PETSCVIEWERBINARY));
+  check(PetscViewerFileSetMode(viewer, FILE_MODE_READ));
+  check(PetscViewerBinarySetSkipInfo(viewer, PETSC_TRUE)); // options in FILE.info, which may write anywhere
+  check(PetscViewerBinarySetSkipOptions(viewer, PETSC_TRUE));
+  check(PetscViewerFileSetName(viewer, file.c_str()));
   Owned<Mat> A;
   check(MatCreate(comm, A.put()));
   check(MatSetSizes(A, local.rows, local.columns, size.rows, size.columns));

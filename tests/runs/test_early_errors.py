@@ -3,6 +3,7 @@
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 
@@ -23,6 +24,7 @@ def refused(run, *words):
     assert not list(run.output.glob("*"))
 
 
+TOAR = ["-modes_solver", "toar", "-modes_dense_limit", "1"]
 # what is given, and words of the message
 OPTIONS = {
     "no such word": (["-cycle_finish", "magic"], ["-cycle_finish", "newton_krylov"]),
@@ -46,6 +48,17 @@ OPTIONS = {
     "fewer iterations of the finish than none": (["-cycle_full_snes_max_it", "-7"], ["-cycle_full_", "max_it", "-7"]),
     "no option of the eigensolver": (["-modes_solver", "toar", "-modes_pep_tool", "1"], ["-modes_pep_tool"]),
     "no option of the linear solver": (["-cycle_full_ksp_rtoll", "1"], ["-cycle_full_ksp_rtoll"]),
+    "a type that needs more than an operator": ([*TOAR, "-modes_pep_type", "jd"], ["-modes_pep_type jd", "toar"]),
+    "a Newton method that needs subdomains": (["-cycle_snes_type", "aspin"], ["-cycle_snes_type aspin", "newtonls"]),
+    "an eigensolver of symmetric problems": ([*TOAR, "-modes_pep_type", "stoar"], ["-modes_", "Hermitian"]),
+    "a transformation that the eigensolver cannot use": ([*TOAR, "-modes_st_type", "filter"], ["-modes_", "shift"]),
+    "a basis too small for its vectors": ([*TOAR, "-modes_pep_ncv", "1"], ["-modes_", "ncv"]),
+    "a linear solver of symmetric problems": (["-cycle_finish", "newton_krylov", "-cycle_full_ksp_type", "cg"], ["-cycle_full_", "cg"]),
+    "a Newton method without its parts": (["-cycle_subspace_newtons", "5", "-cycle_snes_type", "shell"], ["-cycle_", "SNESShell"]),
+    "a solver's view of no format": (["-cycle_snes_view", "::magic"], ["-cycle_snes_view", "ascii_info"]),
+    "a solver's view on the screen": (["-cycle_full_snes_monitor_solution", "draw"], ["-cycle_full_snes_monitor_solution", "draw"]),
+    "a solver's view where there is no folder": ([*TOAR, "-modes_pep_view", ":/no/such/y"], ["-modes_pep_view", "/no/such"]),
+    "less than one step": (["--set", "transient.periods=1e-9"], ["transient.periods", "one time step"]),
     "no file of options": (["-options_file", "missing"], ["-options_file", "missing"]),
     "a log of no format": (["-log_view", "foo:bar:baz"], ["-log_view", "foo"]),
     "a log of no known format": (["-log_view", ":log.txt:magic"], ["-log_view", "ascii_xml"]),
@@ -108,15 +121,31 @@ def test_an_option_that_turns_out_unused_leaves_earlier_results(squeal):
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_stage_that_fails_leaves_what_finished(squeal, tmp_path, ranks):
-    """The eigensolver's linear solver has no factor to work with, which shows after the equilibrium. The next run removes it."""
-    given = [OSCILLATOR, "--output", tmp_path / "results", "--set", "cycle.enabled=false", "--set", "transient.enabled=false"]
-    run = squeal(*given, "-modes_solver", "toar", "-modes_dense_limit", "1", "-modes_st_pc_type", "lsc", ranks=ranks)
+    """One megabyte is too little for the eigensolver's factor, which shows after the equilibrium. The next run removes it."""
+    given = [INPUTS / "pin_on_disc", "--output", tmp_path / "results", "--set", "mesh.parameters.divisions=3", "--set",
+             "cycle.enabled=false", "--set", "modes.method=full", "-modes_solver", "toar"]
+    run = squeal(*given, "-modes_st_mat_mumps_icntl_23", "1", ranks=ranks)
     partial = tmp_path / "results.partial"
     assert run.code == 1 and f"results in {partial}" in run.errors, run.errors
     report = json.loads((partial / "report.json").read_text())
     assert report["equilibrium"]["outcome"] == "converged"
     assert squeal(*given, ranks=ranks).code == 0
     assert not partial.exists()
+
+
+def test_a_view_of_a_solver_that_did_not_run_costs_no_results(squeal):
+    run = squeal(OSCILLATOR, "-cycle_snes_view", "-cycle_snes_converged_reason", ranks=1)
+    assert run.code == 0 and run.report["cycle"]["outcome"] == "converged", run.errors
+
+
+def test_options_beside_a_matrix_are_not_obeyed(squeal, tmp_path):
+    """PETSc reads FILE.info for them, and a log may fall on any file."""
+    shutil.copytree(INPUTS / "oscillator", tmp_path / "scene")
+    scene = tmp_path / "scene" / "matrices.toml"
+    (tmp_path / "scene" / "matrices" / "K.petsc.info").write_text(f"-log_view :{scene}\n-magic 1\n")
+    before = scene.read_bytes()
+    run = squeal(scene, "--set", "cycle.enabled=false", "--set", "transient.enabled=false", ranks=1)
+    assert run.code == 0 and scene.read_bytes() == before, run.errors
 
 
 def test_a_signal_ends_a_sweep_while_its_equilibria_are_sought(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import time
 
@@ -30,6 +31,25 @@ def test_a_sweep_fails_with_its_runs(tmp_path):
     for knobs in ({"SCENE": "no.toml"}, {"SQUEAL": "/bin/false"}):
         run, printed, errors = job(tmp_path, MU="0.2", **knobs)
         assert run.returncode == 1 and "mu_0.2: exit code" in errors and "unstable" not in printed
+
+
+def test_a_run_of_other_arguments_or_inputs_is_not_done(tmp_path):
+    """An earlier one's table came out, with exit code 0."""
+    shutil.copytree(INPUTS / "oscillator", tmp_path / "scene")
+    scene, report = tmp_path / "scene" / "matrices.toml", tmp_path / "out" / "mu_0.2" / "report.json"
+    knobs = {"SCENE": str(scene), "MU": "0.2"}
+    assert job(tmp_path / "out", **knobs)[0].returncode == 0
+    first = report.read_bytes()
+    assert job(tmp_path / "out", **knobs)[0].returncode == 0 and report.read_bytes() == first
+    for changed in (scene, tmp_path / "scene" / "matrices" / "notes.txt"):
+        with open(changed, "a") as file:
+            file.write("# a word\n")
+        before = report.read_bytes()
+        assert job(tmp_path / "out", **knobs)[0].returncode == 0 and report.read_bytes() != before, changed
+    run, printed, errors = job(tmp_path / "out", arguments=["--set", "wrong.key=1"], **knobs)
+    assert run.returncode == 1 and "unstable" not in printed
+    run, printed, errors = job(tmp_path / "out", MU="0.2", SCENE=str(tmp_path / "no.toml"))
+    assert run.returncode == 1 and "unstable" not in printed
 
 
 def test_a_signal_ends_a_job_and_the_next_start_goes_on(tmp_path):

@@ -47,6 +47,7 @@ def test_a_band_without_modes_is_warned_of_with_the_length_of_the_model(converge
     assert "no mode lies below" not in converged(scene, ranks=1).printed
     run = converged(scene, "--set", "mesh.scale=1e-3", ranks=1)
     assert "no mode lies below 5000 Hz: is mesh.scale right (the model is 0.0003 m long)" in run.printed
+    assert "WARNING: the model is 0.0003 m long" in run.printed
     assert ElementTree.parse(run.output / "fields.xdmf").getroot().get("Version").split(".")[0] == "3"  # meshio reads no other
 
 
@@ -58,7 +59,7 @@ def test_a_slip_of_units_is_warned_of(converged, tmp_path, key, value, words):
     assert "WARNING" not in converged(brick_scene(tmp_path), "--dry-run", ranks=1).printed
 
 
-@pytest.mark.parametrize("setting, words", [("force.0.vector=[0,0,0]", "is 0 N"), ("rigid_body.0.mass=1e-300", "grain of dust"),
+@pytest.mark.parametrize("setting, words", [("mesh.scale=1e-3", "0.00024 m long"), ("force.0.vector=[0,0,0]", "is 0 N"), ("rigid_body.0.mass=1e-300", "grain of dust"),
                                             ("transient.load_factor=[[0,1],[0.1,-1]]", "the other way round")])
 def test_a_load_or_mass_that_does_nothing_is_warned_of(converged, setting, words):
     warnings = converged(INPUTS / "pin_on_disc", "--dry-run", "--set", setting, ranks=1).printed

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -103,6 +104,8 @@ MODES_ONLY = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.d
               "--set", "modes.method=full", "--set", "friction.coefficient=0.5"]
 UNDER_WAY = {  # where a library or another process is at work: ranks, scene and arguments, what the log shows
     "mesher": (2, [*MODES_ONLY, "--set", "mesh.parameters.divisions=6"], "model …"),
+    "check of the equilibrium": (1, [OSCILLATOR, "-equilibrium_check_rho", "1.99999", "-equilibrium_check_max_it", "2147483647"],
+                                 "equilibrium …"),
     "basis of the samples": (1, [*MODES_ONLY, "--set", "robustness.samples=1000", "--set", "uncertain=[{key='friction.coefficient', "
                                  "distribution='uniform', from=0.4, to=0.6}]"], "robustness …"),
 }
@@ -239,6 +242,31 @@ def test_checkpoints_of_another_scene_are_refused_and_kept(tmp_path):
     errors = other.communicate(timeout=60)[1]
     assert other.returncode == 1 and "another scene" in errors and len(errors.strip().splitlines()) == 1
     assert (partial(output) / "checkpoint" / "transient").exists()
+
+
+@pytest.mark.parametrize("changed", ["a friction", "a matrix", "a mesh"])
+def test_a_restart_that_is_refused_leaves_the_results_as_they_were(squeal, tmp_path, changed):
+    """Of another scene, or after an input file has changed: modes of the old matrices would stand beside the cycle of the new."""
+    shutil.copytree(INPUTS / ("pin_on_disc" if changed == "a mesh" else "oscillator"), tmp_path / "scene")
+    scene = tmp_path / "scene" / ("matrices.toml" if changed == "a matrix" else "scene.toml")
+    given = [*ENDLESS, "--set", "transient.enabled=true", "--set", "transient.start=mode", *(PIN[1:] if changed == "a mesh" else [])]
+    output = tmp_path / "results"
+    run = start(output, *given, "--checkpoint", "0.1", scene=scene)
+    wait_for(lambda: (partial(output) / "checkpoint" / "transient").exists(), 60)
+    run.send_signal(signal.SIGTERM)
+    assert run.communicate(timeout=60) and run.returncode == 3
+    if changed == "a matrix":
+        with open(tmp_path / "scene" / "matrices" / "C.petsc", "r+b") as file:
+            file.seek(-1, os.SEEK_END)
+            file.write(b"\x01")  # the last bit of its last entry
+    if changed == "a mesh":
+        with open(tmp_path / "scene" / "pin.geo", "a") as file:
+            file.write("// other words\n")
+    before = sorted(tmp_path.rglob("*"))
+    again = start(output, *given, "--restart", *(["--set", "friction.coefficient=0.31"] if changed == "a friction" else []), scene=scene)
+    errors = again.communicate(timeout=60)[1]
+    assert again.returncode == 1 and "another scene" in errors and len(errors.splitlines()) == 1, errors
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_ranks_end_with_their_launcher(tmp_path):

@@ -143,8 +143,36 @@ def make_foreign_partial(tmp_path):
     return []
 
 
+def make_matrices_of_a_results_name(tmp_path):
+    shutil.copytree(INPUTS / "oscillator" / "matrices", tmp_path / "out" / "reduced")
+    return []
+
+
+def make_scene_on_matrices_of_a_results_name(tmp_path):
+    make_matrices_of_a_results_name(tmp_path)
+    (tmp_path / "out" / "options.txt").write_text("of a run")
+    return ["--set", f"matrices.folder={tmp_path}/out/reduced"]
+
+
+def make_link_to_nothing(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "nothing")
+    return ["--output", tmp_path / "link"]
+
+
+def make_place_inside_anothers_meantime(tmp_path):
+    (tmp_path / "other.partial").mkdir()
+    (tmp_path / "other.partial" / "running").write_text("a run")
+    return ["--output", tmp_path / "other.partial" / "out"]
+
+
 REFUSED = {"a pipe": (make_device, "pipe"), "a folder of a file's name": (make_folder_of_a_file, "history.h5 is a folder"),
            "a link": (make_link, "it is a link"), "a folder of another origin": (make_foreign_partial, "another origin"),
+           "a folder of a result's name": (make_matrices_of_a_results_name, "no run has made"),
+           "matrices in a result's place": (make_scene_on_matrices_of_a_results_name, "fall on"),
+           "a link to nothing": (make_link_to_nothing, "a link to"),
+           "a place inside another run's": (make_place_inside_anothers_meantime, "a run works in"),
+           "a state of the lock's name": (lambda tmp_path: ["--set", f"transient.save_state={tmp_path}/out/running"], "this name meanwhile"),
+           "a state on the meantime": (lambda tmp_path: ["--set", f"transient.save_state={tmp_path}/out.partial"], "this name meanwhile"),
            "another run's meantime": (lambda tmp_path: ["--output", tmp_path / "x.partial"], "use this name meanwhile"),
            "a log on the scene": (lambda tmp_path: ["-log_view", f":{SCENE}"], "fall on the scene"),
            "a log on a result": (lambda tmp_path: ["-history", tmp_path / "out" / "report.json"], "report.json")}
@@ -157,9 +185,22 @@ def test_nothing_of_the_users_is_replaced(squeal, tmp_path, name):
     (tmp_path / "out").mkdir()
     given = make(tmp_path)
     before = sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes()
-    run = squeal(SCENE, *([] if "--output" in given else ["--output", tmp_path / "out"]), *given, ranks=1)
+    scene = SCENE.with_name("matrices.toml") if any("matrices.folder" in str(word) for word in given) else SCENE
+    run = squeal(scene, *([] if "--output" in given else ["--output", tmp_path / "out"]), *given, ranks=1)
     assert run.code == 1 and len(run.messages) == 1 and words in run.messages[0], run.errors
     assert before == (sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes())
+
+
+def test_pictures_stay_and_the_results_still_come_in_one_move(converged, endless, tmp_path):
+    """Beside a picture the files used to be replaced one by one, and a kill in between left the earlier results in pieces."""
+    output = converged(SCENE, *SHORT, ranks=1).output
+    (output / "energy.png").write_text("a picture")
+    (output / "notes").mkdir()
+    folder = output.stat().st_ino
+    converged(SCENE, *SHORT, "--output", output, ranks=1)
+    assert output.stat().st_ino != folder  # the folder itself was replaced
+    assert (output / "energy.png").read_text() == "a picture" and (output / "notes").is_dir()
+    assert not list(output.parent.glob("*.partial"))
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

@@ -1,15 +1,20 @@
 #pragma once
 /// Checkpoints: named lists of numbers from which a run that was killed goes on. Every stage that computes for long
 /// keeps its own file of them; all are made and read on rank 0.
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <mpi.h>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace squeal
 {
+
+/// FNV-1a, 64 bits.
+std::uint64_t check_sum(std::string_view bytes);
 
 /// Named lists, and their bytes with a check sum.
 class Checkpoint

@@ -16,8 +16,9 @@ namespace squeal
 /// A geometry as gmsh may run it.
 struct Script
 {
-  std::string text;                    // on the lines of the file
-  std::vector<std::string> parameters; // names in its DefineConstant lists
+  std::string text;                         // on the lines of the file
+  std::vector<std::string> parameters;      // names in its DefineConstant lists
+  std::vector<std::filesystem::path> files; // the geometry and what it includes or merges
 };
 
 /// Reads a geometry and the files that it includes. Throws Error, with file and line, for a statement that may not be

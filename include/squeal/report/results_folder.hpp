@@ -2,8 +2,8 @@
 /// The results of a run as one whole. Stages write into a folder beside the results' place, PLACE.partial. It takes
 /// that place in one move when the run ends. Earlier results stay until then.
 ///
-/// PLACE may be a working folder, a mount point, or a folder whose parent is read-only, or hold other files than
-/// results. Then the files themselves are moved: report.json goes first and comes last.
+/// PLACE may be a working folder, a mount point, or a folder whose parent is read-only. Then the files themselves are
+/// moved: report.json goes first and comes last. Other files than results stay in PLACE.
 #include "squeal/report/result_files.hpp"
 #include "squeal/scene/scene.hpp"
 
@@ -63,6 +63,9 @@ public:
   /// Where a file of the user's own name is written meanwhile: in the partial folder if it belongs into the place.
   std::filesystem::path meanwhile(const std::filesystem::path& file) const;
 
+  /// From here on the checkpoints outlive a failure; before, those copied from the place are removed again.
+  void accept_checkpoints() { copied_ = false; }
+
   std::filesystem::path checkpoints() const { return partial_ / word(ResultFile::checkpoints); }
 
   /// Moves the results to their place, with their checkpoints if the run can go on. Collective.
@@ -76,6 +79,7 @@ private:
   void make(Beginning beginning); // on rank 0
   void move_whole();              // on rank 0
   void move_by_file();            // on rank 0
+  void keep_foreign();            // on rank 0
   void undo();
 
   MPI_Comm comm_;
@@ -83,13 +87,18 @@ private:
   std::string run_;
   std::vector<std::filesystem::path> made_; // folders above the partial one, outermost first
   FolderLock lock_;
-  bool published_ = false, kept_ = false;
+  bool published_ = false, kept_ = false, copied_ = false;
 };
+
+/// The files and folders that the scene names as inputs, its own file first. Files that a geometry includes or merges
+/// are among them. Error: a geometry that may not be run.
+std::vector<std::filesystem::path> inputs_of(const Scene& scene);
 
 /// Whether two names are of one file, which may not exist yet.
 bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b);
 
-/// Error: an output of the scene, or a result in this place, would fall on a file that the run reads.
+/// Error: an output of the scene, or a result in this place, would fall on what the run reads, or on a folder that no
+/// run has made.
 void check_outputs(const Scene& scene, const std::filesystem::path& place);
 
 } // namespace squeal
