@@ -8,6 +8,7 @@
 #include "squeal/base/available_memory.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -227,6 +228,14 @@ double points_of(const SweepSettings& sweep)
   return sweep.directions == SweepDirections::both ? 2 * points : points;
 }
 
+/// The least that a limit of the process may be.
+struct LeastLimit
+{
+  decltype(RLIMIT_STACK) resource;
+  rlim_t value;
+  const char *of, *set_by;
+};
+
 } // namespace
 
 double Forecast::bytes() const
@@ -287,8 +296,17 @@ std::string problem_of(const Forecast& forecast, MPI_Comm comm)
   return problem;
 }
 
-std::string problem_of_address_space()
+std::string problem_of_limits()
 {
+  // what Open MPI 4.1 was seen to start with: 28 files, 4 MB for the segments it shares, and a stack of 256 kB
+  constexpr std::array limits = {LeastLimit{RLIMIT_NOFILE, 28, "open files", "ulimit -n"},
+                                 LeastLimit{RLIMIT_FSIZE, 1 << 22, "bytes a file", "ulimit -f"},
+                                 LeastLimit{RLIMIT_STACK, 1 << 18, "bytes of stack", "ulimit -s"}};
+  for (const LeastLimit& least : limits)
+    if (rlimit limit{}; getrlimit(least.resource, &limit) == 0 && limit.rlim_cur < least.value)
+      return format("%s allows %llu %s, and MPI needs %llu to start: raise the limit", least.set_by,
+                    static_cast<unsigned long long>(limit.rlim_cur), least.of,
+                    static_cast<unsigned long long>(least.value));
   if (can_take(start_of_libraries)) return {};
   return "memory: " + limit_text(start_of_libraries) + " to start: raise the limit";
 }

@@ -334,7 +334,7 @@ std::string problem_of_surroundings()
 {
   std::error_code failed;
   if (std::filesystem::current_path(failed).empty()) return "the working folder no longer exists: change to another";
-  return problem_of_address_space();
+  return problem_of_limits();
 }
 
 } // namespace

@@ -10,7 +10,7 @@ def text(value):
 def skeleton(model, mesh, length, force):
     lines = [f"# Made of {model.source.name}. Lines with FILL IN need a number or a name, and lose their first #.",
              f"title = {text(model.source.stem)}", "", "[mesh]", f"file = {text(mesh)}"]
-    lines += [f"scale = {length!r}"] if length != 1 else ["# scale = 0.001   # FILL IN if the deck is not in metres"]
+    lines += [f"scale = {length!r}"] if length != 1 else ["# Of a deck in mm, N and s? Make this again by tools/mesh … --length 0.001 --force 1, which converts moduli too."]
     for note in model.notes:
         lines += ["", f"# Not taken over: {note}"] if note == model.notes[0] else [f"# Not taken over: {note}"]
     for name, part in model.parts.items():

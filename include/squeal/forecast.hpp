@@ -39,8 +39,8 @@ std::string text_of(const Forecast& forecast);
 /// process's limits leave, or more than a day. Empty if it is.
 std::string problem_of(const Forecast& forecast, MPI_Comm comm);
 
-/// Why this process may not even take what the libraries need to start; empty if it may. Needs no MPI. Below it, MPI
-/// fails in texts of its own, and OpenBLAS tries for ever to allocate its buffer.
-std::string problem_of_address_space();
+/// Which limit of this process leaves the libraries too little to start with; empty if none does. Needs no MPI. Below
+/// them, MPI fails in texts of its own, and OpenBLAS tries for ever to allocate its buffer.
+std::string problem_of_limits();
 
 } // namespace squeal

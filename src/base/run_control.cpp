@@ -27,6 +27,13 @@ const bool ignores_hangup = []
   return sigaction(SIGHUP, nullptr, &given) == 0 && given.sa_handler == SIG_IGN;
 }();
 
+/// Whether mpirun or srun started this process. MPI sets the same variables when it starts by itself.
+const bool is_launched = []
+{
+  constexpr std::array names = {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"};
+  return std::ranges::any_of(names, [](const char* name) { return std::getenv(name) != nullptr; });
+}();
+
 /// Those of terminals, and those by which schedulers announce a limit.
 constexpr std::array<std::pair<int, const char*>, 6> ending_signals = {{{SIGTERM, "SIGTERM"},
                                                                         {SIGINT, "SIGINT"},
@@ -94,12 +101,10 @@ std::vector<pid_t> peers_of_this_machine()
   return peers;
 }
 
-/// A rank is started by mpirun or srun and has no business without it.
+/// A rank is started by mpirun or srun and has no business without it. A run of one process outlives its shell.
 void end_with_launcher()
 {
-  constexpr std::array launched = {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"};
-  if (std::none_of(launched.begin(), launched.end(), [](const char* name) { return std::getenv(name) != nullptr; }))
-    return;
+  if (!is_launched) return;
   const pid_t launcher = getppid();
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != launcher) _exit(1); // it died in between

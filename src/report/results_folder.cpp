@@ -314,10 +314,16 @@ void append_mesh(const fs::path& file, Statements statements, std::vector<fs::pa
   inputs.insert(inputs.end(), files.begin(), files.end());
 }
 
-void append_folder(const fs::path& folder, std::vector<fs::path>& inputs)
+/// Appends a folder of matrices and the files that are read of it, by their names.
+void append_matrices(const fs::path& folder, std::vector<fs::path>& inputs)
 {
+  const std::size_t first = inputs.size();
   inputs.push_back(folder);
-  for (const auto& entry : fs::directory_iterator(folder)) inputs.push_back(entry.path());
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (const fs::path name = entry.path().filename();
+        name.extension() == ".petsc" || name == "dofs.txt" || name == "nodes.txt")
+      inputs.push_back(entry.path());
+  std::sort(inputs.begin() + static_cast<std::ptrdiff_t>(first), inputs.end());
 }
 
 } // namespace
@@ -328,8 +334,8 @@ std::vector<fs::path> inputs_of(const Scene& scene)
   if (scene.mesh) append_mesh(scene.mesh->file, scene.mesh->statements, inputs);
   if (scene.mesh && !scene.cycle.coarse_mesh.empty())
     append_mesh(scene.cycle.coarse_mesh, scene.mesh->statements, inputs);
-  if (scene.matrices) append_folder(*scene.matrices, inputs);
-  for (const Superelement& superelement : scene.superelements) append_folder(superelement.folder, inputs);
+  if (scene.matrices) append_matrices(*scene.matrices, inputs);
+  for (const Superelement& superelement : scene.superelements) append_matrices(superelement.folder, inputs);
   if (scene.transient.start.kind == StartKind::file) inputs.push_back(scene.transient.start.file);
   if (scene.cycle.start.kind == CycleStartKind::file) inputs.push_back(scene.cycle.start.file);
   return inputs;

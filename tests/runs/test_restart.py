@@ -246,7 +246,7 @@ def test_checkpoints_of_another_scene_are_refused_and_kept(tmp_path):
 
 @pytest.mark.parametrize("changed", ["a friction", "a matrix", "a mesh"])
 def test_a_restart_that_is_refused_leaves_the_results_as_they_were(squeal, tmp_path, changed):
-    """Of another scene, or after an input file has changed: modes of the old matrices would stand beside the cycle of the new."""
+    """It is of another scene, or comes after an input file has changed: modes of the old matrices would stand beside the cycle of the new."""
     shutil.copytree(INPUTS / ("pin_on_disc" if changed == "a mesh" else "oscillator"), tmp_path / "scene")
     scene = tmp_path / "scene" / ("matrices.toml" if changed == "a matrix" else "scene.toml")
     given = [*ENDLESS, "--set", "transient.enabled=true", "--set", "transient.start=mode", *(PIN[1:] if changed == "a mesh" else [])]
@@ -267,6 +267,17 @@ def test_a_restart_that_is_refused_leaves_the_results_as_they_were(squeal, tmp_p
     errors = again.communicate(timeout=60)[1]
     assert again.returncode == 1 and "another scene" in errors and len(errors.splitlines()) == 1, errors
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_single_process_outlives_its_shell(tmp_path):
+    """As a run that is left in the background by someone who logs out. MPI, which starts by itself then, used to look like a launcher."""
+    output = tmp_path / "results"
+    command = f"nohup $SQUEAL {OSCILLATOR} --output {output} {' '.join(ENDLESS)} > {tmp_path}/log 2>&1 & echo $!; sleep 2"
+    pid = int(subprocess.run(["bash", "-c", command], capture_output=True, text=True).stdout)
+    wait_for(lambda: (partial(output) / "history.h5").exists())
+    os.kill(pid, signal.SIGTERM)
+    wait_for(lambda: (output / "report.json").exists())
+    assert json.loads((output / "report.json").read_text())["exit_code"] == 3
 
 
 def test_ranks_end_with_their_launcher(tmp_path):
