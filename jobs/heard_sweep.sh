@@ -26,9 +26,10 @@ steps=${STEPS:-60}
 values=(${MU:-$(seq 0.25 0.05 0.8)})
 for mu in "${values[@]}"; do
   said=$output/mu_$mu/said
-  squeal_run "$said" "$scene" --set modes.method=full --set friction.coefficient="$mu" --set transient.enabled=false \
-    --set cycle.steps_per_period="$steps" "$@"
-  ended_run "$said" || continue
+  arguments=("$scene" --set modes.method=full --set friction.coefficient="$mu" --set transient.enabled=false
+    --set cycle.steps_per_period="$steps" "$@")
+  squeal_run "$said" "${arguments[@]}"
+  is_done "$said" "${arguments[@]}" || continue
   amplitude=$(python3 -c "import json; e = json.load(open('$said/report.json'))['estimate']
 print(${AMPLITUDE:-1.5} * (e.get('amplitude') or 2 * (e.get('lift_off_amplitude') or 0)))")
   [ "$amplitude" != 0 ] && [ "$amplitude" != 0.0 ] || { echo "mu = $mu: no mode grows"; continue; }

@@ -232,8 +232,8 @@ double points_of(const SweepSettings& sweep)
 struct LeastLimit
 {
   decltype(RLIMIT_STACK) resource;
-  rlim_t value;
-  const char *of, *set_by;
+  rlim_t value, unit; // the shell's
+  const char* set_by;
 };
 
 } // namespace
@@ -299,13 +299,13 @@ std::string problem_of(const Forecast& forecast, MPI_Comm comm)
 std::string problem_of_limits()
 {
   // what Open MPI 4.1 was seen to start with: 28 files, 4 MB for the segments it shares, and a stack of 256 kB
-  constexpr std::array limits = {LeastLimit{RLIMIT_NOFILE, 28, "open files", "ulimit -n"},
-                                 LeastLimit{RLIMIT_FSIZE, 1 << 22, "bytes a file", "ulimit -f"},
-                                 LeastLimit{RLIMIT_STACK, 1 << 18, "bytes of stack", "ulimit -s"}};
+  constexpr std::array limits = {LeastLimit{RLIMIT_NOFILE, 28, 1, "ulimit -n"},
+                                 LeastLimit{RLIMIT_FSIZE, 4096, 1024, "ulimit -f"},
+                                 LeastLimit{RLIMIT_STACK, 256, 1024, "ulimit -s"}};
   for (const LeastLimit& least : limits)
-    if (rlimit limit{}; getrlimit(least.resource, &limit) == 0 && limit.rlim_cur < least.value)
-      return format("%s allows %llu %s, and MPI needs %llu to start: raise the limit", least.set_by,
-                    static_cast<unsigned long long>(limit.rlim_cur), least.of,
+    if (rlimit limit{}; getrlimit(least.resource, &limit) == 0 && limit.rlim_cur < least.value * least.unit)
+      return format("%s is %llu, and MPI needs %llu to start: raise the limit", least.set_by,
+                    static_cast<unsigned long long>(limit.rlim_cur / least.unit),
                     static_cast<unsigned long long>(least.value));
   if (can_take(start_of_libraries)) return {};
   return "memory: " + limit_text(start_of_libraries) + " to start: raise the limit";

@@ -15,7 +15,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
 #include <new>
 #include <thread>
 #include <unistd.h>
@@ -215,12 +214,12 @@ void check_state_file(const std::string& key, const std::filesystem::path& file,
   const auto folder = file.parent_path(),
              results = (std::filesystem::absolute(output) / ".").lexically_normal().parent_path();
   const std::string label = key + " = " + shortened(file) + ": ";
-  const auto is_results = [&](const std::filesystem::path& path) { return path == results || path / "" == results; };
-  if (is_folder(file) || is_results(file)) throw Error(label + "it is a folder; name a file");
+  const auto is_results = [&](const std::filesystem::path& path) { return path == results; };
+  if (!file.has_filename() || is_folder(file) || is_results(file)) throw Error(label + "it is a folder; name a file");
   if (std::error_code failed; !is_file(file) && std::filesystem::exists(file, failed))
     throw Error(label + "it is a device or a pipe, which the state would replace; name a file");
   const std::string name = file.filename();
-  if (is_results(folder) ? name == "running" || file.extension() == ".part"
+  if (is_results(folder) ? name == "running" || name == "partial" || file.extension() == ".part"
                          : file == results.string() + ".partial" || file == results.string() + ".old")
     throw Error(label + "the run uses this name meanwhile; give the state another one");
   if (is_results(folder)) return;
@@ -247,8 +246,11 @@ std::string request_text(const Scene& scene, ProgramOptions options)
   {
     if (file == scene.file || !is_file(file)) continue;
     std::ifstream stream(file, std::ios::binary);
-    const std::string content{std::istreambuf_iterator<char>(stream), {}};
-    text += format("file %s %zu %016" PRIx64 "\n", file.filename().c_str(), content.size(), check_sum(content));
+    std::vector<char> block(1 << 20);
+    std::uint64_t sum = empty_check_sum;
+    while (stream.read(block.data(), static_cast<std::streamsize>(block.size())) || stream.gcount() > 0)
+      sum = check_sum({block.data(), static_cast<std::size_t>(stream.gcount())}, sum);
+    text += format("file %s %016" PRIx64 "\n", file.filename().c_str(), sum);
   }
   return text;
 }

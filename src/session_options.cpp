@@ -23,7 +23,7 @@ enum class Value
   options_file, // a file that exists, and holds options
   write_file,   // nothing, or a file that can be written
   viewer,       // [ascii][:file[:format]]
-  solver_view,  // the same, or true or false
+  solver_view,  // the same
   info,         // nothing, or file[:classes]
   text,
 };
@@ -100,7 +100,8 @@ std::vector<std::string> parts_of(const std::string& value)
 const SessionOption* find_printing_option(const std::string& name)
 {
   const SessionOption* option = find_option(name);
-  return option || !is_solver_view(name) ? option : &solver_view;
+  const bool is_monitor = name.find("_monitor") != std::string::npos && !name.ends_with("_monitor_cancel");
+  return option || !(is_solver_view(name) || is_monitor) ? option : &solver_view;
 }
 
 /// The file that the option writes; empty if it writes none.
@@ -144,9 +145,8 @@ std::string problem_of_viewer(const SessionOption& option, const std::string& va
 std::string problem_of_value(const SessionOption& option, const std::string& value)
 {
   if (value.empty()) return option.value == Value::options_file ? "it needs the name of a file" : "";
-  const bool is_flag = is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"});
-  if (option.value == Value::flag) return is_flag ? "" : "it is true or false";
-  if (option.value == Value::solver_view && is_flag) return {};
+  if (option.value == Value::flag)
+    return is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"}) ? "" : "it is true or false";
   if (option.value == Value::options_file)
     return is_file(value) && access(value.c_str(), R_OK) == 0 ? "" : "there is no such file, or it cannot be read";
   const std::string file = file_of(option, value);
@@ -165,8 +165,7 @@ bool is_session_option(const std::string& name)
 
 bool is_solver_view(const std::string& name)
 {
-  return name.find("_monitor") != std::string::npos ||
-         std::ranges::any_of(views, [&](const char* ending) { return name.ends_with(ending); });
+  return std::ranges::any_of(views, [&](const char* ending) { return name.ends_with(ending); });
 }
 
 std::string problem_of_session_option(const std::string& name, const std::string& value)

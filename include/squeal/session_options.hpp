@@ -9,7 +9,7 @@ namespace squeal
 /// Whether this is an option of the session that squeal passes on; `name` without its dash.
 bool is_session_option(const std::string& name);
 
-/// Whether by an option of this name a solver prints, where it solves: modes_pep_view, cycle_snes_monitor.
+/// Whether a solver asks for an option of this name only where it solves, and prints by it: modes_pep_view.
 bool is_solver_view(const std::string& name);
 
 /// What is wrong with the value of a session option, or of one by which a solver prints; empty if nothing is.

@@ -24,9 +24,9 @@ inline constexpr std::array solver_prefixes = {
 /// The prefix of an option's name, which stands without its dash; null if it has none of these.
 const SolverPrefix* solver_prefix_of(const std::string& name);
 
-/// Tries the options on objects that are thrown away, so that the stages themselves find nothing wrong later.
-/// Collective. Error: a value that PETSc or SLEPc does not take, or an option that the object does not ask for. Error,
-/// too: an option of a solver that `options` leave out.
+/// Tries the options on objects that are thrown away and solve small problems, so that the stages themselves find
+/// nothing wrong later. Collective. Error: a value that PETSc or SLEPc does not take or fails with, or an option that
+/// the object does not ask for. Error, too: an option of a solver that `options` leave out.
 void check_solver_options(const ProgramOptions& options, MPI_Comm comm);
 
 } // namespace squeal

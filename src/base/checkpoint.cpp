@@ -74,11 +74,10 @@ private:
 
 } // namespace
 
-std::uint64_t check_sum(std::string_view bytes)
+std::uint64_t check_sum(std::string_view bytes, std::uint64_t so_far)
 {
-  std::uint64_t sum = 14695981039346656037ull;
-  for (const char byte : bytes) sum = (sum ^ static_cast<unsigned char>(byte)) * 1099511628211ull;
-  return sum;
+  for (const char byte : bytes) so_far = (so_far ^ static_cast<unsigned char>(byte)) * 1099511628211ull;
+  return so_far;
 }
 
 const std::vector<double>& Checkpoint::list(const std::string& name) const

@@ -168,6 +168,10 @@ void end_run_control()
 Request request(MPI_Comm comm)
 {
   Control& own = control();
+  int ranks = 1, all = 1;
+  MPI_Comm_size(comm, &ranks);
+  MPI_Comm_size(MPI_COMM_WORLD, &all);
+  if (ranks < all) return Request::none; // the other ranks would not know, and would agree at another time
   if (++own.since >= own.every) agree_on_requests(comm);
   if (own.ended_by != 0) return Request::end;
   return own.checkpoint_due ? Request::checkpoint : Request::none;

@@ -1,4 +1,5 @@
 #include "squeal/equilibrium/equilibrium.hpp"
+#include "squeal/base/run_control.hpp"
 
 #include "held_stiffness.hpp"
 #include "squeal/algebra/lent_cores.hpp"
@@ -237,6 +238,7 @@ void check_solution(const Structure& structure, const Interface& interface, cons
   Checks checks;
   on_rank_zero_with_lent_cores(comm, static_cast<std::size_t>(interface.pairs),
                                [&] { checks = check_reactions(search, gap, options); });
+  end_if_asked(comm);
   MPI_Bcast(&checks, sizeof checks, MPI_BYTE, 0, comm);
   equilibrium.outcome.residual = checks.residual;
   equilibrium.check_residual = checks.check_residual;
@@ -360,6 +362,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
           search.rho = 1 / largest_eigenvalue(search.D_nn, 30);
           search.solution = find_split(search.problem, interface, options.max_iterations, 1.5 * search.rho, expected);
         });
+    end_if_asked(comm); // what was cut short is no verdict
     share(search.solution, pairs, comm);
   }
 

@@ -2,6 +2,7 @@
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/base/petsc.hpp"
 #include "squeal/mesh/script.hpp"
 
 #include <algorithm>
@@ -204,7 +205,7 @@ void ResultsFolder::make(Beginning beginning)
 
 ResultsFolder::~ResultsFolder()
 {
-  if (!published_ && !kept_) undo();
+  if (!published_ && !kept_ && rank_of(comm_) == 0) undo();
 }
 
 void ResultsFolder::undo()
@@ -230,13 +231,21 @@ fs::path ResultsFolder::meanwhile(const fs::path& file) const
   return inside.empty() || *inside.begin() == ".." || inside.has_parent_path() ? file : partial_ / inside;
 }
 
-/// Takes files of another origin, such as pictures, along from the earlier results, which are in the partial folder
-/// now. A run that is killed here leaves them there, where no other run removes them.
-void ResultsFolder::keep_foreign()
+/// Of the earlier results, which are in the partial folder now, files of another origin, such as pictures, are taken
+/// along, and the rest is removed. What cannot be moved stays there, and no other run removes it.
+void ResultsFolder::replace_earlier()
 {
-  for (const auto& entry : fs::directory_iterator(partial_))
-    if (const fs::path name = entry.path().filename(); !is_result(name) && !fs::exists(place_ / name))
-      rename_or_throw(entry.path(), place_ / name);
+  std::error_code ignored;
+  std::vector<fs::path> names;
+  for (const auto& entry : fs::directory_iterator(partial_, ignored)) names.push_back(entry.path().filename());
+  fs::remove(partial_ / lock_file, ignored); // first: it would make the folder one that a run may empty
+  for (const fs::path& name : names)
+    if (is_result(name) || name == lock_file || fs::exists(place_ / name, ignored))
+      fs::remove_all(partial_ / name, ignored);
+    else if (std::rename((partial_ / name).c_str(), (place_ / name).c_str()) != 0)
+      std::fprintf(stderr, "squeal: warning: %s stays in %s: %s\n", name.c_str(), partial_.c_str(),
+                   std::strerror(errno));
+  fs::remove(partial_, ignored); // if nothing is left
 }
 
 void ResultsFolder::move_whole()
@@ -244,9 +253,7 @@ void ResultsFolder::move_whole()
   const fs::path old = place_.string() + old_ending;
   if (renameat2(AT_FDCWD, partial_.c_str(), AT_FDCWD, place_.c_str(), RENAME_EXCHANGE) == 0)
   {
-    keep_foreign();
-    std::error_code ignored;
-    fs::remove_all(partial_, ignored); // now the earlier results
+    replace_earlier();
     return;
   }
   if (errno != ENOENT && errno != EINVAL && errno != ENOSYS && errno != ENOTSUP)
@@ -261,9 +268,10 @@ void ResultsFolder::move_whole()
 void ResultsFolder::move_by_file()
 {
   fs::create_directories(place_);
-  const char* const report = word(ResultFile::report);
+  const char *const report = word(ResultFile::report), *const options = word(ResultFile::options);
   fs::remove(place_ / report);
   for (const char* name : result_file_names) fs::remove_all(place_ / name);
+  rename_or_throw(partial_ / options, place_ / options); // by which folders are known to be a run's
   for (const auto& entry : fs::directory_iterator(partial_))
     if (const fs::path name = entry.path().filename(); name != report && name != lock_file)
       rename_or_throw(entry.path(), place_ / name);

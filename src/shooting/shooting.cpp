@@ -184,7 +184,7 @@ bool is_again(const Orbit& orbit, const Orbit& known)
          std::abs(orbit.fluctuation / known.fluctuation - 1) < of_fluctuation;
 }
 
-/// Whether the orbit is that of a cheaper model, which has seen that half the period does not close it.
+/// Whether the orbit is that of a cheaper model, on which half the period was tried.
 bool repeats_start(const Search& search, const Orbit& orbit)
 {
   constexpr double of_period = 0.1; // far from half of it

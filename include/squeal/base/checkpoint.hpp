@@ -13,8 +13,9 @@
 namespace squeal
 {
 
-/// FNV-1a, 64 bits.
-std::uint64_t check_sum(std::string_view bytes);
+/// FNV-1a, 64 bits, of bytes that follow those of the sum so far.
+inline constexpr std::uint64_t empty_check_sum = 14695981039346656037ull;
+std::uint64_t check_sum(std::string_view bytes, std::uint64_t so_far = empty_check_sum);
 
 /// Named lists, and their bytes with a check sum.
 class Checkpoint

@@ -39,7 +39,8 @@ enum class Request
 };
 
 /// What is asked of the run, agreed by all ranks. Collective, and cheap enough to be asked after every time step.
-/// Ranks talk after each step where steps take longer than a millisecond, else after every sixteenth.
+/// Ranks talk after each step where steps take longer than a millisecond, else after every sixteenth. Of a part of the
+/// ranks nothing is ever asked.
 Request request(MPI_Comm comm);
 
 /// Whether this rank knows of a request to end: a signal, or the time limit by its own clock. For waiting that other

@@ -87,7 +87,7 @@ struct ProjectionSolution
 };
 
 /// Iterates r <- max(0, r - rho g), g = q + M r, from r = 0; N must be the identity. `rho` [N/m] is halved when the
-/// residual grows. `tolerance`: of the residual.
+/// residual grows. `tolerance`: of the residual. Ends early where this rank knows of a request to end.
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
                                        long max_iterations);
 

@@ -79,8 +79,8 @@ private:
   void make(Beginning beginning); // on rank 0
   void move_whole();              // on rank 0
   void move_by_file();            // on rank 0
-  void keep_foreign();            // on rank 0
-  void undo();
+  void replace_earlier();         // on rank 0
+  void undo();                    // on rank 0
 
   MPI_Comm comm_;
   std::filesystem::path place_, partial_;
@@ -91,7 +91,7 @@ private:
 };
 
 /// The files and folders that the scene names as inputs, its own file first. Files that a geometry includes or merges
-/// are among them. Error: a geometry that may not be run.
+/// are among them, but for names that a geometry computes. Of one rank; reads the geometry. Error: it may not be run.
 std::vector<std::filesystem::path> inputs_of(const Scene& scene);
 
 /// Whether two names are of one file, which may not exist yet.

@@ -15,7 +15,7 @@ StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptio
                                 Orbit start);
 
 /// An orbit gone round twice is a solution, too. Where half the period nearly closes the one found, that solution is
-/// returned, else `found`. Takes a period.
+/// returned, else `found`. Collective. Takes the steps of a period, and of a search where half of it nearly closes.
 StageResult prefer_half_period(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
                                StageResult found);
 

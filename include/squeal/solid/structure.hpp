@@ -35,7 +35,7 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
 /// for a G or H that is not skew.
 Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm);
 
-/// Whether the structure has more than 10 000 degrees of freedom (large_model). Not collective.
+/// Whether the structure has more degrees of freedom than large_model. Not collective.
 bool is_large(const Structure& structure);
 
 /// What keeps the matrices without contact from being those of a real symmetric problem, in a sentence; empty if
