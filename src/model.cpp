@@ -135,9 +135,12 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
 {
   Model model;
   model.mesh = std::move(mesh);
+  end_if_asked(comm);
   const ContactPairs contact = make_pairs(model.mesh, scene);
+  end_if_asked(comm);
   const Partition partition = partition_mesh(model.mesh, contact.pairs, comm);
   model.dofs = number_dofs(model.mesh, scene, partition, comm);
+  end_if_asked(comm);
   model.structure = assemble(model.mesh, scene, partition, model.dofs, comm);
   model.interface = make_interface(contact.pairs, scene, model.dofs, comm);
   model.coverage = contact.coverage;
@@ -149,13 +152,7 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
 
 Model build_model(const Scene& scene, MPI_Comm comm)
 {
-  const auto meshed = [&]
-  {
-    Mesh mesh = read_mesh(scene, comm);
-    end_if_asked(comm);
-    return model_of_mesh(scene, std::move(mesh), comm);
-  };
-  Model model = scene.matrices ? model_of_matrices(scene, comm) : meshed();
+  Model model = scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh(scene, comm), comm);
   double mass = 0;
   check(MatNorm(model.structure.M, NORM_1, &mass));
   if (mass == 0 && (scene.modes.enabled || scene.transient.enabled || scene.cycle.enabled))

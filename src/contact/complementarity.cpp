@@ -1,7 +1,6 @@
 #include "squeal/contact/complementarity.hpp"
 
 #include "squeal/base/error.hpp"
-#include "squeal/base/run_control.hpp"
 #include "squeal/contact/pair_law.hpp"
 
 #include <algorithm>
@@ -163,7 +162,7 @@ double unilateral_residual(const std::vector<double>& reaction, const std::vecto
 }
 
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
-                                       long max_iterations)
+                                       long max_iterations, bool (*is_over)())
 {
   const std::size_t n = problem.q.size();
   const std::vector<double> scale(n, 1 / problem.compliance);
@@ -177,7 +176,7 @@ ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, do
     result.residual = unilateral_residual(result.reaction, g, scale, problem.q);
     best = std::min(best, result.residual);
     if (result.residual <= tolerance || !std::isfinite(result.residual) || result.iterations >= max_iterations ||
-        is_asked_here())
+        (is_over && is_over()))
       return result;
     if (result.iterations % 50 == 49 && result.residual > 10 * best) rho /= 2;
     for (std::size_t i = 0; i < n; ++i) result.reaction[i] = std::max(0., result.reaction[i] - rho * g[i]);

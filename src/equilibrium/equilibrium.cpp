@@ -219,7 +219,7 @@ Checks check_reactions(const Search& search, const std::vector<double>& gap, con
   checks.uniqueness = has_one_solution(search.problem) ? Uniqueness::assured : Uniqueness::not_assured;
   const PetscInt limit = check_iterations(options, pairs);
   if (limit == 0 || pairs == 0) return checks;
-  const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12, limit);
+  const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12, limit, is_asked_here);
   checks.check_iterations = run.iterations;
   const double largest = *std::max_element(reaction.begin(), reaction.end());
   for (std::size_t i = 0; i < pairs && largest > 0; ++i)
@@ -238,7 +238,6 @@ void check_solution(const Structure& structure, const Interface& interface, cons
   Checks checks;
   on_rank_zero_with_lent_cores(comm, static_cast<std::size_t>(interface.pairs),
                                [&] { checks = check_reactions(search, gap, options); });
-  end_if_asked(comm);
   MPI_Bcast(&checks, sizeof checks, MPI_BYTE, 0, comm);
   equilibrium.outcome.residual = checks.residual;
   equilibrium.check_residual = checks.check_residual;
@@ -362,7 +361,6 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
           search.rho = 1 / largest_eigenvalue(search.D_nn, 30);
           search.solution = find_split(search.problem, interface, options.max_iterations, 1.5 * search.rho, expected);
         });
-    end_if_asked(comm); // what was cut short is no verdict
     share(search.solution, pairs, comm);
   }
 
