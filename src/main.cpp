@@ -214,15 +214,12 @@ void check_state_file(const std::string& key, const std::filesystem::path& file,
   const auto folder = file.parent_path(),
              results = (std::filesystem::absolute(output) / ".").lexically_normal().parent_path();
   const std::string label = key + " = " + shortened(file) + ": ";
-  const auto is_results = [&](const std::filesystem::path& path) { return path == results; };
-  if (!file.has_filename() || is_folder(file) || is_results(file)) throw Error(label + "it is a folder; name a file");
+  if (!file.has_filename() || is_folder(file) || file == results) throw Error(label + "it is a folder; name a file");
   if (std::error_code failed; !is_file(file) && std::filesystem::exists(file, failed))
     throw Error(label + "it is a device or a pipe, which the state would replace; name a file");
-  const std::string name = file.filename();
-  if (is_results(folder) ? name == "running" || name == "partial" || file.extension() == ".part"
-                         : file == results.string() + ".partial" || file == results.string() + ".old")
+  if (is_used_meanwhile(file, results))
     throw Error(label + "the run uses this name meanwhile; give the state another one");
-  if (is_results(folder)) return;
+  if (folder == results) return;
   if (!is_folder(folder)) throw Error(label + "there is no folder " + shortened(folder) + "; make it first");
   if (access((is_file(file) ? file : folder).c_str(), W_OK) != 0 || access(folder.c_str(), W_OK) != 0)
     throw Error(label + "it cannot be written; name a file where you may write");
@@ -231,18 +228,17 @@ void check_state_file(const std::string& key, const std::filesystem::path& file,
 /// Whether a launcher says that this is another rank than the first; known before MPI is up.
 bool is_other_rank()
 {
-  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
-    if (const char* rank = std::getenv(name)) return std::string(rank) != "0";
-  return false;
+  const std::string& rank = launched_rank();
+  return !rank.empty() && rank != "0";
 }
 
 /// The scene, the options and the contents of input files, by which checkpoints are distinguished from those of another
 /// run. Options of the session, about logs and memory, do not matter. Of one rank.
-std::string request_text(const Scene& scene, ProgramOptions options)
+std::string request_text(const Scene& scene, const std::vector<std::filesystem::path>& inputs, ProgramOptions options)
 {
   std::string text = resolved_scene(scene);
   for (const Option& option : options_of(options)) text += option.name + " " + value_of(option) + "\n";
-  for (const std::filesystem::path& file : inputs_of(scene))
+  for (const std::filesystem::path& file : inputs)
   {
     if (file == scene.file || !is_file(file)) continue;
     std::ifstream stream(file, std::ios::binary);
@@ -281,11 +277,17 @@ int run_program(const Arguments& arguments, int argc, char** argv)
     return 0;
   }
   begin_run_control(arguments.limits);
-  on_rank_zero(comm, [&] { check_outputs(scene, output); });
+  std::vector<std::filesystem::path> inputs; // on rank 0
+  on_rank_zero(comm,
+               [&]
+               {
+                 inputs = inputs_of(scene);
+                 check_outputs(scene, inputs, output);
+               });
   ResultsFolder results(output, arguments.beginning, comm);
   const bool restart = arguments.beginning == Beginning::from_checkpoints;
   std::string request;
-  on_rank_zero(comm, [&] { request = request_text(scene, options); });
+  on_rank_zero(comm, [&] { request = request_text(scene, inputs, options); });
   broadcast(request, comm);
   on_every_rank(comm, [&] { open_checkpoints({results.checkpoints(), request, restart}); });
   results.accept_checkpoints();

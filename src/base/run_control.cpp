@@ -27,11 +27,12 @@ const bool ignores_hangup = []
   return sigaction(SIGHUP, nullptr, &given) == 0 && given.sa_handler == SIG_IGN;
 }();
 
-/// Whether mpirun or srun started this process. MPI sets the same variables when it starts by itself.
-const bool is_launched = []
+/// Read before MPI starts, which sets the same variables when it starts by itself.
+const std::string rank_by_launcher = []() -> std::string
 {
-  constexpr std::array names = {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"};
-  return std::ranges::any_of(names, [](const char* name) { return std::getenv(name) != nullptr; });
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
+    if (const char* rank = std::getenv(name)) return rank;
+  return {};
 }();
 
 /// Those of terminals, and those by which schedulers announce a limit.
@@ -104,7 +105,7 @@ std::vector<pid_t> peers_of_this_machine()
 /// A rank is started by mpirun or srun and has no business without it. A run of one process outlives its shell.
 void end_with_launcher()
 {
-  if (!is_launched) return;
+  if (rank_by_launcher.empty()) return;
   const pid_t launcher = getppid();
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != launcher) _exit(1); // it died in between
@@ -143,6 +144,11 @@ void agree_on_requests(MPI_Comm comm)
 }
 
 } // namespace
+
+const std::string& launched_rank()
+{
+  return rank_by_launcher;
+}
 
 void note_ranks()
 {

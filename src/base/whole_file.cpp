@@ -45,7 +45,8 @@ class Draft
 {
 public:
   explicit Draft(const fs::path& place)
-      : path_(place.string() + ".part"), file_(open(path_.c_str(), O_CREAT | O_WRONLY | O_TRUNC | O_CLOEXEC, 0666))
+      : path_(place.string() + unfinished_ending),
+        file_(open(path_.c_str(), O_CREAT | O_WRONLY | O_TRUNC | O_CLOEXEC, 0666))
   {
   }
   ~Draft()

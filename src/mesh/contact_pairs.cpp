@@ -102,7 +102,7 @@ void check_apart(const SurfaceContact& c)
   if (findings.same_way)
     throw Error(surfaces + "both surfaces look the same way at " + text_of(findings.same_way_at) +
                 ": name the faces that look at each other");
-  throw Error(surfaces + "no face of one lies opposite a face of the other: correct the names or the mesh");
+  throw Error(surfaces + "no face of one is opposite a face of the other: correct the names or the mesh");
 }
 
 /// Throws Error for surfaces that do not meet or that penetrate each other.

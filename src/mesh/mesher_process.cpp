@@ -167,7 +167,8 @@ MesherAnswer run_mesher(const MesherTask& task)
 {
   int ends[2] = {-1, -1};
   if (pipe2(ends, O_CLOEXEC) != 0) throw Error(std::string("the mesher cannot be started: ") + std::strerror(errno));
-  // A descriptor that already has the mesher's number would keep its close-on-exec flag; so copies lie above both.
+  // A descriptor that already has the mesher's number would keep its close-on-exec flag; so copies get larger numbers
+  // than both.
   const Descriptor from(ends[0]);
   Descriptor low(ends[1]), to(fcntl(low, F_DUPFD_CLOEXEC, 10));
   const Descriptor low_script(task.script.empty() ? -1 : script_file(task.script));

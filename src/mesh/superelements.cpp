@@ -39,7 +39,7 @@ int joined_node(const Mesh& mesh, const std::set<int>& candidates, const PlacedN
     throw Error(
         user + ": node " + std::to_string(retained.node) +
         format(" at (%g, %g, %g) m meets no node: the nearest is %.3g m away; mesh the parts so that their nodes "
-               "lie on the retained ones, or name the point or group that has them",
+               "coincide with the retained ones, or name the point or group that has them",
                retained.at[0], retained.at[1], retained.at[2], distance(nearest)));
   return nearest;
 }

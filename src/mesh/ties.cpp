@@ -44,7 +44,7 @@ void check_meeting(const Tie& tie, const SlaveRows& rows)
     throw Error(name_of(tie) + format("the surfaces are at least %.4g m apart along the normal, at (%g, %g, %g): give "
                                       "the tie a reach above that, or correct the mesh",
                                       found.nearest, at[0], at[1], at[2]));
-  throw Error(name_of(tie) + "no face of one lies opposite a face of the other: correct the names or the mesh");
+  throw Error(name_of(tie) + "no face of one is opposite a face of the other: correct the names or the mesh");
 }
 
 /// The row of a slave node solved for its own motion. The weights of the others add up to 1, so that a translation is

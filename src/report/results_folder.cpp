@@ -3,6 +3,7 @@
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/petsc.hpp"
+#include "squeal/base/whole_file.hpp"
 #include "squeal/mesh/script.hpp"
 
 #include <algorithm>
@@ -26,6 +27,7 @@ namespace
 
 constexpr const char* lock_file = "running";
 constexpr const char *partial_ending = ".partial", *old_ending = ".old"; // of folders beside the place
+constexpr const char* inner_partial = "partial";                         // the folder in a place that stays
 
 bool is_result(const fs::path& name)
 {
@@ -175,7 +177,8 @@ void ResultsFolder::make(Beginning beginning)
   for (fs::path above = place_.parent_path(); above.has_relative_path(); above = above.parent_path())
     if (above.extension() == partial_ending && fs::exists(above / lock_file))
       refuse_folder(place_, "a run works in " + above.string());
-  const fs::path partial = can_be_replaced(place_) ? fs::path(place_.string() + partial_ending) : place_ / "partial";
+  const fs::path partial =
+      can_be_replaced(place_) ? fs::path(place_.string() + partial_ending) : place_ / inner_partial;
   for (fs::path above = partial.parent_path(); !fs::exists(above); above = above.parent_path())
     made_.insert(made_.begin(), above);
   for (const fs::path& folder : made_) fs::create_directory(folder);
@@ -305,6 +308,13 @@ void ResultsFolder::publish(Checkpoints checkpoints)
   published_ = true;
 }
 
+bool is_used_meanwhile(const fs::path& file, const fs::path& place)
+{
+  if (file.parent_path() != place)
+    return file == place.string() + partial_ending || file == place.string() + old_ending;
+  return file.filename() == lock_file || file.filename() == inner_partial || file.extension() == unfinished_ending;
+}
+
 bool is_same_file(const fs::path& a, const fs::path& b)
 {
   std::error_code none;
@@ -322,6 +332,8 @@ void append_mesh(const fs::path& file, Statements statements, std::vector<fs::pa
   inputs.insert(inputs.end(), files.begin(), files.end());
 }
 
+constexpr std::array row_files = {"dofs.txt", "nodes.txt"}; // beside matrices
+
 /// Appends a folder of matrices and the files that are read of it, by their names.
 void append_matrices(const fs::path& folder, std::vector<fs::path>& inputs)
 {
@@ -329,7 +341,7 @@ void append_matrices(const fs::path& folder, std::vector<fs::path>& inputs)
   inputs.push_back(folder);
   for (const auto& entry : fs::directory_iterator(folder))
     if (const fs::path name = entry.path().filename();
-        name.extension() == ".petsc" || name == "dofs.txt" || name == "nodes.txt")
+        name.extension() == ".petsc" || std::ranges::find(row_files, name) != row_files.end())
       inputs.push_back(entry.path());
   std::sort(inputs.begin() + static_cast<std::ptrdiff_t>(first), inputs.end());
 }
@@ -349,7 +361,7 @@ std::vector<fs::path> inputs_of(const Scene& scene)
   return inputs;
 }
 
-void check_outputs(const Scene& scene, const fs::path& place)
+void check_outputs(const Scene& scene, const std::vector<fs::path>& inputs, const fs::path& place)
 {
   std::error_code failed;
   if (!fs::exists(place, failed) && failed) // a name that is too long, a link to itself
@@ -363,7 +375,6 @@ void check_outputs(const Scene& scene, const fs::path& place)
     if (is_folder(place / word(folder)) && !is_file(place / word(ResultFile::options)))
       throw Error("the output " + place.string() + " holds a folder '" + word(folder) +
                   "' that no run has made: name another folder with --output DIR");
-  const std::vector<fs::path> inputs = inputs_of(scene);
   const auto refuse_on = [](const fs::path& output, const std::vector<fs::path>& others, const std::string& remedy)
   {
     for (const fs::path& other : others)

@@ -55,7 +55,7 @@ TEST_CASE("surfaces that do not meet say how far they are apart and where, or th
   const TemporaryFile file(std::string("shift = 1.25;\n") + blocks, ".geo");
   Scene scene = block_scene(file.path());
   Mesh mesh = read_mesh(scene, comm);
-  CHECK(has(problem_of([&] { make_pairs(mesh, scene); }), "no face of one lies opposite a face of the other"));
+  CHECK(has(problem_of([&] { make_pairs(mesh, scene); }), "no face of one is opposite a face of the other"));
   scene.contacts[0].stator = "base"; // below the low block, which looks down as the high one's face does
   scene.contacts[0].rotor = "roof";
   CHECK(has(problem_of([&] { make_pairs(mesh, scene); }), "no face of one"));

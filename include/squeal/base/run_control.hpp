@@ -20,6 +20,9 @@ struct RunLimits
   double checkpoint_interval = 600; // [s]
 };
 
+/// The rank that mpirun or srun gave this process; empty if neither started it. Known before MPI is up.
+const std::string& launched_rank();
+
 /// Notes the ranks of this machine; from here on a rank whose launcher dies ends with it. Collective, before all else.
 void note_ranks();
 

@@ -6,6 +6,9 @@
 namespace squeal
 {
 
+/// What the name of a file ends in until it is whole.
+inline constexpr const char* unfinished_ending = ".part";
+
 /// When the file must be on the disk.
 enum class Flush
 {

@@ -99,6 +99,10 @@ bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b
 
 /// Error: an output of the scene, or a result in this place, would fall on what the run reads, or on a folder that no
 /// run has made.
-void check_outputs(const Scene& scene, const std::filesystem::path& place);
+void check_outputs(const Scene& scene, const std::vector<std::filesystem::path>& inputs,
+                   const std::filesystem::path& place);
+
+/// Whether a run into the place, an absolute path, uses the name of this file while it works.
+bool is_used_meanwhile(const std::filesystem::path& file, const std::filesystem::path& place);
 
 } // namespace squeal
