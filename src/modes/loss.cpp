@@ -6,7 +6,8 @@
 #include <array>
 #include <cmath>
 #include <Eigen/LU>
-#include <numeric>
+#include <limits>
+#include <optional>
 
 namespace squeal
 {
@@ -21,9 +22,12 @@ using Eigen::VectorXcd;
 
 constexpr std::size_t in_group = 16;  // pairs of neighbouring frequency, of which those at the ends are neighbours only
 constexpr std::size_t neighbours = 3; // at each end
-constexpr int passes = 12;            // of residual correction, at most
+constexpr int passes = 30;            // of residual correction, at most: losses of 2 and more take over 12
 constexpr double tolerance = 1e-13;   // backward error
 constexpr int newton_steps = 60;      // each divides the error of omega by about 2/eta^2
+constexpr double settled = 1e-12;     // last change of lambda over |lambda|: beyond, there is no fixed point
+
+constexpr double oscillating = 1e-6; // Im(lambda) over |lambda|: below it is the rounding of two real ones
 
 /// The matrices of a problem on a subspace V, with their products A V: M, C_0, K, K_loss.
 struct Projected
@@ -82,20 +86,40 @@ struct SmallPair
   VectorXcd a;
 };
 
-/// Newton's method on (lambda, a), with omega taken from the last lambda.
-void solve_small(const Projected& space, Stiffness stiffness, SmallPair& pair)
+/// Newton's method on (lambda, a) with a share of K_loss, and with omega taken from the last lambda. Returns whether it
+/// found a pair that oscillates.
+bool solve_small(const Projected& space, Stiffness stiffness, double share, SmallPair& pair)
 {
-  for (int step = 0; step < newton_steps; ++step)
+  double last = HUGE_VAL;
+  for (int step = 0; step < newton_steps && last > 1e-15; ++step)
   {
-    const Eigen::PartialPivLU<Eigen::MatrixXcd> T(sum(space.entries, factors(stiffness, pair.lambda)));
-    const VectorXcd x = T.solve(sum(space.entries, derivatives(stiffness, pair.lambda)) * pair.a);
-    if (!x.allFinite()) return; // T is singular: lambda is an eigenvalue to rounding
-    const Complex along = pair.a.dot(x);
-    const Complex change = pair.a.squaredNorm() / along;
+    if (!(pair.lambda.imag() > settled * std::abs(pair.lambda))) return false;
+    std::array<Complex, 4> factor = factors(stiffness, pair.lambda), slope = derivatives(stiffness, pair.lambda);
+    factor[3] *= share;
+    slope[3] *= share;
+    const VectorXcd x =
+        Eigen::PartialPivLU<Eigen::MatrixXcd>(sum(space.entries, factor)).solve(sum(space.entries, slope) * pair.a);
+    if (!x.allFinite()) return true; // singular: lambda is an eigenvalue to rounding
+    const Complex change = pair.a.squaredNorm() / pair.a.dot(x);
+    const double now = std::abs(change) / std::abs(pair.lambda);
+    if (last <= settled && now > last) return true; // beside a multiple eigenvalue x is rounding
     pair.a = x.normalized();
     pair.lambda -= change;
-    if (std::abs(change) <= 1e-15 * std::abs(pair.lambda)) return;
+    last = now;
   }
+  return last <= settled && pair.lambda.imag() > settled * std::abs(pair.lambda);
+}
+
+/// The pair of all losses that a pair without them becomes as they grow; nothing where it ends on the way. The steps
+/// move lambda by about an eighth of its imaginary part.
+std::optional<SmallPair> grown(const Projected& space, Stiffness stiffness, SmallPair pair)
+{
+  const auto form = [&](const MatrixXd& A) { return std::abs(pair.a.dot(A * pair.a)); };
+  const double loss = form(space.entries[3]) / form(space.entries[2]);
+  const int steps = 1 + static_cast<int>(std::min(8 * loss * std::abs(pair.lambda) / pair.lambda.imag(), 40.));
+  for (int step = 1; step <= steps; ++step)
+    if (!solve_small(space, stiffness, static_cast<double>(step) / steps, pair)) return std::nullopt;
+  return pair;
 }
 
 /// The residual of a pair in the whole problem, its real and imaginary part, over the sizes of its terms.
@@ -117,32 +141,70 @@ MultiVector residual_of(const Projected& space, Stiffness stiffness, const Small
   return result;
 }
 
-/// One group: pairs as they are in, pairs of their own frequency out.
-struct Group
+/// A mode: as it is without loss factors in, of its own frequency and of the complex problem out.
+struct LossyPair
 {
-  std::vector<SmallPair> viscous, complex;
-  std::vector<double> backward_errors;
+  SmallPair viscous, complex;
+  Stiffness taken = Stiffness::viscous; // complex where there is no fixed point
+  double backward_error = 0;            // of the pair taken
+
+  const SmallPair& pair() const { return taken == Stiffness::viscous ? viscous : complex; }
 };
 
-/// Solves both problems of each pair on the subspace; residuals that are not small join it, until none is left.
+using Group = std::vector<LossyPair>;
+
+/// The rows of a vector that a larger space has too.
+void widen(VectorXcd& a, Index columns)
+{
+  const Index known = a.size();
+  a.conservativeResize(columns);
+  a.tail(columns - known).setZero();
+}
+
+/// Whether a fixed point belongs to the mode: of one loss factor everywhere its distance is at most 0.466, at eta = 1.
+bool is_equivalent(const SmallPair& viscous, const SmallPair& complex)
+{
+  return std::abs(viscous.lambda - complex.lambda) < 0.5 * std::abs(viscous.lambda);
+}
+
+/// Both problems' pairs of each mode on the first subspace.
+void start(const Projected& space, Group& group)
+{
+  for (LossyPair& mode : group)
+  {
+    const std::optional<SmallPair> viscous = grown(space, Stiffness::viscous, mode.viscous);
+    mode.complex = grown(space, Stiffness::complex, mode.complex).value_or(mode.complex);
+    mode.taken = viscous && is_equivalent(*viscous, mode.complex) ? Stiffness::viscous : Stiffness::complex;
+    if (viscous) mode.viscous = *viscous;
+  }
+}
+
+/// Solves both problems of each mode on the subspace; residuals that are not small join it, until none is left.
 void solve_group(Projected& space, Group& group, const PencilFactor& P)
 {
+  start(space, group);
   for (int pass = 0;; ++pass)
   {
     MultiVector residuals{space.V.comm, MatrixXd(space.V.entries.rows(), 0)};
-    for (std::size_t i = 0; i < group.viscous.size(); ++i)
-      for (const Stiffness stiffness : {Stiffness::viscous, Stiffness::complex})
-      {
-        SmallPair& pair = (stiffness == Stiffness::viscous ? group.viscous : group.complex)[i];
-        VectorXcd a = VectorXcd::Zero(space.V.columns());
-        a.head(pair.a.size()) = pair.a;
-        pair.a = a;
-        solve_small(space, stiffness, pair);
-        double error = 0;
-        const MultiVector residual = residual_of(space, stiffness, pair, error);
-        if (stiffness == Stiffness::viscous) group.backward_errors[i] = error;
-        if (error > tolerance) append(residuals, residual);
-      }
+    const auto improve = [&](Stiffness stiffness, SmallPair& pair)
+    {
+      widen(pair.a, space.V.columns());
+      const bool found = solve_small(space, stiffness, 1, pair);
+      double error = 0;
+      const MultiVector residual = residual_of(space, stiffness, pair, error);
+      if (found && error > tolerance) append(residuals, residual);
+      return found ? error : HUGE_VAL;
+    };
+    for (LossyPair& mode : group)
+    {
+      mode.backward_error = improve(Stiffness::complex, mode.complex);
+      if (mode.taken == Stiffness::complex) continue;
+      const double error = improve(Stiffness::viscous, mode.viscous);
+      if (std::isfinite(error) && is_equivalent(mode.viscous, mode.complex))
+        mode.backward_error = error;
+      else
+        mode.taken = Stiffness::complex;
+    }
     if (residuals.columns() == 0 || pass == passes) return;
     if (!extend(space, P.solve(residuals))) return;
   }
@@ -153,7 +215,7 @@ std::vector<std::size_t> by_frequency(const std::vector<Eigenpair>& pairs)
 {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < pairs.size(); ++i)
-    if (pairs[i].lambda.imag() > 0) order.push_back(i);
+    if (pairs[i].lambda.imag() > oscillating * std::abs(pairs[i].lambda)) order.push_back(i);
   std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return pairs[a].lambda.imag() < pairs[b].lambda.imag(); });
   return order;
@@ -168,13 +230,13 @@ double one_norm(Mat A)
 
 } // namespace
 
-std::vector<double> correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
-                                 const PencilOptions& options)
+std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
+                                   const PencilOptions& options)
 {
   const std::array<Mat, 4> matrices = {problem.M, problem.C, problem.K, K_loss};
   std::array<double, 4> norms{};
   std::transform(matrices.begin(), matrices.end(), norms.begin(), one_norm);
-  std::vector<double> errors(solution.pairs.size(), 0.);
+  std::vector<ModeLoss> losses(solution.pairs.size());
   const std::vector<std::size_t> order = by_frequency(solution.pairs);
   ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
   for (std::size_t first = 0; first < order.size(); first += in_group)
@@ -194,31 +256,33 @@ std::vector<double> correct_loss(QuadraticSolution& solution, const QuadraticPro
     {
       const auto column = static_cast<Index>(2 * (k - from));
       const VectorXcd y = a.col(column).cast<Complex>() + Complex(0, 1) * a.col(column + 1);
-      group.viscous.push_back({solution.pairs[order[k]].lambda, y.normalized()});
+      const SmallPair start{solution.pairs[order[k]].lambda, y.normalized()};
+      group.push_back({start, start});
     }
-    group.complex = group.viscous;
-    group.backward_errors.resize(group.viscous.size());
     const double middle = solution.pairs[order[(first + end - 1) / 2]].lambda.imag();
     move_to(pencil, 1.0001 * middle * middle);
     solve_group(space, group, *pencil.factor);
     for (std::size_t k = first; k < end; ++k)
     {
       Eigenpair& pair = solution.pairs[order[k]];
-      const SmallPair& own = group.viscous[k - first];
+      const LossyPair& mode = group[k - first];
+      const SmallPair& own = mode.pair();
       MatrixXd parts(own.a.size(), 2);
       parts << own.a.real(), own.a.imag();
       const MultiVector y = combination(space.V, parts);
       copy_column(y, 0, pair.real);
       copy_column(y, 1, pair.imaginary);
       pair.lambda = own.lambda;
-      pair.backward_error = group.backward_errors[k - first];
-      errors[order[k]] = std::abs(own.lambda - group.complex[k - first].lambda) / std::abs(own.lambda);
+      pair.backward_error = mode.backward_error;
+      const double error = std::abs(own.lambda - mode.complex.lambda) / std::abs(own.lambda);
+      losses[order[k]] = {factors(mode.taken, own.lambda)[3],
+                          mode.taken == Stiffness::viscous ? error : std::numeric_limits<double>::quiet_NaN()};
     }
   }
   solution.outcome.residual = 0;
   for (const Eigenpair& pair : solution.pairs)
     solution.outcome.residual = std::max(solution.outcome.residual, pair.backward_error);
-  return errors;
+  return losses;
 }
 
 } // namespace squeal

@@ -60,10 +60,10 @@ void set_shape(ComplexMode& mode, const ClosedContact& contact, const Eigenpair&
   check(VecAXPBY(mode.imaginary, turn.imag(), turn.real(), real));
 }
 
-/// Adds to the reactions those to lambda (1/omega_j - 1/omega) K_loss phi: the mode's own damping of loss factors.
-void add_loss_reactions(const Structure& structure, const ClosedContact& contact, ComplexMode& mode)
+/// Adds to the reactions those to the mode's own damping of loss factors beyond C's, (own - lambda/omega) K_loss phi.
+void add_loss_reactions(const Structure& structure, const ClosedContact& contact, Complex own, ComplexMode& mode)
 {
-  const Complex factor = mode.lambda * (1 / mode.lambda.imag() - 1 / structure.loss_omega);
+  const Complex factor = own - mode.lambda / structure.loss_omega;
   const Owned<Vec> force = zeros_like(mode.real);
   Owned<Vec> rows;
   check(MatCreateVecs(contact.reaction, nullptr, rows.put()));
@@ -107,12 +107,13 @@ struct ModesProblem
 std::vector<ComplexMode> modes_of(QuadraticSolution& solution, const ModesProblem& problem)
 {
   if (!problem.K_loss.get()) return modes_of(solution, problem.linearised);
-  const std::vector<double> errors = correct_loss(solution, problem.reduced, problem.K_loss, problem.options.pencil);
+  const std::vector<ModeLoss> losses = correct_loss(solution, problem.reduced, problem.K_loss, problem.options.pencil);
   std::vector<ComplexMode> modes = modes_of(solution, problem.linearised);
   for (std::size_t i = 0; i < modes.size(); ++i)
   {
-    modes[i].loss_error = errors[i];
-    if (modes[i].lambda.imag() > 0) add_loss_reactions(problem.structure, problem.linearised.contact, modes[i]);
+    modes[i].loss_error = losses[i].error;
+    if (modes[i].lambda.imag() > 0)
+      add_loss_reactions(problem.structure, problem.linearised.contact, losses[i].factor, modes[i]);
   }
   std::stable_sort(modes.begin(), modes.end(),
                    [](const ComplexMode& a, const ComplexMode& b) { return a.lambda.real() > b.lambda.real(); });
@@ -128,28 +129,27 @@ PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution
   return count_pairs(solution, real, free, 0.8 * end, end);
 }
 
+/// The slices' solution, or that of SLEPc's TOAR where they have fewer pairs than are expected. An overdamped mode is
+/// no pair: then TOAR finds no more either.
 CountedSolution solve_full(const ModesProblem& problem, RealCount& real)
 {
   const PetscInt limit = problem.options.dense_limit;
   const double band = problem.settings.band, end = two_pi * band;
   PetscInt n = 0;
   check(MatGetSize(problem.linearised.K_z, &n, nullptr));
-  CountedSolution result;
+  CountedSolution slices;
   if (n > limit && problem.options.solver == ModesSolver::slices)
   {
-    result = solve_by_slices(problem.reduced, real, band, problem.options.pencil);
-    if (result.count.expected == result.count.found) return result;
-    result.count = count_in_band(problem.reduced, result.solution, real, band);
-    if (result.count.found >= result.count.expected || problem.beyond_inertia) return result;
-    result.solution.outcome.kind = OutcomeKind::not_converged;
-    result.solution.outcome.reason = "fewer pairs were found than are expected; -modes_solver toar uses another method";
-    return result;
+    slices = solve_by_slices(problem.reduced, real, band, problem.options.pencil);
+    if (slices.count.expected == slices.count.found) return slices;
+    slices.count = count_in_band(problem.reduced, slices.solution, real, band);
+    if (slices.count.found >= slices.count.expected || problem.beyond_inertia) return slices;
   }
   QuadraticSettings quadratic{band, 0, n > limit ? count_below(real, end) : 0, limit};
   if (n > limit) quadratic.shift = std::sqrt(-shift_below_zero(problem.linearised.M_z, problem.linearised.K_z)) / end;
-  result.solution = solve_quadratic(problem.reduced, quadratic);
-  result.count = count_in_band(problem.reduced, result.solution, real, band);
-  return result;
+  CountedSolution whole{solve_quadratic(problem.reduced, quadratic), {}};
+  whole.count = count_in_band(problem.reduced, whole.solution, real, band);
+  return whole.count.found < slices.count.found ? std::move(slices) : std::move(whole);
 }
 
 /// Projects on the number of real modes that the scene asks for, or on those up to a little beyond the band, at least

@@ -80,6 +80,12 @@ std::string modes_text(const Modes& modes)
     text += row("", format("loss factors are viscous at each mode's own frequency: at most %.1e of its eigenvalue from "
                            "complex stiffness",
                            loss_error));
+  const auto without = std::ranges::count_if(modes.modes, [](const auto& mode) { return std::isnan(mode.loss_error); });
+  if (without > 0)
+    text +=
+        row("", format("%td modes lose too much for a viscous equivalent at their own frequency: these are of complex "
+                       "stiffness",
+                       without));
   text += row("", format("%12s %14s %12s %16s", "frequency", "growth rate", "damping", "backward error"));
   text += row("", format("%12s %14s %12s %16s", "[Hz]", "[1/s]", "[%]", "[-]"));
   const std::size_t unstable = static_cast<std::size_t>(std::max(modes.unstable_count, 0));

@@ -27,6 +27,20 @@ Sentences of_equilibrium(const Report& report)
   return sentences;
 }
 
+/// What a count that disagrees may mean.
+const char* count_remedy(const Modes& modes)
+{
+  if (modes.count.found > modes.count.expected)
+    return "so none is known to be missing, but the count does not show it: friction or damping moves pairs across the "
+           "end "
+           "of the band; another modes.band may confirm it";
+  if (modes.method == ModesMethod::projection)
+    return "so an unstable one may be missing: raise modes.real_modes, or take modes.method = \"full\"";
+  return "so one is overdamped or an unstable one is missing: with friction.direction_damping = false fewer are "
+         "overdamped, "
+         "and -modes_solver slices and toar seek them in different ways";
+}
+
 Sentences of_modes(const Report& report)
 {
   Sentences sentences;
@@ -54,11 +68,8 @@ Sentences of_modes(const Report& report)
     sentences.push_back("the two routes disagree on the number of unstable modes: raise modes.real_modes or "
                         "modes.residual_passes");
   if (modes.count.certified_by == Certificate::none && modes.count.expected != modes.count.found)
-    sentences.push_back(format("%d pairs were found where %d are expected, so an unstable one may be missing: %s",
-                               modes.count.found, modes.count.expected,
-                               modes.method == ModesMethod::projection
-                                   ? "raise modes.real_modes, or take modes.method = \"full\""
-                                   : "-modes_solver toar seeks them otherwise"));
+    sentences.push_back(format("%d pairs were found where %d are expected, %s", modes.count.found, modes.count.expected,
+                               count_remedy(modes)));
   return sentences;
 }
 
