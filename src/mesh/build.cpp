@@ -205,6 +205,7 @@ UsedSurfaces used_surfaces(const Scene& scene)
   UsedSurfaces used;
   for (const Contact& contact : scene.contacts) used.in_contact.insert({contact.rotor, contact.stator});
   used.all = used.in_contact;
+  for (const Tie& tie : scene.ties) used.all.insert({tie.slave, tie.master});
   for (const RigidBody& body : scene.rigid_bodies) used.all.insert(body.surfaces.begin(), body.surfaces.end());
   for (const Pressure& pressure : scene.pressures) used.all.insert(pressure.on);
   return used;
@@ -295,12 +296,16 @@ Mesh build_mesh(const FileMesh& file, const Scene& scene)
   read_surfaces(file, scene, mesh);
   const std::vector<int> number = drop_unused_nodes(mesh);
   check_conformity(mesh, scene);
-  std::map<std::string, std::set<int>> groups;
+  std::map<std::string, std::set<int>> groups, dimensions;
   for (const ElementBlock& block : file.blocks)
     for (const std::string& name : block.groups)
+    {
+      dimensions[name].insert(block.dimension);
       for (const int node : block.nodes)
         if (number[node] >= 0) groups[name].insert(number[node]);
+    }
   for (const auto& [name, nodes] : groups) mesh.node_groups[name].assign(nodes.begin(), nodes.end());
+  for (const auto& [name, found] : dimensions) mesh.dimensions[name].assign(found.begin(), found.end());
   return mesh;
 }
 

@@ -86,6 +86,12 @@ void check_apart(const SurfaceContact& c)
               " nodes, so the bodies are joined there: give each body its own copy of the surface and its nodes");
 }
 
+[[noreturn]] void fail_inside(const SurfaceContact& c, double depth, const Vec3& at)
+{
+  throw Error(name_of(c.contact) + format("the stator is %.4g m inside the rotor at ", depth) + text_of(at) +
+              ": correct the mesh, or the normal, which points out of the rotor");
+}
+
 /// Throws Error that says why the surfaces do not meet anywhere.
 [[noreturn]] void fail_to_meet(const SurfaceContact& c)
 {
@@ -93,6 +99,7 @@ void check_apart(const SurfaceContact& c)
   wide.search = c.size();
   const OverlapFindings findings = dual_rows(c.slave, c.master, wide).findings;
   const std::string surfaces = name_of(c.contact);
+  if (findings.nearest < 0) fail_inside(c, -findings.nearest, findings.nearest_at);
   if (findings.nearest > 0)
     throw Error(surfaces + format("the surfaces are at least %.4g m apart along the normal, at ", findings.nearest) +
                 text_of(findings.nearest_at) + ": give the contact a reach above that, or correct the mesh");
@@ -109,9 +116,7 @@ void check_apart(const SurfaceContact& c)
 void check_meeting(const SurfaceContact& c, const SlaveRows& rows)
 {
   const OverlapFindings& findings = rows.findings;
-  if (findings.deepest > 0)
-    throw Error(name_of(c.contact) + format("the stator is %.4g m inside the rotor at ", findings.deepest) +
-                text_of(findings.deepest_at) + ": correct the mesh, or the normal, which points out of the rotor");
+  if (findings.deepest > 0) fail_inside(c, findings.deepest, findings.deepest_at);
   if (std::find(rows.covered.begin(), rows.covered.end(), 1) == rows.covered.end()) fail_to_meet(c);
 }
 

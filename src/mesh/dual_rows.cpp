@@ -8,6 +8,7 @@
 #include <boost/geometry.hpp>
 #include <boost/geometry/index/rtree.hpp>
 #include <cmath>
+#include <map>
 
 namespace squeal
 {
@@ -43,9 +44,65 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> multiplier_vectors(const Face& face, st
   return chi;
 }
 
+/// A face beside an edge, and whether it goes along it from the lower node to the higher one.
+struct EdgeFace
+{
+  std::size_t face = 0;
+  bool upwards = false;
+};
+
+using EdgeFaces = std::map<std::pair<int, int>, std::vector<EdgeFace>>;
+
+EdgeFaces edges_of(const std::vector<Face>& faces)
+{
+  EdgeFaces edges;
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    for (int i = 0, corners = corner_count(faces[f].shape); i < corners; ++i)
+    {
+      const int from = faces[f].nodes[i], to = faces[f].nodes[(i + 1) % corners];
+      edges[std::minmax(from, to)].push_back({f, from < to});
+    }
+  return edges;
+}
+
+/// Sets the patches. Returns the side of each face: of a solid's 1. Shells may be numbered one way and their neighbours
+/// the other; in a patch all have the side of the first one.
+std::vector<double> set_patches(ContactSurface& surface)
+{
+  std::vector<double> side(surface.faces.size(), 1);
+  surface.patch.assign(surface.faces.size(), -1);
+  const EdgeFaces edges = edges_of(surface.faces);
+  int patches = 0;
+  for (std::size_t first = 0; first < surface.faces.size(); ++first)
+  {
+    if (surface.patch[first] >= 0) continue;
+    surface.patch[first] = patches;
+    std::vector<std::size_t> reached{first};
+    while (!reached.empty())
+    {
+      const std::size_t f = reached.back();
+      reached.pop_back();
+      const Face& face = surface.faces[f];
+      for (int i = 0, corners = corner_count(face.shape); i < corners; ++i)
+      {
+        const int from = face.nodes[i], to = face.nodes[(i + 1) % corners];
+        for (const EdgeFace& next : edges.at(std::minmax(from, to)))
+        {
+          if (surface.patch[next.face] >= 0) continue;
+          surface.patch[next.face] = patches;
+          if (surface.placed[next.face].two_sided) side[next.face] = next.upwards == (from < to) ? -side[f] : side[f];
+          reached.push_back(next.face);
+        }
+      }
+    }
+    ++patches;
+  }
+  return side;
+}
+
 /// Sets the nodes' normals, and how far the chords of linear faces may stand off the surface. An arc that turns by
 /// angle between the middle and the end of a chord h is h angle/4 above it. Twice that is allowed.
-void set_normals(ContactSurface& surface)
+void set_normals(ContactSurface& surface, const std::vector<double>& side)
 {
   std::vector<Vec3> sum(surface.nodes.size(), Vec3{});
   for (std::size_t f = 0; f < surface.faces.size(); ++f)
@@ -53,7 +110,7 @@ void set_normals(ContactSurface& surface)
     const auto nodes = nodes_of(surface.faces[f]);
     std::vector<Vec3> x;
     for (Eigen::Index i = 0; i < surface.placed[f].x.cols(); ++i) x.push_back(vec3(surface.placed[f].x.col(i)));
-    const auto vectors = multiplier_vectors(surface.faces[f], x);
+    const auto vectors = (side[f] * multiplier_vectors(surface.faces[f], x)).eval();
     surface.placed[f].normal = vectors.rowwise().sum().normalized();
     for (std::size_t i = 0; i < nodes.size(); ++i)
     {
@@ -176,7 +233,7 @@ std::size_t ContactSurface::place_of(int node) const
 
 ContactSurface contact_surface(const Mesh& mesh, const std::string& name, const std::string& user)
 {
-  ContactSurface surface{name, named_faces(mesh, name, user), {}, {}, {}, 0};
+  ContactSurface surface{name, named_faces(mesh, name, user), {}, {}, {}, {}, 0};
   surface.nodes = nodes_of_faces(surface.faces);
   for (const Face& face : surface.faces)
   {
@@ -188,7 +245,7 @@ ContactSurface contact_surface(const Mesh& mesh, const std::string& name, const 
     for (const int node : nodes_of(face)) x.push_back(mesh.nodes[node]);
     surface.placed.push_back({face.shape, position_matrix(x), {}, 0, face.of_shell});
   }
-  set_normals(surface);
+  set_normals(surface, set_patches(surface));
   Eigen::Vector3d low = surface.placed.front().x.col(0), high = low;
   for (const PlacedFace& face : surface.placed)
   {
@@ -209,13 +266,26 @@ std::size_t shared_nodes(const ContactSurface& a, const ContactSurface& b)
 bool turn_shell(ContactSurface& turned, const ContactSurface& other)
 {
   if (!turned.placed.front().two_sided) return false;
-  const Eigen::Vector3d at = turned.placed.front().x.rowwise().mean();
-  const auto distance = [&](const PlacedFace& face) { return (face.x.rowwise().mean() - at).norm(); };
-  const auto near = std::min_element(other.placed.begin(), other.placed.end(),
-                                     [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
-  if (near->normal.dot(turned.placed.front().normal) < 0) return true;
-  for (PlacedFace& face : turned.placed) face.normal = -face.normal;
-  for (Vec3& normal : turned.normals) normal = -1 * normal;
+  std::vector<char> turns; // of each patch, by its first face
+  std::vector<char> node_turns(turned.nodes.size(), 0);
+  for (std::size_t f = 0; f < turned.placed.size(); ++f)
+  {
+    PlacedFace& face = turned.placed[f];
+    const auto patch = static_cast<std::size_t>(turned.patch[f]);
+    if (patch == turns.size())
+    {
+      const Eigen::Vector3d at = face.x.rowwise().mean();
+      const auto distance = [&](const PlacedFace& x) { return (x.x.rowwise().mean() - at).norm(); };
+      const auto near = std::min_element(other.placed.begin(), other.placed.end(),
+                                         [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+      turns.push_back(near->normal.dot(face.normal) >= 0);
+    }
+    if (!turns[patch]) continue;
+    face.normal = -face.normal;
+    for (const int node : nodes_of(turned.faces[f])) node_turns[turned.place_of(node)] = 1;
+  }
+  for (std::size_t i = 0; i < node_turns.size(); ++i)
+    if (node_turns[i]) turned.normals[i] = -1 * turned.normals[i];
   return true;
 }
 

@@ -13,6 +13,7 @@ struct ContactSurface
   const std::vector<Face>& faces;
   std::vector<int> nodes;         // ascending
   std::vector<PlacedFace> placed; // one a face
+  std::vector<int> patch;         // of each face; faces that share an edge are of one
   std::vector<Vec3> normals;      // [-] of each node, outward, unit
   double size = 0;                // [m] diagonal of the bounding box
 
@@ -45,7 +46,8 @@ struct SlaveRows
 /// The number of nodes that two surfaces share.
 std::size_t shared_nodes(const ContactSurface& a, const ContactSurface& b);
 
-/// Turns the faces of a shell, which may look to either side, to oppose the other surface. Returns false for a solid's.
+/// Turns each patch of a shell, which may look to either side, to oppose the other surface. Returns false for a
+/// solid's.
 bool turn_shell(ContactSurface& turned, const ContactSurface& other);
 
 /// Returns the rows of all slave nodes, light ones included.

@@ -195,8 +195,8 @@ bool is_within(const Overlap& overlap, const SlaveInPlane& slave, double slack, 
   const double distance = std::abs(overlap.nearest_gap);
   if (distance > (limits.closes ? slack : limits.distance))
   {
-    if (findings.nearest == 0 || distance < findings.nearest)
-      findings.nearest = distance, findings.nearest_at = place_of(slave, overlap.at);
+    if (findings.nearest == 0 || distance < std::abs(findings.nearest))
+      findings.nearest = overlap.nearest_gap, findings.nearest_at = place_of(slave, overlap.at);
     return false;
   }
   if (!limits.closes && -overlap.least_gap > std::max(slack, findings.deepest))

@@ -42,7 +42,7 @@ struct CoveredFace
 /// What overlaps were left out, or contain each other. Places are on the slave face.
 struct OverlapFindings
 {
-  double nearest = 0; // [m] distance of the nearest one beyond the limit; 0: none
+  double nearest = 0; // [m] gap of the nearest one beyond the limit, negative inside; 0: none
   Vec3 nearest_at{};
   double deepest = 0; // [m] largest depth of one surface in the other; 0: none
   Vec3 deepest_at{};

@@ -43,6 +43,7 @@ Mesh read_on_rank_zero(const Scene& scene, MPI_Comm comm)
   broadcast(mesh.elements, comm);
   broadcast_lists(mesh.surfaces, comm);
   broadcast_lists(mesh.node_groups, comm);
+  broadcast_lists(mesh.dimensions, comm);
   return mesh;
 }
 

@@ -2,6 +2,8 @@
 
 #include "squeal/base/error.hpp"
 
+#include <array>
+
 namespace squeal
 {
 
@@ -11,6 +13,17 @@ namespace
 template <class Map> void add_keys(const Map& map, std::vector<std::string>& names)
 {
   for (const auto& [name, value] : map) names.push_back(name);
+}
+
+/// Nodes of a surface and of a volume of one name are those of the volume: a support would hold all of it.
+void check_one_meaning(const Mesh& mesh, const std::string& name, const std::string& user)
+{
+  constexpr std::array words = {"points", "curves", "surfaces", "volumes"};
+  const auto found = mesh.dimensions.find(name);
+  if (found == mesh.dimensions.end() || found->second.size() < 2) return;
+  const int lowest = found->second.front(), highest = found->second.back();
+  throw Error(user + ": \"" + name + "\" names " + words.at(static_cast<std::size_t>(lowest)) + " and " +
+              words.at(static_cast<std::size_t>(highest)) + " of the mesh: give each a name of its own");
 }
 
 } // namespace
@@ -26,7 +39,11 @@ int point_node(const Mesh& mesh, const std::string& name, const std::string& use
 std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const std::string& user)
 {
   if (const auto point = mesh.points.find(name); point != mesh.points.end()) return {point->second};
-  if (const auto group = mesh.node_groups.find(name); group != mesh.node_groups.end()) return group->second;
+  if (const auto group = mesh.node_groups.find(name); group != mesh.node_groups.end())
+  {
+    check_one_meaning(mesh, name, user);
+    return group->second;
+  }
   std::vector<std::string> known;
   add_keys(mesh.points, known);
   add_keys(mesh.node_groups, known);

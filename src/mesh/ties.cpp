@@ -40,10 +40,10 @@ void check_meeting(const Tie& tie, const SlaveRows& rows)
   if (std::find(rows.covered.begin(), rows.covered.end(), 1) != rows.covered.end()) return;
   const OverlapFindings& found = rows.findings;
   const Vec3& at = found.nearest_at;
-  if (found.nearest > 0)
+  if (found.nearest != 0)
     throw Error(name_of(tie) + format("the surfaces are at least %.4g m apart along the normal, at (%g, %g, %g): give "
                                       "the tie a reach above that, or correct the mesh",
-                                      found.nearest, at[0], at[1], at[2]));
+                                      std::abs(found.nearest), at[0], at[1], at[2]));
   throw Error(name_of(tie) + "no face of one is opposite a face of the other: correct the names or the mesh");
 }
 

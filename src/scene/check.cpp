@@ -38,6 +38,7 @@ public:
       for (const Force& force : scene_.forces) need_known(force.on, points_, &force.on, "[[force]] on");
     }
     for (const Contact& contact : scene_.contacts) check_contact(contact);
+    check_contacts_differ();
     for (const Tie& tie : scene_.ties)
       if (tie.slave == tie.master)
         fail(&tie.master, "[[tie]] slave and master are both \"" + tie.slave + "\"; name two surfaces");
@@ -221,6 +222,16 @@ private:
         std::max(scene_.friction.coefficient, scene_.friction.static_coefficient) > 0)
       fail(&contact.rotor, "[[contact]] needs a rotation or a velocity that drives the rotor where there is friction");
     check_frame(contact);
+  }
+
+  /// Two contacts of the same surfaces would share their pressure in no particular way.
+  void check_contacts_differ() const
+  {
+    std::set<std::pair<std::string, std::string>> known;
+    for (const Contact& contact : scene_.contacts)
+      if (!known.insert(std::minmax(contact.rotor, contact.stator)).second)
+        fail(&contact.rotor, "[[contact]] \"" + contact.rotor + "\" and \"" + contact.stator +
+                                 "\" are in contact already; remove one of the two tables");
   }
 
   void check_friction() const

@@ -185,9 +185,21 @@ std::vector<ConstraintTerm> rotation_terms(const TiedNode& tied, int axis)
   return terms;
 }
 
-/// Makes tied nodes follow the others. What a support holds stays held, and a mid-side of a rigid body stays on it.
+/// Whether each node is on a solid.
+std::vector<char> nodes_on_solids(const Mesh& mesh)
+{
+  std::vector<char> on_solid(mesh.nodes.size(), 0);
+  for (const Element& element : mesh.elements)
+    if (!is_shell(element.shape))
+      for (const int node : nodes_of(element)) on_solid[static_cast<std::size_t>(node)] = 1;
+  return on_solid;
+}
+
+/// Makes tied nodes follow the others. What a support holds stays held, and a mid-side of a rigid body stays on it. The
+/// rotation of a joint of shells and solids follows the solids, and so the node itself: its tie is that of a solid.
 void add_ties(Constraints& constraints, const Mesh& mesh, const Scene& scene)
 {
+  const std::vector<char> on_solid = nodes_on_solids(mesh);
   for (const TiedNode& tied : tied_nodes(mesh, scene).nodes)
   {
     const PetscInt first = 6 * PetscInt{tied.node};
@@ -202,7 +214,8 @@ void add_ties(Constraints& constraints, const Mesh& mesh, const Scene& scene)
       std::vector<ConstraintTerm> terms;
       for (const auto& [node, weight] : tied.others) terms.push_back({6 * PetscInt{node} + c, weight});
       for (int axis = 0; axis < 3; ++axis)
-        if (constraints.kind_of(tied.node, 3 + axis) != DofKind::absent)
+        if (!on_solid[static_cast<std::size_t>(tied.node)] &&
+            constraints.kind_of(tied.node, 3 + axis) != DofKind::absent)
           terms.push_back({first + 3 + axis, cross(unit(axis), tied.arm)[c]});
       make_dependent(constraints, first + c, std::move(terms));
     }

@@ -106,6 +106,11 @@ std::vector<Contribution> superelement_contributions(const Mesh& mesh, const Sce
     const std::filesystem::path& folder = scene.superelements[i].folder;
     const auto read = [&]
     {
+      for (const char* other : {"F.petsc", "G.petsc", "H.petsc"})
+        if (is_file(folder / other))
+          throw Error((folder / other).string() +
+                      ": a superelement has M, K and C alone: remove the file, and put forces "
+                      "into [[force]] by node");
       added.M = small_matrix(folder / "M.petsc", order);
       added.K = small_matrix(folder / "K.petsc", order);
       if (is_file(folder / "C.petsc"))

@@ -88,13 +88,21 @@ bool slides_as_at_equilibrium(const Interface& interface, const Equilibrium& equ
   return true;
 }
 
-/// The largest factor on mu r_n at the times of the ramps.
+/// The largest factor on mu r_n. Between two times of the ramps it is a parabola.
 double largest_friction(const Ramps& ramps)
 {
-  double largest = factor_at(ramps.load, 0) * factor_at(ramps.friction, 0);
+  std::vector<double> times{0};
   for (const TimeFactor* factor : {&ramps.load, &ramps.friction})
-    for (const double time : factor->time)
-      largest = std::max(largest, factor_at(ramps.load, time) * factor_at(ramps.friction, time));
+    times.insert(times.end(), factor->time.begin(), factor->time.end());
+  std::sort(times.begin(), times.end());
+  double largest = factor_at(ramps.load, 0) * factor_at(ramps.friction, 0);
+  for (std::size_t i = 1; i < times.size(); ++i)
+  {
+    const double a = factor_at(ramps.load, times[i - 1]), b = factor_at(ramps.friction, times[i - 1]);
+    const double da = factor_at(ramps.load, times[i]) - a, db = factor_at(ramps.friction, times[i]) - b;
+    const double top = da * db < 0 ? std::clamp(-(a * db + b * da) / (2 * da * db), 0., 1.) : 1;
+    largest = std::max({largest, (a + top * da) * (b + top * db), (a + da) * (b + db)});
+  }
   return largest;
 }
 

@@ -136,6 +136,10 @@ UPPER = 'name = "upper"\nyoung = 1e9\npoisson = 0.3\ndensity = 1000'
 
 # name: how to write it, what the message must speak of
 CASES = {
+    "surfaces inside each other": (block_scene("", "", "{shift, 0, 1, 1, 1, 1}", "{shift, 0, 0.99, 1, 1, 1}"),
+                                   ["blocks.geo", "'under'", "'over'", "0.01 m inside the rotor", "correct the mesh"]),
+    "contact twice": (block_scene("[friction]", '[[contact]]\nrotor = "over"\nstator = "under"\nvelocity = [1, 0, 0]\n[friction]'),
+                      ["scene.toml", '"over" and "under" are in contact already', "remove one"]),
     "missing scene file": (lambda folder: [folder / "absent.toml"], ["absent.toml"]),
     "cycle from no transient": (point_scene('periods = 10\nsteps_per_period = 400\n\n[cycle]\n',
                                             'periods = 10\nenabled = false\n\n[cycle]\nstart = "transient"\n'),

@@ -1,4 +1,4 @@
-"""Contact of meshes that do not match: Hertz's line contact, the disc brake meshed apart, pads finer than the disc."""
+"""Contact of meshes that do not match: Hertz's line contact, the disc brake meshed apart."""
 
 import subprocess
 import sys
@@ -109,7 +109,8 @@ def test_the_disc_brake_meshed_apart(converged):
     """10-node tetrahedra: 1 and 3 ranks agree, all of the pistons' force passes through the pads, moments balance."""
     one, three = (converged(INPUTS / "disc_brake" / "scene.toml", "--set", "transient.periods=1", ranks=ranks).report
                   for ranks in (1, 3))
-    for a, b in zip(one["modes"]["modes"], three["modes"]["modes"]):
+    assert len(one["modes"]["modes"]) > 20
+    for a, b in zip(one["modes"]["modes"], three["modes"]["modes"], strict=True):
         assert b["frequency_hz"] == pytest.approx(a["frequency_hz"], rel=1e-9)
         assert b["growth_rate"] == pytest.approx(a["growth_rate"], rel=1e-6, abs=1e-6)
     assert one["modes"]["unstable_count"] == 3

@@ -54,10 +54,11 @@ def test_ranks_and_given_factors_of_one_agree(converged):
     np.testing.assert_array_equal(other["pad_x"], one["pad_x"])
 
 
-def test_the_refusal_of_steep_friction_knows_the_ramps(squeal):
-    """mu r_n reaches four times the scene's own."""
+@pytest.mark.parametrize("load, friction", [([[0, 1], [1, 2]], [[0, 1], [1, 2]]), ([[0, 0.105], [1, 3.9]], [[0, 3.9], [1, 0.105]])])
+def test_the_refusal_of_steep_friction_knows_the_ramps(squeal, load, friction):
+    """mu r_n reaches four times the scene's own: in the end, or between two times at which it has 0.41 of it."""
     fall = ["--set", "friction.static_coefficient=0.4", "--set", "friction.decay_speed=0.02"]
-    words = arguments(start='"mode"', steps=10, step_size=0.2, load_factor=[[0, 1], [1, 2]], friction_factor=[[0, 1], [1, 2]])
+    words = arguments(start='"mode"', steps=10, step_size=0.2, load_factor=load, friction_factor=friction)
     run = squeal(*words, *fall, ranks=1)
     alone = squeal(*arguments(start='"mode"', steps=10, step_size=0.2, load_factor=[[0, 1]], friction_factor=[[0, 1]]), *fall, ranks=1)
     assert run.report["transient"]["outcome"] == "refused" and "several solutions" in run.report["transient"]["reason"]

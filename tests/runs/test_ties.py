@@ -58,6 +58,21 @@ def test_a_tied_beam_tends_to_the_beam_of_one_piece(converged, tmp_path, quadrat
     assert differences[1] < (2e-3 if quadratic else 1e-2)
 
 
+def test_a_tied_surface_whose_faces_bound_nothing_is_refused(squeal, tmp_path):
+    """Triangles over the sides of bricks: taken for a curve, they would be tied node by node."""
+    mesh = Mesh()
+    part(mesh, "left", 0, 1, [2, 2, 2], False)
+    part(mesh, "right", 1, 2, [2, 3, 3], False)
+    sides = np.array(mesh.groups.pop(("right-low", "quad")))
+    mesh.add("right-low", "triangle", np.vstack([sides[:, [0, 1, 2]], sides[:, [0, 2, 3]]]))
+    mesh.write(tmp_path / "beam.msh")
+    scene = write_scene(tmp_path, mesh={"file": "beam.msh"}, part=[{"name": name, **STEEL} for name in ("left", "right")],
+                        tie=[{"slave": "right-low", "master": "left-high"}])
+    run = squeal(scene)
+    assert run.code == 1
+    assert "beam.msh: surface 'right-low': 18 faces are not on an element of any part" in run.messages[0]
+
+
 def strip_on_a_block(run, folder, cells, across, solid="brick", held=True):
     """Modes of a shell that stands out of a block's face: with as many cells across on the block's own nodes, else tied by its edge."""
     folder.mkdir()

@@ -1,6 +1,7 @@
 """Scenes of other codes as wholes: matrices beside the mesh of the same deck, and CalculiX's matrices beside dense algebra."""
 
 import itertools
+import shutil
 import subprocess
 import sys
 
@@ -166,6 +167,28 @@ def write_superelement(deck, folder, cells, count):
     (folder / "strip.pch").write_text(text)
     (folder / "super.toml").write_text('K = "strip.pch:K"\nM = "strip.pch:M"\nnodes = "deck.inp"\nlength = 0.001\n')
     run_tool("matrices", folder / "super.toml", folder / "super")
+
+
+@pytest.mark.parametrize("name", ["F", "G", "H"])
+def test_what_a_superelement_cannot_have_is_refused(squeal, tmp_path, name):
+    """Left aside, a load or gyroscopic terms of the substructure would be missing without a word."""
+    deck = StripDeck()
+    sets = deck.write_deck(tmp_path / "deck.inp")
+    whole = deck.cells["strip"]
+    far = [cell for cell in whole if min(p[0] for p in cell) >= 4]
+    write_superelement(deck, tmp_path, far, 0)
+    shutil.copy(tmp_path / "super" / "K.petsc", tmp_path / "super" / f"{name}.petsc")
+    deck.cells["strip"] = [cell for cell in whole if cell not in far]
+    sets["seam"] = deck.those("strip", lambda p: p[0] == 4)
+    deck.write_deck(tmp_path / "joined.inp", sets)
+    run_tool("mesh", tmp_path / "joined.inp", tmp_path / "joined", "--length", "0.001")
+    (tmp_path / "more").mkdir()
+    more = write_scene(tmp_path / "more", superelement=[{"name": "far", "folder": "../super", "on": "seam"}]).read_text()
+    scene = tmp_path / "joined" / "scene.toml"
+    scene.write_text(scene.read_text().partition("# [[contact]]")[0] + more)
+    run = squeal(scene)
+    assert run.code == 1
+    assert f"{name}.petsc: a superelement has M, K and C alone" in run.messages[0]
 
 
 @pytest.mark.parametrize("count", [None, 0])

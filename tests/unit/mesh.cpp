@@ -124,6 +124,15 @@ TEST_CASE("a wrong name is answered with the nearest right one")
   CHECK(has(problem([](Scene& s) { s.mesh->file += ".gone"; }), "no such mesh file"));
 }
 
+TEST_CASE("a group of two dimensions holds no support: all of its volume would be held")
+{
+  const TemporaryFile file(std::string(blocks) + "Physical Volume(\"roof\", 77) = {2};\n", ".geo");
+  Scene scene = block_scene(file.path());
+  CHECK(read_mesh(scene, comm).surfaces.at("roof").size() == 9); // as a surface it has one meaning
+  scene.supports = {{"roof", {true, true, true, false, false, false}}};
+  CHECK(has(problem_of([&] { read_mesh(scene, comm); }), "\"roof\" names surfaces and volumes of the mesh"));
+}
+
 TEST_CASE("gmsh's own words reach the message")
 {
   const TemporaryFile file("Point(1) = {0, 0} 1;\n", ".geo");

@@ -1,5 +1,6 @@
 // ranks: 1 2 3
 #include "../support/blocks.hpp"
+#include "../support/bricks.hpp"
 #include "squeal/mesh/contact_pairs.hpp"
 #include "squeal/mesh/partition.hpp"
 
@@ -95,6 +96,39 @@ TEST_CASE("a finer stator has a pair a node, a finer rotor too where it is the s
   CHECK(make_pairs(mesh, scene).pairs.size() == 25);
   scene.contacts[0].slave = SlaveSide::rotor;
   CHECK(make_pairs(mesh, scene).pairs.size() == 9);
+}
+
+TEST_CASE("shells of either numbering face what they touch, patch by patch")
+{
+  Mesh mesh;
+  add_box(mesh, "low", 0, {0, 0, 0}, {3, 1, 1}, {6, 2, 1});
+  for (const double x : {0., 2.}) // two plates apart
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j)
+      {
+        const double a = x + 0.5 * i, b = 0.5 * j;
+        const auto at = [&](double dx, double dy) { return node_at(mesh, {a + dx, b + dy, 1.25}); };
+        std::array<int, 4> corners{at(0, 0), at(0.5, 0), at(0.5, 0.5), at(0, 0.5)};
+        if ((i + j + (x > 0)) % 2 == 1) std::reverse(corners.begin(), corners.end());
+        Face face{FaceShape::quad4, {}, true};
+        Element shell{Shape::shell4, 1, {}};
+        std::copy(corners.begin(), corners.end(), face.nodes.begin());
+        std::copy(corners.begin(), corners.end(), shell.nodes.begin());
+        mesh.elements.push_back(shell);
+        mesh.surfaces["plates"].push_back(face);
+        add_to_group(mesh, "plates", corners);
+      }
+  Scene scene;
+  scene.parts = {{"low", {}, 0, {}}, {"plates", {}, 0.5, {}}};
+  Contact contact;
+  contact.rotor = "low:z+";
+  contact.stator = "plates";
+  contact.reach = 0.5;
+  scene.contacts = {contact};
+  const ContactPairs pairs = make_pairs(mesh, scene);
+  CHECK(pairs.pairs.size() == 18);
+  for (const ContactPair& pair : pairs.pairs) CHECK(norm(pair.normal - Vec3{0, 0, 1}) < 1e-12);
+  CHECK(pairs.coverage[0].covered == doctest::Approx(2).epsilon(1e-12));
 }
 
 TEST_CASE("a surface with a solid on both sides cannot be in contact")

@@ -131,6 +131,16 @@ TEST_CASE("a shell tied to a solid by its edge or its face has six motions witho
   check_free_of_energy(beam_and_skin(0.04, 0.01), tied_parts({"strip", "cube:z+", 0.006}));
 }
 
+TEST_CASE("a solid may be tied by a face that has nodes of a shell, and moves freely")
+{
+  Mesh mesh = cube_and_strip(2), base;
+  add_box(base, "base", 2, {0, -0.1, -0.05}, {0.1, 0, 0.05}, {3, 3, 3});
+  append(mesh, base);
+  Scene scene = tied_parts({"cube:y-", "base:y+", 0});
+  scene.parts.push_back({"base", {young, 0, 7850}, 0, {}});
+  check_free_of_energy(mesh, scene);
+}
+
 TEST_CASE("the rotation of a shared node is the solid's: exact where the solid turns rigidly, no freedom of its own")
 {
   const Mesh mesh = cube_and_strip(2);

@@ -65,6 +65,7 @@ struct Mesh
   std::vector<Element> elements;                           // in the order of the file
   std::map<std::string, std::vector<Face>> surfaces;       // of every named surface, those of shells included
   std::map<std::string, std::vector<int>> node_groups;     // nodes of every named group of any dimension, ascending
+  std::map<std::string, std::vector<int>> dimensions;      // of every named group: 1 has curves, 3 solids, ascending
   std::map<std::string, int> points;                       // node of every scene point and rigid body
   std::vector<std::vector<SuperelementRow>> superelements; // in the scene's order
 };

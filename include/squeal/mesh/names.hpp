@@ -13,6 +13,7 @@ namespace squeal
 int point_node(const Mesh& mesh, const std::string& name, const std::string& user);
 
 /// Returns the node of a point or rigid body, or else the nodes of a group, ascending.
+/// Throws Error for a group of several dimensions, as of a surface and a volume of one name.
 std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const std::string& user);
 
 /// Returns the faces of a surface.
