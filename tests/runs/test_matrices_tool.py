@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sparse
 
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "matrices"
-NAMES = ("M", "C", "K", "B", "F", "gap", "drive")
+NAMES = ("M", "C", "K", "B", "F", "gap", "drive", "compliance")
 
 
 def convert(*arguments):
@@ -22,7 +22,7 @@ def model(n=12, pairs=3, tangential=2):
     K = (half + half.T + 10 * sparse.eye(n)).tocsr() / 3  # thirds: every digit is needed
     B = sparse.random((1 + tangential) * pairs, n, 0.4, random_state=9).tocsr()
     return {"M": sparse.eye(n).tocsr() * 0.1, "C": 1e-7 * K, "K": K, "B": B, "F": random.normal(size=n),
-            "gap": random.normal(size=pairs), "drive": random.normal(size=tangential * pairs)}
+            "gap": random.normal(size=pairs), "drive": random.normal(size=tangential * pairs), "compliance": random.uniform(size=pairs) * 1e-9}
 
 
 def save(folder, arrays):
@@ -82,6 +82,7 @@ def unsymmetric(arrays):
         (lambda a: {"B": a["B"][:-1]}, "B has 8 rows, gap 3 entries"),
         (lambda a: {"B": a["B"][:, :4]}, "B has 4 columns"),
         (lambda a: {"drive": a["drive"][:4]}, "drive has 4 entries"),
+        (lambda a: {"compliance": a["compliance"][:2]}, "compliance has 2 entries, gap 3"),
         (lambda a: {"gap": np.array([np.nan, 0, 0])}, "not finite"),
         (lambda a: {"K": a["K"] * 1j}, "K is not real"),
         (unsymmetric, "K is not symmetric"),
@@ -107,3 +108,53 @@ def test_truncated_and_missing_files_are_named(tmp_path):
     file.unlink()
     assert "no file for K" in convert(tmp_path / "b", tmp_path / "c").stderr
     assert "there is no folder" in convert(tmp_path / "nowhere", tmp_path / "c").stderr
+
+
+def test_a_compliance_needs_pairs(tmp_path):
+    arrays = {name: array for name, array in model().items() if name in ("M", "K", "compliance")}
+    done = convert(save(tmp_path / "a", arrays), tmp_path / "b")
+    assert done.returncode == 1 and "compliance is that of contact pairs" in done.stderr
+
+
+def test_the_units_of_a_compliance(tmp_path):
+    """In mm and kN: 1 mm/kN is 1e-6 m/N."""
+    arrays = model(n=4, pairs=1)
+    save(tmp_path / "a", arrays)
+    lines = [f'{name} = "a/{name}.np{"z" if sparse.issparse(array) else "y"}"' for name, array in arrays.items()]
+    (tmp_path / "dofs.txt").write_text("1 x\n1 y\n2 x\n2 y\n")
+    (tmp_path / "model.toml").write_text("\n".join([*lines, 'dofs = "dofs.txt"', "length = 1e-3", "force = 1e3", ""]))
+    done = convert(tmp_path / "model.toml", tmp_path / "b", "--to", "npz")
+    assert done.returncode == 0, done.stderr
+    np.testing.assert_allclose(np.load(tmp_path / "b" / "compliance.npy"), 1e-6 * arrays["compliance"], rtol=1e-15)
+
+
+def test_what_a_model_before_had_is_removed(tmp_path):
+    """Of the files that the tool writes; others stay, and those of a model that is refused."""
+    arrays, out = model(), tmp_path / "out"
+    for name in ("M", "K"):
+        arrays[name] = arrays[name].toarray()
+    save(tmp_path / "a", arrays)
+    (tmp_path / "a" / "dofs.txt").write_text("".join(f"{node} {motion}\n" for node in range(1, 5) for motion in "xyz"))
+    (tmp_path / "a" / "nodes.txt").write_text("".join(f"{node} {node} 0 0\n" for node in range(1, 5)))
+    assert convert(tmp_path / "a", out).returncode == 0
+    (out / "notes.txt").write_text("mine")
+    before = {file.name: file.read_bytes() for file in out.iterdir()}
+    assert len(before) == len(NAMES) + 3
+    save(tmp_path / "bad", {"M": arrays["M"], "K": arrays["K"][:5]})
+    assert convert(tmp_path / "bad", out).returncode == 1
+    assert {file.name: file.read_bytes() for file in out.iterdir()} == before
+    save(tmp_path / "less", {"M": arrays["M"], "K": arrays["K"]})
+    assert convert(tmp_path / "less", out).returncode == 0
+    assert sorted(file.name for file in out.iterdir()) == ["K.petsc", "M.petsc", "notes.txt"]
+
+
+def test_what_is_read_is_never_written_over_or_removed(tmp_path):
+    folder = save(tmp_path / "a", model())
+    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+    done = convert(folder, folder, "--to", "npz")
+    assert done.returncode == 1 and "M.npz is read" in done.stderr and "another folder" in done.stderr
+    (folder / "model.toml").write_text('K = "K.npz"\nM = "M.npz"\ndofs = "dofs.txt"\n')
+    (folder / "dofs.txt").write_text("".join(f"{node} x\n" for node in range(12)))
+    done = convert(folder / "model.toml", folder)
+    assert done.returncode == 1 and "dofs.txt is read" in done.stderr
+    assert {name: (folder / name).read_bytes() for name in before} == before and not list(folder.glob("*.petsc"))
