@@ -14,6 +14,7 @@ from deck_files import Problem, abaqus_nodes, blocks_of, cards_of, nastran_nodes
 COLUMNS = ("rotor", "stator", "nx", "ny", "nz", "area", "gap")
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 ROUNDING = 1e-6  # of the model's size: positions in decks have as many digits
+ROTATION_KEYS = {"axis": (str, list), "centre": list, "rate": (int, float)}
 
 
 def read_nodes(file):
@@ -75,21 +76,45 @@ def read_pairs(file):
     return pairs
 
 
+def vector_of(value, place, expected="three numbers"):
+    is_vector = isinstance(value, (list, tuple)) and len(value) == 3
+    if not is_vector or not all(type(x) in (int, float) and np.isfinite(x) for x in value):
+        raise Problem(f"{place} = {value}: expected {expected}")
+    return np.array(value, float)
+
+
 def direction_of(value, place):
     """Unit vector of "x", "y", "z" or three numbers."""
-    vector = np.array(AXES.get(value, value) if isinstance(value, str) else value, float) \
-        if not isinstance(value, str) or value in AXES else None
-    if vector is None or vector.shape != (3,) or not np.linalg.norm(vector) > 0:
-        raise Problem(f"{place} = {value}: expected \"x\", \"y\", \"z\" or a vector of three numbers")
+    expected = '"x", "y", "z" or a vector of three numbers'
+    vector = vector_of(AXES.get(value, value) if isinstance(value, str) else value, place, expected)
+    if not np.linalg.norm(vector) > 0:
+        raise Problem(f"{place} = {value}: expected {expected}, not zero")
     return vector / np.linalg.norm(vector)
 
 
-def velocity_at(contact, position, place):
+def check_motion(contact, place):
+    """The rules of a scene's [[contact]] for the motion of its rotor."""
+    if "rotation" in contact and "velocity" in contact:
+        raise Problem(f"{place}: rotation and velocity exclude each other: keep one")
+    rotation = contact.get("rotation", {"axis": "z", "rate": 0})
+    for key in ("axis", "rate"):
+        if key not in rotation:
+            raise Problem(f"{place}, rotation: needs the key '{key}', as in {{ axis = \"z\", centre = [0, 0, 0], rate = 20 }}")
+    direction_of(rotation["axis"], f"{place}, rotation.axis")
+    vector_of(rotation.get("centre", [0, 0, 0]), f"{place}, rotation.centre", "three numbers [m]")
+    if not np.isfinite(rotation["rate"]):
+        raise Problem(f"{place}, rotation.rate = {rotation['rate']}: expected a number [rad/s]")
+    vector_of(contact.get("velocity", [0, 0, 0]), f"{place}, velocity", "three numbers [m/s]")
+    if isinstance(contact.get("tangents"), list) and not 1 <= len(contact["tangents"]) <= 2:
+        raise Problem(f"{place}, tangents: {len(contact['tangents'])} directions; expected one or two")
+
+
+def velocity_at(contact, position):
     """Velocity of the rotor's surface [m/s]."""
     if "rotation" in contact:
         rotation = contact["rotation"]
-        axis = direction_of(rotation.get("axis"), f"{place} rotation.axis")
-        return float(rotation.get("rate", 0)) * np.cross(axis, position - np.array(rotation.get("centre", (0, 0, 0)), float))
+        arm = position - np.array(rotation.get("centre", (0, 0, 0)), float)
+        return float(rotation["rate"]) * np.cross(direction_of(rotation["axis"], "rotation.axis"), arm)
     return np.array(contact.get("velocity", (0, 0, 0)), float)
 
 
@@ -167,7 +192,7 @@ def make_pairs(contacts, labels, nodes, unit):
             if gap < 0 and "gap" not in pair:
                 raise Problem(f"{place}: node {pair['stator']} is {-gap:.3g} m inside the rotor: turn the normal, which points "
                               "out of the rotor, or give the column gap")
-            velocity = square(velocity_at(contact, ends[0], "[[contact]]"), normal)
+            velocity = square(velocity_at(contact, ends[0]), normal)
             tangents = tangents_at(contact, normal, velocity, "[[contact]]")
             if count is None:
                 count = len(tangents)

@@ -358,7 +358,19 @@ BAD_PAIRS = {
     "normal the wrong way": ("11 41\n", CONTACT.replace('"z"', "[0, 0, -1]"), ["line 1", "inside the rotor", "turn the normal"]),
     "no normal": ("7 40\n", CONTACT.replace('normal = "z"\n', ""), ["line 1", "coincide", "nx, ny, nz"]),
     "bad axis": ("7 40\n", CONTACT.replace('axis = "z"', 'axis = "w"'), ["rotation.axis", "three numbers"]),
-    "unknown key": ("7 40\n", CONTACT.replace("normal", "normale"), ["[[contact]]", "normale"]),
+    "unknown key": ("7 40\n", CONTACT.replace("normal", "normale"), ["[[contact]]", "'normale'", "'normal'"]),
+    "centre misspelt": ("7 40\n", CONTACT.replace("centre", "center"), ["model.toml", "rotation", "'center'", "'centre'"]),
+    "rate misspelt": ("7 40\n", CONTACT.replace("rate", "rpm"), ["rotation", "'rpm'", "rate"]),
+    "no rate": ("7 40\n", CONTACT.replace(", rate = 2", ""), ["rotation", "'rate'"]),
+    "no axis": ("7 40\n", CONTACT.replace('axis = "z", ', ""), ["rotation", "'axis'"]),
+    "two drives": ("7 40\n", CONTACT + "velocity = [1, 0, 0]\n", ["rotation and velocity", "keep one"]),
+    "a short velocity": ("7 40\n", CONTACT.replace("rotation", "velocity = [1, 0] #"), ["velocity = [1, 0]", "three numbers"]),
+    "a velocity of words": ("7 40\n", CONTACT.replace("rotation", 'velocity = [1, 0, "a"] #'), ["velocity", "three numbers"]),
+    "a centre of two": ("7 40\n", CONTACT.replace("0, 0, 0", "0, 0"), ["rotation.centre", "three numbers"]),
+    "a rate of text": ("7 40\n", CONTACT.replace("rate = 2", 'rate = "2"'), ["rate = 2", "a number"]),
+    "a normal of words": ("7 40\n", CONTACT.replace('"z"', '[0, "a", 1]', 1), ["normal", "three numbers"]),
+    "a third tangent": ("7 40\n", CONTACT + 'tangents = ["x", "y", "x"]\n', ["tangents", "3 directions", "one or two"]),
+    "no table": ("7 40\n", "contact = [1]\n", ["contact = 1", "[[contact]]"]),
 }
 
 
