@@ -9,7 +9,7 @@ import re
 
 import numpy as np
 import scipy.sparse as sparse
-from deck_files import Problem, abaqus_nodes, blocks_of, cards_of, nastran_nodes, number, whole
+from deck_files import Problem, Systems, abaqus_nodes, blocks_of, cards_of, nastran_nodes, number, whole
 
 COLUMNS = ("rotor", "stator", "nx", "ny", "nz", "area", "gap")
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
@@ -18,12 +18,15 @@ ROTATION_KEYS = {"axis": (str, list), "centre": list, "rate": (int, float)}
 
 
 def read_nodes(file):
-    """Numbers and positions of nodes: of an Abaqus or Nastran deck, or `node, x, y, z` a line."""
-    ending = file.suffix.lower()
+    """Positions of nodes by number, of an Abaqus or Nastran deck, or `node, x, y, z` a line; and the axes of the motions of
+    those whose displacement system is turned, in the columns of a matrix."""
+    ending, turned = file.suffix.lower(), {}
     if ending == ".inp":
         labels, positions = abaqus_nodes(blocks_of(file))
     elif ending in (".bdf", ".nas", ".dat"):
-        labels, positions = nastran_nodes(cards_of(file))
+        cards = cards_of(file)
+        labels, positions = nastran_nodes(cards)
+        turned = turned_axes(cards, dict(zip(labels.tolist(), positions)))
     else:
         rows = [(place, fields) for place, fields in rows_of(file) if fields[0].lstrip("-").isdigit()]
         for place, fields in rows:
@@ -36,7 +39,60 @@ def read_nodes(file):
     known = dict(zip(labels.tolist(), positions))
     if len(known) < len(labels):
         raise Problem(f"{file}: {len(labels) - len(known)} node(s) are there twice")
-    return known
+    return known, turned
+
+
+def turned_axes(cards, positions):
+    """Of each GRID with a displacement system (CD) that is not along x, y and z: its axes at the node, in columns."""
+    systems, found = Systems(cards), {}
+    default = next((card.field(7) for card in cards if card.name == "GRDSET"), "")
+    for card in cards:
+        if card.name != "GRID":
+            continue
+        place, node = f"{card.place}, GRID {card.field(2)}", card.whole(2)
+        system = whole(card.field(7) or default or "0", place)
+        if system > 0 and not systems.are_basic_axes(system, place):  # -1 is a point of a fluid
+            axes = axes_at(systems, system, positions[node], place)
+            found[node] = np.where(abs(axes) < 1e-12, 0.0, axes)
+    return found
+
+
+def axes_at(systems, system, position, place):
+    """On the axis of a cylinder or sphere there is no radius: the system's own axes hold, as in Nastran."""
+    origin, axes = systems.frame(system, place)
+    x, y, z = axes.T @ (position - origin)
+    kind, radius = systems.cards[system].name[-1], np.hypot(x, y)
+    if kind == "R" or radius <= 1e-12 * np.linalg.norm(position - origin) or radius == 0:
+        return axes
+    c, s = x / radius, y / radius
+    if kind == "C":
+        return axes @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    sin, cos = np.array([radius, z]) / np.hypot(radius, z)
+    return axes @ np.array([[sin * c, cos * c, -s], [sin * s, cos * s, c], [cos, -sin, 0]])
+
+
+def to_basic_axes(labels, turned):
+    """T of u = T u_new, whose rows of turned nodes are along x, y and z, and the labels of u_new."""
+    rows = {}
+    for row, (node, dof) in enumerate(labels.tolist()):
+        if node in turned and 1 <= dof <= 6:
+            rows.setdefault((node, dof > 3), []).append(row)
+    labels, i, j, values = labels.copy(), [], [], []
+    for (node, rotational), own in rows.items():
+        along = labels[own, 1] - (4 if rotational else 1)
+        axes = turned[node][:, along]
+        basic = np.flatnonzero(axes.any(axis=1))
+        if len(basic) != len(own):
+            raise Problem(f"node {node}: the matrices have the motions {', '.join(map(str, labels[own, 1]))} of its displacement "
+                          "system alone, which no motions along x, y and z are: write the matrices before supports take "
+                          "rows out, or with displacement systems along x, y and z")
+        i += np.repeat(own, len(own)).tolist()
+        j += own * len(own)
+        values += axes[basic].T.ravel().tolist()
+        labels[own, 1] = basic + (4 if rotational else 1)
+    others = np.setdiff1d(np.arange(len(labels)), i)
+    places = np.concatenate([[i, j], [others, others]], axis=1).astype(np.int64)
+    return sparse.csr_matrix((np.r_[values, np.ones(len(others))], places), (len(labels), len(labels))), labels
 
 
 def rows_of(file):
