@@ -91,7 +91,7 @@ def coordinates(file, values, rows, columns, n):
     places = np.concatenate([rows, columns])
     if len(places) and (places.min() < 0 or places.max() >= n):
         raise Problem(f"{file}: rows and columns from {places.min()} to {places.max()}; expected 0 to {n - 1}")
-    return vendor.both_triangles(sparse.coo_matrix((values, (rows, columns)), (n, n)))
+    return vendor.Untold(sparse.coo_matrix((values, (rows, columns)), (n, n)))
 
 
 def read_matlab(file, name):
@@ -143,17 +143,25 @@ def read_hdf5(item, file):
 
 
 def read_mtx(file, name):
-    """Matrix Market says so in its first line; else it is Abaqus's."""
+    """Matrix Market says so in its first line; else it is Abaqus's, a substructure or an assembled matrix."""
     with open(file, "rb") as stream:
         if stream.read(14).lower() == b"%%matrixmarket":
             return scipy.io.mmread(str(file))
+    _, keywords = vendor.head_of(file)
+    if any(keyword[1:].strip().upper().startswith("USER ELEMENT") for keyword in keywords):
+        return vendor.read_user_element(file, name)
     return vendor.read_abaqus(file)
+
+
+def read_calculix(file, name):
+    """Of a symmetric matrix one triangle, of another one both."""
+    return vendor.read_abaqus(file, half=True)
 
 
 READERS = {".petsc": read_petsc, ".npz": read_npz, ".npy": lambda file, name: load_numpy(file), ".mtx": read_mtx,
            ".mat": read_matlab, ".op4": nastran.read_op4, ".pch": nastran.read_dmig, ".dmig": nastran.read_dmig,
-           ".bdf": nastran.read_dmig, ".sti": lambda file, name: vendor.read_abaqus(file), ".mas": lambda file, name: vendor.read_abaqus(file), ".hb": vendor.read_harwell_boeing, ".rsa": vendor.read_harwell_boeing,
-           ".rua": vendor.read_harwell_boeing, ".matrix": vendor.read_harwell_boeing}
+           ".bdf": nastran.read_dmig, ".sti": read_calculix, ".mas": read_calculix, ".hb": vendor.read_harwell_boeing,
+           ".rsa": vendor.read_harwell_boeing, ".rua": vendor.read_harwell_boeing, ".matrix": vendor.read_harwell_boeing}
 LOADS = {".mtx": lambda file, name: load_of_mtx(file), ".txt": lambda file, name: vendor.read_node_values(file),
          ".csv": lambda file, name: vendor.read_node_values(file)}
 

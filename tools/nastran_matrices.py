@@ -6,7 +6,7 @@ import struct
 import numpy as np
 import scipy.sparse as sparse
 from deck_files import Problem, fields_of, number, whole
-from vendor_matrices import Labelled, both_triangles
+from vendor_matrices import Labelled, both_triangles, chosen
 
 
 # ---- Nastran: DMIG
@@ -44,12 +44,7 @@ def one_of(file, found, name):
     """The entry of this name, or the only one."""
     if not found:
         raise Problem(f"{file}: no matrix; expected an OUTPUT4 file, text or binary, or a punch file with DMIG entries")
-    if name is None and len(found) > 1:
-        raise Problem(f"{file}: holds {', '.join(found)}: say which by \"{file.name}:NAME\"")
-    key = next(iter(found)) if name is None else name.upper()
-    if key not in found:
-        raise Problem(f"{file}: no matrix {key}; it holds {', '.join(found)}")
-    return found[key]
+    return found[chosen(file, found, name)]
 
 
 def dmig_lines(file):
@@ -85,8 +80,9 @@ def dmig_matrix(place, head, columns):
     if form not in (1, 2, 6, 9):
         raise Problem(f"{place}: {head[0]} has the form {form}; expected 1 (square), 6 (symmetric), 2 or 9 (a load)")
     columns = columns[head[0].upper()]
-    if form in (2, 9):
-        columns = columns[:1]  # of a load
+    if form in (2, 9) and len(columns) > 1:
+        raise Problem(f"{columns[1].place}: {head[0]} has {len(columns)} columns, loads of their own: expected one; keep the "
+                      "column of the load that is meant")
     nodes, dofs, values = [], [], []
     for column in columns:
         at = f"{column.place} and below"
@@ -97,7 +93,7 @@ def dmig_matrix(place, head, columns):
     if form in (2, 9):
         return Labelled(rows, None, values)
     own = np.array([[whole(c.node, c.place), whole(c.dof or "0", c.place)] for c in columns], np.int64).reshape(-1, 2)
-    return Labelled(rows, np.repeat(own, [len(column.nodes) for column in columns], axis=0), values)
+    return Labelled(rows, np.repeat(own, [len(column.nodes) for column in columns], axis=0), values, form == 6)
 
 
 def converted(texts, quickly, carefully):

@@ -1,7 +1,7 @@
 """Matrices as Abaqus, CalculiX and Ansys write them, with the nodes and motions of their rows where the file has them.
 
 Every reader returns Labelled, whose rows are (node, dof), or a sparse matrix or array without names. dof counts from 1 to
-6: x y z rx ry rz; 0 is a scalar point. Of a symmetric matrix the files may hold one triangle.
+6: x y z rx ry rz; 0 is a scalar point or a modal coordinate. Of a symmetric matrix the files may hold one triangle.
 """
 
 import re
@@ -9,18 +9,19 @@ import warnings
 
 import numpy as np
 import scipy.sparse as sparse
-from deck_files import Problem, number, whole
+from deck_files import Problem, lines_of, number, whole
 
-DOF_NAMES = {name: dof for dof, names in enumerate(["", "X UX DX T1", "Y UY DY T2", "Z UZ DZ T3", "RX ROTX DRX R1",
+DOF_NAMES = {name: dof for dof, names in enumerate(["-", "X UX DX T1", "Y UY DY T2", "Z UZ DZ T3", "RX ROTX DRX R1",
                                                     "RY ROTY DRY R2", "RZ ROTZ DRZ R3"]) for name in names.split()}
 LAGRANGE = 63  # dof of a Lagrange multiplier
 
 
 class Labelled:
-    """Entries of a matrix, or of a vector when it has no columns, between rows named (node, dof)."""
+    """Entries of a matrix, or of a vector when it has no columns, between rows named (node, dof). half: whether one triangle
+    stands for both; None where the file does not say."""
 
-    def __init__(self, rows, columns, values):
-        self.rows, self.columns, self.values = rows, columns, values
+    def __init__(self, rows, columns, values, half=None):
+        self.rows, self.columns, self.values, self.half = rows, columns, values, half
 
     def labels(self):
         both = [self.rows] if self.columns is None else [self.rows, self.columns]
@@ -31,17 +32,43 @@ class Labelled:
         n, rows = position.size, position(self.rows)
         if self.columns is None:
             return np.bincount(rows, self.values, n)
-        return both_triangles(sparse.coo_matrix((self.values, (rows, position(self.columns))), (n, n)))
+        return sparse.csr_matrix((self.values, (rows, position(self.columns))), (n, n))
 
 
-def both_triangles(matrix):
-    """The whole of a matrix, of which the entries beside the diagonal may be there once for both triangles."""
+class Untold:
+    """A matrix without names whose file does not say whether one triangle stands for both."""
+
+    half = None
+
+    def __init__(self, matrix):
+        self.matrix, self.shape = matrix.tocsr(), matrix.shape
+
+    def array(self, position):
+        return self.matrix
+
+
+def places_of(matrix):
+    """1 wherever the matrix has an entry, be it 0."""
+    places = matrix.tocsr().copy()
+    places.sum_duplicates()
+    places.data = np.ones(places.nnz)
+    return places
+
+
+def is_triangle(matrix):
+    """Whether entries beside the diagonal are there, and no two of them face each other across it."""
+    places = places_of(matrix)
+    facing = places.multiply(places.T).nnz if places.shape[0] == places.shape[1] else places.nnz
+    return facing < places.nnz and facing == (places.diagonal() > 0).sum()
+
+
+def both_triangles(matrix, sign=1):
+    """The whole of a symmetric matrix, or of a skew one by the sign -1, of which entries may be there once for both places."""
+    if matrix.shape[0] != matrix.shape[1]:
+        return matrix.tocsr()
     matrix = matrix.tocsr()
-    matrix.sum_duplicates()
-    upper, lower = sparse.triu(matrix, 1), sparse.tril(matrix, -1)
-    if matrix.shape[0] != matrix.shape[1] or (abs(upper).multiply(abs(lower.T))).nnz:
-        return matrix  # both are there
-    return (matrix + upper.T + lower.T).tocsr()
+    mirrored = sign * matrix.T.tocsr()
+    return (matrix + (mirrored - mirrored.multiply(places_of(matrix)))).tocsr()
 
 
 def numbers_in(file, columns, what):
@@ -79,16 +106,22 @@ def integers(file, table, what):
 # ---- Abaqus: *MATRIX GENERATE with *MATRIX OUTPUT
 
 
-def read_abaqus(file):
-    """MATRIX INPUT, `node, dof, node, dof, value`, or COORDINATE, `row column value`, both with numbers from 1."""
-    with open(file, "rb") as stream:
-        first = next((line for line in stream if line.strip() and not line.lstrip().startswith((b"*", b"%"))), b"")
-    fields = len(first.replace(b",", b" ").split())
+def read_abaqus(file, half=None):
+    """MATRIX INPUT, `node, dof, node, dof, value`, or COORDINATE, `row column value`, both with numbers from 1. The keyword
+    above the first may say whether the matrix is symmetric."""
+    first, keywords = head_of(file)
+    fields = len(first.replace(",", " ").split())
+    for keyword in keywords:
+        if kind := re.search(r"TYPE\s*=\s*(UN)?SYMMETRIC", keyword.upper()):
+            half = kind[1] is None
+        if "SCALE" in keyword.upper():
+            raise Problem(f"{file}: '{keyword[:60]}': a scale factor; expected the entries as they are: scale them, and take "
+                          "the factor out")
     if fields == 5:
         what = "node, dof, node, dof, value"
         table = numbers_in(file, 5, what)
         labels = integers(file, table[:, :4], what)
-        return Labelled(labels[:, :2], labels[:, 2:], table[:, 4])
+        return Labelled(labels[:, :2], labels[:, 2:], table[:, 4], half)
     if fields == 3:
         what = "row, column, value"
         table = numbers_in(file, 3, what)
@@ -96,9 +129,88 @@ def read_abaqus(file):
         if (places < 0).any():
             raise Problem(f"{file}: a row or column below 1: expected {what}, numbers from 1")
         n = places.max() + 1
-        return both_triangles(sparse.coo_matrix((table[:, 2], places.T), (n, n)))
+        matrix = sparse.coo_matrix((table[:, 2], places.T), (n, n))
+        return both_triangles(matrix) if half else Untold(matrix)
     raise Problem(f"{file}: {fields} values in its first line of data: expected 'node, dof, node, dof, value' or "
                   "'row column value'")
+
+
+def head_of(file):
+    """The first line of data, and the keywords above it."""
+    keywords = []
+    with open(file, encoding="latin-1") as stream:
+        for line in map(str.strip, stream):
+            if line.startswith("*") and not line.startswith("**"):
+                keywords.append(line)
+            elif line and not line.startswith(("*", "%")):
+                return line, keywords
+    return "", keywords
+
+
+def read_user_element(file, name):
+    """A substructure as *USER ELEMENT, LINEAR: its nodes in comments below ELEMENT NODES, lists of motions, then of each *MATRIX
+    the columns down to the diagonal, or in whole of an UNSYMM element. A list of motions holds from its node on."""
+    nodes, motions, matrices, state, unsymmetric, count = [], [], {}, "", False, None
+    for n, line in lines_of(file):
+        line, place = line.strip(), f"{file}, line {n}"
+        fields = [field.strip() for field in line.strip("*").split(",") if field.strip()]
+        if line.startswith("**"):
+            if "ELEMENT NODES" in line.upper():
+                state = "nodes"
+            elif state == "nodes" and re.fullmatch(r"[-\d\s,*]*", line):
+                nodes += [whole(field, place, "a node's number") for field in fields]
+        elif line.startswith("*"):
+            key, *options = [" ".join(field.upper().split()) for field in fields]
+            options = dict(option.replace(" =", "=").replace("= ", "=").partition("=")[::2] for option in options)
+            state = "motions" if key == "USER ELEMENT" else "matrix" if key == "MATRIX" else ""
+            if state == "motions":
+                if count is not None:
+                    raise Problem(f"{place}: a second *USER ELEMENT: expected one substructure a file")
+                count, unsymmetric = whole(options.get("NODES", ""), place, "NODES=, their number"), "UNSYMM" in options
+            elif state == "matrix":
+                values = matrices.setdefault(options.get("TYPE", ""), [])
+                if values:
+                    raise Problem(f"{place}: a second *MATRIX, TYPE={options.get('TYPE', '')}")
+        elif state in ("nodes", "motions"):
+            state = "motions"
+            first, *dofs = [whole(field, place, "a motion") for field in (["1"] if not motions else []) + fields]
+            if not (motions[-1][0] if motions else 0) < first <= count or not dofs:
+                raise Problem(f"{place}: '{line[:60]}': expected the place of a node, 2 to {count} and ascending, and its motions")
+            motions.append((first, dofs))
+        elif state == "matrix":
+            values += [number(field, place) for field in fields]
+    if not motions or not matrices:
+        raise Problem(f"{file}: no {'*MATRIX' if motions else 'motions'}: expected *USER ELEMENT, its motions and *MATRIX")
+    if nodes and len(nodes) != count:
+        raise Problem(f"{file}: {len(nodes)} nodes below ELEMENT NODES; expected NODES={count}")
+    rows = rows_of_element(nodes or range(1, count + 1), motions, count)
+    if len(np.unique(rows, axis=0)) < len(rows):
+        raise Problem(f"{file}: a node's motion is there twice")
+    key = chosen(file, matrices, name)
+    i, j = np.indices((len(rows), len(rows))).reshape(2, -1)[::-1] if unsymmetric else np.tril_indices(len(rows))
+    if len(matrices[key]) != len(i):
+        raise Problem(f"{file}: {len(matrices[key])} values of {key}; expected {len(i)} for {len(rows)} motions")
+    found = Labelled(rows[i], rows[j], np.array(matrices[key]), not unsymmetric)
+    if nodes:
+        return found
+    matrix = sparse.csr_matrix((found.values, (i, j)))
+    return matrix if unsymmetric else both_triangles(matrix)
+
+
+def rows_of_element(nodes, motions, count):
+    ends = [first for first, _ in motions[1:]] + [count + 1]
+    return np.array([(nodes[at - 1], dof) for (first, dofs), end in zip(motions, ends) for at in range(first, end)
+                     for dof in dofs], np.int64)
+
+
+def chosen(file, found, name):
+    """The name of one of several, or of the only one."""
+    if name is None and len(found) > 1:
+        raise Problem(f"{file}: holds {', '.join(found)}: say which by \"{file.name}:NAME\"")
+    key = next(iter(found)) if name is None else name.upper()
+    if key not in found:
+        raise Problem(f"{file}: no matrix {key}; it holds {', '.join(found)}")
+    return key
 
 
 def read_node_values(file):
@@ -140,6 +252,8 @@ def read_harwell_boeing(file, name):
     if name is not None and name.upper() == "RHS":
         if parts[3] is None:
             raise Problem(f"{file}: no right-hand side")
+        if (loads := whole(lines[4][14:28].strip() or "1", f"{file}, line 5", "the number of right-hand sides")) > 1:
+            raise Problem(f"{file}, line 5: {loads} right-hand sides; expected one: write the matrix with one load")
         return parts[3]
     starts, indices = parts[0].astype(np.int64) - 1, parts[1].astype(np.int64) - 1
     if starts[0] != 0 or starts[-1] != entries or (np.diff(starts) < 0).any():
@@ -202,7 +316,7 @@ def dof_of(text, place):
     if text.upper().startswith("LAGR"):
         return LAGRANGE
     if text.upper() not in DOF_NAMES:
-        raise Problem(f"{place}: '{text}': expected a motion: 0 to 6, or a name such as x, UX, DX, ROTX, DRX")
+        raise Problem(f"{place}: '{text}': expected a motion: 0 to 6, a name such as x, UX, DX, ROTX, DRX, or - for none")
     return DOF_NAMES[text.upper()]
 
 

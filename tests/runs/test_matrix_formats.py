@@ -82,6 +82,13 @@ def dmig(folder, model):
     return {"K": "both.pch:KAAX", "M": "both.pch:MAAX"}
 
 
+def dmig_loads(folder, model):
+    keys = dmig(folder, model)
+    with open(folder / "both.pch", "a") as file:
+        file.write("DMIG,FX,0,9,1,0,,,2\n" + "".join(f"DMIG,FX,{case},0,,7,1,{case}.5\n" for case in (1, 2)))
+    return {**keys, "F": "both.pch:FX"}
+
+
 def harwell_boeing(folder, model):
     """As HBMAT: pointers, rows and values of the lower triangle in fixed fields, and a mapping."""
     for name, A in model.items():
@@ -329,6 +336,7 @@ BAD = {
     "a complex matrix": (dmig, changed("both.pch", "       6       2       0", "       6       4       0"), ["both.pch, line 2", "complex", "real"]),
     "a name that is not there": (dmig, changed("model.toml", "KAAX", "KGG"), ["no matrix KGG", "KAAX, MAAX"]),
     "no name for several": (dmig, changed("model.toml", ":KAAX", ""), ["both.pch", "KAAX, MAAX", "say which"]),
+    "several loads": (dmig_loads, lambda folder: None, ["both.pch", "FX has 2 columns", "expected one"]),
     "bad number in a field": (dmig, changed("both.pch", "D+0", "Q+0"), ["both.pch", "Q+0", "a value"]),
     "an unknown key": (npz, changed("model.toml", "K = ", "KK = "), ["model.toml", "KK"]),
     "no such file": (npz, changed("model.toml", "K.npz", "L.npz"), ["L.npz"]),
@@ -389,3 +397,211 @@ def test_the_command_says_one_sentence_and_no_hint_at_pickle(tmp_path):
     done = subprocess.run([sys.executable, ROOT / "tools" / "matrices", tmp_path, tmp_path / "out"], capture_output=True, text=True)
     assert done.returncode == 1 and done.stderr.count("\n") == 1
     assert "K.npy" in done.stderr and "pickle" not in done.stderr
+
+
+# ---- one triangle, or all of a matrix
+
+
+def model_of(folder, K, extra="", **others):
+    """Files of MATRIX INPUT of small matrices between the motions of one node; M is 1."""
+    for name, A in {"K": K, "M": np.eye(len(K)), **others}.items():
+        (folder / f"{name}.mtx").write_text("".join(f"7,{i + 1}, 7,{j + 1}, {A[i][j]}\n" for i in range(len(K))
+                                                    for j in range(len(K)) if A[i][j] != 0))
+    file = describe(folder, {name: f"{name}.mtx" for name in others}, extra)
+    return MATRICES.read_model(file)[0]
+
+
+SLIDING = [[2, 0.3], [0, 1]]  # a sliding spring: mu k in one entry
+
+
+def test_one_triangle_is_mirrored_with_a_word_or_kept_by_the_key(tmp_path, capsys):
+    assert (model_of(tmp_path, SLIDING)["K"].toarray() == [[2, 0.3], [0.3, 1]]).all()
+    said = capsys.readouterr().out
+    assert said.count("\n") == 1 and "K.mtx" in said and "symmetric" in said
+    assert (model_of(tmp_path, SLIDING, 'symmetric = ["M"]\n')["K"].toarray() == SLIDING).all()
+    assert (model_of(tmp_path, SLIDING, "symmetric = []\n")["K"].toarray() == SLIDING).all()
+    assert (model_of(tmp_path, [[2, 0.3], [0.1, 1]])["K"].toarray() == [[2, 0.3], [0.1, 1]]).all()
+    assert capsys.readouterr().out == ""
+    with pytest.raises(MATRICES.Problem, match="K is not symmetric"):
+        model_of(tmp_path, [[2, 0.3], [0.1, 1]], 'symmetric = ["K"]\n')
+
+
+@pytest.mark.parametrize("kind, expected", [("UNSYMMETRIC", SLIDING), ("SYMMETRIC", [[2, 0.3], [0.3, 1]])])
+def test_the_head_of_matrix_input_says_what_one_triangle_is(tmp_path, capsys, kind, expected):
+    model_of(tmp_path, SLIDING)
+    capsys.readouterr()
+    file = tmp_path / "K.mtx"
+    file.write_text(f"** written by hand\n*MATRIX INPUT, NAME=K, TYPE={kind}\n" + file.read_text())
+    assert (MATRICES.read_model(tmp_path / "model.toml")[0]["K"].toarray() == expected).all()
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize("form, expected", [(1, SLIDING), (6, [[2, 0.3], [0.3, 1]])])
+def test_dmig_says_by_its_form_what_one_triangle_is(tmp_path, capsys, form, expected):
+    text = "".join(f"DMIG,{name},0,{form if name == 'K' else 6},2,0\nDMIG,{name},7,1,,7,1,{a}\nDMIG,{name},7,2,,7,1,{b}\n,7,2,{c}\n"
+                   for name, a, b, c in (("K", 2.0, 0.3, 1.0), ("M", 1.0, 0.0, 1.0)))
+    (tmp_path / "both.pch").write_text(text.replace(",0.3\n,7,2,1.0", ",0.3,\n,7,2,1.0"))
+    found, *_ = MATRICES.read_model(describe(tmp_path, {"K": "both.pch:K", "M": "both.pch:M"}))
+    assert (found["K"].toarray() == expected).all()
+    assert capsys.readouterr().out == ""
+
+
+def test_one_triangle_of_an_array_is_the_whole_unless_the_key_says_else(tmp_path):
+    np.save(tmp_path / "K.npy", np.array(SLIDING))
+    np.save(tmp_path / "M.npy", np.eye(2))
+    keys = {"K": "K.npy", "M": "M.npy"}
+    assert (MATRICES.read_model(describe(tmp_path, keys))[0]["K"].toarray() == SLIDING).all()
+    found = MATRICES.read_model(describe(tmp_path, keys, 'symmetric = ["K"]\n'))[0]
+    assert (found["K"].toarray() == [[2, 0.3], [0.3, 1]]).all()
+    np.save(tmp_path / "M.npy", np.array(SLIDING))
+    with pytest.raises(MATRICES.Problem, match=r'M is not symmetric.*symmetric = \["M"\]'):
+        MATRICES.read_model(describe(tmp_path, keys))
+
+
+def test_one_triangle_of_a_gyroscopic_matrix_is_mirrored_skew(tmp_path, capsys):
+    G = [[0, 5], [0, 0]]
+    assert (model_of(tmp_path, np.eye(2), G=G)["G"].toarray() == [[0, 5], [-5, 0]]).all()
+    assert "G.mtx" in capsys.readouterr().out
+    assert (model_of(tmp_path, np.eye(2), G=[[0, 5], [-5, 0]])["G"].toarray() == [[0, 5], [-5, 0]]).all()
+    for G in ([[0, 5], [5, 0]], [[1, 5], [-5, 0]]):
+        with pytest.raises(MATRICES.Problem, match="G is not skew"):
+            model_of(tmp_path, np.eye(2), G=G)
+    (tmp_path / "G.mtx").write_text("*MATRIX INPUT, NAME=G, TYPE=SYMMETRIC\n7,1,7,2,5\n")
+    with pytest.raises(MATRICES.Problem, match="G is not skew"):
+        MATRICES.read_model(tmp_path / "model.toml")
+
+
+# ---- displacement systems of Nastran's nodes
+
+
+CYLINDER = "CORD2C,5,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n"
+BALL = "CORD2S,5,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n"
+SLANTED = "CORD2R,5,,0.,0.,0.,0.,0.,1.\n,0.6,0.8,0.\n"
+
+
+def axes_of(kind, x, y, z):
+    """Columns: the directions in which the coordinates of a system about z grow at a point."""
+    r, R = np.hypot(x, y), np.sqrt(x * x + y * y + z * z)
+    if kind == SLANTED:
+        return np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]])
+    if kind == CYLINDER or r == 0:
+        return np.array([[x / r, -y / r, 0], [y / r, x / r, 0], [0, 0, 1]]) if r else np.eye(3)
+    return np.array([[x / R, x * z / (r * R), -y / r], [y / R, y * z / (r * R), x / r], [z / R, -r / R, 0]])
+
+
+def turned_model(folder, kind, places, K, dofs=(1, 2, 3), **keys):
+    """K of translations along x, y and z, written along the displacement system, as Nastran does; rotations are left out."""
+    grids = "".join(f"GRID,{n + 1},,{x},{y},{z},5\n" for n, (x, y, z) in enumerate(places))
+    (folder / "nodes.bdf").write_text("BEGIN BULK\n" + kind + grids)
+    T = scipy.linalg.block_diag(*[axes_of(kind, *place) for place in places])
+    kept = [3 * n + dof - 1 for n in range(len(places)) for dof in dofs]
+    rows = [(n + 1, dof) for n in range(len(places)) for dof in dofs]
+    for name, A in (("K", T.T @ K @ T), ("M", np.eye(len(K)))):
+        np.save(folder / f"{name}.npy", A[np.ix_(kept, kept)])
+    (folder / "dofs.txt").write_text("".join(f"{node} {dof}\n" for node, dof in rows))
+    np.savetxt(folder / "F.txt", [(*row, f) for row, f in zip(rows, (T.T @ np.arange(len(K)))[kept])], fmt="%d %d %.17g")
+    (folder / "pairs.csv").write_text("1 2\n")
+    keys = {"K": "K.npy", "M": "M.npy", "F": "F.txt", "dofs": "dofs.txt", "nodes": "nodes.bdf", **keys}
+    return MATRICES.read_model(describe(folder, keys, '[[contact]]\npairs = "pairs.csv"\nnormal = "y"\nvelocity = [1, 0, 0]\n'))
+
+
+@pytest.mark.parametrize("kind", [CYLINDER, BALL, SLANTED])
+def test_rows_along_displacement_systems_are_turned_to_x_y_z(tmp_path, kind):
+    half = np.random.default_rng(3).normal(size=(9, 9))
+    K = half @ half.T
+    places = [(0, 0.1, 0), (0.3, 0.4, 0.2), (0, 0, 0)]
+    found, labels, *_ = turned_model(tmp_path, kind, places, K)
+    np.testing.assert_allclose(found["K"].toarray(), K, rtol=0, atol=1e-14 * abs(K).max())
+    np.testing.assert_allclose(found["F"], np.arange(9), atol=1e-14)
+    assert (labels == [(node, dof) for node in (1, 2, 3) for dof in (1, 2, 3)]).all()
+    assert (found["B"].toarray()[0] == [0, -1, 0, 0, 1, 0, 0, 0, 0]).all()
+    assert (found["B"].toarray()[1] == [-1, 0, 0, 1, 0, 0, 0, 0, 0]).all()
+
+
+def test_motions_of_a_displacement_system_that_are_some_of_x_y_z_are_turned_and_others_refused(tmp_path):
+    """Without z the radial and the tangential motions span x and y; the radial one alone is y at (0, r) and neither elsewhere."""
+    K = np.diag([2.0, 3, 5, 7, 11, 13])
+    places = [(0, 0.1, 0), (0, 0.3, 0.2)]
+    found, labels, *_ = turned_model(tmp_path, CYLINDER, places, K, dofs=(1, 2))
+    assert (found["K"].toarray() == np.diag([2, 3, 7, 11])).all()
+    assert labels.tolist() == [[1, 1], [1, 2], [2, 1], [2, 2]]
+    found, labels, *_ = turned_model(tmp_path, CYLINDER, places, K, dofs=(1,))
+    assert (found["K"].toarray() == np.diag([3, 11])).all() and labels.tolist() == [[1, 2], [2, 2]]
+    with pytest.raises(MATRICES.Problem, match="node 2: .*displacement system"):
+        turned_model(tmp_path, CYLINDER, [(0, 0.1, 0), (0.3, 0.4, 0)], K, dofs=(1,))
+
+
+# ---- substructures of Abaqus
+
+
+def write_substructure(folder, model, unsymmetric=False):
+    """As *SUBSTRUCTURE MATRIX OUTPUT: columns down to the diagonal, four values a line, each column on a line of its own. The
+    first three nodes have x, y and z, two have y and z, the last one has the coordinates of modes."""
+    nodes = [7, 11, 12, 40, 41, -1]
+    lists = [(1, (1, 2, 3)), (4, (2, 3)), (6, (1, 2, 3, 4, 5))]
+    text = f"**\n** GENERATION OF SUBSTRUCTURE\n*USER ELEMENT, NODES= {len(nodes):9d}, LINEAR{', UNSYMM' * unsymmetric}\n"
+    text += "** ELEMENT NODES\n** 7, 11, 12, 40,\n** 41, -1\n" + "".join(
+        ", ".join(map(str, dofs if at == 1 else (at, *dofs))) + "\n" for at, dofs in lists)
+    for name, A in model.items():
+        text += f"*MATRIX,TYPE={name}\n"
+        for j in range(N):
+            column = [f"{a:.16e}" for a in A[: N if unsymmetric else j + 1, j]]
+            text += "".join(" , ".join(column[k : k + 4]) + " ,\n" for k in range(0, len(column), 4))
+    (folder / "sub.mtx").write_text(text)
+    return {"K": "sub.mtx:STIFFNESS", "M": "sub.mtx:mass"}
+
+
+SUBSTRUCTURE = [(7, 1), (7, 2), (7, 3), (11, 1), (11, 2), (11, 3), (12, 1), (12, 2), (12, 3), (40, 2), (40, 3), (41, 2), (41, 3)]
+
+
+@pytest.mark.parametrize("unsymmetric", [False, True])
+def test_a_substructure_of_abaqus(tmp_path, unsymmetric):
+    model = spring_model()
+    model["K"][0, 1] += 1e5 * unsymmetric
+    names = {"K": "STIFFNESS", "M": "MASS"}
+    keys = write_substructure(tmp_path, {names[name]: A for name, A in model.items()}, unsymmetric)
+    found, labels, *_ = MATRICES.read_model(describe(tmp_path, keys))
+    order = [*range(13, N), *range(13)]  # by number of the node
+    for name in "MK":
+        np.testing.assert_allclose(found[name].toarray(), model[name][np.ix_(order, order)], rtol=1e-15)
+    values = [np.sort_complex(scipy.linalg.eigvals(A, B)) for A, B in
+              ((found["K"].toarray(), found["M"].toarray()), (model["K"], model["M"]))]
+    np.testing.assert_allclose(*values, rtol=1e-10)
+    assert labels[5:].tolist() == [list(row) for row in SUBSTRUCTURE]
+    MATRICES.write_files(tmp_path / "out", "petsc", found, labels, {})
+    assert (tmp_path / "out" / "dofs.txt").read_text().startswith("-1 -\n" * 5 + "7 x\n")
+    again, again_labels, *_ = MATRICES.read_model(tmp_path / "out")
+    assert (again["K"] != found["K"]).nnz == 0 and (again_labels[5:] == SUBSTRUCTURE).all()
+
+
+def test_nodes_of_modal_coordinates_can_be_named(tmp_path):
+    found, labels, *_ = MATRICES.read_model(describe(tmp_path, abaqus(tmp_path, spring_model()), "modal = [11, 1000]\n"))
+    MATRICES.write_dofs(tmp_path / "dofs.txt", labels)
+    lines = (tmp_path / "dofs.txt").read_text().split("\n")
+    assert lines[3:6] == ["11 -"] * 3 and lines[-4:-1] == ["1000 -"] * 3 and lines[6] == "12 x"
+
+
+BAD_SUBSTRUCTURES = {
+    "values missing": ((" , ", "\n*END STEP\n", -1), ["sub.mtx", "values of MASS"]),
+    "other nodes": (("** 41, -1", "** 41", 0), ["sub.mtx", "5 nodes", "NODES=6"]),
+    "a letter": (("e+0", "y+0", 0), ["sub.mtx, line 11", "y+0"]),
+    "places": (("4, 2, 3", "9, 2, 3", 0), ["sub.mtx, line 8", "9, 2, 3", "2 to 6"]),
+    "a motion twice": (("4, 2, 3", "4, 2, 2", 0), ["sub.mtx", "twice"]),
+    "which one": (("*MATRIX,TYPE=MASS", "*MATRIX,TYPE=STRUCTURAL DAMPING", 0), ["no matrix MASS", "STRUCTURAL DAMPING"]),
+    "two elements": (("*MATRIX", "*USER ELEMENT, NODES=2\n*MATRIX", 0), ["second *USER ELEMENT"]),
+    "no count": (("NODES=", "NODE=", 0), ["sub.mtx, line 3", "NODES="]),
+}
+
+
+@pytest.mark.parametrize("case", BAD_SUBSTRUCTURES)
+def test_bad_substructures_are_refused(tmp_path, case):
+    (old, new, which), words = BAD_SUBSTRUCTURES[case]
+    model = spring_model()
+    describe(tmp_path, write_substructure(tmp_path, {"STIFFNESS": model["K"], "MASS": model["M"]}))
+    text = (tmp_path / "sub.mtx").read_text()
+    head, _, tail = text.rpartition(old) if which else text.partition(old)
+    (tmp_path / "sub.mtx").write_text(head + new + tail)
+    with pytest.raises(MATRICES.Problem) as refused:
+        MATRICES.read_model(tmp_path / "model.toml")
+    for word in words:
+        assert word in str(refused.value), refused.value
