@@ -9,7 +9,7 @@ import scipy.io
 import scipy.sparse as sparse
 import vendor_matrices as vendor
 from common import MATRIX_ID, VECTOR_ID
-from deck_files import Problem
+from deck_files import Problem, number, whole
 
 
 def read_petsc(file, name):
@@ -31,7 +31,7 @@ def read_petsc(file, name):
         lengths, at = take(">i4", int(first), at)
         indices, at = take(">i4", int(entries), at)
         values, at = take(">f8", int(entries), at)
-        if lengths.sum() != entries:
+        if lengths.sum() != entries or (lengths < 0).any():
             raise Problem(f"{file}: the rows hold {lengths.sum()} entries, the head says {entries}")
         pointers = np.concatenate([[0], np.cumsum(lengths)])
         result = sparse.csr_matrix((values.astype(float), indices.astype(np.int32), pointers), (int(first), int(columns)))
@@ -144,9 +144,8 @@ def read_hdf5(item, file):
 
 def read_mtx(file, name):
     """Matrix Market says so in its first line; else it is Abaqus's, a substructure or an assembled matrix."""
-    with open(file, "rb") as stream:
-        if stream.read(14).lower() == b"%%matrixmarket":
-            return scipy.io.mmread(str(file))
+    if is_market(file):
+        return read_market(file)
     _, keywords = vendor.head_of(file)
     if any(keyword[1:].strip().upper().startswith("USER ELEMENT") for keyword in keywords):
         return vendor.read_user_element(file, name)
@@ -167,9 +166,58 @@ LOADS = {".mtx": lambda file, name: load_of_mtx(file), ".txt": lambda file, name
 
 
 def load_of_mtx(file):
+    return read_market(file) if is_market(file) else vendor.read_node_values(file)
+
+
+def is_market(file):
     with open(file, "rb") as stream:
-        market = stream.read(14).lower() == b"%%matrixmarket"
-    return scipy.io.mmread(str(file)) if market else vendor.read_node_values(file)
+        return stream.read(14).lower() == b"%%matrixmarket"
+
+
+def read_market(file):
+    try:
+        return scipy.io.mmread(str(file))
+    except Exception as error:  # scipy names no line
+        check_market(file)
+        raise Problem(f"{file}: not a file of Matrix Market ({error})") from None
+
+
+def check_market(file):
+    """Names the first line that has other numbers than the head says."""
+    with open(file, encoding="latin-1") as stream:
+        words = stream.readline().lower().split()
+        lines = [(n, line) for n, line in enumerate(stream, 2) if line.strip() and not line.startswith("%")]
+    known = len(words) == 5 and words[2] in ("coordinate", "array") and words[3] in ("real", "integer", "pattern", "complex")
+    if not known or not lines:
+        raise Problem(f"{file}, line 1: expected '%%MatrixMarket matrix coordinate real general' or the like, then the size")
+    sparse_form = words[2] == "coordinate"
+    values = {"pattern": 0, "complex": 2}.get(words[3], 1)
+    for n, line in lines:
+        fields, place = line.split(), f"{file}, line {n}"
+        wholes = (3 if sparse_form else 2) if n == lines[0][0] else 2 if sparse_form else 0
+        expected = wholes + (0 if n == lines[0][0] else values)
+        if len(fields) != expected:
+            raise Problem(f"{place}: '{line.strip()[:60]}': expected {expected} values")
+        for i, field in enumerate(fields):
+            whole(field, place) if i < wholes else number(field, place)
+    size = whole(lines[0][1].split()[2], f"{file}, line {lines[0][0]}") if sparse_form else len(lines) - 1
+    if len(lines) - 1 != size:
+        raise Problem(f"{file}: {len(lines) - 1} entries; expected {size} as line {lines[0][0]} says")
+
+
+def checked(file, array):
+    """scipy follows indices of compressed rows and columns wherever they lead, out of its memory too."""
+    if isinstance(array, vendor.Labelled):
+        dofs = array.labels()[:, 1]
+        if len(dofs) and not 0 <= dofs.min() <= dofs.max() < vendor.LAGRANGE:
+            raise Problem(f"{file}: motions from {dofs.min()} to {dofs.max()}; expected 0 to {vendor.LAGRANGE - 1}")
+    if sparse.issparse(array) and hasattr(array, "check_format"):
+        try:
+            array.check_format()
+        except ValueError as error:
+            raise Problem(f"{file}: rows and columns that do not fit its size of {array.shape[0]} x {array.shape[1]} "
+                          f"({error}); was it cut or changed?") from None
+    return array
 
 
 def read_array(file, name, is_load):
@@ -180,7 +228,7 @@ def read_array(file, name, is_load):
     if not file.is_file():
         raise Problem(f"there is no file {file}")
     try:
-        return readers[file.suffix.lower()](file, name)
+        return checked(file, readers[file.suffix.lower()](file, name))
     except Problem:
         raise
     except Exception as error:  # the readers of numpy and scipy raise of every kind

@@ -159,11 +159,12 @@ def binary_op4(file, data, order):
                 raise Problem(f"{place}: a record of {length} bytes; expected a matrix's head of 24")
             wide = length == 48  # integers and words of 8 bytes
             columns, rows, form, kind = struct.unpack_from(order + ("4q" if wide else "4i"), record)
-            name = record[32:48 if wide else 0] if wide else record[16:24]
-            name = name.decode("latin-1").strip().upper()
+            name = (record[32:48] if wide else record[16:24]).decode("latin-1").strip().upper()
             current, big = Op4Columns(place, (abs(rows), columns), form, kind), rows < 0
             continue
         word = 8 if wide else 4
+        if length < 3 * word:
+            raise Problem(f"{place}: a record of {length} bytes; expected a column's three integers")
         column, row, words = struct.unpack_from(order + ("3q" if wide else "3i"), record)
         body = record[3 * word :]
         if column > current.shape[1]:

@@ -5,6 +5,7 @@ the rotor's velocity.
 """
 
 import csv
+import math
 import re
 
 import numpy as np
@@ -22,7 +23,11 @@ def read_nodes(file):
     those whose displacement system is turned, in the columns of a matrix."""
     ending, turned = file.suffix.lower(), {}
     if ending == ".inp":
-        labels, positions = abaqus_nodes(blocks_of(file))
+        blocks = blocks_of(file)
+        labels, positions = abaqus_nodes(blocks)
+        if place := next((block.place for block in blocks if block.name == "TRANSFORM"), None):
+            raise Problem(f"{place}: *TRANSFORM turns the motions of nodes; expected rows along x, y and z: write the matrices "
+                          "without it, and take it out of the deck")
     elif ending in (".bdf", ".nas", ".dat"):
         cards = cards_of(file)
         labels, positions = nastran_nodes(cards)
@@ -36,6 +41,8 @@ def read_nodes(file):
         positions = np.array([[number(text, place) for text in fields[1:]] for place, fields in rows]).reshape(-1, 3)
     if not len(labels):
         raise Problem(f"{file}: no nodes; expected *NODE, GRID, or lines 'node, x, y, z'")
+    if not np.isfinite(positions).all():
+        raise Problem(f"{file}: node {labels[~np.isfinite(positions).all(axis=1)][0]} has a position that is no finite number")
     known = dict(zip(labels.tolist(), positions))
     if len(known) < len(labels):
         raise Problem(f"{file}: {len(labels) - len(known)} node(s) are there twice")
@@ -122,6 +129,8 @@ def read_pairs(file):
             raise Problem(f"{place}: {len(fields)} values; expected {len(columns)}: {', '.join(columns)}")
         pair = {name: whole(text, place, "a node's number") if name in COLUMNS[:2] else number(text, place)
                 for name, text in zip(columns, fields)}
+        if not all(map(math.isfinite, pair.values())):
+            raise Problem(f"{place}: '{', '.join(fields)}': expected finite numbers")
         if pair["rotor"] == pair["stator"]:
             raise Problem(f"{place}: node {pair['rotor']} is in contact with itself")
         if pair.get("area", 1) <= 0:
@@ -134,7 +143,7 @@ def read_pairs(file):
 
 def vector_of(value, place, expected="three numbers"):
     is_vector = isinstance(value, (list, tuple)) and len(value) == 3
-    if not is_vector or not all(type(x) in (int, float) and np.isfinite(x) for x in value):
+    if not is_vector or not all(type(x) in (int, float) and math.isfinite(x) for x in value):
         raise Problem(f"{place} = {value}: expected {expected}")
     return np.array(value, float)
 
@@ -158,7 +167,7 @@ def check_motion(contact, place):
             raise Problem(f"{place}, rotation: needs the key '{key}', as in {{ axis = \"z\", centre = [0, 0, 0], rate = 20 }}")
     direction_of(rotation["axis"], f"{place}, rotation.axis")
     vector_of(rotation.get("centre", [0, 0, 0]), f"{place}, rotation.centre", "three numbers [m]")
-    if not np.isfinite(rotation["rate"]):
+    if not math.isfinite(rotation["rate"]):
         raise Problem(f"{place}, rotation.rate = {rotation['rate']}: expected a number [rad/s]")
     vector_of(contact.get("velocity", [0, 0, 0]), f"{place}, velocity", "three numbers [m/s]")
     if isinstance(contact.get("tangents"), list) and not 1 <= len(contact["tangents"]) <= 2:

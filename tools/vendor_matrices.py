@@ -100,6 +100,8 @@ def integers(file, table, what):
     if (table != np.round(table)).any():
         line = np.flatnonzero((table != np.round(table)).any(axis=1))[0]
         raise Problem(f"{file}: entry {line + 1}: {table[line]}: expected {what}")
+    if abs(table).max(initial=0) > 2**53:
+        raise Problem(f"{file}: a number of {abs(table).max():.3g}: expected {what}")
     return table.astype(np.int64)
 
 
@@ -129,6 +131,8 @@ def read_abaqus(file, half=None):
         if (places < 0).any():
             raise Problem(f"{file}: a row or column below 1: expected {what}, numbers from 1")
         n = places.max() + 1
+        if n > 100 * len(table) + 1000:
+            raise Problem(f"{file}: a row or column {n}, but {len(table)} entries in all: expected {what}")
         matrix = sparse.coo_matrix((table[:, 2], places.T), (n, n))
         return both_triangles(matrix) if half else Untold(matrix)
     raise Problem(f"{file}: {fields} values in its first line of data: expected 'node, dof, node, dof, value' or "
@@ -296,7 +300,7 @@ def read_mapping(file):
     with open(file, encoding="latin-1") as stream:
         for n, line in enumerate(stream, 1):
             fields = line.replace(",", " ").split()
-            if len(fields) != 3 or not fields[0].isdigit():
+            if len(fields) != 3 or not fields[0].isdecimal():
                 if found and fields:
                     raise Problem(f"{file}, line {n}: '{line.strip()[:60]}': expected row, node, motion")
                 continue
@@ -311,7 +315,7 @@ def read_mapping(file):
 
 def dof_of(text, place):
     """1 to 6 of a motion's number or name; 0 of a scalar point."""
-    if text.isdigit() and int(text) <= 6:
+    if text.isdecimal() and int(text) <= 6:
         return int(text)
     if text.upper().startswith("LAGR"):
         return LAGRANGE

@@ -323,6 +323,35 @@ def changed(file, old, new):
     return change
 
 
+def petsc(folder, model):
+    for name, A in model.items():
+        MATRICES.write_petsc(folder / f"{name}.petsc", sparse.csr_matrix(A))
+    return {"K": "K.petsc", "M": "M.petsc"}
+
+
+def far_index(file):
+    data = bytearray(file.read_bytes())
+    data[4 * (4 + N) : 4 * (5 + N)] = np.array([100000], ">i4").tobytes()
+    file.write_bytes(data)
+
+
+def far_column(folder):
+    K = sparse.load_npz(folder / "K.npz")
+    K.indices[0] = 100000
+    sparse.save_npz(folder / "K.npz", K)
+
+
+def turned_deck(folder):
+    (folder / "deck.inp").write_text("*NODE\n7, 0, 0, 0\n*TRANSFORM, NSET=A, TYPE=C\n0, 0, 0, 0, 0, 1\n")
+    (folder / "model.toml").open("a").write('nodes = "deck.inp"\n')
+
+
+def mend_line(file, index, fields):
+    lines = file.read_text().split("\n")
+    lines[index : index + 1] = [" ".join(fields)] if fields else []
+    file.write_text("\n".join(lines))
+
+
 BAD = {
     "a word among numbers": (abaqus, changed("K.mtx", "7,3, 7,1,", "7,y, 7,1,"), ["K.mtx, line 3", "'y'", "node, dof, node, dof, value"]),
     "a value missing": (abaqus, changed("K.mtx", "7,3, 7,1,", "7,3, 7,"), ["K.mtx, line 3", "4 values"]),
@@ -338,6 +367,17 @@ BAD = {
     "no name for several": (dmig, changed("model.toml", ":KAAX", ""), ["both.pch", "KAAX, MAAX", "say which"]),
     "several loads": (dmig_loads, lambda folder: None, ["both.pch", "FX has 2 columns", "expected one"]),
     "bad number in a field": (dmig, changed("both.pch", "D+0", "Q+0"), ["both.pch", "Q+0", "a value"]),
+    "a letter of Matrix Market": (matrix_market, lambda folder: mend_line(folder / "K.mtx", 5, ["1", "2", "x"]), ["K.mtx, line 6", "'x'"]),
+    "an entry of Matrix Market lost": (matrix_market, lambda folder: mend_line(folder / "K.mtx", 5, []), ["K.mtx", "entries", "line 3"]),
+    "a column beyond the end": (npz, far_column, ["K.npz", "do not fit its size of 18 x 18"]),
+    "PETSc's column beyond the end": (petsc, lambda folder: far_index(folder / "K.petsc"), ["K.petsc", "do not fit its size"]),
+    "a motion of none": (abaqus, changed("K.mtx", "7,2, ", "7,99, "), ["K.mtx", "99", "0 to 62"]),
+    "a row far away": (abaqus_coordinate, changed("K.mtx", "       3        1", "99999999        1"), ["K.mtx", "99999999"]),
+    "no pairs file": (npz, lambda folder: (folder / "model.toml").open("a").write('dofs = "none.txt"'), ["model.toml", "none.txt"]),
+    "letters of no alphabet": (npz, lambda folder: (folder / "model.toml").write_bytes(b"K = \"\xff\""), ["model.toml", "not TOML"]),
+    "turned motions": (abaqus, lambda folder: turned_deck(folder), ["deck.inp, line 3", "*TRANSFORM", "along x, y and z"]),
+    "a huge number of a node": (abaqus_coordinate, changed("dofs.csv", "7, y", "99999999999999999999, y"), ["dofs.csv", "64 bits"]),
+    "symmetric of no matrix": (npz, changed("model.toml", "K = ", 'symmetric = ["B"]\nK = '), ["model.toml", "symmetric names B"]),
     "an unknown key": (npz, changed("model.toml", "K = ", "KK = "), ["model.toml", "KK"]),
     "no such file": (npz, changed("model.toml", "K.npz", "L.npz"), ["L.npz"]),
     "an unknown ending": (npz, changed("model.toml", "K.npz", "K.xls"), ["K.xls", ".op4"]),
@@ -365,6 +405,7 @@ BAD_PAIRS = {
     "values": ("7 40 0 0\n", CONTACT, ["line 1", "expected"]),
     "normal the wrong way": ("11 41\n", CONTACT.replace('"z"', "[0, 0, -1]"), ["line 1", "inside the rotor", "turn the normal"]),
     "no normal": ("7 40\n", CONTACT.replace('normal = "z"\n', ""), ["line 1", "coincide", "nx, ny, nz"]),
+    "a gap of none": ("7 40 0 0 1 1 nan\n", CONTACT, ["line 1", "nan", "finite"]),
     "bad axis": ("7 40\n", CONTACT.replace('axis = "z"', 'axis = "w"'), ["rotation.axis", "three numbers"]),
     "unknown key": ("7 40\n", CONTACT.replace("normal", "normale"), ["[[contact]]", "'normale'", "'normal'"]),
     "centre misspelt": ("7 40\n", CONTACT.replace("centre", "center"), ["model.toml", "rotation", "'center'", "'centre'"]),
