@@ -159,8 +159,8 @@ def read_calculix(file, name):
 
 READERS = {".petsc": read_petsc, ".npz": read_npz, ".npy": lambda file, name: load_numpy(file), ".mtx": read_mtx,
            ".mat": read_matlab, ".op4": nastran.read_op4, ".pch": nastran.read_dmig, ".dmig": nastran.read_dmig,
-           ".bdf": nastran.read_dmig, ".sti": read_calculix, ".mas": read_calculix, ".hb": vendor.read_harwell_boeing,
-           ".rsa": vendor.read_harwell_boeing, ".rua": vendor.read_harwell_boeing, ".matrix": vendor.read_harwell_boeing}
+           ".bdf": nastran.read_dmig, ".sti": read_calculix, ".mas": read_calculix,
+           **dict.fromkeys((".hb", ".rsa", ".rua", ".matrix"), vendor.read_harwell_boeing)}
 LOADS = {".mtx": lambda file, name: load_of_mtx(file), ".txt": lambda file, name: vendor.read_node_values(file),
          ".csv": lambda file, name: vendor.read_node_values(file)}
 
@@ -187,11 +187,10 @@ def check_market(file):
     with open(file, encoding="latin-1") as stream:
         words = stream.readline().lower().split()
         lines = [(n, line) for n, line in enumerate(stream, 2) if line.strip() and not line.startswith("%")]
-    known = len(words) == 5 and words[2] in ("coordinate", "array") and words[3] in ("real", "integer", "pattern", "complex")
-    if not known or not lines:
-        raise Problem(f"{file}, line 1: expected '%%MatrixMarket matrix coordinate real general' or the like, then the size")
-    sparse_form = words[2] == "coordinate"
-    values = {"pattern": 0, "complex": 2}.get(words[3], 1)
+    counts = {"pattern": 0, "complex": 2, "real": 1, "integer": 1}
+    if len(words) != 5 or words[2] not in ("coordinate", "array") or words[3] not in counts or not lines:
+        raise Problem(f"{file}, line 1: expected '%%MatrixMarket matrix coordinate real general', then its size")
+    sparse_form, values = words[2] == "coordinate", counts[words[3]]
     for n, line in lines:
         fields, place = line.split(), f"{file}, line {n}"
         wholes = (3 if sparse_form else 2) if n == lines[0][0] else 2 if sparse_form else 0

@@ -81,8 +81,8 @@ def dmig_matrix(place, head, columns):
         raise Problem(f"{place}: {head[0]} has the form {form}; expected 1 (square), 6 (symmetric), 2 or 9 (a load)")
     columns = columns[head[0].upper()]
     if form in (2, 9) and len(columns) > 1:
-        raise Problem(f"{columns[1].place}: {head[0]} has {len(columns)} columns, loads of their own: expected one; keep the "
-                      "column of the load that is meant")
+        raise Problem(f"{columns[1].place}: {head[0]} has {len(columns)} columns, a load each: expected one; keep "
+                      "the column of the load that is meant")
     nodes, dofs, values = [], [], []
     for column in columns:
         at = f"{column.place} and below"

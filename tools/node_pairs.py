@@ -19,15 +19,15 @@ ROTATION_KEYS = {"axis": (str, list), "centre": list, "rate": (int, float)}
 
 
 def read_nodes(file):
-    """Positions of nodes by number, of an Abaqus or Nastran deck, or `node, x, y, z` a line; and the axes of the motions of
-    those whose displacement system is turned, in the columns of a matrix."""
+    """Positions of nodes by number, of an Abaqus or Nastran deck, or `node, x, y, z` a line; and the axes of the
+    motions of those whose displacement system is turned, in the columns of a matrix."""
     ending, turned = file.suffix.lower(), {}
     if ending == ".inp":
         blocks = blocks_of(file)
         labels, positions = abaqus_nodes(blocks)
         if place := next((block.place for block in blocks if block.name == "TRANSFORM"), None):
-            raise Problem(f"{place}: *TRANSFORM turns the motions of nodes; expected rows along x, y and z: write the matrices "
-                          "without it, and take it out of the deck")
+            raise Problem(f"{place}: *TRANSFORM turns the motions of nodes; expected rows along x, y and z: write the "
+                          "matrices without it, and take it out of the deck")
     elif ending in (".bdf", ".nas", ".dat"):
         cards = cards_of(file)
         labels, positions = nastran_nodes(cards)
@@ -42,7 +42,8 @@ def read_nodes(file):
     if not len(labels):
         raise Problem(f"{file}: no nodes; expected *NODE, GRID, or lines 'node, x, y, z'")
     if not np.isfinite(positions).all():
-        raise Problem(f"{file}: node {labels[~np.isfinite(positions).all(axis=1)][0]} has a position that is no finite number")
+        wrong = labels[~np.isfinite(positions).all(axis=1)][0]
+        raise Problem(f"{file}: node {wrong} has a position that is no finite number")
     known = dict(zip(labels.tolist(), positions))
     if len(known) < len(labels):
         raise Problem(f"{file}: {len(labels) - len(known)} node(s) are there twice")
@@ -90,9 +91,9 @@ def to_basic_axes(labels, turned):
         axes = turned[node][:, along]
         basic = np.flatnonzero(axes.any(axis=1))
         if len(basic) != len(own):
-            raise Problem(f"node {node}: the matrices have the motions {', '.join(map(str, labels[own, 1]))} of its displacement "
-                          "system alone, which no motions along x, y and z are: write the matrices before supports take "
-                          "rows out, or with displacement systems along x, y and z")
+            raise Problem(f"node {node}: the matrices have the motions {', '.join(map(str, labels[own, 1]))} of its "
+                          "displacement system alone, which no motions along x, y and z are: write the matrices before "
+                          "supports take rows out, or with displacement systems along x, y and z")
         i += np.repeat(own, len(own)).tolist()
         j += own * len(own)
         values += axes[basic].T.ravel().tolist()
@@ -164,7 +165,8 @@ def check_motion(contact, place):
     rotation = contact.get("rotation", {"axis": "z", "rate": 0})
     for key in ("axis", "rate"):
         if key not in rotation:
-            raise Problem(f"{place}, rotation: needs the key '{key}', as in {{ axis = \"z\", centre = [0, 0, 0], rate = 20 }}")
+            raise Problem(f"{place}, rotation: needs the key '{key}', as in "
+                          '{ axis = "z", centre = [0, 0, 0], rate = 20 }')
     direction_of(rotation["axis"], f"{place}, rotation.axis")
     vector_of(rotation.get("centre", [0, 0, 0]), f"{place}, rotation.centre", "three numbers [m]")
     if not math.isfinite(rotation["rate"]):

@@ -17,8 +17,8 @@ LAGRANGE = 63  # dof of a Lagrange multiplier
 
 
 class Labelled:
-    """Entries of a matrix, or of a vector when it has no columns, between rows named (node, dof). half: whether one triangle
-    stands for both; None where the file does not say."""
+    """Entries of a matrix, or of a vector when it has no columns, between rows named (node, dof). half: whether one
+    triangle stands for both; None where the file does not say."""
 
     def __init__(self, rows, columns, values, half=None):
         self.rows, self.columns, self.values, self.half = rows, columns, values, half
@@ -63,7 +63,7 @@ def is_triangle(matrix):
 
 
 def both_triangles(matrix, sign=1):
-    """The whole of a symmetric matrix, or of a skew one by the sign -1, of which entries may be there once for both places."""
+    """The whole of a symmetric matrix, or of a skew one by the sign -1, whose entries may be there once."""
     if matrix.shape[0] != matrix.shape[1]:
         return matrix.tocsr()
     matrix = matrix.tocsr()
@@ -109,16 +109,16 @@ def integers(file, table, what):
 
 
 def read_abaqus(file, half=None):
-    """MATRIX INPUT, `node, dof, node, dof, value`, or COORDINATE, `row column value`, both with numbers from 1. The keyword
-    above the first may say whether the matrix is symmetric."""
+    """MATRIX INPUT, `node, dof, node, dof, value`, or COORDINATE, `row column value`, both with numbers from 1. The
+    keyword above the first may say whether the matrix is symmetric."""
     first, keywords = head_of(file)
     fields = len(first.replace(",", " ").split())
     for keyword in keywords:
         if kind := re.search(r"TYPE\s*=\s*(UN)?SYMMETRIC", keyword.upper()):
             half = kind[1] is None
         if "SCALE" in keyword.upper():
-            raise Problem(f"{file}: '{keyword[:60]}': a scale factor; expected the entries as they are: scale them, and take "
-                          "the factor out")
+            raise Problem(f"{file}: '{keyword[:60]}': a scale factor; expected the entries as they are: scale them "
+                          "and take the factor out")
     if fields == 5:
         what = "node, dof, node, dof, value"
         table = numbers_in(file, 5, what)
@@ -152,8 +152,9 @@ def head_of(file):
 
 
 def read_user_element(file, name):
-    """A substructure as *USER ELEMENT, LINEAR: its nodes in comments below ELEMENT NODES, lists of motions, then of each *MATRIX
-    the columns down to the diagonal, or in whole of an UNSYMM element. A list of motions holds from its node on."""
+    """A substructure as *USER ELEMENT, LINEAR: its nodes in comments below ELEMENT NODES, lists of motions, then of
+    each *MATRIX the columns down to the diagonal, or in whole of an UNSYMM element. A list of motions holds from its
+    node on."""
     nodes, motions, matrices, state, unsymmetric, count = [], [], {}, "", False, None
     for n, line in lines_of(file):
         line, place = line.strip(), f"{file}, line {n}"
@@ -179,12 +180,14 @@ def read_user_element(file, name):
             state = "motions"
             first, *dofs = [whole(field, place, "a motion") for field in (["1"] if not motions else []) + fields]
             if not (motions[-1][0] if motions else 0) < first <= count or not dofs:
-                raise Problem(f"{place}: '{line[:60]}': expected the place of a node, 2 to {count} and ascending, and its motions")
+                raise Problem(f"{place}: '{line[:60]}': expected the place of a node, 2 to {count} and ascending, "
+                              "and its motions")
             motions.append((first, dofs))
         elif state == "matrix":
             values += [number(field, place) for field in fields]
     if not motions or not matrices:
-        raise Problem(f"{file}: no {'*MATRIX' if motions else 'motions'}: expected *USER ELEMENT, its motions and *MATRIX")
+        missing = "*MATRIX" if motions else "motions"
+        raise Problem(f"{file}: no {missing}: expected *USER ELEMENT, its motions and *MATRIX")
     if nodes and len(nodes) != count:
         raise Problem(f"{file}: {len(nodes)} nodes below ELEMENT NODES; expected NODES={count}")
     rows = rows_of_element(nodes or range(1, count + 1), motions, count)
@@ -221,7 +224,12 @@ def read_node_values(file):
     """A load as `node, dof, value`, such as what *MATRIX OUTPUT, LOAD writes."""
     what = "node, dof, value"
     table = numbers_in(file, 3, what)
-    return Labelled(integers(file, table[:, :2], what), None, table[:, 2])
+    labels = integers(file, table[:, :2], what)
+    found, counts = np.unique(labels, axis=0, return_counts=True)
+    if (counts > 1).any():
+        node, dof = found[np.argmax(counts > 1)]
+        raise Problem(f"{file}: node {node}, dof {dof} is there {counts.max()} times: expected one load")
+    return Labelled(labels, None, table[:, 2])
 
 
 # ---- Ansys: HBMAT
@@ -320,7 +328,7 @@ def dof_of(text, place):
     if text.upper().startswith("LAGR"):
         return LAGRANGE
     if text.upper() not in DOF_NAMES:
-        raise Problem(f"{place}: '{text}': expected a motion: 0 to 6, a name such as x, UX, DX, ROTX, DRX, or - for none")
+        raise Problem(f"{place}: '{text}': expected a motion: 0 to 6, a name such as x, UX, DX, ROTX, or - for none")
     return DOF_NAMES[text.upper()]
 
 

@@ -22,7 +22,8 @@ def model(n=12, pairs=3, tangential=2):
     K = (half + half.T + 10 * sparse.eye(n)).tocsr() / 3  # thirds: every digit is needed
     B = sparse.random((1 + tangential) * pairs, n, 0.4, random_state=9).tocsr()
     return {"M": sparse.eye(n).tocsr() * 0.1, "C": 1e-7 * K, "K": K, "B": B, "F": random.normal(size=n),
-            "gap": random.normal(size=pairs), "drive": random.normal(size=tangential * pairs), "compliance": random.uniform(size=pairs) * 1e-9}
+            "gap": random.normal(size=pairs), "drive": random.normal(size=tangential * pairs),
+            "compliance": random.uniform(size=pairs) * 1e-9}
 
 
 def save(folder, arrays):

@@ -341,6 +341,11 @@ def far_column(folder):
     sparse.save_npz(folder / "K.npz", K)
 
 
+def doubled_load(folder):
+    (folder / "F.csv").write_text("*CLOAD\n7, 1, 5\n*CLOAD\n7, 1, 5\n")
+    (folder / "model.toml").open("a").write('F = "F.csv"\n')
+
+
 def turned_deck(folder):
     (folder / "deck.inp").write_text("*NODE\n7, 0, 0, 0\n*TRANSFORM, NSET=A, TYPE=C\n0, 0, 0, 0, 0, 1\n")
     (folder / "model.toml").open("a").write('nodes = "deck.inp"\n')
@@ -353,31 +358,45 @@ def mend_line(file, index, fields):
 
 
 BAD = {
-    "a word among numbers": (abaqus, changed("K.mtx", "7,3, 7,1,", "7,y, 7,1,"), ["K.mtx, line 3", "'y'", "node, dof, node, dof, value"]),
+    "a word among numbers": (abaqus, changed("K.mtx", "7,3, 7,1,", "7,y, 7,1,"),
+                             ["K.mtx, line 3", "'y'", "node, dof, node, dof, value"]),
     "a value missing": (abaqus, changed("K.mtx", "7,3, 7,1,", "7,3, 7,"), ["K.mtx, line 3", "4 values"]),
     "map of another model": (abaqus_coordinate, changed("dofs.csv", "1000, z\n", ""), ["dofs.csv has 17 rows", "18"]),
     "a motion twice": (abaqus_coordinate, changed("dofs.csv", "7, y", "7, x"), ["dofs.csv", "twice"]),
     "an unknown motion": (abaqus_coordinate, changed("dofs.csv", "7, y", "7, w"), ["dofs.csv, line 2", "'w'", "UX"]),
-    "a row missing in the mapping": (harwell_boeing, changed("model.mapping", "           2           7", "          19           7"), ["row 2"]),
+    "a row missing in the mapping": (harwell_boeing,
+                                     changed("model.mapping", "           2           7", "          19           7"),
+                                     ["row 2"]),
     "lines cut off": (harwell_boeing, lambda folder: (folder / "K.hb").write_text("\n".join((folder / "K.hb").read_text().split("\n")[:12])),
                       ["K.hb", "truncated", "12 lines", "for the rows"]),
     "unassembled elements": (harwell_boeing, changed("K.hb", "RSA", "RSE"), ["K.hb, line 3", "RSE", "RSA"]),
-    "a complex matrix": (dmig, changed("both.pch", "       6       2       0", "       6       4       0"), ["both.pch, line 2", "complex", "real"]),
+    "a complex matrix": (dmig, changed("both.pch", "       6       2       0", "       6       4       0"),
+                         ["both.pch, line 2", "complex", "real"]),
     "a name that is not there": (dmig, changed("model.toml", "KAAX", "KGG"), ["no matrix KGG", "KAAX, MAAX"]),
     "no name for several": (dmig, changed("model.toml", ":KAAX", ""), ["both.pch", "KAAX, MAAX", "say which"]),
+    "a load twice": (abaqus, doubled_load, ["F.csv: node 7, dof 1 is there 2 times", "one load"]),
     "several loads": (dmig_loads, lambda folder: None, ["both.pch", "FX has 2 columns", "expected one"]),
     "bad number in a field": (dmig, changed("both.pch", "D+0", "Q+0"), ["both.pch", "Q+0", "a value"]),
-    "a letter of Matrix Market": (matrix_market, lambda folder: mend_line(folder / "K.mtx", 5, ["1", "2", "x"]), ["K.mtx, line 6", "'x'"]),
-    "an entry of Matrix Market lost": (matrix_market, lambda folder: mend_line(folder / "K.mtx", 5, []), ["K.mtx", "entries", "line 3"]),
+    "a letter of Matrix Market": (matrix_market, lambda folder: mend_line(folder / "K.mtx", 5, ["1", "2", "x"]),
+                                  ["K.mtx, line 6", "'x'"]),
+    "an entry of Matrix Market lost": (matrix_market, lambda folder: mend_line(folder / "K.mtx", 5, []),
+                                       ["K.mtx", "entries", "line 3"]),
     "a column beyond the end": (npz, far_column, ["K.npz", "do not fit its size of 18 x 18"]),
-    "PETSc's column beyond the end": (petsc, lambda folder: far_index(folder / "K.petsc"), ["K.petsc", "do not fit its size"]),
+    "PETSc's column beyond the end": (petsc, lambda folder: far_index(folder / "K.petsc"),
+                                      ["K.petsc", "do not fit its size"]),
     "a motion of none": (abaqus, changed("K.mtx", "7,2, ", "7,99, "), ["K.mtx", "99", "0 to 62"]),
-    "a row far away": (abaqus_coordinate, changed("K.mtx", "       3        1", "99999999        1"), ["K.mtx", "99999999"]),
-    "no pairs file": (npz, lambda folder: (folder / "model.toml").open("a").write('dofs = "none.txt"'), ["model.toml", "none.txt"]),
-    "letters of no alphabet": (npz, lambda folder: (folder / "model.toml").write_bytes(b"K = \"\xff\""), ["model.toml", "not TOML"]),
-    "turned motions": (abaqus, lambda folder: turned_deck(folder), ["deck.inp, line 3", "*TRANSFORM", "along x, y and z"]),
-    "a huge number of a node": (abaqus_coordinate, changed("dofs.csv", "7, y", "99999999999999999999, y"), ["dofs.csv", "64 bits"]),
-    "symmetric of no matrix": (npz, changed("model.toml", "K = ", 'symmetric = ["B"]\nK = '), ["model.toml", "symmetric names B"]),
+    "a row far away": (abaqus_coordinate, changed("K.mtx", "       3        1", "99999999        1"),
+                       ["K.mtx", "99999999"]),
+    "no pairs file": (npz, lambda folder: (folder / "model.toml").open("a").write('dofs = "none.txt"'),
+                      ["model.toml", "none.txt"]),
+    "letters of no alphabet": (npz, lambda folder: (folder / "model.toml").write_bytes(b"K = \"\xff\""),
+                               ["model.toml", "not TOML"]),
+    "turned motions": (abaqus, lambda folder: turned_deck(folder),
+                       ["deck.inp, line 3", "*TRANSFORM", "along x, y and z"]),
+    "a huge number of a node": (abaqus_coordinate, changed("dofs.csv", "7, y", "99999999999999999999, y"),
+                                ["dofs.csv", "64 bits"]),
+    "symmetric of no matrix": (npz, changed("model.toml", "K = ", 'symmetric = ["B"]\nK = '),
+                               ["model.toml", "symmetric names B"]),
     "an unknown key": (npz, changed("model.toml", "K = ", "KK = "), ["model.toml", "KK"]),
     "no such file": (npz, changed("model.toml", "K.npz", "L.npz"), ["L.npz"]),
     "an unknown ending": (npz, changed("model.toml", "K.npz", "K.xls"), ["K.xls", ".op4"]),
@@ -403,18 +422,22 @@ BAD_PAIRS = {
     "itself": ("7 7\n", CONTACT, ["line 1", "itself"]),
     "columns": ("rotor, stator, area, nx\n", CONTACT, ["line 1", "expected rotor, stator"]),
     "values": ("7 40 0 0\n", CONTACT, ["line 1", "expected"]),
-    "normal the wrong way": ("11 41\n", CONTACT.replace('"z"', "[0, 0, -1]"), ["line 1", "inside the rotor", "turn the normal"]),
+    "normal the wrong way": ("11 41\n", CONTACT.replace('"z"', "[0, 0, -1]"),
+                             ["line 1", "inside the rotor", "turn the normal"]),
     "no normal": ("7 40\n", CONTACT.replace('normal = "z"\n', ""), ["line 1", "coincide", "nx, ny, nz"]),
     "a gap of none": ("7 40 0 0 1 1 nan\n", CONTACT, ["line 1", "nan", "finite"]),
     "bad axis": ("7 40\n", CONTACT.replace('axis = "z"', 'axis = "w"'), ["rotation.axis", "three numbers"]),
     "unknown key": ("7 40\n", CONTACT.replace("normal", "normale"), ["[[contact]]", "'normale'", "'normal'"]),
-    "centre misspelt": ("7 40\n", CONTACT.replace("centre", "center"), ["model.toml", "rotation", "'center'", "'centre'"]),
+    "centre misspelt": ("7 40\n", CONTACT.replace("centre", "center"),
+                        ["model.toml", "rotation", "'center'", "'centre'"]),
     "rate misspelt": ("7 40\n", CONTACT.replace("rate", "rpm"), ["rotation", "'rpm'", "rate"]),
     "no rate": ("7 40\n", CONTACT.replace(", rate = 2", ""), ["rotation", "'rate'"]),
     "no axis": ("7 40\n", CONTACT.replace('axis = "z", ', ""), ["rotation", "'axis'"]),
     "two drives": ("7 40\n", CONTACT + "velocity = [1, 0, 0]\n", ["rotation and velocity", "keep one"]),
-    "a short velocity": ("7 40\n", CONTACT.replace("rotation", "velocity = [1, 0] #"), ["velocity = [1, 0]", "three numbers"]),
-    "a velocity of words": ("7 40\n", CONTACT.replace("rotation", 'velocity = [1, 0, "a"] #'), ["velocity", "three numbers"]),
+    "a short velocity": ("7 40\n", CONTACT.replace("rotation", "velocity = [1, 0] #"),
+                         ["velocity = [1, 0]", "three numbers"]),
+    "a velocity of words": ("7 40\n", CONTACT.replace("rotation", 'velocity = [1, 0, "a"] #'),
+                            ["velocity", "three numbers"]),
     "a centre of two": ("7 40\n", CONTACT.replace("0, 0, 0", "0, 0"), ["rotation.centre", "three numbers"]),
     "a rate of text": ("7 40\n", CONTACT.replace("rate = 2", 'rate = "2"'), ["rate = 2", "a number"]),
     "a normal of words": ("7 40\n", CONTACT.replace('"z"', '[0, "a", 1]', 1), ["normal", "three numbers"]),
@@ -479,9 +502,9 @@ def test_the_head_of_matrix_input_says_what_one_triangle_is(tmp_path, capsys, ki
 
 @pytest.mark.parametrize("form, expected", [(1, SLIDING), (6, [[2, 0.3], [0.3, 1]])])
 def test_dmig_says_by_its_form_what_one_triangle_is(tmp_path, capsys, form, expected):
-    text = "".join(f"DMIG,{name},0,{form if name == 'K' else 6},2,0\nDMIG,{name},7,1,,7,1,{a}\nDMIG,{name},7,2,,7,1,{b}\n,7,2,{c}\n"
-                   for name, a, b, c in (("K", 2.0, 0.3, 1.0), ("M", 1.0, 0.0, 1.0)))
-    (tmp_path / "both.pch").write_text(text.replace(",0.3\n,7,2,1.0", ",0.3,\n,7,2,1.0"))
+    text = "".join(f"DMIG,{name},0,{kind},2,0\nDMIG,{name},7,1,,7,1,{a}\nDMIG,{name},7,2,,7,1,{b},\n,7,2,{c}\n"
+                   for name, kind, a, b, c in (("K", form, 2.0, 0.3, 1.0), ("M", 6, 1.0, 0.0, 1.0)))
+    (tmp_path / "both.pch").write_text(text)
     found, *_ = MATRICES.read_model(describe(tmp_path, {"K": "both.pch:K", "M": "both.pch:M"}))
     assert (found["K"].toarray() == expected).all()
     assert capsys.readouterr().out == ""
@@ -531,7 +554,7 @@ def axes_of(kind, x, y, z):
 
 
 def turned_model(folder, kind, places, K, dofs=(1, 2, 3), **keys):
-    """K of translations along x, y and z, written along the displacement system, as Nastran does; rotations are left out."""
+    """K of translations along x, y and z, written along the displacement system, as Nastran does."""
     grids = "".join(f"GRID,{n + 1},,{x},{y},{z},5\n" for n, (x, y, z) in enumerate(places))
     (folder / "nodes.bdf").write_text("BEGIN BULK\n" + kind + grids)
     T = scipy.linalg.block_diag(*[axes_of(kind, *place) for place in places])
@@ -540,10 +563,12 @@ def turned_model(folder, kind, places, K, dofs=(1, 2, 3), **keys):
     for name, A in (("K", T.T @ K @ T), ("M", np.eye(len(K)))):
         np.save(folder / f"{name}.npy", A[np.ix_(kept, kept)])
     (folder / "dofs.txt").write_text("".join(f"{node} {dof}\n" for node, dof in rows))
-    np.savetxt(folder / "F.txt", [(*row, f) for row, f in zip(rows, (T.T @ np.arange(len(K)))[kept])], fmt="%d %d %.17g")
+    loads = (T.T @ np.arange(len(K)))[kept]
+    np.savetxt(folder / "F.txt", [(*row, load) for row, load in zip(rows, loads)], fmt="%d %d %.17g")
     (folder / "pairs.csv").write_text("1 2\n")
     keys = {"K": "K.npy", "M": "M.npy", "F": "F.txt", "dofs": "dofs.txt", "nodes": "nodes.bdf", **keys}
-    return MATRICES.read_model(describe(folder, keys, '[[contact]]\npairs = "pairs.csv"\nnormal = "y"\nvelocity = [1, 0, 0]\n'))
+    contact = '[[contact]]\npairs = "pairs.csv"\nnormal = "y"\nvelocity = [1, 0, 0]\n'
+    return MATRICES.read_model(describe(folder, keys, contact))
 
 
 @pytest.mark.parametrize("kind", [CYLINDER, BALL, SLANTED])
@@ -560,7 +585,7 @@ def test_rows_along_displacement_systems_are_turned_to_x_y_z(tmp_path, kind):
 
 
 def test_motions_of_a_displacement_system_that_are_some_of_x_y_z_are_turned_and_others_refused(tmp_path):
-    """Without z the radial and the tangential motions span x and y; the radial one alone is y at (0, r) and neither elsewhere."""
+    """Without z the radial and the tangential motions span x and y; the radial one alone is y at (0, r) only."""
     K = np.diag([2.0, 3, 5, 7, 11, 13])
     places = [(0, 0.1, 0), (0, 0.3, 0.2)]
     found, labels, *_ = turned_model(tmp_path, CYLINDER, places, K, dofs=(1, 2))
@@ -576,11 +601,11 @@ def test_motions_of_a_displacement_system_that_are_some_of_x_y_z_are_turned_and_
 
 
 def write_substructure(folder, model, unsymmetric=False):
-    """As *SUBSTRUCTURE MATRIX OUTPUT: columns down to the diagonal, four values a line, each column on a line of its own. The
-    first three nodes have x, y and z, two have y and z, the last one has the coordinates of modes."""
+    """As *SUBSTRUCTURE MATRIX OUTPUT: columns down to the diagonal, four values a line, each column on a line of its
+    own. The first three nodes have x, y and z, two have y and z, the last one has the coordinates of modes."""
     nodes = [7, 11, 12, 40, 41, -1]
     lists = [(1, (1, 2, 3)), (4, (2, 3)), (6, (1, 2, 3, 4, 5))]
-    text = f"**\n** GENERATION OF SUBSTRUCTURE\n*USER ELEMENT, NODES= {len(nodes):9d}, LINEAR{', UNSYMM' * unsymmetric}\n"
+    text = f"**\n** SUBSTRUCTURE\n*USER ELEMENT, NODES= {len(nodes):9d}, LINEAR{', UNSYMM' * unsymmetric}\n"
     text += "** ELEMENT NODES\n** 7, 11, 12, 40,\n** 41, -1\n" + "".join(
         ", ".join(map(str, dofs if at == 1 else (at, *dofs))) + "\n" for at, dofs in lists)
     for name, A in model.items():
@@ -592,7 +617,7 @@ def write_substructure(folder, model, unsymmetric=False):
     return {"K": "sub.mtx:STIFFNESS", "M": "sub.mtx:mass"}
 
 
-SUBSTRUCTURE = [(7, 1), (7, 2), (7, 3), (11, 1), (11, 2), (11, 3), (12, 1), (12, 2), (12, 3), (40, 2), (40, 3), (41, 2), (41, 3)]
+SUBSTRUCTURE = [*((node, dof) for node in (7, 11, 12) for dof in (1, 2, 3)), (40, 2), (40, 3), (41, 2), (41, 3)]
 
 
 @pytest.mark.parametrize("unsymmetric", [False, True])
@@ -616,7 +641,8 @@ def test_a_substructure_of_abaqus(tmp_path, unsymmetric):
 
 
 def test_nodes_of_modal_coordinates_can_be_named(tmp_path):
-    found, labels, *_ = MATRICES.read_model(describe(tmp_path, abaqus(tmp_path, spring_model()), "modal = [11, 1000]\n"))
+    file = describe(tmp_path, abaqus(tmp_path, spring_model()), "modal = [11, 1000]\n")
+    found, labels, *_ = MATRICES.read_model(file)
     MATRICES.write_dofs(tmp_path / "dofs.txt", labels)
     lines = (tmp_path / "dofs.txt").read_text().split("\n")
     assert lines[3:6] == ["11 -"] * 3 and lines[-4:-1] == ["1000 -"] * 3 and lines[6] == "12 x"
@@ -628,7 +654,8 @@ BAD_SUBSTRUCTURES = {
     "a letter": (("e+0", "y+0", 0), ["sub.mtx, line 11", "y+0"]),
     "places": (("4, 2, 3", "9, 2, 3", 0), ["sub.mtx, line 8", "9, 2, 3", "2 to 6"]),
     "a motion twice": (("4, 2, 3", "4, 2, 2", 0), ["sub.mtx", "twice"]),
-    "which one": (("*MATRIX,TYPE=MASS", "*MATRIX,TYPE=STRUCTURAL DAMPING", 0), ["no matrix MASS", "STRUCTURAL DAMPING"]),
+    "which one": (("*MATRIX,TYPE=MASS", "*MATRIX,TYPE=STRUCTURAL DAMPING", 0),
+                  ["no matrix MASS", "STRUCTURAL DAMPING"]),
     "two elements": (("*MATRIX", "*USER ELEMENT, NODES=2\n*MATRIX", 0), ["second *USER ELEMENT"]),
     "no count": (("NODES=", "NODE=", 0), ["sub.mtx, line 3", "NODES="]),
 }
