@@ -109,6 +109,7 @@ def test_truncated_and_missing_files_are_named(tmp_path):
     file.unlink()
     assert "no file for K" in convert(tmp_path / "b", tmp_path / "c").stderr
     assert "there is no folder" in convert(tmp_path / "nowhere", tmp_path / "c").stderr
+    assert "a file is in the way" in convert(tmp_path / "a", tmp_path / "a" / "gap.npy").stderr
 
 
 def test_a_compliance_needs_pairs(tmp_path):

@@ -510,11 +510,12 @@ def test_dmig_says_by_its_form_what_one_triangle_is(tmp_path, capsys, form, expe
     assert capsys.readouterr().out == ""
 
 
-def test_one_triangle_of_an_array_is_the_whole_unless_the_key_says_else(tmp_path):
+def test_one_triangle_of_an_array_is_the_whole_unless_the_key_says_else(tmp_path, capsys):
     np.save(tmp_path / "K.npy", np.array(SLIDING))
     np.save(tmp_path / "M.npy", np.eye(2))
     keys = {"K": "K.npy", "M": "M.npy"}
     assert (MATRICES.read_model(describe(tmp_path, keys))[0]["K"].toarray() == SLIDING).all()
+    assert "K.npy: one triangle, taken as all of K" in capsys.readouterr().out
     found = MATRICES.read_model(describe(tmp_path, keys, 'symmetric = ["K"]\n'))[0]
     assert (found["K"].toarray() == [[2, 0.3], [0.3, 1]]).all()
     np.save(tmp_path / "M.npy", np.array(SLIDING))
