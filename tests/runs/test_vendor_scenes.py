@@ -142,8 +142,37 @@ def reduced(K, M, kept, count):
     return shapes.T @ K @ shapes, shapes.T @ M @ shapes
 
 
-def write_superelement(deck, folder, cells, count):
-    """A part of the strip on its nodes next to the mesh and on modes, as Nastran writes it: nodes, and scalar points behind."""
+def nastran_superelement(file, seam, K, M):
+    """DMIG: nodes, and scalar points behind."""
+    names = [(n, c) for n in seam for c in (1, 2, 3)] + [(9001 + i, 0) for i in range(len(K) - 3 * len(seam))]
+    text = ""
+    for name, A in (("STIFFNESS", K), ("MASS", M)):
+        text += f"DMIG,{name[:4]},0,6,2,0,,,{len(names)}\n"
+        for j, (node, c) in enumerate(names):
+            text += f"DMIG*   {name[:4]:16}{node:16d}{c:16d}\n"
+            text += "".join(f"*,{names[i][0]},{names[i][1]},{A[i, j]:.17e}\n" for i in range(j, len(names)))
+    file.write_text(text)
+    return "STIF", "MASS"
+
+
+def abaqus_superelement(file, seam, K, M):
+    """*USER ELEMENT, LINEAR: nodes, and those of modal coordinates behind, with one motion each."""
+    modes = range(1, len(K) - 3 * len(seam) + 1)
+    nodes = [*seam, *(-i for i in modes)]
+    text = f"*USER ELEMENT, NODES={len(nodes)}, LINEAR\n** ELEMENT NODES\n"
+    text += "".join(f"** {', '.join(map(str, nodes[i : i + 8]))}\n" for i in range(0, len(nodes), 8)) + "1, 2, 3\n"
+    text += f"{len(seam) + 1}, 1\n" if modes else ""
+    for name, A in (("STIFFNESS", K), ("MASS", M)):
+        text += f"*MATRIX,TYPE={name}\n"
+        for j in range(len(A)):
+            column = [f"{a:.17e}" for a in A[: j + 1, j]]
+            text += "".join(", ".join(column[k : k + 4]) + "\n" for k in range(0, j + 1, 4))
+    file.write_text(text)
+    return "STIFFNESS", "MASS"
+
+
+def write_superelement(deck, folder, cells, count, write):
+    """A part of the strip on its nodes next to the mesh and on modes."""
     own = sorted({deck.nodes["strip", p] for cell in cells for p in cell})
     rows = {node: 3 * i for i, node in enumerate(own)}
     K, M = np.zeros((2, 3 * len(own), 3 * len(own)))
@@ -157,15 +186,10 @@ def write_superelement(deck, folder, cells, count):
     free = np.setdiff1d(np.arange(len(K)), held)
     kept = np.searchsorted(free, [rows[n] + c for n in seam for c in range(3)])
     K, M = reduced(K[np.ix_(free, free)], M[np.ix_(free, free)], kept, len(free) - len(kept) if count is None else count)
-    names = [(n, c) for n in seam for c in (1, 2, 3)] + [(9001 + i, 0) for i in range(len(K) - len(kept))]
-    text = ""
-    for name, A in (("K", K), ("M", M)):
-        text += f"DMIG,{name},0,6,2,0,,,{len(names)}\n"
-        for j, (node, c) in enumerate(names):
-            text += f"DMIG*   {name:16}{node:16d}{c:16d}\n"
-            text += "".join(f"*,{names[i][0]},{names[i][1]},{A[i, j]:.17e}\n" for i in range(j, len(names)))
-    (folder / "strip.pch").write_text(text)
-    (folder / "super.toml").write_text('K = "strip.pch:K"\nM = "strip.pch:M"\nnodes = "deck.inp"\nlength = 0.001\n')
+    file = folder / ("strip.pch" if write is nastran_superelement else "strip.mtx")
+    stiffness, mass = write(file, seam, K, M)
+    (folder / "super.toml").write_text(f'K = "{file.name}:{stiffness}"\nM = "{file.name}:{mass}"\nnodes = "deck.inp"\n'
+                                       "length = 0.001\n")
     run_tool("matrices", folder / "super.toml", folder / "super")
 
 
@@ -176,7 +200,7 @@ def test_what_a_superelement_cannot_have_is_refused(squeal, tmp_path, name):
     sets = deck.write_deck(tmp_path / "deck.inp")
     whole = deck.cells["strip"]
     far = [cell for cell in whole if min(p[0] for p in cell) >= 4]
-    write_superelement(deck, tmp_path, far, 0)
+    write_superelement(deck, tmp_path, far, 0, nastran_superelement)
     shutil.copy(tmp_path / "super" / "K.petsc", tmp_path / "super" / f"{name}.petsc")
     deck.cells["strip"] = [cell for cell in whole if cell not in far]
     sets["seam"] = deck.those("strip", lambda p: p[0] == 4)
@@ -191,15 +215,16 @@ def test_what_a_superelement_cannot_have_is_refused(squeal, tmp_path, name):
     assert f"{name}.petsc: a superelement has M, K and C alone" in run.messages[0]
 
 
-@pytest.mark.parametrize("count", [None, 0])
-def test_superelement_takes_the_place_of_a_part_of_the_mesh(converged, tmp_path, count):
+@pytest.mark.parametrize("count, write", [(None, nastran_superelement), (0, nastran_superelement),
+                                          (None, abaqus_superelement)])
+def test_superelement_takes_the_place_of_a_part_of_the_mesh(converged, tmp_path, count, write):
     """With all its modes a reduced half of the strip is that half: the eigenvalues are those of the whole mesh, to the rounding of
     the reduction. With none it is stiffer, and the lowest frequency lies above."""
     deck = StripDeck()
     sets = deck.write_deck(tmp_path / "deck.inp")
     whole = deck.cells["strip"]
     far = [cell for cell in whole if min(p[0] for p in cell) >= 4]
-    write_superelement(deck, tmp_path, far, count)
+    write_superelement(deck, tmp_path, far, count, write)
     physics = {"friction": {"coefficient": 0.4}, "damping": {"beta": 1e-8}, "modes": {"method": "full", "band": 60000},
                "force": [{"on": "top", "vector": [0, 0, -100]}],
                "contact": [{"rotor": "face", "stator": "foot", "tangents": ["x"], "velocity": [1, 0, 0]}]}
