@@ -175,6 +175,9 @@ def is_market(file):
 
 
 def read_market(file):
+    with open(file, encoding="latin-1") as stream:
+        if all(not line.strip() or line.startswith("%") for line in stream):  # scipy reads on for ever
+            raise Problem(f"{file}: truncated: no sizes below its first line")
     try:
         return scipy.io.mmread(str(file))
     except Exception as error:  # scipy names no line

@@ -190,6 +190,8 @@ def read_user_element(file, name):
         raise Problem(f"{file}: no {missing}: expected *USER ELEMENT, its motions and *MATRIX")
     if nodes and len(nodes) != count:
         raise Problem(f"{file}: {len(nodes)} nodes below ELEMENT NODES; expected NODES={count}")
+    if count > max(map(len, matrices.values())):
+        raise Problem(f"{file}: NODES={count}, but fewer values: expected a column for each motion of each node")
     rows = rows_of_element(nodes or range(1, count + 1), motions, count)
     if len(np.unique(rows, axis=0)) < len(rows):
         raise Problem(f"{file}: a node's motion is there twice")

@@ -351,6 +351,10 @@ def turned_deck(folder):
     (folder / "model.toml").open("a").write('nodes = "deck.inp"\n')
 
 
+def mend_text(file, end):
+    file.write_text(file.read_text().partition(end)[0] + end)
+
+
 def mend_line(file, index, fields):
     lines = file.read_text().split("\n")
     lines[index : index + 1] = [" ".join(fields)] if fields else []
@@ -381,6 +385,7 @@ BAD = {
                                   ["K.mtx, line 6", "'x'"]),
     "an entry of Matrix Market lost": (matrix_market, lambda folder: mend_line(folder / "K.mtx", 5, []),
                                        ["K.mtx", "entries", "line 3"]),
+    "a head alone": (matrix_market, lambda folder: mend_text(folder / "K.mtx", "\n%\n"), ["K.mtx: truncated"]),
     "a column beyond the end": (npz, far_column, ["K.npz", "do not fit its size of 18 x 18"]),
     "PETSc's column beyond the end": (petsc, lambda folder: far_index(folder / "K.petsc"),
                                       ["K.petsc", "do not fit its size"]),
@@ -639,6 +644,19 @@ def test_a_substructure_of_abaqus(tmp_path, unsymmetric):
     assert (tmp_path / "out" / "dofs.txt").read_text().startswith("-1 -\n" * 5 + "7 x\n")
     again, again_labels, *_ = MATRICES.read_model(tmp_path / "out")
     assert (again["K"] != found["K"]).nnz == 0 and (again_labels[5:] == SUBSTRUCTURE).all()
+
+
+def test_a_substructure_without_names_of_nodes(tmp_path):
+    """Its rows are in the file's order; of far more nodes than values it is refused at once."""
+    file = tmp_path / "sub.mtx"
+    for count in (2, 99999999999):
+        file.write_text(f"*USER ELEMENT, NODES={count}, LINEAR\n1\n*MATRIX, TYPE=STIFFNESS\n2\n-1, 3\n")
+        if count == 2:
+            found = MATRICES.matrix_files.read_array(file, None, False).toarray()
+            assert (found == [[2, -1], [-1, 3]]).all()
+        else:
+            with pytest.raises(MATRICES.Problem, match="NODES=99999999999, but fewer values"):
+                MATRICES.matrix_files.read_array(file, None, False)
 
 
 def test_nodes_of_modal_coordinates_can_be_named(tmp_path):
