@@ -1,5 +1,6 @@
 """Decks of other codes as text: keyword blocks of Abaqus and CalculiX, cards of Nastran, each with its place."""
 
+import math
 import re
 
 import numpy as np
@@ -29,6 +30,9 @@ def included(file, name, depth):
 
 # ---- Abaqus and CalculiX
 
+DATA_FILES = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "BOUNDARY"}  # whose INPUT names a file of their data
+MADE_OR_MOVED = {"SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "SYMMETRIC MODEL GENERATION"}  # nodes
+
 
 class Block:
     """One keyword: *NAME, KEY=VALUE, ... and the lines of data below it."""
@@ -36,16 +40,20 @@ class Block:
     def __init__(self, place, name, options):
         self.place, self.name, self.options, self.lines = place, name, options, []
 
-    def rows(self):
-        """(place, fields) of every line of data."""
+    def rows(self, least=0, what=""):
+        """(place, fields) of every line of data; one with fewer than the least number of fields is refused."""
         for place, line in self.lines:
             fields = [field.strip() for field in line.split(",")]
-            yield place, fields[:-1] if fields[-1] == "" else fields
+            while fields and fields[-1] == "":
+                fields.pop()
+            if len(fields) < least:
+                raise Problem(f"{place}: '{line[:60]}': {len(fields)} fields; expected {what}")
+            yield place, fields
 
 
-def blocks_of(file, depth=0):
-    """The keyword blocks of an input deck, in order."""
-    blocks, head = [], ""
+def blocks_of(file, depth=0, blocks=None):
+    """The keyword blocks of an input deck, in order; an included file may go on with the data of the last keyword."""
+    blocks, head = [] if blocks is None else blocks, ""
     for number, line in lines_of(file):
         line = line.strip()
         if not line or line.startswith("**"):
@@ -62,18 +70,24 @@ def blocks_of(file, depth=0):
                 key, _, value = word.partition("=")
                 options[key.strip().upper()] = value.strip().strip('"')
             if name.upper() == "INCLUDE":
-                blocks += blocks_of(included(file, options.get("INPUT", ""), depth), depth + 1)
-            else:
-                blocks.append(Block(place, " ".join(name.upper().split()), options))
+                blocks_of(included(file, options.get("INPUT", ""), depth), depth + 1, blocks)
+                continue
+            blocks.append(Block(place, " ".join(name.upper().split()), options))
+            if blocks[-1].name in DATA_FILES and "INPUT" in options:
+                blocks_of(included(file, options["INPUT"], depth), depth + 1, blocks)
         elif not blocks:
             raise Problem(f"{place}: '{line[:60]}': expected a keyword, such as *NODE")
         else:
-            blocks[-1].lines.append((place, line))
+            blocks[-1].lines.append((place, line.replace('"', "")))
+    if head:
+        raise Problem(f"{file}: ends within '{head[:60]}', which goes on behind its last comma")
     return blocks
 
 
 def whole(text, place, what="a whole number"):
     try:
+        if "_" in text:  # which Python takes between digits
+            raise ValueError
         return int(text)
     except ValueError:
         raise Problem(f"{place}: '{text}': expected {what}") from None
@@ -82,19 +96,37 @@ def whole(text, place, what="a whole number"):
 def number(text, place, what="a number"):
     """Fortran's forms too: 1.5D+3, and Nastran's 1.5+3."""
     try:
-        return float(text)
+        value = float(text)
     except ValueError:
         fixed = re.sub(r"(?<=[\d.])([+-])", r"E\1", re.sub("[dD]", "E", text.strip()))
         try:
-            return float(fixed.replace("EE", "E"))
+            value = float(fixed.replace("EE", "E"))
         except ValueError:
-            raise Problem(f"{place}: '{text}': expected {what}") from None
+            value = math.nan
+    if not math.isfinite(value) or "_" in text:
+        raise Problem(f"{place}: '{text}': expected {what}")
+    return value
+
+
+def node_table(nodes):
+    """Numbers and positions of (place, number, position); a number may come again at the same position only."""
+    found = {}
+    for place, label, position in nodes:
+        if not 0 < label < 2**31:
+            raise Problem(f"{place}: node {label}: expected a number from 1 to {2**31 - 1}")
+        before, known = found.setdefault(label, (place, position))
+        if known is not position and tuple(known) != tuple(position):
+            raise Problem(f"{place}: node {label} is at another position than in {before}: give it one position")
+    return np.array(list(found), np.int64), np.array([at for _, at in found.values()], float).reshape(-1, 3)
 
 
 def abaqus_nodes(blocks):
     """Numbers and positions of all *NODE blocks, in order."""
-    labels, positions = [], []
+    nodes = []
     for block in blocks:
+        if block.name in MADE_OR_MOVED and (block.lines or block.name != "SYSTEM"):
+            raise Problem(f"{block.place}: *{block.name} makes or moves nodes: let the preprocessor write all nodes, in global "
+                          "coordinates")
         if block.name in ("INSTANCE", "ASSEMBLY"):
             raise Problem(f"{block.place}: *{block.name}: the solver numbers the nodes of parts anew; write a flat deck "
                           "(in Abaqus/CAE: Model, Edit Attributes, Do not use parts and assemblies in input files)")
@@ -105,10 +137,9 @@ def abaqus_nodes(blocks):
         for place, fields in block.rows():
             if not 2 <= len(fields) <= 7:
                 raise Problem(f"{place}: {len(fields)} fields; expected a node's number and its x, y, z")
-            labels.append(whole(fields[0], place))
-            place_of = [number(field or "0", place) for field in fields[1:4]]
-            positions.append(place_of + [0.0] * (3 - len(place_of)))
-    return np.array(labels, np.int64), np.array(positions, float).reshape(-1, 3)
+            position = [number(field or "0", place) for field in fields[1:4]]
+            nodes.append((place, whole(fields[0], place), position + [0.0] * (3 - len(position))))
+    return node_table(nodes)
 
 
 # ---- Nastran
@@ -152,12 +183,17 @@ def fields_of(line):
     return fields[0], data + [""] * ((4 if wide else 8) - len(data))
 
 
-def cards_of(file, depth=0):
-    """The cards of the bulk data. What stands before BEGIN BULK is left out."""
+def sections_of(file):
+    """Numbered lines without comments, of the case control and of the bulk data."""
     lines = [(n, line.split("$")[0].rstrip()) for n, line in lines_of(file)]
     begin = next((i + 1 for i, (_, line) in enumerate(lines) if line.upper().split()[:2] == ["BEGIN", "BULK"]), 0)
+    return lines[: max(begin - 1, 0)], lines[begin:]
+
+
+def cards_of(file, depth=0):
+    """The cards of the bulk data."""
     cards = []
-    for n, line in lines[begin:]:
+    for n, line in sections_of(file)[1]:
         if not line.strip():
             continue
         place = f"{file}, line {n}"
@@ -182,13 +218,12 @@ def nastran_nodes(cards):
     grids = [card for card in cards if card.name == "GRID"]
     systems = Systems(cards)
     default = next((card.field(3) for card in cards if card.name == "GRDSET"), "")
-    labels, positions = [], []
+    nodes = []
     for card in grids:
-        labels.append(card.whole(2))
         place = f"{card.place}, GRID {card.field(2)}"
         system = whole(card.field(3) or default or "0", place)
-        positions.append(systems.position(system, [card.number(i, 0.0) for i in (4, 5, 6)], place))
-    return np.array(labels, np.int64), np.array(positions).reshape(-1, 3)
+        nodes.append((card.place, card.whole(2), systems.position(system, [card.number(i, 0.0) for i in (4, 5, 6)], place)))
+    return node_table(nodes)
 
 
 class Systems:
