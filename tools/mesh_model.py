@@ -58,18 +58,21 @@ class Model:
         self.element_sets = {}  # name: numbers of solid elements
         self.surfaces = {}  # name: faces, each a tuple of nodes in gmsh's order
         self.node_sets = {}  # name: nodes
-        self.materials = {}  # name: {"young": , "poisson": , "density": }
+        self.materials = {}  # name: {"young": , "poisson": , "density": , "loss_factor": , "alpha": , "beta": }
+        self.loss_factor = 0.0  # of all parts, beside those of their materials
         self.supports = []  # (name of a node set, motions)
         self.ties = []  # (slave, master)
         self.contacts = []  # (slave, master)
         self.notes = []  # what the deck has and the mesh has not
+        self.places = {}  # of the elements in the deck
 
     def add_element(self, place, number, kind, nodes, code):
         if number in self.elements:
-            raise Problem(f"{place}: element {number} is there twice")
+            raise Problem(f"{place}: element {number} is there twice, first in {self.places[number]}; give it another number")
         missing = [node for node in nodes if node not in self.nodes]
         if missing:
             raise Problem(f"{place}: element {number} has node {missing[0]}, which the deck does not define")
+        self.places[number] = place
         self.elements[number] = (kind, tuple(nodes[i] for i in gmsh_order(kind, code)))
 
     def faces(self, number):
@@ -103,14 +106,74 @@ class Model:
     def drop_loose_nodes(self):
         """Nodes of sets that no element has, such as reference nodes."""
         used = {node for _, nodes in self.elements.values() for node in nodes}
-        self.node_sets = {name: [node for node in nodes if node in used] for name, nodes in self.node_sets.items()}
-        loose = [name for name, nodes in self.node_sets.items() if not nodes]
-        self.notes += [f"the set {name}, whose nodes no element has" for name in loose]
-        self.node_sets = {name: nodes for name, nodes in self.node_sets.items() if nodes}
-        self.supports = [(name, motions) for name, motions in self.supports if name not in loose]
+        for name, nodes in list(self.node_sets.items()):
+            kept = [node for node in dict.fromkeys(nodes) if node in used]
+            lost = len(set(nodes)) - len(kept)
+            self.node_sets[name] = kept
+            if not kept:
+                its = " and its support" if any(name == of for of, _ in self.supports) else ""
+                self.notes.append(f"the set {name}{its}, whose nodes no element has")
+                del self.node_sets[name]
+            elif lost:
+                self.notes.append(f"{lost} nodes of the set {name}, which no element has")
+        self.supports = [(name, motions) for name, motions in self.supports if name in self.node_sets]
+
+    def drop_idle_supports(self):
+        """squeal refuses a support that holds rotations of solids and nothing else."""
+        turning = self.nodes_with_rotations()
+        for name, motions in list(self.supports):
+            if not {"x", "y", "z"} & set(motions) and turning.isdisjoint(self.node_sets[name]):
+                self.notes.append(f"the support of {name} along {' '.join(motions)}: its nodes have no rotations")
+                self.supports.remove((name, motions))
+
+    def nodes_with_rotations(self):
+        shells = [n for part in self.parts.values() for n in part.elements if self.elements[n][0] in FLAT]
+        return {node for n in shells for node in self.elements[n][1]}
+
+    def unused(self, name):
+        """The name, or one like it that no group has."""
+        while any(name in groups for groups in (self.parts, self.surfaces, self.node_sets, self.element_sets)):
+            name += "_"
+        return name
+
+    def separate_names(self):
+        """squeal takes the nodes of all groups of a name. So parts keep their names, then surfaces, then sets of nodes, and what
+        has other nodes under the same name gets another one."""
+        for name, faces in list(self.surfaces.items()):
+            if name in self.parts:
+                part = [face for n in self.parts[name].elements for face in self.faces(n)]
+                shell = self.elements[self.parts[name].elements[0]][0] in FLAT
+                if not shell or {corners_of(face) for face in part} != {corners_of(face) for face in faces}:
+                    self.move(self.surfaces, name, "_faces", "a surface")
+        for name, nodes in list(self.node_sets.items()):
+            known = [self.elements[n][1] for n in self.parts[name].elements] if name in self.parts else self.surfaces.get(name)
+            if known is None:
+                continue
+            if {node for of in known for node in of} == set(nodes):
+                del self.node_sets[name]
+            else:
+                self.move(self.node_sets, name, "_nodes", "a set of nodes")
+        for name in list(self.element_sets):
+            if name in self.parts or name in self.surfaces or name in self.node_sets:
+                self.move(self.element_sets, name, "_elements", "a set of elements")
+
+    def move(self, groups, name, ending, what):
+        """Under another name, which supports, ties and contacts follow."""
+        shown = self.unused(name + ending)
+        self.notes.append(f"the name {name} of {what}, which another group has: it is {shown}")
+        groups[shown] = groups.pop(name)
+        if groups is self.node_sets:
+            self.supports = [(shown if of == name else of, motions) for of, motions in self.supports]
+        elif groups is self.surfaces:
+            self.call_faces(name, shown)
+
+    def call_faces(self, name, shown):
+        self.ties, self.contacts = ([tuple(shown if of == name else of for of in pair) for pair in pairs]
+                                    for pairs in (self.ties, self.contacts))
 
     def name_faces_of_node_sets(self):
-        """A set of nodes that covers free faces is a surface too, of the same name: contacts and pressures need faces."""
+        """A set of nodes that covers free faces is a surface too, NAME_faces where it has other nodes besides: contacts and
+        pressures need faces."""
         free = self.free_faces(self.solids())
         touching = {}
         for key, face in free.items():
@@ -119,10 +182,14 @@ class Model:
         for name, nodes in list(self.node_sets.items()):
             wanted = set(nodes)
             keys = {key for node in nodes for key in touching.get(node, []) if wanted.issuperset(free[key])}
-            if keys and name not in self.surfaces:
-                self.surfaces[name] = [free[key] for key in sorted(keys, key=sorted)]
+            if keys:
+                shown = name
                 if {node for key in keys for node in free[key]} == wanted:
                     del self.node_sets[name]  # the surface has the same nodes
+                else:
+                    shown = self.unused(name + "_faces")
+                    self.call_faces(name, shown)
+                self.surfaces[shown] = [free[key] for key in sorted(keys, key=sorted)]
 
     def add_parts_of_the_rest(self, name):
         """Solid elements without a part: a part a connected body."""
@@ -131,7 +198,7 @@ class Model:
         if rest:
             bodies = self.bodies(rest)
             for i, body in enumerate(bodies, 1):
-                self.parts[name if len(bodies) == 1 else f"{name}_{i}"] = Part(body)
+                self.parts[self.unused(name if len(bodies) == 1 else f"{name}_{i}")] = Part(body)
 
     def bodies(self, numbers):
         from scipy.sparse import coo_matrix
@@ -204,15 +271,14 @@ def write_msh(model, file):
         raise Problem(f"{model.source}: no solid and no shell elements")
     points = np.array([model.nodes[node] for node in used])
     box = " ".join(f"{v:.17g}" for v in (*points.min(axis=0), *points.max(axis=0)))
-    entities = {0: [], 1: [], 2: [], 3: []}
+    entities = {dimension: {} for dimension in range(4)}  # names: number
     for dimension, of, *_ in blocks:
-        if of not in entities[dimension]:
-            entities[dimension].append(of)
+        entities[dimension].setdefault(of, len(entities[dimension]) + 1)
     lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names))]
     lines += [f'{dimension} {tags[dimension, name]} "{name}"' for dimension, name in names]
     lines += ["$EndPhysicalNames", "$Entities", " ".join(str(len(entities[d])) for d in range(4))]
     for d in (0, 2, 3):
-        for i, of in enumerate(entities[d], 1):
+        for of, i in entities[d].items():
             place = " ".join(box.split()[:3]) if d == 0 else box
             physical = " ".join(str(tags[d, name]) for name in of)
             lines.append(f"{i} {place} {len(of)} {physical}" + ("" if d == 0 else " 0"))
@@ -223,7 +289,7 @@ def write_msh(model, file):
     lines += ["$EndNodes", "$Elements", f"{len(blocks)} {count} 1 {count}"]
     number = 0
     for dimension, of, kind, cells in blocks:
-        lines.append(f"{dimension} {entities[dimension].index(of) + 1} {kind} {len(cells)}")
+        lines.append(f"{dimension} {entities[dimension][of]} {kind} {len(cells)}")
         for cell in cells:
             number += 1
             lines.append(f"{number} " + " ".join(map(str, cell)))

@@ -16,14 +16,17 @@ def skeleton(model, mesh, length, force):
     for name, part in model.parts.items():
         lines += ["", "[[part]]", f"name = {text(name)}", *material(model, part, length, force)]
         if model.elements[part.elements[0]][0] not in KINDS:
-            lines.append(f"thickness = {part.thickness * length!r}" if part.thickness else
+            lines.append(f"thickness = {part.thickness * length:.12g}" if part.thickness else
                          "# thickness =    # FILL IN [m]: these are shells; or remove this part, if they are the surface of a solid")
     for name, motions in model.supports:
         fixed = "all" if len(motions) == len(MOTIONS) else " ".join(motions)
         lines += ["", "[[support]]", f"on = {text(name)}", f"fixed = {text(fixed)}"]
     if not model.supports:
         lines += ["", "# [[support]]", f"# on = \"\"          # FILL IN: {names_of(model)}", '# fixed = "all"']
-    lines += ["", *contacts(model), "", "[damping]", "# beta = 1e-7     # FILL IN [s]: C = alpha M + beta K", ""]
+    lines += ["", *contacts(model), "", "[damping]", "# beta = 1e-7     # FILL IN [s]: C = alpha M + beta K"]
+    if any(line.startswith("loss_factor = ") for line in lines):
+        lines.append("# loss_frequency =    # FILL IN [Hz]: where loss factors have their viscous equivalent in time")
+    lines.append("")
     lines += ["# [[force]]", f"# on = \"\"          # FILL IN: {names_of(model)}", "# vector = [0, 0, 0]   # FILL IN [N]: the whole force", ""]
     return "\n".join(lines)
 
@@ -31,11 +34,12 @@ def skeleton(model, mesh, length, force):
 def material(model, part, length, force):
     """Stress is force over length squared, density force s2 over length to the fourth."""
     known = model.materials.get(part.material, {}) if part.material else {}
-    lines = [f"# {known['note']}"] if "note" in known else []
+    lines = []
     for key, unit, factor in (("young", "Pa", force / length**2), ("poisson", "-", 1), ("density", "kg/m3", force / length**4)):
         missing = key not in known or (known[key] == 0 and key != "poisson")
         lines.append(f"# {key} =    # FILL IN [{unit}]: the deck has none" if missing else f"{key} = {known[key] * factor:.12g}")
-    return lines
+    damping = {**known, "loss_factor": known.get("loss_factor", 0) + model.loss_factor}
+    return lines + [f"{key} = {damping[key]:.12g}" for key in ("loss_factor", "alpha", "beta") if damping.get(key)]
 
 
 def names_of(model):

@@ -17,6 +17,7 @@ ORDERS = {
 }
 
 TOOL = load_tool("mesh")
+MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 class TwoBlocks:
@@ -286,7 +287,7 @@ def test_all_that_an_input_deck_may_name(tmp_path):
         "*TIE, NAME=t\nside, hull\n*CONTACT PAIR, INTERACTION=i\nSkin, side\n*BOUNDARY\n1, ZSYMM\nref, 1, 6\nRight, 2, 2, 0.1\n")
     model = TOOL.read_deck(tmp_path / "deck.inp")
     assert {name: {frozenset(f) for f in faces} for name, faces in model.surfaces.items() if name != "hull" and name != "of_body"} == {
-        "side": {RIGHT}, "Skin": {TOP}, "Right": {RIGHT}, "dots": {RIGHT}, "both": {RIGHT}, "All": {frozenset(f) for f in model.faces(1)}}
+        "side": {RIGHT}, "Skin": {TOP}, "Right": {RIGHT}, "dots": {RIGHT}, "both_faces": {RIGHT}, "All": {frozenset(f) for f in model.faces(1)}}
     assert len(model.surfaces["hull"]) == len(model.surfaces["of_body"]) == 6
     assert model.node_sets == {"both": [2, 3, 6, 7, 1], "node_1": [1]}  # the others are the nodes of their surfaces
     assert model.supports == [("node_1", ["z", "rx", "ry"]), ("Right", ["y"])]
@@ -309,10 +310,115 @@ def test_all_that_bulk_data_may_name(tmp_path):
     assert list(model.parts) == ["caliper", "property_30"] and model.parts["property_30"].thickness == 0.002
     surfaces = {name: {frozenset(face) for face in faces} for name, faces in model.surfaces.items()}
     assert surfaces == {"property_20": {TOP}, "set_4": {RIGHT}, "set_6": {TOP}, "spc_1_3": {frozenset((1, 2, 3, 4))}}
-    assert model.element_sets == {"set_6": [1]}
+    assert model.element_sets == {"set_6_elements": [1]}
     assert model.node_sets == {"spc_grid_12": [4], "spc_2_13": [10], "spc_2_2": [11]}
     assert dict(model.supports) == {"spc_grid_12": ["x", "y"], "spc_1_3": ["z"], "spc_2_13": ["x", "z"], "spc_2_2": ["y"]}
     assert model.materials["7"] == {"young": 2.1e11, "poisson": 0.3, "density": 7850} and "RBE2" in model.notes[0]
+
+
+FLAT_CUBE = "*NODE\n" + "".join(f"{i}, {x}, {y}, {z}\n" for i, (x, y, z) in enumerate(CUBE, 1))
+CUBE_ON_CUBE = FLAT_CUBE + "".join(f"{i}, {x}, {y}, 2\n" for i, (x, y) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1)), 9)) + (
+    "*ELEMENT, TYPE=C3D8, ELSET=all\n1, 1,2,3,4,5,6,7,8\n2, 5,6,7,8,9,10,11,12\n")
+
+
+def read_text(tmp_path, text, name="deck.inp"):
+    (tmp_path / name).write_text(text)
+    return TOOL.read_deck(tmp_path / name)
+
+
+def groups_of(file):
+    """{name: [(dimension, nodes)]} of the groups in a mesh, as gmsh lists them."""
+    sections = dict(part.split("\n", 1) for part in file.read_text().split("$") if "\n" in part.strip())
+    names = {int(line.split()[1]): line.split('"')[1] for line in sections["PhysicalNames"].splitlines()[1:]}
+    counts, *entities = [line.split() for line in sections["Entities"].splitlines()]
+    of = {}
+    for dimension, count in enumerate(map(int, counts)):
+        for entity in (entities.pop(0) for _ in range(count)):
+            first = 4 if dimension == 0 else 7
+            of[dimension, entity[0]] = [names[int(tag)] for tag in entity[first + 1 : first + 1 + int(entity[first])]]
+    groups, lines = {}, [line.split() for line in sections["Elements"].splitlines()[1:]]
+    while lines:
+        dimension, entity, _, count = lines.pop(0)
+        for cell in (lines.pop(0) for _ in range(int(count))):
+            for name in of[int(dimension), entity]:
+                groups.setdefault(name, {}).setdefault(int(dimension), set()).update(map(int, cell[1:]))
+    return groups
+
+
+def test_a_name_is_one_group(tmp_path, squeal):
+    """Abaqus/CAE writes a set of nodes and one of elements by the same name; a support of the one must not hold the other."""
+    text = CUBE_ON_CUBE + "*NSET, NSET=Set-1\n1,2,3,4\n*ELSET, ELSET=Set-1\n1\n*BOUNDARY\nSet-1, ENCASTRE\n"
+    (tmp_path / "deck.inp").write_text(text)
+    scene = convert(tmp_path / "deck.inp", tmp_path / "out")
+    groups = groups_of(tmp_path / "out" / "deck.msh")
+    assert groups["Set-1"] == {2: {1, 2, 3, 4}} and groups["Set-1_elements"] == {3: set(range(1, 9))}
+    assert all(len(of) == 1 for of in groups.values())
+    assert tomllib.loads(scene.read_text())["support"] == [{"on": "Set-1", "fixed": "all"}]
+    assert "Set-1 of a set of elements" in scene.read_text()
+    # a part keeps its name; supports and ties follow what is renamed
+    text = CUBE_ON_CUBE.replace("ELSET=all", "ELSET=one") + (
+        "*NSET, NSET=one\n1,2,3,4,5\n*SURFACE, NAME=one\none, S1\n*SURFACE, NAME=two\none, S2\n*TIE, NAME=t\nONE, Two\n"
+        "*BOUNDARY\none, 1, 3\n*SOLID SECTION, ELSET=one, MATERIAL=m\n")
+    model = read_text(tmp_path, text)
+    assert list(model.parts) == ["one"] and model.ties == [("one_faces", "two")] and model.supports == [("one_nodes", ["x", "y", "z"])]
+    assert model.node_sets["one_nodes"] == [1, 2, 3, 4, 5]
+    # the same nodes under the same name are one group
+    model = read_text(tmp_path, CUBE_ON_CUBE + "*NSET, NSET=all, ELSET=all\n*NSET, NSET=low\n1,2,3,4\n*SURFACE, NAME=low\n1, S1\n")
+    assert list(model.parts) == ["all"] and list(model.surfaces) == ["low"] and model.node_sets == {} and model.notes == []
+
+
+PART = "*PART, NAME=p\n" + CUBE_ON_CUBE + "*SOLID SECTION, ELSET=all, MATERIAL=m\n*END PART\n*ASSEMBLY, NAME=a\n"
+
+
+def test_numbers_outside_of_instances_are_others(tmp_path):
+    """A reference point of the assembly has number 1, as has a node of the part; no node of the part moves."""
+    text = PART + ("*INSTANCE, NAME=i, PART=p\n5.\n*END INSTANCE\n*NODE\n1, 9., 9., 9.\n*NSET, NSET=rp\n1\n"
+                   "*NSET, NSET=low, INSTANCE=i\n1,2,3,4\n*END ASSEMBLY\n*BOUNDARY\nrp, 1, 6\nlow, PINNED\n")
+    model = read_text(tmp_path, text)
+    assert [tuple(model.nodes[n]) for n in (1, 7)] == [(5, 0, 0), (6, 1, 1)] and tuple(model.nodes[13]) == (9, 9, 9)
+    assert model.supports == [("low", ["x", "y", "z"])] and "the set rp and its support" in model.notes[0]
+
+
+@pytest.mark.parametrize("data, at", [("", (0, 0, 0)), ("5.\n", (5, 0, 0)), (",\n0,0,0,0,0,1,90\n", (0, 0, 0)), (",,3.\n", (0, 0, 3))])
+def test_missing_numbers_of_a_translation_are_zero(tmp_path, data, at):
+    text = PART + f"*INSTANCE, NAME=i, PART=p\n{data}*END INSTANCE\n*END ASSEMBLY\n"
+    assert tuple(read_text(tmp_path, text).nodes[1]) == at
+
+
+def test_a_part_without_instance_is_named(tmp_path):
+    text = "*PART, NAME=spare\n*END PART\n" + PART + "*INSTANCE, NAME=i, PART=p\n*END INSTANCE\n*END ASSEMBLY\n"
+    assert read_text(tmp_path, text).notes == ["*PART (line 1)"]
+
+
+def test_data_from_other_files(tmp_path):
+    """INPUT of a keyword, and an included file that goes on with its data."""
+    (tmp_path / "nodes.txt").write_text("1, 0,0,0\n2, 1,0,0\n")
+    (tmp_path / "more.txt").write_text("3, 0,1,0\n4, 0,0,1\n")
+    model = read_text(tmp_path, "*NODE, INPUT=nodes.txt\n*INCLUDE, INPUT=more.txt\n*ELEMENT, TYPE=C3D4, ELSET=e\n1, 1,2,3,4\n")
+    assert list(model.nodes) == [1, 2, 3, 4] and model.notes == []
+
+
+def test_what_an_input_deck_has_and_the_mesh_has_not_is_named(tmp_path):
+    """Keywords, options, layers, lines and names; the skeleton has what it can of them."""
+    shells = "*ELEMENT, TYPE=S4, ELSET=skin\n3, 9,10,11,12\n*ELEMENT, TYPE=S4, ELSET=bare\n4, 1,2,3,4\n*ELEMENT, TYPE=B31, ELSET=rod\n5, 1,2\n6, 2,3\n"
+    model = read_text(tmp_path, CUBE_ON_CUBE + shells + (
+        "*ELSET, ELSET=mixed\nall, rod\n*NSET, NSET=n\n1, 77\n*SURFACE, NAME=side\nall, S3\n*SURFACE, NAME=Top\n2, S2\n"
+        "*SURFACE, NAME=r, TYPE=CYLINDER\nSTART, 0,1\n*MATERIAL, NAME=m\n*ELASTIC\n2e11, .3\n1e11, .3, 40.\n"
+        "*DAMPING, BETA=1e-7, STRUCTURAL=0.01\n*SOLID SECTION, ELSET=all, MATERIAL=m\n"
+        "*SHELL SECTION, ELSET=skin, COMPOSITE, OFFSET=SPOS\n0.1, 3, m\n0.2, 3, m\n*TIE, NAME=t\nSIDE, TOP\n*CONTACT PAIR\nr, TOP\nside, TOP\n"
+        "*TRANSFORM, NSET=n\n0,1,0,-1,0,0\n*BOUNDARY, OP=NEW\nskins, 4, 6\nn, ENCASTRE\nn, 11, 11, 20.\n*NSET, NSET=Skins\n5,6,7\n"
+        "*STEP\n*CLOAD\n1,1,1.\n*CLOAD\n1,2,1.\n*DSLOAD\nside, P, 1.\n*NODE FILE\nU\n*END STEP\n"))
+    notes = "\n".join(model.notes)
+    for words in ("2 elements of type B31", "OFFSET=SPOS of *SHELL SECTION (line 40)", "*TRANSFORM (line 48)", "OP=NEW of *BOUNDARY (line 50)",
+                  "*CLOAD (2 times, first in line 57)", "*DSLOAD (line 61)", "first line of *ELASTIC (line 35)", "2 layers of *SHELL SECTION",
+                  "the surface r (line 32)", "degrees of freedom from 11 on of n", "support of Skins along rx ry rz: its nodes have no rotations",
+                  "1 shells without a *SHELL SECTION", "*CONTACT PAIR (line 46), whose surface r", "1 nodes of the set n", "the set rod, whose elements"):
+        assert words in notes, words
+    assert len(model.notes) == 15
+    assert model.ties == model.contacts == [("side", "Top")] and model.supports == [("n", list(MOTIONS))]
+    assert model.parts["skin"].thickness == pytest.approx(0.3, rel=1e-15) and model.parts["skin"].material == "M"
+    scene = convert(tmp_path / "deck.inp", tmp_path / "out").read_text()
+    assert "loss_factor = 0.01\nbeta = 1e-07\n" in scene and "# loss_frequency =    # FILL IN" in scene
 
 
 BAD = {
@@ -325,6 +431,24 @@ BAD = {
     "an instance that is missing": ("*PART, NAME=a\n*NODE\n1,0,0,0\n*END PART\n*INSTANCE, NAME=b, PART=a\n*END INSTANCE\n"
                                     "*NSET, NSET=n, INSTANCE=d\n1\n", ["line 7", "'d'", "known are b"]),
     "no instance": ("*PART, NAME=a\n*NODE\n1,0,0,0\n*END PART\n", ["*INSTANCE"]),
+    "a node at two places": ("*NODE\n1,0,0,0\n2,0,0,0\n1,0,0,0\n1,0,0,2\n", ["line 5", "node 1", "line 2", "one position"]),
+    "a node below 1": ("*NODE\n0,0,0,0\n", ["line 2", "node 0", "from 1"]),
+    "no number": ("*NODE\n1,0,nan,0\n", ["line 2", "'nan'"]),
+    "an element twice": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=S3\n1,1,1,1\n1,1,1,1\n", ["line 5", "line 4", "twice"]),
+    "nodes in a system": ("*SYSTEM\n1,0,0\n*NODE\n1,0,0,0\n", ["line 1", "*SYSTEM", "global coordinates"]),
+    "nodes made": ("*NODE\n1,0,0,0\n*NGEN\n1,5\n", ["line 3", "*NGEN", "preprocessor"]),
+    "elements made": ("*NODE\n1,0,0,0\n*ELGEN, ELSET=e\n1,5\n", ["line 3", "*ELGEN", "preprocessor"]),
+    "an end within a keyword": ("*NODE\n1,0,0,0\n*NSET,\n", ["*NSET", "comma"]),
+    "a surface of nothing": ("*NODE\n1,0,0,0\n*SURFACE, NAME=s\n,\n", ["line 4", "0 fields", "a face"]),
+    "a support of nothing": ("*NODE\n1,0,0,0\n*BOUNDARY\n,\n", ["line 4", "0 fields", "ENCASTRE"]),
+    "a density of nothing": ("*NODE\n1,0,0,0\n*MATERIAL, NAME=m\n*DENSITY\n,\n", ["line 5", "0 fields", "a density"]),
+    "a step of 0": ("*NODE\n1,0,0,0\n*NSET, NSET=n, GENERATE\n1,5,0\n", ["line 4", "steps of 0"]),
+    "a translation too long": ("*PART, NAME=a\n*END PART\n*INSTANCE, NAME=b, PART=a\n0,0,1,0\n", ["line 4", "4 fields", "next line"]),
+    "an axis of one point": ("*PART, NAME=a\n*END PART\n*INSTANCE, NAME=b, PART=a\n,\n0,0,1,0,0,1,9\n", ["line 5", "axis"]),
+    "an instance twice": ("*PART, NAME=a\n*END PART\n*INSTANCE, NAME=b, PART=a\n*END INSTANCE\n*INSTANCE, NAME=B, PART=a\n",
+                          ["line 5", "'B'", "line 3"]),
+    "a support in a turned system": (FLAT_CUBE + "*NSET, NSET=n\n1\n*TRANSFORM, NSET=n\n0,1,0,-1,0,0\n*BOUNDARY\nn, 1\n",
+                                     ["line 15", "node 1", "line 12", "all translations"]),
     "nothing": ("*HEADING\nx\n", ["two.inp", "*NODE"]),
     "a face that is not there": ("*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT, TYPE=C3D4, ELSET=e\n9,1,2,3,4\n*SURFACE, NAME=s\ne, S5\n",
                                  ["line 9", "'S5'", "S1 to S4"]),
