@@ -1,14 +1,17 @@
 """Meshes of Nastran: bulk data to a mesh_model.Model. Names of properties come from the comments that preprocessors write."""
 
 import re
+from collections import Counter
 
-from deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes
+from deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, sections_of, whole
 from mesh_model import FLAT, KINDS, MOTIONS, Model, Part
 
 ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6", ("CTETRA", 4): "tet4",
             ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3"}
 CORNERS = {"CHEXA": (8, 20), "CPENTA": (6, 15), "CTETRA": (4, 10), "CQUAD4": (4, 4), "CTRIA3": (3, 3)}
-READ = {"GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "SPC", "SPC1", "SPCADD", "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS}
+READ = {"GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "SPC", "SPC1", "SPCADD", "SET1", "SET3",
+        "PARAM", "ENDDATA", *CORNERS}
+SHELL_FIELDS = {"CQUAD4": {"ZOFFS": (9,), "T1 to T4": (12, 13, 14, 15)}, "CTRIA3": {"ZOFFS": (8,), "T1 to T3": (12, 13, 14)}}
 
 
 def read_bdf(file):
@@ -18,18 +21,28 @@ def read_bdf(file):
     model.nodes = dict(zip(labels.tolist(), positions))
     if not model.nodes:
         raise Problem(f"{file}: no GRID")
+    left_out = Counter(card.name for card in cards if card.name not in READ)
+    if left_out:
+        model.notes.append("the cards " + ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items())))
     of_property = {}
     for card in cards:
         if card.name in CORNERS:
             read_element(card, model, of_property)
+    note_shell_fields(cards, model)
     read_materials(cards, model)
     read_properties(cards, model, of_property, names_in_comments(file))
-    read_supports(cards, model)
-    read_sets(cards, file, model)
-    left_out = sorted({card.name for card in cards} - READ)
-    if left_out:
-        model.notes.append("the cards " + ", ".join(left_out))
+    case = "\n".join(line for _, line in sections_of(file)[0])
+    read_supports(cards, case, model)
+    read_sets(cards, case, model)
     return model
+
+
+def note_shell_fields(cards, model):
+    for name, fields in SHELL_FIELDS.items():
+        for what, places in fields.items():
+            count = sum(any(card.number(i, 0.0) for i in places) for card in cards if card.name == name)
+            if count:
+                model.notes.append(f"{what} of {count} {name}")
 
 
 def read_element(card, model, of_property):
@@ -51,14 +64,33 @@ def read_element(card, model, of_property):
 
 
 def read_materials(cards, model):
+    """GE of a material and G of all are loss factors; WTMASS multiplies densities."""
+    values = {}
     for card in cards:
-        if card.name != "MAT1":
-            continue
+        if card.name == "PARAM":
+            values[card.field(2).upper()] = card
+    others = sorted(set(values) - {"WTMASS", "G", "POST"})
+    if others:
+        model.notes.append("PARAM " + ", ".join(others))
+    mass = values["WTMASS"].number(3, 1.0) if "WTMASS" in values else 1.0
+    model.loss_factor = values["G"].number(3, 0.0) if "G" in values else 0.0
+    for card in by_number(cards, "MAT1").values():
         young, shear, poisson = (card.number(i, 0.0) for i in (3, 4, 5))
         if card.field(5) == "" and young and shear:
             poisson = young / (2 * shear) - 1
         young = young or 2 * shear * (1 + poisson)
-        model.materials[card.field(2)] = {"young": young, "poisson": poisson, "density": card.number(6, 0.0)}
+        model.materials[card.field(2)] = {"young": young, "poisson": poisson, "density": card.number(6, 0.0) * mass,
+                                          "loss_factor": card.number(9, 0.0)}
+
+
+def by_number(cards, *names):
+    found = {}
+    for card in cards:
+        if card.name in names:
+            before = found.setdefault(card.whole(2), card)
+            if before.fields != card.fields:
+                raise Problem(f"{card.place}: {card.name} {card.field(2)} is there twice, first in {before.place}; keep one")
+    return found
 
 
 def names_in_comments(file):
@@ -78,43 +110,81 @@ def names_in_comments(file):
 
 def read_properties(cards, model, of_property, names):
     """A part for every property; flat elements on the faces of solids are surfaces, whatever their property."""
-    properties = {card.whole(2): card for card in cards if card.name in ("PSOLID", "PSHELL")}
+    properties = by_number(cards, "PSOLID", "PSHELL")
     free = model.free_faces(model.solids())
-    for number, elements in of_property.items():
-        name = names.get(number, f"property_{number}")
-        card = properties.get(number)
+    for pid, elements in of_property.items():
+        name = names.get(pid, f"property_{pid}")
+        if model.unused(name) != name:
+            name += f"_{pid}"
+        card = properties.get(pid)
         material = card.field(3) if card else None
         flat = [n for n in elements if model.elements[n][0] in FLAT]
         solid = [n for n in elements if model.elements[n][0] in KINDS]
         if solid:
             model.parts[name] = Part(solid, material)
+        thickness = card.number(4, 0.0) if card and card.name == "PSHELL" else 0.0
         if flat and all(frozenset(model.elements[n][1]) in free for n in flat):
-            model.surfaces[name] = [model.elements[n][1] for n in flat]
+            shown = model.unused(name if not solid else name + "_faces")
+            model.surfaces[shown] = [model.elements[n][1] for n in flat]
+            if thickness:
+                model.notes.append(f"the thickness {thickness:g} of PSHELL {pid}, whose elements lie on solids: {shown} is a surface; "
+                                   "a [[part]] with a thickness makes shells of it")
         elif flat:
-            shown = name if not solid else name + "_shells"
-            model.parts[shown] = Part(flat, material, card.number(4, 0.0) if card and card.name == "PSHELL" else 0.0)
+            model.parts[model.unused(name if not solid else name + "_shells")] = Part(flat, material, thickness)
+            note_shell_property(card, model)
+
+
+def note_shell_property(card, model):
+    """What a homogeneous shell of one material has not: other bending, shear or membrane, and a mass of its own."""
+    if card is None or card.name != "PSHELL":
+        return
+    found = ["MID2"] if card.field(5) != card.field(3) else []
+    found += ["MID4"] if card.field(12) else []
+    for what, i, usual in (("12I/T**3", 6, 1.0), ("TS/T", 8, 5 / 6), ("NSM", 9, 0.0)):
+        if abs(card.number(i, usual) - usual) > 1e-3:
+            found.append(what)
+    if found:
+        model.notes.append(f"{', '.join(found)} of PSHELL {card.field(2)}")
 
 
 def listed(texts, place):
-    """Numbers of a list with THRU."""
-    words, found = [text.upper() for text in texts if text], []
-    i = 0
+    """Numbers of a list with THRU, BY and EXCEPT; what EXCEPT names is out as long as it is within the range before it."""
+    words, found, i = [text.upper() for text in texts if text], [], 0
+
+    def number_at(i):
+        if i >= len(words) or not words[i].isdecimal():
+            raise Problem(f"{place}: '{' '.join(words[max(i - 2, 0) : i + 1])}': expected numbers, or first THRU last")
+        return int(words[i])
+
     while i < len(words):
-        if i + 2 < len(words) and words[i + 1] == "THRU":
-            found += range(int(words[i]), int(words[i + 2]) + 1)
-            i += 3
-            continue
-        if not words[i].isdigit():
-            raise Problem(f"{place}: '{words[i]}': expected numbers, or first THRU last")
-        found.append(int(words[i]))
-        i += 1
+        first = last = number_at(i)
+        step, i = 1, i + 1
+        if words[i : i + 1] == ["THRU"]:
+            last, i = number_at(i + 1), i + 2
+        if words[i : i + 1] == ["BY"]:
+            step, i = number_at(i + 1), i + 2
+        if last < first or step < 1:
+            raise Problem(f"{place}: {first} THRU {last} BY {step}: expected ascending numbers")
+        chosen = range(first, last + 1, step)
+        if words[i : i + 1] == ["EXCEPT"]:
+            i += 1
+            out = set()
+            while i < len(words) and first <= number_at(i) <= last and words[i + 1 : i + 2] != ["THRU"]:
+                out.add(number_at(i))
+                i += 1
+            chosen = [n for n in chosen if n not in out]
+        found += chosen
     return found
 
 
-def read_supports(cards, model):
-    """Of each set number and its motions, a set of nodes; the motions that GRID holds too."""
+def read_supports(cards, case, model):
+    """Of each set number and its motions, a set of nodes; the motions that GRID holds too. Rotations of solids are no motions."""
+    default = next((card.field(8) for card in cards if card.name == "GRDSET"), "")
+    applied = applied_supports(cards, case, model)
     held = {}
     for card in cards:
+        if card.name in ("SPC", "SPC1") and card.whole(2) not in applied:
+            continue
         if card.name == "SPC1":
             nodes = [n for n in listed(card.fields[2:], card.place) if n in model.nodes]
             held.setdefault((card.field(2), card.field(3)), []).extend(nodes)
@@ -122,19 +192,53 @@ def read_supports(cards, model):
             for i in (3, 6):
                 if card.field(i):
                     held.setdefault((card.field(2), card.field(i + 1)), []).append(card.whole(i))
-        elif card.name == "GRID" and card.field(8).strip("0"):
-            held.setdefault(("grid", card.field(8)), []).append(card.whole(2))
-    turned = turned_nodes(cards)
+                    if card.number(i + 2, 0.0):
+                        model.notes.append(f"the enforced motion {card.field(i + 2)} of node {card.field(i)} in {card.name} "
+                                           f"{card.field(2)}: it is held at zero")
+        elif card.name == "GRID" and (card.field(8) or default).strip("0"):
+            held.setdefault(("grid", card.field(8) or default), []).append(card.whole(2))
+    turned, turning, idle = turned_nodes(cards), model.nodes_with_rotations(), 0
     for (number, motions), nodes in held.items():
-        if not motions.isdigit() or not set(motions) <= set("123456"):
-            raise Problem(f"{model.source}: SPC1 {number} holds '{motions}'; expected digits from 1 to 6")
-        oblique = [n for n in nodes if n in turned]
+        if not motions.isdecimal() or not set(motions) <= set("123456"):
+            raise Problem(f"{model.source}: SPC {number} holds '{motions}'; expected digits from 1 to 6")
+        moving = [n for n in dict.fromkeys(nodes) if n in turning or set(motions) & set("123")]
+        idle += len(set(nodes)) - len(moving)
+        oblique = [n for n in moving if n in turned]
         if oblique and not ({"1", "2", "3"} <= set(motions) and len(set(motions) & set("456")) in (0, 3)):
             raise Problem(f"{turned[oblique[0]]}: SPC {number} holds motions {motions} of node {oblique[0]} in a turned system: "
                           "expected all translations, or motions along the basic axes")
-        name = f"spc_{number}_{motions}"
-        model.node_sets[name] = list(dict.fromkeys(nodes))
-        model.supports.append((name, [MOTIONS[int(digit) - 1] for digit in sorted(motions)]))
+        if moving:
+            name = f"spc_{number}_{motions}"
+            model.node_sets[name] = moving
+            model.supports.append((name, [MOTIONS[int(digit) - 1] for digit in sorted(set(motions))]))
+    if idle:
+        model.notes.append(f"the held rotations of {idle} nodes that have none, as nodes of solids")
+
+
+def applied_supports(cards, case, model):
+    """Numbers of the SPC and SPC1 that the case control selects, of all its subcases; all where it selects none."""
+    known = {card.whole(2): card.field(2) for card in cards if card.name in ("SPC", "SPC1")}
+    sums = {}
+    for card in cards:
+        if card.name == "SPCADD":
+            sums.setdefault(card.whole(2), []).extend(listed(card.fields[1:], card.place))
+    selected = {int(n) for n in re.findall(r"^\s*SPC\s*=\s*(\d+)", case, flags=re.M | re.I)}
+    if not selected:
+        if known:
+            model.notes.append("a choice of supports, which the case control lacks: all are there, SPC " + ", ".join(map(str, known)))
+        return set(known)
+    if len(selected) > 1:
+        model.notes.append("the choice of supports by subcases: all are there, SPC " + ", ".join(map(str, sorted(selected))))
+    applied = set()
+    for n in selected:
+        applied |= {n} if n not in sums else {n, *sums[n]}
+    missing = applied - set(known) - set(sums)
+    if missing:
+        model.notes.append(f"SPC {', '.join(map(str, sorted(missing)))}, which the case control selects and the deck has not")
+    others = set(known) - applied
+    if others:
+        model.notes.append(f"SPC {', '.join(map(str, sorted(others)))}, which the case control does not select")
+    return applied
 
 
 def turned_nodes(cards):
@@ -144,34 +248,45 @@ def turned_nodes(cards):
     found = {}
     for card in cards:
         if card.name == "GRID":
-            system = card.field(7) or default or "0"
-            if system != "-1" and not systems.are_basic_axes(int(system), card.place):
+            system = whole(card.field(7) or default or "0", card.place)
+            if system != -1 and not systems.are_basic_axes(system, card.place):
                 found[card.whole(2)] = card.place
     return found
 
 
-def read_sets(cards, file, model):
-    """SET1 and the case control's SET are of nodes; SET3 says what it is of."""
+def read_sets(cards, case, model):
+    """SET1 is of nodes and SET3 says what it is of. The case control's SET may be of nodes, of elements or of other things."""
     for card in cards:
         if card.name == "SET1":
             add_set(model, f"set_{card.field(2)}", listed(card.fields[1:], card.place), "GRID")
         elif card.name == "SET3":
             add_set(model, f"set_{card.field(2)}", listed(card.fields[2:], card.place), card.field(3).upper())
-    text = "\n".join(line.split("$")[0] for _, line in lines_of(file))
-    for number, items in re.findall(r"^\s*SET\s+(\d+)\s*=((?:[^\n]*,\s*\n)*[^\n]*)", text.partition("BEGIN BULK")[0], flags=re.M):
-        if "ALL" not in items.upper():
-            add_set(model, f"set_{number}", listed(items.replace(",", " ").split(), f"{file}, SET {number}"), "GRID")
+    for number, items in re.findall(r"^\s*SET\s+(\d+)\s*=((?:[^\n]*,\s*\n)*[^\n]*)", case, flags=re.M | re.I):
+        try:
+            numbers = listed(items.replace(",", " ").split(), "")
+        except Problem:
+            model.notes.append(f"SET {number} of the case control, which is no list of numbers")
+            continue
+        add_set(model, f"set_{number}", numbers, "GRID")
 
 
 def add_set(model, name, items, kind):
+    items = list(dict.fromkeys(items))
     if kind == "GRID":
-        nodes = [n for n in items if n in model.nodes]
-        if nodes:
-            model.node_sets[name] = nodes
+        known = [n for n in items if n in model.nodes]
+        if known:
+            model.node_sets.setdefault(name, []).extend(known)
     elif kind.startswith("ELEM"):
-        solids = [n for n in items if n in model.elements and model.elements[n][0] in KINDS]
-        flat = [model.elements[n][1] for n in items if n in model.elements and model.elements[n][0] in FLAT]
+        known = [n for n in items if n in model.elements]
+        solids = [n for n in known if model.elements[n][0] in KINDS]
+        flat = [model.elements[n][1] for n in known if model.elements[n][0] in FLAT]
         if solids:
-            model.element_sets[name] = solids
+            model.element_sets.setdefault(name, []).extend(solids)
         if flat:
-            model.surfaces[name] = flat
+            model.surfaces.setdefault(name, []).extend(flat)
+    else:
+        model.notes.append(f"{name}, a set of {kind}")
+        return
+    if len(known) < len(items):
+        what = "nodes" if kind == "GRID" else "elements of the mesh"
+        model.notes.append(f"{len(items) - len(known)} of the {len(items)} numbers of {name}, which are no {what}")

@@ -304,7 +304,7 @@ def test_all_that_bulk_data_may_name(tmp_path):
     (tmp_path / "deck.bdf").write_text(
         "SET 4 = 2, 3,\n 6 THRU 7\nSET 5 = ALL\nBEGIN BULK\n" + grids + "GRID*                 10                              2.              0.\n"
         "*                     0.\nGRID,11,,2.,1.,0.\nCHEXA,1,10,1,2,3,4,5,6\n,7,8\n$ANSA_NAME_COMMENT;10;PSOLID;caliper;\nPSOLID,10,7\n"
-        "MAT1,7,2.1+11,8.1-1\nMAT1,7,2.1+11,,.3,7850.\nSPC1,1,3,1,THRU,4\nSPC,2,10,13,0.,11,2,0.\nSET3,6,ELEM,1,2\nRBE2,50,1,123,2\n"
+        "MAT1,8,2.1+11,7.+10\nMAT1,7,2.1+11,,.3,7850.\nSPC1,1,3,1,THRU,4\nSPC,2,10,13,0.,11,2,0.\nSET3,6,ELEM,1,2\nRBE2,50,1,123,2\n"
         "INCLUDE 'more.bdf'\nENDDATA\nnothing more\n")
     model = TOOL.read_deck(tmp_path / "deck.bdf")
     assert list(model.parts) == ["caliper", "property_30"] and model.parts["property_30"].thickness == 0.002
@@ -313,7 +313,65 @@ def test_all_that_bulk_data_may_name(tmp_path):
     assert model.element_sets == {"set_6_elements": [1]}
     assert model.node_sets == {"spc_grid_12": [4], "spc_2_13": [10], "spc_2_2": [11]}
     assert dict(model.supports) == {"spc_grid_12": ["x", "y"], "spc_1_3": ["z"], "spc_2_13": ["x", "z"], "spc_2_2": ["y"]}
-    assert model.materials["7"] == {"young": 2.1e11, "poisson": 0.3, "density": 7850} and "RBE2" in model.notes[0]
+    assert model.materials["7"] == {"young": 2.1e11, "poisson": 0.3, "density": 7850, "loss_factor": 0}
+    assert model.materials["8"]["poisson"] == pytest.approx(0.5, rel=1e-15) and "RBE2" in model.notes[0]
+
+
+BULK = "".join(f"GRID,{i},,{x}.,{y}.,{z}.\n" for i, (x, y, z) in enumerate(CUBE, 1)) + "CHEXA,1,10,1,2,3,4,5,6\n,7,8\nPSOLID,10,7\n"
+
+
+def test_the_case_control_selects_supports(tmp_path):
+    spc = "SPC1,1,3,1,2\nSPC1,2,1,3\nSPC1,3,2,4\nSPCADD,9,1,3\n"
+    model = read_text(tmp_path, "SUBCASE 1\n  spc = 9\nBEGIN BULK\n" + spc + BULK, "a.bdf")
+    assert model.supports == [("spc_1_3", ["z"]), ("spc_3_2", ["y"])] and model.notes == ["SPC 2, which the case control does not select"]
+    model = read_text(tmp_path, "BEGIN BULK\n" + spc + BULK, "a.bdf")
+    assert len(model.supports) == 3 and "which the case control lacks: all are there, SPC 1, 2, 3" in model.notes[0]
+    model = read_text(tmp_path, "SPC=1\nSUBCASE 2\nSPC=7\nBEGIN BULK\n" + spc + BULK, "a.bdf")
+    assert model.supports == [("spc_1_3", ["z"])] and "SPC 7, which the case control selects and the deck has not" in model.notes
+
+
+def test_rotations_that_solids_have_not_are_not_held(tmp_path):
+    """456 at nodes of solids, which preprocessors write, would be a support without a motion and a surface of all faces."""
+    text = "GRDSET,,,,,,,456\n" + BULK.replace("GRID,1,,0.,0.,0.", "GRID,1,,0.,0.,0.,,123")
+    model = read_text(tmp_path, text, "a.bdf")
+    assert model.supports == [("spc_grid_123", ["x", "y", "z"])] and model.node_sets == {"spc_grid_123": [1]} and model.surfaces == {}
+    assert model.notes == ["the held rotations of 7 nodes that have none, as nodes of solids"]
+    shell = "GRID,9,,2.,0.,0.\nGRID,10,,2.,1.,0.\nCQUAD4,2,20,2,9,10,3\nPSHELL,20,7,0.1,7\n"
+    model = read_text(tmp_path, text + shell, "a.bdf")
+    assert dict(model.supports)["spc_grid_456"] == ["rx", "ry", "rz"] and model.node_sets["spc_grid_456"] == [2, 3, 9, 10]
+
+
+def test_sets_of_the_case_control(tmp_path):
+    case = ("SET 1 = 1 THRU 8 EXCEPT 3, 5, 6, 7, 8\nset 2 = 2,3,\n 6,7\nSET 3 = 0.5, 1.5\nSET 4 = ALL\nSET 5 = 1, 2001\nSET 6 = 2001\n"
+            "SET 7 = 1 THRU 3 EXCEPT 2, 5 THRU 6\nSET 8 = 1 THRU 7 BY 3\n")
+    model = read_text(tmp_path, case + "BEGIN BULK\n" + BULK, "a.bdf")
+    assert model.node_sets == {"set_1": [1, 2, 4], "set_5": [1], "set_7": [1, 3, 5, 6], "set_8": [1, 4, 7]}
+    assert [frozenset(face) for face in model.surfaces["set_2"]] == [RIGHT]
+    assert model.notes == ["SET 3 of the case control, which is no list of numbers", "SET 4 of the case control, which is no list of numbers",
+                           "1 of the 2 numbers of set_5, which are no nodes", "1 of the 1 numbers of set_6, which are no nodes"]
+
+
+def test_what_bulk_data_has_and_the_mesh_has_not_is_named(tmp_path):
+    """Of parameters WTMASS and G are read, and loss factors of materials; a plate on a lining stays a surface."""
+    text = BULK + ("PARAM,WTMASS,1.-3\nPARAM,G,0.02\nPARAM,POST,-1\nPARAM,W3,6000.\nMAT1,7,2.1+11,,.3,7850.,,,0.01\nSPC,1,1,3,0.5\n"
+                   "GRID,9,,2.,0.,0.\nGRID,10,,2.,1.,0.\nCQUAD4,2,20,2,9,10,3,,0.1\n,,0,1.,1.\nPSHELL,20,7,0.1,8,2.0,8,0.833333,0.4\n"
+                   "CQUAD4,3,30,5,6,7,8\nPSHELL,30,7,5.\nCONM2,4,1,,3.\nCONM2,5,2,,3.\n")
+    model = read_text(tmp_path, text, "a.bdf")
+    assert model.materials["7"]["density"] == pytest.approx(7.85, rel=1e-15)
+    assert [line for line in convert(tmp_path / "a.bdf", tmp_path / "out").read_text().splitlines() if line.startswith("loss_factor")] == [
+        "loss_factor = 0.03"] * 2
+    notes = "\n".join(model.notes)
+    for words in ("the cards CONM2 (2)", "ZOFFS of 1 CQUAD4", "T1 to T4 of 1 CQUAD4", "PARAM W3", "thickness 5 of PSHELL 30, whose elements lie on solids",
+                  "MID2, 12I/T**3, NSM of PSHELL 20", "the enforced motion 0.5 of node 1", "all are there, SPC 1"):
+        assert words in notes, words
+    assert len(model.notes) == 8
+
+
+def test_parts_of_one_name_are_two(tmp_path):
+    names = '$HMNAME PROP 10 "steel"\n$HMNAME PROP 11 "steel"\n'
+    more = "".join(f"GRID,{i + 10},,{x}.,{y}.,{z + 5}.\n" for i, (x, y, z) in enumerate(CUBE, 1))
+    model = read_text(tmp_path, names + BULK + more + "CHEXA,2,11,11,12,13,14,15,16\n,17,18\nPSOLID,11,7\n", "a.bdf")
+    assert {name: part.elements for name, part in model.parts.items()} == {"steel": [1], "steel_11": [2]}
 
 
 FLAT_CUBE = "*NODE\n" + "".join(f"{i}, {x}, {y}, {z}\n" for i, (x, y, z) in enumerate(CUBE, 1))
@@ -460,6 +518,11 @@ BAD_BULK = {
     "a system in itself": ("CORD2R,7,7,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nGRID,1,7,0.,0.,0.\n", ["line 1", "in itself"]),
     "a support in a turned system": ("CORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,1.,0.\nGRID,1,,0.,0.,0.,7,1\n", ["line 3", "turned system"]),
     "a word for a number": ("GRID,1,,x,0.,0.\n", ["line 1", "GRID, field 4", "'x'"]),
+    "a node at two places": ("GRID,1\nGRID,1,,1.,0.,0.\n", ["line 2", "node 1", "line 1", "one position"]),
+    "a material twice": ("GRID,1\nMAT1,1,1.,,.3\nMAT1,1,2.,,.3\n", ["line 3", "MAT1 1", "line 2", "keep one"]),
+    "a list that ends in THRU": ("GRID,1\nSPC1,1,3,1,THRU,x\n", ["line 2", "1 THRU X", "first THRU last"]),
+    "a list that goes down": ("GRID,1\nSPC1,1,3,9,THRU,1\n", ["line 2", "9 THRU 1", "ascending"]),
+    "a system that is a word": ("GRID,1,,0.,0.,0.,x\n", ["line 1", "'x'", "a whole number"]),
     "an element twice": ("GRID,1\nCTRIA3,1,1,1,1,1\nCTRIA3,1,1,1,1,1\n", ["line 3", "element 1", "twice"]),
 }
 
