@@ -12,12 +12,12 @@ SKINS = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8"}
 NAMED_SUPPORTS = {"ENCASTRE": "x y z rx ry rz", "PINNED": "x y z", "XSYMM": "x ry rz", "YSYMM": "y rx rz", "ZSYMM": "z rx ry",
                   "XASYMM": "y z rx", "YASYMM": "x z ry", "ZASYMM": "x y rz"}
 OPTIONS = {"NODE": "NSET SYSTEM INPUT", "ELEMENT": "TYPE ELSET INPUT", "SURFACE": "NAME TYPE INTERNAL INPUT",
-           "BOUNDARY": "INPUT", "ELASTIC": "TYPE", "DENSITY": "", "DAMPING": "ALPHA BETA STRUCTURAL", "TIE": "NAME ADJUST",
-           "SOLID SECTION": "ELSET MATERIAL ORIENTATION CONTROLS",
+           "BOUNDARY": "INPUT", "ELASTIC": "TYPE", "DENSITY": "", "DAMPING": "ALPHA BETA STRUCTURAL",
+           "TIE": "NAME ADJUST", "SOLID SECTION": "ELSET MATERIAL ORIENTATION CONTROLS",
            "SHELL SECTION": "ELSET MATERIAL ORIENTATION CONTROLS COMPOSITE"}  # what is read of keywords
 READ = {*OPTIONS, "ELSET", "NSET", "MATERIAL", "CONTACT PAIR", "SYSTEM"}
-SILENT = set("HEADING,PREPRINT,STEP,END STEP,OUTPUT,NODE OUTPUT,ELEMENT OUTPUT,CONTACT OUTPUT,ENERGY OUTPUT,MODAL OUTPUT,NODE FILE,"
-             "EL FILE,CONTACT FILE,NODE PRINT,EL PRINT,CONTACT PRINT,RESTART,FILE FORMAT,PRINT".split(","))  # no physics
+SILENT = set("HEADING,PREPRINT,STEP,END STEP,OUTPUT,NODE OUTPUT,ELEMENT OUTPUT,CONTACT OUTPUT,ENERGY OUTPUT,MODAL OUTPUT,"
+             "NODE FILE,EL FILE,CONTACT FILE,NODE PRINT,EL PRINT,CONTACT PRINT,RESTART,FILE FORMAT,PRINT".split(","))
 MADE = ("ELGEN", "ELCOPY")
 
 
@@ -106,7 +106,7 @@ def note_what_is_left_out(blocks, model, elements):
         if block.name not in READ | SILENT:
             found.setdefault(f"*{block.name}", []).append(block.place)
         for key, value in block.options.items() if block.name in OPTIONS else ():
-            if key not in OPTIONS[block.name].split() and (key, value.upper()) not in (("OFFSET", "SMID"), ("OP", "MOD")):
+            if key not in OPTIONS[block.name].split() and f"{key}={value}".upper() not in ("OFFSET=SMID", "OP=MOD"):
                 found.setdefault(f"{key}{'=' if value else ''}{value} of *{block.name}", []).append(block.place)
     for what, places in found.items():
         times = f"{len(places)} times, first in " if len(places) > 1 else ""
@@ -169,7 +169,8 @@ def read_set(block, key, sets, element_sets=None, model=None):
                 raise Problem(f"{place}: {len(fields)} fields; expected first, last[, step]")
             first, last, step = [*(whole(field or "1", place) for field in fields), 1][:3]
             if step < 1 or last < first:
-                raise Problem(f"{place}: {first} to {last} by steps of {step}; expected ascending numbers and a step of 1 or more")
+                raise Problem(f"{place}: {first} to {last} by steps of {step}; expected ascending numbers and a step of 1 or "
+                              "more")
             found += range(first, last + 1, step)
         else:
             for field in fields:
@@ -194,7 +195,8 @@ def read_materials(blocks, model):
             if not kind.startswith("ISO"):
                 model.notes.append(f"*ELASTIC, TYPE={kind} is not isotropic ({line})")
                 continue
-            rows = list(block.rows(2, "Young's modulus and Poisson's ratio") if block.name == "ELASTIC" else block.rows(1, "a density"))
+            expected = (2, "Young's modulus and Poisson's ratio") if block.name == "ELASTIC" else (1, "a density")
+            rows = list(block.rows(*expected))
             if len(rows) > 1:
                 model.notes.append(f"all but the first line of *{block.name} ({line}), as of other temperatures")
             for place, fields in rows[:1]:
@@ -205,7 +207,8 @@ def read_materials(blocks, model):
 
 
 def read_sections(blocks, model, elements):
-    """A part for every section; a later section takes its elements from earlier ones. Solids without one are parts by their sets."""
+    """A part for every section; a later section takes its elements from earlier ones. Solids without one are parts by
+    their sets."""
     owner = {}
     for block in blocks:
         if block.name not in ("SOLID SECTION", "SHELL SECTION"):
@@ -220,7 +223,7 @@ def read_sections(blocks, model, elements):
         fit = [n for n in numbers if n in model.elements and model.elements[n][0] in kinds]
         others = sum(n in model.elements for n in numbers) - len(fit)
         if others:
-            model.notes.append(f"*{block.name} of {others} elements of {shown}, which are of another kind ({line_of(block.place, model)})")
+            model.notes.append(f"*{block.name} ({line_of(block.place, model)}) of {others} elements of another kind in {shown}")
         if fit:
             model.parts[shown] = part
             owner.update((n, shown) for n in fit)
@@ -244,8 +247,8 @@ def read_thickness(block, part, model):
     part.thickness = sum(number(fields[0], place) for place, fields in rows)
     materials = {fields[2].upper() if len(fields) > 2 else "" for _, fields in rows}
     part.material = materials.pop() if len(materials) == 1 else None
-    model.notes.append(f"the {len(rows)} layers of *SHELL SECTION ({line_of(block.place, model)}): the part has their thickness together"
-                       + ("" if part.material else " and no material"))
+    model.notes.append(f"the {len(rows)} layers of *SHELL SECTION ({line_of(block.place, model)}): the part has their "
+                       "thickness together" + ("" if part.material else " and no material"))
 
 
 def read_surfaces(blocks, model, elements, nodes):
@@ -256,25 +259,28 @@ def read_surfaces(blocks, model, elements, nodes):
         if not name or name in model.surfaces:
             raise Problem(f"{block.place}: the surface '{name}': expected NAME=NAME, which no other surface has")
         rows = list(block.rows(1, "an element, a node or a set, and a face"))
+        line = line_of(block.place, model)
         sides = {fields[1].upper() for _, fields in rows if len(fields) > 1}
         if kind not in ("ELEMENT", "NODE") or "COMBINE" in block.options or any(re.match("E", side) for side in sides):
-            model.notes.append(f"the surface {name} ({line_of(block.place, model)}): of no faces of elements")
+            model.notes.append(f"the surface {name} ({line}): of no faces of elements")
         elif kind == "NODE":
             found = []
             for place, fields in rows:
                 found += [int(fields[0])] if fields[0].isdecimal() else nodes.get(fields[0], place, "the node set")
             if name in model.node_sets and set(model.node_sets[name]) != set(found):
-                raise Problem(f"{block.place}: the surface '{name}' has other nodes than the set of this name: give it another name")
+                raise Problem(f"{block.place}: the surface '{name}' has other nodes than the set of this name: give it "
+                              "another name")
             model.node_sets[name] = found
         else:
             faces = []
             for place, fields in rows:
-                numbers = [int(fields[0])] if fields[0].isdecimal() else elements.sets.get(fields[0], place, "the element set")
-                faces += faces_of(model, numbers, fields[1].upper() if len(fields) > 1 else "", place, elements.left_out)
+                of, side = fields[0], fields[1].upper() if len(fields) > 1 else ""
+                numbers = [int(of)] if of.isdecimal() else elements.sets.get(of, place, "the element set")
+                faces += faces_of(model, numbers, side, place, elements.left_out)
             if faces:
                 model.surfaces[name] = faces
             else:
-                model.notes.append(f"the surface {name} ({line_of(block.place, model)}): of no solid and no shell elements")
+                model.notes.append(f"the surface {name} ({line}): of no solid and no shell elements")
 
 
 def faces_of(model, numbers, side, place, left_out):
@@ -313,8 +319,8 @@ def read_boundaries(blocks, model, nodes):
             motions = motions_of(fields, place, name, model)
             oblique = [n for n in numbers if n in turned]
             if oblique and motions and not ({"x", "y", "z"} <= motions and len(motions) in (3, 6)):
-                raise Problem(f"{place}: holds {' '.join(sorted(motions))} of node {oblique[0]} in the turned system of {turned[oblique[0]]}: "
-                              "expected all translations, or motions along the global axes")
+                raise Problem(f"{place}: holds {' '.join(sorted(motions))} of node {oblique[0]} in the turned system of "
+                              f"{turned[oblique[0]]}: expected all translations, or motions along the global axes")
             if motions:
                 held.setdefault(name, set()).update(motions)
     model.supports = [(name, [m for m in MOTIONS if m in motions]) for name, motions in held.items()]
@@ -325,7 +331,8 @@ def turned_nodes(blocks, nodes):
     found = {}
     for block in blocks:
         if block.name == "TRANSFORM":
-            found.update((n, block.place) for n in nodes.get(block.options.get("NSET", ""), block.place, "the node set"))
+            of = nodes.get(block.options.get("NSET", ""), block.place, "the node set")
+            found.update(dict.fromkeys(of, block.place))
     return found
 
 
@@ -339,7 +346,7 @@ def motions_of(fields, place, name, model):
     if not 1 <= first <= last:
         raise Problem(f"{place}: motions {first} to {last}; expected 1 to 6")
     if last > 6:
-        model.notes.append(f"the degrees of freedom from {max(first, 7)} on of {name} in *BOUNDARY ({line_of(place, model)})")
+        model.notes.append(f"the degrees of freedom from {max(first, 7)} on of {name} ({line_of(place, model)})")
     if first <= 6 and len(fields) > 3 and number(fields[3] or "0", place) != 0:
         model.notes.append(f"the prescribed motion {fields[3]} of {name} ({line_of(place, model)}): it is held at zero")
     return {MOTIONS[i - 1] for i in range(first, min(last, 6) + 1)}

@@ -9,8 +9,8 @@ SETS = ("NSET", "ELSET")  # options that define a set in *NODE and *ELEMENT, and
 
 
 class Scope:
-    """One instance of a part, or what stands outside of all: its blocks, what is added to their numbers, and the names that its
-    sets get."""
+    """One instance of a part, or what stands outside of all: its blocks, what is added to their numbers, and the names
+    that its sets get."""
 
     def __init__(self, name="", part="", place=""):
         self.name, self.part, self.place = name, part, place
@@ -36,8 +36,8 @@ def instance_of(block):
     if rows:
         place, fields = rows[0]
         if len(fields) > 3:
-            raise Problem(f"{place}: {len(fields)} fields; expected the translation x, y, z of an instance; its rotation goes into "
-                          "the next line")
+            raise Problem(f"{place}: {len(fields)} fields; expected the translation x, y, z of an instance; its rotation "
+                          "goes into the next line")
         instance.shift[: len(fields)] = [number(field or "0", place) for field in fields]
     if len(rows) > 1:
         place, fields = rows[1]
@@ -60,8 +60,8 @@ def flattened(blocks):
 
 
 def divided(blocks):
-    """Instances with the blocks of their parts, and the blocks outside of parts and instances, among them *PART of parts that
-    are placed nowhere."""
+    """Instances with the blocks of their parts, and the blocks outside of parts and instances, among them *PART of parts
+    that are placed nowhere."""
     parts, heads, instances, outside = {}, {}, [], Scope()
     scope = outside.blocks
     for block in blocks:
@@ -75,8 +75,8 @@ def divided(blocks):
                 raise Problem(f"{block.place}: *INSTANCE of part '{instance.part}', which is not defined above; known are "
                               + (", ".join(parts) or "none"))
             if before := [other for other in instances if other.name.upper() == instance.name.upper()]:
-                raise Problem(f"{block.place}: the instance '{instance.name}' is there twice, first in {before[0].place}; give it "
-                              "another name")
+                raise Problem(f"{block.place}: the instance '{instance.name}' is there twice, first in {before[0].place}; "
+                              "give it another name")
             instance.blocks = list(parts[instance.part.upper()])
             instances.append(instance)
             scope = instance.blocks
@@ -118,13 +118,15 @@ def name_sets(instances, outside):
     for instance in instances:
         for block in instance.blocks:
             for name in names_in(block):
-                alone = count[name.upper()] == 1
-                instance.flat_names[name.upper()] = name if alone else f"{instance.name}_{name}"
+                flat = name if count[name.upper()] == 1 else f"{instance.name}_{name}"
+                while flat != name and flat.upper() in count:
+                    flat += "_"
+                instance.flat_names[name.upper()] = flat
 
 
 def relabelled(block, scope, instances):
-    """A copy of a block with the numbers and names of the flat deck; one outside of all defines its own name, also where it
-    is of an instance."""
+    """A copy of a block with the numbers and names of the flat deck; one outside of all defines its own name, also where
+    it is of an instance."""
     defines = scope not in instances
     if defines and "INSTANCE" in block.options:
         scope = find_instance(block.options["INSTANCE"], block.place, instances)

@@ -125,8 +125,8 @@ def abaqus_nodes(blocks):
     nodes = []
     for block in blocks:
         if block.name in MADE_OR_MOVED and (block.lines or block.name != "SYSTEM"):
-            raise Problem(f"{block.place}: *{block.name} makes or moves nodes: let the preprocessor write all nodes, in global "
-                          "coordinates")
+            raise Problem(f"{block.place}: *{block.name} makes or moves nodes: let the preprocessor write all nodes, in "
+                          "global coordinates")
         if block.name in ("INSTANCE", "ASSEMBLY"):
             raise Problem(f"{block.place}: *{block.name}: the solver numbers the nodes of parts anew; write a flat deck "
                           "(in Abaqus/CAE: Model, Edit Attributes, Do not use parts and assemblies in input files)")
@@ -222,7 +222,8 @@ def nastran_nodes(cards):
     for card in grids:
         place = f"{card.place}, GRID {card.field(2)}"
         system = whole(card.field(3) or default or "0", place)
-        nodes.append((card.place, card.whole(2), systems.position(system, [card.number(i, 0.0) for i in (4, 5, 6)], place)))
+        position = systems.position(system, [card.number(i, 0.0) for i in (4, 5, 6)], place)
+        nodes.append((card.place, card.whole(2), position))
     return node_table(nodes)
 
 

@@ -68,7 +68,8 @@ class Model:
 
     def add_element(self, place, number, kind, nodes, code):
         if number in self.elements:
-            raise Problem(f"{place}: element {number} is there twice, first in {self.places[number]}; give it another number")
+            raise Problem(f"{place}: element {number} is there twice, first in {self.places[number]}; give it another "
+                          "number")
         missing = [node for node in nodes if node not in self.nodes]
         if missing:
             raise Problem(f"{place}: element {number} has node {missing[0]}, which the deck does not define")
@@ -137,8 +138,8 @@ class Model:
         return name
 
     def separate_names(self):
-        """squeal takes the nodes of all groups of a name. So parts keep their names, then surfaces, then sets of nodes, and what
-        has other nodes under the same name gets another one."""
+        """squeal takes the nodes of all groups of a name. So parts keep their names, then surfaces, then sets of nodes, and
+        what has other nodes under the same name gets another one."""
         for name, faces in list(self.surfaces.items()):
             if name in self.parts:
                 part = [face for n in self.parts[name].elements for face in self.faces(n)]
@@ -146,12 +147,11 @@ class Model:
                 if not shell or {corners_of(face) for face in part} != {corners_of(face) for face in faces}:
                     self.move(self.surfaces, name, "_faces", "a surface")
         for name, nodes in list(self.node_sets.items()):
-            known = [self.elements[n][1] for n in self.parts[name].elements] if name in self.parts else self.surfaces.get(name)
-            if known is None:
-                continue
-            if {node for of in known for node in of} == set(nodes):
+            part = [self.elements[n][1] for n in self.parts[name].elements] if name in self.parts else None
+            known = part or self.surfaces.get(name)
+            if known and {node for of in known for node in of} == set(nodes):
                 del self.node_sets[name]
-            else:
+            elif known:
                 self.move(self.node_sets, name, "_nodes", "a set of nodes")
         for name in list(self.element_sets):
             if name in self.parts or name in self.surfaces or name in self.node_sets:
@@ -172,8 +172,8 @@ class Model:
                                     for pairs in (self.ties, self.contacts))
 
     def name_faces_of_node_sets(self):
-        """A set of nodes that covers free faces is a surface too, NAME_faces where it has other nodes besides: contacts and
-        pressures need faces."""
+        """A set of nodes that covers free faces is a surface too, NAME_faces where it has other nodes besides: contacts
+        and pressures need faces."""
         free = self.free_faces(self.solids())
         touching = {}
         for key, face in free.items():
@@ -190,6 +190,13 @@ class Model:
                     shown = self.unused(name + "_faces")
                     self.call_faces(name, shown)
                 self.surfaces[shown] = [free[key] for key in sorted(keys, key=sorted)]
+
+    def drop_ties_without_faces(self):
+        for tie in list(self.ties):
+            bare = [name for name in tie if name not in self.surfaces]
+            if bare:
+                self.notes.append(f"the tie of {tie[0]} (slave) and {tie[1]} (master): {bare[0]} has no faces")
+                self.ties.remove(tie)
 
     def add_parts_of_the_rest(self, name):
         """Solid elements without a part: a part a connected body."""

@@ -464,15 +464,15 @@ def test_what_an_input_deck_has_and_the_mesh_has_not_is_named(tmp_path):
         "*SURFACE, NAME=r, TYPE=CYLINDER\nSTART, 0,1\n*MATERIAL, NAME=m\n*ELASTIC\n2e11, .3\n1e11, .3, 40.\n"
         "*DAMPING, BETA=1e-7, STRUCTURAL=0.01\n*SOLID SECTION, ELSET=all, MATERIAL=m\n"
         "*SHELL SECTION, ELSET=skin, COMPOSITE, OFFSET=SPOS\n0.1, 3, m\n0.2, 3, m\n*TIE, NAME=t\nSIDE, TOP\n*CONTACT PAIR\nr, TOP\nside, TOP\n"
-        "*TRANSFORM, NSET=n\n0,1,0,-1,0,0\n*BOUNDARY, OP=NEW\nskins, 4, 6\nn, ENCASTRE\nn, 11, 11, 20.\n*NSET, NSET=Skins\n5,6,7\n"
+        "*TIE, NAME=u\nrow, TOP\n*SURFACE, NAME=row, TYPE=NODE\n1\n2\n*TRANSFORM, NSET=n\n0,1,0,-1,0,0\n*BOUNDARY, OP=NEW\nskins, 4, 6\nn, ENCASTRE\nn, 11, 11, 20.\n*NSET, NSET=Skins\n5,6,7\n"
         "*STEP\n*CLOAD\n1,1,1.\n*CLOAD\n1,2,1.\n*DSLOAD\nside, P, 1.\n*NODE FILE\nU\n*END STEP\n"))
     notes = "\n".join(model.notes)
-    for words in ("2 elements of type B31", "OFFSET=SPOS of *SHELL SECTION (line 40)", "*TRANSFORM (line 48)", "OP=NEW of *BOUNDARY (line 50)",
-                  "*CLOAD (2 times, first in line 57)", "*DSLOAD (line 61)", "first line of *ELASTIC (line 35)", "2 layers of *SHELL SECTION",
+    for words in ("2 elements of type B31", "OFFSET=SPOS of *SHELL SECTION (line 40)", "*TRANSFORM (line 53)", "OP=NEW of *BOUNDARY (line 55)",
+                  "*CLOAD (2 times, first in line 62)", "*DSLOAD (line 66)", "first line of *ELASTIC (line 35)", "2 layers of *SHELL SECTION", "tie of row (slave) and Top (master): row has no faces",
                   "the surface r (line 32)", "degrees of freedom from 11 on of n", "support of Skins along rx ry rz: its nodes have no rotations",
                   "1 shells without a *SHELL SECTION", "*CONTACT PAIR (line 46), whose surface r", "1 nodes of the set n", "the set rod, whose elements"):
         assert words in notes, words
-    assert len(model.notes) == 15
+    assert len(model.notes) == 16
     assert model.ties == model.contacts == [("side", "Top")] and model.supports == [("n", list(MOTIONS))]
     assert model.parts["skin"].thickness == pytest.approx(0.3, rel=1e-15) and model.parts["skin"].material == "M"
     scene = convert(tmp_path / "deck.inp", tmp_path / "out").read_text()
