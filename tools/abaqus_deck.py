@@ -16,8 +16,9 @@ OPTIONS = {"NODE": "NSET SYSTEM INPUT", "ELEMENT": "TYPE ELSET INPUT", "SURFACE"
            "TIE": "NAME ADJUST", "SOLID SECTION": "ELSET MATERIAL ORIENTATION CONTROLS",
            "SHELL SECTION": "ELSET MATERIAL ORIENTATION CONTROLS COMPOSITE"}  # what is read of keywords
 READ = {*OPTIONS, "ELSET", "NSET", "MATERIAL", "CONTACT PAIR", "SYSTEM"}
-SILENT = set("HEADING,PREPRINT,STEP,END STEP,OUTPUT,NODE OUTPUT,ELEMENT OUTPUT,CONTACT OUTPUT,ENERGY OUTPUT,MODAL OUTPUT,"
-             "NODE FILE,EL FILE,CONTACT FILE,NODE PRINT,EL PRINT,CONTACT PRINT,RESTART,FILE FORMAT,PRINT".split(","))
+SILENT = set("HEADING,PREPRINT,STEP,END STEP,OUTPUT,NODE OUTPUT,ELEMENT OUTPUT,CONTACT OUTPUT,ENERGY OUTPUT,"
+             "MODAL OUTPUT,NODE FILE,EL FILE,CONTACT FILE,NODE PRINT,EL PRINT,CONTACT PRINT,RESTART,FILE FORMAT,"
+             "PRINT".split(","))  # these ask for results
 MADE = ("ELGEN", "ELCOPY")
 
 
@@ -169,8 +170,7 @@ def read_set(block, key, sets, element_sets=None, model=None):
                 raise Problem(f"{place}: {len(fields)} fields; expected first, last[, step]")
             first, last, step = [*(whole(field or "1", place) for field in fields), 1][:3]
             if step < 1 or last < first:
-                raise Problem(f"{place}: {first} to {last} by steps of {step}; expected ascending numbers and a step of 1 or "
-                              "more")
+                raise Problem(f"{place}: {first} to {last} by steps of {step}; expected ascending numbers")
             found += range(first, last + 1, step)
         else:
             for field in fields:
@@ -223,7 +223,8 @@ def read_sections(blocks, model, elements):
         fit = [n for n in numbers if n in model.elements and model.elements[n][0] in kinds]
         others = sum(n in model.elements for n in numbers) - len(fit)
         if others:
-            model.notes.append(f"*{block.name} ({line_of(block.place, model)}) of {others} elements of another kind in {shown}")
+            line = line_of(block.place, model)
+            model.notes.append(f"*{block.name} ({line}) of {others} elements of another kind in {shown}")
         if fit:
             model.parts[shown] = part
             owner.update((n, shown) for n in fit)
@@ -319,7 +320,7 @@ def read_boundaries(blocks, model, nodes):
             motions = motions_of(fields, place, name, model)
             oblique = [n for n in numbers if n in turned]
             if oblique and motions and not ({"x", "y", "z"} <= motions and len(motions) in (3, 6)):
-                raise Problem(f"{place}: holds {' '.join(sorted(motions))} of node {oblique[0]} in the turned system of "
+                raise Problem(f"{place}: {' '.join(sorted(motions))} of node {oblique[0]} in the turned system of "
                               f"{turned[oblique[0]]}: expected all translations, or motions along the global axes")
             if motions:
                 held.setdefault(name, set()).update(motions)

@@ -36,7 +36,7 @@ def instance_of(block):
     if rows:
         place, fields = rows[0]
         if len(fields) > 3:
-            raise Problem(f"{place}: {len(fields)} fields; expected the translation x, y, z of an instance; its rotation "
+            raise Problem(f"{place}: {len(fields)} fields; expected the translation x, y, z alone; a rotation "
                           "goes into the next line")
         instance.shift[: len(fields)] = [number(field or "0", place) for field in fields]
     if len(rows) > 1:
@@ -60,8 +60,8 @@ def flattened(blocks):
 
 
 def divided(blocks):
-    """Instances with the blocks of their parts, and the blocks outside of parts and instances, among them *PART of parts
-    that are placed nowhere."""
+    """Instances with the blocks of their parts, and the blocks outside of both, among them *PART of parts that are
+    placed nowhere."""
     parts, heads, instances, outside = {}, {}, [], Scope()
     scope = outside.blocks
     for block in blocks:
@@ -75,8 +75,8 @@ def divided(blocks):
                 raise Problem(f"{block.place}: *INSTANCE of part '{instance.part}', which is not defined above; known are "
                               + (", ".join(parts) or "none"))
             if before := [other for other in instances if other.name.upper() == instance.name.upper()]:
-                raise Problem(f"{block.place}: the instance '{instance.name}' is there twice, first in {before[0].place}; "
-                              "give it another name")
+                raise Problem(f"{block.place}: the instance '{instance.name}' is there twice, first in "
+                              f"{before[0].place}; give it another name")
             instance.blocks = list(parts[instance.part.upper()])
             instances.append(instance)
             scope = instance.blocks
@@ -125,8 +125,8 @@ def name_sets(instances, outside):
 
 
 def relabelled(block, scope, instances):
-    """A copy of a block with the numbers and names of the flat deck; one outside of all defines its own name, also where
-    it is of an instance."""
+    """A copy of a block with the numbers and names of the flat deck; one outside of all keeps the name that it defines,
+    also where it is of an instance."""
     defines = scope not in instances
     if defines and "INSTANCE" in block.options:
         scope = find_instance(block.options["INSTANCE"], block.place, instances)

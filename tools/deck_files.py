@@ -125,7 +125,7 @@ def abaqus_nodes(blocks):
     nodes = []
     for block in blocks:
         if block.name in MADE_OR_MOVED and (block.lines or block.name != "SYSTEM"):
-            raise Problem(f"{block.place}: *{block.name} makes or moves nodes: let the preprocessor write all nodes, in "
+            raise Problem(f"{block.place}: *{block.name} makes or moves nodes: let the preprocessor write all nodes in "
                           "global coordinates")
         if block.name in ("INSTANCE", "ASSEMBLY"):
             raise Problem(f"{block.place}: *{block.name}: the solver numbers the nodes of parts anew; write a flat deck "

@@ -138,7 +138,7 @@ class Model:
         return name
 
     def separate_names(self):
-        """squeal takes the nodes of all groups of a name. So parts keep their names, then surfaces, then sets of nodes, and
+        """squeal takes the nodes of all groups of a name. So parts keep their names, then surfaces, then sets of nodes;
         what has other nodes under the same name gets another one."""
         for name, faces in list(self.surfaces.items()):
             if name in self.parts:

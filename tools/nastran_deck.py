@@ -9,9 +9,10 @@ from mesh_model import FLAT, KINDS, MOTIONS, Model, Part
 ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6", ("CTETRA", 4): "tet4",
             ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3"}
 CORNERS = {"CHEXA": (8, 20), "CPENTA": (6, 15), "CTETRA": (4, 10), "CQUAD4": (4, 4), "CTRIA3": (3, 3)}
-READ = {"GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "SPC", "SPC1", "SPCADD", "SET1", "SET3",
-        "PARAM", "ENDDATA", *CORNERS}
-SHELL_FIELDS = {"CQUAD4": {"ZOFFS": (9,), "T1 to T4": (12, 13, 14, 15)}, "CTRIA3": {"ZOFFS": (8,), "T1 to T3": (12, 13, 14)}}
+READ = {"GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "SPC", "SPC1", "SPCADD", "SET1",
+        "SET3", "PARAM", "ENDDATA", *CORNERS}
+SHELL_FIELDS = {"CQUAD4": {"ZOFFS": (9,), "T1 to T4": (12, 13, 14, 15)},
+                "CTRIA3": {"ZOFFS": (8,), "T1 to T3": (12, 13, 14)}}
 
 
 def read_bdf(file):
@@ -89,7 +90,8 @@ def by_number(cards, *names):
         if card.name in names:
             before = found.setdefault(card.whole(2), card)
             if before.fields != card.fields:
-                raise Problem(f"{card.place}: {card.name} {card.field(2)} is there twice, first in {before.place}; keep one")
+                raise Problem(f"{card.place}: {card.name} {card.field(2)} is there twice, first in {before.place}; "
+                              "keep one")
     return found
 
 
@@ -127,8 +129,8 @@ def read_properties(cards, model, of_property, names):
             shown = model.unused(name if not solid else name + "_faces")
             model.surfaces[shown] = [model.elements[n][1] for n in flat]
             if thickness:
-                model.notes.append(f"the thickness {thickness:g} of PSHELL {pid}, whose elements lie on solids: {shown} is a surface; "
-                                   "a [[part]] with a thickness makes shells of it")
+                model.notes.append(f"the thickness {thickness:g} of PSHELL {pid}, whose elements lie on solids: {shown} "
+                                   "is a surface; a [[part]] with a thickness makes shells of it")
         elif flat:
             model.parts[model.unused(name if not solid else name + "_shells")] = Part(flat, material, thickness)
             note_shell_property(card, model)
@@ -148,7 +150,7 @@ def note_shell_property(card, model):
 
 
 def listed(texts, place):
-    """Numbers of a list with THRU, BY and EXCEPT; what EXCEPT names is out as long as it is within the range before it."""
+    """Numbers of a list with THRU, BY and EXCEPT; what EXCEPT names is out while it is in the range before it."""
     words, found, i = [text.upper() for text in texts if text], [], 0
 
     def number_at(i):
@@ -178,7 +180,8 @@ def listed(texts, place):
 
 
 def read_supports(cards, case, model):
-    """Of each set number and its motions, a set of nodes; the motions that GRID holds too. Rotations of solids are no motions."""
+    """Of each set number and its motions, a set of nodes; the motions that GRID holds too. Nodes of solids have no
+    rotations."""
     default = next((card.field(8) for card in cards if card.name == "GRDSET"), "")
     applied = applied_supports(cards, case, model)
     held = {}
@@ -193,7 +196,7 @@ def read_supports(cards, case, model):
                 if card.field(i):
                     held.setdefault((card.field(2), card.field(i + 1)), []).append(card.whole(i))
                     if card.number(i + 2, 0.0):
-                        model.notes.append(f"the enforced motion {card.field(i + 2)} of node {card.field(i)} in {card.name} "
+                        model.notes.append(f"the enforced motion {card.field(i + 2)} of node {card.field(i)} in SPC "
                                            f"{card.field(2)}: it is held at zero")
         elif card.name == "GRID" and (card.field(8) or default).strip("0"):
             held.setdefault(("grid", card.field(8) or default), []).append(card.whole(2))
@@ -225,20 +228,24 @@ def applied_supports(cards, case, model):
     selected = {int(n) for n in re.findall(r"^\s*SPC\s*=\s*(\d+)", case, flags=re.M | re.I)}
     if not selected:
         if known:
-            model.notes.append("a choice of supports, which the case control lacks: all are there, SPC " + ", ".join(map(str, known)))
+            model.notes.append(f"a choice of supports in the case control: all are there, SPC {joined(known)}")
         return set(known)
     if len(selected) > 1:
-        model.notes.append("the choice of supports by subcases: all are there, SPC " + ", ".join(map(str, sorted(selected))))
+        model.notes.append(f"the choice of supports by subcases: all are there, SPC {joined(selected)}")
     applied = set()
     for n in selected:
         applied |= {n} if n not in sums else {n, *sums[n]}
     missing = applied - set(known) - set(sums)
     if missing:
-        model.notes.append(f"SPC {', '.join(map(str, sorted(missing)))}, which the case control selects and the deck has not")
+        model.notes.append(f"SPC {joined(missing)}, which the case control selects and the deck has not")
     others = set(known) - applied
     if others:
-        model.notes.append(f"SPC {', '.join(map(str, sorted(others)))}, which the case control does not select")
+        model.notes.append(f"SPC {joined(others)}, which the case control does not select")
     return applied
+
+
+def joined(numbers):
+    return ", ".join(map(str, sorted(numbers)))
 
 
 def turned_nodes(cards):
@@ -255,7 +262,7 @@ def turned_nodes(cards):
 
 
 def read_sets(cards, case, model):
-    """SET1 is of nodes and SET3 says what it is of. The case control's SET may be of nodes, of elements or of other things."""
+    """SET1 is of nodes, SET3 says what it is of; the case control's SET may be of nodes, elements or other things."""
     for card in cards:
         if card.name == "SET1":
             add_set(model, f"set_{card.field(2)}", listed(card.fields[1:], card.place), "GRID")
