@@ -365,6 +365,9 @@ def name_element_sets(model, elements):
             model.element_sets[name] = solids
         if flat and not (part and model.elements[part[0]][0] in FLAT):
             add_surface(model, name, flat)
+        unknown = [n for n in numbers if n not in model.elements and n not in elements.left_out]
+        if unknown and len(unknown) < len(numbers):
+            model.notes.append(f"{len(unknown)} elements of the set {name} that are not there, {unknown[0]} the first")
         if numbers and not solids and not flat:
             model.notes.append(f"the set {name}, whose elements are left out or not there")
     owned = {n for part in model.parts.values() for n in part.elements}

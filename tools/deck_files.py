@@ -18,13 +18,14 @@ def lines_of(file):
     return enumerate(data.decode("latin-1").splitlines(), 1)
 
 
-def included(file, name, depth):
-    """A file that a deck includes, beside it."""
+def included(file, line, name, depth):
+    """A file that a line of a deck includes, beside it."""
+    place = f"{file}, line {line}"
     if depth > 8:
-        raise Problem(f"{file}: includes go deeper than 8 files")
+        raise Problem(f"{place}: includes go deeper than 8 files")
     other = file.parent / name.strip().strip("'\"")
     if not other.is_file():
-        raise Problem(f"{file}: includes {name.strip()}, which is not there")
+        raise Problem(f"{place}: includes {name.strip()}, which is not there")
     return other
 
 
@@ -70,11 +71,11 @@ def blocks_of(file, depth=0, blocks=None):
                 key, _, value = word.partition("=")
                 options[key.strip().upper()] = value.strip().strip('"')
             if name.upper() == "INCLUDE":
-                blocks_of(included(file, options.get("INPUT", ""), depth), depth + 1, blocks)
+                blocks_of(included(file, number, options.get("INPUT", ""), depth), depth + 1, blocks)
                 continue
             blocks.append(Block(place, " ".join(name.upper().split()), options))
             if blocks[-1].name in DATA_FILES and "INPUT" in options:
-                blocks_of(included(file, options["INPUT"], depth), depth + 1, blocks)
+                blocks_of(included(file, number, options["INPUT"], depth), depth + 1, blocks)
         elif not blocks:
             raise Problem(f"{place}: '{line[:60]}': expected a keyword, such as *NODE")
         else:
@@ -200,7 +201,7 @@ def cards_of(file, depth=0):
         if line.upper().startswith("ENDDATA"):
             break
         if line.upper().startswith("INCLUDE"):
-            cards += cards_of(included(file, line[7:], depth), depth + 1)
+            cards += cards_of(included(file, n, line[7:], depth), depth + 1)
             continue
         first, data = fields_of(line)
         if first == "" or first[0] in "+*":

@@ -227,7 +227,7 @@ def applied_supports(cards, case, model):
             sums.setdefault(card.whole(2), []).extend(listed(card.fields[1:], card.place))
     selected = {int(n) for n in re.findall(r"^\s*SPC\s*=\s*(\d+)", case, flags=re.M | re.I)}
     if not selected:
-        if known:
+        if len(known) > 1:
             model.notes.append(f"a choice of supports in the case control: all are there, SPC {joined(known)}")
         return set(known)
     if len(selected) > 1:
