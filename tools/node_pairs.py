@@ -130,8 +130,6 @@ def read_pairs(file):
             raise Problem(f"{place}: {len(fields)} values; expected {len(columns)}: {', '.join(columns)}")
         pair = {name: whole(text, place, "a node's number") if name in COLUMNS[:2] else number(text, place)
                 for name, text in zip(columns, fields)}
-        if not all(map(math.isfinite, pair.values())):
-            raise Problem(f"{place}: '{', '.join(fields)}': expected finite numbers")
         if pair["rotor"] == pair["stator"]:
             raise Problem(f"{place}: node {pair['rotor']} is in contact with itself")
         if pair.get("area", 1) <= 0:

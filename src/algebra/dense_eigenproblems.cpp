@@ -248,18 +248,53 @@ std::vector<Complex> dense_quadratic_eigenvalues(const MatrixXd& M, const Matrix
   return result;
 }
 
-TwoSidedPair two_sided_pair(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, Complex lambda)
+namespace
 {
-  const Complex near = lambda * (1 + 1e-10); // so that no pivot vanishes
+
+/// Three steps of inverse iteration from the pair's vectors.
+void iterate(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, TwoSidedPair& pair)
+{
+  const Complex near = pair.lambda * (1 + 1e-10); // so that no pivot vanishes
   const Eigen::MatrixXcd Q = near * near * M.cast<Complex>() + near * C.cast<Complex>() + K.cast<Complex>();
   const Eigen::PartialPivLU<Eigen::MatrixXcd> factor(Q);
-  TwoSidedPair pair{lambda, Eigen::VectorXcd::Ones(K.rows()), Eigen::VectorXcd::Ones(K.rows())};
   for (int iteration = 0; iteration < 3; ++iteration)
   {
     pair.right = factor.solve(pair.right).normalized();
     pair.left = factor.transpose().solve(pair.left).normalized();
   }
+}
+
+/// The root of left'(lambda^2 M + lambda C + K) right that is nearest to the pair's lambda.
+Complex rayleigh_quotient(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, const TwoSidedPair& pair)
+{
+  const auto form = [&](const MatrixXd& A) -> Complex { return pair.left.transpose() * (A * pair.right); };
+  const Complex m = form(M), c = form(C), k = form(K), root = std::sqrt(c * c - 4. * m * k);
+  const Complex one = (root - c) / (2. * m), other = (-root - c) / (2. * m);
+  return std::abs(one - pair.lambda) < std::abs(other - pair.lambda) ? one : other;
+}
+
+} // namespace
+
+TwoSidedPair two_sided_pair(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, Complex lambda)
+{
+  TwoSidedPair pair{lambda, Eigen::VectorXcd::Ones(K.rows()), Eigen::VectorXcd::Ones(K.rows())};
+  iterate(M, C, K, pair);
   return pair;
+}
+
+void refine_pairs_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C, const MatrixXd& K,
+                         std::vector<TwoSidedPair>& pairs)
+{
+  const auto refine = [&]
+  {
+    for (TwoSidedPair& pair : pairs)
+    {
+      iterate(M, C, K, pair);
+      pair.lambda = rayleigh_quotient(M, C, K, pair);
+    }
+  };
+  on_rank_zero(comm, refine);
+  share(comm, pairs, K.rows(), {&TwoSidedPair::right, &TwoSidedPair::left});
 }
 
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)

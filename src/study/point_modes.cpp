@@ -25,6 +25,7 @@ constexpr double share = 0.02;     // directions of corrections below this part 
 constexpr Index small_basis = 120; // shapes: such a problem is solved whole at once
 constexpr double undamped_reach = 1.2; // undamped modes on which a large basis is solved first, over the window
 constexpr double slow = 0.8;           // ratio of errors before and after a correction that did not help
+constexpr std::size_t few = 4;         // pairs refined one by one; six take as long as solving the whole
 constexpr double spurious = 1e-8;      // backward error of what is no mode
 
 /// The closed pairs taken out, and the damping of the friction direction; null where there is none.
@@ -197,6 +198,40 @@ enum class Extent
   whole,
 };
 
+/// The backward errors of pairs of the projected problem.
+SolvedPairs with_errors(const ModesBasis& modes, const ProjectedSliding& on_basis, std::vector<TwoSidedPair> pairs)
+{
+  SolvedPairs solved{std::move(pairs), {}, {}};
+  solved.right = backward_errors(modes, on_basis, solved.pairs, Side::right);
+  solved.left = backward_errors(modes, on_basis, solved.pairs, Side::left);
+  return solved;
+}
+
+/// Where a few pairs alone miss their tolerance, they are refined on the whole basis.
+void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const PointProblem& problem,
+                SolvedPairs& solved)
+{
+  std::vector<std::size_t> places;
+  std::vector<TwoSidedPair> pairs;
+  for (std::size_t k = 0; k < solved.pairs.size(); ++k)
+    if (solved.backward_error(k) > tolerance_of(solved.pairs[k], problem)) places.push_back(k);
+  if (places.empty() || places.size() > few) return;
+  for (const std::size_t k : places) pairs.push_back(solved.pairs[k]);
+  const Index shapes = modes.basis.shapes();
+  refine_pairs_shared(modes.basis.T.comm, on_basis.M.bottomRightCorner(shapes, shapes),
+                      on_basis.C.bottomRightCorner(shapes, shapes), on_basis.K.bottomRightCorner(shapes, shapes),
+                      pairs);
+  SolvedPairs refined = with_errors(modes, on_basis, std::move(pairs));
+  for (std::size_t i = 0; i < places.size(); ++i)
+  {
+    const std::size_t k = places[i];
+    if (!(refined.backward_error(i) < solved.backward_error(k))) continue;
+    solved.pairs[k] = std::move(refined.pairs[i]);
+    solved.right[k] = refined.right[i];
+    solved.left[k] = refined.left[i];
+  }
+}
+
 /// The pairs of the projected problem in the window, falling growth rate.
 SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_basis, const Window& window,
                             Extent extent)
@@ -221,10 +256,7 @@ SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_
     }
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const TwoSidedPair& a, const TwoSidedPair& b) { return a.lambda.real() > b.lambda.real(); });
-  SolvedPairs solved{std::move(pairs), {}, {}};
-  solved.right = backward_errors(modes, on_basis, solved.pairs, Side::right);
-  solved.left = backward_errors(modes, on_basis, solved.pairs, Side::left);
-  return solved;
+  return with_errors(modes, on_basis, std::move(pairs));
 }
 
 /// The corrections (K_z - tau M_z)^-1 r of residuals join the basis. Returns whether they add anything.
@@ -313,6 +345,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   {
     const ProjectedSliding on_basis = project(modes.basis, point.contact, point.Cf);
     SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
+    if (extent == Extent::near_band) refine_few(modes, on_basis, problem, solved);
     double now = largest_excess(solved, problem);
     if (extent == Extent::near_band && now > 1 && now > slow * before)
     {

@@ -49,6 +49,7 @@ MatrixXd shared_sum(const MatrixXd& local, MPI_Comm comm)
 void set_matrix(SlidingBasis& basis, BasisImage& image, Mat A)
 {
   if (image.matrix.get() && equal(image.matrix, A)) return;
+  basis.by_Z.Z = {};
   image.matrix = copy_of(A);
   const MultiVector AT = product(A, basis.T);
   image.contact_rows = {AT.comm, AT.entries(basis.contact_dofs, Eigen::all)};
@@ -66,6 +67,13 @@ std::vector<Index> local_pivots(const ClosedContact& contact)
   return rows;
 }
 
+Owned<IS> set_of(MPI_Comm comm, const std::vector<PetscInt>& places)
+{
+  Owned<IS> set;
+  check(ISCreateGeneral(comm, static_cast<PetscInt>(places.size()), places.data(), PETSC_COPY_VALUES, set.put()));
+  return set;
+}
+
 /// The pivots of this rank.
 Owned<IS> pivot_set(Mat A, const ClosedContact& contact)
 {
@@ -74,18 +82,7 @@ Owned<IS> pivot_set(Mat A, const ClosedContact& contact)
   std::vector<PetscInt> own;
   for (const PetscInt pivot : contact.pivots)
     if (pivot >= first && pivot < last) own.push_back(pivot);
-  Owned<IS> set;
-  check(ISCreateGeneral(comm_of(A), static_cast<PetscInt>(own.size()), own.data(), PETSC_COPY_VALUES, set.put()));
-  return set;
-}
-
-Owned<IS> all_columns(Mat A)
-{
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRangeColumn(A, &first, &last));
-  Owned<IS> set;
-  check(ISCreateStride(comm_of(A), last - first, first, 1, set.put()));
-  return set;
+  return set_of(comm_of(A), own);
 }
 
 Owned<Mat> part_of(Mat A, IS rows, IS columns)
@@ -95,55 +92,82 @@ Owned<Mat> part_of(Mat A, IS rows, IS columns)
   return result;
 }
 
-/// What a lift of T by a basis of the closed pairs changes, on the rows of the pivots.
-MultiVector change_by_lift(const SlidingBasis& basis, const ClosedContact& contact, Mat lift)
+/// What a lift of T by a basis of the closed pairs changes, on the rows of the pivots. These rows of the lift have
+/// entries at other degrees of freedom of the contact alone.
+MultiVector change_by_lift(const SlidingBasis& basis, const ClosedContact& contact, const std::vector<Index>& pivots,
+                           Mat lift)
 {
-  MultiVector change = product(part_of(lift, pivot_set(lift, contact), all_columns(lift)), kept_rows(basis.T, contact));
-  change.entries -= basis.T.entries(local_pivots(contact), Eigen::all);
+  std::vector<Index> rows;
+  std::vector<PetscInt> columns;
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRangeColumn(lift, &first, &last));
+  for (std::size_t below = 0; const Index dof : basis.contact_dofs)
+  {
+    while (below < pivots.size() && pivots[below] < dof) ++below;
+    if (below < pivots.size() && pivots[below] == dof) continue;
+    rows.push_back(dof);
+    columns.push_back(first + static_cast<PetscInt>(dof) - static_cast<PetscInt>(below));
+  }
+  MultiVector change = product(part_of(lift, pivot_set(lift, contact), set_of(comm_of(lift), columns)),
+                               {basis.T.comm, basis.T.entries(rows, Eigen::all)});
+  change.entries -= basis.T.entries(pivots, Eigen::all);
   return change;
 }
 
-/// Both lifts, and where the pivots are.
-struct Lifts
+bool same(Mat A, Mat B)
 {
-  const ClosedContact& contact;
-  std::vector<Index> pivots;     // local rows
-  std::vector<Index> in_contact; // their places among the contact's degrees of freedom
-  MultiVector of_Y, of_Z;        // changes on the rows of the pivots
-};
-
-Lifts make_lifts(const SlidingBasis& basis, const ClosedContact& contact)
-{
-  Lifts lifts{contact,
-              local_pivots(contact),
-              {},
-              change_by_lift(basis, contact, contact.Y),
-              change_by_lift(basis, contact, contact.Z)};
-  for (const Index pivot : lifts.pivots)
-    lifts.in_contact.push_back(std::lower_bound(basis.contact_dofs.begin(), basis.contact_dofs.end(), pivot) -
-                               basis.contact_dofs.begin());
-  return lifts;
+  PetscInt rows = 0, columns = 0, other_rows = 0, other_columns = 0;
+  check(MatGetLocalSize(A, &rows, &columns));
+  check(MatGetLocalSize(B, &other_rows, &other_columns));
+  int same = rows == other_rows && columns == other_columns;
+  MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, comm_of(A));
+  return same && equal(A, B);
 }
 
-MatrixXd projected(const BasisImage& image, const Lifts& lifts)
+/// Sets the lift by Z where it has changed.
+void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact)
 {
-  const MatrixXd rows = image.contact_rows.entries(lifts.in_contact, Eigen::all);
-  const Owned<IS> pivots = pivot_set(image.matrix, lifts.contact);
-  const MultiVector coupled = product(part_of(image.matrix, pivots, pivots), lifts.of_Z);
-  MatrixXd local = lifts.of_Y.entries.transpose() * (rows + coupled.entries);
-  local.noalias() += rows.transpose() * lifts.of_Z.entries;
-  return image.products + shared_sum(local, lifts.of_Y.comm);
+  LiftByZ& lift = basis.by_Z;
+  if (lift.Z.get() && same(lift.Z, contact.Z)) return;
+  lift.Z = copy_of(contact.Z);
+  lift.pivots = local_pivots(contact);
+  lift.in_contact.clear();
+  lift.change = change_by_lift(basis, contact, lift.pivots, contact.Z);
+  for (const Index pivot : lift.pivots)
+    lift.in_contact.push_back(std::lower_bound(basis.contact_dofs.begin(), basis.contact_dofs.end(), pivot) -
+                              basis.contact_dofs.begin());
+  const MatrixXd at_pivots = basis.T.entries(lift.pivots, Eigen::all).rightCols(basis.shapes());
+  lift.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) -
+              shared_sum(at_pivots.transpose() * at_pivots, basis.T.comm); // shapes are orthonormal
+  for (BasisImage* image : {&basis.M, &basis.C, &basis.K})
+  {
+    const MatrixXd rows = image->contact_rows.entries(lift.in_contact, Eigen::all);
+    const Owned<IS> pivots = pivot_set(image->matrix, contact);
+    image->lifted_rows = product(part_of(image->matrix, pivots, pivots), lift.change);
+    image->lifted_rows.entries += rows;
+    image->lifted_products = image->products + shared_sum(rows.transpose() * lift.change.entries, basis.T.comm);
+  }
+}
+
+/// T_Y'A T_Z
+MatrixXd projected(const BasisImage& image, const MultiVector& by_Y)
+{
+  return image.lifted_products + inner_products(by_Y, image.lifted_rows);
 }
 
 /// T'Cf T of the lifted T. Only degrees of freedom of the contact have entries in Cf.
-MatrixXd projected_damping(const SlidingBasis& basis, const Lifts& lifts, Mat Cf)
+MatrixXd projected_damping(const SlidingBasis& basis, const MultiVector& by_Y, Mat Cf)
 {
-  MultiVector right = basis.T, left = basis.T;
-  right.entries(lifts.pivots, Eigen::all) += lifts.of_Z.entries;
-  left.entries(lifts.pivots, Eigen::all) += lifts.of_Y.entries;
-  const MultiVector force = product(Cf, right);
-  const MatrixXd at_contact = left.entries(basis.contact_dofs, Eigen::all);
-  return shared_sum(at_contact.transpose() * force.entries(basis.contact_dofs, Eigen::all), left.comm);
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(Cf, &first, &last));
+  std::vector<PetscInt> rows;
+  for (const Index dof : basis.contact_dofs) rows.push_back(first + static_cast<PetscInt>(dof));
+  const Owned<IS> contact = set_of(comm_of(Cf), rows);
+  MultiVector right{basis.T.comm, basis.T.entries(basis.contact_dofs, Eigen::all)};
+  MatrixXd left = right.entries;
+  right.entries(basis.by_Z.in_contact, Eigen::all) += basis.by_Z.change.entries;
+  left(basis.by_Z.in_contact, Eigen::all) += by_Y.entries;
+  return shared_sum(left.transpose() * product(part_of(Cf, contact, contact), right).entries, basis.T.comm);
 }
 
 } // namespace
@@ -189,6 +213,7 @@ Index extend(SlidingBasis& basis, MultiVector X)
   MultiVector shapes = columns_from(basis.T, basis.sketched);
   const Index gained = extend_orthonormal(shapes, std::move(X)), before = basis.T.columns(), size = before + gained;
   if (gained == 0) return 0;
+  basis.by_Z.Z = {};
   const MultiVector news = columns_from(shapes, shapes.columns() - gained);
   append(basis.T, news);
   for (BasisImage* image : {&basis.M, &basis.C, &basis.K})
@@ -203,14 +228,13 @@ Index extend(SlidingBasis& basis, MultiVector X)
   return gained;
 }
 
-ProjectedSliding project(const SlidingBasis& basis, const ClosedContact& contact, Mat Cf)
+ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat Cf)
 {
-  const Lifts lifts = make_lifts(basis, contact);
-  ProjectedSliding result{projected(basis.M, lifts), projected(basis.C, lifts), projected(basis.K, lifts)};
-  if (Cf) result.C += projected_damping(basis, lifts, Cf);
-  const MatrixXd at_pivots = basis.T.entries(lifts.pivots, Eigen::all).rightCols(basis.shapes());
-  result.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) -
-                shared_sum(at_pivots.transpose() * at_pivots, basis.T.comm); // shapes are orthonormal
+  lift_by_Z(basis, contact);
+  const MultiVector by_Y = change_by_lift(basis, contact, basis.by_Z.pivots, contact.Y);
+  ProjectedSliding result{projected(basis.M, by_Y), projected(basis.C, by_Y), projected(basis.K, by_Y)};
+  if (Cf) result.C += projected_damping(basis, by_Y, Cf);
+  result.kept = basis.by_Z.kept;
   return result;
 }
 

@@ -14,9 +14,21 @@ namespace squeal
 /// A symmetric matrix on T.
 struct BasisImage
 {
-  Owned<Mat> matrix;          // a copy of A
-  MultiVector contact_rows{}; // of A T, at the degrees of freedom of the contact that this rank has
-  Eigen::MatrixXd products{}; // T'A T
+  Owned<Mat> matrix;                 // a copy of A
+  MultiVector contact_rows{};        // of A T, at the degrees of freedom of the contact that this rank has
+  Eigen::MatrixXd products{};        // T'A T
+  MultiVector lifted_rows{};         // of A T_Z at the pivots, where T_Z is T lifted by Z
+  Eigen::MatrixXd lifted_products{}; // T'A T_Z
+};
+
+/// The lift by Z, which stays while the closed pairs, T and the matrices do: friction changes Y alone.
+struct LiftByZ
+{
+  Owned<Mat> Z;                           // a copy; null: to be made
+  MultiVector change{};                   // D_Z, of the pivots' rows
+  std::vector<Eigen::Index> pivots{};     // local rows
+  std::vector<Eigen::Index> in_contact{}; // their places among the contact's degrees of freedom
+  Eigen::MatrixXd kept{};                 // inner products of the shapes without the pivots
 };
 
 /// The first columns of T are random vectors, `sketched` of them. They only test: the products with a residual show its
@@ -27,6 +39,7 @@ struct SlidingBasis
   Eigen::Index sketched = 0;
   std::vector<Eigen::Index> contact_dofs{}; // local rows, ascending
   BasisImage M{}, C{}, K{};
+  LiftByZ by_Z{};
 
   Eigen::Index shapes() const { return T.columns() - sketched; }
 };
@@ -47,7 +60,7 @@ struct ProjectedSliding
 };
 
 /// `Cf`: the damping of the friction direction; may be null.
-ProjectedSliding project(const SlidingBasis& basis, const ClosedContact& contact, Mat Cf);
+ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat Cf);
 
 /// The degrees of freedom of x that are no pivots.
 MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact);

@@ -430,7 +430,7 @@ BAD_PAIRS = {
     "normal the wrong way": ("11 41\n", CONTACT.replace('"z"', "[0, 0, -1]"),
                              ["line 1", "inside the rotor", "turn the normal"]),
     "no normal": ("7 40\n", CONTACT.replace('normal = "z"\n', ""), ["line 1", "coincide", "nx, ny, nz"]),
-    "a gap of none": ("7 40 0 0 1 1 nan\n", CONTACT, ["line 1", "nan", "finite"]),
+    "a gap of none": ("7 40 0 0 1 1 nan\n", CONTACT, ["line 1", "nan", "expected a number"]),
     "bad axis": ("7 40\n", CONTACT.replace('axis = "z"', 'axis = "w"'), ["rotation.axis", "three numbers"]),
     "unknown key": ("7 40\n", CONTACT.replace("normal", "normale"), ["[[contact]]", "'normale'", "'normal'"]),
     "centre misspelt": ("7 40\n", CONTACT.replace("centre", "center"),
