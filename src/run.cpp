@@ -89,7 +89,7 @@ BrakeBranch run_branch(const Chain& chain)
   const auto model_at = [&](double parameter) {
     return model_with(chain.model, scene, std::array{SceneNumber{scene.branch->key, parameter}});
   };
-  return find_branch({*scene.branch, model_at, chain.sliding(), report.cycle,
+  return find_branch({*scene.branch, model_at, chain.sliding(), report.cycle, report.modes.modes, scene.fidelity,
                       steps_along_branch(scene.cycle, report.cycle), tolerance, chain.model.probes, scene.modes,
                       chain.options.modes, chain.options.equilibrium, chain.options.step,
                       chain.options.cycle.shooting});

@@ -1,6 +1,9 @@
 #include "squeal/branch/brake_branch.hpp"
 
 #include "equilibrium_stability.hpp"
+#include "reduced_family.hpp"
+
+#include "squeal/algebra/dense_matrix.hpp"
 
 #include <algorithm>
 
@@ -71,6 +74,125 @@ std::vector<ParameterRange> coexistence_of(const BrakeBranch& found, const std::
   return ranges;
 }
 
+/// Whether so many shapes are worth a model of their own. A step of a dense model reads a few of its square matrices,
+/// and one of the full model its factor, which has a few dozen entries a column: at an eighth of the size both take as
+/// long, and the derivatives of the dense one still cost far less.
+bool is_far_smaller(const BrakeBranchProblem& problem, std::size_t shapes)
+{
+  constexpr std::size_t times = 8;
+  PetscInt dofs = 0;
+  check(VecGetSize(problem.sliding.structure.load, &dofs));
+  return times * shapes <= static_cast<std::size_t>(dofs);
+}
+
+/// Of its reduced model: the real and imaginary parts of the modes, and the rows of the active pairs.
+std::size_t least_shapes(const BrakeBranchProblem& problem)
+{
+  const PairsSeen seen = pairs_seen_in(problem, 1);
+  return 2 * problem.own_modes.size() +
+         PairRows<std::size_t>(problem.sliding.interface.directions).rows_of(seen.roles({}).active.size());
+}
+
+/// A point of rank 0's branch.
+struct ReducedPoint
+{
+  double parameter = 0, period = 0;
+  Eigen::VectorXd state; // (q, v)
+};
+
+/// Those of rank 0 on every rank. Collective.
+std::vector<ReducedPoint> points_of_first_rank(const Branch& branch, MPI_Comm comm)
+{
+  int count = static_cast<int>(branch.points.size());
+  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
+  std::vector<ReducedPoint> points(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < points.size(); ++i)
+  {
+    Eigen::VectorXd all(2);
+    if (i < branch.points.size())
+    {
+      const BranchPoint& point = branch.points[i];
+      const Eigen::MatrixXd state = columns_of_states(std::array{point.state.get()});
+      all.resize(state.size() + 2);
+      all << point.parameter, point.period, state.col(0);
+    }
+    broadcast(all, comm);
+    points[i] = {all[0], all[1], all.tail(all.size() - 2)};
+  }
+  return points;
+}
+
+/// One period of the full model from every point: its residual, and what its pairs do.
+void check_on_full_model(BrakeFamily& full, const ReducedFamily& reduced, Branch& branch, PairsSeen& seen)
+{
+  const Flow flow = full.flows().flow;
+  const MPI_Comm comm = comm_of(full.sliding().structure.load);
+  const std::vector<ReducedPoint> points = points_of_first_rank(branch, comm);
+  Progress progress(comm, "branch, full model", static_cast<double>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i)
+  {
+    full.set_parameter(points[i].parameter);
+    const Owned<Vec> start = reduced.lifted(points[i].state), moved = full.rest();
+    const MeasuredPeriod measured = full.measured_period(points[i].period, start);
+    const Owned<Vec> defect = state_of(measured.end.u, measured.end.v);
+    check(VecAXPY(defect, -1, start));
+    check(VecAYPX(moved, -1, start));
+    const double residual = energy_norm(flow, defect) / energy_norm(flow, moved);
+    if (i < branch.points.size()) branch.points[i].full_residual = residual;
+    for (const std::vector<ContactStatus>& statuses : measured.statuses)
+      for (std::size_t pair = 0; pair < statuses.size(); ++pair) seen.add(pair, statuses[pair]);
+    progress.update(static_cast<double>(i + 1), format("residual %.1e", residual));
+  }
+}
+
+/// Points spread evenly over the branch, closed on the full model.
+std::vector<CorrectedPoint> corrected_points(BrakeFamily& full, ReducedFamily& reduced,
+                                             const BrakeBranchProblem& problem,
+                                             const ContinuationSettings& continuation, const Branch& branch)
+{
+  const std::vector<ReducedPoint> points = points_of_first_rank(branch, comm_of(problem.sliding.structure.load));
+  std::vector<CorrectedPoint> corrected;
+  const auto wanted = std::min(points.size(), static_cast<std::size_t>(problem.settings.corrections));
+  for (std::size_t i = 0; i < wanted; ++i)
+  {
+    const std::size_t place = wanted < 2 ? points.size() / 2 : i * (points.size() - 1) / (wanted - 1);
+    const ReducedPoint& point = points[place];
+    full.set_parameter(point.parameter);
+    reduced.set_parameter(point.parameter);
+    FlowFamily family = full.flows();
+    family.preconditioner = reduced.lifted_preconditioner(point.period, point.state);
+    const Owned<Vec> start = reduced.lifted(point.state);
+    const Orbit orbit{copy_of(start.get()), point.period, zeros_like(start), zeros_like(start), 0, 0};
+    corrected.push_back({place, close_orbit(family, continuation, problem.shooting, orbit, point.parameter)});
+  }
+  return corrected;
+}
+
+/// Follows the branch on a reduced model, again while the full one's pairs do what it leaves out.
+void trace_on_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem,
+                            const ContinuationSettings& continuation, BrakeBranch& found)
+{
+  constexpr double margin = 2; // a branch reaches further than the cycle that it starts from
+  constexpr int rounds = 4;
+  PairsSeen seen = pairs_seen_in(problem, margin);
+  for (int round = 1;; ++round)
+  {
+    ReducedFamily reduced(full, problem, seen);
+    found.branch = trace_branch(reduced.flows(), continuation, problem.shooting, reduced.reduced(problem.cycle.orbit),
+                                problem.settings.own);
+    check_on_full_model(full, reduced, found.branch, seen);
+    const auto active = seen.roles({}).active.size(), had = reduced.model().active.size();
+    found.reduction = {reduced.model().size(),
+                       static_cast<int>(had),
+                       static_cast<int>(active - had),
+                       reduced.interpolation_error(),
+                       {}};
+    if (active > had && round < rounds) continue;
+    found.reduction->corrections = corrected_points(full, reduced, problem, continuation, found.branch);
+    return;
+  }
+}
+
 } // namespace
 
 std::string no_cycle_to_follow(const LimitCycle& cycle, double tolerance)
@@ -97,8 +219,13 @@ BrakeBranch find_branch(const BrakeBranchProblem& problem)
   found.equilibria = equilibria_along(family, problem);
   std::vector<BranchEvent> hopf = hopf_points(family, problem, found.equilibria);
   family.set_parameter(problem.settings.own);
-  found.branch =
-      trace_branch(family.flows(), continuation, problem.shooting, problem.cycle.orbit, problem.settings.own);
+  const bool reduces = problem.fidelity == CycleModel::reduced ||
+                       (problem.fidelity == CycleModel::automatic && is_far_smaller(problem, least_shapes(problem)));
+  if (reduces)
+    trace_on_reduced_model(family, problem, continuation, found);
+  else
+    found.branch =
+        trace_branch(family.flows(), continuation, problem.shooting, problem.cycle.orbit, problem.settings.own);
   found.coexistence = coexistence_of(found, hopf);
   found.outcome = outcome_of(problem, found.branch);
   found.branch.events.insert(found.branch.events.begin(), hopf.begin(), hopf.end());

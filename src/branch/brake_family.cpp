@@ -8,26 +8,24 @@
 namespace squeal
 {
 
-namespace
+void count_statuses(const std::vector<std::vector<ContactStatus>>& statuses, PointMeasures& measures)
 {
-
-/// Counts over a period from the statuses of its steps.
-void count_statuses(const MeasuredPeriod& measured, const std::vector<char>& closed, PointMeasures& measures)
-{
-  const auto& statuses = measured.statuses;
-  for (std::size_t pair = 0; pair < closed.size(); ++pair)
-    for (std::size_t step = 0; step < statuses.size(); ++step)
+  const std::size_t steps = statuses.size(), pairs = steps > 0 ? statuses.front().size() : 0;
+  for (std::size_t pair = 0; pair < pairs; ++pair)
+  {
+    int open = 0, lift_offs = 0;
+    for (std::size_t step = 0; step < steps; ++step)
     {
-      const ContactStatus now = statuses[step][pair];
-      if (now == ContactStatus::stick) ++measures.stick_steps;
-      if (now != ContactStatus::open || !closed[pair]) continue;
-      ++measures.open_steps;
-      const ContactStatus before = statuses[step > 0 ? step - 1 : statuses.size() - 1][pair];
-      if (before != ContactStatus::open) ++measures.lift_offs;
+      const ContactStatus now = statuses[step][pair], before = statuses[step > 0 ? step - 1 : steps - 1][pair];
+      measures.stick_steps += now == ContactStatus::stick;
+      open += now == ContactStatus::open;
+      lift_offs += now == ContactStatus::open && before != ContactStatus::open;
     }
+    if (lift_offs == 0) continue; // open or closed throughout
+    measures.open_steps += open;
+    measures.lift_offs += lift_offs;
+  }
 }
-
-} // namespace
 
 BrakeAt::BrakeAt(double value, BrakeModel made, const BrakeBranchProblem& problem)
     : parameter(value), model(std::move(made)), map{{model.structure, model.interface, equilibrium},
@@ -103,13 +101,18 @@ void BrakeFamily::parameter_column(double period, Vec start, Vec column)
   check(VecCopy(change.v, velocity(column)));
 }
 
-PointMeasures BrakeFamily::measure(const Orbit& orbit)
+MeasuredPeriod BrakeFamily::measured_period(double period, Vec start)
 {
   (void)sliding(); // energies refer to it
-  MeasuredPeriod measured = measure_period(at_->map, {problem_.probes, 0}, orbit.period, orbit.state, nullptr);
+  return measure_period(at_->map, {problem_.probes, 0}, period, start, nullptr);
+}
+
+PointMeasures BrakeFamily::measure(const Orbit& orbit)
+{
+  MeasuredPeriod measured = measured_period(orbit.period, orbit.state);
   PointMeasures measures{measured.mean_energy, measured.mean_fluctuating_energy, std::move(measured.peak_to_peak),
                          measured.open_pairs_mean};
-  count_statuses(measured, at_->equilibrium.closed, measures);
+  count_statuses(measured.statuses, measures);
   return measures;
 }
 

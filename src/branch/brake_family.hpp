@@ -8,6 +8,9 @@
 namespace squeal
 {
 
+/// Adds the counts of a period, from the statuses of the pairs at its steps.
+void count_statuses(const std::vector<std::vector<ContactStatus>>& statuses, PointMeasures& measures);
+
 /// The brake at a value of the parameter.
 struct BrakeAt
 {
@@ -33,9 +36,10 @@ public:
 
   void set_parameter(double parameter);
   SlidingEquilibrium sliding(); // at the value set last; finds its equilibrium
+  MeasuredPeriod measured_period(double period, Vec start);
+  Owned<Vec> rest();
 
 private:
-  Owned<Vec> rest();
   void parameter_column(double period, Vec start, Vec column);
   PointMeasures measure(const Orbit& orbit);
 

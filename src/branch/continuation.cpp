@@ -205,6 +205,19 @@ Branch joined(BranchSide backward, BranchSide forward)
   return branch;
 }
 
+BranchVector rising_parameter(const BranchCorrector& corrector, const Orbit& start)
+{
+  return {zeros_like(start.state), 0, corrector.scales.parameter};
+}
+
+/// The orbit of this value near the start.
+std::optional<CorrectedOrbit> correct_start(BranchCorrector& corrector, const Orbit& start, double parameter)
+{
+  CorrectedOrbit first{squeal::copy_of(start), parameter, 0};
+  refer_to(corrector, first);
+  return correct(corrector, vector_of(first), rising_parameter(corrector, start));
+}
+
 /// A branch that could not begin.
 Branch without_start(long periods)
 {
@@ -216,6 +229,19 @@ Branch without_start(long periods)
 
 } // namespace
 
+std::optional<BranchPoint> close_orbit(const FlowFamily& family, const ContinuationSettings& settings,
+                                       const ShootingOptions& options, const Orbit& start, double parameter)
+{
+  Progress progress(comm_of(displacement(start.state)), "corrections", 20);
+  ConvergenceLog log{progress};
+  BranchCorrector corrector{family, settings, options, log};
+  corrector.scales.parameter = settings.greatest - settings.least;
+  std::optional<CorrectedOrbit> closed = correct_start(corrector, start, parameter);
+  if (!closed) return {};
+  ExaminedOrbit examined = examine(corrector, std::move(*closed), Examined::measures_alone);
+  return point_of(examined);
+}
+
 Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settings, const ShootingOptions& options,
                     const Orbit& start, double parameter)
 {
@@ -223,10 +249,8 @@ Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settin
   ConvergenceLog log{progress, {}, 0.};
   BranchCorrector corrector{family, settings, options, log};
   corrector.scales.parameter = settings.greatest - settings.least;
-  CorrectedOrbit first{squeal::copy_of(start), parameter, 0};
-  refer_to(corrector, first);
-  const BranchVector rising{zeros_like(start.state), 0, corrector.scales.parameter};
-  std::optional<CorrectedOrbit> closed = correct(corrector, vector_of(first), rising);
+  const BranchVector rising = rising_parameter(corrector, start);
+  std::optional<CorrectedOrbit> closed = correct_start(corrector, start, parameter);
   if (!closed) return without_start(log.convergence.periods);
   refer_to(corrector, *closed);
   ExaminedOrbit examined = examine(corrector, std::move(*closed), Examined::multipliers_too);

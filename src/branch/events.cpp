@@ -21,9 +21,10 @@ struct Search
   int halvings; // of the interval between the points
 };
 
-bool counts(BranchEventKind kind, std::complex<double> multiplier)
+/// Whether a multiplier is beyond the unit circle by more than its bar, and the way that the event is about.
+bool counts(BranchEventKind kind, std::complex<double> multiplier, double error)
 {
-  if (!(std::abs(multiplier) > 1)) return false;
+  if (!(std::abs(multiplier) > 1 + error)) return false;
   if (kind == BranchEventKind::neimark_sacker) return multiplier.imag() > 0;
   return kind == BranchEventKind::period_doubling && multiplier.imag() == 0 && multiplier.real() < 0;
 }
@@ -32,9 +33,11 @@ Count multipliers_of(BranchEventKind kind)
 {
   return [kind](const ExaminedOrbit& orbit)
   {
-    const auto& values = orbit.multipliers.values;
-    return static_cast<int>(
-        std::count_if(values.begin(), values.end(), [kind](std::complex<double> m) { return counts(kind, m); }));
+    const Multipliers& multipliers = orbit.multipliers;
+    int count = 0;
+    for (std::size_t i = 0; i < multipliers.values.size(); ++i)
+      count += counts(kind, multipliers.values[i], multipliers.errors[i]);
+    return count;
   };
 }
 

@@ -1,8 +1,8 @@
 #include "floquet.hpp"
 
-#include "reduced_spectrum.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/cycle/reduced_spectrum.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -155,15 +155,6 @@ std::vector<Owned<Vec>> lifted(const ReducedModel& model, const MatrixXd& vector
   return states;
 }
 
-MatrixXd energy_representatives(const ReducedModel& model, const MatrixXd& left)
-{
-  const Index n = model.size();
-  MatrixXd result(left.rows(), left.cols());
-  result << solve_dense(model.K_z, left.topRows(n), "cycle: the reduced model has a motion without stiffness"),
-      model.M_factor.solve(left.bottomRows(n));
-  return result;
-}
-
 /// The sliding modes that decay slowest, as states.
 std::vector<Owned<Vec>> slow_sliding_motions(const std::vector<ComplexMode>& modes, Vec pattern)
 {
@@ -231,12 +222,7 @@ void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, int other
   const MPI_Comm comm = map.model.shapes.comm;
   const auto change = [&](const std::vector<Complex>& values, std::size_t i)
   { return std::abs(values[i]) - std::abs(spectrum.values[i]); };
-  const auto moved = multipliers_along(spectrum, map, period, contacts(RecordedPeriods::moved), comm);
-  for (std::size_t i = 0; i < moved.size(); ++i)
-  {
-    slow.errors.push_back(std::abs(change(moved, i)));
-    slow.rises.push_back(std::max(0., change(moved, i)));
-  }
+  set_changes(spectrum, multipliers_along(spectrum, map, period, contacts(RecordedPeriods::moved), comm), slow);
   if (other_steps == 0) return;
   ReducedMap other{map.model, other_steps, map.theta};
   const auto compared = multipliers_along(spectrum, other, period, contacts(RecordedPeriods::other), comm);

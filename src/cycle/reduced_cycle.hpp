@@ -1,6 +1,6 @@
 #pragma once
 /// The limit cycle of the reduced model: its active pairs, its free motion, its shooting (src/README.md, section 7.7).
-#include "reduced_flow.hpp"
+#include "squeal/cycle/reduced_flow.hpp"
 #include "squeal/cycle/fidelity.hpp"
 
 namespace squeal

@@ -1,4 +1,4 @@
-#include "reduced_flow.hpp"
+#include "squeal/cycle/reduced_flow.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
 
@@ -70,6 +70,37 @@ Owned<Vec> vector_of(const ReducedState& state)
 ReducedState reduced_state(Vec state)
 {
   return {entries_of(displacement(state)), entries_of(velocity(state))};
+}
+
+MatrixXd columns_of_states(std::span<const Vec> states)
+{
+  MatrixXd columns(0, 0);
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    const VectorXd both = stacked(reduced_state(states[k]));
+    if (k == 0) columns.resize(both.size(), static_cast<Eigen::Index>(states.size()));
+    columns.col(static_cast<Eigen::Index>(k)) = both;
+  }
+  return columns;
+}
+
+void copy_columns(const MatrixXd& columns, std::span<const Vec> states)
+{
+  const Eigen::Index size = columns.rows() / 2;
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    const auto column = columns.col(static_cast<Eigen::Index>(k));
+    put(ReducedState{column.head(size), column.tail(size)}, states[k]);
+  }
+}
+
+std::vector<Owned<Vec>> states_of_columns(const MatrixXd& columns)
+{
+  const Eigen::Index size = columns.rows() / 2;
+  std::vector<Owned<Vec>> states;
+  for (const auto column : columns.colwise())
+    states.push_back(vector_of(ReducedState{column.head(size), column.tail(size)}));
+  return states;
 }
 
 EnergyMatrices energy_matrices(const ReducedModel& model)

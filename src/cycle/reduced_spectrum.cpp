@@ -1,8 +1,9 @@
-#include "reduced_spectrum.hpp"
+#include "squeal/cycle/reduced_spectrum.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 
+#include <algorithm>
 #include <Eigen/LU>
 #include <Eigen/QR>
 
@@ -117,6 +118,25 @@ Eigen::VectorXcd resolvent(const MatrixXd& columns, Complex m, const Eigen::Vect
   square.diagonal().array() -= m;
   const Eigen::VectorXcd z = square.partialPivLu().solve(slow_rows<Eigen::MatrixXcd>(x, size, slow));
   return columns.cast<Complex>() * z / m;
+}
+
+MatrixXd energy_representatives(const ReducedModel& model, const MatrixXd& left)
+{
+  const Index n = model.size();
+  MatrixXd result(left.rows(), left.cols());
+  result << solve_dense(model.K_z, left.topRows(n), "cycle: the reduced model has a motion without stiffness"),
+      model.M_factor.solve(left.bottomRows(n));
+  return result;
+}
+
+void set_changes(const ReducedSpectrum& spectrum, const std::vector<Complex>& moved, SlowMotions& slow)
+{
+  for (std::size_t i = 0; i < moved.size(); ++i)
+  {
+    const double change = std::abs(moved[i]) - std::abs(spectrum.values[i]);
+    slow.errors.push_back(std::abs(change));
+    slow.rises.push_back(std::max(0., change));
+  }
 }
 
 std::vector<Complex> multipliers_along(const ReducedSpectrum& spectrum, ReducedMap& map, double period,

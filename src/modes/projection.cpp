@@ -113,7 +113,7 @@ void expand(const Subspace& space, const QuadraticNorms& norms, Pairs pairs, con
 }
 
 /// An orthonormal basis of the residuals' directions, down to `share` of the largest. No column counts for more than
-/// 30 times the median: a combination of corrections that is no pair but lies in the window would outweigh all others.
+/// 30 times the median: a combination of corrections that is no pair but is in the window would outweigh all others.
 MultiVector largest_directions(MultiVector residuals, double share)
 {
   constexpr double outstanding = 30;

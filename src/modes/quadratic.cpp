@@ -84,7 +84,7 @@ Owned<PEP> make_solver(Mat M, Mat C, Mat K, PetscInt count, double shift)
   return pep;
 }
 
-/// Appends the pairs of a solved PEP that lie in the window. Returns the largest |nu - shift| of all.
+/// Appends the pairs of a solved PEP in the window. Returns the largest |nu - shift| of all.
 double collect(PEP pep, double omega, double shift, const Window& window, std::vector<Eigenpair>& pairs)
 {
   PetscInt converged = 0;

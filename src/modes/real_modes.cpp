@@ -241,7 +241,7 @@ RealModes search_from_below_zero(Mat M, Mat K, double limit, PetscInt count, con
     const PetscInt wanted = std::min<PetscInt>(n - found.x.columns(), missing + 1);
     modes.outcome.iterations += append_nearest(found.x, pencil, wanted);
     found = ritz_pairs(found.x, M, K);
-    // The count lies above the last mode by 1e-6 of its distance from the shift, far above the error of theta.
+    // The count is taken above the last mode by 1e-6 of its distance from the shift, far above the error of theta.
     if (!inertia && found.theta.size() >= count)
       inertia = inertia_at(found.theta[count - 1] + 1e-6 * (found.theta[count - 1] - shift), K, M, options.pencil);
     missing = inertia ? inertia->below - found.number_below(inertia->limit)

@@ -125,14 +125,13 @@ namespace
 {
 
 /// Law, gaps, reactions and drive of the active pairs; normal ones alone if they slide along the drive throughout.
-void set_active_pairs(ReducedModel& model, const Interface& interface, const Equilibrium& equilibrium,
-                      const Reduction& reduction)
+void set_active_pairs(ReducedModel& model, const Interface& interface, const Equilibrium& equilibrium, bool sliding)
 {
   const std::vector<double> motion = relative(interface, equilibrium.u);
   const PairView still(motion, interface.directions), reactions(equilibrium.reactions, interface.directions);
   const TangentView drive(interface.drive, interface.directions);
-  model.directions = reduction.sliding ? 0 : interface.directions;
-  if (!reduction.sliding) model.friction = interface.friction;
+  model.directions = sliding ? 0 : interface.directions;
+  if (!sliding) model.friction = interface.friction;
   for (const int pair : model.active)
   {
     const auto i = static_cast<std::size_t>(pair);
@@ -140,7 +139,7 @@ void set_active_pairs(ReducedModel& model, const Interface& interface, const Equ
     model.compliance.push_back(c);
     model.gap.push_back(equilibrium.closed[i] ? -c * reactions.normal(i) : interface.gap[i] + still.normal(i));
     model.reactions.push_back(reactions.normal(i));
-    if (reduction.sliding) continue;
+    if (sliding) continue;
     for (const double friction : reactions.tangential(i)) model.reactions.push_back(friction);
     for (const double velocity : drive.of(i)) model.drive.push_back(velocity);
   }
@@ -171,6 +170,23 @@ void add_unsymmetric_parts(ReducedModel& model, const SlidingEquilibrium& slidin
   if (const Owned<Mat> turning = friction_damping(interface, pairs.follows, pairs.reactions, FrictionDamping::whole);
       turning.get())
     add(turning, model.C);
+}
+
+/// The shapes in the coordinates that Z keeps, and whole.
+struct Shapes
+{
+  const MultiVector& columns;
+  const MultiVector& X; // Z columns
+};
+
+/// M, C and K on the shapes, tested by Y columns, which are returned.
+MultiVector set_matrices(ReducedModel& model, const SlidingEquilibrium& sliding, const ClosedContact& contact,
+                         const ClosedPairs& pairs, const Shapes& shapes)
+{
+  MultiVector left = product(contact.Y, shapes.columns);
+  project(model, sliding.structure, contact, shapes.columns, shapes.X);
+  add_unsymmetric_parts(model, sliding, pairs, left, shapes.X);
+  return left;
 }
 
 } // namespace
@@ -213,19 +229,17 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   append(columns, attachment_columns(E, BZ, forces, reduction.factor));
   model.omega = omega;
   const MatrixXd energy = energies(of_modes_alone, forces.transpose() * whole_product(BZ, columns));
-  choose_basis(model, energy, M_z, columns, {modal, of_modes.apart}, reduction.threshold);
+  choose_basis(model, energy, M_z, columns, {modal, of_modes.more, of_modes.apart}, reduction.threshold);
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
   MultiVector X = product(contact.Z, columns);
-  project(model, structure, contact, columns, X);
-  const MultiVector left = product(contact.Y, columns);
   std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
   if (reduction.sliding)
     for (const int pair : active) follows[static_cast<std::size_t>(pair)] = 1; // no reaction while open
-  add_unsymmetric_parts(model, sliding, {roles.sliding, follows, roles.reactions}, left, X);
+  const MultiVector left =
+      set_matrices(model, sliding, contact, {roles.sliding, follows, roles.reactions}, {columns, X});
   model.H = (forces.transpose() * whole_product(B, left)).transpose();
   model.G = whole_product(B, X);
   if (reduction.sliding) model.G = normal_rows(model.G, interface.directions);
-
   model.E_factor.compute(model.K_z + omega * omega * model.M_z);
   model.M_factor.compute(model.M_z);
   if (model.M_factor.info() != Eigen::Success || model.E_factor.info() != Eigen::Success)
@@ -233,8 +247,58 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
                 "fidelity = \"full\"");
   model.shapes = std::move(X);
   model.active = active;
-  set_active_pairs(model, interface, equilibrium, reduction);
+  set_active_pairs(model, interface, equilibrium, reduction.sliding);
+  model.force = -model.H * VectorXd::Map(model.reactions.data(), model.H.cols());
   return model;
+}
+
+namespace
+{
+
+/// What is not in balance at (u0, r0) of `about` in the brake `other`, but for the active pairs: its load, less the
+/// structure's forces, and the springs of the pairs that slide, with friction.
+Owned<Vec> unbalanced(const SlidingEquilibrium& about, const SlidingEquilibrium& other, const PairRoles& roles)
+{
+  const Interface& interface = other.interface;
+  Owned<Vec> force = zeros_like(other.structure.load);
+  check(MatMult(other.structure.K, about.equilibrium.u, force));
+  check(VecAYPX(force, -1, other.structure.load));
+  std::vector<double> reactions(interface.size(), 0.);
+  const PairView still(about.equilibrium.reactions, interface.directions);
+  const PairView<double> springs(reactions, interface.directions);
+  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
+  const TangentView e(directions, interface.directions);
+  for (std::size_t i = 0; i < mu.size(); ++i)
+  {
+    if (!roles.sliding[i] || compliance_of(interface, i) == 0) continue;
+    springs.normal(i) = still.normal(i);
+    for (std::size_t k = 0; k < e.of(i).size(); ++k) springs.tangential(i)[k] = mu[i] * still.normal(i) * e.of(i)[k];
+  }
+  add_reactions(interface, reactions, force);
+  return force;
+}
+
+} // namespace
+
+ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibrium& about,
+                                const SlidingEquilibrium& other, const PairRoles& roles)
+{
+  const ClosedContact contact = eliminate_closed_pairs(other.structure, other.interface, roles.sliding);
+  const MultiVector columns = kept_entries(model.shapes, contact.Z, other.structure.load);
+  ReducedModel result;
+  const MultiVector left = set_matrices(
+      result, other, contact, {roles.sliding, roles.sliding, other.equilibrium.reactions}, {columns, model.shapes});
+  const Owned<Mat> B = rows_of(other.interface, model.active, RowsTaken::all);
+  result.H = whole_product(B, left).transpose();
+  result.G = whole_product(B, model.shapes);
+  result.active = model.active;
+  set_active_pairs(result, other.interface, about.equilibrium, false);
+  result.gap = model.gap;
+  result.omega = model.omega;
+  result.slow = model.slow;
+  const Owned<Vec> force = unbalanced(about, other, roles);
+  result.force = inner_products(left, columns_of(std::array{force.get()})).col(0);
+  return result;
 }
 
 namespace
@@ -248,6 +312,7 @@ ReducedModel on_shapes(const ReducedModel& model, const MatrixXd& basis, Index s
                                              &ReducedModel::C_z, &ReducedModel::K_z})
     result.*part = basis.transpose() * (model.*part * basis);
   result.H = basis.transpose() * model.H;
+  result.force = basis.transpose() * model.force;
   result.G = model.G * basis;
   result.active = model.active;
   result.directions = model.directions;

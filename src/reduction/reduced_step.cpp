@@ -53,14 +53,15 @@ void prepare(ReducedMap& map, double period)
   const ReducedModel& model = map.model;
   const double theta = map.theta;
   const Eigen::Index n = model.size(), rows = model.G.rows();
-  MatrixXd right(n, 2 * n + rows);
-  right << model.M - h * (1 - theta) * model.C - h * h * theta * (1 - theta) * model.K, -h * model.K, h * model.H;
+  MatrixXd right(n, 2 * n + rows + 1);
+  right << model.M - h * (1 - theta) * model.C - h * h * theta * (1 - theta) * model.K, -h * model.K, h * model.H,
+      h * model.force;
   right = solve_dense(model.M + h * theta * model.C + h * h * theta * theta * model.K, right,
                       "reduced model: a motion has neither mass nor stiffness");
   map.h = h;
   map.from_state = right.leftCols(2 * n);
-  map.from_reactions = right.rightCols(rows);
-  map.from_equilibrium = -map.from_reactions * VectorXd::Map(model.reactions.data(), rows);
+  map.from_reactions = right.middleCols(2 * n, rows);
+  map.from_load = right.col(2 * n + rows);
   map.W = model.G * map.from_reactions;
   const std::vector<Eigen::Index> normal = normal_rows(model);
   for (std::size_t i = 0; i < normal.size(); ++i) map.W(normal[i], normal[i]) += gap_law(map, i).by_reaction;
@@ -121,7 +122,7 @@ bool find_reactions(const ReducedMap& map, const ReducedState& state, const Vect
   while (leave_out_where_turned(reactions(), PairView<const double>(contact.w, model.directions),
                                 PairView(contact.past, model.directions)))
   {
-    contact.r_before.resize(0); // no step lies between
+    contact.r_before.resize(0); // no step is between
     converged = solve_contact(map, b(), contact);
   }
   return converged;
@@ -133,7 +134,7 @@ bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact
 {
   VectorXd both(2 * map.model.size());
   both << state.v, state.q;
-  VectorXd next = map.from_state * both + map.from_equilibrium;
+  VectorXd next = map.from_state * both + map.from_load;
   const bool converged = find_reactions(map, state, next, contact);
   next.noalias() += map.from_reactions * contact.r;
   state.q += map.h * (map.theta * next + (1 - map.theta) * state.v);

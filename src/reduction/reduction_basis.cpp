@@ -108,6 +108,28 @@ double highest_frequency(const std::vector<ComplexMode>& modes)
   return highest;
 }
 
+MultiVector kept_entries(const MultiVector& X, Mat Z, Vec pattern)
+{
+  Owned<Vec> y;
+  check(MatCreateVecs(Z, y.put(), nullptr));
+  const Owned<VecScatter> scatter = to_kept(Z, pattern, y);
+  const Owned<Vec> x = zeros_like(pattern);
+  PetscInt own = 0;
+  check(VecGetLocalSize(y, &own));
+  MultiVector result{X.comm, MatrixXd(own, X.columns())};
+  for (Index j = 0; j < X.columns(); ++j)
+  {
+    copy_column(X, j, x);
+    check(VecScatterBegin(scatter, x, y, INSERT_VALUES, SCATTER_FORWARD));
+    check(VecScatterEnd(scatter, x, y, INSERT_VALUES, SCATTER_FORWARD));
+    const PetscScalar* entries = nullptr;
+    check(VecGetArrayRead(y, &entries));
+    result.entries.col(j) = Eigen::VectorXd::Map(entries, own);
+    check(VecRestoreArrayRead(y, &entries));
+  }
+  return result;
+}
+
 ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction, Mat Z)
 {
   const double omega = modes.front().lambda.imag();
@@ -132,7 +154,9 @@ ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction&
     std::stable_partition(shapes.begin() + 2, shapes.end(),
                           [limit](const ModeShape& shape) { return shape.frequency < limit; });
   }
-  ModeColumns result{empty_multivector(Z), std::min(count, static_cast<std::ptrdiff_t>(shapes.size()) - 2)};
+  ModeColumns result{empty_multivector(Z), static_cast<Index>(reduction.more.size()),
+                     std::min(count, static_cast<std::ptrdiff_t>(shapes.size()) - 2)};
+  for (const Vec shape : reduction.more) shapes.push_back({0, shape});
   Owned<Vec> y;
   check(MatCreateVecs(Z, y.put(), nullptr));
   const Owned<VecScatter> scatter = to_kept(Z, modes.front().real, y);
@@ -203,10 +227,12 @@ MatrixXd by_falling_period(const MatrixXd& mass, double omega, Index& slow)
 void choose_basis(ReducedModel& model, const MatrixXd& energy, Mat M_z, MultiVector& columns, const ModeCounts& counts,
                   double threshold)
 {
-  const auto [of_modes, apart] = counts;
+  const auto [of_modes, more, apart] = counts;
+  constexpr double new_shape = 1e-3; // what further shapes add: a part e of a mode moves its value by e^2
   Orthonormal basis{energy, MatrixXd(columns.columns(), 0)};
   model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
-  model.modes += extend(basis, of_modes - apart - 2, 1e-6);
+  model.modes += extend(basis, of_modes - more - apart - 2, 1e-6);
+  model.modes += extend(basis, more, new_shape);
   const int before = model.modes;
   const int last = extend(basis, apart, 1e-6);
   model.modes += last;

@@ -8,11 +8,14 @@
 namespace squeal
 {
 
-/// Shapes of modes, and the number of them that come after the attachments.
+/// The entries of X = Z y in the coordinates y. `pattern`: a vector of the structure's.
+MultiVector kept_entries(const MultiVector& X, Mat Z, Vec pattern);
+
+/// Shapes of modes, then further ones. Those of the modes kept apart are the last ones.
 struct ModeColumns
 {
   MultiVector columns;
-  Eigen::Index apart = 0;
+  Eigen::Index more = 0, apart = 0; // numbers of further shapes, and of those kept apart
 };
 
 /// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts. Then real modes.
@@ -32,10 +35,11 @@ MultiVector attachment_columns(Mat A, Mat rows, const Eigen::SparseMatrix<double
 /// `mass`: of the shapes. Sets `slow` to the number of those that swing by less than four times omega [rad/s].
 Eigen::MatrixXd by_falling_period(const Eigen::MatrixXd& mass, double omega, Eigen::Index& slow);
 
-/// The numbers of columns that are modes, and of those among them that are kept apart, which are the last ones.
+/// The numbers of columns before the attachments, and of those among them that are further shapes or kept apart, which
+/// are the last ones.
 struct ModeCounts
 {
-  Eigen::Index modes = 0, apart = 0;
+  Eigen::Index modes = 0, more = 0, apart = 0;
 };
 
 /// Replaces the columns by the basis: the modes, the attachments next to them, all by falling period. `energy`: X'E X

@@ -28,11 +28,58 @@ Json point_entry(const BranchPoint& point, const Scene& scene)
                 {"stick_steps", point.measures.stick_steps},
                 {"stability", word(point.multipliers.stability)},
                 {"multipliers", multiplier_list(point.multipliers)}};
+  if (!std::isnan(point.full_residual)) entry["full_residual"] = point.full_residual;
   Json swings = Json::object();
   for (std::size_t i = 0; i < point.measures.peak_to_peak.size(); ++i)
     swings[scene.probes[i].name] = point.measures.peak_to_peak[i];
   entry["peak_to_peak"] = swings;
   return entry;
+}
+
+Json reduction_entry(const BranchReduction& reduction, const std::vector<BranchPoint>& points)
+{
+  Json entry = {{"shapes", reduction.shapes},
+                {"active_pairs", reduction.active_pairs},
+                {"missed_pairs", reduction.missed_pairs},
+                {"interpolation_error", reduction.interpolation_error},
+                {"corrections", Json::array()}};
+  for (const CorrectedPoint& corrected : reduction.corrections)
+  {
+    Json point = {{"parameter", points[corrected.place].parameter}, {"converged", corrected.orbit.has_value()}};
+    if (corrected.orbit)
+    {
+      point["frequency_hz"] = 1 / corrected.orbit->period;
+      point["mean_fluctuating_energy"] = corrected.orbit->measures.mean_fluctuating_energy;
+      point["residual"] = corrected.orbit->residual;
+    }
+    entry["corrections"].push_back(point);
+  }
+  return entry;
+}
+
+/// What the branch on a reduced model is worth.
+std::vector<std::string> reduction_lines(const BrakeBranch& branch)
+{
+  if (!branch.reduction) return {};
+  const BranchReduction& reduction = *branch.reduction;
+  double largest = 0;
+  for (const BranchPoint& point : branch.branch.points) largest = std::max(largest, point.full_residual);
+  std::vector<std::string> lines = {format(
+      "reduced model of %d shapes, %d pairs keep their contact; its cycles miss the full model's by at most %.1e "
+      "a period; between samples its matrices are right to %.1e",
+      reduction.shapes, reduction.active_pairs, largest, reduction.interpolation_error)};
+  if (reduction.missed_pairs > 0)
+    lines.push_back(format("%d more pairs of the full model open or stick", reduction.missed_pairs));
+  for (const CorrectedPoint& corrected : reduction.corrections)
+  {
+    const BranchPoint& point = branch.branch.points[corrected.place];
+    lines.push_back(
+        corrected.orbit
+            ? format("full model at %.6g: %.7g Hz, %.5g J, residual %.1e", point.parameter, 1 / corrected.orbit->period,
+                     corrected.orbit->measures.mean_fluctuating_energy, corrected.orbit->residual)
+            : format("full model at %.6g: no cycle was found next to the reduced model's", point.parameter));
+  }
+  return lines;
 }
 
 /// Of the largest multiplier; NaN where none is known.
@@ -78,6 +125,8 @@ void add_branch(const BrakeBranch& branch, const Scene& scene, Json& entry)
   entry["periods_integrated"] = branch.branch.periods;
   entry["tangent_columns"] = branch.branch.columns;
   entry["ends"] = {{"backward", word(branch.branch.ends.backward)}, {"forward", word(branch.branch.ends.forward)}};
+  entry["model"] = word(branch.reduction ? CycleModel::reduced : CycleModel::full);
+  if (branch.reduction) entry["reduction"] = reduction_entry(*branch.reduction, branch.branch.points);
   entry["points"] = Json::array();
   for (const BranchPoint& point : branch.branch.points) entry["points"].push_back(point_entry(point, scene));
   entry["events"] = Json::array();
@@ -182,6 +231,7 @@ std::vector<std::string> branch_lines(const BrakeBranch& branch, const Scene& sc
     if (event.kind != BranchEventKind::grazing || ++grazings <= grazings_shown) lines.push_back(event_line(event));
   if (grazings > grazings_shown)
     lines.push_back(format("%zu more grazings are in report.json", grazings - grazings_shown));
+  for (std::string& line : reduction_lines(branch)) lines.push_back(std::move(line));
   for (const ParameterRange& range : branch.coexistence)
     lines.push_back(
         format("from %.6g to %.6g a stable cycle stands beside a stable equilibrium", range.from, range.to));

@@ -275,6 +275,8 @@ SceneKeys keys_of(BranchSettings& b)
       {"from", &b.from, required, Rule::any, "-", "its value at one end, in its own unit"},
       {"to", &b.to, required, Rule::any, "-", "its value at the other end"},
       {"points", &b.points, optional, Rule::positive, "-", "number of points if it alone changed along the branch"},
+      {"corrections", &b.corrections, optional, Rule::not_negative, "-",
+       "number of points of a reduced model's branch that the full model corrects"},
   };
 }
 

@@ -118,7 +118,7 @@ std::vector<double> backward_errors(const ModesBasis& modes, const ProjectedSlid
   for (Index k = 0; k < a.cols(); ++k)
   {
     const Complex lambda = pairs[static_cast<std::size_t>(k)].lambda;
-    // the random entries lie evenly in (-1, 1): their mean square is 1/3
+    // the random entries are spread evenly over (-1, 1): their mean square is 1/3
     const double residual =
         (lambda * (lambda * M.col(k) + C.col(k)) + K.col(k)).norm() * std::sqrt(3. / static_cast<double>(tests));
     errors.push_back(residual / (scale_of(modes, lambda) * sizes(k)));
@@ -207,6 +207,19 @@ SolvedPairs with_errors(const ModesBasis& modes, const ProjectedSliding& on_basi
   return solved;
 }
 
+/// M, C and K of the projected problem.
+struct DenseSliding
+{
+  MatrixXd M, C, K;
+};
+
+/// On the shapes alone, which come after the sketched columns.
+DenseSliding without_sketch(const ProjectedSliding& on_basis, Index shapes)
+{
+  return {on_basis.M.bottomRightCorner(shapes, shapes), on_basis.C.bottomRightCorner(shapes, shapes),
+          on_basis.K.bottomRightCorner(shapes, shapes)};
+}
+
 /// Where a few pairs alone miss their tolerance, they are refined on the whole basis.
 void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const PointProblem& problem,
                 SolvedPairs& solved)
@@ -217,10 +230,8 @@ void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const
     if (solved.backward_error(k) > tolerance_of(solved.pairs[k], problem)) places.push_back(k);
   if (places.empty() || places.size() > few) return;
   for (const std::size_t k : places) pairs.push_back(solved.pairs[k]);
-  const Index shapes = modes.basis.shapes();
-  refine_pairs_shared(modes.basis.T.comm, on_basis.M.bottomRightCorner(shapes, shapes),
-                      on_basis.C.bottomRightCorner(shapes, shapes), on_basis.K.bottomRightCorner(shapes, shapes),
-                      pairs);
+  const DenseSliding on_shapes = without_sketch(on_basis, modes.basis.shapes());
+  refine_pairs_shared(modes.basis.T.comm, on_shapes.M, on_shapes.C, on_shapes.K, pairs);
   SolvedPairs refined = with_errors(modes, on_basis, std::move(pairs));
   for (std::size_t i = 0; i < places.size(); ++i)
   {
@@ -236,10 +247,8 @@ void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const
 SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_basis, const Window& window,
                             Extent extent)
 {
-  const Index shapes = modes.basis.shapes();
   const MPI_Comm comm = modes.basis.T.comm;
-  MatrixXd M = on_basis.M.bottomRightCorner(shapes, shapes), C = on_basis.C.bottomRightCorner(shapes, shapes),
-           K = on_basis.K.bottomRightCorner(shapes, shapes);
+  auto [M, C, K] = without_sketch(on_basis, modes.basis.shapes());
   InvariantSubspaces spaces;
   if (extent == Extent::near_band)
   {

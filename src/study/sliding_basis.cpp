@@ -1,6 +1,7 @@
 #include "sliding_basis.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace squeal
 {
@@ -114,21 +115,11 @@ MultiVector change_by_lift(const SlidingBasis& basis, const ClosedContact& conta
   return change;
 }
 
-bool same(Mat A, Mat B)
-{
-  PetscInt rows = 0, columns = 0, other_rows = 0, other_columns = 0;
-  check(MatGetLocalSize(A, &rows, &columns));
-  check(MatGetLocalSize(B, &other_rows, &other_columns));
-  int same = rows == other_rows && columns == other_columns;
-  MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, comm_of(A));
-  return same && equal(A, B);
-}
-
 /// Sets the lift by Z where it has changed.
 void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact)
 {
   LiftByZ& lift = basis.by_Z;
-  if (lift.Z.get() && same(lift.Z, contact.Z)) return;
+  if (lift.Z.get() && equal(lift.Z, contact.Z)) return;
   lift.Z = copy_of(contact.Z);
   lift.pivots = local_pivots(contact);
   lift.in_contact.clear();
@@ -174,7 +165,13 @@ MatrixXd projected_damping(const SlidingBasis& basis, const MultiVector& by_Y, M
 
 bool equal(Mat A, Mat B)
 {
+  std::array<PetscInt, 2> size{}, other{};
+  check(MatGetLocalSize(A, &size[0], &size[1]));
+  check(MatGetLocalSize(B, &other[0], &other[1]));
+  int alike = size == other; // else MatEqual is an error
+  MPI_Allreduce(MPI_IN_PLACE, &alike, 1, MPI_INT, MPI_MIN, comm_of(A));
   PetscBool same = PETSC_FALSE;
+  if (alike == 0) return false;
   check(MatEqual(A, B, &same));
   return same == PETSC_TRUE;
 }

@@ -80,6 +80,46 @@ def test_ranks_agree_on_the_events(friction, module_run):
         assert first["period"] == pytest.approx(second["period"], rel=5e-6)
 
 
+PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "modes.method=full", "--set", "transient.enabled=false", "--set",
+       "cycle.steps_per_period=32", "--set", "branch.points=4"]
+
+
+@pytest.fixture(scope="module")
+def reduced(module_run):
+    return module_run(*PIN, *branch_of("friction.coefficient", 0.28, 0.34), "--set", "branch.corrections=3", ranks=1)
+
+
+def test_a_reduced_branch_is_near_the_full_model(reduced, converged):
+    """The full model, which the test above holds to single runs, closes beside the reduced one's cycles."""
+    branch = reduced["branch"]
+    assert branch["model"] == "reduced" and branch["ends"] == {"backward": "bound", "forward": "bound"}
+    assert branch["reduction"]["missed_pairs"] == 0 and branch["reduction"]["interpolation_error"] < 1e-5
+    corrections = branch["reduction"]["corrections"]
+    assert [round(point["parameter"], 9) for point in corrections] == [0.28, 0.3, 0.34]
+    for corrected in corrections:
+        point = min(branch["points"], key=lambda point: abs(point["parameter"] - corrected["parameter"]))
+        assert corrected["converged"] and corrected["residual"] <= 1e-5
+        # One period of the full model misses the reduced cycle by 4 % of its motion. Its energy is off by about as much,
+        # its period, which is stationary there to first order, by a part of the square: a thousandth.
+        assert 1e-4 < point["full_residual"] < 0.1
+        assert point["frequency_hz"] == pytest.approx(corrected["frequency_hz"], rel=2e-3)
+        assert point["mean_fluctuating_energy"] == pytest.approx(corrected["mean_fluctuating_energy"], rel=0.05)
+    own = reduced["cycle"]
+    assert corrections[1]["frequency_hz"] == pytest.approx(1 / own["period"], rel=1.7e-4)
+    assert corrections[1]["mean_fluctuating_energy"] == pytest.approx(own["mean_fluctuating_energy"], rel=1e-3)
+
+
+def test_ranks_agree_on_a_reduced_branch(reduced, module_run):
+    other = module_run(*PIN, *branch_of("friction.coefficient", 0.28, 0.34), "--set", "branch.corrections=3", ranks=2)
+    assert [kind for kind, *_ in events(reduced)] == [kind for kind, *_ in events(other)]
+    for (_, first, error), (_, second, _) in zip(events(reduced), events(other)):
+        assert abs(first - second) <= error + 1e-9
+    for first, second in zip(reduced["branch"]["points"], other["branch"]["points"], strict=True):
+        # the step is off by 3.5e-3 of the period, and the phase of its grid against the events moves a twentieth of that
+        assert first["period"] == pytest.approx(second["period"], rel=1.7e-4)
+        assert first["full_residual"] == pytest.approx(second["full_residual"], rel=0.05)
+
+
 @pytest.mark.parametrize("key, start, end, words", [
     ("friction.coefficent", 0.2, 0.4, "not in the scene"),
     ("friction.direction_damping", 0.2, 0.4, "not a number"),

@@ -1,5 +1,5 @@
 #pragma once
-/// The motions that many starts lead to (src/README.md, section 9.4). Starts are all unstable modes, their pairs, and
+/// The motions that many starts lead to (src/README.md, section 9.5). Starts are all unstable modes, their pairs, and
 /// random sums of modes. They are integrated together until their energies have settled.
 ///
 /// Caveat: motions are distinguished by mean energy and frequency alone, and one that few starts lead to may be missed.

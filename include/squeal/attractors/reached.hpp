@@ -1,5 +1,5 @@
 #pragma once
-/// What a motion has settled on (src/README.md, section 9.4): means of a window, their trend, and which motions are the
+/// What a motion has settled on (src/README.md, section 9.5): means of a window, their trend, and which motions are the
 /// same. Arithmetic on lists that every rank has; no function throws.
 #include "squeal/base/words.hpp"
 #include "squeal/settled/statistics.hpp"

@@ -28,6 +28,22 @@ struct ParameterRange
   double from = 0, to = 0;
 };
 
+/// A point of a reduced model's branch, and the full model's cycle next to it at the same value.
+struct CorrectedPoint
+{
+  std::size_t place = 0;            // among the points
+  std::optional<BranchPoint> orbit; // none: no cycle was found there
+};
+
+/// What a branch was followed on where that was not the full model.
+struct BranchReduction
+{
+  int shapes = 0, active_pairs = 0;
+  int missed_pairs = 0;           // which the full model's periods saw do what the reduced one leaves out
+  double interpolation_error = 0; // [-] of the matrices between the samples
+  std::vector<CorrectedPoint> corrections;
+};
+
 /// outcome: "converged" (both sides came to a bound, to first lift-off or to a Hopf point), "not converged" (how far
 /// they came), "skipped", "off".
 struct BrakeBranch
@@ -36,6 +52,7 @@ struct BrakeBranch
   Branch branch;                                // its events include those of the equilibrium
   std::vector<EquilibriumStability> equilibria; // by rising parameter
   std::vector<ParameterRange> coexistence;      // of a stable cycle and a stable equilibrium
+  std::optional<BranchReduction> reduction;     // of a branch on a reduced model
 };
 
 /// The cycle that is followed, the number that changes, and how each point is computed.
@@ -45,6 +62,8 @@ struct BrakeBranchProblem
   std::function<BrakeModel(double parameter)> model_at; // with matrices of the layout of the scene's own
   SlidingEquilibrium sliding;                           // of the scene itself
   const LimitCycle& cycle;                              // where the branch starts
+  const std::vector<ComplexMode>& own_modes;            // of the scene, the followed one first
+  CycleModel fidelity = CycleModel::full;               // automatic: reduced where that is far smaller
   int steps_per_period = 0;
   double tolerance = 0; // on the full-space residual
   Mat probes = nullptr;

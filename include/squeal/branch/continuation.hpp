@@ -18,7 +18,7 @@ struct PointMeasures
   double mean_energy = 0, mean_fluctuating_energy = 0; // [J]
   std::vector<double> peak_to_peak;                    // [m] per probe
   double open_pairs_mean = 0;
-  int open_steps = 0;  // of pairs that are closed at equilibrium
+  int open_steps = 0;  // of pairs that open and close
   int lift_offs = 0;   // uninterrupted times that these pairs are open
   int stick_steps = 0; // of all pairs
 };
@@ -34,6 +34,8 @@ struct FlowFamily
   std::function<void(double period, Vec start, Vec column)> parameter_column;
   std::function<PointMeasures(const Orbit& orbit)> measure{}; // at the value set last; may be empty
   Preconditioner preconditioner{};
+  /// Makes the preconditioner that of this period. Empty: there is but one.
+  std::function<void(double period, Vec start)> renew_preconditioner{};
 };
 
 /// A closed orbit of the branch.
@@ -45,6 +47,7 @@ struct BranchPoint
   double fluctuation = 0;          // |x - rest| in the energy norm
   Multipliers multipliers;
   PointMeasures measures;
+  double full_residual = std::numeric_limits<double>::quiet_NaN(); // of a reduced model's orbit: on the full one
 };
 
 /// What happens along a branch.
@@ -119,6 +122,10 @@ struct ContinuationSettings
   int points = 30;                // that would span the range if the parameter alone changed
   double tolerance = 0;           // on the full-space residual
 };
+
+/// The orbit of this value that closes near `start`, without its multipliers; none where none does.
+std::optional<BranchPoint> close_orbit(const FlowFamily& family, const ContinuationSettings& settings,
+                                       const ShootingOptions& options, const Orbit& start, double parameter);
 
 /// The branch through the orbit of the value `parameter` that closes near this one; without points where none does.
 /// Collective. Error: as of the family.

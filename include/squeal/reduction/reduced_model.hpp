@@ -3,7 +3,7 @@
 ///
 /// Pairs that stay closed and sliding are eliminated as in the modes (paper, eq. 5): du = Z y, equations tested by Y.
 /// The others, the active ones, keep unilateral contact and Coulomb friction. Then y = V q, V dense:
-///     M q'' + C q' + K q = H (r - r0),   M = (Y V)'M (Z V) ...,  H = (Y V)'B_a',
+///     M q'' + C q' + K q = H r + f,   f = -H r0,   M = (Y V)'M (Z V) ...,  H = (Y V)'B_a',
 ///     g = g0 + G_n q >= 0,   s = G_t q' - v_d,   G = B_a Z V,
 /// all three matrices unsymmetric. V holds real and imaginary parts of the full problem's complex modes in the band, so
 /// that the reduced model has exactly their growth rates. It holds frictionless real modes above the band and the
@@ -24,6 +24,7 @@
 #include "squeal/modes/modes.hpp"
 
 #include <Eigen/Dense>
+#include <span>
 
 namespace squeal
 {
@@ -33,6 +34,7 @@ struct ReducedModel
 {
   Eigen::MatrixXd M, C, K;                        // size x size [of kg, N s/m, N/m]
   Eigen::MatrixXd H, G;                           // size x rows, rows x size; rows by pairs as PairRows counts them
+  Eigen::VectorXd force;                          // [N on the shapes] of the load at u0: -H r0 at an equilibrium
   Eigen::MatrixXd M_z, C_z, K_z;                  // symmetric: V'Z'M Z V ..., of the energies
   Eigen::LLT<Eigen::MatrixXd> E_factor, M_factor; // of K_z + omega^2 M_z, M_z
   std::vector<int> active;                        // pairs, ascending
@@ -70,7 +72,8 @@ struct Reduction
   bool sliding = false;    // the active pairs slide along the drive throughout
   const RealModes* real = nullptr; // frictionless ones; those above the complex modes are taken, too. Null: none
   FactorOptions factor{};
-  double apart = 0; // part of the modes, those of highest frequency, that `apart` of the model holds
+  double apart = 0;            // part of the modes, those of highest frequency, that `apart` of the model holds
+  std::span<const Vec> more{}; // further shapes, which a model with modes kept apart does not take
 };
 
 /// The model whose other closed pairs slide throughout. Collective. Error: as of eliminate_closed_pairs; K + omega^2 M
@@ -89,6 +92,12 @@ struct PairRoles
 /// The same with the roles of all pairs given.
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, const PairRoles& roles,
                     const Reduction& reduction);
+
+/// The same shapes, about the same state, for the brake with another value of a number of its scene. `about`: the
+/// equilibrium that the model was made at; `other`: the other brake, whose own equilibrium turns the friction of C_f.
+/// E_factor and M_factor are not made. The model's friction must be free. Collective.
+ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibrium& about,
+                                const SlidingEquilibrium& other, const PairRoles& roles);
 
 /// The model on its first `size` shapes, those of longest period, without the shapes themselves.
 ReducedModel truncated(const ReducedModel& model, Eigen::Index size);

@@ -29,9 +29,9 @@ struct ReducedMap
   const ReducedModel& model;
   int steps = 0;
   double theta = 0.5;
-  double h = 0;                 // [s] of the matrices below
-  Eigen::MatrixXd from_state{}; // v_free = from_state (v, q) + from_equilibrium
-  Eigen::VectorXd from_equilibrium{};
+  double h = 0;                      // [s] of the matrices below
+  Eigen::MatrixXd from_state{};      // v_free = from_state (v, q) + from_load
+  Eigen::VectorXd from_load{};       // h A^-1 f
   Eigen::MatrixXd from_reactions{};  // h A^-1 H
   Eigen::MatrixXd W{};               // G h A^-1 H
   Eigen::MatrixXf W_single{}, W_n{}; // the same for changes; its normal rows

@@ -2,6 +2,7 @@
 /// Largest multipliers of a reduced model's monodromy matrix on recorded contact, with right and left vectors
 /// (src/README.md, sections 6.9 and 7.5). The same on every rank.
 #include "squeal/reduction/reduced_tangent.hpp"
+#include "squeal/shooting/flow.hpp"
 
 #include <complex>
 
@@ -28,6 +29,12 @@ struct LargeValues
 /// Collective.
 ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
                                   const LargeValues& wanted, MPI_Comm comm);
+
+/// Columns (q, v) that act on a state by the energy product as these left vectors do by the plain one.
+Eigen::MatrixXd energy_representatives(const ReducedModel& model, const Eigen::MatrixXd& left);
+
+/// Sets the errors and rises of the slow motions to what the moduli change by: `moved` are the values on another grid.
+void set_changes(const ReducedSpectrum& spectrum, const std::vector<std::complex<double>>& moved, SlowMotions& slow);
 
 /// The multipliers that these vectors give on other contact or with other steps: eigenvalues of (L'R)^-1 L'Phi R, in
 /// the order of the spectrum's values. Collective.

@@ -11,6 +11,12 @@ namespace squeal
 Owned<Vec> vector_of(const ReducedState& state);
 ReducedState reduced_state(Vec state);
 
+/// States as columns (q, v), and such columns into states.
+Eigen::MatrixXd columns_of_states(std::span<const Vec> states);
+void copy_columns(const Eigen::MatrixXd& columns, std::span<const Vec> states);
+/// New states of one rank's own.
+std::vector<Owned<Vec>> states_of_columns(const Eigen::MatrixXd& columns);
+
 /// M_z and K_z as matrices of one rank's own, for the energy product.
 struct EnergyMatrices
 {

@@ -1,0 +1,415 @@
+#include "reduced_family.hpp"
+
+#include "squeal/cycle/reduced_spectrum.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// The least stable modes of a value: those that grow and as many of the next ones.
+Modes modes_of(const SlidingEquilibrium& sliding, const BrakeBranchProblem& problem)
+{
+  ModesSettings settings = problem.modes;
+  if (settings.method == ModesMethod::both) settings.method = ModesMethod::full; // which decides there
+  return find_modes(sliding, linearise(sliding), settings, problem.modes_options);
+}
+
+void need(const Outcome& outcome, const char* what, const BrakeBranchProblem& problem, double parameter)
+{
+  if (outcome.kind != OutcomeKind::converged)
+    throw Error(format("the scene with %s = %.6g has no %s", problem.settings.key.c_str(), parameter, what));
+}
+
+/// What one polynomial in the parameter stands for.
+constexpr std::array matrix_parts = {&ReducedModel::M, &ReducedModel::C,   &ReducedModel::K,  &ReducedModel::H,
+                                     &ReducedModel::G, &ReducedModel::M_z, &ReducedModel::K_z};
+constexpr std::array list_parts = {&ReducedModel::compliance, &ReducedModel::drive};
+
+/// Weights of the samples at a value: the polynomial through Chebyshev points of the second kind (Berrut and Trefethen
+/// 2004, eq. 4.2 and 5.4).
+std::vector<double> weights_at(const std::vector<double>& nodes, double parameter)
+{
+  std::vector<double> weights(nodes.size(), 0.);
+  double sum = 0;
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+  {
+    if (parameter == nodes[i])
+    {
+      std::fill(weights.begin(), weights.end(), 0.);
+      weights[i] = 1;
+      return weights;
+    }
+    const bool end = i == 0 || i + 1 == nodes.size();
+    weights[i] = (i % 2 == 0 ? 1 : -1) * (end ? 0.5 : 1) / (parameter - nodes[i]);
+    sum += weights[i];
+  }
+  for (double& weight : weights) weight /= sum;
+  return weights;
+}
+
+ReducedBrake combined(const std::vector<ReducedBrake>& samples, const std::vector<double>& weights)
+{
+  const auto nearest = std::max_element(weights.begin(), weights.end()) - weights.begin();
+  const ReducedBrake& like = samples[static_cast<std::size_t>(nearest)];
+  const auto sum = [&](const auto& part)
+  {
+    std::decay_t<decltype(part(like))> total = weights[0] * part(samples[0]);
+    for (std::size_t i = 1; i < samples.size(); ++i) total += weights[i] * part(samples[i]);
+    return total;
+  };
+  ReducedBrake result;
+  ReducedModel& model = result.model;
+  for (const auto part : matrix_parts)
+    model.*part = sum([part](const ReducedBrake& b) -> const MatrixXd& { return b.model.*part; });
+  for (const auto part : list_parts)
+  {
+    const VectorXd values =
+        sum([part](const ReducedBrake& b)
+            { return VectorXd(VectorXd::Map((b.model.*part).data(), static_cast<Index>((b.model.*part).size()))); });
+    (model.*part).assign(values.begin(), values.end());
+  }
+  model.force = sum([](const ReducedBrake& b) -> const VectorXd& { return b.model.force; });
+  model.friction = like.model.friction;
+  for (const auto part : {&FrictionLaw::coefficient, &FrictionLaw::static_coefficient, &FrictionLaw::decay_speed})
+    model.friction.*part = sum([part](const ReducedBrake& b) { return b.model.friction.*part; });
+  model.active = like.model.active;
+  model.directions = like.model.directions;
+  model.gap = like.model.gap;
+  model.reactions = like.model.reactions;
+  model.omega = like.model.omega;
+  model.slow = like.model.slow;
+  result.rest = sum([](const ReducedBrake& b) -> const VectorXd& { return b.rest; });
+  result.pull = sum([](const ReducedBrake& b) -> const VectorXd& { return b.pull; });
+  result.energy = sum([](const ReducedBrake& b) { return b.energy; });
+  return result;
+}
+
+/// The largest relative distance between the parts that motion depends on.
+double distance(const ReducedModel& found, const ReducedModel& exact)
+{
+  double largest = (found.force - exact.force).norm() / std::max(exact.force.norm(), 1e-300);
+  for (const auto part : matrix_parts)
+    largest = std::max(largest, (found.*part - exact.*part).norm() / std::max((exact.*part).norm(), 1e-300));
+  return largest;
+}
+
+/// The energy norm of the followed mode at an amplitude of 1.
+double unit_norm(const BrakeBranchProblem& problem)
+{
+  const ComplexMode& mode = problem.own_modes.front();
+  const Owned<Vec> v = zeros_like(mode.real);
+  check(VecAXPY(v, mode.lambda.real(), mode.real));
+  check(VecAXPY(v, -mode.lambda.imag(), mode.imaginary));
+  const Owned<Vec> state = state_of(mode.real, v);
+  Flow flow;
+  flow.M = problem.sliding.structure.M;
+  flow.K = problem.sliding.structure.K;
+  return energy_norm(flow, state);
+}
+
+/// A state some part of a step later.
+ReducedState moved_on(const ReducedMap& map, double time, ReducedState state)
+{
+  ReducedMap part{map.model, map.steps, map.theta};
+  prepare(part, time * map.steps);
+  ReducedContact contact{map.reactions};
+  (void)advance(part, state, contact);
+  return state;
+}
+
+/// The reactions at rest with the friction of this value. Those of another value would make pairs stick or slide at the
+/// start of a period by the least change.
+VectorXd sliding_reactions(const ReducedModel& model)
+{
+  VectorXd reactions = VectorXd::Map(model.reactions.data(), static_cast<Index>(model.reactions.size()));
+  const PairView<double> r(reactions, model.directions);
+  const TangentView drive(model.drive, model.directions);
+  for (std::size_t i = 0; i < r.pairs(); ++i)
+  {
+    const double speed = length(drive.of(i));
+    const double friction = speed > 0 ? friction_coefficient(model.friction, speed).value * r.normal(i) / speed : 0;
+    for (std::size_t k = 0; k < drive.of(i).size(); ++k) r.tangential(i)[k] = friction * drive.of(i)[k];
+  }
+  return reactions;
+}
+
+} // namespace
+
+void PairsSeen::add(std::size_t pair, ContactStatus status)
+{
+  (status == ContactStatus::open ? open : status == ContactStatus::slip ? slipping : sticking)[pair] = 1;
+}
+
+PairRoles PairsSeen::roles(const std::vector<double>& reactions) const
+{
+  PairRoles roles{{}, std::vector<char>(open.size(), 0), reactions};
+  for (std::size_t i = 0; i < open.size(); ++i)
+    if (sticking[i] || (open[i] && slipping[i]))
+      roles.active.push_back(static_cast<int>(i));
+    else if (slipping[i])
+      roles.sliding[i] = 1;
+  return roles;
+}
+
+PairsSeen pairs_seen_in(const BrakeBranchProblem& problem, double margin)
+{
+  const auto& [structure, interface, equilibrium] = problem.sliding;
+  const auto pairs = static_cast<std::size_t>(interface.pairs);
+  PairsSeen seen{std::vector<char>(pairs, 0), std::vector<char>(pairs, 0), std::vector<char>(pairs, 0)};
+  for (std::size_t i = 0; i < pairs; ++i)
+    seen.add(i, equilibrium.closed[i] ? ContactStatus::slip : ContactStatus::open);
+  for (const std::vector<ContactStatus>& statuses : problem.cycle.measured.statuses)
+    for (std::size_t i = 0; i < pairs; ++i) seen.add(i, statuses[i]);
+  const double amplitude = margin * problem.cycle.orbit.fluctuation / unit_norm(problem);
+  for (const int pair : pairs_that_may_change(interface, equilibrium, problem.own_modes.front(), amplitude))
+    for (const ContactStatus status : {ContactStatus::open, ContactStatus::slip})
+      seen.add(static_cast<std::size_t>(pair), status);
+  return seen;
+}
+
+ReducedFamily::At::At(double value, ReducedBrake made, int steps, double theta)
+    : parameter(value), brake(std::move(made)), map{brake.model, steps, theta}
+{
+  map.reactions = sliding_reactions(brake.model);
+}
+
+ReducedFamily::ReducedFamily(BrakeFamily& full, const BrakeBranchProblem& problem, const PairsSeen& seen)
+    : problem_(problem), least_(std::min(problem.settings.from, problem.settings.to)),
+      greatest_(std::max(problem.settings.from, problem.settings.to)),
+      roles_(seen.roles(problem.sliding.equilibrium.reactions))
+{
+  // shapes of the ends: their least stable modes, and where they rest
+  std::vector<Owned<Vec>> shapes;
+  for (const double end : {least_, greatest_})
+  {
+    full.set_parameter(end);
+    const SlidingEquilibrium sliding = full.sliding();
+    need(sliding.equilibrium.outcome, "equilibrium", problem, end);
+    Modes modes = modes_of(sliding, problem);
+    need(modes.outcome, "modes", problem, end);
+    shapes.push_back(copy_of(sliding.equilibrium.u.get()));
+    check(VecAXPY(shapes.back(), -1, problem.sliding.equilibrium.u));
+    for (ComplexMode& mode : modes.modes)
+    {
+      shapes.push_back(std::move(mode.real));
+      shapes.push_back(std::move(mode.imaginary));
+    }
+  }
+  std::erase_if(shapes,
+                [](const Owned<Vec>& shape)
+                {
+                  double norm = 0;
+                  check(VecNorm(shape, NORM_2, &norm));
+                  return norm == 0;
+                });
+  const std::vector<Vec> more(shapes.begin(), shapes.end());
+  Reduction reduction;
+  reduction.modes = static_cast<PetscInt>(problem.own_modes.size());
+  reduction.factor = problem.step.factor;
+  reduction.more = more;
+  own_ = reduce(problem.sliding, problem.own_modes, roles_, reduction);
+  energy_ = energy_matrices(own_);
+  if (problem.probes) probes_ = whole_product(problem.probes, own_.shapes);
+  open_pairs_ = problem.sliding.interface.pairs - static_cast<int>(roles_.active.size()) -
+                static_cast<int>(std::count(roles_.sliding.begin(), roles_.sliding.end(), 1));
+  take_samples(full);
+  set_parameter(problem.settings.own);
+}
+
+ReducedBrake ReducedFamily::sample(BrakeFamily& full, double parameter)
+{
+  full.set_parameter(parameter);
+  const SlidingEquilibrium sliding = full.sliding();
+  need(sliding.equilibrium.outcome, "equilibrium", problem_, parameter);
+  ReducedBrake brake{on_the_same_shapes(own_, problem_.sliding, sliding, roles_), {}, {}};
+  const Vec u0 = problem_.sliding.equilibrium.u;
+  const Owned<Vec> moved = copy_of(sliding.equilibrium.u.get()), zero = zeros_like(moved), force = zeros_like(moved);
+  check(VecAXPY(moved, -1, u0));
+  brake.rest = coordinates(own_, problem_.sliding.structure, moved, zero).q;
+  check(MatMult(sliding.structure.K, u0, force));
+  brake.pull = inner_products(own_.shapes, columns_of(std::array{force.get()})).col(0);
+  check(VecDot(force, u0, &brake.energy));
+  brake.energy /= 2;
+  return brake;
+}
+
+void ReducedFamily::take_samples(BrakeFamily& full)
+{
+  constexpr int first_intervals = 4, most_intervals = 32;
+  constexpr double close_enough = 1e-7; // of each matrix
+  const auto node = [&](int i, int intervals)
+  { return (least_ + greatest_) / 2 - (greatest_ - least_) / 2 * std::cos(std::numbers::pi * i / intervals); };
+  for (int intervals = first_intervals;; intervals *= 2)
+  {
+    std::vector<double> nodes;
+    std::vector<ReducedBrake> samples;
+    double error = samples_.empty() ? 1 : 0;
+    for (int i = 0; i <= intervals; ++i)
+    {
+      nodes.push_back(node(i, intervals));
+      const bool known = !samples_.empty() && i % 2 == 0;
+      samples.push_back(known ? samples_[static_cast<std::size_t>(i / 2)] : sample(full, nodes.back()));
+      if (!known && !samples_.empty())
+        error = std::max(error, distance(interpolated(nodes.back()).model, samples.back().model));
+    }
+    nodes_ = std::move(nodes);
+    samples_ = std::move(samples);
+    interpolation_error_ = error;
+    if (error <= close_enough || intervals == most_intervals) return;
+  }
+}
+
+ReducedBrake ReducedFamily::interpolated(double parameter) const
+{
+  return combined(samples_, weights_at(nodes_, parameter));
+}
+
+void ReducedFamily::set_parameter(double parameter)
+{
+  if (at_ && at_->parameter == parameter) return;
+  at_ = std::make_unique<At>(parameter, interpolated(parameter), problem_.steps_per_period, problem_.cycle.theta);
+  at_->map.contact.tolerance = problem_.step.contact.tolerance;
+  at_->flow = flow_of(at_->map, energy_);
+}
+
+Orbit ReducedFamily::reduced(const Orbit& orbit)
+{
+  const Owned<Vec> moved = copy_of(displacement(orbit.state));
+  check(VecAXPY(moved, -1, problem_.sliding.equilibrium.u));
+  const Owned<Vec> state = vector_of(coordinates(own_, problem_.sliding.structure, moved, velocity(orbit.state)));
+  return {copy_of(state.get()), orbit.period, zeros_like(state), zeros_like(state), orbit.fluctuation, orbit.residual};
+}
+
+Owned<Vec> ReducedFamily::lifted(const VectorXd& state) const
+{
+  const Owned<Vec> still = zeros_like(problem_.sliding.structure.load);
+  Owned<Vec> result = state_of(problem_.sliding.equilibrium.u, still);
+  add_motion(own_, 1, state.head(own_.size()), displacement(result));
+  add_motion(own_, 1, state.tail(own_.size()), velocity(result));
+  return result;
+}
+
+Preconditioner ReducedFamily::lifted_preconditioner(double period, const VectorXd& state)
+{
+  lifted_correction_ =
+      monodromy_correction(at_->map, period, {state.head(own_.size()), state.tail(own_.size())}, PETSC_COMM_SELF);
+  return preconditioner_of(lifted_correction_, own_, problem_.sliding.structure);
+}
+
+SlowMotions ReducedFamily::slow_motions(double period, Vec start)
+{
+  constexpr LargeValues wanted{0.85, 4, 48};
+  ReducedMap& map = at_->map;
+  const ReducedState state = reduced_state(start);
+  const auto moved = record_contacts(map, period, moved_on(map, period / map.steps / 2, state));
+  recorded_ = record_contacts(map, period, state);
+  const ReducedSpectrum spectrum = large_multipliers(map, period, recorded_, wanted, PETSC_COMM_SELF);
+  SlowMotions slow;
+  slow.periods = 2;
+  slow.values = spectrum.values;
+  set_changes(spectrum, multipliers_along(spectrum, map, period, moved, PETSC_COMM_SELF), slow);
+  slow.right = states_of_columns(spectrum.right);
+  slow.left = states_of_columns(energy_representatives(own_, spectrum.left));
+  slow.confirmed = [] { return true; }; // these are its own
+  slow.correct = [columns = spectrum.columns](std::complex<double> m, Vec real, Vec imaginary)
+  {
+    const MatrixXd parts = columns_of_states(std::array{real, imaginary});
+    Eigen::VectorXcd x(parts.rows());
+    x.real() = parts.col(0);
+    x.imag() = parts.col(1);
+    const Eigen::VectorXcd y = resolvent(columns, m, x) - x / m;
+    MatrixXd result(parts.rows(), 2);
+    result << y.real(), y.imag();
+    copy_columns(result, std::array{real, imaginary});
+  };
+  return slow;
+}
+
+void ReducedFamily::parameter_column(double period, Vec start, Vec column)
+{
+  // 1e-5 of the range: the contact's tolerance of 1e-10 is then below 1e-4 of the quotient
+  const double parameter = at_->parameter, change = 1e-5 * (greatest_ - least_);
+  const Owned<Vec> below = zeros_like(column);
+  set_parameter(parameter + change);
+  at_->flow.integrate(period, start, column, nullptr);
+  set_parameter(parameter - change);
+  at_->flow.integrate(period, start, below, nullptr);
+  set_parameter(parameter);
+  check(VecAXPBY(column, -0.5 / change, 0.5 / change, below));
+}
+
+PointMeasures ReducedFamily::measure(const Orbit& orbit)
+{
+  const ReducedBrake& brake = at_->brake;
+  const ReducedModel& model = brake.model;
+  ReducedMap& map = at_->map;
+  const ReducedState start = reduced_state(orbit.state);
+  PointMeasures measures;
+  const Index probes = probes_.rows();
+  VectorXd least = VectorXd::Constant(probes, std::numeric_limits<double>::infinity()), most = -least;
+  const auto watch = [&](const ReducedState& now)
+  {
+    const VectorXd moved = now.q - brake.rest;
+    const double kinetic = now.v.dot(model.M_z * now.v);
+    measures.mean_fluctuating_energy += (kinetic + moved.dot(model.K_z * moved)) / (2. * map.steps);
+    measures.mean_energy +=
+        (brake.energy + brake.pull.dot(now.q) + (kinetic + now.q.dot(model.K_z * now.q)) / 2) / map.steps;
+    const VectorXd values = probes_ * now.q;
+    least = least.cwiseMin(values);
+    most = most.cwiseMax(values);
+  };
+  (void)integrate(map, orbit.period, start, watch);
+  for (Index i = 0; i < probes; ++i) measures.peak_to_peak.push_back(most[i] - least[i]);
+  std::vector<std::vector<ContactStatus>> statuses;
+  for (const RecordedContact& contact : record_contacts(map, orbit.period, start))
+    statuses.push_back(contact_status(PairView<const double>(contact.r, model.directions),
+                                      PairView<const double>(contact.w, model.directions), model.friction));
+  count_statuses(statuses, measures);
+  double open = 0;
+  for (const auto& status : statuses)
+    open += static_cast<double>(std::count(status.begin(), status.end(), ContactStatus::open));
+  measures.open_pairs_mean = open_pairs_ + open / static_cast<double>(statuses.size());
+  return measures;
+}
+
+FlowFamily ReducedFamily::flows()
+{
+  FlowFamily family;
+  family.flow.M = energy_.M;
+  family.flow.K = energy_.K;
+  family.flow.integrate = [this](double period, Vec start, Vec end, Vec rate)
+  { at_->flow.integrate(period, start, end, rate); };
+  family.flow.record_period = [this](double period, Vec start, double shift)
+  {
+    const double step = period / at_->map.steps;
+    const ReducedState state = reduced_state(start);
+    recorded_ = record_contacts(at_->map, period, shift > 0 ? moved_on(at_->map, shift * step, state) : state);
+  };
+  family.flow.apply_tangent = [this](std::span<const Vec> states)
+  {
+    ReducedMap& map = at_->map;
+    copy_columns(apply_tangent(map, map.h * map.steps, recorded_, columns_of_states(states), PETSC_COMM_SELF), states);
+  };
+  family.flow.slow_motions = [this](double period, Vec start) { return slow_motions(period, start); };
+  family.set_parameter = [this](double parameter) { set_parameter(parameter); };
+  family.rest = [this] { return vector_of(ReducedState{at_->brake.rest, VectorXd::Zero(own_.size())}); };
+  family.parameter_column = [this](double period, Vec start, Vec column) { parameter_column(period, start, column); };
+  family.measure = [this](const Orbit& orbit) { return measure(orbit); };
+  family.preconditioner = preconditioner_of(correction_);
+  family.renew_preconditioner = [this](double period, Vec start)
+  { correction_ = monodromy_correction(at_->map, period, reduced_state(start), PETSC_COMM_SELF); };
+  return family;
+}
+
+} // namespace squeal
