@@ -4,6 +4,7 @@
 #include "reduced_family.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/base/run_control.hpp"
 
 #include <algorithm>
 
@@ -19,14 +20,16 @@ bool natural(BranchEnding ending)
   return ending != BranchEnding::step_too_small && ending != BranchEnding::number_of_points;
 }
 
-Outcome outcome_of(const BrakeBranchProblem& problem, const Branch& branch)
+Outcome outcome_of(const BrakeBranchProblem& problem, const BrakeBranch& found)
 {
+  const Branch& branch = found.branch;
   Outcome outcome{OutcomeKind::converged, "", static_cast<int>(branch.points.size()), 0};
   if (branch.points.empty())
   {
     outcome.kind = OutcomeKind::not_converged;
-    outcome.reason = format("the cycle to start from does not close within %.0e at %d steps a period",
-                            problem.tolerance, problem.steps_per_period);
+    outcome.reason = format("the cycle to start from does not close within %.0e at %d steps a period%s",
+                            problem.tolerance, problem.steps_per_period,
+                            found.reduction ? " on the reduced model: fidelity = \"full\" does without" : "");
     return outcome;
   }
   for (const BranchPoint& point : branch.points) outcome.residual = std::max(outcome.residual, point.residual);
@@ -42,6 +45,13 @@ Outcome outcome_of(const BrakeBranchProblem& problem, const Branch& branch)
   };
   note(branch.ends.backward, branch.points.front());
   note(branch.ends.forward, branch.points.back());
+  if (found.reduction && found.reduction->missed_pairs > 0)
+  {
+    outcome.kind = OutcomeKind::not_converged;
+    outcome.reason += (outcome.reason.empty() ? "" : "; ") +
+                      format("%d pairs of the full model do what the reduced one leaves out: fidelity = \"full\"",
+                             found.reduction->missed_pairs);
+  }
   return outcome;
 }
 
@@ -85,14 +95,6 @@ bool is_far_smaller(const BrakeBranchProblem& problem, std::size_t shapes)
   return times * shapes <= static_cast<std::size_t>(dofs);
 }
 
-/// Of its reduced model: the real and imaginary parts of the modes, and the rows of the active pairs.
-std::size_t least_shapes(const BrakeBranchProblem& problem)
-{
-  const PairsSeen seen = pairs_seen_in(problem, 1);
-  return 2 * problem.own_modes.size() +
-         PairRows<std::size_t>(problem.sliding.interface.directions).rows_of(seen.roles({}).active.size());
-}
-
 /// A point of rank 0's branch.
 struct ReducedPoint
 {
@@ -133,6 +135,7 @@ void check_on_full_model(BrakeFamily& full, const ReducedFamily& reduced, Branch
   {
     full.set_parameter(points[i].parameter);
     const Owned<Vec> start = reduced.lifted(points[i].state), moved = full.rest();
+    full.start_from_rest();
     const MeasuredPeriod measured = full.measured_period(points[i].period, start);
     const Owned<Vec> defect = state_of(measured.end.u, measured.end.v);
     check(VecAXPY(defect, -1, start));
@@ -158,8 +161,10 @@ std::vector<CorrectedPoint> corrected_points(BrakeFamily& full, ReducedFamily& r
     const std::size_t place = wanted < 2 ? points.size() / 2 : i * (points.size() - 1) / (wanted - 1);
     const ReducedPoint& point = points[place];
     full.set_parameter(point.parameter);
+    full.start_from_rest();
     reduced.set_parameter(point.parameter);
     FlowFamily family = full.flows();
+    family.parameter_column = [](double, Vec, Vec column) { check(VecSet(column, 0)); }; // the parameter stays
     family.preconditioner = reduced.lifted_preconditioner(point.period, point.state);
     const Owned<Vec> start = reduced.lifted(point.state);
     const Orbit orbit{copy_of(start.get()), point.period, zeros_like(start), zeros_like(start), 0, 0};
@@ -174,10 +179,12 @@ void trace_on_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem
 {
   constexpr double margin = 2; // a branch reaches further than the cycle that it starts from
   constexpr int rounds = 4;
+  const MPI_Comm comm = comm_of(problem.sliding.structure.load);
   PairsSeen seen = pairs_seen_in(problem, margin);
   for (int round = 1;; ++round)
   {
     ReducedFamily reduced(full, problem, seen);
+    end_if_asked(comm);
     found.branch = trace_branch(reduced.flows(), continuation, problem.shooting, reduced.reduced(problem.cycle.orbit),
                                 problem.settings.own);
     check_on_full_model(full, reduced, found.branch, seen);
@@ -191,6 +198,41 @@ void trace_on_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem
     found.reduction->corrections = corrected_points(full, reduced, problem, continuation, found.branch);
     return;
   }
+}
+
+/// Whether a reduced model can stand for the full one: some pairs open or stick, and friction does not change with
+/// speed, which those that slide throughout would have to a first order only.
+bool may_reduce(const BrakeBranchProblem& problem)
+{
+  const PairsSeen seen = pairs_seen_in(problem, 1);
+  const std::size_t active = seen.roles({}).active.size();
+  const PairRows<std::size_t> rows(problem.sliding.interface.directions);
+  return active > 0 && problem.sliding.interface.friction.decay_speed == 0 &&
+         is_far_smaller(problem, 2 * problem.own_modes.size() + rows.rows_of(active));
+}
+
+/// Whether the branch was followed on a reduced model. "auto" goes without one where the range has no equilibria or
+/// modes to make it of, or where its cycle does not close. Where it is asked for, the outcome says why there is none.
+bool try_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem, const ContinuationSettings& continuation,
+                       BrakeBranch& found)
+{
+  const bool asked = problem.fidelity == CycleModel::reduced;
+  if (!asked && (problem.fidelity == CycleModel::full || !may_reduce(problem))) return false;
+  try
+  {
+    trace_on_reduced_model(full, problem, continuation, found);
+    int followed = found.branch.points.empty() ? 0 : 1;
+    MPI_Bcast(&followed, 1, MPI_INT, 0, comm_of(problem.sliding.structure.load));
+    if (asked || followed != 0) return true;
+  }
+  catch (const Error& error) // on every rank alike: all of them make the same samples
+  {
+    if (asked) found.outcome = {OutcomeKind::refused, error.what(), 0, 0};
+    if (asked) return true;
+  }
+  found.reduction.reset();
+  full.set_parameter(problem.settings.own);
+  return false;
 }
 
 } // namespace
@@ -219,15 +261,12 @@ BrakeBranch find_branch(const BrakeBranchProblem& problem)
   found.equilibria = equilibria_along(family, problem);
   std::vector<BranchEvent> hopf = hopf_points(family, problem, found.equilibria);
   family.set_parameter(problem.settings.own);
-  const bool reduces = problem.fidelity == CycleModel::reduced ||
-                       (problem.fidelity == CycleModel::automatic && is_far_smaller(problem, least_shapes(problem)));
-  if (reduces)
-    trace_on_reduced_model(family, problem, continuation, found);
-  else
+  if (!try_reduced_model(family, problem, continuation, found))
     found.branch =
         trace_branch(family.flows(), continuation, problem.shooting, problem.cycle.orbit, problem.settings.own);
   found.coexistence = coexistence_of(found, hopf);
-  found.outcome = outcome_of(problem, found.branch);
+  if (found.outcome.kind == OutcomeKind::refused) return found;
+  found.outcome = outcome_of(problem, found);
   found.branch.events.insert(found.branch.events.begin(), hopf.begin(), hopf.end());
   return found;
 }

@@ -101,6 +101,12 @@ void BrakeFamily::parameter_column(double period, Vec start, Vec column)
   check(VecCopy(change.v, velocity(column)));
 }
 
+void BrakeFamily::start_from_rest()
+{
+  (void)sliding();
+  at_->map.reactions = at_->equilibrium.reactions;
+}
+
 MeasuredPeriod BrakeFamily::measured_period(double period, Vec start)
 {
   (void)sliding(); // energies refer to it

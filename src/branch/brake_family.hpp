@@ -36,6 +36,8 @@ public:
 
   void set_parameter(double parameter);
   SlidingEquilibrium sliding(); // at the value set last; finds its equilibrium
+  /// The next period starts from the reactions at rest: those of another value would stick or slide at once.
+  void start_from_rest();
   MeasuredPeriod measured_period(double period, Vec start);
   Owned<Vec> rest();
 

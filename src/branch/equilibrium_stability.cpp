@@ -21,9 +21,7 @@ EquilibriumStability stability_at(BrakeFamily& family, const BrakeBranchProblem&
   family.set_parameter(parameter);
   const SlidingEquilibrium sliding = family.sliding();
   if (sliding.equilibrium.outcome.kind != OutcomeKind::converged) return stability;
-  ModesSettings settings = problem.modes;
-  if (settings.method == ModesMethod::both) settings.method = ModesMethod::full; // which decides there
-  const Modes modes = find_modes(sliding, linearise(sliding), settings, problem.modes_options);
+  const Modes modes = modes_at(sliding, problem);
   if (modes.outcome.kind != OutcomeKind::converged) return stability;
   stability.known = true;
   stability.unstable_modes = modes.unstable_count;
@@ -59,6 +57,13 @@ BranchEvent crossing(BrakeFamily& family, const BrakeBranchProblem& problem, std
 }
 
 } // namespace
+
+Modes modes_at(const SlidingEquilibrium& sliding, const BrakeBranchProblem& problem)
+{
+  ModesSettings settings = problem.modes;
+  if (settings.method == ModesMethod::both) settings.method = ModesMethod::full; // which decides there
+  return find_modes(sliding, linearise(sliding), settings, problem.modes_options);
+}
 
 std::vector<EquilibriumStability> equilibria_along(BrakeFamily& family, const BrakeBranchProblem& problem)
 {

@@ -5,6 +5,9 @@
 namespace squeal
 {
 
+/// The modes of the band at an equilibrium of the range.
+Modes modes_at(const SlidingEquilibrium& sliding, const BrakeBranchProblem& problem);
+
 /// At values spread evenly over the range, and at the scene's own.
 std::vector<EquilibriumStability> equilibria_along(BrakeFamily& family, const BrakeBranchProblem& problem);
 

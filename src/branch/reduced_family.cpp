@@ -1,5 +1,8 @@
 #include "reduced_family.hpp"
 
+#include "equilibrium_stability.hpp"
+
+#include "squeal/base/run_control.hpp"
 #include "squeal/cycle/reduced_spectrum.hpp"
 
 #include <algorithm>
@@ -16,14 +19,6 @@ namespace
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// The least stable modes of a value: those that grow and as many of the next ones.
-Modes modes_of(const SlidingEquilibrium& sliding, const BrakeBranchProblem& problem)
-{
-  ModesSettings settings = problem.modes;
-  if (settings.method == ModesMethod::both) settings.method = ModesMethod::full; // which decides there
-  return find_modes(sliding, linearise(sliding), settings, problem.modes_options);
-}
 
 void need(const Outcome& outcome, const char* what, const BrakeBranchProblem& problem, double parameter)
 {
@@ -171,7 +166,11 @@ PairsSeen pairs_seen_in(const BrakeBranchProblem& problem, double margin)
     seen.add(i, equilibrium.closed[i] ? ContactStatus::slip : ContactStatus::open);
   for (const std::vector<ContactStatus>& statuses : problem.cycle.measured.statuses)
     for (std::size_t i = 0; i < pairs; ++i) seen.add(i, statuses[i]);
-  const double amplitude = margin * problem.cycle.orbit.fluctuation / unit_norm(problem);
+  double amplitude = margin * problem.cycle.orbit.fluctuation / unit_norm(problem);
+  MPI_Bcast(&amplitude, 1, MPI_DOUBLE, 0, comm_of(structure.load)); // sums may differ in their last bit
+  for (const int pair : pairs_that_may_turn(interface, problem.own_modes.front(), amplitude))
+    if (equilibrium.closed[static_cast<std::size_t>(pair)])
+      seen.add(static_cast<std::size_t>(pair), ContactStatus::stick);
   for (const int pair : pairs_that_may_change(interface, equilibrium, problem.own_modes.front(), amplitude))
     for (const ContactStatus status : {ContactStatus::open, ContactStatus::slip})
       seen.add(static_cast<std::size_t>(pair), status);
@@ -189,14 +188,14 @@ ReducedFamily::ReducedFamily(BrakeFamily& full, const BrakeBranchProblem& proble
       greatest_(std::max(problem.settings.from, problem.settings.to)),
       roles_(seen.roles(problem.sliding.equilibrium.reactions))
 {
-  // shapes of the ends: their least stable modes, and where they rest
+  // shapes of the ends: their modes, and where they rest
   std::vector<Owned<Vec>> shapes;
   for (const double end : {least_, greatest_})
   {
     full.set_parameter(end);
     const SlidingEquilibrium sliding = full.sliding();
     need(sliding.equilibrium.outcome, "equilibrium", problem, end);
-    Modes modes = modes_of(sliding, problem);
+    Modes modes = modes_at(sliding, problem);
     need(modes.outcome, "modes", problem, end);
     shapes.push_back(copy_of(sliding.equilibrium.u.get()));
     check(VecAXPY(shapes.back(), -1, problem.sliding.equilibrium.u));
@@ -220,7 +219,7 @@ ReducedFamily::ReducedFamily(BrakeFamily& full, const BrakeBranchProblem& proble
   reduction.more = more;
   own_ = reduce(problem.sliding, problem.own_modes, roles_, reduction);
   energy_ = energy_matrices(own_);
-  if (problem.probes) probes_ = whole_product(problem.probes, own_.shapes);
+  probes_ = problem.probes ? whole_product(problem.probes, own_.shapes) : MatrixXd(0, own_.size());
   open_pairs_ = problem.sliding.interface.pairs - static_cast<int>(roles_.active.size()) -
                 static_cast<int>(std::count(roles_.sliding.begin(), roles_.sliding.end(), 1));
   take_samples(full);
@@ -232,6 +231,7 @@ ReducedBrake ReducedFamily::sample(BrakeFamily& full, double parameter)
   full.set_parameter(parameter);
   const SlidingEquilibrium sliding = full.sliding();
   need(sliding.equilibrium.outcome, "equilibrium", problem_, parameter);
+  check_shapes_fit(sliding.interface);
   ReducedBrake brake{on_the_same_shapes(own_, problem_.sliding, sliding, roles_), {}, {}};
   const Vec u0 = problem_.sliding.equilibrium.u;
   const Owned<Vec> moved = copy_of(sliding.equilibrium.u.get()), zero = zeros_like(moved), force = zeros_like(moved);
@@ -241,7 +241,22 @@ ReducedBrake ReducedFamily::sample(BrakeFamily& full, double parameter)
   brake.pull = inner_products(own_.shapes, columns_of(std::array{force.get()})).col(0);
   check(VecDot(force, u0, &brake.energy));
   brake.energy /= 2;
+  MPI_Bcast(&brake.energy, 1, MPI_DOUBLE, 0, comm_of(u0));
   return brake;
+}
+
+void ReducedFamily::check_shapes_fit(const Interface& other) const
+{
+  const Interface& own = problem_.sliding.interface;
+  PetscBool same = PETSC_FALSE;
+  check(MatEqual(own.B, other.B, &same));
+  for (std::size_t i = 0; i < own.gap.size(); ++i)
+    if (own.gap[i] != other.gap[i] || (compliance_of(own, i) == 0) != (compliance_of(other, i) == 0))
+      same = PETSC_FALSE;
+  if (same == PETSC_FALSE)
+    throw Error(format("%s moves the contact itself, which a reduced model for all values cannot: set fidelity = "
+                       "\"full\"",
+                       problem_.settings.key.c_str()));
 }
 
 void ReducedFamily::take_samples(BrakeFamily& full)
@@ -288,7 +303,9 @@ Orbit ReducedFamily::reduced(const Orbit& orbit)
   const Owned<Vec> moved = copy_of(displacement(orbit.state));
   check(VecAXPY(moved, -1, problem_.sliding.equilibrium.u));
   const Owned<Vec> state = vector_of(coordinates(own_, problem_.sliding.structure, moved, velocity(orbit.state)));
-  return {copy_of(state.get()), orbit.period, zeros_like(state), zeros_like(state), orbit.fluctuation, orbit.residual};
+  double period = orbit.period;
+  MPI_Bcast(&period, 1, MPI_DOUBLE, 0, comm_of(moved)); // every rank follows the branch by itself
+  return {copy_of(state.get()), period, zeros_like(state), zeros_like(state), orbit.fluctuation, orbit.residual};
 }
 
 Owned<Vec> ReducedFamily::lifted(const VectorXd& state) const
@@ -389,7 +406,10 @@ FlowFamily ReducedFamily::flows()
   family.flow.M = energy_.M;
   family.flow.K = energy_.K;
   family.flow.integrate = [this](double period, Vec start, Vec end, Vec rate)
-  { at_->flow.integrate(period, start, end, rate); };
+  {
+    end_if_asked(PETSC_COMM_SELF); // which is the whole run on one rank, and else asks for nothing
+    at_->flow.integrate(period, start, end, rate);
+  };
   family.flow.record_period = [this](double period, Vec start, double shift)
   {
     const double step = period / at_->map.steps;

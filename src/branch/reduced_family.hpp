@@ -66,6 +66,7 @@ private:
     Flow flow;
   };
 
+  void check_shapes_fit(const Interface& other) const; // Error: they do not
   ReducedBrake sample(BrakeFamily& full, double parameter);
   ReducedBrake interpolated(double parameter) const;
   void take_samples(BrakeFamily& full);

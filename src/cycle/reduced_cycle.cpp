@@ -71,8 +71,9 @@ void build_model(ReducedSearch& search, double amplitude)
   const CycleProblem& problem = search.problem;
   const ReducedOptions& options = search.options.reduced;
   // where its cycle is the answer, friction is left free
-  const bool sliding = search.fidelity.asked != CycleModel::reduced &&
-                       slide_throughout(problem.sliding.interface, problem.unstable.modes.front(), amplitude);
+  const bool sliding =
+      search.fidelity.asked != CycleModel::reduced &&
+      pairs_that_may_turn(problem.sliding.interface, problem.unstable.modes.front(), amplitude).empty();
   search.model = reduce(problem.sliding, problem.modes, search.active,
                         {options.modes, options.threshold, sliding, &search.real, problem.step.factor});
   search.energy = energy_matrices(search.model);

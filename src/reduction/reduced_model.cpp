@@ -109,16 +109,17 @@ std::vector<int> pairs_that_may_change(const Interface& interface, const Equilib
   return pairs;
 }
 
-bool slide_throughout(const Interface& interface, const ComplexMode& mode, double amplitude)
+std::vector<int> pairs_that_may_turn(const Interface& interface, const ComplexMode& mode, double amplitude)
 {
   const std::vector<double> real = relative(interface, mode.real), imaginary = relative(interface, mode.imaginary);
+  std::vector<int> pairs;
   for (std::size_t i = 0; i < interface.gap.size(); ++i)
   {
     const double moves = std::hypot(length(PairView(real, interface.directions).tangential(i)),
                                     length(PairView(imaginary, interface.directions).tangential(i)));
-    if (amplitude * std::abs(mode.lambda) * moves >= drive_speed(interface, i)) return false;
+    if (amplitude * std::abs(mode.lambda) * moves >= drive_speed(interface, i)) pairs.push_back(static_cast<int>(i));
   }
-  return true;
+  return pairs;
 }
 
 namespace
@@ -257,13 +258,13 @@ namespace
 
 /// What is not in balance at (u0, r0) of `about` in the brake `other`, but for the active pairs: its load, less the
 /// structure's forces, and the springs of the pairs that slide, with friction.
-Owned<Vec> unbalanced(const SlidingEquilibrium& about, const SlidingEquilibrium& other, const PairRoles& roles)
+Owned<Vec> unbalanced_force(const SlidingEquilibrium& about, const SlidingEquilibrium& other, const PairRoles& roles)
 {
   const Interface& interface = other.interface;
-  Owned<Vec> force = zeros_like(other.structure.load);
-  check(MatMult(other.structure.K, about.equilibrium.u, force));
-  check(VecAYPX(force, -1, other.structure.load));
-  std::vector<double> reactions(interface.size(), 0.);
+  Owned<Vec> unbalanced = zeros_like(other.structure.load);
+  check(MatMult(other.structure.K, about.equilibrium.u, unbalanced));
+  check(VecAYPX(unbalanced, -1, other.structure.load));
+  std::vector<double> reactions(interface.size(), 0.); // of springs as long as at u0
   const PairView still(about.equilibrium.reactions, interface.directions);
   const PairView<double> springs(reactions, interface.directions);
   const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
@@ -271,11 +272,12 @@ Owned<Vec> unbalanced(const SlidingEquilibrium& about, const SlidingEquilibrium&
   for (std::size_t i = 0; i < mu.size(); ++i)
   {
     if (!roles.sliding[i] || compliance_of(interface, i) == 0) continue;
-    springs.normal(i) = still.normal(i);
-    for (std::size_t k = 0; k < e.of(i).size(); ++k) springs.tangential(i)[k] = mu[i] * still.normal(i) * e.of(i)[k];
+    const double force = still.normal(i) * compliance_of(about.interface, i) / compliance_of(interface, i);
+    springs.normal(i) = force;
+    for (std::size_t k = 0; k < e.of(i).size(); ++k) springs.tangential(i)[k] = mu[i] * force * e.of(i)[k];
   }
-  add_reactions(interface, reactions, force);
-  return force;
+  add_reactions(interface, reactions, unbalanced);
+  return unbalanced;
 }
 
 } // namespace
@@ -296,7 +298,7 @@ ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibr
   result.gap = model.gap;
   result.omega = model.omega;
   result.slow = model.slow;
-  const Owned<Vec> force = unbalanced(about, other, roles);
+  const Owned<Vec> force = unbalanced_force(about, other, roles);
   result.force = inner_products(left, columns_of(std::array{force.get()})).col(0);
   return result;
 }

@@ -123,7 +123,8 @@ struct ContinuationSettings
   double tolerance = 0;           // on the full-space residual
 };
 
-/// The orbit of this value that closes near `start`, without its multipliers; none where none does.
+/// The orbit of this value that closes near `start`, without its multipliers; none where none does. Collective. Error:
+/// as of the family.
 std::optional<BranchPoint> close_orbit(const FlowFamily& family, const ContinuationSettings& settings,
                                        const ShootingOptions& options, const Orbit& start, double parameter);
 

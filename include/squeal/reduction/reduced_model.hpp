@@ -61,8 +61,8 @@ double highest_frequency(const std::vector<ComplexMode>& modes);
 std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
                                        const ComplexMode& mode, double amplitude);
 
-/// Whether no pair comes to rest or turns round in that motion's velocity. Collective.
-bool slide_throughout(const Interface& interface, const ComplexMode& mode, double amplitude);
+/// Pairs that may come to rest or turn round in that motion's velocity. Ascending. Collective.
+std::vector<int> pairs_that_may_turn(const Interface& interface, const ComplexMode& mode, double amplitude);
 
 /// How a model is reduced.
 struct Reduction
