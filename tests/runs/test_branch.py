@@ -112,8 +112,9 @@ def test_a_reduced_branch_is_near_the_full_model(reduced, converged):
 def test_ranks_agree_on_a_reduced_branch(reduced, module_run):
     other = module_run(*PIN, *branch_of("friction.coefficient", 0.28, 0.34), "--set", "branch.corrections=3", ranks=2)
     assert [kind for kind, *_ in events(reduced)] == [kind for kind, *_ in events(other)]
-    for (_, first, error), (_, second, _) in zip(events(reduced), events(other)):
-        assert abs(first - second) <= error + 1e-9
+    for (_, first, error), (_, second, other_error) in zip(events(reduced), events(other)):
+        # halves of the intervals that hold them; the cycles at their ends differ by the phase of the grid, as periods do
+        assert abs(first - second) <= 2 * (error + other_error)
     for first, second in zip(reduced["branch"]["points"], other["branch"]["points"], strict=True):
         # the step is off by 3.5e-3 of the period, and the phase of its grid against the events moves a twentieth of that
         assert first["period"] == pytest.approx(second["period"], rel=1.7e-4)
