@@ -27,6 +27,19 @@ void count_statuses(const std::vector<std::vector<ContactStatus>>& statuses, Poi
   }
 }
 
+void difference_column(const FlowFamily& family, double parameter, double range, double period, Vec start, Vec column)
+{
+  // 1e-5 of the range: the contact's tolerance of 1e-10 is then below 1e-4 of the quotient
+  const double change = 1e-5 * range;
+  const Owned<Vec> below = zeros_like(column);
+  family.set_parameter(parameter + change);
+  family.flow.integrate(period, start, column, nullptr);
+  family.set_parameter(parameter - change);
+  family.flow.integrate(period, start, below, nullptr);
+  family.set_parameter(parameter);
+  check(VecAXPBY(column, -0.5 / change, 0.5 / change, below));
+}
+
 BrakeAt::BrakeAt(double value, BrakeModel made, const BrakeBranchProblem& problem)
     : parameter(value), model(std::move(made)), map{{model.structure, model.interface, equilibrium},
                                                     problem.step,
@@ -81,15 +94,7 @@ void BrakeFamily::parameter_column(double period, Vec start, Vec column)
 {
   if (!friction_)
   {
-    // 1e-5 of the range: the contact's tolerance of 1e-10 is then below 1e-4 of the quotient
-    const double parameter = at_->parameter, change = 1e-5 * range_;
-    const Owned<Vec> below = zeros_like(column);
-    set_parameter(parameter + change);
-    at_->flow.integrate(period, start, column, nullptr);
-    set_parameter(parameter - change);
-    at_->flow.integrate(period, start, below, nullptr);
-    set_parameter(parameter);
-    check(VecAXPBY(column, -0.5 / change, 0.5 / change, below));
+    difference_column(flows(), at_->parameter, range_, period, start, column);
     return;
   }
   at_->flow.record_period(period, start, 0);

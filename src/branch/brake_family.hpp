@@ -11,6 +11,9 @@ namespace squeal
 /// Adds the counts of a period, from the statuses of the pairs at its steps.
 void count_statuses(const std::vector<std::vector<ContactStatus>>& statuses, PointMeasures& measures);
 
+/// column = dPhi_period(start)/dparameter by a central difference, where `range` is that of the parameter.
+void difference_column(const FlowFamily& family, double parameter, double range, double period, Vec start, Vec column);
+
 /// The brake at a value of the parameter.
 struct BrakeAt
 {

@@ -331,12 +331,11 @@ Preconditioner ReducedFamily::lifted_preconditioner(double period, const VectorX
 
 SlowMotions ReducedFamily::slow_motions(double period, Vec start)
 {
-  constexpr LargeValues wanted{0.85, 4, 48};
   ReducedMap& map = at_->map;
   const ReducedState state = reduced_state(start);
   const auto moved = record_contacts(map, period, moved_on(map, period / map.steps / 2, state));
   recorded_ = record_contacts(map, period, state);
-  const ReducedSpectrum spectrum = large_multipliers(map, period, recorded_, wanted, PETSC_COMM_SELF);
+  const ReducedSpectrum spectrum = large_multipliers(map, period, recorded_, deciding_values, PETSC_COMM_SELF);
   SlowMotions slow;
   slow.periods = 2;
   slow.values = spectrum.values;
@@ -356,19 +355,6 @@ SlowMotions ReducedFamily::slow_motions(double period, Vec start)
     copy_columns(result, std::array{real, imaginary});
   };
   return slow;
-}
-
-void ReducedFamily::parameter_column(double period, Vec start, Vec column)
-{
-  // 1e-5 of the range: the contact's tolerance of 1e-10 is then below 1e-4 of the quotient
-  const double parameter = at_->parameter, change = 1e-5 * (greatest_ - least_);
-  const Owned<Vec> below = zeros_like(column);
-  set_parameter(parameter + change);
-  at_->flow.integrate(period, start, column, nullptr);
-  set_parameter(parameter - change);
-  at_->flow.integrate(period, start, below, nullptr);
-  set_parameter(parameter);
-  check(VecAXPBY(column, -0.5 / change, 0.5 / change, below));
 }
 
 PointMeasures ReducedFamily::measure(const Orbit& orbit)
@@ -429,7 +415,8 @@ FlowFamily ReducedFamily::flows()
   family.flow.slow_motions = [this](double period, Vec start) { return slow_motions(period, start); };
   family.set_parameter = [this](double parameter) { set_parameter(parameter); };
   family.rest = [this] { return vector_of(ReducedState{at_->brake.rest, VectorXd::Zero(own_.size())}); };
-  family.parameter_column = [this](double period, Vec start, Vec column) { parameter_column(period, start, column); };
+  family.parameter_column = [this](double period, Vec start, Vec column)
+  { difference_column(flows(), at_->parameter, greatest_ - least_, period, start, column); };
   family.measure = [this](const Orbit& orbit) { return measure(orbit); };
   family.preconditioner = preconditioner_of(correction_);
   family.renew_preconditioner = [this](double period, Vec start)

@@ -71,7 +71,6 @@ private:
   ReducedBrake interpolated(double parameter) const;
   void take_samples(BrakeFamily& full);
   SlowMotions slow_motions(double period, Vec start);
-  void parameter_column(double period, Vec start, Vec column);
   PointMeasures measure(const Orbit& orbit);
 
   const BrakeBranchProblem& problem_;

@@ -101,15 +101,13 @@ RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, V
   return result;
 }
 
-constexpr LargeValues wanted{0.85, 4, 48};
-
 /// Of as many large multipliers both ways; a value within `margin` of the limit may fall on either side. Lists that are
 /// cut off are compared above their smallest values.
 bool as_many_above(double limit, const std::vector<Complex>& a, const std::vector<Complex>& b)
 {
   constexpr double margin = 5e-3;
   for (const std::vector<Complex>* values : {&a, &b}) // a pair that would exceed the number is left out whole
-    if (static_cast<int>(values->size()) >= wanted.at_most - 1)
+    if (static_cast<int>(values->size()) >= deciding_values.at_most - 1)
       limit = std::max(limit, std::abs(values->back()) + 2 * margin);
   const auto above = [](double least, const std::vector<Complex>& values)
   { return std::count_if(values.begin(), values.end(), [&](Complex value) { return std::abs(value) > least; }); };
@@ -135,7 +133,7 @@ bool have_partners(double limit, const std::vector<Complex>& a, const std::vecto
 bool alike(double limit, const std::vector<Complex>& a, const std::vector<Complex>& b)
 {
   for (const std::vector<Complex>* values : {&a, &b}) // a pair that would exceed the number is left out whole
-    if (static_cast<int>(values->size()) >= wanted.at_most - 1)
+    if (static_cast<int>(values->size()) >= deciding_values.at_most - 1)
       limit = std::max(limit, std::abs(values->back()) + 1e-2);
   return have_partners(limit, a, b) && have_partners(limit, b, a);
 }
@@ -245,7 +243,7 @@ bool confirmed_by_fewer_shapes(const ReducedMap& map, double period, std::span<c
 {
   const ReducedModel smaller = truncated(map.model, (3 * map.model.size() + 3) / 4);
   ReducedMap few{smaller, map.steps, map.theta};
-  return as_many_above(0.95, values, large_multipliers(few, period, contacts, wanted, comm).values);
+  return as_many_above(0.95, values, large_multipliers(few, period, contacts, deciding_values, comm).values);
 }
 
 /// Whether the model without its highest modes has the same multipliers above 0.95. The attachments stay: friction on
@@ -255,7 +253,7 @@ bool confirmed_by_fewer_modes(const ReducedMap& map, double period, std::span<co
 {
   const ReducedModel smaller = without_modes_apart(map.model);
   ReducedMap few{smaller, map.steps, map.theta};
-  return alike(0.95, values, large_multipliers(few, period, contacts, wanted, comm).values);
+  return alike(0.95, values, large_multipliers(few, period, contacts, deciding_values, comm).values);
 }
 
 /// x = (A_r - m)^-1 x: the reduced resolvent on the state's coordinates, -1/m on what those miss.
@@ -300,7 +298,7 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
   };
   ReducedMap own{*model, map.steps, map.theta};
   auto recorded = contacts(RecordedPeriods::own);
-  ReducedSpectrum spectrum = large_multipliers(own, period, recorded, wanted, comm);
+  ReducedSpectrum spectrum = large_multipliers(own, period, recorded, deciding_values, comm);
   slow.values = spectrum.values;
   // no motion beside a cycle that shooting finds doubles in a period: shapes that do not fit friction do
   if (!slow.values.empty() && std::abs(slow.values.front()) > 2)

@@ -228,7 +228,7 @@ void choose_basis(ReducedModel& model, const MatrixXd& energy, Mat M_z, MultiVec
                   double threshold)
 {
   const auto [of_modes, more, apart] = counts;
-  constexpr double new_shape = 1e-3; // what further shapes add: a part e of a mode moves its value by e^2
+  constexpr double new_shape = 1e-3; // part of further shapes that must be new
   Orthonormal basis{energy, MatrixXd(columns.columns(), 0)};
   model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
   model.modes += extend(basis, of_modes - more - apart - 2, 1e-6);

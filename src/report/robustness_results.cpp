@@ -20,7 +20,7 @@ Json probability_entry(const Probability& probability)
           {"upper", probability.upper}};
 }
 
-/// The value below which a part of an ascending list lies.
+/// The value below which a part of an ascending list is.
 double part_of(const std::vector<double>& ascending, double part)
 {
   const double place = part * static_cast<double>(ascending.size() - 1);

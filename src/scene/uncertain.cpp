@@ -13,7 +13,7 @@ namespace squeal
 namespace
 {
 
-constexpr double cut_off = 4; // deviations: 6 of 100 000 draws lie beyond
+constexpr double cut_off = 4; // deviations: 6 of 100 000 draws are beyond
 
 /// The quantile of the normal distribution of mean 0 and deviation 1, cut off.
 double standard_quantile(double part)

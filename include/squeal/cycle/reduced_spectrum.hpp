@@ -26,6 +26,9 @@ struct LargeValues
   int at_least = 0, at_most = 0;
 };
 
+/// Those that a verdict is about.
+inline constexpr LargeValues deciding_values{0.85, 4, 48};
+
 /// Collective.
 ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
                                   const LargeValues& wanted, MPI_Comm comm);
