@@ -162,17 +162,18 @@ Sizes sizes_of(const Model& model, const FactorOptions& options)
   return sizes;
 }
 
-/// The factor, each rank's part of the condensed operator, and half of the matrix as triplets and by columns.
-double memory_of_factor(const Sizes& sizes)
+/// The factor, each rank's part of its condensed operator, and half of the matrix as triplets and by columns.
+double memory_of_factor(const Sizes& sizes, double condensed_operator)
 {
-  return sizes.factor.bytes + sizes.ranks * sizes.condensed_operator() + 2 * triplet * sizes.entries / 2;
+  return sizes.factor.bytes + sizes.ranks * condensed_operator + 2 * triplet * sizes.entries / 2;
 }
 
-/// K with springs at the pairs, its factor and condensed operator D, and three matrices of pairs: D's normal part, the
-/// same with friction, and a factor of that.
+/// K with springs at the pairs, its factor and condensed operator D of two rows a pair, and three matrices of pairs:
+/// D's normal part, the same with friction, and a factor of that.
 double memory_of_equilibrium(const Sizes& sizes)
 {
-  return matrix_entry * sizes.entries + memory_of_factor(sizes) + 3 * number * sizes.pairs * sizes.pairs;
+  const double of_pairs = number * sizes.pairs * sizes.pairs;
+  return matrix_entry * sizes.entries + memory_of_factor(sizes, 4 * of_pairs) + 3 * of_pairs;
 }
 
 /// Six matrices: M and K of the frictionless problem, M, C and K of the sliding one, and C with friction. Two pencils:
@@ -202,8 +203,9 @@ double memory_of_response(const Sizes& sizes, const Scene& scene, const Response
 /// M and K together, the factor, W, and its near field in single precision, which may be all of it.
 double memory_of_step(const Sizes& sizes)
 {
-  return (2 * number + sizeof(PetscInt)) * sizes.entries / 2 + matrix_entry * sizes.entries + memory_of_factor(sizes) +
-         sizes.condensed_operator() / 2 + number * vectors_of_modes_kept * sizes.dofs;
+  return (2 * number + sizeof(PetscInt)) * sizes.entries / 2 + matrix_entry * sizes.entries +
+         memory_of_factor(sizes, sizes.condensed_operator()) + sizes.condensed_operator() / 2 +
+         number * vectors_of_modes_kept * sizes.dofs;
 }
 
 /// A reduced model has at most a shape for each pair, and those of the modes. They are held four times at its making.

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 namespace squeal
@@ -64,20 +65,28 @@ std::vector<double> gaps_of(const Interface& interface, Vec u)
   return gap;
 }
 
-/// The gaps that normal reactions cause with the friction that each brings along, D_nn + D_nt mu e; on rank 0, where D
-/// is. `mu`: of every pair.
-Eigen::MatrixXd normal_compliance(const PairMatrixView& D, const Interface& interface, const std::vector<double>& mu)
+/// cos of the angle from each pair's axis, which D was made for, to its drive: 1 or -1, 0 without a drive.
+std::vector<double> senses(const Interface& interface, const std::vector<double>& axes)
 {
   const std::vector<double> directions = drive_directions(interface);
-  const TangentView e(directions, interface.directions);
-  const auto pairs = static_cast<Eigen::Index>(mu.size());
+  const TangentView e(directions, interface.directions), axis(axes, interface.directions);
+  std::vector<double> result;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(interface.pairs); ++i)
+    result.push_back(std::inner_product(e.of(i).begin(), e.of(i).end(), axis.of(i).begin(), 0.));
+  return result;
+}
+
+/// The gaps that normal reactions cause with the friction that each brings along, D_nn + D_nt mu e; on rank 0, where D
+/// is. `friction`: of every pair along its axis.
+Eigen::MatrixXd normal_compliance(const PairMatrixView& D, const std::vector<double>& friction)
+{
+  const auto pairs = static_cast<Eigen::Index>(friction.size());
   Eigen::MatrixXd result(pairs, pairs);
-  for (std::size_t i = 0; i < mu.size(); ++i)
-    for (std::size_t j = 0; j < mu.size(); ++j)
+  for (std::size_t i = 0; i < friction.size(); ++i)
+    for (std::size_t j = 0; j < friction.size(); ++j)
     {
       const PairVector row = D.block(i, j)[0];
-      const double friction = dot(std::span(row).subspan(1, e.of(j).size()), e.of(j));
-      result(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = row[0] + mu[j] * friction;
+      result(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = row[0] + friction[j] * row[1];
     }
   return result;
 }
@@ -301,20 +310,35 @@ OptionList options_of(EquilibriumOptions& options)
 
 struct PairCompliance::Parts
 {
+  std::vector<double> axes; // of each pair, as TangentView reads them
   Held held;
   std::vector<double> D; // on rank 0; empty without pairs
 };
 
 PairCompliance::PairCompliance(const Structure& structure, const Interface& interface,
                                const EquilibriumOptions& options)
-    : parts_(std::make_unique<Parts>(hold(structure, interface, options.factor)))
+    : parts_(std::make_unique<Parts>(sliding_axes(interface)))
 {
+  parts_->held = hold(structure, along(interface, parts_->axes), options.factor);
   if (interface.pairs > 0) parts_->D = parts_->held.factor.condensed(1);
 }
 
 PairCompliance::PairCompliance(PairCompliance&&) noexcept = default;
 PairCompliance& PairCompliance::operator=(PairCompliance&&) noexcept = default;
 PairCompliance::~PairCompliance() = default;
+
+bool PairCompliance::serves(const Interface& interface) const
+{
+  const std::vector<double> directions = drive_directions(interface), sense = senses(interface, parts_->axes);
+  const TangentView<const double> e(directions, interface.directions), axis(parts_->axes, interface.directions);
+  for (std::size_t i = 0; i < sense.size(); ++i)
+  {
+    const double along = drive_speed(interface, i) == 0 ? 0 : std::copysign(1, sense[i]);
+    for (std::size_t k = 0; k < e.of(i).size(); ++k)
+      if (std::abs(e.of(i)[k] - along * axis.of(i)[k]) > 1e-12) return false;
+  }
+  return true;
+}
 
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
 {
@@ -351,12 +375,14 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
         comm, pairs,
         [&]
         {
-          const PairMatrixView view(D, pairs, interface.directions);
-          search.D_nn = normal_compliance(view, interface, std::vector<double>(pairs, 0.));
+          const PairMatrixView view(D, pairs, 1);
+          std::vector<double> friction = drive_friction(interface);
+          const std::vector<double> sense = senses(interface, compliance.parts().axes);
+          for (std::size_t i = 0; i < pairs; ++i) friction[i] *= sense[i];
+          search.D_nn = normal_compliance(view, std::vector<double>(pairs, 0.));
           Eigen::VectorXd c(search.D_nn.rows());
           for (std::size_t i = 0; i < pairs; ++i) c(static_cast<Eigen::Index>(i)) = compliance_of(interface, i);
-          search.problem =
-              problem_of(search.D_nn, normal_compliance(view, interface, drive_friction(interface)), held.kappa, q, c);
+          search.problem = problem_of(search.D_nn, normal_compliance(view, friction), held.kappa, q, c);
           search.D_nn += c.asDiagonal();
           search.rho = 1 / largest_eigenvalue(search.D_nn, 30);
           search.solution = find_split(search.problem, interface, options.max_iterations, 1.5 * search.rho, expected);

@@ -160,7 +160,7 @@ public:
   {
     const BrakeModel& model = model_.at(values);
     const auto& [structure, interface] = model;
-    if (!compliance_ || model_.stiffness_changes())
+    if (!compliance_ || model_.stiffness_changes() || !compliance_->serves(interface))
     {
       compliance_.reset();
       compliance_.emplace(structure, interface, equilibrium_options_);

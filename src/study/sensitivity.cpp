@@ -190,10 +190,10 @@ public:
         (same && same_load == PETSC_TRUE && model.interface.friction.coefficient == interface.friction.coefficient &&
          drive_directions(model.interface) == drive_directions(interface)))
       return std::nullopt;
-    if (!same)
+    if (same && !compliance_) compliance_.emplace(structure, interface, options_);
+    if (!same || !compliance_->serves(model.interface))
       return find_equilibrium(model.structure, model.interface,
                               PairCompliance(model.structure, model.interface, options_), equilibrium.closed, options_);
-    if (!compliance_) compliance_.emplace(structure, interface, options_);
     return find_equilibrium(model.structure, model.interface, *compliance_, equilibrium.closed, options_);
   }
 

@@ -54,7 +54,8 @@ void SweptModel::go_to(const SweptPlace& place)
 const PairCompliance& SweptModel::compliance()
 {
   const auto& [structure, interface] = *model_;
-  if (compliance_ && equal(K_, structure.K) && equal(B_, interface.B)) return *compliance_;
+  if (compliance_ && equal(K_, structure.K) && equal(B_, interface.B) && compliance_->serves(interface))
+    return *compliance_;
   compliance_.reset();
   K_ = copy_of(structure.K);
   B_ = copy_of(interface.B);

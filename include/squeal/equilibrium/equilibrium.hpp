@@ -65,7 +65,8 @@ struct EquilibriumOptions
 
 OptionList options_of(EquilibriumOptions& options);
 
-/// The stiffness factored and the compliance D of the pairs. Neither load, drive nor friction changes them.
+/// The stiffness factored and the compliance D of the pairs, on their normals and the axes they slide along. Neither
+/// load nor friction changes them, nor a drive along the same axes.
 class PairCompliance
 {
 public:
@@ -74,6 +75,9 @@ public:
   PairCompliance(PairCompliance&&) noexcept;
   PairCompliance& operator=(PairCompliance&&) noexcept;
   ~PairCompliance();
+
+  /// Whether the drive of this interface, which has the same B, is along the axes. The same on all ranks.
+  bool serves(const Interface& interface) const;
 
   struct Parts;
   const Parts& parts() const { return *parts_; }
@@ -85,8 +89,8 @@ private:
 /// Error: K is singular on a body that contact does not hold either (which body). Collective.
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options);
 
-/// The same with a compliance that is at hand, first tried with these closed pairs; empty: none are expected.
-/// Collective.
+/// The same with a compliance that is at hand and serves the interface, first tried with these closed pairs; empty:
+/// none are expected. Collective.
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const PairCompliance& compliance,
                              const std::vector<char>& expected, const EquilibriumOptions& options);
 
