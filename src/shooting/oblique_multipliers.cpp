@@ -24,7 +24,8 @@ using Eigen::MatrixXd;
 using Complex = std::complex<double>;
 
 constexpr double largest_condition = 1e6; // of W'V: beyond, an error of 1e-10 in Z is one of 1e-4 in mu
-constexpr int passes_at_most = 8;
+// A pass takes some 0.6 of an error: 16 were needed on the pin. Of a large one the bar does not ask for more than 8.
+constexpr int passes_at_most = 24, passes_of_large_model = 8;
 
 std::vector<Complex> values_of(const std::vector<DenseEigenpair>& pairs)
 {
@@ -210,7 +211,7 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
     project(monodromy, slow, refined, passes);
     refined = deciding_pairs(passes);
     if (pass > 1) std::erase_if(refined, is_settled);
-    if (refined.empty() || pass == passes_at_most) break;
+    if (refined.empty() || pass == (dofs > large_model ? passes_of_large_model : passes_at_most)) break;
     if (extend(monodromy, corrections(monodromy, slow, refined, passes), passes) == 0) break;
   }
   if (meaningless(passes) && !repels(passes))
