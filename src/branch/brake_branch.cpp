@@ -224,11 +224,13 @@ bool try_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem, con
     int followed = found.branch.points.empty() ? 0 : 1;
     MPI_Bcast(&followed, 1, MPI_INT, 0, comm_of(problem.sliding.structure.load));
     if (asked || followed != 0) return true;
+    found.not_reduced = "no cycle of the reduced model closes beside the full model's";
   }
   catch (const Error& error) // on every rank alike: all of them make the same samples
   {
     if (asked) found.outcome = {OutcomeKind::refused, error.what(), 0, 0};
     if (asked) return true;
+    found.not_reduced = error.what();
   }
   found.reduction.reset();
   full.set_parameter(problem.settings.own);

@@ -127,6 +127,7 @@ void add_branch(const BrakeBranch& branch, const Scene& scene, Json& entry)
   entry["ends"] = {{"backward", word(branch.branch.ends.backward)}, {"forward", word(branch.branch.ends.forward)}};
   entry["model"] = word(branch.reduction ? CycleModel::reduced : CycleModel::full);
   if (branch.reduction) entry["reduction"] = reduction_entry(*branch.reduction, branch.branch.points);
+  if (!branch.not_reduced.empty()) entry["not_reduced"] = branch.not_reduced;
   entry["points"] = Json::array();
   for (const BranchPoint& point : branch.branch.points) entry["points"].push_back(point_entry(point, scene));
   entry["events"] = Json::array();
@@ -232,6 +233,7 @@ std::vector<std::string> branch_lines(const BrakeBranch& branch, const Scene& sc
   if (grazings > grazings_shown)
     lines.push_back(format("%zu more grazings are in report.json", grazings - grazings_shown));
   for (std::string& line : reduction_lines(branch)) lines.push_back(std::move(line));
+  if (!branch.not_reduced.empty()) lines.push_back("followed on the full model: " + branch.not_reduced);
   for (const ParameterRange& range : branch.coexistence)
     lines.push_back(
         format("from %.6g to %.6g a stable cycle stands beside a stable equilibrium", range.from, range.to));

@@ -121,6 +121,14 @@ def test_ranks_agree_on_a_reduced_branch(reduced, module_run):
         assert first["full_residual"] == pytest.approx(second["full_residual"], rel=0.05)
 
 
+def test_a_number_that_no_reduced_model_holds_is_followed_on_the_full_one(converged):
+    run = converged(*PIN, *branch_of("contact.0.gap", 0, 2e-9), "--set", "contact.0.gap=1e-9", "--set", "branch.points=1",
+                    ranks=1)
+    branch = run.report["branch"]
+    assert branch["model"] == "full" and "contact.0.gap moves the contact itself" in branch["not_reduced"]
+    assert "followed on the full model: contact.0.gap" in run.printed
+
+
 @pytest.mark.parametrize("key, start, end, words", [
     ("friction.coefficent", 0.2, 0.4, "not in the scene"),
     ("friction.direction_damping", 0.2, 0.4, "not a number"),

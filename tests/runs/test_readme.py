@@ -178,7 +178,7 @@ UNLESS_STABLE |= {"sweep.points[].reason"}
 UNLESS_STABLE |= {f"coarse.{key}" for key in ("dofs", "pairs", "residual", "frequency_hz", "mean_fluctuating_energy", "periods")}
 # Written of branches with events, where a stable cycle stands beside a stable equilibrium, and of reduced models, which
 # test_branch reads.
-OF_SOME_BRANCHES = re.compile(r"branch\.((events|coexistence)\[\]\.\w+|reduction\..+|points\[\]\.full_residual)")
+OF_SOME_BRANCHES = re.compile(r"branch\.((events|coexistence)\[\]\.\w+|reduction\..+|points\[\]\.full_residual|not_reduced)")
 
 
 def compare(documented, written):

@@ -53,6 +53,7 @@ struct BrakeBranch
   std::vector<EquilibriumStability> equilibria; // by rising parameter
   std::vector<ParameterRange> coexistence;      // of a stable cycle and a stable equilibrium
   std::optional<BranchReduction> reduction;     // of a branch on a reduced model
+  std::string not_reduced;                      // why none serves a large model, where one was tried
 };
 
 /// The cycle that is followed, the number that changes, and how each point is computed.
