@@ -103,8 +103,9 @@ void examine(const TangentBundle& bundle, double period, ExaminedMotion& motion)
 OptionList options_of(SettledOptions& options)
 {
   return {
-      {"-settled_periods", &options.periods, Range::natural,
-       "at most integrated to see what a motion settles on where no cycle attracts"},
+      {"-settled_periods", &options.periods, Range::not_negative,
+       "at most integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 beyond 10 000 "
+       "degrees of freedom"},
       {"-settled_exponents", &options.exponents, Range::natural, "Lyapunov exponents of a settled motion"},
   };
 }

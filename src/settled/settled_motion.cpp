@@ -145,8 +145,9 @@ void take_as_answer(const SettledMotion& motion, Outcome& of_cycle)
   of_cycle.kind = OutcomeKind::settled;
 }
 
-SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, const SettledOptions& options)
+SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, SettledOptions options)
 {
+  if (options.periods == 0) options.periods = is_large(problem.sliding.structure) ? 512 : 2048;
   SettledMotion motion;
   PeriodMap map{problem.sliding, problem.step, cycle.steps_per_period, cycle.theta};
   map.reactions = problem.sliding.equilibrium.reactions;

@@ -28,6 +28,6 @@ struct SettledMotion
 void take_as_answer(const SettledMotion& motion, Outcome& of_cycle);
 
 /// Integrates on from the end of the search's free motion. Collective. A run that is asked to end throws Interrupted.
-SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, const SettledOptions& options);
+SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, SettledOptions options);
 
 } // namespace squeal
