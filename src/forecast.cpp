@@ -5,7 +5,8 @@
 #include "squeal/forecast.hpp"
 
 #include "squeal/algebra/factor_forecast.hpp"
-#include "squeal/base/available_memory.hpp"
+#include "squeal/base/free_memory.hpp"
+#include "squeal/reduction/reduced_model.hpp"
 
 #include <algorithm>
 #include <array>
@@ -72,27 +73,6 @@ double sum_of_ranks(double value, MPI_Comm comm)
 {
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_SUM, comm);
   return value;
-}
-
-/// What the node and the limits of its control group leave [byte].
-double free_memory_of_node()
-{
-  double cgroup = HUGE_VAL, used = 0;
-  std::ifstream limit("/sys/fs/cgroup/memory.max"), usage("/sys/fs/cgroup/memory.current");
-  if (!(limit >> cgroup)) cgroup = HUGE_VAL; // also the word "max"
-  usage >> used;
-  return std::min(available_memory(), cgroup - used);
-}
-
-/// Of all nodes together.
-double free_memory(MPI_Comm comm)
-{
-  MPI_Comm node = MPI_COMM_NULL;
-  MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node);
-  double bytes = rank_of(node) == 0 ? free_memory_of_node() : 0;
-  MPI_Comm_free(&node);
-  MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_DOUBLE, MPI_SUM, comm);
-  return bytes;
 }
 
 /// Whether this process may take so many more bytes of addresses; the limit is that of ulimit -v.
@@ -208,11 +188,14 @@ double memory_of_step(const Sizes& sizes)
          number * vectors_of_modes_kept * sizes.dofs;
 }
 
-/// A reduced model has at most a shape for each pair, and those of the modes. They are held four times at its making.
-double memory_of_cycle(const Sizes& sizes, CycleModel fidelity)
+/// A reduced model has at most a shape for each pair, and those of the modes. Where the full model alone is followed,
+/// it serves the multipliers, and is done without where it does not fit what is `free`.
+double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, double free)
 {
-  const double shapes = fidelity == CycleModel::full ? 0 : sizes.pairs + vectors_of_modes_kept;
-  return memory_of_step(sizes) + number * (4 * shapes + vectors_of_shooting) * sizes.dofs;
+  const double least = memory_of_step(sizes) + number * vectors_of_shooting * sizes.dofs;
+  const double reduced = memory_of_reduction(sizes.dofs, sizes.pairs + vectors_of_modes_kept);
+  if (fidelity == CycleModel::full && least + reduced > free) return least;
+  return least + reduced;
 }
 
 /// What the points of a sweep and the samples of a robustness study are laid out in. Their modes come on top.
@@ -261,7 +244,7 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
     add(Stage::transient, memory_of_step(sizes) + number * entries * steps_of_transient(scene.transient));
-  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity));
+  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, free_memory(comm)));
   if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
   forecast.steps = steps_of(scene, options);

@@ -157,6 +157,18 @@ MultiVector combination(const MultiVector& X, const MatrixXd& a)
   return {X.comm, X.entries * a};
 }
 
+void combine(MultiVector& X, const MatrixXd& a)
+{
+  constexpr Index height = 512; // rows at once
+  MatrixXd part;
+  for (Index i = 0; i < X.entries.rows(); i += height)
+  {
+    part.noalias() = X.entries.middleRows(i, std::min(height, X.entries.rows() - i)) * a;
+    X.entries.block(i, 0, part.rows(), part.cols()) = part;
+  }
+  X.entries.conservativeResize(Eigen::NoChange, a.cols());
+}
+
 MultiVector columns_from(const MultiVector& X, Index first)
 {
   return {X.comm, X.entries.rightCols(X.columns() - first)};
@@ -169,16 +181,40 @@ MatrixXd inner_products(const MultiVector& X, const MultiVector& Y)
   return result;
 }
 
+namespace
+{
+
+constexpr Index block_width =
+    128; // columns of a symmetric product made at once; the part above the diagonal is left out
+
+/// Column block `first` of the lower triangle of X'Y, by Y's columns from there on. This rank's part.
+void add_block(const MultiVector& X, Index first, const Eigen::Ref<const MatrixXd>& Y, MatrixXd& result)
+{
+  const Index below = X.columns() - first;
+  result.block(first, first, below, Y.cols()).noalias() = X.entries.rightCols(below).transpose() * Y;
+}
+
+} // namespace
+
 MatrixXd symmetric_inner_products(const MultiVector& X, const MultiVector& Y)
 {
-  constexpr Index width = 128; // of a block of columns, of which the part above the diagonal is left out
-  const Index size = X.columns();
-  MatrixXd result = MatrixXd::Zero(size, size);
-  for (Index j = 0; j < size; j += width)
+  MatrixXd result = MatrixXd::Zero(X.columns(), X.columns());
+  for (Index j = 0; j < X.columns(); j += block_width)
+    add_block(X, j, Y.entries.middleCols(j, std::min(block_width, X.columns() - j)), result);
+  add_up(result, X.comm);
+  result.triangularView<Eigen::StrictlyUpper>() = result.transpose();
+  return result;
+}
+
+MatrixXd symmetric_inner_products(const MultiVector& X, Mat A,
+                                  const std::function<void(Index first, const MultiVector& image)>& visit)
+{
+  MatrixXd result = MatrixXd::Zero(X.columns(), X.columns());
+  for (Index j = 0; j < X.columns(); j += block_width)
   {
-    const Index count = std::min(width, size - j);
-    result.block(j, j, size - j, count).noalias() =
-        X.entries.rightCols(size - j).transpose() * Y.entries.middleCols(j, count);
+    const MultiVector image = product(A, {X.comm, X.entries.middleCols(j, std::min(block_width, X.columns() - j))});
+    add_block(X, j, image.entries, result);
+    if (visit) visit(j, image);
   }
   add_up(result, X.comm);
   result.triangularView<Eigen::StrictlyUpper>() = result.transpose();

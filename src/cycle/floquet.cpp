@@ -2,6 +2,7 @@
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/base/free_memory.hpp"
 #include "squeal/cycle/reduced_spectrum.hpp"
 
 #include <algorithm>
@@ -195,8 +196,21 @@ int eliminated_pairs(const CycleProblem& problem, const RecordedPeriods& periods
   return static_cast<int>(std::count(roles.sliding.begin(), roles.sliding.end(), 1));
 }
 
-/// The reduced model for the recorded periods.
-ReducedModel model_for(const CycleProblem& problem, const RecordedPeriods& periods)
+/// Why a model of so many shapes is not made; empty: there is room for it.
+std::string lack_of_memory(const Structure& structure, Index shapes)
+{
+  PetscInt dofs = 0;
+  check(VecGetSize(structure.load, &dofs));
+  const double needed = memory_of_reduction(dofs, static_cast<double>(shapes)),
+               free = free_memory(comm_of(structure.load));
+  if (needed <= free) return {};
+  return format("a reduced model of %ld shapes takes %.3g GB, and %.3g GB are free: a larger machine would decide",
+                static_cast<long>(shapes), 1e-9 * needed, 1e-9 * free);
+}
+
+/// The reduced model for the recorded periods; null where it does not fit the memory, with the reason.
+std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const RecordedPeriods& periods,
+                                              std::string& missing)
 {
   const Interface& interface = problem.sliding.interface;
   const std::vector<PairHistory> pairs = histories(interface, periods.records);
@@ -207,9 +221,15 @@ ReducedModel model_for(const CycleProblem& problem, const RecordedPeriods& perio
       std::none_of(pairs.begin(), pairs.end(), [](const PairHistory& pair) { return pair.stuck || pair.turned; });
   const bool many = PairRows<std::size_t>(interface.directions).rows_of(roles.active.size()) > 150;
   const RealModes beyond = modes_beyond_band(problem);
+  const std::size_t forces =
+      slide && many ? roles.active.size() : PairRows<std::size_t>(interface.directions).rows_of(roles.active.size());
+  missing = lack_of_memory(problem.sliding.structure,
+                           static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces));
+  if (!missing.empty()) return nullptr;
   constexpr double highest = 0.25; // of the modes: what they change says what those beyond them may
-  return reduce(problem.sliding, problem.modes, roles,
-                {static_cast<int>(problem.modes.size()), 1e-5, slide && many, &beyond, problem.step.factor, highest});
+  return std::make_shared<const ReducedModel>(
+      reduce(problem.sliding, problem.modes, roles,
+             {static_cast<int>(problem.modes.size()), 1e-5, slide && many, &beyond, problem.step.factor, highest}));
 }
 
 /// What the grid of time changes the modulus of each value of the spectrum by. A step of order 2 on grids of n and 2 n
@@ -290,7 +310,8 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
   const RecordedPeriods periods = record_periods(map, other_steps, period, start);
   SlowMotions slow;
   slow.periods = other_steps > 0 ? 3 : 2;
-  const auto model = std::make_shared<const ReducedModel>(model_for(problem, periods));
+  const auto model = model_for(problem, periods, slow.missing);
+  if (!model) return slow;
   const auto contacts = [&](int which)
   {
     return recorded_contacts(*model, problem.sliding.interface.directions,

@@ -37,22 +37,31 @@ MultiVector rows_of(const MultiVector& X, const std::vector<PetscInt>& rows)
   return {X.comm, X.entries(rows, Eigen::all)};
 }
 
-/// M, C and K on X = Z columns, tested by Z and by Y, which is Z but for a few rows.
-void project(ReducedModel& model, const Structure& structure, const ClosedContact& contact, const MultiVector& columns,
-             const MultiVector& X)
+/// Shapes y in the coordinates that Z keeps, as motions.
+struct Shapes
 {
+  const MultiVector& X;    // Z y
+  const MultiVector& left; // Y y, which is Z y but for a few rows
+};
+
+/// M, C and K on X, tested by X and by the left shapes.
+void project(ReducedModel& model, const Structure& structure, const ClosedContact& contact, const Shapes& shapes)
+{
+  const auto& [X, left] = shapes;
   Owned<Mat> difference;
   check(MatDuplicate(contact.Y, MAT_COPY_VALUES, difference.put()));
   check(MatAXPY(difference, -1, contact.Z, DIFFERENT_NONZERO_PATTERN));
   const std::vector<PetscInt> follow = own_rows(difference);
-  const MultiVector more = rows_of(product(difference, columns), follow);
+  const MultiVector more{X.comm, left.entries(follow, Eigen::all) - X.entries(follow, Eigen::all)};
+  MultiVector followed{X.comm, MatrixXd(more.entries.rows(), X.columns())};
+  const auto keep = [&](Index first, const MultiVector& image)
+  { followed.entries.middleCols(first, image.columns()) = image.entries(follow, Eigen::all); };
   for (const auto& [matrix, unsymmetric, symmetric] :
        {std::tuple{structure.M.get(), &model.M, &model.M_z}, std::tuple{structure.C.get(), &model.C, &model.C_z},
         std::tuple{structure.K.get(), &model.K, &model.K_z}})
   {
-    const MultiVector image = product(matrix, X);
-    *symmetric = symmetric_inner_products(X, image);
-    *unsymmetric = *symmetric + inner_products(more, rows_of(image, follow));
+    *symmetric = symmetric_inner_products(X, matrix, keep);
+    *unsymmetric = *symmetric + inner_products(more, followed);
   }
 }
 
@@ -173,21 +182,12 @@ void add_unsymmetric_parts(ReducedModel& model, const SlidingEquilibrium& slidin
     add(turning, model.C);
 }
 
-/// The shapes in the coordinates that Z keeps, and whole.
-struct Shapes
+/// M, C and K on the shapes, tested by the left ones.
+void set_matrices(ReducedModel& model, const SlidingEquilibrium& sliding, const ClosedContact& contact,
+                  const ClosedPairs& pairs, const Shapes& shapes)
 {
-  const MultiVector& columns;
-  const MultiVector& X; // Z columns
-};
-
-/// M, C and K on the shapes, tested by Y columns, which are returned.
-MultiVector set_matrices(ReducedModel& model, const SlidingEquilibrium& sliding, const ClosedContact& contact,
-                         const ClosedPairs& pairs, const Shapes& shapes)
-{
-  MultiVector left = product(contact.Y, shapes.columns);
-  project(model, sliding.structure, contact, shapes.columns, shapes.X);
-  add_unsymmetric_parts(model, sliding, pairs, left, shapes.X);
-  return left;
+  project(model, sliding.structure, contact, shapes);
+  add_unsymmetric_parts(model, sliding, pairs, shapes.left, shapes.X);
 }
 
 } // namespace
@@ -233,11 +233,12 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   choose_basis(model, energy, M_z, columns, {modal, of_modes.more, of_modes.apart}, reduction.threshold);
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
   MultiVector X = product(contact.Z, columns);
+  const MultiVector left = product(contact.Y, columns);
+  columns.entries.resize(0, 0);
   std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
   if (reduction.sliding)
     for (const int pair : active) follows[static_cast<std::size_t>(pair)] = 1; // no reaction while open
-  const MultiVector left =
-      set_matrices(model, sliding, contact, {roles.sliding, follows, roles.reactions}, {columns, X});
+  set_matrices(model, sliding, contact, {roles.sliding, follows, roles.reactions}, {X, left});
   model.H = (forces.transpose() * whole_product(B, left)).transpose();
   model.G = whole_product(B, X);
   if (reduction.sliding) model.G = normal_rows(model.G, interface.directions);
@@ -288,8 +289,9 @@ ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibr
   const ClosedContact contact = eliminate_closed_pairs(other.structure, other.interface, roles.sliding);
   const MultiVector columns = kept_entries(model.shapes, contact.Z, other.structure.load);
   ReducedModel result;
-  const MultiVector left = set_matrices(
-      result, other, contact, {roles.sliding, roles.sliding, other.equilibrium.reactions}, {columns, model.shapes});
+  const MultiVector left = product(contact.Y, columns);
+  set_matrices(result, other, contact, {roles.sliding, roles.sliding, other.equilibrium.reactions},
+               {model.shapes, left});
   const Owned<Mat> B = rows_of(other.interface, model.active, RowsTaken::all);
   result.H = whole_product(B, left).transpose();
   result.G = whole_product(B, model.shapes);

@@ -237,11 +237,10 @@ void choose_basis(ReducedModel& model, const MatrixXd& energy, Mat M_z, MultiVec
   const int last = extend(basis, apart, 1e-6);
   model.modes += last;
   model.attachments = extend(basis, columns.columns() - of_modes, threshold);
-  columns = combination(columns, basis.T);
-  const MatrixXd turn =
-      by_falling_period(symmetric_inner_products(columns, product(M_z, columns)), model.omega, model.slow);
+  combine(columns, basis.T);
+  const MatrixXd turn = by_falling_period(symmetric_inner_products(columns, M_z), model.omega, model.slow);
   model.apart = turn.middleRows(before, last).transpose();
-  columns = combination(columns, turn);
+  combine(columns, turn);
 }
 
 } // namespace squeal

@@ -4,6 +4,7 @@
 #include "squeal/base/petsc.hpp"
 
 #include <Eigen/Core>
+#include <functional>
 #include <span>
 
 namespace squeal
@@ -45,6 +46,9 @@ void product(Mat A, std::span<const Vec> x, std::span<const Vec> y);
 /// X a
 MultiVector combination(const MultiVector& X, const Eigen::MatrixXd& a);
 
+/// X a in place of X, for a of no more columns than rows: X is never held twice.
+void combine(MultiVector& X, const Eigen::MatrixXd& a);
+
 /// The columns of X from `first` on.
 MultiVector columns_from(const MultiVector& X, Eigen::Index first);
 
@@ -53,6 +57,11 @@ Eigen::MatrixXd inner_products(const MultiVector& X, const MultiVector& Y);
 
 /// The same where the result is symmetric, as X'A X: half the work.
 Eigen::MatrixXd symmetric_inner_products(const MultiVector& X, const MultiVector& Y);
+
+/// X'A X of a symmetric A. A X is formed some columns at a time, which `visit` is shown from their first one on.
+Eigen::MatrixXd
+symmetric_inner_products(const MultiVector& X, Mat A,
+                         const std::function<void(Eigen::Index first, const MultiVector& image)>& visit = {});
 
 /// 2-norms of the columns.
 Eigen::VectorXd column_norms(const MultiVector& X);

@@ -1,0 +1,38 @@
+#include "squeal/base/free_memory.hpp"
+
+#include "squeal/base/available_memory.hpp"
+#include "squeal/base/petsc.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// What the node and the limits of its control group leave [byte].
+double free_memory_of_node()
+{
+  double cgroup = HUGE_VAL, used = 0;
+  std::ifstream limit("/sys/fs/cgroup/memory.max"), usage("/sys/fs/cgroup/memory.current");
+  if (!(limit >> cgroup)) cgroup = HUGE_VAL; // also the word "max"
+  usage >> used;
+  return std::min(available_memory(), cgroup - used);
+}
+
+} // namespace
+
+double free_memory(MPI_Comm comm)
+{
+  MPI_Comm node = MPI_COMM_NULL;
+  MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node);
+  double bytes = rank_of(node) == 0 ? free_memory_of_node() : 0;
+  MPI_Comm_free(&node);
+  MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_DOUBLE, MPI_SUM, comm);
+  return bytes;
+}
+
+} // namespace squeal
