@@ -184,41 +184,40 @@ MatrixXd inner_products(const MultiVector& X, const MultiVector& Y)
 namespace
 {
 
-constexpr Index block_width =
-    128; // columns of a symmetric product made at once; the part above the diagonal is left out
-
-/// Column block `first` of the lower triangle of X'Y, by Y's columns from there on. This rank's part.
-void add_block(const MultiVector& X, Index first, const Eigen::Ref<const MatrixXd>& Y, MatrixXd& result)
+/// X'Y of a symmetric result, by blocks of Y's columns: `block_of` gives so many from a place on. What is above the
+/// blocks of the diagonal is left out.
+template <class Block> MatrixXd symmetric_by_blocks(const MultiVector& X, Block block_of)
 {
-  const Index below = X.columns() - first;
-  result.block(first, first, below, Y.cols()).noalias() = X.entries.rightCols(below).transpose() * Y;
+  constexpr Index width = 128;
+  const Index size = X.columns();
+  MatrixXd result = MatrixXd::Zero(size, size);
+  for (Index j = 0; j < size; j += width)
+  {
+    const Index count = std::min(width, size - j);
+    result.block(j, j, size - j, count).noalias() = X.entries.rightCols(size - j).transpose() * block_of(j, count);
+  }
+  add_up(result, X.comm);
+  result.triangularView<Eigen::StrictlyUpper>() = result.transpose();
+  return result;
 }
 
 } // namespace
 
 MatrixXd symmetric_inner_products(const MultiVector& X, const MultiVector& Y)
 {
-  MatrixXd result = MatrixXd::Zero(X.columns(), X.columns());
-  for (Index j = 0; j < X.columns(); j += block_width)
-    add_block(X, j, Y.entries.middleCols(j, std::min(block_width, X.columns() - j)), result);
-  add_up(result, X.comm);
-  result.triangularView<Eigen::StrictlyUpper>() = result.transpose();
-  return result;
+  return symmetric_by_blocks(X, [&](Index first, Index count) { return Y.entries.middleCols(first, count); });
 }
 
 MatrixXd symmetric_inner_products(const MultiVector& X, Mat A,
                                   const std::function<void(Index first, const MultiVector& image)>& visit)
 {
-  MatrixXd result = MatrixXd::Zero(X.columns(), X.columns());
-  for (Index j = 0; j < X.columns(); j += block_width)
-  {
-    const MultiVector image = product(A, {X.comm, X.entries.middleCols(j, std::min(block_width, X.columns() - j))});
-    add_block(X, j, image.entries, result);
-    if (visit) visit(j, image);
-  }
-  add_up(result, X.comm);
-  result.triangularView<Eigen::StrictlyUpper>() = result.transpose();
-  return result;
+  return symmetric_by_blocks(X,
+                             [&](Index first, Index count)
+                             {
+                               MultiVector image = product(A, {X.comm, X.entries.middleCols(first, count)});
+                               if (visit) visit(first, image);
+                               return std::move(image.entries);
+                             });
 }
 
 VectorXd column_norms(const MultiVector& X)

@@ -228,8 +228,11 @@ bool try_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem, con
   }
   catch (const Error& error) // on every rank alike: all of them make the same samples
   {
-    if (asked) found.outcome = {OutcomeKind::refused, error.what(), 0, 0};
-    if (asked) return true;
+    if (asked)
+    {
+      found.outcome = {OutcomeKind::refused, error.what(), 0, 0};
+      return true;
+    }
     found.not_reduced = error.what();
   }
   found.reduction.reset();

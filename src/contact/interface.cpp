@@ -259,26 +259,22 @@ Interface along(const Interface& interface, const std::vector<double>& axes)
   Interface result;
   result.pairs = interface.pairs;
   result.directions = 1;
-  const PairRows<PetscInt> from(interface.directions), to(result.directions);
+  const PairRows<PetscInt> from(interface.directions);
   const TangentView e(axes, interface.directions);
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(interface.B, &first, &last));
   // a pair belongs where its normal row is; its other rows may be another rank's
   const auto first_pair_from = [&](PetscInt row) { return (row + from.per_pair() - 1) / from.per_pair(); };
-  const PetscInt begin = first_pair_from(first), end = first_pair_from(last);
-  Owned<Mat> rows;
-  check(MatCreateAIJ(comm_of(interface.B), to.rows_of(end - begin), last - first, PETSC_DETERMINE, PETSC_DETERMINE,
-                     interface.directions, nullptr, interface.directions, nullptr, rows.put()));
-  for (PetscInt pair = begin; pair < end; ++pair)
+  std::vector<SparseRow> rows;
+  for (PetscInt pair = first_pair_from(first); pair < first_pair_from(last); ++pair)
   {
-    check(MatSetValue(rows, to.normal(pair), from.normal(pair), 1, INSERT_VALUES));
-    PetscInt k = 0;
-    for (const double component : e.of(static_cast<std::size_t>(pair)))
-      check(MatSetValue(rows, to.normal(pair) + 1, from.normal(pair) + ++k, component, INSERT_VALUES));
+    rows.push_back({{from.normal(pair), 1}});
+    rows.emplace_back();
+    PetscInt row = from.normal(pair);
+    for (const double component : e.of(static_cast<std::size_t>(pair))) rows.back()[++row] = component;
   }
-  check(MatAssemblyBegin(rows, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(rows, MAT_FINAL_ASSEMBLY));
-  check(MatMatMult(rows, interface.B, MAT_INITIAL_MATRIX, PETSC_DEFAULT, result.B.put()));
+  const Owned<Mat> taken = matrix_of_rows(rows, last - first, comm_of(interface.B));
+  check(MatMatMult(taken, interface.B, MAT_INITIAL_MATRIX, PETSC_DEFAULT, result.B.put()));
   return result;
 }
 

@@ -219,17 +219,17 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   const PairRoles roles = roles_of(pairs, interface, steps);
   const bool slide =
       std::none_of(pairs.begin(), pairs.end(), [](const PairHistory& pair) { return pair.stuck || pair.turned; });
-  const bool many = PairRows<std::size_t>(interface.directions).rows_of(roles.active.size()) > 150;
+  const std::size_t rows = PairRows<std::size_t>(interface.directions).rows_of(roles.active.size());
+  const bool follow = slide && rows > 150; // friction, the normal force
   const RealModes beyond = modes_beyond_band(problem);
-  const std::size_t forces =
-      slide && many ? roles.active.size() : PairRows<std::size_t>(interface.directions).rows_of(roles.active.size());
+  const std::size_t forces = follow ? roles.active.size() : rows;
   missing = lack_of_memory(problem.sliding.structure,
                            static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces));
   if (!missing.empty()) return nullptr;
   constexpr double highest = 0.25; // of the modes: what they change says what those beyond them may
   return std::make_shared<const ReducedModel>(
       reduce(problem.sliding, problem.modes, roles,
-             {static_cast<int>(problem.modes.size()), 1e-5, slide && many, &beyond, problem.step.factor, highest}));
+             {static_cast<int>(problem.modes.size()), 1e-5, follow, &beyond, problem.step.factor, highest}));
 }
 
 /// What the grid of time changes the modulus of each value of the spectrum by. A step of order 2 on grids of n and 2 n

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 
 namespace squeal
@@ -65,14 +64,14 @@ std::vector<double> gaps_of(const Interface& interface, Vec u)
   return gap;
 }
 
-/// cos of the angle from each pair's axis, which D was made for, to its drive: 1 or -1, 0 without a drive.
+/// Whether each pair's drive is along its axis, which D was made for: 1, -1 against it, 0 without a drive.
 std::vector<double> senses(const Interface& interface, const std::vector<double>& axes)
 {
-  const std::vector<double> directions = drive_directions(interface);
-  const TangentView e(directions, interface.directions), axis(axes, interface.directions);
+  const TangentView drive(interface.drive, interface.directions);
+  const TangentView axis(axes, interface.directions);
   std::vector<double> result;
   for (std::size_t i = 0; i < static_cast<std::size_t>(interface.pairs); ++i)
-    result.push_back(std::inner_product(e.of(i).begin(), e.of(i).end(), axis.of(i).begin(), 0.));
+    result.push_back(drive_speed(interface, i) == 0 ? 0 : std::copysign(1, dot(drive.of(i), axis.of(i))));
   return result;
 }
 
@@ -329,14 +328,12 @@ PairCompliance::~PairCompliance() = default;
 
 bool PairCompliance::serves(const Interface& interface) const
 {
+  constexpr double rounding = 1e-12; // of unit vectors
   const std::vector<double> directions = drive_directions(interface), sense = senses(interface, parts_->axes);
   const TangentView<const double> e(directions, interface.directions), axis(parts_->axes, interface.directions);
   for (std::size_t i = 0; i < sense.size(); ++i)
-  {
-    const double along = drive_speed(interface, i) == 0 ? 0 : std::copysign(1, sense[i]);
     for (std::size_t k = 0; k < e.of(i).size(); ++k)
-      if (std::abs(e.of(i)[k] - along * axis.of(i)[k]) > 1e-12) return false;
-  }
+      if (std::abs(e.of(i)[k] - sense[i] * axis.of(i)[k]) > rounding) return false;
   return true;
 }
 

@@ -226,7 +226,7 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   ModeColumns of_modes = mode_columns(modes, reduction, contact.Z);
   MultiVector& columns = of_modes.columns;
   const Index modal = columns.columns();
-  const MatrixXd of_modes_alone = symmetric_inner_products(columns, product(E, columns));
+  const MatrixXd of_modes_alone = symmetric_inner_products(columns, E);
   append(columns, attachment_columns(E, BZ, forces, reduction.factor));
   model.omega = omega;
   const MatrixXd energy = energies(of_modes_alone, forces.transpose() * whole_product(BZ, columns));

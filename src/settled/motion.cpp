@@ -19,7 +19,7 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
   const double length = static_cast<double>(energies.size());
   if (base.explained < 0.8)
     return {MotionKind::undecided, "quasi-periodic and weakly irregular",
-            format("%.0f %% of the side bands lie on combinations of two frequencies: more periods would decide "
+            format("%.0f %% of the side bands are at combinations of two frequencies: more periods would decide "
                    "(-settled_periods)",
                    100 * base.explained)};
   // Had the modulation decayed to a half, the window would show it.
