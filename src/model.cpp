@@ -166,9 +166,9 @@ Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm)
   return scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, model.mesh, comm);
 }
 
-BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers)
+BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers, MPI_Comm comm)
 {
-  Model changed = rebuild_model(model, scene_with(scene, numbers), comm_of(model.structure.load));
+  Model changed = rebuild_model(model, scene_with(scene, numbers), comm);
   return {std::move(changed.structure), std::move(changed.interface)};
 }
 

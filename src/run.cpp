@@ -86,8 +86,10 @@ BrakeBranch run_branch(const Chain& chain)
   const double tolerance = scene.cycle.tolerance > 0 ? scene.cycle.tolerance : plain_tolerance;
   const std::string reason = no_cycle_to_follow(report.cycle, tolerance);
   if (!reason.empty()) return not_run<BrakeBranch>(OutcomeKind::skipped, reason);
-  const auto model_at = [&](double parameter) {
-    return model_with(chain.model, scene, std::array{SceneNumber{scene.branch->key, parameter}});
+  const auto model_at = [&](double parameter)
+  {
+    return model_with(chain.model, scene, std::array{SceneNumber{scene.branch->key, parameter}},
+                      comm_of(chain.model.structure.load));
   };
   return find_branch({*scene.branch, model_at, chain.sliding(), report.cycle, report.modes.modes, scene.fidelity,
                       steps_along_branch(scene.cycle, report.cycle), tolerance, chain.model.probes, scene.modes,
@@ -109,7 +111,7 @@ Sensitivity run_sensitivity(const Chain& chain)
   if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
   if (!part.empty()) return not_run<Sensitivity>(OutcomeKind::refused, part);
   const auto model_at = [&](const SceneNumber& number)
-  { return model_with(chain.model, scene, std::span(&number, 1)); };
+  { return model_with(chain.model, scene, std::span(&number, 1), comm_of(chain.model.structure.load)); };
   std::vector<int> probes;
   for (const Change& change : scene.changes)
     probes.push_back(
@@ -125,11 +127,11 @@ Sweep run_scene_sweep(const Chain& chain)
   if (!scene.sweep) return not_run<Sweep>(OutcomeKind::off, "the scene has no [sweep]");
   const std::string part = part_beyond_sweeps(chain.model);
   if (!part.empty()) return not_run<Sweep>(OutcomeKind::refused, part);
-  const auto model_at = [&](std::span<const double> values)
+  const auto model_at = [&](std::span<const double> values, MPI_Comm comm)
   {
     std::vector<SceneNumber> numbers;
     for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.sweep->key[i], values[i]});
-    return model_with(chain.model, scene, numbers);
+    return model_with(chain.model, scene, numbers, comm);
   };
   return run_sweep(
       {*scene.sweep, model_at, scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.sweep},
@@ -146,8 +148,7 @@ Robustness run_robustness(const Chain& chain)
   {
     std::vector<SceneNumber> numbers;
     for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.uncertain[i].key, values[i]});
-    Model model = rebuild_model(chain.model, scene_with(scene, numbers), PETSC_COMM_SELF);
-    return BrakeModel{std::move(model.structure), std::move(model.interface)};
+    return model_with(chain.model, scene, numbers, PETSC_COMM_SELF);
   };
   return find_robustness({*scene.robustness, scene.uncertain, model_at, scene.friction, scene.modes,
                           chain.options.modes, chain.options.equilibrium, chain.options.robustness},

@@ -25,7 +25,7 @@ Model build_model(const Scene& scene, MPI_Comm comm);
 Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm);
 
 /// Structure and contact of the scene with other values of its numbers, likewise. Collective.
-BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers);
+BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers, MPI_Comm comm);
 
 /// What the model is, as far as it is known before anything is solved. Collective.
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm);

@@ -122,13 +122,13 @@ bool time_is_up()
   return limit > 0 && seconds_since(control().begun) > limit;
 }
 
-/// All ranks take what any of them knows, and rank 0's clock.
+/// All ranks of `comm` take what any of them knows, and its rank 0's clock.
 void agree_on_requests(MPI_Comm comm)
 {
   Control& own = control();
   int rank = 0;
   MPI_Comm_rank(comm, &rank);
-  std::array<int, 3> known = {signal_received, 0, 1};
+  std::array<int, 3> known = {std::max(static_cast<int>(signal_received), own.ended_by), 0, 1};
   if (rank == 0)
   {
     if (known[0] == 0 && time_is_up()) known[0] = by_time_limit;
@@ -181,6 +181,21 @@ Request request(MPI_Comm comm)
   if (++own.since >= own.every) agree_on_requests(comm);
   if (own.ended_by != 0) return Request::end;
   return own.checkpoint_due ? Request::checkpoint : Request::none;
+}
+
+Request request_of_part(MPI_Comm part)
+{
+  agree_on_requests(part);
+  const Control& own = control();
+  if (own.ended_by != 0) return Request::end;
+  return own.checkpoint_due ? Request::checkpoint : Request::none;
+}
+
+void join_parts(MPI_Comm comm)
+{
+  control().checkpoint_due = false; // of one part alone
+  agree_on_requests(comm);
+  if (control().ended_by != 0) throw Interrupted{};
 }
 
 bool is_asked_here()

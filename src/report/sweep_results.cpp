@@ -89,6 +89,7 @@ void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
   entry["residual"] = sweep.outcome.residual;
   entry["basis_shapes"] = sweep.basis;
   entry["basis_corrections"] = sweep.passes;
+  entry["groups"] = sweep.groups;
   entry["points"] = Json::array();
   for (const SweepPoint& point : sweep.points) entry["points"].push_back(point_entry(point));
   entry["unstable_tracks"] = Json::array();
@@ -178,6 +179,7 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
   if (scene.sweep->stages == SweepStages::equilibrium) return lines;
   lines.back() += format("; backward error %.1e at most, on a basis of %d shapes after %d corrections",
                          sweep.outcome.residual, sweep.basis, sweep.passes);
+  if (sweep.groups > 1) lines.back() += format(", by %d groups of ranks", sweep.groups);
   if (sweep.tracks > 0)
     lines.push_back(
         format("%d modes followed, MAC %.3f at least, %d lost on the way", sweep.tracks, sweep.least_mac, sweep.lost));

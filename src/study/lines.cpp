@@ -63,4 +63,36 @@ std::vector<SweepLine> lines_of(const SweepSettings& settings)
   return both;
 }
 
+std::size_t points_of(const std::vector<SweepLine>& lines)
+{
+  std::size_t points = 0;
+  for (const SweepLine& line : lines) points += line.points.size();
+  return points;
+}
+
+std::vector<SweepLine> share_of(const std::vector<SweepLine>& lines, int group, int groups)
+{
+  const std::size_t total = points_of(lines);
+  const auto begin_of = [&](int g) { return total * static_cast<std::size_t>(g) / static_cast<std::size_t>(groups); };
+  const std::size_t begin = begin_of(group), end = begin_of(group + 1);
+  std::vector<SweepLine> share;
+  bool begins_line = false;
+  for (std::size_t first = 0; const SweepLine& line : lines)
+  {
+    const std::size_t last = first + line.points.size(), from = std::max(begin, first), to = std::min(end, last);
+    if (from < to)
+    {
+      SweepLine& piece = share.emplace_back(line);
+      piece.known = line.ordered && from > first;
+      const auto at = [&](std::size_t place) { return line.points.begin() + static_cast<std::ptrdiff_t>(place); };
+      piece.points = {at(from - first - (piece.known ? 1 : 0)), at(to - first)};
+      begins_line = begins_line || (line.ordered && !piece.known);
+    }
+    first = last;
+  }
+  if (group > 0 && begins_line)
+    share.insert(share.begin(), {{lines.front().points.front()}, lines.front().reversed, true, true});
+  return share;
+}
+
 } // namespace squeal

@@ -7,10 +7,12 @@
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "sweep_checkpoint.hpp"
+#include "sweep_groups.hpp"
 #include "swept_model.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <numbers>
 
 namespace squeal
@@ -46,26 +48,33 @@ double instability(std::complex<double> lambda)
   return lambda.real() - 1e-8 * std::abs(lambda);
 }
 
+/// Where a share of the points is visited, and the name of its checkpoint.
+struct SharePlace
+{
+  MPI_Comm comm;
+  bool of_part; // of the ranks
+  std::string checkpoint;
+};
+
 class Sweeper
 {
 public:
-  Sweeper(const SweepProblem& problem, MPI_Comm comm)
-      : problem_(problem), model_(problem), comm_(comm), sweep_(kept_sweep(comm)),
+  Sweeper(const SweepProblem& problem, SharePlace place)
+      : problem_(problem), model_(problem, place.comm), place_(std::move(place)),
+        sweep_(kept_sweep(place_.checkpoint, place_.comm)),
         kept_(static_cast<std::size_t>(std::ranges::count(sweep_.points, false, &SweepPoint::inserted)))
   {
   }
 
-  Sweep run()
+  /// Visits these lines.
+  Sweep run(const std::vector<SweepLine>& lines)
   {
-    const std::vector<SweepLine> lines = lines_of(problem_.settings);
-    std::size_t total = 0;
-    for (const SweepLine& line : lines) total += line.points.size();
-    Progress progress(comm_, "sweep", static_cast<double>(total));
+    Progress progress(place_.comm, "sweep", static_cast<double>(points_of(lines)));
     progress_ = &progress;
     for (const SweepLine& line : lines)
       for (const std::vector<double>& values : line.points)
       {
-        end_if_asked(comm_);
+        end_if_asked_here();
         model_.prepare({values, line.reversed});
       }
     if (model_.model() && is_large(model_.model()->structure)) tolerance_ = large_tolerance;
@@ -76,11 +85,19 @@ public:
       if (lines.size() > 1) train(lines.back());
     }
     for (const SweepLine& line : lines) run_line(line);
-    assess(total);
+    sweep_.basis = static_cast<int>(model_.shapes());
+    sweep_.passes = model_.passes();
     return std::move(sweep_);
   }
 
 private:
+  Request asked() const { return place_.of_part ? request_of_part(place_.comm) : request(place_.comm); }
+
+  void end_if_asked_here() const
+  {
+    if (asked() == Request::end) throw Interrupted();
+  }
+
   /// Makes the basis by the ends and the middle of a line that has points between them, which then need few
   /// corrections.
   void train(const SweepLine& line)
@@ -89,7 +106,7 @@ private:
     const std::size_t last = line.points.size() - 1;
     for (const std::size_t place : {last, std::size_t{0}, last / 2})
     {
-      end_if_asked(comm_);
+      end_if_asked_here();
       const SweptPlace at{line.points[place], line.reversed};
       if (model_.equilibrium_at(at).outcome.kind == OutcomeKind::converged) model_.modes_at(at, tolerance_);
     }
@@ -105,10 +122,10 @@ private:
         if (++done_ == kept_ && line.ordered) before = restored_end(line);
         continue;
       }
-      if (const Request asked = request(comm_); asked != Request::none)
+      if (const Request now = asked(); now != Request::none)
       {
-        keep_sweep(sweep_, comm_);
-        if (asked == Request::end) throw Interrupted();
+        keep_sweep(sweep_, place_.checkpoint, place_.comm);
+        if (now == Request::end) throw Interrupted();
       }
       std::optional<Followed> now = evaluate({values, line.reversed});
       progress_->update(static_cast<double>(++done_), "");
@@ -310,24 +327,9 @@ private:
     sweep_.thresholds.push_back(std::move(threshold));
   }
 
-  void assess(std::size_t total)
-  {
-    sweep_.outcome.iterations = static_cast<int>(sweep_.points.size());
-    sweep_.basis = static_cast<int>(model_.shapes());
-    sweep_.passes = model_.passes();
-    int failed = 0;
-    std::string first;
-    for (const SweepPoint& point : sweep_.points)
-      if (point.outcome.kind != OutcomeKind::converged && ++failed == 1)
-        first = format("%s = %g: ", problem_.settings.key[0].c_str(), point.values[0]) + point.outcome.reason;
-    if (failed == 0) return;
-    sweep_.outcome.kind = OutcomeKind::not_converged;
-    sweep_.outcome.reason = format("%d of %zu points failed, the first at ", failed, total) + first;
-  }
-
   const SweepProblem& problem_;
   SweptModel model_;
-  MPI_Comm comm_;
+  SharePlace place_;
   Sweep sweep_;
   std::size_t kept_; // points of the scene that were done before a restart
   double tolerance_ = exact_tolerance;
@@ -335,6 +337,53 @@ private:
   std::optional<Followed> first_{}; // of all lines
   std::size_t done_ = 0;            // points
 };
+
+/// Sets what follows from the points.
+void assess(Sweep& sweep, const std::string& key, std::size_t total)
+{
+  sweep.outcome.iterations = static_cast<int>(sweep.points.size());
+  int failed = 0;
+  std::string first;
+  for (const SweepPoint& point : sweep.points)
+    if (point.outcome.kind != OutcomeKind::converged && ++failed == 1)
+      first = format("%s = %g: ", key.c_str(), point.values[0]) + point.outcome.reason;
+  if (failed == 0) return;
+  sweep.outcome.kind = OutcomeKind::not_converged;
+  sweep.outcome.reason = format("%d of %zu points failed, the first at ", failed, total) + first;
+}
+
+/// Each group's share of the points, visited at the same time. What a group throws ends all of them after their work.
+Sweep run_in_groups(const SweepProblem& problem, const std::vector<SweepLine>& lines, int groups, MPI_Comm comm)
+{
+  const RankGroup group(comm, groups);
+  std::vector<std::vector<SweepLine>> shares;
+  for (int g = 0; g < groups; ++g) shares.push_back(share_of(lines, g, groups));
+  const std::string checkpoint = format("sweep_%d_of_%d", group.number() + 1, groups);
+  Sweep own;
+  std::exception_ptr failure;
+  try
+  {
+    own = Sweeper(problem, {group.comm(), true, checkpoint}).run(shares[static_cast<std::size_t>(group.number())]);
+  }
+  catch (const Interrupted&) // which join_parts throws on all ranks
+  {
+  }
+  catch (...)
+  {
+    failure = std::current_exception();
+  }
+  agree(comm, failure);
+  try
+  {
+    join_parts(comm);
+  }
+  catch (const Interrupted&)
+  {
+    if (!own.points.empty()) keep_sweep(own, checkpoint, group.comm());
+    throw;
+  }
+  return joined(shared(own, group, groups, comm), shares);
+}
 
 } // namespace
 
@@ -347,12 +396,20 @@ OptionList options_of(SweepOptions& options)
       {"-sweep_passes", &options.passes, Range::not_negative, "corrections of the basis at a point, at most"},
       {"-sweep_depth", &options.depth, Range::not_negative,
        "times that a step between points is halved where modes are unclear, at most"},
+      {"-sweep_groups", &options.groups, Range::not_negative,
+       "groups of ranks that share the points, at most one a rank or a point; 0: as many as pay"},
   };
 }
 
 Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm)
 {
-  return Sweeper(problem, comm).run();
+  const std::vector<SweepLine> lines = lines_of(problem.settings);
+  const std::size_t total = points_of(lines);
+  const int groups = groups_of(problem.options.groups, total, comm);
+  Sweep sweep =
+      groups > 1 ? run_in_groups(problem, lines, groups, comm) : Sweeper(problem, {comm, false, "sweep"}).run(lines);
+  assess(sweep, problem.settings.key[0], total);
+  return sweep;
 }
 
 } // namespace squeal

@@ -1,6 +1,5 @@
 #include "sweep_checkpoint.hpp"
 
-#include "squeal/base/checkpoint.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/run_control.hpp"
 
@@ -9,8 +8,6 @@ namespace squeal
 
 namespace
 {
-
-constexpr const char* name_of_file = "sweep";
 
 /// Reads the numbers of a list one after the other.
 class List
@@ -35,6 +32,13 @@ public:
     return list;
   }
 
+  std::string text()
+  {
+    std::string text;
+    for (const double letter : numbers()) text.push_back(static_cast<char>(letter));
+    return text;
+  }
+
 private:
   const std::vector<double>& values_;
   std::size_t next_ = 0;
@@ -54,6 +58,7 @@ void append(const SweepPoint& point, std::vector<double>& list)
         point.closed, point.unstable, static_cast<int>(point.modes.size())})
     list.push_back(value);
   list.push_back(point.outcome.residual);
+  append({point.outcome.reason.begin(), point.outcome.reason.end()}, list);
   for (const SweptMode& mode : point.modes)
     list.insert(list.end(), {mode.lambda.real(), mode.lambda.imag(), mode.backward_error,
                              static_cast<double>(mode.track), mode.mac, static_cast<double>(mode.subspace)});
@@ -66,11 +71,11 @@ SweepPoint point_from(List& list)
   point.reversed = list.integer() != 0;
   point.inserted = list.integer() != 0;
   point.outcome.kind = static_cast<OutcomeKind>(list.integer());
-  if (point.outcome.kind != OutcomeKind::converged) point.outcome.reason = "it failed before the restart";
   point.closed = list.integer();
   point.unstable = list.integer();
   point.modes.resize(static_cast<std::size_t>(list.integer()));
   point.outcome.residual = list.number();
+  point.outcome.reason = list.text();
   for (SweptMode& mode : point.modes)
   {
     const double real = list.number(), imaginary = list.number();
@@ -85,10 +90,8 @@ SweepPoint point_from(List& list)
 
 } // namespace
 
-void keep_sweep(const Sweep& sweep, MPI_Comm comm)
+Checkpoint packed(const Sweep& sweep)
 {
-  checkpoint_made();
-  if (!checkpoints_are_kept() || rank_of(comm) != 0) return;
   std::vector<double> points, thresholds;
   for (const SweepPoint& point : sweep.points) append(point, points);
   for (const Threshold& threshold : sweep.thresholds)
@@ -102,17 +105,16 @@ void keep_sweep(const Sweep& sweep, MPI_Comm comm)
   checkpoint.set("points", std::move(points));
   checkpoint.set("thresholds", std::move(thresholds));
   checkpoint.set("following", std::vector<double>{static_cast<double>(sweep.tracks), static_cast<double>(sweep.lost),
-                                                  sweep.least_mac, sweep.outcome.residual});
-  keep(checkpoint, name_of_file);
+                                                  sweep.least_mac, sweep.outcome.residual,
+                                                  static_cast<double>(sweep.basis), static_cast<double>(sweep.passes)});
+  return checkpoint;
 }
 
-Sweep kept_sweep(MPI_Comm comm)
+Sweep unpacked(const Checkpoint& checkpoint)
 {
   Sweep sweep;
   sweep.outcome.kind = OutcomeKind::converged;
-  const std::optional<Checkpoint> checkpoint = kept_everywhere(name_of_file, comm);
-  if (!checkpoint) return sweep;
-  List points(*checkpoint, "points"), thresholds(*checkpoint, "thresholds"), following(*checkpoint, "following");
+  List points(checkpoint, "points"), thresholds(checkpoint, "thresholds"), following(checkpoint, "following");
   while (!points.ended()) sweep.points.push_back(point_from(points));
   while (!thresholds.ended())
   {
@@ -128,6 +130,22 @@ Sweep kept_sweep(MPI_Comm comm)
   sweep.lost = following.integer();
   sweep.least_mac = following.number();
   sweep.outcome.residual = following.number();
+  sweep.basis = following.integer();
+  sweep.passes = following.integer();
+  return sweep;
+}
+
+void keep_sweep(const Sweep& sweep, const std::string& name, MPI_Comm comm)
+{
+  checkpoint_made();
+  if (checkpoints_are_kept() && rank_of(comm) == 0) keep(packed(sweep), name);
+}
+
+Sweep kept_sweep(const std::string& name, MPI_Comm comm)
+{
+  if (const std::optional<Checkpoint> checkpoint = kept_everywhere(name, comm)) return unpacked(*checkpoint);
+  Sweep sweep;
+  sweep.outcome.kind = OutcomeKind::converged;
   return sweep;
 }
 

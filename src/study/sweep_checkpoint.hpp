@@ -1,14 +1,20 @@
 #pragma once
 /// The points of a sweep that is not finished, as a checkpoint.
+#include "squeal/base/checkpoint.hpp"
 #include "squeal/study/sweep.hpp"
 
 namespace squeal
 {
 
-/// Keeps the points so far. Collective.
-void keep_sweep(const Sweep& sweep, MPI_Comm comm);
+Checkpoint packed(const Sweep& sweep);
+
+/// Error: it is cut short.
+Sweep unpacked(const Checkpoint& checkpoint);
+
+/// Keeps the points so far under a name. Collective.
+void keep_sweep(const Sweep& sweep, const std::string& name, MPI_Comm comm);
 
 /// The points to go on from; none where the run begins. Collective.
-Sweep kept_sweep(MPI_Comm comm);
+Sweep kept_sweep(const std::string& name, MPI_Comm comm);
 
 } // namespace squeal

@@ -26,8 +26,8 @@ std::vector<double> without_friction(std::vector<double> values, const SweepSett
 
 } // namespace
 
-SweptModel::SweptModel(const SweepProblem& problem)
-    : problem_(problem), equilibrium_options_(problem.equilibrium_options)
+SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm)
+    : problem_(problem), comm_(comm), equilibrium_options_(problem.equilibrium_options)
 {
   // the independent fixed point is a check of single runs
   if (equilibrium_options_.check_max_iterations < 0) equilibrium_options_.check_max_iterations = 0;
@@ -40,7 +40,7 @@ void SweptModel::go_to(const SweptPlace& place)
   if (!model_ || without_friction(at_.values, settings) != without_friction(place.values, settings))
   {
     model_.reset();
-    model_ = problem_.model_at(place.values);
+    model_ = problem_.model_at(place.values, comm_);
     at_ = {place.values};
   }
   Interface& interface = model_->interface;

@@ -22,7 +22,7 @@ struct SweptPlace
 class SweptModel
 {
 public:
-  explicit SweptModel(const SweepProblem& problem);
+  SweptModel(const SweepProblem& problem, MPI_Comm comm);
 
   /// Finds the equilibrium of a point. The pairs that are closed at all points prepared are those of the basis.
   void prepare(const SweptPlace& place);
@@ -48,6 +48,7 @@ private:
   BasisProblem basis_problem() const;
 
   const SweepProblem& problem_;
+  MPI_Comm comm_;
   EquilibriumOptions equilibrium_options_;
   std::optional<BrakeModel> model_{}; // at the point visited last
   SweptPlace at_{};

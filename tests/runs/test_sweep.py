@@ -154,14 +154,44 @@ def test_random_points_repeat_with_their_seed(converged):
     assert all(0.05 <= float(row["friction.coefficient"]) <= 0.5 and row["track"] == "" for row in first)
 
 
-def test_ranks_agree(pin, squeal):
-    other = squeal(*PIN, *sweep_of(end=0.35, points=4, directions="both"), ranks=2)
+@pytest.mark.parametrize("ranks, groups", [(2, 0), (2, 1), (3, 2), (3, 3)])
+def test_ranks_and_their_groups_agree(ranks, groups, pin, squeal):
+    """However the points are shared: the same modes, under the same names, and the same thresholds."""
+    other = squeal(*PIN, *sweep_of(end=0.35, points=4, directions="both"), "-sweep_groups", str(groups), ranks=ranks)
     assert other.code == 0
+    assert other.report["sweep"]["groups"] == (groups or 2)  # of eight points each gets four at least
     first, second = rows_of(pin.output), rows_of(other.output)
-    for mu in (0.05, 0.35):
-        same_modes(modes_at(first, mu, -1), modes_at(second, mu, -1), 1e-9)
+    for direction in (1, -1):
+        for mu in (0.05, 0.15, 0.25, 0.35):
+            same_modes(modes_at(first, mu, direction), modes_at(second, mu, direction), 1e-9)
+    assert names(first) == names(second)
     for a, b in zip(pin.report["sweep"]["thresholds"], other.report["sweep"]["thresholds"], strict=True):
+        assert a["track"] == b["track"] and a["direction"] == b["direction"]
         assert a["values"][0] == pytest.approx(b["values"][0], abs=a["error"] + b["error"])
+
+
+def names(rows):
+    """The modes' numbers at each point, by rising frequency."""
+    points = {}
+    for row in sorted((row for row in rows if row["frequency_hz"]), key=lambda row: float(row["frequency_hz"])):
+        points.setdefault((row["friction.coefficient"], row["direction"]), []).append(row["track"])
+    return points
+
+
+@pytest.mark.parametrize("sweep", [
+    sweep_of(TWO, "[0.1,0.02]", "[0.3,0.05]", points="[5,4]", directions="both"),
+    sweep_of(TWO, "[0.1,0.02]", "[0.3,0.05]", samples=11),
+    ["--set", "sweep.key=friction.coefficient", "--set", "sweep.values=[0.1,0.2,0.3]"],
+])
+def test_groups_share_few_points_two_numbers_and_random_ones(sweep, squeal):
+    one, two = squeal(*OSCILLATOR, *sweep, ranks=1), squeal(*OSCILLATOR, *sweep, "-sweep_groups", "9", ranks=2)
+    assert one.code == two.code == 0
+    assert two.report["sweep"]["groups"] == 2
+    for a, b in zip(one.report["sweep"]["points"], two.report["sweep"]["points"], strict=True):
+        assert a["values"] == b["values"] and a["direction"] == b["direction"]
+        assert a["growth_rate"] == pytest.approx(b["growth_rate"], abs=1e-9)  # of an eigenvalue of some 10 1/s
+    for a, b in zip(one.report["sweep"]["thresholds"], two.report["sweep"]["thresholds"], strict=True):
+        assert a["values"] == pytest.approx(b["values"], abs=a["error"] + b["error"]) and a["track"] == b["track"]
 
 
 def test_points_that_fail_are_passed_over(squeal):
@@ -211,16 +241,19 @@ def test_the_pictures_are_drawn(pin, converged):
         assert (run.output / "sweep.png").stat().st_size > 10000
 
 
-def test_an_interrupted_sweep_goes_on_where_it_was(squeal, tmp_path):
-    """The same points and thresholds as in one piece, whatever was done before the end."""
-    ask = [*PIN, *sweep_of(end=0.35, points=8), "--output", tmp_path / "in_two"]
-    whole = squeal(*PIN, *sweep_of(end=0.35, points=8), ranks=1)
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_an_interrupted_sweep_goes_on_where_it_was(ranks, squeal, tmp_path):
+    """The same points and thresholds as in one piece, whatever was done before the end; two ranks are two groups."""
+    sweep = sweep_of(end=0.35, points=8)
+    ask = [*PIN, *sweep, "--output", tmp_path / "in_two"]
+    whole = squeal(*PIN, *sweep, ranks=ranks)
     seconds = whole.report["timings"]
     limit = sum(seconds.values()) - 0.5 * seconds["sweep"]
-    first = squeal(*ask, "--time-limit", f"{limit:.2f}", ranks=1)
-    again = squeal(*ask, "--restart", ranks=1) if first.code == 3 else first
+    first = squeal(*ask, "--time-limit", f"{limit:.2f}", ranks=ranks)
+    again = squeal(*ask, "--restart", ranks=ranks) if first.code == 3 else first
     assert whole.code == again.code == 0, again.errors
     one, two = whole.report["sweep"], json.loads((tmp_path / "in_two" / "report.json").read_text())["sweep"]
+    assert one["groups"] == two["groups"] == ranks
     assert [p["values"] for p in one["points"]] == [p["values"] for p in two["points"]]
     for a, b in zip(one["thresholds"], two["thresholds"], strict=True):
         assert a["values"][0] == pytest.approx(b["values"][0], abs=a["error"] + b["error"]) and a["track"] == b["track"]

@@ -46,6 +46,14 @@ enum class Request
 /// ranks nothing is ever asked.
 Request request(MPI_Comm comm);
 
+/// The same of a part of the ranks that works by itself, by what these know and their first one's clock. Collective
+/// among them, at any time; join_parts comes after.
+Request request_of_part(MPI_Comm part);
+
+/// After parts of the ranks have worked by themselves: throws Interrupted if any of them was asked to end. Collective
+/// of all ranks.
+void join_parts(MPI_Comm comm);
+
 /// Whether this rank knows of a request to end: a signal, or the time limit by its own clock. For waiting that other
 /// ranks have no part in.
 bool is_asked_here();

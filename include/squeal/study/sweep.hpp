@@ -51,8 +51,9 @@ struct Sweep
   int tracks = 0;       // number of followed modes
   int lost = 0;         // modes in the band that could not be followed to the next point
   double least_mac = 1; // along all tracks
-  int basis = 0;        // shapes of the basis in the end
-  int passes = 0;       // corrections of the basis by residuals
+  int basis = 0;        // shapes of the basis in the end; of several groups the largest
+  int passes = 0;       // corrections of the bases by residuals
+  int groups = 1;       // of ranks, which shared the points
 };
 
 /// Options -sweep_...
@@ -61,6 +62,7 @@ struct SweepOptions
   double tolerance = 0; // backward error of right and left vectors on the basis; 0: chosen
   PetscInt passes = 8;  // corrections at a point, at most
   PetscInt depth = 6;   // times that a step is halved, at most
+  PetscInt groups = 0;  // of ranks, at most one a rank or a point; 0: chosen
 };
 
 OptionList options_of(SweepOptions& options);
@@ -69,7 +71,7 @@ OptionList options_of(SweepOptions& options);
 struct SweepProblem
 {
   const SweepSettings& settings;
-  std::function<BrakeModel(std::span<const double> values)> model_at;
+  std::function<BrakeModel(std::span<const double> values, MPI_Comm comm)> model_at;
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
@@ -77,7 +79,7 @@ struct SweepProblem
 };
 
 /// Visits all points, follows the modes along each line and finds the thresholds on the way. A point that fails is
-/// recorded with its reason. Collective.
+/// recorded with its reason. Groups of ranks visit a part of the points each. Collective.
 Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm);
 
 } // namespace squeal

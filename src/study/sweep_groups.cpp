@@ -1,0 +1,164 @@
+#include "sweep_groups.hpp"
+
+#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/base/broadcast.hpp"
+#include "squeal/base/free_memory.hpp"
+#include "sweep_checkpoint.hpp"
+
+#include <algorithm>
+#include <map>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// The first rank of a group, and of the rank behind the last group.
+int first_rank(int group, int groups, int ranks)
+{
+  return static_cast<int>((static_cast<long>(group) * ranks + groups - 1) / groups);
+}
+
+using TrackNames = std::map<int, int>; // of a part, to those of the whole
+
+/// The names of a point's tracks by those of the same point elsewhere, matched by their eigenvalues.
+TrackNames names_by(const SweepPoint& here, const SweepPoint& there)
+{
+  std::vector<std::complex<double>> own, known;
+  for (const SweptMode& mode : here.modes) own.push_back(mode.lambda);
+  for (const SweptMode& mode : there.modes) known.push_back(mode.lambda);
+  TrackNames names;
+  if (known.size() > own.size()) // the nearest of the shorter list: one may stand on the band's end
+  {
+    const std::vector<std::size_t> places = nearest_places(own, known);
+    for (std::size_t i = 0; i < own.size(); ++i) names[here.modes[i].track] = there.modes[places[i]].track;
+    return names;
+  }
+  const std::vector<std::size_t> places = nearest_places(known, own);
+  for (std::size_t i = 0; i < known.size(); ++i) names[here.modes[places[i]].track] = there.modes[i].track;
+  return names;
+}
+
+/// The last of the points that is this one and has modes; null: there is none.
+const SweepPoint* same_point(const std::vector<SweepPoint>& points, const SweepPoint& wanted)
+{
+  const auto found = std::find_if(points.rbegin(), points.rend(),
+                                  [&](const SweepPoint& point)
+                                  {
+                                    return point.values == wanted.values && point.reversed == wanted.reversed &&
+                                           point.outcome.kind == OutcomeKind::converged;
+                                  });
+  return found == points.rend() ? nullptr : &*found;
+}
+
+bool of_line(const Threshold& threshold, const SweepLine& line)
+{
+  const std::vector<double>& values = line.points.front();
+  return threshold.reversed == line.reversed &&
+         std::equal(values.begin() + 1, values.end(), threshold.values.begin() + 1, threshold.values.end());
+}
+
+/// Gives parts their places in the whole.
+class Joiner
+{
+public:
+  explicit Joiner(const Sweep& first) : whole_(first) {}
+
+  void add(const Sweep& part, const std::vector<SweepLine>& share)
+  {
+    TrackNames of_first; // by the first point of all
+    auto point = part.points.begin();
+    for (const SweepLine& line : share)
+    {
+      const auto begin = point;
+      for (std::size_t visited = 0; point != part.points.end() && visited < line.points.size(); ++point)
+        visited += point->inserted ? 0 : 1;
+      TrackNames names = of_first;
+      if (line.known && begin != point)
+        if (const SweepPoint* const there = same_point(whole_.points, *begin)) names = names_by(*begin, *there);
+      if (line.known && line.points.size() == 1)
+        of_first = names;
+      else
+        take(part, line, {begin + (line.known ? 1 : 0), point}, names);
+    }
+    whole_.lost += part.lost;
+    whole_.least_mac = std::min(whole_.least_mac, part.least_mac);
+    whole_.outcome.residual = std::max(whole_.outcome.residual, part.outcome.residual);
+    whole_.basis = std::max(whole_.basis, part.basis);
+    whole_.passes += part.passes;
+  }
+
+  Sweep whole() { return std::move(whole_); }
+
+private:
+  /// The points and thresholds of a line; what has no name yet gets a new one.
+  void take(const Sweep& part, const SweepLine& line, std::vector<SweepPoint> points, TrackNames& names)
+  {
+    const auto rename = [&](int& track)
+    {
+      if (track < 0) return;
+      const auto [name, is_new] = names.try_emplace(track, whole_.tracks);
+      whole_.tracks += is_new;
+      track = name->second;
+    };
+    for (SweepPoint& point : points)
+    {
+      for (SweptMode& mode : point.modes) rename(mode.track);
+      whole_.points.push_back(std::move(point));
+    }
+    for (Threshold threshold : part.thresholds)
+      if (of_line(threshold, line))
+      {
+        rename(threshold.track);
+        whole_.thresholds.push_back(std::move(threshold));
+      }
+  }
+
+  Sweep whole_;
+};
+
+} // namespace
+
+int groups_of(PetscInt wanted, std::size_t points, MPI_Comm comm)
+{
+  constexpr std::size_t fewest = 4; // points of a group: two that another one visits as well cost half as much again
+  const int ranks = ranks_of(comm);
+  if (wanted > 0) return std::min({static_cast<int>(wanted), ranks, static_cast<int>(points)});
+  const double of_model = peak_memory(comm), free = free_memory(comm); // a model with its modes, as so far
+  int groups = static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(ranks), points / fewest));
+  groups = std::min(groups, 1 + static_cast<int>(free / of_model));
+  while (groups > 1 && ranks % groups != 0) --groups;
+  MPI_Bcast(&groups, 1, MPI_INT, 0, comm);
+  return std::max(1, groups);
+}
+
+RankGroup::RankGroup(MPI_Comm comm, int groups)
+{
+  const int rank = rank_of(comm), ranks = ranks_of(comm);
+  while (first_rank(number_ + 1, groups, ranks) <= rank) ++number_;
+  MPI_Comm_split(comm, number_, rank, &comm_);
+}
+
+std::vector<Sweep> shared(const Sweep& own, const RankGroup& group, int groups, MPI_Comm comm)
+{
+  std::vector<Sweep> parts;
+  for (int g = 0; g < groups; ++g)
+  {
+    std::string bytes = g == group.number() ? packed(own).bytes() : std::string();
+    broadcast(bytes, comm, first_rank(g, groups, ranks_of(comm)));
+    parts.push_back(unpacked(*Checkpoint::from(bytes)));
+  }
+  return parts;
+}
+
+Sweep joined(const std::vector<Sweep>& parts, const std::vector<std::vector<SweepLine>>& shares)
+{
+  Joiner joiner(parts.front());
+  for (std::size_t g = 1; g < parts.size(); ++g) joiner.add(parts[g], shares[g]);
+  Sweep whole = joiner.whole();
+  whole.groups = static_cast<int>(parts.size());
+  return whole;
+}
+
+} // namespace squeal

@@ -1,0 +1,37 @@
+#pragma once
+/// A sweep shared by groups of ranks: each has a model of its own, and all their points make one sweep in the end.
+#include "lines.hpp"
+#include "squeal/base/petsc.hpp"
+#include "squeal/study/sweep.hpp"
+
+namespace squeal
+{
+
+/// The number of groups to take, at most one a rank and one a point; `wanted` = 0: as many as have memory for a model
+/// each, if each gets enough points to pay for its own basis. Collective.
+int groups_of(PetscInt wanted, std::size_t points, MPI_Comm comm);
+
+/// The group of this rank; groups hold neighbouring ranks. Collective.
+class RankGroup
+{
+public:
+  RankGroup(MPI_Comm comm, int groups);
+  RankGroup(const RankGroup&) = delete;
+  RankGroup& operator=(const RankGroup&) = delete;
+  ~RankGroup() { MPI_Comm_free(&comm_); }
+
+  int number() const { return number_; }
+  MPI_Comm comm() const { return comm_; }
+
+private:
+  int number_ = 0;
+  MPI_Comm comm_ = MPI_COMM_NULL;
+};
+
+/// Every group's part, on every rank. Collective.
+std::vector<Sweep> shared(const Sweep& own, const RankGroup& group, int groups, MPI_Comm comm);
+
+/// One sweep of the parts. A part's tracks get the numbers that the first modes of each of its lines have elsewhere.
+Sweep joined(const std::vector<Sweep>& parts, const std::vector<std::vector<SweepLine>>& shares);
+
+} // namespace squeal
