@@ -4,6 +4,7 @@
 #include "dense_factor.hpp"
 #include "mumps_factor.hpp"
 #include "squeal/algebra/factor_forecast.hpp"
+#include "squeal/algebra/large_pages.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
@@ -120,17 +121,24 @@ FactorForecast multifrontal_forecast(const SymbolicFactor& symbolic)
   return forecast;
 }
 
-/// Multiplies the lower triangle, stored by columns, by `factor` and copies it to the upper one, by tiles that fit the
+/// Multiplies the lower triangle, stored by columns, by `factor` and copies it to the upper one, by blocks that fit the
 /// cache.
 void scale_and_mirror(std::vector<double>& matrix, int size, double factor)
 {
   const auto n = static_cast<std::size_t>(size);
-  constexpr std::size_t tile = 64;
-  for (std::size_t row = 0; row < n; row += tile)
-    for (std::size_t column = 0; column <= row; column += tile)
-      for (std::size_t i = row; i < std::min(row + tile, n); ++i)
-        for (std::size_t j = column; j < std::min(column + tile, i + 1); ++j)
+  constexpr std::size_t block = 64;
+  for (std::size_t row = 0; row < n; row += block)
+    for (std::size_t column = 0; column <= row; column += block)
+      for (std::size_t i = row; i < std::min(row + block, n); ++i)
+        for (std::size_t j = column; j < std::min(column + block, i + 1); ++j)
           matrix[i * n + j] = matrix[j * n + i] *= factor;
+}
+
+/// The number of columns of a strip of moderate size that is wide enough for BLAS; a multiple of 6, see read().
+int strip_width(int size)
+{
+  constexpr int least = 384, numbers = 2 << 20; // 16 MB
+  return std::max(least, numbers / std::max(1, size) / 6 * 6);
 }
 
 /// Calls work(factor) with the factor that works through rank 0, if this rank holds one.
@@ -188,11 +196,68 @@ bool Factor::failed() const
   return parts_->failed;
 }
 
-std::vector<double> Factor::condensed(double scale)
+std::vector<double> Factor::condensed(double scale) const
 {
-  auto result = with_factor<std::vector<double>>(*parts_, [](auto& factor) { return factor.take_schur_complement(); });
+  std::vector<double> result;
+  if (const auto products = condensed_products())
+  {
+    const auto n = static_cast<std::size_t>(parts_->on_rank_zero() ? parts_->border : 0);
+    result = vector_on_large_pages(n * n);
+    result.resize(n * n);
+    products->read(
+        [&](const CondensedStrip& strip)
+        {
+          for (std::size_t j = strip.first; j < strip.last; ++j)
+            std::copy_n(strip.values + (j - strip.first) * strip.height, strip.height, &result[j * n + strip.first]);
+        });
+  }
+  else
+    result = on_held_factor<std::vector<double>>(*parts_, [](auto& factor) { return factor.take_schur_complement(); });
   if (parts_->on_rank_zero()) scale_and_mirror(result, parts_->border, scale);
   return result;
+}
+
+void Factor::read_condensed(const std::function<void(const CondensedStrip&)>& take) const
+{
+  if (const auto products = condensed_products()) return products->read(take);
+  const auto whole =
+      on_held_factor<std::vector<double>>(*parts_, [](auto& factor) { return factor.take_schur_complement(); });
+  const auto n = static_cast<std::size_t>(parts_->border);
+  if (parts_->on_rank_zero()) take({0, n, n, whole.data()});
+}
+
+std::optional<CondensedProducts> Factor::condensed_products() const
+{
+  if (parts_->cholesky) return CondensedProducts(*parts_);
+  return {};
+}
+
+int CondensedProducts::size() const
+{
+  return parts_->border;
+}
+
+double CondensedProducts::entries() const
+{
+  return parts_->cholesky->border_entries();
+}
+
+std::vector<double> CondensedProducts::product(std::span<const double> x, std::size_t columns) const
+{
+  return parts_->cholesky->schur_product(x, columns);
+}
+
+void CondensedProducts::read(const std::function<void(const CondensedStrip&)>& take) const
+{
+  const int width = strip_width(size());
+  for (int first = 0; first < size(); first += width)
+  {
+    const int last = std::min(first + width, size());
+    const std::vector<double> values = parts_->cholesky->schur_complement(first, last);
+    const auto begin = static_cast<std::size_t>(first);
+    if (parts_->on_rank_zero())
+      take({begin, static_cast<std::size_t>(last), static_cast<std::size_t>(size()) - begin, values.data()});
+  }
 }
 
 std::vector<double> Factor::forward(std::span<const Vec> b) const

@@ -6,7 +6,6 @@
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <memory>
 #include <utility>
 
@@ -67,74 +66,6 @@ Triplets entries_of_columns(const Triplets& own, const TreeShare& share, MPI_Com
   return result;
 }
 
-/// Zeros that take no memory before they are written.
-using LazyZeros = std::unique_ptr<double[], decltype(&std::free)>;
-
-LazyZeros lazy_zeros(std::size_t count)
-{
-  return {static_cast<double*>(std::calloc(std::max<std::size_t>(1, count), sizeof(double))), &std::free};
-}
-
-/// Adds the lower triangles of all ranks to that of rank 0. Collective.
-void sum_on_rank_zero(double* matrix, int size, MPI_Comm comm)
-{
-  constexpr std::size_t together = 1 << 18; // numbers
-  const std::size_t n = at(size);
-  std::vector<double> part;
-  for (std::size_t first = 0, last = 0; first < n; first = last)
-  {
-    part.clear();
-    for (; last < n && part.size() < together; ++last)
-      part.insert(part.end(), matrix + last * n + last, matrix + (last + 1) * n);
-    const bool receives = rank_of(comm) == 0;
-    MPI_Reduce(receives ? MPI_IN_PLACE : part.data(), part.data(), static_cast<int>(part.size()), MPI_DOUBLE, MPI_SUM,
-               0, comm);
-    const double* from = part.data();
-    for (std::size_t j = first; receives && j < last; from += n - j++) std::copy_n(from, n - j, matrix + j * n + j);
-  }
-}
-
-/// Adds E E' of a shared supernode to this rank's part of the Schur complement. `own`: this rank's rows of E, `height`
-/// apart. All rows are brought together for some pivots at a time. Collective.
-void add_shared_to_schur_complement(const SymbolicFactor& symbolic, const SharedSupernode& shared, const double* own,
-                                    std::pair<std::size_t, std::size_t> height_and_pivots, MPI_Comm comm,
-                                    double* schur_complement)
-{
-  const auto [height, pivots] = height_and_pivots;
-  const int ranks = ranks_of(comm), rows = to_int(shared.border.size());
-  std::vector<int> count(at(ranks), 0), border(at(rows)), holder(at(rows));
-  for (std::size_t i = 0; i < at(rows); ++i)
-  {
-    border[i] = shared.border[i] - symbolic.dofs;
-    holder[i] = holder_of(border[i], ranks);
-    ++count[at(holder[i])];
-  }
-  const std::size_t mine = at(count[at(rank_of(comm))]);
-  constexpr std::size_t together = 128;
-  for (std::size_t first = 0; first < pivots; first += together)
-  {
-    const std::size_t width = std::min(together, pivots - first);
-    std::vector<double> part(mine * width), all(at(rows) * width), E(all.size());
-    for (std::size_t j = 0; j < width; ++j) std::copy_n(own + (first + j) * height, mine, part.data() + j * mine);
-    std::vector<int> counts(count), starts(count.size(), 0);
-    for (std::size_t p = 0; p < counts.size(); ++p)
-    {
-      counts[p] *= static_cast<int>(width);
-      if (p > 0) starts[p] = starts[p - 1] + counts[p - 1];
-    }
-    MPI_Allgatherv(part.data(), to_int(part.size()), MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE,
-                   comm);
-    std::vector<std::size_t> next(starts.begin(), starts.end());
-    for (std::size_t i = 0; i < at(rows); ++i)
-    {
-      const std::size_t rank = at(holder[i]), from = next[rank]++;
-      for (std::size_t j = 0; j < width; ++j) E[j * at(rows) + i] = all[from + j * at(count[rank])];
-    }
-    add_to_schur_complement({E.data(), rows, static_cast<int>(width), border}, symbolic.border, rank_of(comm), ranks,
-                            schur_complement);
-  }
-}
-
 } // namespace
 
 Cholesky::Cholesky(Triplets own, SymbolicFactor symbolic, const RowLayout& layout, MPI_Comm comm)
@@ -150,25 +81,15 @@ void Cholesky::factorise(Triplets own)
   const SymbolicFactor& symbolic = share_.symbolic;
   const Columns A = ordered(own, symbolic);
   own = {};
-  const bool first = rank_of(comm_) == 0;
-  const std::size_t border = at(symbolic.border);
-  if (first)
-  {
-    schur_complement_ = vector_on_large_pages(border * border);
-    schur_complement_.resize(schur_complement_.capacity(), 0.);
-  }
-  const LazyZeros part = lazy_zeros(first ? 0 : border * border);
-  double* const sum = first ? schur_complement_.data() : part.get();
   values_ = vector_on_large_pages(symbolic.values);
   // Updates form a stack, since children come before parents. Its memory is not touched before it is needed.
   const auto waiting = std::make_unique_for_overwrite<double[]>(largest_sizes(symbolic, 0, share_.own).first);
-  int failed = !eliminate_own(A, waiting.get(), sum);
+  int failed = !eliminate_own(A, waiting.get());
   if (ranks_of(comm_) > 1)
   {
     MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_LOR, comm_);
-    if (!failed) failed = !eliminate_shared(A, sum);
+    if (!failed) failed = !eliminate_shared(A);
     MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_LOR, comm_);
-    if (!failed) sum_on_rank_zero(sum, symbolic.border, comm_);
   }
   failed_ = failed;
 }
@@ -185,18 +106,17 @@ void Cholesky::pack(const Supernode& supernode, const double* front, std::size_t
 }
 
 /// Leaves the updates of the subtrees' roots in `waiting`.
-bool Cholesky::eliminate_own(const Columns& A, double* waiting, double* schur_complement)
+bool Cholesky::eliminate_own(const Columns& A, double* waiting)
 {
   const SymbolicFactor& symbolic = share_.symbolic;
   const auto values = std::make_unique_for_overwrite<double[]>(largest_sizes(symbolic, 0, share_.own).second);
-  std::vector<int> local(at(symbolic.dofs + symbolic.border)), border;
+  std::vector<int> local(at(symbolic.dofs + symbolic.border));
   left_.assign(share_.own, nullptr);
   double* top = waiting;
   for (std::size_t k = 0; k < share_.own; ++k)
   {
     const Supernode& supernode = symbolic.supernodes[k];
     const Front front{supernode, rows_of(supernode), values.get()};
-    const std::size_t pivots = front.pivots(), inner = at(supernode.inner());
     assemble(front, A, local);
     for (auto number = supernode.children.rbegin(); number != supernode.children.rend(); ++number)
     {
@@ -206,11 +126,6 @@ bool Cholesky::eliminate_own(const Columns& A, double* waiting, double* schur_co
     }
     if (!eliminate_pivots(front)) return false;
     pack(supernode, front.values, at(supernode.below));
-    border.clear();
-    for (std::size_t i = inner; i < at(supernode.below); ++i) border.push_back(front.below[i] - symbolic.dofs);
-    if (!border.empty())
-      add_to_schur_complement({front.values + pivots + inner, supernode.height(), supernode.columns, border},
-                              symbolic.border, 0, 1, schur_complement);
     copy_update(front, top);
     left_[k] = top;
     top += update_size(supernode);
@@ -219,7 +134,7 @@ bool Cholesky::eliminate_own(const Columns& A, double* waiting, double* schur_co
 }
 
 /// Continues where a pivot is not positive, since all ranks take part.
-bool Cholesky::eliminate_shared(const Columns& A, double* schur_complement)
+bool Cholesky::eliminate_shared(const Columns& A)
 {
   const SymbolicFactor& symbolic = share_.symbolic;
   const int ranks = ranks_of(comm_), me = rank_of(comm_);
@@ -233,7 +148,6 @@ bool Cholesky::eliminate_shared(const Columns& A, double* schur_complement)
     const SharedSupernode& shared = share_.shared[k];
     values.resize(std::max(values.size(), front_size(supernode)));
     const Front front{supernode, rows_of(supernode), values.data()};
-    const std::size_t pivots = front.pivots(), inner = at(supernode.inner());
     for (const int row : shared.border)
       if (holder_of(row - symbolic.dofs, ranks) != me) local[at(row)] = -1;
     assemble(front, A, local);
@@ -253,10 +167,7 @@ bool Cholesky::eliminate_shared(const Columns& A, double* schur_complement)
       update = {};
     }
     positive = eliminate_pivots(front) && positive;
-    pack(supernode, front.values, inner);
-    if (!shared.border.empty())
-      add_shared_to_schur_complement(symbolic, shared, front.values + pivots + inner, {front.height(), pivots}, comm_,
-                                     schur_complement);
+    pack(supernode, front.values, at(supernode.inner()));
     updates_[k].resize(update_size(supernode));
     copy_update(front, updates_[k].data());
   }

@@ -23,8 +23,12 @@ public:
   /// Whether A is not positive definite, the same on all ranks; the factor is then not to be used.
   bool failed() const { return failed_; }
 
-  /// E E' by columns, of which the lower triangle is set; on rank 0. Moves its storage out: call it once.
-  std::vector<double> take_schur_complement() { return std::move(schur_complement_); }
+  /// Columns `first` to `last` of E E' from row `first` on, one column after the other, of which the lower triangle is
+  /// set; on rank 0. Collective.
+  std::vector<double> schur_complement(int first, int last) const;
+
+  /// E E' x for each x, the border's rows one after the other; x is read and the product given on rank 0. Collective.
+  std::vector<double> schur_product(std::span<const double> x, std::size_t columns) const;
 
   /// E L^-1 b, on rank 0, of right-hand sides whose own rows are given; keeps L^-1 b. Collective.
   std::vector<double> forward(std::span<const double* const> b);
@@ -35,10 +39,13 @@ public:
   /// Entries of L and E on all ranks.
   double entries() const { return share_.symbolic.entries; }
 
+  /// Those of E alone. Collective.
+  double border_entries() const;
+
 private:
   void factorise(Triplets own);
-  bool eliminate_own(const Columns& A, double* waiting, double* schur_complement);
-  bool eliminate_shared(const Columns& A, double* schur_complement);
+  bool eliminate_own(const Columns& A, double* waiting);
+  bool eliminate_shared(const Columns& A);
   void pack(const Supernode& supernode, const double* front, std::size_t split);
   void sum_shared_pivots();
   void subtract_shared_border();
@@ -50,13 +57,12 @@ private:
   std::vector<double> values_;               // L and E, packed
   std::vector<std::vector<double>> updates_; // of shared supernodes, until they are added to their parents
   std::vector<const double*> left_;          // the same of own subtrees' roots
-  std::vector<double> schur_complement_;
-  std::vector<double> work_;            // L^-1 b: the entries of all columns at a position are neighbours
-  std::size_t columns_ = 0, lanes_ = 0; // of `work_`: lanes_ - columns_ of each position are not used
+  std::vector<double> work_;                 // L^-1 b: the entries of all columns at a position are neighbours
+  std::size_t columns_ = 0, lanes_ = 0;      // of `work_`: lanes_ - columns_ of each position are not used
   bool failed_ = false;
 };
 
-/// The largest memory that a Cholesky takes on one rank, without its Schur complement [bytes].
+/// The largest memory that a Cholesky takes on one rank [bytes].
 double cholesky_memory(const SymbolicFactor& symbolic);
 
 /// The same of this rank's share.

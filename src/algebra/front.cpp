@@ -5,29 +5,6 @@
 namespace squeal
 {
 
-namespace
-{
-
-/// The product of some rows of E with others, which begin no later, added to the Schur complement.
-void add_tile(const BorderRows& E, std::pair<int, int> rows, std::pair<int, int> columns, int border,
-              std::vector<double>& product, double* schur_complement)
-{
-  PetscBLASInt height = rows.second, width = columns.second, pivots = E.pivots, n = E.height;
-  const double one = 1, zero = 0;
-  product.resize(std::max(product.size(), at(height) * at(width)));
-  BLASgemm_("N", "T", &height, &width, &pivots, &one, E.values + rows.first, &n, E.values + columns.first, &n, &zero,
-            product.data(), &height);
-  for (int j = 0; j < width; ++j)
-  {
-    double* const column = schur_complement + at(E.rows[at(columns.first + j)]) * at(border);
-    const double* const from = &product[at(j) * at(height)];
-    for (int i = std::max(0, columns.first + j - rows.first); i < height; ++i)
-      column[E.rows[at(rows.first + i)]] += from[i];
-  }
-}
-
-} // namespace
-
 Columns ordered(const Triplets& lower, const SymbolicFactor& symbolic)
 {
   const std::size_t count = lower.row.size();
@@ -103,28 +80,6 @@ bool eliminate_pivots(const Front& front)
   if (border > 0)
     BLASgemm_("N", "T", &border, &inner, &pivots, &minus, lower + inner, &n, lower, &n, &one, update + inner, &n);
   return true;
-}
-
-void add_to_schur_complement(const BorderRows& E, int border, int first, int ranks, double* schur_complement)
-{
-  const int rows = static_cast<int>(E.rows.size());
-  if (rows == border && ranks == 1)
-  {
-    PetscBLASInt n = border, pivots = E.pivots, height = E.height;
-    const double one = 1;
-    BLASsyrk_("L", "N", &n, &pivots, &one, E.values, &height, &one, schur_complement, &n);
-    return;
-  }
-  constexpr int most = 128;
-  // alone, a rank takes a tile's columns with all rows below; several take square tiles in turn
-  const int tall = ranks == 1 ? rows : most;
-  int number = 0;
-  std::vector<double> product;
-  for (int column = 0; column < rows; column += most)
-    for (int row = column; row < rows; row += tall)
-      if (number++ % ranks == first)
-        add_tile(E, {row, std::min(tall, rows - row)}, {column, std::min(most, rows - column)}, border, product,
-                 schur_complement);
 }
 
 } // namespace squeal

@@ -1,5 +1,5 @@
 #pragma once
-/// Frontal matrices of a supernodal factor: assembly, elimination, and what they add to the Schur complement.
+/// Frontal matrices of a supernodal factor: assembly and elimination.
 #include "symbolic_factor.hpp"
 
 #include <algorithm>
@@ -66,17 +66,5 @@ void copy_update(const Front& front, double* to);
 
 /// Factorises the pivots and subtracts their products from the inner rows. Returns false if a pivot is not positive.
 bool eliminate_pivots(const Front& front);
-
-/// Rows of E = B L^-T: `height` apart, for that many pivots.
-struct BorderRows
-{
-  const double* values;
-  int height, pivots;
-  std::span<const int> rows; // of the border, counted from zero
-};
-
-/// Adds E E' to the lower triangle of the Schur complement of `border` rows, tile by tile. Every `ranks`-th tile is
-/// this rank's, from `first` on.
-void add_to_schur_complement(const BorderRows& E, int border, int first, int ranks, double* schur_complement);
 
 } // namespace squeal

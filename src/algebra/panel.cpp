@@ -149,8 +149,8 @@ template <class Work> SQUEAL_INLINE void for_each_strip(const Panel& L, Work wor
   for (std::size_t j = 0; j < L.columns; j += width_from(j, L.columns))
   {
     const std::size_t some = width_from(j, L.columns);
-    with_width(some, [&](auto width) SQUEAL_INLINE_LAMBDA { work(strip, j, width); });
-    strip += some * padded(L.rows);
+    with_width(some, [&](auto width) SQUEAL_INLINE_LAMBDA { work(strip + width * L.above, j, width); });
+    strip += some * (L.above + padded(L.rows));
   }
 }
 
@@ -354,6 +354,21 @@ double* pack_panel(const double* from, std::size_t height, std::size_t rows, std
         std::fill(to + count, to + tile, 0.);
       }
   return to;
+}
+
+void unpack_rows(const Panel& L, std::size_t first, double* to)
+{
+  const std::size_t height = L.rows - first;
+  for_each_strip(L,
+                 [&](const double* strip, std::size_t j, auto width)
+                 {
+                   for (std::size_t k = 0; k < width; ++k)
+                     for (std::size_t i = first, end = 0; i < L.rows; i = end)
+                     {
+                       end = std::min(L.rows, i / tile * tile + tile);
+                       std::copy_n(strip + row_of(i, width) + tile * k, end - i, to + (j + k) * height + i - first);
+                     }
+                 });
 }
 
 double* pack_triangle(const double* from, std::size_t height, std::size_t columns, double* to)

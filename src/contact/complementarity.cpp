@@ -36,10 +36,19 @@ MatrixXd split_matrix(const ComplementarityProblem& problem, const std::vector<c
   return matrix;
 }
 
-double relative_defect(const MatrixXd& matrix, const VectorXd& x, const VectorXd& rhs)
+/// |rhs - N g + M r| over the largest of rhs, the gaps and the reactions times their compliance.
+double relative_defect(const ComplementarityProblem& problem, const SplitSolution& solution, const VectorXd& rhs)
 {
-  const double scale = std::max(rhs.lpNorm<Eigen::Infinity>(), x.lpNorm<Eigen::Infinity>());
-  return scale > 0 ? (rhs - matrix * x).lpNorm<Eigen::Infinity>() / scale : 0;
+  const auto g = as_vector(solution.gap), r = as_vector(solution.reaction);
+  const double scale = std::max(
+      {rhs.lpNorm<Eigen::Infinity>(), g.lpNorm<Eigen::Infinity>(), problem.compliance * r.lpNorm<Eigen::Infinity>()});
+  if (!(scale > 0)) return 0;
+  VectorXd defect = rhs + problem.M * r;
+  if (problem.N.size() == 0)
+    defect -= g;
+  else
+    defect.noalias() -= problem.N * g;
+  return defect.lpNorm<Eigen::Infinity>() / scale;
 }
 
 /// The shortest of the least-squares solutions: pairs that share a rigid face share its load evenly.
@@ -54,11 +63,11 @@ VectorXd shortest_solution(const MatrixXd& matrix, const VectorXd& rhs)
 } // namespace
 
 SplitSolver::SplitSolver(const ComplementarityProblem& problem, std::vector<char> closed)
-    : closed_(std::move(closed)), compliance_(problem.compliance), matrix_(split_matrix(problem, closed_))
+    : problem_(problem), closed_(std::move(closed)), storage_(split_matrix(problem, closed_))
 {
   if (closed_.empty()) return;
-  if (!matrix_.allFinite()) throw Error("contact at rest: the compliance of the pairs is not a finite number");
-  factors_.emplace(matrix_);
+  if (!storage_.allFinite()) throw Error("contact at rest: the compliance of the pairs is not a finite number");
+  factors_.emplace(storage_); // in place
   const VectorXd pivots = factors_->matrixLU().diagonal().cwiseAbs();
   if (!(pivots.minCoeff() > 1e-13 * pivots.maxCoeff())) factors_.reset();
 }
@@ -73,13 +82,14 @@ SplitSolution SplitSolver::solve(const std::vector<double>& rhs) const
   if (!as_vector(rhs).allFinite())
     throw Error(
         "contact at rest: the gaps under the loads are not finite numbers: are forces in N and pressures in Pa?");
-  const VectorXd x = factors_ ? VectorXd(factors_->solve(as_vector(rhs))) : shortest_solution(matrix_, as_vector(rhs));
-  solution.defect = relative_defect(matrix_, x, as_vector(rhs));
+  const VectorXd x = factors_ ? VectorXd(factors_->solve(as_vector(rhs)))
+                              : shortest_solution(split_matrix(problem_, closed_), as_vector(rhs));
   for (std::size_t i = 0; i < n; ++i)
     if (closed_[i])
-      solution.reaction[i] = x[static_cast<Index>(i)] / compliance_;
+      solution.reaction[i] = x[static_cast<Index>(i)] / problem_.compliance;
     else
       solution.gap[i] = x[static_cast<Index>(i)];
+  solution.defect = relative_defect(problem_, solution, as_vector(rhs));
   return solution;
 }
 
@@ -144,8 +154,9 @@ StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vecto
 
 bool has_one_solution(const ComplementarityProblem& problem)
 {
-  const MatrixXd symmetric = (problem.M + problem.M.transpose()) / 2;
-  return symmetric.rows() == 0 || symmetric.llt().info() == Eigen::Success;
+  if (problem.M.rows() == 0) return true;
+  MatrixXd symmetric = (problem.M + problem.M.transpose()) / 2;
+  return Eigen::LLT<Eigen::Ref<MatrixXd>>(symmetric).info() == Eigen::Success; // in place
 }
 
 double unilateral_residual(const std::vector<double>& reaction, const std::vector<double>& gap,
@@ -183,7 +194,7 @@ ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, do
   }
 }
 
-double largest_eigenvalue(const Eigen::Ref<const MatrixXd>& A, int iterations)
+double largest_eigenvalue(const MatrixXd& A, const VectorXd& added, int iterations)
 {
   VectorXd x(A.rows()), image(A.rows());
   for (Index i = 0; i < x.size(); ++i) x[i] = 1 + 0.5 * std::sin(7. * static_cast<double>(i) + 1);
@@ -193,6 +204,7 @@ double largest_eigenvalue(const Eigen::Ref<const MatrixXd>& A, int iterations)
     if (x.norm() == 0) return 0;
     x.normalize();
     image.noalias() = A.selfadjointView<Eigen::Lower>() * x;
+    image += added.cwiseProduct(x);
     eigenvalue = image.norm();
     x.swap(image);
   }

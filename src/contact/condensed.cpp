@@ -98,18 +98,13 @@ Factored factor_positive(Mat A, const Interface& interface, const FactorOptions&
   return result;
 }
 
-CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names,
-                           const FactorOptions& options)
+Factor factor_held(Mat A, const Interface& interface, const DofNames& names, const FactorOptions& options)
 {
   auto [factor, loose, indefinite, resistance] = factor_positive(A, interface, options);
   if (loose)
     throw Error((indefinite ? "not positive definite: driven on, not back, is" : "singular: nothing resists") +
                 (" a motion that is largest at " + describe(names, *loose)) + "; give it a support, a spring or mass");
-  CondensedOperator condensed;
-  condensed.factor = std::move(factor);
-  condensed.W = condensed.factor.condensed(scale);
-  condensed.size = static_cast<int>(interface.size());
-  return condensed;
+  return std::move(factor);
 }
 
 } // namespace squeal

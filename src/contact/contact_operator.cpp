@@ -1,5 +1,6 @@
 #include "squeal/contact/contact_operator.hpp"
 
+#include "near_field.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/algebra/simd.hpp"
 #include "squeal/base/error.hpp"
@@ -51,59 +52,6 @@ SQUEAL_SIMD void add_runs(const NearField& near, std::size_t pair, std::size_t n
   }
 }
 
-/// The largest entry of each block of a pair's rows.
-std::vector<double> block_sizes(const PairMatrixView& W, std::size_t pair, std::size_t pairs)
-{
-  std::vector<double> sizes(pairs, 0.);
-  for (std::size_t j = 0; j < pairs; ++j)
-    for (const PairVector& row : W.block(pair, j))
-      for (const double entry : row) sizes[j] = std::max(sizes[j], std::abs(entry));
-  return sizes;
-}
-
-/// The size below which the blocks of a pair's rows add up to the share NearField::left_out of its own block.
-double negligible_size(const std::vector<double>& sizes, std::size_t pair)
-{
-  std::vector<double> ascending = sizes;
-  std::sort(ascending.begin(), ascending.end());
-  double sum = 0;
-  for (const double size : ascending)
-  {
-    sum += size;
-    if (sum > NearField::left_out * sizes[pair]) return size;
-  }
-  return ascending.back();
-}
-
-/// Blocks that are negligible in both pairs' rows are left out, so that no row misses more than its share.
-NearField near_field(const PairMatrixView& W, std::size_t pairs, int directions)
-{
-  NearField near;
-  const PairRows<std::size_t> rows(directions);
-  std::vector<double> limits;
-  for (std::size_t i = 0; i < pairs; ++i) limits.push_back(negligible_size(block_sizes(W, i, pairs), i));
-  for (std::size_t i = 0; i < pairs; ++i)
-  {
-    near.runs_of.push_back(near.runs.size());
-    near.values_of.push_back(near.values.size());
-    const std::vector<double> sizes = block_sizes(W, i, pairs);
-    for (std::size_t j = 0; j < pairs; ++j)
-    {
-      if (sizes[j] < std::min(limits[i], limits[j])) continue;
-      const bool follows =
-          near.runs.size() > near.runs_of.back() && near.runs.back().first + near.runs.back().count == rows.normal(j);
-      if (!follows) near.runs.push_back({rows.normal(j), 0});
-      near.runs.back().count += rows.per_pair();
-    }
-    for (std::size_t run = near.runs_of.back(); run < near.runs.size(); ++run)
-      for (std::size_t k = 0; k < rows.per_pair(); ++k)
-        for (const double entry : W.row(i, k).subspan(near.runs[run].first, near.runs[run].count))
-          near.values.push_back(static_cast<float>(entry));
-  }
-  near.runs_of.push_back(near.runs.size());
-  return near;
-}
-
 } // namespace
 
 SQUEAL_SIMD void add_rows(const float* rows, std::size_t length, std::size_t number, const PairVector& factors,
@@ -116,6 +64,14 @@ void ContactOperator::multiply(std::span<const std::span<const double>> x, std::
 {
   const std::size_t n = size(), lanes = lanes_for(x.size());
   if (x.empty()) return;
+  if (products_)
+  {
+    std::vector<double> all;
+    for (const std::span<const double> column : x) all.insert(all.end(), column.begin(), column.end());
+    const std::vector<double> result = multiply_by_factor(all, x.size());
+    for (std::size_t k = 0; k < y.size(); ++k) std::copy_n(result.data() + k * n, n, y[k].data());
+    return;
+  }
   if (lanes == 1) return multiply_one(x[0], y[0]);
   std::vector<double> from(n * lanes), to(n * lanes);
   for (std::size_t k = 0; k < x.size(); ++k)
@@ -138,19 +94,36 @@ void ContactOperator::add_near_product(std::size_t pair, const PairVector& chang
 
 double ContactOperator::near_share() const
 {
-  return values_.empty() ? 0 : static_cast<double>(near_.values.size()) / static_cast<double>(values_.size());
-}
-
-Eigen::MatrixXd ContactOperator::submatrix(std::span<const Eigen::Index> rows) const
-{
-  const auto n = static_cast<Eigen::Index>(size());
-  return Eigen::MatrixXd::Map(values_.data(), n, n)(rows, rows);
+  const auto n = static_cast<double>(size());
+  return n == 0 ? 0 : static_cast<double>(near_.values.size()) / (n * n);
 }
 
 double ContactOperator::largest_eigenvalue(int iterations) const
 {
-  const auto n = static_cast<Eigen::Index>(size());
-  return squeal::largest_eigenvalue(Eigen::MatrixXd::Map(values_.data(), n, n), iterations);
+  std::vector<double> x(size()), y(size());
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] = 1 + 0.1 * std::sin(static_cast<double>(i));
+  double largest = 0;
+  for (int k = 0; k < iterations; ++k)
+  {
+    const double length = std::sqrt(dot(x, x));
+    if (length == 0) break;
+    for (double& entry : x) entry /= length;
+    const std::span<const double> in = x;
+    const std::span<double> out = y;
+    multiply(std::span(&in, 1), std::span(&out, 1));
+    largest = dot(x, y);
+    std::swap(x, y);
+  }
+  return largest;
+}
+
+void ContactOperator::set_diagonal(std::vector<PairBlock> blocks)
+{
+  diagonal_ = std::move(blocks);
+  double largest = 0;
+  for (const PairBlock& A : diagonal_)
+    for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, A[k][k]);
+  for (const PairBlock& A : diagonal_) scale_.push_back(natural_scale(A, largest));
 }
 
 ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions)
@@ -164,15 +137,53 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
   ContactOperator op;
   op.pairs_ = count;
   op.directions_ = directions;
-  double largest = 0;
-  for (std::size_t pair = 0; pair < count; ++pair)
+  if (n > fits_the_cache)
   {
-    op.diagonal_.push_back(view.block(pair, pair));
-    for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, op.diagonal_.back()[k][k]);
+    NearFieldBuilder builder(count, directions);
+    const CondensedStrip whole{0, n, n, W.data()};
+    builder.measure(whole);
+    builder.collect(whole);
+    op.near_ = builder.finish();
+    op.set_diagonal(builder.diagonal());
   }
-  for (const PairBlock& A : op.diagonal_) op.scale_.push_back(natural_scale(A, largest));
-  if (n > fits_the_cache) op.near_ = near_field(view, count, directions);
+  else
+  {
+    std::vector<PairBlock> blocks;
+    for (std::size_t pair = 0; pair < count; ++pair) blocks.push_back(view.block(pair, pair));
+    op.set_diagonal(std::move(blocks));
+  }
   op.values_ = std::move(W);
+  return op;
+}
+
+bool stays_in_factor(double rows, double border_entries, double free)
+{
+  const double half = rows * rows / 2; // of a symmetric W, which a product reads; or E twice
+  return 2 * border_entries < half || sizeof(double) * 2 * half > free / 4;
+}
+
+ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm)
+{
+  ContactOperator op;
+  op.products_ = W;
+  if (ranks_of(comm) > 1) op.shared_by_ = comm;
+  NearFieldBuilder builder(static_cast<std::size_t>(pairs), directions);
+  std::vector<double> values;
+  const auto scaled = [&](const CondensedStrip& strip)
+  {
+    values.assign(strip.values, strip.values + (strip.last - strip.first) * strip.height);
+    for (double& entry : values) entry *= W.scale;
+    for (std::size_t j = strip.first; !W.diagonal.empty() && j < strip.last; ++j)
+      values[(j - strip.first) * (strip.height + 1)] += W.diagonal[j];
+    return CondensedStrip{strip.first, strip.last, strip.height, values.data()};
+  };
+  W.products.read([&](const CondensedStrip& strip) { builder.measure(scaled(strip)); });
+  W.products.read([&](const CondensedStrip& strip) { builder.collect(scaled(strip)); });
+  if (rank_of(comm) != 0) return op;
+  op.pairs_ = static_cast<std::size_t>(pairs);
+  op.directions_ = directions;
+  op.near_ = builder.finish();
+  op.set_diagonal(builder.diagonal());
   return op;
 }
 

@@ -3,7 +3,8 @@
 ///
 /// Let w = w_0 + dw with w_0 = W r_0 + b from the last product with W, and dw the effect of the changes since. The
 /// sweeps update dw alone. It is small, so the near field and single precision suffice; where they did not lead to
-/// convergence, W itself is swept over. A problem counts as converged only by the residual after a product with W.
+/// convergence, W itself is swept over, where it is whole. A problem counts as converged only by the residual after a
+/// product with W.
 #include "gauss_seidel.hpp"
 
 #include <algorithm>
@@ -208,7 +209,7 @@ void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& se
     std::erase_if(left, [&](const ContactWork* work)
                   { return work->result.converged || work->result.iterations >= settings.max_iterations; });
   }
-  sweep_until_converged<double>(left, settings);
+  if (works.front()->W.is_whole()) sweep_until_converged<double>(left, settings);
 }
 
 } // namespace squeal

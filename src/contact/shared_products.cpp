@@ -1,5 +1,6 @@
-/// Products with a W whose columns are shared by the ranks: y = sum over ranks of what the lower triangle of their
-/// columns and its transpose have in W x. Columns go to ranks by equal parts of the triangle.
+/// Products that ranks form together. Of a W whose columns they share: y = sum over ranks of what the lower triangle of
+/// their columns and its transpose have in W x. Columns go to ranks by equal parts of the triangle. Of a W in the
+/// factor: each rank reads its part of the factor.
 #include "squeal/algebra/large_pages.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/base/integers.hpp"
@@ -89,13 +90,30 @@ void ContactOperator::multiply_one(std::span<const double> x, std::span<double> 
   MPI_Reduce(MPI_IN_PLACE, y.data(), to_int(rows_), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
 }
 
+/// On rank 0.
+std::vector<double> ContactOperator::multiply_by_factor(std::span<const double> x, std::size_t columns) const
+{
+  int more = to_int(columns);
+  if (shared_by_ != MPI_COMM_NULL) MPI_Bcast(&more, 1, MPI_INT, 0, shared_by_);
+  std::vector<double> y = products_->products.product(x, columns);
+  const std::vector<double>& added = products_->diagonal;
+  for (std::size_t i = 0; i < y.size(); ++i)
+    y[i] = products_->scale * y[i] + (added.empty() ? 0 : added[i % added.size()] * x[i]);
+  return y;
+}
+
 void ContactOperator::serve() const
 {
   std::vector<double> x(rows_), y(rows_);
   for (int more = 1;;)
   {
-    MPI_Bcast(&more, 1, MPI_INT, 0, shared_by_);
+    MPI_Bcast(&more, 1, MPI_INT, 0, shared_by_); // vectors to be multiplied
     if (!more) return;
+    if (products_)
+    {
+      (void)products_->products.product({}, static_cast<std::size_t>(more));
+      continue;
+    }
     MPI_Bcast(x.data(), to_int(rows_), MPI_DOUBLE, 0, shared_by_);
     std::fill(y.begin(), y.end(), 0.);
     add_strips(x, y);

@@ -142,6 +142,9 @@ std::vector<ContactResult> solve_contacts(const ContactOperator& W, const Fricti
     }
     form_products(cold);
     gauss_seidel(all, settings);
+    if (!W.is_whole()) // sweeps over the near field may not converge where friction is strong
+      for (ContactWork& work : works)
+        if (!work.result.converged) fixed_point(work, settings);
     break;
   }
   case ContactSolver::fixed_point:

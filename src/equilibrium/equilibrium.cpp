@@ -75,19 +75,32 @@ std::vector<double> senses(const Interface& interface, const std::vector<double>
   return result;
 }
 
-/// The gaps that normal reactions cause with the friction that each brings along, D_nn + D_nt mu e; on rank 0, where D
-/// is. `friction`: of every pair along its axis.
-Eigen::MatrixXd normal_compliance(const PairMatrixView& D, const std::vector<double>& friction)
+/// What reactions do to gaps, pairs x pairs: D_nn of normal ones, D_nt of friction along the axes. On rank 0.
+struct GapCompliance
 {
-  const auto pairs = static_cast<Eigen::Index>(friction.size());
-  Eigen::MatrixXd result(pairs, pairs);
-  for (std::size_t i = 0; i < friction.size(); ++i)
-    for (std::size_t j = 0; j < friction.size(); ++j)
-    {
-      const PairVector row = D.block(i, j)[0];
-      result(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = row[0] + friction[j] * row[1];
-    }
-  return result;
+  Eigen::MatrixXd D_nn, D_nt;
+};
+
+/// From the condensed operator D of two rows a pair. Collective.
+GapCompliance gap_compliance(const Factor& factor, int pairs, MPI_Comm comm)
+{
+  GapCompliance D;
+  if (pairs == 0) return D;
+  if (rank_of(comm) == 0) D = {Eigen::MatrixXd(pairs, pairs), Eigen::MatrixXd(pairs, pairs)};
+  const PairRows<std::size_t> rows(1);
+  factor.read_condensed(
+      [&](const CondensedStrip& strip)
+      {
+        for (std::size_t j = rows.pair_of(strip.first); j < rows.pair_of(strip.last); ++j)
+          for (std::size_t i = j; i < static_cast<std::size_t>(pairs); ++i)
+          {
+            const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
+            D.D_nn(row, column) = D.D_nn(column, row) = strip.entry(rows.normal(i), rows.normal(j));
+            D.D_nt(column, row) = strip.entry(rows.tangential(i), rows.normal(j));
+            if (i > j) D.D_nt(row, column) = strip.entry(rows.normal(i), rows.tangential(j));
+          }
+      });
+  return D;
 }
 
 /// `c`: compliances of the pairs. The unknown gap is then g + c r.
@@ -170,7 +183,7 @@ std::vector<double> add_compliance(const Interface& interface, double sign, cons
 /// What the search shares between ranks; D and the problem live on rank 0.
 struct Search
 {
-  Eigen::MatrixXd D_nn;
+  Eigen::VectorXd own; // diagonal of D_nn with the compliance of the pairs
   ComplementarityProblem problem;
   StatusSolution solution;
   double rho = 0; // 1/lambda_max(D_nn)
@@ -221,7 +234,7 @@ Checks check_reactions(const Search& search, const std::vector<double>& gap, con
   std::vector<double> rho(pairs, search.rho);
   checks.check_residual = unilateral_residual(reaction, gap, rho, gap);
   for (std::size_t i = 0; i < pairs; ++i)
-    if (const double own = search.D_nn.diagonal()[static_cast<Eigen::Index>(i)]; own > 0) rho[i] = 1 / own;
+    if (const double own = search.own(static_cast<Eigen::Index>(i)); own > 0) rho[i] = 1 / own;
   checks.residual = unilateral_residual(reaction, gap, rho, gap);
   if (search.problem.N.size() > 0) return checks;
   checks.uniqueness = has_one_solution(search.problem) ? Uniqueness::assured : Uniqueness::not_assured;
@@ -311,7 +324,7 @@ struct PairCompliance::Parts
 {
   std::vector<double> axes; // of each pair, as TangentView reads them
   Held held;
-  std::vector<double> D; // on rank 0; empty without pairs
+  GapCompliance D;
 };
 
 PairCompliance::PairCompliance(const Structure& structure, const Interface& interface,
@@ -319,7 +332,7 @@ PairCompliance::PairCompliance(const Structure& structure, const Interface& inte
     : parts_(std::make_unique<Parts>(sliding_axes(interface)))
 {
   parts_->held = hold(structure, along(interface, parts_->axes), options.factor);
-  if (interface.pairs > 0) parts_->D = parts_->held.factor.condensed(1);
+  parts_->D = gap_compliance(parts_->held.factor, interface.pairs, comm_of(structure.load));
 }
 
 PairCompliance::PairCompliance(PairCompliance&&) noexcept = default;
@@ -367,21 +380,22 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   search.solution.outcome = StatusOutcome::converged;
   if (pairs > 0)
   {
-    const std::vector<double>& D = compliance.parts().D;
+    const auto& [D_nn, D_nt] = compliance.parts().D;
     on_rank_zero_with_lent_cores(
         comm, pairs,
         [&]
         {
-          const PairMatrixView view(D, pairs, 1);
-          std::vector<double> friction = drive_friction(interface);
-          const std::vector<double> sense = senses(interface, compliance.parts().axes);
-          for (std::size_t i = 0; i < pairs; ++i) friction[i] *= sense[i];
-          search.D_nn = normal_compliance(view, std::vector<double>(pairs, 0.));
-          Eigen::VectorXd c(search.D_nn.rows());
-          for (std::size_t i = 0; i < pairs; ++i) c(static_cast<Eigen::Index>(i)) = compliance_of(interface, i);
-          search.problem = problem_of(search.D_nn, normal_compliance(view, friction), held.kappa, q, c);
-          search.D_nn += c.asDiagonal();
-          search.rho = 1 / largest_eigenvalue(search.D_nn, 30);
+          const std::vector<double> mu = drive_friction(interface), sense = senses(interface, compliance.parts().axes);
+          Eigen::VectorXd friction(D_nn.rows()), c(D_nn.rows());
+          for (Eigen::Index i = 0; i < c.size(); ++i)
+          {
+            const auto pair = static_cast<std::size_t>(i);
+            friction(i) = mu[pair] * sense[pair];
+            c(i) = compliance_of(interface, pair);
+          }
+          search.problem = problem_of(D_nn, D_nn + D_nt * friction.asDiagonal(), held.kappa, q, c);
+          search.own = D_nn.diagonal() + c;
+          search.rho = 1 / largest_eigenvalue(D_nn, c, 30);
           search.solution = find_split(search.problem, interface, options.max_iterations, 1.5 * search.rho, expected);
         });
     share(search.solution, pairs, comm);

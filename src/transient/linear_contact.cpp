@@ -26,12 +26,12 @@ void regularise(MatrixXd& A, Index rows)
 
 } // namespace
 
-LinearContact::LinearContact(const ContactOperator& W, const FrictionLaw& law, const StepRecord& record,
-                             std::span<const ContactStatus> statuses)
-    : size_(static_cast<Index>(W.size())), directions_(W.directions())
+LinearContact::LinearContact(std::span<const double> W, int directions, const FrictionLaw& law,
+                             const StepRecord& record, std::span<const ContactStatus> statuses)
+    : size_(static_cast<Index>(record.reactions.size())), directions_(directions)
 {
-  const PairRows<Index> rows(W.directions());
-  const PairView reactions(record.reactions, W.directions()), velocity(record.contact_velocity, W.directions());
+  const PairRows<Index> rows(directions);
+  const PairView reactions(record.reactions, directions), velocity(record.contact_velocity, directions);
   std::vector<Index> following;
   for (std::size_t pair = 0; pair < statuses.size(); ++pair)
   {
@@ -56,7 +56,7 @@ LinearContact::LinearContact(const ContactOperator& W, const FrictionLaw& law, c
   leading_ = static_cast<Index>(rows_.size());
   for (Slip& slip : slips_) slip.first += leading_;
   rows_.insert(rows_.end(), following.begin(), following.end());
-  W_ = W.submatrix(rows_);
+  W_ = MatrixXd::Map(W.data(), size_, size_)(rows_, rows_);
 }
 
 MatrixXd LinearContact::by_whole_system(const MatrixXd& db, const VectorXd& dmu)

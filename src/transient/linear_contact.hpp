@@ -23,7 +23,8 @@ namespace squeal
 class LinearContact
 {
 public:
-  LinearContact(const ContactOperator& W, const FrictionLaw& law, const StepRecord& record,
+  /// `W`: all its entries.
+  LinearContact(std::span<const double> W, int directions, const FrictionLaw& law, const StepRecord& record,
                 std::span<const ContactStatus> statuses);
 
   /// dr of each column of db, with the change of the law's coefficient of each; every row of W, zeros on open pairs.

@@ -110,10 +110,21 @@ MatrixXd contact_of_start(const ThetaStep& step, const Interface& interface, con
   return db;
 }
 
-/// dr of every column, on every rank. `Bv_free`: B dv_f of each, on rank 0.
-MatrixXd reactions(const ThetaStep& step, const Interface& interface, const StepRecord& record,
-                   std::span<const TangentColumn> columns, MatrixXd db, const std::vector<double>& Bv_free)
+/// The step whose tangent is taken.
+struct RecordedStep
 {
+  const ThetaStep& step;
+  const Structure& structure;
+  const Interface& interface;
+  const StepRecord& record;
+  std::span<const double> W; // all entries, on rank 0
+};
+
+/// dr of every column, on every rank. `Bv_free`: B dv_f of each, on rank 0.
+MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> columns, MatrixXd db,
+                   const std::vector<double>& Bv_free)
+{
+  const auto& [step, structure, interface, record, W] = of;
   MatrixXd dr = MatrixXd::Zero(db.rows(), db.cols());
   on_rank_zero_with_lent_cores(comm_of(interface.B), interface.size(),
                                [&]
@@ -123,7 +134,7 @@ MatrixXd reactions(const ThetaStep& step, const Interface& interface, const Step
                                  for (Index k = 0; k < dmu.size(); ++k)
                                    dmu(k) = columns[static_cast<std::size_t>(k)].friction;
                                  LinearContact contact(
-                                     step.W, law_of_step(step, interface.friction), record,
+                                     W, interface.directions, law_of_step(step, interface.friction), record,
                                      contact_status(interface, record.reactions, record.contact_velocity));
                                  dr = contact.response(db, dmu);
                                });
@@ -131,26 +142,17 @@ MatrixXd reactions(const ThetaStep& step, const Interface& interface, const Step
   return dr;
 }
 
-/// The step whose tangent is taken.
-struct RecordedStep
-{
-  const ThetaStep& step;
-  const Structure& structure;
-  const Interface& interface;
-  const StepRecord& record;
-};
-
 /// dv+ of every column from A dv_f in Av, with the contact that `db` starts from; Av becomes A dv+.
 void solve_columns(const RecordedStep& of, std::span<const TangentColumn> columns, MatrixXd db, TangentWork& work)
 {
-  const auto& [step, structure, interface, record] = of;
+  const auto& [step, structure, interface, record, W] = of;
   const std::vector<Vec> Av = handles(work.Av);
   MatrixXd dr = MatrixXd::Zero(0, 0);
   const std::vector<double> Bv_free = step.factor.forward(Av);
   std::vector<double> lambda;
   if (interface.pairs > 0)
   {
-    dr = step.h * reactions(step, interface, record, columns, std::move(db), Bv_free);
+    dr = step.h * reactions(of, columns, std::move(db), Bv_free);
     for (std::size_t k = 0; k < columns.size(); ++k)
     {
       const double* const impulse = dr.col(static_cast<Index>(k)).data();
@@ -194,7 +196,7 @@ void solve_columns_with_gyroscopic_part(const RecordedStep& of, std::span<const 
 
 void one_step(const RecordedStep& of, std::span<TangentColumn> columns, TangentWork& work)
 {
-  const auto& [step, structure, interface, record] = of;
+  const auto& [step, structure, interface, record, W] = of;
   const double h = step.h, theta = step.theta;
   const std::vector<Vec> Av = handles(work.Av), v_next = handles(work.v_next);
   MatrixXd db;
@@ -240,13 +242,16 @@ std::vector<StepRecord> record_steps(const ThetaStep& step, const Structure& str
 void advance_tangents(const ThetaStep& step, const Structure& structure, const Interface& interface,
                       std::span<const StepRecord> records, std::span<TangentColumn> columns)
 {
+  std::vector<double> formed;
+  if (!step.W.is_whole()) formed = whole_operator(step, interface);
+  const std::span<const double> W = step.W.is_whole() ? step.W.entries() : formed;
   for (std::size_t first = 0; first < columns.size(); first += at_once)
   {
     const auto batch = columns.subspan(first, std::min(at_once, columns.size() - first));
     TangentWork work = begin_tangents(step, structure, batch);
     for (const StepRecord& record : records)
     {
-      one_step({step, structure, interface, record}, batch, work);
+      one_step({step, structure, interface, record, W}, batch, work);
       end_if_asked(comm_of(structure.load));
     }
   }

@@ -5,6 +5,7 @@
 /// and A v+ is the right-hand side just solved for: a step multiplies by M and K once each. The same vectors give the
 /// energies and, from (A - M) v_theta = h theta C v_theta + theta^2 h (K u+ - K u), the damping work.
 #include "squeal/algebra/multivector.hpp"
+#include "squeal/base/free_memory.hpp"
 #include "step_contact.hpp"
 
 #include <algorithm>
@@ -217,6 +218,8 @@ OptionList options_of(StepOptions& options)
        "opposes the sliding velocity at theta, or at the end of the step (end)"},
       {"-transient_contact_law", choice_of(options.law), Range::any,
        "contact on displacements, or on velocities (velocity)"},
+      {"-transient_contact_operator", choice_of(options.storage), Range::any,
+       "W whole, or in the factor of the step (by_factor), which takes no memory of its own"},
       {"-transient_refuse", &options.refuse, Range::any,
        "false: march even where theta and the step give misleading growth rates"},
   };
@@ -234,6 +237,48 @@ Owned<Mat> step_matrix(const Structure& structure, double h, double theta)
   return A;
 }
 
+namespace
+{
+
+/// What the compliance of the pairs adds to the diagonal of W; empty: nothing.
+std::vector<double> added_by_compliance(const ThetaStep& step, const Interface& interface)
+{
+  std::vector<double> added;
+  if (interface.compliance.empty()) return added;
+  added.assign(interface.size(), 0.);
+  const PairView<double> rows(added, interface.directions);
+  for (std::size_t i = 0; i < rows.pairs(); ++i)
+    rows.normal(i) = compliant_gap(compliance_of(interface, i), step.theta, step.h).by_reaction;
+  return added;
+}
+
+ContactOperator condensed_operator(const ThetaStep& step, const Interface& interface, OperatorStorage storage)
+{
+  if (interface.pairs == 0) return {};
+  const MPI_Comm comm = comm_of(interface.B);
+  const auto products = step.factor.condensed_products();
+  const auto rows = static_cast<double>(interface.size());
+  if (products && storage != OperatorStorage::whole &&
+      (storage == OperatorStorage::by_factor || stays_in_factor(rows, products->entries(), free_memory(comm))))
+    return make_contact_operator({*products, step.h, added_by_compliance(step, interface)}, interface.pairs,
+                                 interface.directions, comm);
+  ContactOperator W;
+  std::vector<double> entries = whole_operator(step, interface);
+  if (rank_of(comm) == 0) W = make_contact_operator(std::move(entries), interface.pairs, interface.directions);
+  W.share_columns(comm);
+  return W;
+}
+
+} // namespace
+
+std::vector<double> whole_operator(const ThetaStep& step, const Interface& interface)
+{
+  std::vector<double> W = step.factor.condensed(step.h);
+  const std::vector<double> added = added_by_compliance(step, interface);
+  for (std::size_t i = 0; i < added.size() && !W.empty(); ++i) W[i * added.size() + i] += added[i];
+  return W;
+}
+
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta,
                           const StepOptions& options)
 {
@@ -246,20 +291,9 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.law = options.law;
   step.opposed = options.opposed;
   step.contact = options.contact;
-  CondensedOperator condensed =
-      condense(step_matrix(structure, h, theta), interface, h, structure.names, options.factor);
-  step.factor = std::move(condensed.factor);
+  step.factor = factor_held(step_matrix(structure, h, theta), interface, structure.names, options.factor);
   step.factor_seconds = MPI_Wtime() - start;
-  if (rank_of(comm_of(structure.load)) == 0)
-  {
-    for (std::size_t i = 0; i < interface.gap.size(); ++i)
-    {
-      const std::size_t row = PairRows<std::size_t>(interface.directions).normal(i);
-      condensed.W[row * interface.size() + row] += compliant_gap(compliance_of(interface, i), theta, h).by_reaction;
-    }
-    step.W = make_contact_operator(std::move(condensed.W), interface.pairs, interface.directions);
-  }
-  step.W.share_columns(comm_of(structure.load));
+  step.W = condensed_operator(step, interface, options.storage);
   step.matrices = pair_matrices(structure.M, structure.K);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
   return step;

@@ -66,7 +66,8 @@ TEST_CASE("the status iteration finds what trying every split finds")
     REQUIRE(truth.size() == 1); // little friction: one solution
     CHECK(found.outcome == StatusOutcome::converged);
     CHECK(difference(found.reaction, truth[0]) < 1e-9); // condition below 1e5
-    const auto projected = solve_by_projection(problem, 0.5 / largest_eigenvalue(problem.M, 30), 1e-12, 100000);
+    const auto projected = solve_by_projection(
+        problem, 0.5 / largest_eigenvalue(problem.M, Eigen::VectorXd::Zero(problem.M.rows()), 30), 1e-12, 100000);
     CHECK(projected.residual <= 1e-12);
     CHECK(difference(projected.reaction, truth[0]) < 1e-8);
   }

@@ -9,7 +9,9 @@
 #include "squeal/base/petsc.hpp"
 
 #include <array>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -41,6 +43,18 @@ struct FactorOptions
 
 OptionList options_of(FactorOptions& options);
 
+class CondensedProducts;
+
+/// Columns `first` to `last` of a symmetric matrix from row `first` on, one after the other, `height` numbers each.
+struct CondensedStrip
+{
+  std::size_t first, last, height;
+  const double* values;
+
+  /// row >= column
+  double entry(std::size_t row, std::size_t column) const { return values[(column - first) * height + row - first]; }
+};
+
 /// The factor of a bordered matrix. Its members are collective.
 class Factor
 {
@@ -56,9 +70,15 @@ public:
   /// Whether a pivot was zero or negative: A is not positive definite, and the factor is not to be used.
   bool failed() const;
 
-  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere. Moves its storage out:
-  /// call it once.
-  std::vector<double> condensed(double scale);
+  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere. MUMPS and the dense factor
+  /// move their storage out: call it once, or read the strips once.
+  std::vector<double> condensed(double scale) const;
+
+  /// Gives B A^-1 B' to `take` on rank 0, strip after strip.
+  void read_condensed(const std::function<void(const CondensedStrip&)>& take) const;
+
+  /// B A^-1 B' without storing it; nothing of MUMPS and the dense factor, which have stored it already.
+  std::optional<CondensedProducts> condensed_products() const;
 
   /// B A^-1 b for each b, one after the other; on rank 0 only. `backward` must follow before the next `forward`.
   std::vector<double> forward(std::span<const Vec> b) const;
@@ -71,8 +91,34 @@ public:
   double entries() const;
 
 private:
+  friend class CondensedProducts;
   struct Parts;
   std::unique_ptr<Parts> parts_;
+};
+
+/// The condensed operator B A^-1 B' = E E' of the rows E = B L^-T that a supernodal factor A = L L' holds
+/// (src/README.md, section 8.1). It belongs to the factor, wherever that is moved to, and ends with it. Its members are
+/// collective; what they return is on rank 0 only, empty elsewhere.
+class CondensedProducts
+{
+public:
+  /// Rows of B.
+  int size() const;
+
+  /// Numbers of E that a product reads, on all ranks.
+  double entries() const;
+
+  /// The product with each of `columns` vectors x, one after the other; x is read on rank 0.
+  std::vector<double> product(std::span<const double> x, std::size_t columns) const;
+
+  /// Gives `take` a strip after the other, of whole pairs of two or three rows and of moderate size, on rank 0.
+  void read(const std::function<void(const CondensedStrip&)>& take) const;
+
+private:
+  friend class Factor;
+  explicit CondensedProducts(const Factor::Parts& parts) : parts_(&parts) {}
+
+  const Factor::Parts* parts_;
 };
 
 /// x = A^-1 b. The factor has no border. Collective.

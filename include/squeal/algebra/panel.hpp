@@ -20,11 +20,12 @@ constexpr std::size_t lanes_for(std::size_t columns)
   return columns == 1 ? 1 : columns <= 4 ? 4 : (columns + 7) / 8 * 8;
 }
 
-/// A packed matrix of rows x columns.
+/// A packed matrix of rows x columns: all of what was packed, or its last rows.
 struct Panel
 {
   const double* values;
   std::size_t rows, columns;
+  std::size_t above = 0; // rows of every strip that are left out, whole tiles
 };
 
 /// The numbers that a packed panel and a packed triangle take. Both arguments count numbers, not bytes.
@@ -34,6 +35,9 @@ std::size_t packed_triangle(std::size_t columns);
 /// Pack part of a column-major matrix with `height` rows; each returns the end of what it wrote.
 double* pack_panel(const double* from, std::size_t height, std::size_t rows, std::size_t columns, double* to);
 double* pack_triangle(const double* from, std::size_t height, std::size_t columns, double* to);
+
+/// Writes the rows of a panel from `first` on by columns, rows - first apart.
+void unpack_rows(const Panel& L, std::size_t first, double* to);
 
 /// y -= L x
 void subtract_product(const Panel& L, std::size_t lanes, const double* x, double* y);

@@ -34,14 +34,15 @@ struct SplitSolution
 class SplitSolver
 {
 public:
+  /// `problem` is borrowed.
   SplitSolver(const ComplementarityProblem& problem, std::vector<char> closed);
   SplitSolution solve(const std::vector<double>& rhs) const;
 
 private:
+  const ComplementarityProblem& problem_;
   std::vector<char> closed_;
-  double compliance_ = 0;
-  Eigen::MatrixXd matrix_;
-  std::optional<Eigen::PartialPivLU<Eigen::MatrixXd>> factors_; // none if a pivot is lost in rounding
+  Eigen::MatrixXd storage_;                                                 // of the factors
+  std::optional<Eigen::PartialPivLU<Eigen::Ref<Eigen::MatrixXd>>> factors_; // none if a pivot is lost in rounding
 };
 
 /// Of one right-hand side. Error: an entry is not finite.
@@ -91,7 +92,7 @@ struct ProjectionSolution
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
                                        long max_iterations, bool (*is_over)() = nullptr);
 
-/// Largest eigenvalue of a symmetric positive semi-definite matrix, by power iteration: a lower bound.
-double largest_eigenvalue(const Eigen::Ref<const Eigen::MatrixXd>& A, int iterations);
+/// Largest eigenvalue of a symmetric positive semi-definite A with a diagonal added, by power iteration: a lower bound.
+double largest_eigenvalue(const Eigen::MatrixXd& A, const Eigen::VectorXd& added, int iterations);
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #pragma once
-/// The condensed contact operator W = scale B A^-1 B' (dense, symmetric, whole on rank 0) and the factor of A that it
-/// came with (src/README.md, sections 4.4 and 8.4).
+/// The factor of a matrix A bordered by the rows B of the pairs, from which the condensed contact operator W = scale B
+/// A^-1 B' comes (src/README.md, sections 4.4 and 8.4).
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/contact/interface.hpp"
 
@@ -9,18 +9,9 @@
 namespace squeal
 {
 
-/// W and the factor that it came with.
-struct CondensedOperator
-{
-  Factor factor;         // of A bordered by B
-  std::vector<double> W; // row-major, size x size; on rank 0 only, empty elsewhere
-  int size = 0;          // rows of B
-};
-
-/// Factors A (symmetric) and forms W. Collective.
+/// A factored, bordered by the interface's B. Collective.
 /// Error: A singular, naming (`describe`) the offending degree of freedom.
-CondensedOperator condense(Mat A, const Interface& interface, double scale, const DofNames& names,
-                           const FactorOptions& options);
+Factor factor_held(Mat A, const Interface& interface, const DofNames& names, const FactorOptions& options);
 
 /// A symmetric matrix A, bordered by the interface's B, and whether it is positive definite.
 struct Factored

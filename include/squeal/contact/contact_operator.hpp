@@ -3,19 +3,32 @@
 /// How it is stored is known to this type alone: solvers use its products, the blocks of its diagonal, and its rows
 /// added up pair by pair.
 ///
+/// It is whole on rank 0, or it stays in the factor of A as W = scale E E' (section 8.1): a product then reads the rows
+/// of E, which all ranks hold a part of.
+///
 /// The near field (section 4.7) holds the blocks that matter during sweeps, in single precision. Of a row it lacks the
 /// smallest ones, whose sizes add up to a hundredth of the pair's own block. What it leaves out is met by a product
 /// with W after the sweeps, so that each such round can gain a factor of a hundred.
+#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/contact/pair_law.hpp"
 
 #include <cstddef>
 #include <Eigen/Core>
+#include <optional>
 #include <span>
 #include <vector>
 
 namespace squeal
 {
+
+/// scale E E' plus a diagonal matrix, by products that the factor forms.
+struct ScaledProducts
+{
+  CondensedProducts products;
+  double scale = 1;
+  std::vector<double> diagonal; // that is added, of every row; empty: none
+};
 
 /// Row by row, runs of neighbouring pairs.
 struct NearField
@@ -31,7 +44,26 @@ struct NearField
   std::vector<float> values; // run after run, the pair's rows of each run one after the other
 };
 
-/// On rank 0. A large W gives its columns to several ranks too, which then form products together.
+/// Where W is stored. automatic: whole, but where stays_in_factor says so.
+enum class OperatorStorage
+{
+  automatic,
+  whole,
+  by_factor,
+};
+
+inline constexpr std::array operator_storage_words = {"automatic", "whole", "by_factor"};
+
+inline Words words_of(OperatorStorage)
+{
+  return operator_storage_words;
+}
+
+/// Whether a product with a W of so many rows reads fewer numbers by the factor, whose rows of E have so many entries,
+/// or a whole W would take more than a quarter of the memory that is `free` [bytes].
+bool stays_in_factor(double rows, double border_entries, double free);
+
+/// On rank 0. The ranks form products together where W is in the factor, or gave its columns to all of them.
 class ContactOperator
 {
 public:
@@ -48,7 +80,10 @@ public:
   /// y_k = W x_k, reading W once.
   void multiply(std::span<const std::span<const double>> x, std::span<const std::span<double>> y) const;
 
-  /// w += W dr of a change dr of one pair's reaction.
+  /// Whether rank 0 has all entries; the same on all ranks of a W in the factor.
+  bool is_whole() const { return !products_; }
+
+  /// w += W dr of a change dr of one pair's reaction. W is whole.
   void add_product(std::size_t pair, const PairVector& change, std::span<double> w) const;
 
   /// The same by the near field, which small operators do not have.
@@ -56,18 +91,19 @@ public:
   bool has_near_field() const { return !near_.runs.empty(); }
   double near_share() const; // entries of the near field over those of W
 
-  /// Gives every rank its part of the columns of a large W. From now on products with one vector are formed from
+  /// Gives every rank its part of the columns of a large whole W. From now on products with one vector are formed from
   /// these, within ServedProducts only. Collective.
   void share_columns(MPI_Comm comm);
 
-  /// W on these rows and columns.
-  Eigen::MatrixXd submatrix(std::span<const Eigen::Index> rows) const;
+  /// W, if it is whole.
+  std::span<const double> entries() const { return values_; }
 
   /// By power iteration: a lower bound.
   double largest_eigenvalue(int iterations) const;
 
 private:
   friend ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
+  friend ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm);
   friend class ServedProducts;
 
   /// Strips of eight columns of the lower triangle, one after the other, from each strip's first row on.
@@ -77,14 +113,17 @@ private:
     std::vector<double> values{};    // not on rank 0, which has W
   };
 
+  void set_diagonal(std::vector<PairBlock> blocks);
   void multiply_one(std::span<const double> x, std::span<double> y) const;
+  std::vector<double> multiply_by_factor(std::span<const double> x, std::size_t columns) const;
   void add_strips(std::span<const double> x, std::span<double> y) const;
   void serve() const;
   void end_products() const;
 
   std::size_t pairs_ = 0;
   int directions_ = 0;
-  std::vector<double> values_; // by rows
+  std::vector<double> values_;             // by rows; empty: W is in the factor
+  std::optional<ScaledProducts> products_; // the same on all ranks; none: W is whole
   std::vector<PairBlock> diagonal_;
   std::vector<NaturalScale> scale_;
   NearField near_;                     // empty: W is small
@@ -109,6 +148,9 @@ private:
 
 /// From a dense symmetric W, stored by rows. Error: the number of its entries does not fit.
 ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
+
+/// From products with the factor's rows, of which the near field is formed strip by strip, twice. Collective.
+ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm);
 
 /// target += sum of factors[k] row_k over the rows of one pair (1 to 3), `length` long, one after the other. Arithmetic
 /// of one rank.

@@ -42,8 +42,9 @@ struct StepOptions
   ContactLaw law = ContactLaw::displacement;
   Opposed opposed = Opposed::theta;
   ContactSettings contact{};
-  bool refuse = true;     // what step_guards.hpp refuses
-  FactorOptions factor{}; // listed by itself
+  OperatorStorage storage = OperatorStorage::automatic; // of W
+  bool refuse = true;                                   // what step_guards.hpp refuses
+  FactorOptions factor{};                               // listed by itself
 };
 
 OptionList options_of(StepOptions& options);

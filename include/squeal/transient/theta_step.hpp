@@ -50,6 +50,9 @@ Owned<Mat> step_matrix(const Structure& structure, double h, double theta);
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta,
                           const StepOptions& options);
 
+/// All entries of W, by rows, on rank 0; formed from the factor anew. Collective.
+std::vector<double> whole_operator(const ThetaStep& step, const Interface& interface);
+
 /// M v_k and K u_k of (v, u) into a pair of spans, each matrix read once.
 void multiply_mass_and_stiffness(const ThetaStep& step, const Structure& structure,
                                  const std::array<std::span<const Vec>, 2>& of,

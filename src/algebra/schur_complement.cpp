@@ -1,0 +1,247 @@
+/// Parts of the Schur complement E E' of a bordered factor, and products with it, from the rows of E that the factor
+/// holds. Nothing of its size is stored. Each rank adds up what its own subtrees give and, of shared supernodes, what
+/// its border rows give.
+#include "cholesky.hpp"
+#include "squeal/algebra/panel.hpp"
+#include "squeal/base/integers.hpp"
+
+#include <algorithm>
+#include <petscblaslapack.h>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// E of one supernode: the rows of its panel that belong to the border.
+struct BorderRows
+{
+  Panel panel;                    // its first rows may belong to the tile that ends above the border
+  std::size_t before;             // number of these
+  std::span<const int> positions; // in the order of elimination, of the rows after them; ascending
+  int dofs;                       // positions before the border
+
+  std::size_t rows() const { return positions.size(); }
+  std::size_t row(std::size_t i) const { return at(positions[i] - dofs); } // of the border, from zero
+  std::size_t pivots() const { return panel.columns; }
+};
+
+BorderRows border_rows(const TreeShare& share, std::size_t k, const std::vector<double>& values)
+{
+  const Supernode& supernode = share.symbolic.supernodes[k];
+  const std::size_t pivots = at(supernode.columns), below = at(supernode.below), inner = at(supernode.inner());
+  const double* const panels = values.data() + supernode.values_begin + packed_triangle(pivots);
+  const bool shared = k >= share.own; // these have a panel of their own for the border
+  const std::size_t above = inner / tile * tile;
+  return {shared ? Panel{panels + packed_panel(inner, pivots), below - inner, pivots, 0}
+                 : Panel{panels, below - above, pivots, above},
+          shared ? 0 : inner - above,
+          {share.symbolic.rows.data() + supernode.rows_begin + inner, below - inner},
+          share.symbolic.dofs};
+}
+
+/// The place of the first row that is not before `row`.
+std::size_t place_of_row(std::span<const int> rows, int row)
+{
+  return static_cast<std::size_t>(std::lower_bound(rows.begin(), rows.end(), row) - rows.begin());
+}
+
+/// Some columns of a lower triangle, from the first one's row on.
+struct Strip
+{
+  int first, last;
+  std::size_t height; // distance of two columns
+  double* values;
+
+  double* column(int j) const { return values + at(j - first) * height; }
+};
+
+/// Rows of E by columns, `height` apart.
+struct DenseRows
+{
+  std::vector<int> rows{}; // of the border, ascending
+  std::vector<double> values{};
+};
+
+/// Adds the products of `left` with `right`, rows that the strip has as columns, to the strip's lower triangle.
+void add_products(const DenseRows& left, const DenseRows& right, std::size_t pivots, const Strip& strip)
+{
+  constexpr std::size_t most = 128; // columns at once: of what is above their diagonal block nothing is computed
+  const double one = 1, zero = 0;
+  std::vector<double> products;
+  for (std::size_t j = 0; j < right.rows.size(); j += most)
+  {
+    const std::size_t begin = place_of_row(left.rows, right.rows[j]), width = std::min(most, right.rows.size() - j);
+    PetscBLASInt m = to_int(left.rows.size() - begin), n = to_int(width), k = to_int(pivots),
+                 left_height = to_int(left.rows.size()), right_height = to_int(right.rows.size());
+    if (m == 0) return;
+    products.resize(std::max(products.size(), at(m) * width));
+    BLASgemm_("N", "T", &m, &n, &k, &one, left.values.data() + begin, &left_height, right.values.data() + j,
+              &right_height, &zero, products.data(), &m);
+    for (std::size_t c = 0; c < width; ++c)
+    {
+      const int row = right.rows[j + c];
+      double* const to = strip.column(row) - strip.first;
+      const double* const from = products.data() + c * at(m);
+      for (std::size_t i = place_of_row(left.rows, row) - begin; i < at(m); ++i) to[left.rows[begin + i]] += from[i];
+    }
+  }
+}
+
+/// Rows of E from the strip's first one on.
+DenseRows rows_from(const BorderRows& E, int first)
+{
+  const std::size_t begin = place_of_row(E.positions, E.dofs + first);
+  DenseRows dense;
+  for (const int position : E.positions.subspan(begin)) dense.rows.push_back(position - E.dofs);
+  dense.values.resize(dense.rows.size() * E.pivots());
+  if (!dense.rows.empty()) unpack_rows(E.panel, E.before + begin, dense.values.data());
+  return dense;
+}
+
+/// The leading rows, before the border's row `last`.
+DenseRows rows_before(const DenseRows& E, std::size_t pivots, int last)
+{
+  const std::size_t count = place_of_row(E.rows, last);
+  DenseRows leading{{E.rows.begin(), E.rows.begin() + static_cast<std::ptrdiff_t>(count)}, {}};
+  leading.values.resize(count * pivots);
+  for (std::size_t j = 0; j < pivots; ++j)
+    std::copy_n(E.values.data() + j * E.rows.size(), count, leading.values.data() + j * count);
+  return leading;
+}
+
+/// All ranks' rows of a shared supernode that the strip has as columns. `own`: this rank's. Collective.
+DenseRows gathered(const DenseRows& own, const std::vector<int>& border, std::size_t pivots, MPI_Comm comm)
+{
+  const int ranks = ranks_of(comm);
+  std::vector<int> count(at(ranks), 0), counts, starts(count.size(), 0);
+  for (const int row : border) ++count[at(holder_of(row, ranks))];
+  for (const int rows : count) counts.push_back(to_int(at(rows) * pivots));
+  for (std::size_t p = 1; p < counts.size(); ++p) starts[p] = starts[p - 1] + counts[p - 1];
+  std::vector<double> received(border.size() * pivots);
+  MPI_Allgatherv(own.values.data(), to_int(own.values.size()), MPI_DOUBLE, received.data(), counts.data(),
+                 starts.data(), MPI_DOUBLE, comm);
+  DenseRows all{border, std::vector<double>(received.size())};
+  std::vector<std::size_t> next(starts.begin(), starts.end());
+  for (std::size_t i = 0; i < border.size(); ++i)
+  {
+    const auto rank = at(holder_of(border[i], ranks));
+    const std::size_t from = next[rank]++;
+    for (std::size_t j = 0; j < pivots; ++j) all.values[j * border.size() + i] = received[from + j * at(count[rank])];
+  }
+  return all;
+}
+
+/// own -= E' x; x has the border's rows.
+void subtract_transposed_rows(const BorderRows& E, std::size_t lanes, const double* x, double* own,
+                              std::vector<double>& part)
+{
+  part.assign((E.panel.rows + tile) * lanes, 0.);
+  for (std::size_t i = 0; i < E.rows(); ++i)
+    std::copy_n(x + E.row(i) * lanes, lanes, part.data() + (E.before + i) * lanes);
+  subtract_transposed(E.panel, lanes, part.data(), own);
+}
+
+/// y -= E times `own`; y has the border's rows.
+void subtract_rows(const BorderRows& E, std::size_t lanes, const double* own, double* y, std::vector<double>& part)
+{
+  part.assign((E.panel.rows + tile) * lanes, 0.);
+  subtract_product(E.panel, lanes, own, part.data());
+  for (std::size_t i = 0; i < E.rows(); ++i)
+    for (std::size_t l = 0; l < lanes; ++l) y[E.row(i) * lanes + l] += part[(E.before + i) * lanes + l];
+}
+
+/// Adds the parts of all ranks on rank 0, in messages of moderate length; empties those of the others. Collective.
+void sum_on_rank_zero(std::vector<double>& part, MPI_Comm comm)
+{
+  if (ranks_of(comm) == 1) return;
+  constexpr std::size_t together = 1 << 22; // numbers
+  const bool first = rank_of(comm) == 0;
+  for (std::size_t begin = 0; begin < part.size(); begin += together)
+  {
+    double* const from = part.data() + begin;
+    MPI_Reduce(first ? MPI_IN_PLACE : from, from, to_int(std::min(together, part.size() - begin)), MPI_DOUBLE, MPI_SUM,
+               0, comm);
+  }
+  if (!first) part = {};
+}
+
+} // namespace
+
+std::vector<double> Cholesky::schur_complement(int first, int last) const
+{
+  const std::size_t height = at(share_.symbolic.border - first);
+  std::vector<double> values(height * at(last - first), 0.);
+  const Strip strip{first, last, height, values.data()};
+  for (std::size_t k = 0; k < share_.symbolic.supernodes.size(); ++k)
+  {
+    const BorderRows E = border_rows(share_, k, values_);
+    const std::size_t pivots = E.pivots();
+    if (k < share_.own)
+    {
+      if (place_of_row(E.positions, E.dofs + first) == place_of_row(E.positions, E.dofs + last)) continue;
+      const DenseRows own = rows_from(E, first);
+      add_products(own, rows_before(own, pivots, last), pivots, strip);
+      continue;
+    }
+    std::vector<int> columns;
+    for (const int position : share_.shared[k - share_.own].border)
+      if (const int row = position - share_.symbolic.dofs; row >= first && row < last) columns.push_back(row);
+    if (columns.empty()) continue;
+    const DenseRows own = rows_from(E, first);
+    add_products(own, gathered(rows_before(own, pivots, last), columns, pivots, comm_), pivots, strip);
+  }
+  sum_on_rank_zero(values, comm_);
+  return values;
+}
+
+std::vector<double> Cholesky::schur_product(std::span<const double> x, std::size_t columns) const
+{
+  const std::size_t border = at(share_.symbolic.border), lanes = lanes_for(columns), own = share_.own;
+  std::vector<double> from(border * lanes, 0.), to(border * lanes, 0.), part;
+  if (rank_of(comm_) == 0)
+    for (std::size_t k = 0; k < columns; ++k)
+      for (std::size_t i = 0; i < border; ++i) from[i * lanes + k] = x[k * border + i];
+  if (ranks_of(comm_) > 1) MPI_Bcast(from.data(), to_int(from.size()), MPI_DOUBLE, 0, comm_);
+  std::vector<BorderRows> shared;
+  std::vector<double> of_shared, pivots;
+  for (std::size_t k = own; k < share_.symbolic.supernodes.size(); ++k)
+  {
+    shared.push_back(border_rows(share_, k, values_));
+    const std::size_t begin = of_shared.size();
+    of_shared.resize(begin + shared.back().pivots() * lanes, 0.);
+    subtract_transposed_rows(shared.back(), lanes, from.data(), of_shared.data() + begin, part);
+  }
+  if (!shared.empty())
+    MPI_Allreduce(MPI_IN_PLACE, of_shared.data(), to_int(of_shared.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  for (std::size_t begin = 0; const BorderRows& E : shared)
+  {
+    subtract_rows(E, lanes, of_shared.data() + begin, to.data(), part);
+    begin += E.pivots() * lanes;
+  }
+  for (std::size_t k = 0; k < own; ++k)
+  {
+    const BorderRows E = border_rows(share_, k, values_);
+    if (E.rows() == 0) continue;
+    pivots.assign(E.pivots() * lanes, 0.);
+    subtract_transposed_rows(E, lanes, from.data(), pivots.data(), part);
+    subtract_rows(E, lanes, pivots.data(), to.data(), part);
+  }
+  std::vector<double> result(border * columns);
+  for (std::size_t k = 0; k < columns; ++k)
+    for (std::size_t i = 0; i < border; ++i) result[k * border + i] = to[i * lanes + k];
+  sum_on_rank_zero(result, comm_);
+  return result;
+}
+
+double Cholesky::border_entries() const
+{
+  double entries = 0;
+  for (const Supernode& supernode : share_.symbolic.supernodes)
+    entries += static_cast<double>(supernode.columns) * supernode.border;
+  MPI_Allreduce(MPI_IN_PLACE, &entries, 1, MPI_DOUBLE, MPI_SUM, comm_);
+  return entries;
+}
+
+} // namespace squeal

@@ -1,0 +1,53 @@
+#pragma once
+/// The near field of W (contact_operator.hpp), from strips of its columns: once to measure its blocks, and once more to
+/// keep those that matter.
+#include "squeal/contact/contact_operator.hpp"
+
+#include <array>
+
+namespace squeal
+{
+
+/// Strips are of whole pairs and come in the order of their columns.
+class NearFieldBuilder
+{
+public:
+  NearFieldBuilder(std::size_t pairs, int directions);
+
+  /// Of the first pass.
+  void measure(const CondensedStrip& strip);
+
+  /// Of the second pass.
+  void collect(const CondensedStrip& strip);
+
+  /// After the first pass.
+  const std::vector<PairBlock>& diagonal() const { return diagonal_; }
+
+  /// After the second pass; moves out what was collected.
+  NearField finish();
+
+private:
+  /// Sums of the sizes of a row's blocks, by eighths of octaves of their size.
+  static constexpr int bins = 512;
+  using Sizes = std::array<double, bins>;
+
+  struct Block // of the lower triangle
+  {
+    std::size_t row, column; // pairs
+  };
+
+  PairBlock block(const CondensedStrip& strip, std::size_t i, std::size_t j) const;
+  int bin_of(double size) const;
+  double limit_of(std::size_t pair) const;
+
+  std::size_t pairs_;
+  PairRows<std::size_t> rows_;
+  double unit_ = 0; // a size, from which bins are counted
+  std::vector<Sizes> sizes_;
+  std::vector<double> limits_; // sizes of blocks that are left out of a pair's rows
+  std::vector<PairBlock> diagonal_;
+  std::vector<Block> blocks_;
+  std::vector<float> values_; // of these, one after the other
+};
+
+} // namespace squeal
