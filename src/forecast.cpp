@@ -36,6 +36,8 @@ constexpr double vectors_of_modes_kept = 200; // of the same 100 pairs
 constexpr double vectors_of_shooting = 100;   // pairs of differences, work of a step, columns of the multipliers
 // A basis grows beyond its limit by what one pass adds; with it its copy while it grows, and the random vectors:
 constexpr double passes_of_response = 40;
+constexpr double near_part =
+    0.15; // of W's entries that the near field has: 0.11 on the brake of 33 224 degrees of freedom
 constexpr double start_of_libraries = 400e6; // [byte] OpenBLAS's buffer of 128 MB, those of MPI and of PETSc
 
 double steps_of_transient(const TransientSettings& transient)
@@ -142,18 +144,17 @@ Sizes sizes_of(const Model& model, const FactorOptions& options)
   return sizes;
 }
 
-/// The factor, each rank's part of its condensed operator, and half of the matrix as triplets and by columns.
-double memory_of_factor(const Sizes& sizes, double condensed_operator)
+/// The factor, and half of the matrix as triplets and by columns.
+double memory_of_factor(const Sizes& sizes)
 {
-  return sizes.factor.bytes + sizes.ranks * condensed_operator + 2 * triplet * sizes.entries / 2;
+  return sizes.factor.bytes + 2 * triplet * sizes.entries / 2;
 }
 
-/// K with springs at the pairs, its factor and condensed operator D of two rows a pair, and three matrices of pairs:
-/// D's normal part, the same with friction, and a factor of that.
+/// K with springs at the pairs, its factor, and five matrices of pairs: two parts of D, their sum with friction, a
+/// factor of that and, with springs, what these take off again.
 double memory_of_equilibrium(const Sizes& sizes)
 {
-  const double of_pairs = number * sizes.pairs * sizes.pairs;
-  return matrix_entry * sizes.entries + memory_of_factor(sizes, 4 * of_pairs) + 3 * of_pairs;
+  return matrix_entry * sizes.entries + memory_of_factor(sizes) + 5 * number * sizes.pairs * sizes.pairs;
 }
 
 /// Six matrices: M and K of the frictionless problem, M, C and K of the sliding one, and C with friction. Two pencils:
@@ -180,19 +181,30 @@ double memory_of_response(const Sizes& sizes, const Scene& scene, const Response
          3 * 2 * number * sizes.ranks * pairs * scene.response->count;
 }
 
-/// M and K together, the factor, W, and its near field in single precision, which may be all of it.
-double memory_of_step(const Sizes& sizes)
+/// Whether W stays in the factor, of the memory that is left beside it.
+bool stays_in_factor(const Sizes& sizes, OperatorStorage storage, double free)
 {
-  return (2 * number + sizeof(PetscInt)) * sizes.entries / 2 + matrix_entry * sizes.entries +
-         memory_of_factor(sizes, sizes.condensed_operator()) + sizes.condensed_operator() / 2 +
+  if (sizes.factor.border_entries == 0 || storage == OperatorStorage::whole) return false;
+  return storage == OperatorStorage::by_factor ||
+         squeal::stays_in_factor(sizes.contact, sizes.factor.border_entries, free - memory_of_factor(sizes));
+}
+
+/// M and K together, the factor, and the near field in single precision with its blocks while it is made. A whole W is
+/// on rank 0, and the others share half of it.
+double memory_of_step(const Sizes& sizes, bool in_factor)
+{
+  const double whole = sizes.condensed_operator(), near_field = 2 * near_part * whole / 2;
+  return (2 * number + sizeof(PetscInt)) * sizes.entries / 2 + matrix_entry * sizes.entries + memory_of_factor(sizes) +
+         near_field + (in_factor ? 0 : whole * (1 + (1 - 1 / sizes.ranks) / 2)) +
          number * vectors_of_modes_kept * sizes.dofs;
 }
 
 /// A reduced model has at most a shape for each pair, and those of the modes. Where the full model alone is followed,
-/// it serves the multipliers, and is done without where it does not fit what is `free`.
-double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, double free)
+/// it serves the multipliers, and is done without where it does not fit what is `free`. The tangent needs a whole W.
+double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, bool in_factor, double free)
 {
-  const double least = memory_of_step(sizes) + number * vectors_of_shooting * sizes.dofs;
+  const double least = memory_of_step(sizes, in_factor) + (in_factor ? sizes.condensed_operator() : 0) +
+                       number * vectors_of_shooting * sizes.dofs;
   const double reduced = memory_of_reduction(sizes.dofs, sizes.pairs + vectors_of_modes_kept);
   if (fidelity == CycleModel::full && least + reduced > free) return least;
   return least + reduced;
@@ -236,19 +248,23 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const Sizes sizes = sizes_of(model, options.factor);
   const MPI_Comm comm = comm_of(model.structure.K);
   forecast.held = sum_of_ranks(resident_memory(), comm);
-  forecast.on_rank_zero = 1.5 * sizes.condensed_operator();
+  const double free = free_memory(comm);
+  const bool in_factor = stays_in_factor(sizes, options.step.storage, free);
+  forecast.on_rank_zero = std::max(in_factor ? 0 : sizes.condensed_operator(), 4 * number * sizes.pairs * sizes.pairs);
   const auto add = [&](Stage stage, double bytes) { forecast.stages.push_back({stage, forecast.held + bytes}); };
   add(Stage::equilibrium, memory_of_equilibrium(sizes));
   if (seeks_modes(scene)) add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes.dense_limit, comm));
   if (scene.response) add(Stage::response, memory_of_response(sizes, scene, options.response, comm));
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
-    add(Stage::transient, memory_of_step(sizes) + number * entries * steps_of_transient(scene.transient));
-  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, free_memory(comm)));
+    add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient));
+  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, in_factor, free));
   if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
   forecast.steps = steps_of(scene, options);
-  forecast.step_seconds = seconds_of_no_model + seconds_per_byte * (sizes.factor.bytes + sizes.condensed_operator());
+  // two products a step, each of which reads half of W, or the rows of E twice
+  const double contact = in_factor ? 4 * number * sizes.factor.border_entries : sizes.condensed_operator();
+  forecast.step_seconds = seconds_of_no_model + seconds_per_byte * (sizes.factor.bytes + contact);
   return forecast;
 }
 

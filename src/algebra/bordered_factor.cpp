@@ -116,6 +116,7 @@ FactorForecast multifrontal_forecast(const SymbolicFactor& symbolic)
     waiting += square(inner);
     symmetric += columns * (columns + inner);
     forecast.entries += columns * ((columns + 1) / 2 + inner);
+    forecast.border_entries += columns * supernode.border;
     not_symmetric += columns * (columns + 2 * inner);
   }
   return forecast;
@@ -324,12 +325,15 @@ FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
   if (plan.kind == FactorKind::dense)
   {
     const double n = dofs, rows = n + border;
-    return {sizeof(double) * n * rows, n * n, n * n, n * n / 2};
+    return {sizeof(double) * n * rows, n * n, n * n, n * n / 2, 0};
   }
   FactorForecast forecast = multifrontal_forecast(plan.symbolic);
   MPI_Bcast(&forecast, sizeof forecast, MPI_BYTE, 0, comm);
   if (plan.kind == FactorKind::mumps)
+  {
+    forecast.border_entries = 0;
     forecast.bytes = mumps_factor_memory({std::move(plan.entries), plan.symbolic.position, dofs, border, comm});
+  }
   else
   {
     forecast.bytes = cholesky_memory(share_tree(std::move(plan.symbolic), comm));

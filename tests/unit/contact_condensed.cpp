@@ -198,7 +198,22 @@ void check_agreement(FactorKind kind, const test::Rows& K, std::size_t rows, std
   Factor sparse(structure.K, interface.B, {.kind = kind}), dense(structure.K, interface.B, {.kind = FactorKind::dense});
   CHECK(!sparse.failed());
   CHECK(!dense.failed());
-  CHECK(largest_difference(sparse.condensed(2), dense.condensed(2)) < 1e-12);
+  const std::vector<double> exact = dense.condensed(2);
+  CHECK(largest_difference(sparse.condensed(2), exact) < 1e-12);
+  CHECK(sparse.condensed_products().has_value() == (kind == FactorKind::supernodal));
+  if (const auto products = sparse.condensed_products())
+  {
+    std::vector<double> x(rows);
+    for (std::size_t i = 0; i < rows; ++i) x[i] = std::cos(static_cast<double>(i));
+    const std::vector<double> y = products->product(x, 1);
+    CHECK(y.empty() == exact.empty()); // on rank 0 only
+    for (std::size_t i = 0; i < y.size(); ++i)
+    {
+      double sum = 0;
+      for (std::size_t j = 0; j < rows; ++j) sum += exact[i * rows + j] / 2 * x[j];
+      CHECK(std::abs(y[i] - sum) < 1e-11);
+    }
+  }
 
   std::vector<Owned<Vec>> loads, by_sparse, by_dense;
   std::vector<Vec> b, x, y;

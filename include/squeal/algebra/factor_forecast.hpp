@@ -12,6 +12,7 @@ struct FactorForecast
   double bytes = 0;                        // of a Factor while it is made, without its Schur complement
   double symmetric = 0, not_symmetric = 0; // numbers in MUMPS's L D L' and L U of A while they are made
   double entries = 0;                      // of L of A alone
+  double border_entries = 0;               // of E in a supernodal factor; 0: of another kind
 };
 
 /// Of a Factor of A and B, and of MUMPS's factors of A in the same order. B may be null. Collective.
