@@ -16,12 +16,6 @@ bool starts_without_a_mode(const TransientSettings& settings)
   return settings.start.kind == StartKind::file || settings.start.kind == StartKind::rest;
 }
 
-/// From a state file or from rest for a given number of steps, the transient needs no mode.
-bool follows_a_mode(const TransientSettings& settings)
-{
-  return settings.enabled && (!starts_without_a_mode(settings) || settings.steps == 0);
-}
-
 /// The state that the cycle's search starts from, where it is none of the modes'.
 const State* given_start(const Chain& chain)
 {
@@ -57,6 +51,11 @@ bool motion_goes_on(const LimitCycle& cycle)
 }
 
 } // namespace
+
+bool follows_a_mode(const TransientSettings& settings)
+{
+  return settings.enabled && (!starts_without_a_mode(settings) || settings.steps == 0);
+}
 
 std::string no_mode_to_follow(const Report& report)
 {

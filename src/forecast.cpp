@@ -6,6 +6,7 @@
 
 #include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/base/free_memory.hpp"
+#include "squeal/chain.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
 #include <algorithm>
@@ -58,7 +59,7 @@ double steps_of(const Scene& scene, const ProgramOptions& options)
 
 bool seeks_modes(const Scene& scene)
 {
-  return scene.modes.enabled || scene.cycle.enabled || scene.transient.enabled;
+  return scene.modes.enabled || scene.cycle.enabled || follows_a_mode(scene.transient);
 }
 
 /// The resident memory of this process [bytes]; 0 where the system does not say.

@@ -59,4 +59,7 @@ SettledMotion run_settled(const Chain& chain);
 /// The motions that the scene's starts lead to.
 Attractors run_attractors(const Chain& chain);
 
+/// From a state file or from rest for a given number of steps, the transient needs no mode.
+bool follows_a_mode(const TransientSettings& settings);
+
 } // namespace squeal
