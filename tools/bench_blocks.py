@@ -74,12 +74,16 @@ def sliding_start(M, K, B, F):
     return u, v
 
 
-def write_scene(folder, M, C, K, B, F, u, v):
+def write_matrices(folder, M, C, K, B, F):
     pairs = B.shape[0] // 3
     for name, A in (("M", M), ("C", C), ("K", K), ("B", B)):
         common.write_petsc(folder / f"{name}.petsc", A)
     for name, x in (("F", F), ("gap", np.zeros(pairs)), ("drive", np.tile([BELT, 0.0], pairs))):
         common.write_petsc(folder / f"{name}.petsc", x)
+
+
+def write_scene(folder, M, C, K, B, F, u, v):
+    write_matrices(folder, M, C, K, B, F)
     common.write_petsc(folder / "state", u, v)
     arrays = {f"{k}_{part}": getattr(A, part) for k, A in dict(M=M, C=C, K=K, B=B).items()
               for part in ("data", "indices", "indptr", "shape")}

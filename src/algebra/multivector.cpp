@@ -25,12 +25,13 @@ void add_up(MatrixXd& parts, MPI_Comm comm)
   MPI_Bcast(parts.data(), size, MPI_DOUBLE, 0, comm);
 }
 
-/// A PETSc matrix that borrows the entries.
-Owned<Mat> as_matrix(const MultiVector& X)
+/// A PETSc matrix that borrows the entries of `count` columns.
+Owned<Mat> as_matrix(const MultiVector& X, Index first, Index count)
 {
   Owned<Mat> A;
+  double* const entries = const_cast<double*>(X.entries.data()) + first * X.entries.rows();
   check(MatCreateDense(X.comm, static_cast<PetscInt>(X.entries.rows()), PETSC_DECIDE, PETSC_DETERMINE,
-                       static_cast<PetscInt>(X.columns()), const_cast<double*>(X.entries.data()), A.put()));
+                       static_cast<PetscInt>(count), entries, A.put()));
   return A;
 }
 
@@ -118,14 +119,18 @@ MultiVector product(Mat A, const MultiVector& X)
   PetscInt rows = 0;
   check(MatGetLocalSize(A, &rows, nullptr));
   MultiVector Y{X.comm, MatrixXd(rows, X.columns())};
-  if (X.columns() == 0) return Y;
-  const Owned<Mat> from = as_matrix(X);
-  Owned<Mat> to;
-  check(MatMatMult(A, from, MAT_INITIAL_MATRIX, PETSC_DEFAULT, to.put()));
-  const PetscScalar* values = nullptr;
-  check(MatDenseGetArrayRead(to, &values));
-  Y.entries = MatrixXd::Map(values, rows, X.columns());
-  check(MatDenseRestoreArrayRead(to, &values));
+  constexpr Index at_once = 256; // columns: PETSc's product is a copy
+  for (Index first = 0; first < X.columns(); first += at_once)
+  {
+    const Index count = std::min(at_once, X.columns() - first);
+    const Owned<Mat> from = as_matrix(X, first, count);
+    Owned<Mat> to;
+    check(MatMatMult(A, from, MAT_INITIAL_MATRIX, PETSC_DEFAULT, to.put()));
+    const PetscScalar* values = nullptr;
+    check(MatDenseGetArrayRead(to, &values));
+    Y.entries.middleCols(first, count) = MatrixXd::Map(values, rows, count);
+    check(MatDenseRestoreArrayRead(to, &values));
+  }
   return Y;
 }
 

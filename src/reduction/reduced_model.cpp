@@ -37,31 +37,67 @@ MultiVector rows_of(const MultiVector& X, const std::vector<PetscInt>& rows)
   return {X.comm, X.entries(rows, Eigen::all)};
 }
 
-/// Shapes y in the coordinates that Z keeps, as motions.
-struct Shapes
+/// What the left shapes Y y have beyond Z y: rows of few degrees of freedom, so that Y y itself is not stored.
+struct LeftPart
 {
-  const MultiVector& X;    // Z y
-  const MultiVector& left; // Y y, which is Z y but for a few rows
+  std::vector<PetscInt> rows; // own ones
+  MultiVector entries;        // (Y - Z) y on these
+  MatrixXd on_pairs;          // B (Y - Z) y, B of the active pairs
 };
 
-/// M, C and K on X, tested by X and by the left shapes.
-void project(ReducedModel& model, const Structure& structure, const ClosedContact& contact, const Shapes& shapes)
+LeftPart left_part(const ClosedContact& contact, Mat B, const MultiVector& y)
 {
-  const auto& [X, left] = shapes;
-  Owned<Mat> difference;
+  Owned<Mat> difference, on_rows, on_pairs;
+  Owned<IS> rows, columns;
+  PetscInt first = 0, first_column = 0, last_column = 0;
   check(MatDuplicate(contact.Y, MAT_COPY_VALUES, difference.put()));
   check(MatAXPY(difference, -1, contact.Z, DIFFERENT_NONZERO_PATTERN));
-  const std::vector<PetscInt> follow = own_rows(difference);
-  const MultiVector more{X.comm, left.entries(follow, Eigen::all) - X.entries(follow, Eigen::all)};
-  MultiVector followed{X.comm, MatrixXd(more.entries.rows(), X.columns())};
+  check(MatGetOwnershipRange(difference, &first, nullptr));
+  check(MatGetOwnershipRangeColumn(difference, &first_column, &last_column));
+  LeftPart part{own_rows(difference), {}, {}};
+  std::vector<PetscInt> global = part.rows;
+  for (PetscInt& row : global) row += first;
+  const MPI_Comm comm = comm_of(difference);
+  check(ISCreateGeneral(comm, static_cast<PetscInt>(global.size()), global.data(), PETSC_COPY_VALUES, rows.put()));
+  check(ISCreateStride(comm, last_column - first_column, first_column, 1, columns.put()));
+  check(MatCreateSubMatrix(difference, rows, columns, MAT_INITIAL_MATRIX, on_rows.put()));
+  check(MatMatMult(B, difference, MAT_INITIAL_MATRIX, PETSC_DEFAULT, on_pairs.put()));
+  part.entries = product(on_rows, y);
+  part.on_pairs = whole_product(on_pairs, y);
+  return part;
+}
+
+/// Shapes as motions.
+struct Shapes
+{
+  const MultiVector& X; // Z y
+  const LeftPart& left;
+};
+
+/// Own rows of the left shapes; `rows` ascend.
+MultiVector left_rows(const Shapes& shapes, const std::vector<PetscInt>& rows)
+{
+  MultiVector result = rows_of(shapes.X, rows);
+  for (std::size_t i = 0; i < shapes.left.rows.size(); ++i)
+    if (const auto found = std::lower_bound(rows.begin(), rows.end(), shapes.left.rows[i]);
+        found != rows.end() && *found == shapes.left.rows[i])
+      result.entries.row(found - rows.begin()) += shapes.left.entries.entries.row(static_cast<Index>(i));
+  return result;
+}
+
+/// M, C and K on X, tested by X and by the left shapes.
+void project(ReducedModel& model, const Structure& structure, const Shapes& shapes)
+{
+  const auto& [X, left] = shapes;
+  MultiVector followed{X.comm, MatrixXd(left.entries.entries.rows(), X.columns())};
   const auto keep = [&](Index first, const MultiVector& image)
-  { followed.entries.middleCols(first, image.columns()) = image.entries(follow, Eigen::all); };
+  { followed.entries.middleCols(first, image.columns()) = image.entries(shapes.left.rows, Eigen::all); };
   for (const auto& [matrix, unsymmetric, symmetric] :
        {std::tuple{structure.M.get(), &model.M, &model.M_z}, std::tuple{structure.C.get(), &model.C, &model.C_z},
         std::tuple{structure.K.get(), &model.K, &model.K_z}})
   {
     *symmetric = symmetric_inner_products(X, matrix, keep);
-    *unsymmetric = *symmetric + inner_products(more, followed);
+    *unsymmetric = *symmetric + inner_products(left.entries, followed);
   }
 }
 
@@ -166,13 +202,13 @@ struct ClosedPairs
 /// Adds to K the springs of pairs with a compliance, with the friction that follows. Adds to C friction that turns and
 /// the gyroscopic part.
 void add_unsymmetric_parts(ReducedModel& model, const SlidingEquilibrium& sliding, const ClosedPairs& pairs,
-                           const MultiVector& left, const MultiVector& X)
+                           const Shapes& shapes)
 {
   const Interface& interface = sliding.interface;
   const auto add = [&](Mat A, MatrixXd& reduced)
   {
     const std::vector<PetscInt> rows = own_rows(A);
-    reduced += inner_products(rows_of(left, rows), rows_of(product(A, X), rows));
+    reduced += inner_products(left_rows(shapes, rows), rows_of(product(A, shapes.X), rows));
   };
   if (sliding.structure.G.get()) add(sliding.structure.G, model.C);
   if (const Owned<Mat> forces = contact_stiffness(interface, pairs.sliding, PairForces::with_friction); forces.get())
@@ -183,11 +219,11 @@ void add_unsymmetric_parts(ReducedModel& model, const SlidingEquilibrium& slidin
 }
 
 /// M, C and K on the shapes, tested by the left ones.
-void set_matrices(ReducedModel& model, const SlidingEquilibrium& sliding, const ClosedContact& contact,
-                  const ClosedPairs& pairs, const Shapes& shapes)
+void set_matrices(ReducedModel& model, const SlidingEquilibrium& sliding, const ClosedPairs& pairs,
+                  const Shapes& shapes)
 {
-  project(model, sliding.structure, contact, shapes);
-  add_unsymmetric_parts(model, sliding, pairs, shapes.left, shapes.X);
+  project(model, sliding.structure, shapes);
+  add_unsymmetric_parts(model, sliding, pairs, shapes);
 }
 
 } // namespace
@@ -233,14 +269,14 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   choose_basis(model, energy, M_z, columns, {modal, of_modes.more, of_modes.apart}, reduction.threshold);
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
   MultiVector X = product(contact.Z, columns);
-  const MultiVector left = product(contact.Y, columns);
+  const LeftPart left = left_part(contact, B, columns);
   columns.entries.resize(0, 0);
   std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
   if (reduction.sliding)
     for (const int pair : active) follows[static_cast<std::size_t>(pair)] = 1; // no reaction while open
-  set_matrices(model, sliding, contact, {roles.sliding, follows, roles.reactions}, {X, left});
-  model.H = (forces.transpose() * whole_product(B, left)).transpose();
+  set_matrices(model, sliding, {roles.sliding, follows, roles.reactions}, {X, left});
   model.G = whole_product(B, X);
+  model.H = (forces.transpose() * (model.G + left.on_pairs)).transpose();
   if (reduction.sliding) model.G = normal_rows(model.G, interface.directions);
   model.E_factor.compute(model.K_z + omega * omega * model.M_z);
   model.M_factor.compute(model.M_z);
@@ -289,19 +325,21 @@ ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibr
   const ClosedContact contact = eliminate_closed_pairs(other.structure, other.interface, roles.sliding);
   const MultiVector columns = kept_entries(model.shapes, contact.Z, other.structure.load);
   ReducedModel result;
-  const MultiVector left = product(contact.Y, columns);
-  set_matrices(result, other, contact, {roles.sliding, roles.sliding, other.equilibrium.reactions},
-               {model.shapes, left});
   const Owned<Mat> B = rows_of(other.interface, model.active, RowsTaken::all);
-  result.H = whole_product(B, left).transpose();
+  const LeftPart left = left_part(contact, B, columns);
+  const Shapes shapes{model.shapes, left};
+  set_matrices(result, other, {roles.sliding, roles.sliding, other.equilibrium.reactions}, shapes);
   result.G = whole_product(B, model.shapes);
+  result.H = (result.G + left.on_pairs).transpose();
   result.active = model.active;
   set_active_pairs(result, other.interface, about.equilibrium, false);
   result.gap = model.gap;
   result.omega = model.omega;
   result.slow = model.slow;
   const Owned<Vec> force = unbalanced_force(about, other, roles);
-  result.force = inner_products(left, columns_of(std::array{force.get()})).col(0);
+  const MultiVector unbalanced = columns_of(std::array{force.get()});
+  result.force =
+      (inner_products(model.shapes, unbalanced) + inner_products(left.entries, rows_of(unbalanced, left.rows))).col(0);
   return result;
 }
 

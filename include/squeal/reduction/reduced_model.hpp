@@ -81,10 +81,10 @@ struct Reduction
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
                     const Reduction& reduction);
 
-/// Memory of all ranks at the making of a model [byte], whose shapes are then held three times.
+/// Memory of all ranks at the making of a model [byte], whose shapes are then held twice.
 inline double memory_of_reduction(double dofs, double shapes)
 {
-  return 3 * sizeof(double) * dofs * shapes;
+  return 2 * sizeof(double) * dofs * shapes;
 }
 
 /// What each pair does in the motion that a model is made for. Pairs that are neither active nor sliding stay open.

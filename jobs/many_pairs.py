@@ -1,0 +1,44 @@
+#!/usr/bin/env python3
+"""Writes an elastic block on a moving belt with many contact pairs, SIDE x SIDE elements of its face and two layers.
+
+    jobs/many_pairs.py 126 FOLDER
+    build/squeal FOLDER/scene.toml
+
+The run finds the equilibrium and makes ten steps while the block is pressed onto the belt. 126 x 126 elements have
+16 129 pairs: a whole contact operator would take 18.7 GB, so that it stays in the factor.
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tools"))
+import bench_blocks
+
+SCENE = """title = "block on a belt, {pairs} pairs"
+
+[matrices]
+folder = "matrices"
+
+[friction]
+coefficient = 0.4
+
+[modes]
+enabled = false
+
+[estimate]
+enabled = false
+
+[transient]
+start = "rest"
+steps = 10
+step_size = 1e-5 # s
+load_factor = [[0, 0], [2e-5, 1]]
+"""
+
+if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    side, folder = int(sys.argv[1]), Path(sys.argv[2])
+    (folder / "matrices").mkdir(parents=True, exist_ok=True)
+    bench_blocks.write_matrices(folder / "matrices", *bench_blocks.block_on_belt(side, side, 2))
+    (folder / "scene.toml").write_text(SCENE.format(pairs=(side + 1) ** 2))
