@@ -154,9 +154,9 @@ Json multiplier_entry(const Multipliers& multipliers)
                 {"values", multiplier_list(multipliers)}};
   if (multipliers.crossing != Crossing::none) entry["crossing"] = word(multipliers.crossing);
   if (!multipliers.refusal.empty()) entry["refusal"] = multipliers.refusal;
-  if (multipliers.seen.periods > 0)
-    entry["seen"] = {
-        {"periods", multipliers.seen.periods}, {"growth", multipliers.seen.growth}, {"error", multipliers.seen.error}};
+  for (const SeenGrowth& seen : multipliers.seen)
+    entry["seen"].push_back(
+        {{"part", seen.part}, {"periods", seen.periods}, {"growth", seen.growth}, {"error", seen.error}});
   if (!multipliers.would_decide.empty()) entry["would_decide"] = multipliers.would_decide;
   return entry;
 }

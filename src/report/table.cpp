@@ -141,6 +141,9 @@ std::string cycle_text(const Report& report, const Scene& scene)
       row("", format("residual: full space %.2e (%s), projected ", cycle.orbit.residual, judged.c_str()) + projected);
   text += row("", format("%d Newton steps, %ld periods integrated, %d steps a period", cycle.convergence.iterations,
                          cycle.convergence.periods, cycle.steps_per_period));
+  for (const SeenGrowth& seen : cycle.multipliers.seen)
+    text += row("", format("seen over %ld periods from %.2g %% beside it: grows %.6f times a period, error bar %.1e",
+                           seen.periods, 100 * seen.part, seen.growth, seen.error));
   if (cycle.outcome.kind != OutcomeKind::converged) return text; // the figures of no cycle would mislead
   text += row("", format("period %.10g s, frequency %.8g Hz", cycle.orbit.period, 1 / cycle.orbit.period));
   text += row("", format("the step's own error of the period: about %+.1e", -cycle_bias(report).frequency));

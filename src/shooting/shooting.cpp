@@ -1,5 +1,6 @@
 #include "squeal/shooting/shooting.hpp"
 
+#include "beside_orbit.hpp"
 #include "free_periods.hpp"
 #include "newton_krylov.hpp"
 #include "squeal/base/constants.hpp"
@@ -82,70 +83,6 @@ struct Attempt
   bool answers() const { return converged() && !repels() && beside != Beside::unclear; }
 };
 
-/// A state beside an orbit, displaced by a part of its fluctuation along the motion that grows most. `part`: positive
-/// towards less energy.
-Owned<Vec> state_beside(const OrbitProblem& problem, const Attempt& attempt, double part)
-{
-  const Orbit& orbit = attempt.found.orbit;
-  const Owned<Vec> fluctuation = fluctuation_of(problem, orbit);
-  const double outwards = energy_product(problem.flow, fluctuation, attempt.floquet.fastest) > 0 ? 1 : -1;
-  Owned<Vec> state = copy_of(orbit.state.get());
-  check(VecAXPY(state, -part * outwards * orbit.fluctuation, attempt.floquet.fastest));
-  return state;
-}
-
-/// The slope of a line through all but the first quarter of the logarithms, and twice its standard error. Neighbours
-/// are correlated: eight values in a row count as one.
-SeenGrowth fit_growth(const std::vector<double>& logarithms)
-{
-  const std::size_t first = logarithms.size() / 4, count = logarithms.size() - first;
-  if (count < 16) return {};
-  const double middle = static_cast<double>(count - 1) / 2;
-  double sum = 0, moment = 0, squares = 0, weight = 0;
-  for (std::size_t k = 0; k < count; ++k)
-  {
-    const double x = static_cast<double>(k) - middle;
-    sum += logarithms[first + k];
-    moment += x * logarithms[first + k];
-    weight += x * x;
-  }
-  const double slope = moment / weight, mean = sum / static_cast<double>(count);
-  for (std::size_t k = 0; k < count; ++k)
-    squares += std::pow(logarithms[first + k] - mean - slope * (static_cast<double>(k) - middle), 2);
-  const double error = 2 * std::sqrt(8 * squares / static_cast<double>(count) / weight);
-  return {static_cast<long>(logarithms.size()), std::exp(slope), error * std::exp(slope)};
-}
-
-/// A motion beside an orbit, as parts of its fluctuation.
-struct Watched
-{
-  double first = 0;               // where the motion begins
-  double lowest = 0, highest = 0; // where it has been seen long enough
-  long periods = 0;               // at most
-};
-
-/// Distances from the orbit at the ends of periods of a motion that begins beside it, without their part along the
-/// flow.
-std::vector<double> distances_beside(const Search& search, const Attempt& attempt, const Watched& watched)
-{
-  const auto& [problem, options, log, start] = search;
-  const Orbit& orbit = attempt.found.orbit;
-  const Owned<Vec> state = state_beside(problem, attempt, watched.first), flow = copy_of(orbit.rate.get());
-  normalise(problem.flow, flow);
-  std::vector<double> distances;
-  for (long k = 0; k < watched.periods; ++k)
-  {
-    const Orbit now = evaluate(problem, log, state, orbit.period);
-    check(VecAXPY(state, 1, now.defect));
-    const Owned<Vec> away = copy_of(state.get());
-    check(VecAXPY(away, -1, orbit.state));
-    check(VecAXPY(away, -energy_product(problem.flow, flow, away), flow));
-    distances.push_back(energy_norm(problem.flow, away) / orbit.fluctuation);
-    if (!(distances.back() < watched.highest) || distances.back() < watched.lowest) break;
-  }
-  return distances;
-}
-
 /// Holds a verdict against a motion beside the orbit, until its distance has doubled or halved. Doubling shows that an
 /// undecided orbit repels. Where it does not double over periods that should make it four times as large, the verdict
 /// "unstable" is undecided: where contact only just opens, closes or sticks, the tangent holds in a neighbourhood that
@@ -163,7 +100,8 @@ void hold_against_motion(const Search& search, Attempt& attempt)
   const long at_most = dofs > large_model ? many_of_large : many;
   if (!(std::log(4) / std::log(largest) <= static_cast<double>(at_most))) return;
   if (log.convergence.periods + at_most > options.max_periods) return;
-  const std::vector<double> distances = distances_beside(search, attempt, {part, 0.5 * part, 2 * part, at_most});
+  const std::vector<double> distances = distances_beside(problem, log, attempt.found.orbit, attempt.floquet.fastest,
+                                                         {part, 0.5 * part, 2 * part, at_most});
   if (!(distances.back() < 2 * part)) attempt.beside = Beside::leaves;
   if (!unstable || attempt.beside == Beside::leaves) return;
   if (distances.back() > 0.5 * part) attempt.beside = Beside::unclear;
@@ -252,7 +190,8 @@ Attempt search_on(const Search& search, Attempt best, int done, Orbit& free)
     if (best.repels() && (side == 0 || other_side))
     {
       side = other_side ? -1 : 1;
-      state = state_beside(problem, best, 0.1 * side); // far enough to leave it in a few periods
+      state = state_beside(problem, best.found.orbit, best.floquet.fastest,
+                           0.1 * side); // far enough to leave it in a few periods
       period = best.found.orbit.period;
       collapses = 0;
     }
@@ -282,20 +221,6 @@ std::string leaving_time(const Multipliers& multipliers, double period)
   const double periods = 1 / std::log(std::abs(fastest));
   return format("; at %.4g Hz it grows e-fold in %.3g periods (%.2g s): a larger -cycle_free_periods follows it",
                 std::abs(std::arg(fastest)) / (two_pi * period), periods, periods * period);
-}
-
-/// Integrates beside the orbit and fits the growth of the distance from it. The first quarter is left out, where other
-/// motions decay, and what comes after a third of the fluctuation or a tenth of the first distance: the shift in time
-/// that a motion ends with leaves the flow's direction by its square.
-SeenGrowth watch(const Search& search, const Attempt& attempt)
-{
-  constexpr double first = 0.03; // of the fluctuation
-  if (!attempt.converged() || !attempt.floquet.fastest.get()) return {};
-  const Watched watched{first, 0.1 * first, 1. / 3, search.options.watched_periods};
-  std::vector<double> logarithms = distances_beside(search, attempt, watched);
-  if (!(logarithms.back() < watched.highest) || logarithms.back() < watched.lowest) logarithms.pop_back();
-  for (double& value : logarithms) value = std::log(value);
-  return fit_growth(logarithms);
 }
 
 /// How the search for an orbit ended, in words.
@@ -353,7 +278,11 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
 
   ShootingResult result;
   result.outcome = outcome_of(log.convergence, ending, found.found.orbit.residual);
+  std::vector<SeenGrowth> seen;
+  if (options.watched_periods > 0 && found.converged())
+    seen = growths_beside(problem, log, found.found.orbit, found.floquet, options.watched_periods);
   result.multipliers = std::move(found.floquet.multipliers);
+  result.multipliers.seen = std::move(seen);
   refuse_repelling(result.multipliers, start.other_unstable.size(), result.outcome);
   if (found.beside != Beside::not_seen && result.outcome.kind == OutcomeKind::converged)
   {
@@ -363,7 +292,6 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
                                 : "whether the cycle found repels is undecided: " + result.multipliers.would_decide;
   }
   if (slow) result.outcome.reason += leaving_time(result.multipliers, found.found.orbit.period);
-  if (options.watched_periods > 0) result.multipliers.seen = watch(search, found);
   result.orbit = std::move(found.found.orbit);
   if (goes_on) result.free = std::move(free);
   result.convergence = std::move(log.convergence);

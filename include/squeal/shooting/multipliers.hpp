@@ -51,11 +51,12 @@ inline Words words_of(Crossing)
   return crossing_words;
 }
 
-/// What a motion beside an orbit was seen to do: it began at 3 % of the fluctuation along the fastest motion.
+/// What a motion beside an orbit was seen to do that began along the fastest motion.
 struct SeenGrowth
 {
-  long periods = 0; // integrated until the distance became large or vanished; 0: not watched
+  long periods = 0; // integrated until the distance became large or vanished; 0: too few for a line
   double growth = std::numeric_limits<double>::quiet_NaN(), error = growth; // of the distance, a period
+  double part = 0; // of the orbit's fluctuation, where the motion began
 };
 
 /// The multipliers of an orbit, their bars, and what they say of its stability.
@@ -71,7 +72,7 @@ struct Multipliers
   long periods = 0;                   // columns of the tangent, or difference quotients, over one period each
   MultiplierMethod method = MultiplierMethod::automatic; // that was used
   std::string refusal;                                   // why the oblique projection did not serve
-  SeenGrowth seen{};
+  std::vector<SeenGrowth> seen{};                        // from smaller and smaller parts; the last is the smallest
 };
 
 /// The multipliers and the motion that grows most.
