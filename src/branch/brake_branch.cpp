@@ -173,6 +173,28 @@ std::vector<CorrectedPoint> corrected_points(BrakeFamily& full, ReducedFamily& r
   return corrected;
 }
 
+/// The branch of a reduced model, which every rank follows by itself. Collective.
+Branch trace_by_itself(ReducedFamily& reduced, const BrakeBranchProblem& problem,
+                       const ContinuationSettings& continuation)
+{
+  const MPI_Comm comm = comm_of(problem.sliding.structure.load);
+  const Orbit start = reduced.reduced(problem.cycle.orbit);
+  Branch branch;
+  int asked = 0;
+  try
+  {
+    branch = trace_branch(reduced.flows(), continuation, problem.shooting, start, problem.settings.own);
+  }
+  catch (const Interrupted&)
+  {
+    asked = 1;
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &asked, 1, MPI_INT, MPI_MAX, comm);
+  do join_parts(comm); // throws where rank 0 knows as well
+  while (asked != 0);  // its clock may be a little behind
+  return branch;
+}
+
 /// Follows the branch on a reduced model, again while the full one's pairs do what it leaves out.
 void trace_on_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem,
                             const ContinuationSettings& continuation, BrakeBranch& found)
@@ -185,8 +207,7 @@ void trace_on_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem
   {
     ReducedFamily reduced(full, problem, seen);
     end_if_asked(comm);
-    found.branch = trace_branch(reduced.flows(), continuation, problem.shooting, reduced.reduced(problem.cycle.orbit),
-                                problem.settings.own);
+    found.branch = trace_by_itself(reduced, problem, continuation);
     check_on_full_model(full, reduced, found.branch, seen);
     const auto active = seen.roles({}).active.size(), had = reduced.model().active.size();
     found.reduction = {reduced.model().size(),

@@ -16,6 +16,7 @@ struct BranchSide
 {
   std::vector<ExaminedOrbit> orbits; // the start first
   std::vector<BranchEvent> events;
+  std::array<KnownBeyond, 2> known; // multipliers
   BranchEnding ending = BranchEnding::number_of_points;
 };
 
@@ -87,6 +88,8 @@ void note_events(BranchCorrector& corrector, BranchSide& side)
 {
   const std::size_t count = side.orbits.size();
   std::vector<BranchEvent> fresh = events_between(corrector, side.orbits[count - 2], side.orbits[count - 1]);
+  for (KnownBeyond& known : side.known)
+    if (auto crossing = crossing_among(corrector, side.orbits, known)) fresh.push_back(*crossing);
   if (count > 2)
     if (auto fold = fold_among(corrector, {&side.orbits[count - 3], &side.orbits[count - 2], &side.orbits[count - 1]}))
       fresh.push_back(*fold);
@@ -140,7 +143,7 @@ double range_passed(const BranchCorrector& corrector, const BranchSide& side, bo
 BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, BranchVector tangent)
 {
   const int points = corrector.settings.points;
-  BranchSide side;
+  BranchSide side{{}, {}, known_beyond(start.multipliers)};
   side.orbits.push_back(copy_of(start));
   refer_to(corrector, side.orbits.back().corrected);
   Walk walk{std::move(tangent), 1. / points, 2e-3 / points, 6. / points};

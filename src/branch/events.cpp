@@ -21,24 +21,53 @@ struct Search
   int halvings; // of the interval between the points
 };
 
-/// Whether a multiplier is beyond the unit circle by more than its bar, and the way that the event is about.
-bool counts(BranchEventKind kind, std::complex<double> multiplier, double error)
+/// Whether the event is about a multiplier.
+bool is_of(BranchEventKind kind, std::complex<double> multiplier)
 {
-  if (!(std::abs(multiplier) > 1 + error)) return false;
   if (kind == BranchEventKind::neimark_sacker) return multiplier.imag() > 0;
   return kind == BranchEventKind::period_doubling && multiplier.imag() == 0 && multiplier.real() < 0;
 }
 
-Count multipliers_of(BranchEventKind kind)
+/// The number of multipliers of the event beyond the unit circle, by their values.
+int beyond(BranchEventKind kind, const Multipliers& multipliers)
 {
-  return [kind](const ExaminedOrbit& orbit)
+  return static_cast<int>(std::count_if(multipliers.values.begin(), multipliers.values.end(),
+                                        [kind](std::complex<double> value)
+                                        { return is_of(kind, value) && std::abs(value) > 1; }));
+}
+
+/// The least and the greatest number of them that the bars allow.
+struct CountRange
+{
+  int least = 0, most = 0;
+};
+
+CountRange range_beyond(BranchEventKind kind, const Multipliers& multipliers)
+{
+  CountRange range;
+  for (std::size_t i = 0; i < multipliers.values.size(); ++i)
   {
-    const Multipliers& multipliers = orbit.multipliers;
-    int count = 0;
-    for (std::size_t i = 0; i < multipliers.values.size(); ++i)
-      count += counts(kind, multipliers.values[i], multipliers.errors[i]);
-    return count;
-  };
+    if (!is_of(kind, multipliers.values[i])) continue;
+    const double size = std::abs(multipliers.values[i]), bar = multipliers.errors[i];
+    range.least += size - bar > 1;
+    range.most += size + bar > 1;
+  }
+  return range;
+}
+
+int all_beyond(const Multipliers& multipliers)
+{
+  return static_cast<int>(std::count_if(multipliers.values.begin(), multipliers.values.end(),
+                                        [](std::complex<double> value) { return std::abs(value) > 1; }));
+}
+
+/// The modulus of the event's multiplier of that place, the largest first, and its bar; none: there are not as many.
+std::optional<std::pair<double, double>> modulus_of(BranchEventKind kind, const Multipliers& multipliers, int place)
+{
+  for (std::size_t i = 0; i < multipliers.values.size(); ++i)
+    if (is_of(kind, multipliers.values[i]) && place-- == 0)
+      return std::pair{std::abs(multipliers.values[i]), multipliers.errors[i]};
+  return {};
 }
 
 /// z on the straight line between two orbits.
@@ -66,32 +95,40 @@ BranchEvent event_at(BranchEventKind kind, const ExaminedOrbit& orbit, double er
           0};
 }
 
+/// An event, and the multipliers at the ends of the interval that is left.
+struct LocatedEvent
+{
+  BranchEvent event;
+  Multipliers before, after;
+};
+
 /// Halves the interval between two orbits of different counts. The event is put to the end of higher energy of what is
 /// left: there the orbit has what the event is about.
-BranchEvent locate(BranchCorrector& corrector, const Search& search, const ExaminedOrbit& from, const ExaminedOrbit& to)
+LocatedEvent locate(BranchCorrector& corrector, const Search& search, const ExaminedOrbit& from,
+                    const ExaminedOrbit& to)
 {
   const int first = search.count(from);
   double low = 0, high = 1;
   double low_parameter = from.corrected.parameter, high_parameter = to.corrected.parameter;
   double period = to.corrected.orbit.period, energy = to.measures.mean_fluctuating_energy;
+  Multipliers before = from.multipliers, after = to.multipliers;
   for (int i = 0; i < search.halvings; ++i)
   {
     const double middle = 0.5 * (low + high);
     std::optional<CorrectedOrbit> corrected = correct_between(corrector, from, to, middle);
     if (!corrected) break;
-    const ExaminedOrbit orbit = examine(corrector, std::move(*corrected), search.examined);
-    const bool before = search.count(orbit) == first;
-    (before ? low : high) = middle;
-    (before ? low_parameter : high_parameter) = orbit.corrected.parameter;
+    ExaminedOrbit orbit = examine(corrector, std::move(*corrected), search.examined);
+    const bool is_before = search.count(orbit) == first;
+    (is_before ? low : high) = middle;
+    (is_before ? low_parameter : high_parameter) = orbit.corrected.parameter;
+    (is_before ? before : after) = std::move(orbit.multipliers);
     period = orbit.corrected.orbit.period;
     energy = orbit.measures.mean_fluctuating_energy;
   }
-  return {search.kind,
-          0.5 * (low_parameter + high_parameter),
-          0.5 * std::abs(high_parameter - low_parameter),
-          period,
-          energy,
-          search.count(to) - first};
+  return {{search.kind, 0.5 * (low_parameter + high_parameter), 0.5 * std::abs(high_parameter - low_parameter), period,
+           energy, search.count(to) - first},
+          std::move(before),
+          std::move(after)};
 }
 
 bool moves(const PointMeasures& measures)
@@ -107,9 +144,6 @@ std::vector<Search> searches(const ExaminedOrbit& from, const ExaminedOrbit& to)
   std::vector<Search> found = {
       {BranchEventKind::first_lift_off, lifts, Examined::measures_alone, 7},
       {BranchEventKind::first_stick, sticks, Examined::measures_alone, 5},
-      {BranchEventKind::neimark_sacker, multipliers_of(BranchEventKind::neimark_sacker), Examined::multipliers_too, 5},
-      {BranchEventKind::period_doubling, multipliers_of(BranchEventKind::period_doubling), Examined::multipliers_too,
-       5},
   };
   // the first opening is no grazing of an impacting motion
   if (moves(from.measures) && moves(to.measures))
@@ -150,8 +184,44 @@ ExaminedOrbit examine(BranchCorrector& corrector, CorrectedOrbit corrected, Exam
 std::vector<BranchEvent> events_between(BranchCorrector& corrector, const ExaminedOrbit& from, const ExaminedOrbit& to)
 {
   std::vector<BranchEvent> events;
-  for (const Search& search : searches(from, to)) events.push_back(locate(corrector, search, from, to));
+  for (const Search& search : searches(from, to)) events.push_back(locate(corrector, search, from, to).event);
   return events;
+}
+
+std::array<KnownBeyond, 2> known_beyond(const Multipliers& start)
+{
+  std::array<KnownBeyond, 2> known = {{{BranchEventKind::neimark_sacker}, {BranchEventKind::period_doubling}}};
+  for (KnownBeyond& one : known) one.count = beyond(one.kind, start);
+  return known;
+}
+
+std::optional<BranchEvent> crossing_among(BranchCorrector& corrector, const std::vector<ExaminedOrbit>& orbits,
+                                          KnownBeyond& known)
+{
+  const BranchEventKind kind = known.kind;
+  const std::size_t last = orbits.size() - 1;
+  const CountRange range = range_beyond(kind, orbits[last].multipliers);
+  if (range.least <= known.count && known.count <= range.most)
+  {
+    if (range.least == range.most) known.place = last;
+    return {};
+  }
+  std::size_t before = last - 1; // the last of the orbits that are as is known, by the values
+  while (before > known.place && beyond(kind, orbits[before].multipliers) != known.count) --before;
+  const Search search{kind, [kind](const ExaminedOrbit& orbit) { return beyond(kind, orbit.multipliers); },
+                      Examined::multipliers_too, 5};
+  LocatedEvent located = locate(corrector, search, orbits[before], orbits[before + 1]);
+  const std::size_t since = known.place;
+  const int place = std::min(known.count, beyond(kind, orbits[last].multipliers));
+  located.event.change = beyond(kind, orbits[last].multipliers) - known.count;
+  known = {kind, known.count + located.event.change, last};
+  if (all_beyond(located.before) == all_beyond(located.after)) return {};
+  // what the bar leaves open, by the slope between the orbits that are certain
+  const auto from = modulus_of(kind, orbits[since].multipliers, place),
+             to = modulus_of(kind, orbits[last].multipliers, place), at = modulus_of(kind, located.after, place);
+  const double distance = std::abs(orbits[last].corrected.parameter - orbits[since].corrected.parameter);
+  if (from && to && at) located.event.error += at->second * distance / std::abs(to->first - from->first);
+  return located.event;
 }
 
 std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::array<const ExaminedOrbit*, 3>& points)

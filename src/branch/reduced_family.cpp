@@ -398,7 +398,7 @@ FlowFamily ReducedFamily::flows()
   family.flow.K = energy_.K;
   family.flow.integrate = [this](double period, Vec start, Vec end, Vec rate)
   {
-    end_if_asked(PETSC_COMM_SELF); // which is the whole run on one rank, and else asks for nothing
+    if (is_asked_here()) throw Interrupted{}; // every rank follows the branch by itself
     at_->flow.integrate(period, start, end, rate);
   };
   family.flow.record_period = [this](double period, Vec start, double shift)

@@ -22,6 +22,7 @@ using FamilyRate = std::function<void(double parameter, const std::vector<double
 struct SmoothFamily
 {
   double parameter = 0, period = 0;
+  double moved = 0; // what the tangent adds to the parameter
   SmoothModel model;
   Owned<Vec> recorded{};
   FlowFamily family{};
@@ -58,7 +59,10 @@ std::unique_ptr<SmoothFamily> family_of(const FamilyRate& rate_of, const std::ve
   };
   family.flow.apply_tangent = [self](std::span<const Vec> states)
   {
+    const double parameter = self->parameter;
+    self->parameter += self->moved;
     for (const Vec state : states) central_difference(self->model.flow, self->period, self->recorded, state);
+    self->parameter = parameter;
   };
   family.parameter_column = [self](double period, Vec start, Vec column)
   {
@@ -100,6 +104,19 @@ void subcritical(double p, const std::vector<double>& x, std::vector<double>& ra
 void with_bystander(double p, const std::vector<double>& x, std::vector<double>& rate)
 {
   rate = {x[2], x[3], (1 - x[0] * x[0] - x[2] * x[2]) * x[2] - x[0], p * x[3] - 3 * x[1]};
+}
+
+/// A circle of radius 1, and beside it y'' + 3 y = p y'/20, whose multipliers have the modulus exp(pi p/20).
+void with_slow_bystander(double p, const std::vector<double>& x, std::vector<double>& rate)
+{
+  with_bystander(p / 20, x, rate);
+}
+
+/// A circle of radius 1, and beside it y'' + p y = y'/5: above p = 1/100 its multipliers are complex, below real, and
+/// beyond the unit circle on either side.
+void with_meeting_bystander(double p, const std::vector<double>& x, std::vector<double>& rate)
+{
+  rate = {x[2], x[3], (1 - x[0] * x[0] - x[2] * x[2]) * x[2] - x[0], x[3] / 5 - p * x[1]};
 }
 
 const BranchEvent* event_of(const Branch& branch, BranchEventKind kind)
@@ -153,6 +170,41 @@ TEST_CASE("a Neimark-Sacker point is located within its error, and both bounds a
   CHECK(passed->change == 1);
   CHECK(std::abs(passed->parameter) <= passed->error);
   CHECK(passed->error < 1e-3);
+}
+
+TEST_CASE("bars that reach across the unit circle at some points make up no event")
+{
+  const auto made = family_of(with_slow_bystander, {1, 3});
+  SmoothFamily* const self = made.get();
+  made->family.flow.record_period = [self](double period, Vec start, double shift)
+  {
+    self->period = period;
+    self->recorded = copy_of(start);
+    // a bar is what a shift changes: here what 1/20 of p does, in every other interval of a length of 1/500
+    self->moved = shift > 0 && static_cast<long>(std::floor(500 * self->parameter)) % 2 == 0 ? 0.05 : 0;
+  };
+  const Branch branch = branch_from(*made, {1, 0}, 2 * pi, -0.07, {-0.1, 0.1, 100, 1e-9});
+  CHECK(branch.points.back().parameter == 0.1);
+  int flickers = 0; // points whose bars reach across among points whose bars do not
+  for (std::size_t i = 1; i < branch.points.size(); ++i)
+    flickers += branch.points[i].parameter > 0.01 && branch.points[i].parameter < 0.05 &&
+                branch.points[i].multipliers.stability != branch.points[i - 1].multipliers.stability;
+  CHECK(flickers >= 2);
+  REQUIRE(branch.events.size() == 1);
+  CHECK(branch.events[0].kind == BranchEventKind::neimark_sacker);
+  CHECK(branch.events[0].change == 1);
+  CHECK(std::abs(branch.events[0].parameter) <= branch.events[0].error);
+  CHECK(std::abs(branch.events[0].parameter) < 1e-3); // its value passes 1 there, whatever the bars
+}
+
+TEST_CASE("multipliers that meet on the real axis beyond the unit circle are no event")
+{
+  const auto made = family_of(with_meeting_bystander, {1, 3});
+  const Branch branch = branch_from(*made, {1, 0}, 2 * pi, 0.015, {0.005, 0.02, 5, 1e-9});
+  CHECK(branch.points.front().parameter == 0.005);
+  CHECK(branch.points.front().multipliers.values[0].imag() == 0);
+  CHECK(branch.points.back().multipliers.values[0].imag() != 0);
+  CHECK(branch.events.empty());
 }
 
 TEST_CASE("both bounds of a range are reached exactly, and no event is made up between")
