@@ -47,14 +47,30 @@ double steps_of_transient(const TransientSettings& transient)
   return transient.steps > 0 ? static_cast<double>(transient.steps) : transient.periods * transient.steps_per_period;
 }
 
+double points_of(const SweepSettings& sweep)
+{
+  double points = static_cast<double>(sweep.values.size());
+  if (points == 0) points = std::accumulate(sweep.points.begin(), sweep.points.end(), 1., std::multiplies<>());
+  if (sweep.samples > 0) points = sweep.samples;
+  return sweep.directions == SweepDirections::both ? 2 * points : points;
+}
+
+/// Motions that a sweep seeks at most: one a point.
+double motions_of(const Scene& scene)
+{
+  return scene.sweep && scene.sweep->stages == SweepStages::cycle ? points_of(*scene.sweep) : 0;
+}
+
 double steps_of(const Scene& scene, const ProgramOptions& options)
 {
   double steps = steps_of_transient(scene.transient);
-  if (!scene.cycle.enabled) return steps;
+  const double motions = motions_of(scene);
+  if (!scene.cycle.enabled && motions == 0) return steps;
   const double a_period = scene.cycle.steps_per_period > 0 ? scene.cycle.steps_per_period : usual_steps;
   const double cycle = a_period * std::min(periods_to_a_cycle, static_cast<double>(options.cycle.shooting.max_periods));
   const double starts = scene.cycle.starts, points = scene.branch ? scene.branch->points : 0;
-  return steps + cycle * (1 + starts + points) + a_period * scene.cycle.free_periods;
+  const double of_scene = scene.cycle.enabled ? cycle * (1 + starts + points) + a_period * scene.cycle.free_periods : 0;
+  return steps + of_scene + motions * (cycle + a_period * scene.cycle.free_periods);
 }
 
 bool seeks_modes(const Scene& scene)
@@ -218,14 +234,6 @@ double memory_of_points(double points)
   return number * numbers_of_point * points;
 }
 
-double points_of(const SweepSettings& sweep)
-{
-  double points = static_cast<double>(sweep.values.size());
-  if (points == 0) points = std::accumulate(sweep.points.begin(), sweep.points.end(), 1., std::multiplies<>());
-  if (sweep.samples > 0) points = sweep.samples;
-  return sweep.directions == SweepDirections::both ? 2 * points : points;
-}
-
 /// The least that a limit of the process may be.
 struct LeastLimit
 {
@@ -259,8 +267,9 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
     add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient));
-  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, in_factor, free));
-  if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)));
+  const double cycle = memory_of_cycle(sizes, scene.fidelity, in_factor, free);
+  if (scene.cycle.enabled) add(Stage::cycle, cycle);
+  if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)) + (motions_of(scene) > 0 ? cycle : 0));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
   forecast.steps = steps_of(scene, options);
   // two products a step, each of which reads half of W, or the rows of E twice

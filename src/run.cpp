@@ -11,6 +11,7 @@
 #include "squeal/study/robustness.hpp"
 #include "squeal/study/sensitivity.hpp"
 #include "squeal/study/sweep.hpp"
+#include "squeal/swept_motion.hpp"
 
 #include <algorithm>
 #include <array>
@@ -133,9 +134,10 @@ Sweep run_scene_sweep(const Chain& chain)
     for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.sweep->key[i], values[i]});
     return model_with(chain.model, scene, numbers, comm);
   };
-  return run_sweep(
-      {*scene.sweep, model_at, scene.modes, chain.options.modes, chain.options.equilibrium, chain.options.sweep},
-      comm_of(chain.model.structure.load));
+  const auto motion_at = [&](const SweptPlace& place, MPI_Comm comm) { return find_swept_motion(chain, place, comm); };
+  return run_sweep({*scene.sweep, model_at, motion_at, scene.modes, chain.options.modes, chain.options.equilibrium,
+                    chain.options.sweep},
+                   comm_of(chain.model.structure.load));
 }
 
 Robustness run_robustness(const Chain& chain)

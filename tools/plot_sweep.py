@@ -1,4 +1,5 @@
-"""Pictures of a sweep: frequency and growth of the followed modes against the number, and a map of stability for two."""
+"""Pictures of a sweep: frequency and growth of the followed modes against the number, with the motions where they were
+sought, and a map of stability for two numbers."""
 
 import numpy as np
 from plot_basis import frequency_unit, heading, plt, those_with
@@ -14,9 +15,38 @@ def tables_of(results):
     return {name: results.series("sweep", name) for name in names}
 
 
+def motions_of(sweep, direction):
+    """Values and motions of one direction of rotation, by rising first number."""
+    points = [p for p in sweep["points"] if "motion" in p and p["direction"] == direction]
+    return sorted(((p["values"][0], p["motion"]) for p in points), key=lambda pair: pair[0])
+
+
+def look_of(motion):
+    """Mark, filling and label of a motion by what is known of it."""
+    if motion["outcome"] == "settled":
+        return "D", "none", "settled motion, no cycle attracts"
+    if motion["stability"] == "stable":
+        return "o", "black", "cycle, attracts"
+    if motion["stability"] == "unstable":
+        return "o", "none", "cycle, repels"
+    return "s", "0.6", "motion, undecided"
+
+
+def draw_motions(above, energy, motions, size):
+    """Frequencies among the modes' and mean energies, with the error of settled motions."""
+    for value, motion in motions:
+        if motion["frequency_hz"] is None:
+            continue
+        mark, filling, label = look_of(motion)
+        style = {"marker": mark, "mfc": filling, "mec": "black", "color": "black", "ls": "", "ms": 6, "zorder": 5}
+        above.plot([value], [motion["frequency_hz"] / size], label=label, **style)
+        energy.errorbar([value], [motion["mean_fluctuating_energy"]], yerr=motion["energy_error"] or 0, capsize=2, lw=0.8,
+                        **style)
+
+
 def sweep_of(results):
     sweep = results.stage("sweep")
-    if sweep["stages"] != "modes":
+    if sweep["stages"] == "equilibrium":
         raise Missing("the sweep has no modes")
     if sweep["followed_modes"] == 0:
         raise Missing("no mode of the sweep was followed")
@@ -48,7 +78,6 @@ def draw_column(axes, table, rows, sweep, size):
         above.plot(number, frequency / size, "-", color=colour, marker=mark, ms=3.5, lw=1.4, label=label)
         below.plot(number, growth, "-", color=colour, marker=mark, ms=3.5, lw=1.4)
     below.axhline(0, color="0.3", lw=0.8)
-    limit_growth(below, table["growth_rate"][np.ix_(rows, coloured)] if coloured else table["growth_rate"][rows])
 
 
 def limit_growth(axes, growth):
@@ -64,22 +93,38 @@ def draw_chart(results, sweep, table):
     """The lock-in chart. Of two numbers, the first value of the second one."""
     directions = [d for d in (1, -1) if (table["direction"] == d).any()]
     size, unit = frequency_unit(np.nanmax(table["frequency"]))
-    figure, axes = plt.subplots(2, len(directions), figsize=(4.2 + 3.6 * len(directions), 7), sharex=True, sharey="row",
-                                squeeze=False)
+    motions = {direction: motions_of(sweep, direction) for direction in directions}
+    rows_of_axes = 3 if any(motion["frequency_hz"] for pairs in motions.values() for _, motion in pairs) else 2
+    figure, axes = plt.subplots(rows_of_axes, len(directions), figsize=(4.2 + 3.6 * len(directions), 3.5 * rows_of_axes),
+                                sharex=True, sharey="row", squeeze=False)
     for column, direction in enumerate(directions):
         rows = ordered_rows(table, table["direction"] == direction)
-        draw_column(axes[:, column], table, rows, sweep, size)
+        draw_column(axes[:2, column], table, rows, sweep, size)
+        if rows_of_axes == 3:
+            draw_motions(axes[0, column], axes[2, column], motions[direction], size)
         for threshold in sweep["thresholds"]:
             if threshold["direction"] == direction:
                 for ax in axes[:, column]:
                     ax.axvline(threshold["values"][0], color="0.4", lw=0.8, ls=":")
-        axes[1, column].set_xlabel(sweep["keys"][0])
+        axes[-1, column].set_xlabel(sweep["keys"][0])
         if len(directions) > 1:
             axes[0, column].set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
     axes[0, 0].set_ylabel(f"frequency [{unit}]")
     axes[1, 0].set_ylabel("growth rate [1/s]")
-    if any(axes[0, 0].get_legend_handles_labels()[1]):
-        handles, labels = axes[0, 0].get_legend_handles_labels()
+    if rows_of_axes == 3:
+        axes[2, 0].set_ylabel("mean energy of the motion [J]")
+        energies = [m["mean_fluctuating_energy"] for pairs in motions.values() for _, m in pairs if m["frequency_hz"]]
+        if max(energies) > 10 * min(energies) > 0:
+            axes[2, 0].set_yscale("log")
+    coloured = [entry["track"] for entry in sweep["unstable_tracks"]]
+    limit_growth(axes[1, 0], table["growth_rate"][:, coloured] if coloured else table["growth_rate"])
+    legend = {}
+    for ax in axes[0]:  # a mode keeps its colour: one label each
+        for handle, label in zip(*ax.get_legend_handles_labels()):
+            if ax is axes[0, 0] or not label.startswith("mode "):
+                legend[label] = handle
+    if legend:
+        labels, handles = list(legend), list(legend.values())
         figure.get_layout_engine().set(rect=(0, 0.06, 1, 0.94))  # the legend is below
         figure.legend(handles, labels, loc="lower center", ncols=min(4, len(labels)), fontsize=8)
     figure.suptitle(heading([results], "modes against " + sweep["keys"][0]))

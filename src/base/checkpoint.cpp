@@ -30,6 +30,18 @@ CheckpointPlace& place()
   return one;
 }
 
+/// What the names of all checkpoints begin with at present.
+std::string& prefix()
+{
+  static std::string one;
+  return one;
+}
+
+fs::path file_of(const std::string& name)
+{
+  return place().folder / (prefix() + name);
+}
+
 /// Says once that there is no room for checkpoints.
 void warn(const std::string& reason)
 {
@@ -151,6 +163,26 @@ void open_checkpoints(const CheckpointPlace& given)
                 "): give those, or begin again without --restart");
 }
 
+CheckpointNames::CheckpointNames(const std::string& given)
+{
+  prefix() = given;
+}
+
+CheckpointNames::~CheckpointNames()
+{
+  prefix().clear();
+}
+
+void CheckpointNames::remove_all()
+{
+  std::error_code ignored;
+  if (prefix().empty()) return;
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(place().folder, ignored))
+    if (entry.path().filename().string().starts_with(prefix())) files.push_back(entry.path());
+  for (const fs::path& file : files) fs::remove(file, ignored);
+}
+
 bool checkpoints_are_kept()
 {
   return !place().folder.empty();
@@ -166,7 +198,7 @@ void keep(const Checkpoint& checkpoint, const std::string& name)
     fs::create_directories(place().folder);
     if (!fs::exists(place().folder / request_file))
       write_whole_file(place().folder / request_file, place().request, Flush::now);
-    write_whole_file(place().folder / name, bytes, Flush::now);
+    write_whole_file(file_of(name), bytes, Flush::now);
   }
   catch (const std::exception& error)
   {
@@ -180,7 +212,7 @@ namespace
 std::string bytes_kept(const std::string& name)
 {
   if (!place().restart) return {};
-  std::ifstream stream(place().folder / name, std::ios::binary);
+  std::ifstream stream(file_of(name), std::ios::binary);
   std::ostringstream bytes;
   if (stream) bytes << stream.rdbuf();
   return bytes.str();
@@ -196,7 +228,7 @@ std::optional<Checkpoint> kept(const std::string& name)
 void remove_kept(const std::string& name)
 {
   std::error_code ignored;
-  fs::remove(place().folder / name, ignored);
+  fs::remove(file_of(name), ignored);
 }
 
 std::optional<Checkpoint> kept_everywhere(const std::string& name, MPI_Comm comm)

@@ -52,6 +52,7 @@ struct Control
   int ended_by = 0;         // agreed: a signal's number, or by_time_limit
   bool checkpoint_due = false;
   std::vector<pid_t> peers; // ranks of this machine
+  int together = 0;         // number of ranks that work together; 0: all
 };
 
 Control& control()
@@ -174,13 +175,23 @@ void end_run_control()
 Request request(MPI_Comm comm)
 {
   Control& own = control();
-  int ranks = 1, all = 1;
+  int ranks = 1, all = own.together;
   MPI_Comm_size(comm, &ranks);
-  MPI_Comm_size(MPI_COMM_WORLD, &all);
+  if (all == 0) MPI_Comm_size(MPI_COMM_WORLD, &all);
   if (ranks < all) return Request::none; // the other ranks would not know, and would agree at another time
   if (++own.since >= own.every) agree_on_requests(comm);
   if (own.ended_by != 0) return Request::end;
   return own.checkpoint_due ? Request::checkpoint : Request::none;
+}
+
+WorkOfPart::WorkOfPart(MPI_Comm part)
+{
+  MPI_Comm_size(part, &control().together);
+}
+
+WorkOfPart::~WorkOfPart()
+{
+  control().together = 0;
 }
 
 Request request_of_part(MPI_Comm part)

@@ -1,4 +1,4 @@
-#include "heard.hpp"
+#include "squeal/report/heard.hpp"
 
 #include <algorithm>
 #include <cmath>

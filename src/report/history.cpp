@@ -80,7 +80,7 @@ void write_history(const Report& report, const Scene& scene, const std::filesyst
   }
   if (has_run(report.response.outcome)) write_response(file, report.response, scene);
   if (has_run(report.branch.outcome)) write_branch(file, report.branch, scene);
-  if (has_run(report.sweep.outcome)) write_sweep(file, report.sweep);
+  if (has_run(report.sweep.outcome)) write_sweep(file, report.sweep, scene);
   if (has_run(report.robustness.outcome)) write_robustness(file, report.robustness);
   file.keep();
 }

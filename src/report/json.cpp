@@ -3,10 +3,10 @@
 #include "branch_results.hpp"
 #include "derived.hpp"
 #include "files.hpp"
-#include "heard.hpp"
 #include "response_results.hpp"
 #include "robustness_results.hpp"
 #include "sensitivity_results.hpp"
+#include "squeal/report/heard.hpp"
 #include "sweep_results.hpp"
 #include "warnings.hpp"
 

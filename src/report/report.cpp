@@ -5,6 +5,7 @@
 #include "squeal/report/history.hpp"
 #include "squeal/report/json.hpp"
 #include "squeal/report/result_files.hpp"
+#include "sweep_motion_results.hpp"
 #include "sweep_results.hpp"
 
 #include <cctype>
@@ -107,6 +108,12 @@ void write_results(const Report& report, const Scene& scene, const FieldNodes& n
     on_rank_zero(
         comm,
         [&] { write_whole_file(output / word(ResultFile::sweep), sweep_csv(report.sweep, scene), Flush::by_system); });
+  if (has_motions(report.sweep))
+    on_rank_zero(comm,
+                 [&] {
+                   write_whole_file(output / word(ResultFile::sweep_motions), motions_csv(report.sweep, scene),
+                                    Flush::by_system);
+                 });
   if (has_run(report.robustness.outcome))
     on_rank_zero(comm,
                  [&]

@@ -1,5 +1,7 @@
 #include "sweep_results.hpp"
 
+#include "sweep_motion_results.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -60,7 +62,8 @@ Json point_entry(const SweepPoint& point)
   return entry;
 }
 
-/// values as "0.3, 1e-6".
+} // namespace
+
 std::string text_of(const std::vector<double>& values)
 {
   std::string text;
@@ -75,8 +78,6 @@ std::string csv_text(const std::string& text)
   return quoted + "\"";
 }
 
-} // namespace
-
 void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
 {
   const SweepSettings& settings = *scene.sweep;
@@ -86,12 +87,17 @@ void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
   entry["followed_modes"] = sweep.tracks;
   entry["lost_modes"] = sweep.lost;
   entry["least_mac"] = sweep.least_mac;
+  entry["least_mac_across"] = sweep.least_mac_across;
   entry["residual"] = sweep.outcome.residual;
   entry["basis_shapes"] = sweep.basis;
   entry["basis_corrections"] = sweep.passes;
   entry["groups"] = sweep.groups;
   entry["points"] = Json::array();
-  for (const SweepPoint& point : sweep.points) entry["points"].push_back(point_entry(point));
+  for (const SweepPoint& point : sweep.points)
+  {
+    Json& added = entry["points"].emplace_back(point_entry(point));
+    if (point.motion) added["motion"] = motion_entry(*point.motion, scene);
+  }
   entry["unstable_tracks"] = Json::array();
   for (int number = 0; const Track& track : tracks_of(sweep))
   {
@@ -116,7 +122,7 @@ void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
                                    {"change", threshold.change}});
 }
 
-void write_sweep(Hdf5File& file, const Sweep& sweep)
+void write_sweep(Hdf5File& file, const Sweep& sweep, const Scene& scene)
 {
   const std::size_t points = sweep.points.size(), tracks = static_cast<std::size_t>(sweep.tracks);
   const double none = std::numeric_limits<double>::quiet_NaN();
@@ -144,6 +150,7 @@ void write_sweep(Hdf5File& file, const Sweep& sweep)
   file.write("sweep/direction", {points}, direction, "1 as in the scene, -1 reversed");
   file.write("sweep/closed", {points}, closed, "pairs");
   file.write("sweep/unstable_modes", {points}, unstable, "-");
+  write_motions(file, sweep, scene);
   if (tracks == 0) return;
   file.write("sweep/frequency", {points, tracks}, frequency, "Hz");
   file.write("sweep/growth_rate", {points, tracks}, growth, "1/s");
@@ -183,6 +190,8 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
   if (sweep.tracks > 0)
     lines.push_back(
         format("%d modes followed, MAC %.3f at least, %d lost on the way", sweep.tracks, sweep.least_mac, sweep.lost));
+  if (sweep.least_mac_across < 1)
+    lines.back() += format("; MAC %.3f at least where pairs open or close", sweep.least_mac_across);
   std::size_t unstable = 0;
   for (int number = 0; const Track& track : tracks_of(sweep))
   {
@@ -201,6 +210,7 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
   }
   if (sweep.thresholds.size() > shown || unstable > shown)
     lines.emplace_back("the rest is in report.json and sweep.csv");
+  for (std::string& line : motion_lines(sweep)) lines.push_back(std::move(line));
   return lines;
 }
 

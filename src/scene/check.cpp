@@ -302,7 +302,8 @@ private:
   void check_cycle() const
   {
     const CycleSettings& c = scene_.cycle;
-    if (c.start.kind == CycleStartKind::transient && c.enabled && !scene_.transient.enabled)
+    const bool sought = c.enabled || (scene_.sweep && scene_.sweep->stages == SweepStages::cycle);
+    if (c.start.kind == CycleStartKind::transient && sought && !scene_.transient.enabled)
       fail(&c.start, "[cycle] start = 'transient' needs the [transient] that it starts from the end of");
     if (c.amplitude > 0 && c.start.kind != CycleStartKind::mode)
       fail(&c.amplitude, "[cycle] amplitude belongs to start = \"mode\": give that too, or leave it out");

@@ -292,7 +292,8 @@ SceneKeys keys_of(SweepSettings& s)
       {"samples", &s.samples, optional, Rule::not_negative, "-", "number of random points of the ranges, instead"},
       {"seed", &s.seed, optional, Rule::not_negative, "-", "of the random points"},
       {"directions", choice_of(s.directions), optional, Rule::any, "word", "of rotation: one, or both"},
-      {"stages", choice_of(s.stages), optional, Rule::any, "word", "at each point: equilibrium alone, or modes too"},
+      {"stages", choice_of(s.stages), optional, Rule::any, "word",
+       "at each point: equilibrium alone, modes too, or the cycle where modes grow"},
   };
 }
 

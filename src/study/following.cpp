@@ -43,12 +43,28 @@ MatrixXcd form(const PointModes& lefts, const PointModes& rights, const PointMod
   return result + left.transpose() * (matrices.C * right);
 }
 
-/// The four forms between the modes of two points, with the matrices of the one that was computed last.
-struct Forms
+/// left'A right of vectors given by their real, then their imaginary parts.
+MatrixXcd bilinear(const MultiVector& left, const MultiVector& A_right)
 {
-  MatrixXcd there, back; // left of the first with right of the second, and the reverse
-  MatrixXcd first, second;
-};
+  const MatrixXd parts = inner_products(left, A_right);
+  const Index rows = parts.rows() / 2, columns = parts.cols() / 2;
+  MatrixXcd result(rows, columns);
+  result.real() = parts.topLeftCorner(rows, columns) - parts.bottomRightCorner(rows, columns);
+  result.imag() = parts.topRightCorner(rows, columns) + parts.bottomLeftCorner(rows, columns);
+  return result;
+}
+
+/// The same form of vectors in the structure's degrees of freedom.
+MatrixXcd form(const ExpandedModes& lefts, const ExpandedModes& rights, const MultiVector& M_right,
+               const MultiVector& C_right)
+{
+  MatrixXcd result = bilinear(lefts.left, M_right);
+  for (Index i = 0; i < result.rows(); ++i)
+    for (Index j = 0; j < result.cols(); ++j)
+      result(i, j) *=
+          lefts.pairs[static_cast<std::size_t>(i)].lambda + rights.pairs[static_cast<std::size_t>(j)].lambda;
+  return result + bilinear(lefts.left, C_right);
+}
 
 /// A ratio of 1 is perfect; one above it is as far off as its inverse.
 double folded(double ratio)
@@ -57,7 +73,7 @@ double folded(double ratio)
   return ratio > 1 ? 1 / ratio : ratio;
 }
 
-MatrixXd all_macs(const Forms& forms)
+MatrixXd all_macs(const ModeForms& forms)
 {
   MatrixXd macs(forms.there.rows(), forms.there.cols());
   for (Index i = 0; i < macs.rows(); ++i)
@@ -68,7 +84,7 @@ MatrixXd all_macs(const Forms& forms)
 
 /// The MAC of two subspaces: the least modulus of the eigenvalues of first^-1 there second^-1 back, which are 1 for
 /// equal ones. It does not depend on the vectors that span them, which are nearly parallel at lock-in.
-double subspace_mac(const Forms& forms, const Places& from, const Places& to)
+double subspace_mac(const ModeForms& forms, const Places& from, const Places& to)
 {
   const MatrixXcd first = forms.first(from, from), second = forms.second(to, to);
   const MatrixXcd there = forms.there(from, to), back = forms.back(to, from);
@@ -143,12 +159,12 @@ Places places_left(Index count, const std::vector<char>& taken)
 }
 
 /// Modes that are each other's best, with a clear MAC.
-void match_single(const MatrixXd& macs, std::vector<Match>& matches, std::vector<char>& taken)
+void match_single(const MatrixXd& macs, double clear, std::vector<Match>& matches, std::vector<char>& taken)
 {
   for (Index i = 0; i < macs.rows(); ++i)
   {
     Index j = 0, back = 0;
-    if (macs.row(i).maxCoeff(&j) < clear_mac) continue;
+    if (macs.row(i).maxCoeff(&j) < clear) continue;
     macs.col(j).maxCoeff(&back);
     if (back != i) continue;
     matches[static_cast<std::size_t>(i)] = {static_cast<int>(j), macs(i, j), 1};
@@ -179,15 +195,46 @@ void add_neighbour(Cluster& cluster, const MatrixXd& macs, const std::vector<Mat
 
 } // namespace
 
-std::vector<Match> follow(const PointModes& from, const PointModes& to)
+ModeForms forms_between(const PointModes& from, const PointModes& to)
 {
-  std::vector<Match> matches(from.pairs.size());
-  if (from.pairs.empty() || to.pairs.empty()) return matches;
   const PointModes& last = from.M.rows() > to.M.rows() ? from : to; // has all shapes
-  const Forms forms{form(from, to, last), form(to, from, last), form(from, from, last), form(to, to, last)};
+  return {form(from, to, last), form(to, from, last), form(from, from, last), form(to, to, last)};
+}
+
+ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, const Structure& structure, Mat Cf)
+{
+  ModeForms forms;
+  for (const ExpandedModes* rights : {&from, &to})
+  {
+    const MultiVector M = product(structure.M, rights->right);
+    MultiVector C = product(structure.C, rights->right);
+    if (Cf) C.entries += product(Cf, rights->right).entries;
+    const bool of_first = rights == &from;
+    (of_first ? forms.first : forms.there) = form(from, *rights, M, C);
+    (of_first ? forms.back : forms.second) = form(to, *rights, M, C);
+  }
+  return forms;
+}
+
+PointModes leading_part(const PointModes& modes, Index shapes)
+{
+  PointModes part = modes;
+  const Index kept = std::min(shapes, modes.M.rows());
+  for (MatrixXd* A : {&part.M, &part.C}) *A = A->topLeftCorner(kept, kept).eval();
+  for (TwoSidedPair& pair : part.pairs)
+    for (Eigen::VectorXcd* vector : {&pair.right, &pair.left})
+      *vector = vector->head(std::min(shapes, vector->size())).eval();
+  return part;
+}
+
+std::vector<Match> follow(const ModeForms& forms, double clear)
+{
+  const auto count = static_cast<std::size_t>(forms.first.rows()), next = static_cast<std::size_t>(forms.second.rows());
+  std::vector<Match> matches(count);
+  if (count == 0 || next == 0) return matches;
   const MatrixXd macs = all_macs(forms);
-  std::vector<char> taken(to.pairs.size(), 0);
-  match_single(macs, matches, taken);
+  std::vector<char> taken(next, 0);
+  match_single(macs, clear, matches, taken);
   std::vector<char> seen(matches.size());
   for (std::size_t i = 0; i < matches.size(); ++i) seen[i] = matches[i].to >= 0;
   for (std::size_t i = 0; i < matches.size(); ++i)
@@ -198,12 +245,12 @@ std::vector<Match> follow(const PointModes& from, const PointModes& to)
     for (const Index k : cluster.from) seen[static_cast<std::size_t>(k)] = 1;
     if (cluster.from.size() != cluster.to.size()) continue;
     double mac = subspace_mac(forms, cluster.from, cluster.to);
-    if (mac < clear_mac)
+    if (mac < clear)
     {
       add_neighbour(cluster, macs, matches);
       mac = subspace_mac(forms, cluster.from, cluster.to);
     }
-    if (mac < clear_mac) continue;
+    if (mac < clear) continue;
     match_within(cluster, macs, mac, matches);
     for (const Index k : cluster.to) taken[static_cast<std::size_t>(k)] = 1;
   }

@@ -16,7 +16,35 @@ struct Match
 /// At least this much of a mode, or of a subspace, must be found again.
 inline constexpr double clear_mac = 0.9;
 
-/// For each mode of a point its match at the next one, by the MAC of right with left vectors. Not collective.
-std::vector<Match> follow(const PointModes& from, const PointModes& to);
+/// The same where other pairs are closed: modes jump there. More than half of a mode is in one other alone.
+inline constexpr double clear_mac_across = 0.6;
+
+/// The form b of section 10.3 between the modes of two points, with the matrices of one of them.
+struct ModeForms
+{
+  Eigen::MatrixXcd there, back; // left of the first with right of the second, and the reverse
+  Eigen::MatrixXcd first, second;
+};
+
+/// On the basis that both points share; equal pairs are closed. Not collective.
+ModeForms forms_between(const PointModes& from, const PointModes& to);
+
+/// Modes in the structure's degrees of freedom, as `expanded` gives them.
+struct ExpandedModes
+{
+  const std::vector<TwoSidedPair>& pairs;
+  MultiVector right, left;
+};
+
+/// In the structure's degrees of freedom, whatever pairs are closed. `Cf`: damping of the friction direction at one of
+/// the points; may be null. Collective.
+ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, const Structure& structure, Mat Cf);
+
+/// The first shapes of the basis alone.
+PointModes leading_part(const PointModes& modes, Eigen::Index shapes);
+
+/// For each mode of the first point its match at the second one, by the MAC of right with left vectors, which is at
+/// least `clear`. Not collective.
+std::vector<Match> follow(const ModeForms& forms, double clear);
 
 } // namespace squeal

@@ -307,6 +307,15 @@ ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>
   return modes;
 }
 
+void turn_round(ModesBasis& modes)
+{
+  if (!modes.turned)
+    modes.turned = GrownBasis{leading_part(modes.basis, modes.shared), std::vector<char>(modes.attached.size(), 0)};
+  std::swap(modes.basis, modes.turned->basis);
+  std::swap(modes.attached, modes.turned->attached);
+  std::swap(modes.whole, modes.turned->whole);
+}
+
 void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed)
 {
   const Structure& structure = problem.structure;
@@ -325,7 +334,16 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   if (real.omega.size() < fewest) real = solve_real_modes(modes.M_z, modes.K_z, fewest, problem.options);
   MultiVector shapes = empty_multivector(modes.K_z);
   for (const Owned<Vec>& shape : real.shapes) append(shapes, shape);
-  extend(modes.basis, product(modes.contact.Z, shapes));
+  const MultiVector news = product(modes.contact.Z, shapes);
+  extend(modes.basis, news);
+  if (modes.turned)
+  {
+    set_structure(modes.turned->basis, structure);
+    extend(modes.turned->basis, news);
+    modes.turned->attached.assign(closed.size(), 0);
+  }
+  else
+    modes.shared = modes.basis.shapes();
   modes.pencil = make_shift_invert(modes.K_z, modes.M_z, Symmetry::symmetric, problem.options.pencil);
   move_to(modes.pencil, shift_below_zero(modes.M_z, modes.K_z));
 }
@@ -336,7 +354,7 @@ MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, cons
   const MatrixXcd a = vectors_of(pairs, side);
   MatrixXd parts(a.rows(), 2 * a.cols());
   parts << a.real(), a.imag();
-  const MultiVector shapes = columns_from(modes.basis.T, modes.basis.sketched);
+  const MultiVector shapes{modes.basis.T.comm, modes.basis.T.entries.middleCols(modes.basis.sketched, a.rows())};
   return product(side == Side::right ? contact.Z : contact.Y, combination(kept_rows(shapes, contact), parts));
 }
 

@@ -11,6 +11,14 @@
 namespace squeal
 {
 
+/// What grows with the points of one direction of rotation, whose modes need other corrections than the reversed one's.
+struct GrownBasis
+{
+  SlidingBasis basis;
+  std::vector<char> attached{}; // pairs beyond the closed ones whose static shapes the basis holds
+  bool whole = false;           // undamped modes in and near the band were not enough to solve on
+};
+
 /// Modes of the frictionless structure in and beyond the band, corrected wherever a point needs it.
 struct ModesBasis
 {
@@ -20,10 +28,12 @@ struct ModesBasis
   std::vector<char> attached{}; // other pairs whose static shapes the basis holds
   Owned<Mat> M_z{}, K_z{};
   Owned<Mat> Z_transposed{};
-  ShiftInvert pencil{};   // of K_z, M_z just below zero
-  QuadraticNorms norms{}; // of M_z, C_z and K_z
-  int passes = 0;         // corrections so far
-  bool whole = false;     // undamped modes in and near the band were not enough to solve on
+  ShiftInvert pencil{};               // of K_z, M_z just below zero
+  QuadraticNorms norms{};             // of M_z, C_z and K_z
+  int passes = 0;                     // corrections so far
+  bool whole = false;                 // undamped modes in and near the band were not enough to solve on
+  Eigen::Index shared = 0;            // shapes that come first in both directions
+  std::optional<GrownBasis> turned{}; // of the other direction, once it is needed
 };
 
 /// The structure on which a basis is made, and the band of its modes [Hz].
@@ -39,6 +49,9 @@ ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>
 
 /// Goes over to fewer closed pairs: their modes join the basis, whose shapes keep their places.
 void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed);
+
+/// Goes over to the basis of the other direction of rotation, which begins with the shapes that both share.
+void turn_round(ModesBasis& modes);
 
 /// What modes are sought on, and how exactly.
 struct PointProblem

@@ -217,7 +217,8 @@ private:
     for (const UncertainNumber& number : problem_.numbers) settings.key.push_back(number.key);
     const SweepOptions options;
     const auto model_at = [&](std::span<const double> values, MPI_Comm) { return problem_.model_at(values); };
-    const SweepProblem sweep{settings, model_at, problem_.modes, problem_.modes_options, equilibrium_options_, options};
+    const SweepProblem sweep{settings, model_at, {}, problem_.modes, problem_.modes_options, equilibrium_options_,
+                             options};
     SweptModel swept(sweep, MPI_COMM_SELF);
     const std::vector<std::vector<double>> points = training_values(problem_);
     for (const std::vector<double>& values : points) swept.prepare({values, false});

@@ -198,6 +198,22 @@ SlidingBasis make_basis(const Structure& structure, const Interface& interface, 
   return basis;
 }
 
+SlidingBasis leading_part(const SlidingBasis& basis, Index shapes)
+{
+  const Index columns = basis.sketched + shapes;
+  SlidingBasis part{{basis.T.comm, basis.T.entries.leftCols(columns)}, basis.sketched, basis.contact_dofs};
+  const auto of_image = [&](const BasisImage& image)
+  {
+    return BasisImage{copy_of(image.matrix),
+                      {image.contact_rows.comm, image.contact_rows.entries.leftCols(columns)},
+                      image.products.topLeftCorner(columns, columns)};
+  };
+  part.M = of_image(basis.M);
+  part.C = of_image(basis.C);
+  part.K = of_image(basis.K);
+  return part;
+}
+
 void set_structure(SlidingBasis& basis, const Structure& structure)
 {
   set_matrix(basis, basis.M, structure.M);

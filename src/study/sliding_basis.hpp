@@ -49,6 +49,9 @@ SlidingBasis make_basis(const Structure& structure, const Interface& interface, 
 /// Appends what the shapes X add to the span. Returns the number of columns gained.
 Eigen::Index extend(SlidingBasis& basis, MultiVector X);
 
+/// A basis of the first shapes alone.
+SlidingBasis leading_part(const SlidingBasis& basis, Eigen::Index shapes);
+
 /// Takes over the matrices of a structure where they have changed.
 void set_structure(SlidingBasis& basis, const Structure& structure);
 

@@ -8,11 +8,11 @@
 #include "squeal/base/run_control.hpp"
 #include "sweep_checkpoint.hpp"
 #include "sweep_groups.hpp"
+#include "sweep_motions.hpp"
 #include "swept_model.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <numbers>
 
 namespace squeal
@@ -79,7 +79,7 @@ public:
       }
     if (model_.model() && is_large(model_.model()->structure)) tolerance_ = large_tolerance;
     if (problem_.options.tolerance > 0) tolerance_ = problem_.options.tolerance;
-    if (problem_.settings.stages == SweepStages::modes)
+    if (problem_.settings.stages >= SweepStages::modes)
     {
       train(lines.front());
       if (lines.size() > 1) train(lines.back());
@@ -176,7 +176,7 @@ private:
     const Equilibrium& at = model_.equilibrium_at({point.values, point.reversed});
     point.closed = static_cast<int>(std::ranges::count(at.closed, 1));
     point.modes.outcome = at.outcome;
-    if (at.outcome.kind == OutcomeKind::converged && problem_.settings.stages == SweepStages::modes)
+    if (at.outcome.kind == OutcomeKind::converged && problem_.settings.stages >= SweepStages::modes)
       point.modes = model_.modes_at({point.values, point.reversed}, tolerance_);
     if (point.modes.outcome.kind == OutcomeKind::converged) return point;
     record(point, {});
@@ -196,7 +196,7 @@ private:
           break;
         }
     if (first_)
-      for (std::size_t i = 0; const Match& match : follow(first_->modes, now.modes))
+      for (std::size_t i = 0; const Match& match : follow(forms_with_first(now), clear_mac))
       {
         const int track = first_->tracks[i++];
         if (match.to >= 0) now.tracks[static_cast<std::size_t>(match.to)] = track;
@@ -207,10 +207,31 @@ private:
     if (!first_) first_ = now;
   }
 
+  /// Between the first point of all and one whose basis may be that of the other direction of rotation.
+  ModeForms forms_with_first(const Followed& now) const
+  {
+    if (first_->reversed == now.reversed) return forms_between(first_->modes, now.modes);
+    const Eigen::Index shapes = model_.shared_shapes();
+    return forms_between(leading_part(first_->modes, shapes), leading_part(now.modes, shapes));
+  }
+
+  ModeForms forms(const Followed& before, const Followed& now)
+  {
+    return model_.forms({before.values, before.reversed}, before.modes, {now.values, now.reversed}, now.modes);
+  }
+
+  /// What counts as clear where a step cannot be halved any further.
+  double least_clear(const Followed& before, const Followed& now)
+  {
+    const bool same = model_.same_pairs_closed({before.values, before.reversed}, {now.values, now.reversed});
+    return same ? clear_mac : clear_mac_across;
+  }
+
   /// Follows the modes to a point, with points between where they are unclear, and seeks the thresholds on the way.
   void advance(Followed& before, Followed& now, int depth)
   {
-    const std::vector<Match> matches = follow(before.modes, now.modes);
+    const ModeForms between_both = forms(before, now);
+    std::vector<Match> matches = follow(between_both, clear_mac);
     if (depth < problem_.options.depth && !all_clear(before, matches))
     {
       std::vector<double> middle = now.values;
@@ -222,6 +243,7 @@ private:
         return;
       }
     }
+    if (!all_clear(before, matches)) matches = follow(between_both, least_clear(before, now));
     take_tracks(before, now, matches);
     seek_thresholds(before, now, matches);
     record(now, matches_at(now, matches));
@@ -242,7 +264,8 @@ private:
       if (matches[i].to >= 0)
       {
         now.tracks[static_cast<std::size_t>(matches[i].to)] = before.tracks[i];
-        sweep_.least_mac = std::min(sweep_.least_mac, matches[i].mac);
+        double& least = matches[i].mac < clear_mac ? sweep_.least_mac_across : sweep_.least_mac;
+        least = std::min(least, matches[i].mac);
       }
       else if (in_band(before.modes.pairs[i], problem_.modes.band))
         ++sweep_.lost;
@@ -304,7 +327,7 @@ private:
       values[0] = value;
       std::optional<Followed> here = evaluate({values, now.reversed, true});
       if (!here) return std::nullopt;
-      const std::vector<Match> matches = follow(nearest->modes, here->modes);
+      const std::vector<Match> matches = follow(forms(*nearest, *here), least_clear(*nearest, *here));
       here->tracks.assign(here->modes.pairs.size(), -1);
       std::optional<double> result;
       for (std::size_t i = 0; i < matches.size(); ++i)
@@ -342,14 +365,23 @@ private:
 void assess(Sweep& sweep, const std::string& key, std::size_t total)
 {
   sweep.outcome.iterations = static_cast<int>(sweep.points.size());
-  int failed = 0;
-  std::string first;
-  for (const SweepPoint& point : sweep.points)
-    if (point.outcome.kind != OutcomeKind::converged && ++failed == 1)
-      first = format("%s = %g: ", key.c_str(), point.values[0]) + point.outcome.reason;
-  if (failed == 0) return;
-  sweep.outcome.kind = OutcomeKind::not_converged;
-  sweep.outcome.reason = format("%d of %zu points failed, the first at ", failed, total) + first;
+  const auto note = [&](const auto& outcome_of, const char* what, std::size_t of)
+  {
+    int failed = 0;
+    std::string first;
+    for (const SweepPoint& point : sweep.points)
+      if (const Outcome* outcome = outcome_of(point); outcome && !succeeded(*outcome) && ++failed == 1)
+        first = format("%s = %g: ", key.c_str(), point.values[0]) + outcome->reason;
+    if (failed == 0) return;
+    sweep.outcome.kind = OutcomeKind::not_converged;
+    sweep.outcome.reason += (sweep.outcome.reason.empty() ? "" : "; ") +
+                            format("%d of %zu %s failed, the first at ", failed, of, what) + first;
+  };
+  note([](const SweepPoint& point) { return &point.outcome; }, "points", total);
+  const auto motions =
+      std::ranges::count_if(sweep.points, [](const SweepPoint& point) { return point.motion.has_value(); });
+  note([](const SweepPoint& point) { return point.motion ? &point.motion->outcome : nullptr; }, "motions",
+       static_cast<std::size_t>(motions));
 }
 
 /// Each group's share of the points, visited at the same time. What a group throws ends all of them after their work.
@@ -360,22 +392,14 @@ Sweep run_in_groups(const SweepProblem& problem, const std::vector<SweepLine>& l
   for (int g = 0; g < groups; ++g) shares.push_back(share_of(lines, g, groups));
   const std::string checkpoint = format("sweep_%d_of_%d", group.number() + 1, groups);
   Sweep own;
-  std::exception_ptr failure;
   try
   {
-    own = Sweeper(problem, {group.comm(), true, checkpoint}).run(shares[static_cast<std::size_t>(group.number())]);
-  }
-  catch (const Interrupted&) // which join_parts throws on all ranks
-  {
-  }
-  catch (...)
-  {
-    failure = std::current_exception();
-  }
-  agree(comm, failure);
-  try
-  {
-    join_parts(comm);
+    work_in_parts(
+        comm,
+        [&] {
+          own =
+              Sweeper(problem, {group.comm(), true, checkpoint}).run(shares[static_cast<std::size_t>(group.number())]);
+        });
   }
   catch (const Interrupted&)
   {
@@ -403,11 +427,16 @@ OptionList options_of(SweepOptions& options)
 
 Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm)
 {
+  constexpr std::size_t fewest = 4; // points of a group: two that another one visits as well cost half as much again
   const std::vector<SweepLine> lines = lines_of(problem.settings);
   const std::size_t total = points_of(lines);
-  const int groups = groups_of(problem.options.groups, total, comm);
-  Sweep sweep =
-      groups > 1 ? run_in_groups(problem, lines, groups, comm) : Sweeper(problem, {comm, false, "sweep"}).run(lines);
+  const int groups = groups_of(problem.options.groups, {total, fewest}, comm);
+  const auto linear = [&]
+  {
+    return groups > 1 ? run_in_groups(problem, lines, groups, comm)
+                      : Sweeper(problem, {comm, false, "sweep"}).run(lines);
+  };
+  Sweep sweep = problem.settings.stages == SweepStages::cycle ? with_motions(linear, problem, comm) : linear();
   assess(sweep, problem.settings.key[0], total);
   return sweep;
 }

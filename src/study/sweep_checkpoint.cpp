@@ -106,7 +106,8 @@ Checkpoint packed(const Sweep& sweep)
   checkpoint.set("thresholds", std::move(thresholds));
   checkpoint.set("following", std::vector<double>{static_cast<double>(sweep.tracks), static_cast<double>(sweep.lost),
                                                   sweep.least_mac, sweep.outcome.residual,
-                                                  static_cast<double>(sweep.basis), static_cast<double>(sweep.passes)});
+                                                  static_cast<double>(sweep.basis), static_cast<double>(sweep.passes),
+                                                  static_cast<double>(sweep.groups), sweep.least_mac_across});
   return checkpoint;
 }
 
@@ -132,7 +133,44 @@ Sweep unpacked(const Checkpoint& checkpoint)
   sweep.outcome.residual = following.number();
   sweep.basis = following.integer();
   sweep.passes = following.integer();
+  sweep.groups = following.integer();
+  sweep.least_mac_across = following.number();
   return sweep;
+}
+
+Checkpoint packed(const SweptMotion& motion)
+{
+  std::vector<double> numbers;
+  for (const int value : {static_cast<int>(motion.outcome.kind), static_cast<int>(motion.kind),
+                          static_cast<int>(motion.stability), motion.steps_per_period})
+    numbers.push_back(value);
+  numbers.insert(numbers.end(),
+                 {motion.frequency_hz, motion.energy.value, motion.energy.error, motion.multiplier,
+                  motion.multiplier_error, motion.estimate, motion.residual, static_cast<double>(motion.periods)});
+  append({motion.outcome.reason.begin(), motion.outcome.reason.end()}, numbers);
+  append({motion.heard.begin(), motion.heard.end()}, numbers);
+  append(motion.peak_to_peak, numbers);
+  Checkpoint checkpoint;
+  checkpoint.set("motion", std::move(numbers));
+  return checkpoint;
+}
+
+SweptMotion motion_from(const Checkpoint& checkpoint)
+{
+  List list(checkpoint, "motion");
+  SweptMotion motion;
+  motion.outcome.kind = static_cast<OutcomeKind>(list.integer());
+  motion.kind = static_cast<MotionKind>(list.integer());
+  motion.stability = static_cast<Stability>(list.integer());
+  motion.steps_per_period = list.integer();
+  for (double* number : {&motion.frequency_hz, &motion.energy.value, &motion.energy.error, &motion.multiplier,
+                         &motion.multiplier_error, &motion.estimate, &motion.residual})
+    *number = list.number();
+  motion.periods = static_cast<long>(list.number());
+  motion.outcome.reason = list.text();
+  motion.heard = list.text();
+  motion.peak_to_peak = list.numbers();
+  return motion;
 }
 
 void keep_sweep(const Sweep& sweep, const std::string& name, MPI_Comm comm)

@@ -11,6 +11,9 @@ Checkpoint packed(const Sweep& sweep);
 /// Error: it is cut short.
 Sweep unpacked(const Checkpoint& checkpoint);
 
+Checkpoint packed(const SweptMotion& motion);
+SweptMotion motion_from(const Checkpoint& checkpoint);
+
 /// Keeps the points so far under a name. Collective.
 void keep_sweep(const Sweep& sweep, const std::string& name, MPI_Comm comm);
 

@@ -3,9 +3,11 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/free_memory.hpp"
+#include "squeal/base/run_control.hpp"
 #include "sweep_checkpoint.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <map>
 
 namespace squeal
@@ -13,12 +15,6 @@ namespace squeal
 
 namespace
 {
-
-/// The first rank of a group, and of the rank behind the last group.
-int first_rank(int group, int groups, int ranks)
-{
-  return static_cast<int>((static_cast<long>(group) * ranks + groups - 1) / groups);
-}
 
 using TrackNames = std::map<int, int>; // of a part, to those of the whole
 
@@ -84,6 +80,7 @@ public:
     }
     whole_.lost += part.lost;
     whole_.least_mac = std::min(whole_.least_mac, part.least_mac);
+    whole_.least_mac_across = std::min(whole_.least_mac_across, part.least_mac_across);
     whole_.outcome.residual = std::max(whole_.outcome.residual, part.outcome.residual);
     whole_.basis = std::max(whole_.basis, part.basis);
     whole_.passes += part.passes;
@@ -120,9 +117,32 @@ private:
 
 } // namespace
 
-int groups_of(PetscInt wanted, std::size_t points, MPI_Comm comm)
+int first_rank(int group, int groups, int ranks)
 {
-  constexpr std::size_t fewest = 4; // points of a group: two that another one visits as well cost half as much again
+  return static_cast<int>((static_cast<long>(group) * ranks + groups - 1) / groups);
+}
+
+void work_in_parts(MPI_Comm comm, const std::function<void()>& work)
+{
+  std::exception_ptr failure;
+  try
+  {
+    work();
+  }
+  catch (const Interrupted&) // which join_parts throws on all ranks
+  {
+  }
+  catch (...)
+  {
+    failure = std::current_exception();
+  }
+  agree(comm, failure);
+  join_parts(comm);
+}
+
+int groups_of(PetscInt wanted, const SharedPoints& shared, MPI_Comm comm)
+{
+  const auto [points, fewest] = shared;
   const int ranks = ranks_of(comm);
   if (wanted > 0) return std::min({static_cast<int>(wanted), ranks, static_cast<int>(points)});
   const double of_model = peak_memory(comm), free = free_memory(comm); // a model with its modes, as so far

@@ -7,9 +7,22 @@
 namespace squeal
 {
 
+/// What is shared among groups.
+struct SharedPoints
+{
+  std::size_t points = 0, fewest = 1; // that a group is worth
+};
+
 /// The number of groups to take, at most one a rank and one a point; `wanted` = 0: as many as have memory for a model
-/// each, if each gets enough points to pay for its own basis. Collective.
-int groups_of(PetscInt wanted, std::size_t points, MPI_Comm comm);
+/// each, if each gets enough points. Collective.
+int groups_of(PetscInt wanted, const SharedPoints& shared, MPI_Comm comm);
+
+/// The first rank of a group, and of the rank behind the last group.
+int first_rank(int group, int groups, int ranks);
+
+/// Does the work of this rank's group. What any group throws ends all of them after their work; so does a request to
+/// end, as Interrupted. Collective.
+void work_in_parts(MPI_Comm comm, const std::function<void()>& work);
 
 /// The group of this rank; groups hold neighbouring ranks. Collective.
 class RankGroup

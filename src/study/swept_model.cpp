@@ -118,7 +118,13 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
       throw Error(
           format("the number of contact pairs changes from %zu to %zu", common.size(), equilibrium.closed.size()));
     for (std::size_t i = 0; i < common.size(); ++i) common[i] = common[i] && equilibrium.closed[i];
-    if (!basis_) basis_ = make_modes_basis(basis_problem(), common);
+    if (!basis_)
+    {
+      basis_ = make_modes_basis(basis_problem(), common);
+      basis_reversed_ = place.reversed;
+    }
+    if (basis_reversed_ != place.reversed) turn_round(*basis_);
+    basis_reversed_ = place.reversed;
     if (common != basis_->closed) rebase(*basis_, basis_problem(), common);
     modes = find_point_modes(
         *basis_,
@@ -133,6 +139,34 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
     modes.outcome = {OutcomeKind::not_converged, error.what(), 0, 0};
   }
   return modes;
+}
+
+bool SweptModel::same_pairs_closed(const SweptPlace& a, const SweptPlace& b)
+{
+  return equilibrium_at(a).closed == equilibrium_at(b).closed;
+}
+
+ModeForms SweptModel::forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to,
+                            const PointModes& second)
+{
+  if (first.pairs.empty() || second.pairs.empty() || same_pairs_closed(from, to)) return forms_between(first, second);
+  const auto expand = [&](const SweptPlace& place, const PointModes& modes)
+  {
+    go_to(place);
+    return ExpandedModes{modes.pairs, vectors(modes, Side::right), vectors(modes, Side::left)};
+  };
+  const ExpandedModes before = expand(from, first), now = expand(to, second);
+  const Equilibrium& at = equilibria_.at(to);
+  const Interface& interface = model_->interface;
+  const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
+  const Owned<Mat> Cf = friction_damping(interface, at.closed, at.reactions, part);
+  return forms_between(before, now, model_->structure, Cf);
+}
+
+Eigen::Index SweptModel::shapes() const
+{
+  if (!basis_) return 0;
+  return std::max(basis_->basis.shapes(), basis_->turned ? basis_->turned->basis.shapes() : 0);
 }
 
 MultiVector SweptModel::vectors(const PointModes& modes, Side side) const

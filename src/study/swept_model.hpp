@@ -1,23 +1,14 @@
 #pragma once
 /// The model at the points of a sweep, with what they share: its matrices, the compliance of its pairs and the basis of
 /// its modes.
+#include "following.hpp"
 #include "lines.hpp"
-#include "point_modes.hpp"
 
 #include <map>
 #include <optional>
 
 namespace squeal
 {
-
-/// Where a sweep is: the values of its numbers, and whether the rotation is reversed.
-struct SweptPlace
-{
-  std::vector<double> values{};
-  bool reversed = false;
-
-  auto operator<=>(const SweptPlace&) const = default;
-};
 
 class SweptModel
 {
@@ -35,10 +26,20 @@ public:
   /// all, then the imaginary ones.
   MultiVector vectors(const PointModes& modes, Side side) const;
 
+  /// Whether the same pairs are closed at two points.
+  bool same_pairs_closed(const SweptPlace& a, const SweptPlace& b);
+
+  /// Between the modes of two points of a line, the second one being that of the modes found last.
+  ModeForms forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to, const PointModes& second);
+
+  /// The number of shapes that the bases of both directions of rotation have in common.
+  Eigen::Index shared_shapes() const { return basis_ ? basis_->shared : 0; }
+
   /// At the point visited last; null: at none.
   const BrakeModel* model() const { return model_ ? &*model_ : nullptr; }
 
-  Eigen::Index shapes() const { return basis_ ? basis_->basis.shapes() : 0; }
+  /// Of the larger basis.
+  Eigen::Index shapes() const;
   int passes() const { return basis_ ? basis_->passes : 0; }
 
 private:
@@ -58,6 +59,7 @@ private:
   std::optional<PairCompliance> compliance_{};
   Owned<Mat> K_{}, B_{}; // of the compliance
   std::optional<ModesBasis> basis_{};
+  bool basis_reversed_ = false; // the direction whose basis is at hand
 };
 
 } // namespace squeal

@@ -210,6 +210,97 @@ def test_equilibrium_alone(converged):
     assert [p["closed"] > 0 for p in sweep["points"]] == [True] * 3 and "growth_rate" not in sweep["points"][0]
 
 
+CYCLES = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "sweep.stages=cycle"]
+
+
+def motions_of(report):
+    return {(p["values"][0], p["direction"]): p["motion"] for p in report["sweep"]["points"] if "motion" in p}
+
+
+@pytest.fixture(scope="module")
+def cycles(tmp_path_factory):
+    from conftest import Run
+    run = Run([*CYCLES, *sweep_of(start=0.1, end=0.5, points=5, directions="both"), "--set", "cycle.enabled=false"], 1,
+              tmp_path_factory.mktemp("cycles"))
+    assert run.code == 0, run.printed[-2000:] + run.errors[-2000:]
+    return run
+
+
+def test_motions_are_those_of_single_runs(cycles, converged):
+    """At the scene's points where a mode grows, and there alone: the same stages from the same start, to rounding."""
+    motions = motions_of(cycles.report)
+    assert set(motions) == {(p["values"][0], p["direction"]) for p in cycles.report["sweep"]["points"]
+                            if p["unstable_modes"] > 0 and not p["inserted"]}
+    assert any(value == pytest.approx(0.3) for value, _ in motions)
+    for (value, direction), motion in motions.items():
+        single = converged(*CYCLES[:3], "--set", f"friction.coefficient={value!r}", "--set",
+                           f"contact.0.velocity=[{0.6 * direction},0,0]", ranks=1).report
+        cycle = single["cycle"]
+        assert motion["heard"] == single["heard"] and motion["outcome"] == cycle["outcome"] == "converged"
+        assert motion["stability"] == cycle["multipliers"]["stability"]
+        # the list of multipliers is in falling modulus
+        assert motion["largest_multiplier"] == pytest.approx(cycle["multipliers"]["values"][0]["modulus"], rel=1e-9)
+        for ours, theirs in (("frequency_hz", "frequency_hz"), ("mean_fluctuating_energy", "mean_fluctuating_energy"),
+                             ("periods_integrated", "periods_integrated")):
+            assert motion[ours] == pytest.approx(cycle[theirs], rel=1e-9)
+        assert motion["peak_to_peak"] == pytest.approx(cycle["peak_to_peak"], rel=1e-9)
+        assert motion["estimated_amplitude"] == pytest.approx(single["estimate"]["amplitude"], rel=1e-9)
+
+
+def test_motions_stand_in_every_file(cycles):
+    motions = motions_of(cycles.report)
+    with open(cycles.output / "sweep_motions.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["heard"] for row in rows] == [motion["heard"] for motion in motions.values()]
+    with h5py.File(cycles.output / "history.h5") as file:
+        frequency = file["sweep/motion/frequency_hz"][()]
+        stability = file["sweep/motion/stability"][()]
+    assert list(frequency[~np.isnan(frequency)]) == [motion["frequency_hz"] for motion in motions.values()]
+    assert (stability[~np.isnan(frequency)] == 1).all() and (stability[np.isnan(frequency)] == -1).all()
+    assert all(f"{motion['heard']}" in cycles.printed for motion in motions.values())
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_groups_share_motions(ranks, cycles, squeal):
+    other = squeal(*CYCLES, *sweep_of(start=0.1, end=0.5, points=5, directions="both"), "--set", "cycle.enabled=false",
+                   "-sweep_groups", str(ranks), ranks=ranks)
+    assert other.code == 0, other.errors
+    first, second = motions_of(cycles.report), motions_of(other.report)
+    assert set(first) == set(second)
+    for place, motion in first.items():
+        # both close to the scene's tolerance
+        assert motion["frequency_hz"] == pytest.approx(second[place]["frequency_hz"], rel=1e-6)
+        assert motion["outcome"] == second[place]["outcome"] and motion["stability"] == second[place]["stability"]
+
+
+def test_a_motion_that_fails_is_passed_over(squeal):
+    """Two free periods and one of shooting are too few to close the cycle."""
+    run = squeal(*CYCLES, *sweep_of(start=0.1, end=0.3, points=3), "--set", "cycle.enabled=false", "--set",
+                 "cycle.free_periods=0", "-cycle_max_periods", "1", "-settled_periods", "1", ranks=1)
+    sweep = run.report["sweep"]
+    assert run.code == 2 and sweep["outcome"] == "not converged"
+    assert "motions failed" in sweep["reason"] and all(p["outcome"] == "converged" for p in sweep["points"])
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_interrupted_motions_go_on_where_they_were(ranks, squeal, tmp_path):
+    """The same motions as in one piece; what was done before the end is not done again."""
+    motions = [*PIN, "--set", "sweep.key=friction.coefficient", "--set", "sweep.values=[0.3,0.32,0.34]", "--set",
+               "sweep.stages=cycle", "--set", "cycle.steps_per_period=20", "-settled_periods", "16", "-sweep_groups", str(ranks)]
+    ask = [*motions, "--output", tmp_path / "in_two"]
+    whole = squeal(*motions, ranks=ranks)
+    seconds = whole.report["timings"]
+    first = squeal(*ask, "--time-limit", f"{sum(seconds.values()) - 0.4 * seconds['sweep']:.2f}", ranks=ranks)
+    again = squeal(*ask, "--restart", ranks=ranks) if first.code == 3 else first
+    assert whole.code == again.code, again.errors
+    one, two = motions_of(whole.report), motions_of(json.loads((tmp_path / "in_two" / "report.json").read_text()))
+    assert set(one) == set(two) and len(one) == 3
+    for place, motion in one.items():
+        assert motion["outcome"] == two[place]["outcome"] and motion["kind"] == two[place]["kind"]
+        # two ranks add in another order
+        assert motion["frequency_hz"] == pytest.approx(two[place]["frequency_hz"], rel=1e-12 if ranks == 1 else 1e-4)
+
+
 @pytest.mark.parametrize("settings, words", [
     (sweep_of("friction.coefficent"), "not in the scene"),
     (sweep_of("friction.direction_damping"), "not a number"),
@@ -224,6 +315,7 @@ def test_equilibrium_alone(converged):
     (sweep_of("['friction.coefficient','friction.coefficient']"), "twice"),
     (sweep_of(TWO), "give one a key"),
     (sweep_of(directions="all"), "none of one, both"),
+    (sweep_of(stages="squeal"), "none of equilibrium, modes, cycle"),
     (["--set", "sweep.key=friction.coefficient"], "from holds 0 numbers"),
 ])
 def test_bad_sweeps_are_refused_before_the_first_stage(settings, words, squeal):
@@ -233,10 +325,15 @@ def test_bad_sweeps_are_refused_before_the_first_stage(settings, words, squeal):
     assert "model …" not in run.printed
 
 
-def test_the_pictures_are_drawn(pin, converged):
+def test_a_start_that_motions_need_is_asked_for(squeal):
+    run = squeal(*CYCLES, *sweep_of(), "--set", "cycle.enabled=false", "--set", "cycle.start=transient", "--dry-run", ranks=1)
+    assert run.code == 1 and "needs the [transient]" in run.messages[0], run.errors
+
+
+def test_the_pictures_are_drawn(pin, cycles, converged):
     two = converged(*OSCILLATOR, *sweep_of(TWO, "[0.1,0.02]", "[0.3,0.05]", points="[5,4]"),
                     ranks=1)
-    for run in (pin, two):
+    for run in (pin, two, cycles):
         subprocess.run([sys.executable, ROOT / "tools" / "plot", run.output], check=True, capture_output=True)
         assert (run.output / "sweep.png").stat().st_size > 10000
 

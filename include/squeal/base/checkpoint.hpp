@@ -52,6 +52,20 @@ struct CheckpointPlace
 /// Sets the place of this run. Error: the checkpoints to go on from are of another request.
 void open_checkpoints(const CheckpointPlace& place);
 
+/// While one lives, the names of this process's checkpoints begin with `prefix`: work that is done several times in a
+/// run keeps its checkpoints apart.
+class CheckpointNames
+{
+public:
+  explicit CheckpointNames(const std::string& prefix);
+  CheckpointNames(const CheckpointNames&) = delete;
+  CheckpointNames& operator=(const CheckpointNames&) = delete;
+  ~CheckpointNames();
+
+  /// Removes all that are kept with the prefix.
+  static void remove_all();
+};
+
 /// Whether checkpoints are kept at all.
 bool checkpoints_are_kept();
 

@@ -42,9 +42,20 @@ enum class Request
 };
 
 /// What is asked of the run, agreed by all ranks. Collective, and cheap enough to be asked after every time step.
-/// Ranks talk after each step where steps take longer than a millisecond, else after every sixteenth. Of a part of the
-/// ranks nothing is ever asked.
+/// Ranks talk after each step where steps take longer than a millisecond, else after every sixteenth. Of fewer ranks
+/// than work together nothing is ever asked.
 Request request(MPI_Comm comm);
+
+/// While one lives, `part` is all ranks that work together: request() asks them. join_parts comes after. Collective
+/// among them.
+class WorkOfPart
+{
+public:
+  explicit WorkOfPart(MPI_Comm part);
+  WorkOfPart(const WorkOfPart&) = delete;
+  WorkOfPart& operator=(const WorkOfPart&) = delete;
+  ~WorkOfPart();
+};
 
 /// The same of a part of the ranks that works by itself, by what these know and their first one's clock. Collective
 /// among them, at any time; join_parts comes after.

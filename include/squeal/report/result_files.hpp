@@ -13,6 +13,7 @@ enum class ResultFile
   report,
   history,
   sweep,
+  sweep_motions,
   robustness,
   fields,
   field_places, // how ParaView finds its way in the fields
@@ -22,9 +23,9 @@ enum class ResultFile
   checkpoints, // a folder
 };
 
-inline constexpr std::array result_file_names = {"report.json", "history.h5",  "sweep.csv",     "robustness.csv",
-                                                 "fields.h5",   "fields.xdmf", "resolved.toml", "options.txt",
-                                                 "reduced",     "checkpoint"};
+inline constexpr std::array result_file_names = {"report.json",    "history.h5", "sweep.csv",   "sweep_motions.csv",
+                                                 "robustness.csv", "fields.h5",  "fields.xdmf", "resolved.toml",
+                                                 "options.txt",    "reduced",    "checkpoint"};
 
 inline Words words_of(ResultFile)
 {

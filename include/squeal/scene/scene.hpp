@@ -183,9 +183,10 @@ enum class SweepStages
 {
   equilibrium,
   modes,
+  cycle, // or the settled motion, where modes grow
 };
 
-inline constexpr std::array sweep_stages_words = {"equilibrium", "modes"};
+inline constexpr std::array sweep_stages_words = {"equilibrium", "modes", "cycle"};
 
 inline Words words_of(SweepStages)
 {

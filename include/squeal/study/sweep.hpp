@@ -2,8 +2,12 @@
 /// Stability of sliding at many values of one or two numbers of the scene, with the modes followed from value to value
 /// (src/README.md, section 10).
 #include "squeal/modes/modes.hpp"
+#include "squeal/settled/motion.hpp"
+#include "squeal/shooting/multipliers.hpp"
 
 #include <functional>
+#include <limits>
+#include <optional>
 
 namespace squeal
 {
@@ -18,6 +22,35 @@ struct SweptMode
   int subspace = 1;            // number of modes that were followed together, whose subspace has this MAC
 };
 
+/// Where a sweep is: the values of its numbers, and whether the rotation is reversed.
+struct SweptPlace
+{
+  std::vector<double> values{};
+  bool reversed = false;
+
+  auto operator<=>(const SweptPlace&) const = default;
+};
+
+/// What the chain of stages says at a point where a mode grows. outcome: of the search for a cycle, "settled" where the
+/// settled motion answers; else of the stage that ended the chain. NaN: not known.
+struct SweptMotion
+{
+  static constexpr double none = std::numeric_limits<double>::quiet_NaN();
+
+  Outcome outcome;
+  std::string heard;                                 // in a sentence
+  MotionKind kind = MotionKind::undecided;           // of what attracts
+  double frequency_hz = none;                        // of the cycle, or of the settled motion's strongest line
+  MeanValue energy{none, none};                      // [J] mean fluctuating one; error: of a settled motion's mean
+  Stability stability = Stability::not_examined;     // of the cycle that was found
+  double multiplier = none, multiplier_error = none; // modulus of its largest one
+  double estimate = none;                            // [m] estimated amplitude of the followed mode
+  double residual = none;                            // of the cycle, in the full space
+  std::vector<double> peak_to_peak;                  // [m] one a probe
+  int steps_per_period = 0;
+  long periods = 0; // integrated, of the full model
+};
+
 /// outcome: that of the stage that ended the point: "converged", or what failed and why.
 struct SweepPoint
 {
@@ -25,9 +58,10 @@ struct SweepPoint
   bool reversed = false;      // direction of rotation
   bool inserted = false;      // between points of the scene, where modes were unclear
   Outcome outcome;
-  int closed = 0;               // pairs
-  int unstable = 0;             // modes in the band
-  std::vector<SweptMode> modes; // in the band, falling growth rate
+  int closed = 0;                      // pairs
+  int unstable = 0;                    // modes in the band
+  std::vector<SweptMode> modes;        // in the band, falling growth rate
+  std::optional<SweptMotion> motion{}; // where it was sought
 };
 
 /// Where the growth rate of a followed mode passes zero along the first number.
@@ -41,19 +75,21 @@ struct Threshold
   int change = 0;          // of the number of unstable modes as the value rises
 };
 
-/// outcome: "converged", "not converged" (points failed: how many, the first reason), "refused", "skipped", "off".
+/// outcome: "converged", "not converged" (points or motions failed: how many, the first reason), "refused", "skipped",
+/// "off".
 /// residual: the largest backward error. iterations: number of points.
 struct Sweep
 {
   Outcome outcome;
   std::vector<SweepPoint> points; // line by line, along the first number
   std::vector<Threshold> thresholds;
-  int tracks = 0;       // number of followed modes
-  int lost = 0;         // modes in the band that could not be followed to the next point
-  double least_mac = 1; // along all tracks
-  int basis = 0;        // shapes of the basis in the end; of several groups the largest
-  int passes = 0;       // corrections of the bases by residuals
-  int groups = 1;       // of ranks, which shared the points
+  int tracks = 0;              // number of followed modes
+  int lost = 0;                // modes in the band that could not be followed to the next point
+  double least_mac = 1;        // along all tracks, where the same pairs are closed or modes change little
+  double least_mac_across = 1; // of modes that jump where pairs open or close
+  int basis = 0;               // shapes of the basis in the end; of several groups the largest
+  int passes = 0;              // corrections of the bases by residuals
+  int groups = 1;              // of ranks, which shared the points
 };
 
 /// Options -sweep_...
@@ -72,14 +108,16 @@ struct SweepProblem
 {
   const SweepSettings& settings;
   std::function<BrakeModel(std::span<const double> values, MPI_Comm comm)> model_at;
+  std::function<SweptMotion(const SweptPlace& place, MPI_Comm comm)> motion_at; // Error: why there is none
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
   const SweepOptions& options;
 };
 
-/// Visits all points, follows the modes along each line and finds the thresholds on the way. A point that fails is
-/// recorded with its reason. Groups of ranks visit a part of the points each. Collective.
+/// Visits all points, follows the modes along each line and finds the thresholds on the way. Then come the motions of
+/// the scene's points where modes grow, if they are asked for. A point that fails is recorded with its reason. Groups
+/// of ranks visit a part of the points each. Collective.
 Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm);
 
 } // namespace squeal
