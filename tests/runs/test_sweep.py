@@ -238,8 +238,8 @@ def test_motions_are_those_of_single_runs(cycles, converged):
         cycle = single["cycle"]
         assert motion["heard"] == single["heard"] and motion["outcome"] == cycle["outcome"] == "converged"
         assert motion["stability"] == cycle["multipliers"]["stability"]
-        # the list of multipliers is in falling modulus
-        assert motion["largest_multiplier"] == pytest.approx(cycle["multipliers"]["values"][0]["modulus"], rel=1e-9)
+        first = cycle["multipliers"]["values"][0]  # in falling modulus
+        assert motion["largest_multiplier"] == pytest.approx(abs(complex(first["real"], first["imaginary"])), rel=1e-9)
         for ours, theirs in (("frequency_hz", "frequency_hz"), ("mean_fluctuating_energy", "mean_fluctuating_energy"),
                              ("periods_integrated", "periods_integrated")):
             assert motion[ours] == pytest.approx(cycle[theirs], rel=1e-9)
@@ -260,10 +260,10 @@ def test_motions_stand_in_every_file(cycles):
     assert all(f"{motion['heard']}" in cycles.printed for motion in motions.values())
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
-def test_groups_share_motions(ranks, cycles, squeal):
+def test_groups_share_motions(cycles, squeal):
+    """One rank each: the model has two nodes."""
     other = squeal(*CYCLES, *sweep_of(start=0.1, end=0.5, points=5, directions="both"), "--set", "cycle.enabled=false",
-                   "-sweep_groups", str(ranks), ranks=ranks)
+                   "-sweep_groups", "2", ranks=2)
     assert other.code == 0, other.errors
     first, second = motions_of(cycles.report), motions_of(other.report)
     assert set(first) == set(second)
@@ -285,8 +285,8 @@ def test_a_motion_that_fails_is_passed_over(squeal):
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_interrupted_motions_go_on_where_they_were(ranks, squeal, tmp_path):
     """The same motions as in one piece; what was done before the end is not done again."""
-    motions = [*PIN, "--set", "sweep.key=friction.coefficient", "--set", "sweep.values=[0.3,0.32,0.34]", "--set",
-               "sweep.stages=cycle", "--set", "cycle.steps_per_period=20", "-settled_periods", "16", "-sweep_groups", str(ranks)]
+    motions = [*CYCLES, *sweep_of(start=0.2, end=0.5, points=4), "--set", "cycle.enabled=false", "--set",
+               "cycle.steps_per_period=3000", "-sweep_groups", str(ranks)]
     ask = [*motions, "--output", tmp_path / "in_two"]
     whole = squeal(*motions, ranks=ranks)
     seconds = whole.report["timings"]
@@ -294,11 +294,7 @@ def test_interrupted_motions_go_on_where_they_were(ranks, squeal, tmp_path):
     again = squeal(*ask, "--restart", ranks=ranks) if first.code == 3 else first
     assert whole.code == again.code, again.errors
     one, two = motions_of(whole.report), motions_of(json.loads((tmp_path / "in_two" / "report.json").read_text()))
-    assert set(one) == set(two) and len(one) == 3
-    for place, motion in one.items():
-        assert motion["outcome"] == two[place]["outcome"] and motion["kind"] == two[place]["kind"]
-        # two ranks add in another order
-        assert motion["frequency_hz"] == pytest.approx(two[place]["frequency_hz"], rel=1e-12 if ranks == 1 else 1e-4)
+    assert len(one) == 4 and one == two  # to the last bit: each motion is that of one rank
 
 
 @pytest.mark.parametrize("settings, words", [
