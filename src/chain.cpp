@@ -91,8 +91,8 @@ Response run_response(Chain& chain)
   for (std::size_t i = 0; i < scene.probes.size(); ++i)
     if (scene.response->excitation.empty() || std::ranges::count(scene.response->excitation, scene.probes[i].name) > 0)
       excitations.push_back(static_cast<int>(i));
-  return find_response({chain.model.structure, *chain.linearised, chain.model.probes, excitations,
-                        frequencies_of(*scene.response), chain.options.response, chain.options.pencil});
+  return find_response({chain.model.structure, *chain.linearised, chain.report.modes.modes, chain.model.probes,
+                        excitations, frequencies_of(*scene.response), chain.options.response, chain.options.pencil});
 }
 
 std::vector<Estimate> run_estimates(const Chain& chain)

@@ -22,9 +22,14 @@ constexpr double variance = 1. / 3; // of their entries, even in (-1, 1)
 constexpr double rounding = 1e-14;  // backward error that no correction makes smaller
 
 /// Factors of M, C, K and K_loss.
+std::array<Complex, 4> factors_at(Complex s)
+{
+  return {s * s, s, 1, Complex(0, 1)};
+}
+
 std::array<Complex, 4> factors_at(double omega)
 {
-  return {-omega * omega, Complex(0, omega), 1, Complex(0, 1)};
+  return factors_at(Complex(0, omega));
 }
 
 /// Q(omega) from the first `columns` columns of the matrices, `rows` of them.
@@ -34,14 +39,6 @@ MatrixXcd sum_at(double omega, const std::vector<MatrixXd>& A, Index rows, Index
   MatrixXcd Q = MatrixXcd::Zero(rows, columns);
   for (std::size_t k = 0; k < A.size(); ++k) Q += factor[k] * A[k].topLeftCorner(rows, columns);
   return Q;
-}
-
-/// Coefficients of x and w in columns.
-std::array<MatrixXcd, 2> solve_at(double omega, const HarmonicBasis& basis, Index size)
-{
-  const Eigen::PartialPivLU<MatrixXcd> Q(sum_at(omega, basis.products, size, size));
-  return {Q.solve(basis.forces[0].topRows(size).cast<Complex>()),
-          Q.transpose().solve(basis.forces[1].topRows(size).cast<Complex>())};
 }
 
 void append_columns(MatrixXd& A, const MatrixXd& columns)
@@ -109,11 +106,18 @@ Index extend(HarmonicBasis& basis, MultiVector X)
   return gained;
 }
 
+std::array<MatrixXcd, 2> solve_at(double omega, const HarmonicBasis& basis, Index size)
+{
+  const Eigen::PartialPivLU<MatrixXcd> Q(sum_at(omega, basis.products, size, size));
+  return {Q.solve(basis.forces[0].topRows(size).cast<Complex>()),
+          Q.transpose().solve(basis.forces[1].topRows(size).cast<Complex>())};
+}
+
 HarmonicScan scan(const HarmonicBasis& basis, std::span<const double> omega, Index size, double tolerance)
 {
   const auto count = static_cast<Index>(omega.size());
   const Index b = basis.problem.sides[0].forces.columns(), c = basis.problem.sides[1].forces.columns();
-  HarmonicScan result{MatrixXcd::Zero(b * c, count), MatrixXd::Zero(b + c, count), MatrixXd::Zero(b + c, count)};
+  HarmonicScan result{MatrixXcd::Zero(b * c, count), MatrixXd::Zero(b + c, count), MatrixXd::Zero(b + c, count), b};
   const MPI_Comm comm = basis.V.comm;
   for (Index f = rank_of(comm); f < count; f += ranks_of(comm))
   {
@@ -132,23 +136,27 @@ HarmonicScan scan(const HarmonicBasis& basis, std::span<const double> omega, Ind
   return result;
 }
 
-MultiVector residual_at(const HarmonicBasis& basis, ResponseEnd side, Index force, double omega)
+MultiVector dynamic_image(const HarmonicSide& side, Complex s, const MultiVector& x)
 {
-  const auto which = static_cast<std::size_t>(side);
+  MultiVector image{x.comm, MatrixXd::Zero(x.entries.rows(), 2)};
+  const auto factor = factors_at(s);
+  for (std::size_t k = 0; k < side.matrices.size(); ++k)
+  {
+    const MatrixXd Ax = product(side.matrices[k], x).entries;
+    image.entries.col(0) += factor[k].real() * Ax.col(0) - factor[k].imag() * Ax.col(1);
+    image.entries.col(1) += factor[k].imag() * Ax.col(0) + factor[k].real() * Ax.col(1);
+  }
+  return image;
+}
+
+MultiVector residual_of(const HarmonicBasis& basis, ResponseEnd side, Index force, double omega,
+                        const Eigen::VectorXcd& a)
+{
   const HarmonicSide& own = basis.problem.of(side);
-  const Eigen::VectorXcd a = solve_at(omega, basis, basis.size())[which].col(force);
   MatrixXd parts(a.size(), 2);
   parts << a.real(), a.imag();
-  const MultiVector x = combination(basis.V, parts);
-  MultiVector residual{x.comm, MatrixXd::Zero(x.entries.rows(), 2)};
-  residual.entries.col(0) = -own.forces.entries.col(force);
-  const auto factor = factors_at(omega);
-  for (std::size_t k = 0; k < own.matrices.size(); ++k)
-  {
-    const MatrixXd Ax = product(own.matrices[k], x).entries;
-    residual.entries.col(0) += factor[k].real() * Ax.col(0) - factor[k].imag() * Ax.col(1);
-    residual.entries.col(1) += factor[k].imag() * Ax.col(0) + factor[k].real() * Ax.col(1);
-  }
+  MultiVector residual = dynamic_image(own, Complex(0, omega), combination(basis.V, parts));
+  residual.entries.col(0) -= own.forces.entries.col(force);
   return residual;
 }
 

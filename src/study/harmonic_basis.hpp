@@ -61,13 +61,28 @@ struct HarmonicScan
   Eigen::MatrixXcd receptance; // H: rows c within b
   Eigen::MatrixXd residuals;   // |Q x - b| of all b, then |Q'w - c| of all c, over the unit force
   Eigen::MatrixXd defects;     // the same over what is allowed
+  Eigen::Index driven = 0;     // number of b, the first rows of both
+
+  /// Of each frequency, the geometric mean of the largest value of either problem.
+  Eigen::RowVectorXd means_of(const Eigen::MatrixXd& rows) const
+  {
+    const Eigen::RowVectorXd largest = rows.topRows(driven).colwise().maxCoeff();
+    return largest.cwiseProduct(rows.bottomRows(rows.rows() - driven).colwise().maxCoeff()).cwiseSqrt();
+  }
 };
 
 /// Each rank solves frequencies of its own; all have the result. `size`: the number of shapes taken, the first ones.
 /// `tolerance`: residual allowed; rounding is allowed in any case. Collective.
 HarmonicScan scan(const HarmonicBasis& basis, std::span<const double> omega, Eigen::Index size, double tolerance);
 
-/// The residual of one force at omega, real and imaginary part. Collective.
-MultiVector residual_at(const HarmonicBasis& basis, ResponseEnd side, Eigen::Index force, double omega);
+/// Q(s) x of a complex x, or Q(s)'x of ResponseEnd::read. Two columns: real and imaginary part. Collective.
+MultiVector dynamic_image(const HarmonicSide& side, std::complex<double> s, const MultiVector& x);
+
+/// Coefficients of all x and of all w at omega, in columns, on the first `size` shapes.
+std::array<Eigen::MatrixXcd, 2> solve_at(double omega, const HarmonicBasis& basis, Eigen::Index size);
+
+/// The residual of one force at omega for the coefficients a: real and imaginary part. Collective.
+MultiVector residual_of(const HarmonicBasis& basis, ResponseEnd side, Eigen::Index force, double omega,
+                        const Eigen::VectorXcd& a);
 
 } // namespace squeal

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace squeal
 {
@@ -21,8 +22,16 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr std::size_t few = 48; // frequencies whose residuals are estimated before those of all are
-constexpr double deep = 1e-4;   // part of the largest |H| at a frequency; below it errors are relative to this
+constexpr std::size_t few = 16;     // frequencies whose residuals are estimated before those of all are
+constexpr double deep = 1e-4;       // part of the largest |H| at a frequency; below it errors are relative to this
+constexpr double negligible = 1e-3; // part of a mode's shape that a basis does not start with
+
+/// Modes of the equilibrium on the kept degrees of freedom.
+struct KnownModes
+{
+  std::vector<std::complex<double>> lambda; // [1/s]
+  MultiVector shapes;                       // of norm 1, real and imaginary part of each
+};
 
 /// The equations of section 3.4 and their transposes, with the forces of both sides.
 struct Equations
@@ -31,6 +40,7 @@ struct Equations
   Owned<Mat> K_loss{};
   std::vector<Owned<Mat>> transposes{};
   HarmonicProblem harmonic{};
+  KnownModes modes{};
 
   std::vector<Mat> matrices() const
   {
@@ -71,6 +81,26 @@ std::vector<int> all_rows(Mat probes)
   return rows;
 }
 
+/// The known modes that oscillate, each turned in phase such that its real part is as large as can be.
+KnownModes known_modes(const ResponseProblem& problem, Mat pattern)
+{
+  KnownModes known{{}, empty_multivector(pattern)};
+  for (const ComplexMode& mode : problem.modes)
+  {
+    if (!(mode.lambda.imag() > 0)) continue;
+    const MultiVector whole = columns_of(std::array{mode.real.get(), mode.imaginary.get()});
+    MultiVector parts = kept_rows(whole, problem.linearised.contact);
+    const MatrixXd products = inner_products(parts, parts);
+    const double turn = -std::atan2(2 * products(0, 1), products(0, 0) - products(1, 1)) / 2;
+    MatrixXd rotation(2, 2);
+    rotation << std::cos(turn), std::sin(turn), -std::sin(turn), std::cos(turn);
+    parts = combination(parts, rotation / std::sqrt(products.trace()));
+    append(known.shapes, parts);
+    known.lambda.push_back(mode.lambda);
+  }
+  return known;
+}
+
 Equations make_equations(const ResponseProblem& problem)
 {
   const ClosedContact& contact = problem.linearised.contact;
@@ -87,6 +117,7 @@ Equations make_equations(const ResponseProblem& problem)
   for (HarmonicSide& side : harmonic.sides) side.forces = empty_multivector(equations.sliding.K);
   append_forces(harmonic.sides[0], problem.probes, problem.excitations, contact.Y);
   append_forces(harmonic.sides[1], problem.probes, all_rows(problem.probes), contact.Z);
+  equations.modes = known_modes(problem, equations.sliding.K);
   return equations;
 }
 
@@ -99,22 +130,55 @@ std::vector<double> thinned(const std::vector<double>& omega, std::size_t most)
   return result;
 }
 
+/// The known modes between these frequencies, or at most half their distance beyond.
+std::vector<Index> modes_near(const KnownModes& modes, double from, double to)
+{
+  std::vector<Index> near;
+  for (std::size_t i = 0; i < modes.lambda.size(); ++i)
+    if (std::abs(modes.lambda[i].imag() - (from + to) / 2) <= to - from) near.push_back(static_cast<Index>(i));
+  return near;
+}
+
+/// What modes add to a basis: their shapes phi, and for the transposed problem -P'^-1 Q(lambda)'phi, by which its modes
+/// differ from them to first order in friction.
+MultiVector shapes_of(const Equations& equations, const std::vector<Index>& which, const PencilFactor& P)
+{
+  MultiVector shapes = empty_multivector(equations.sliding.K), residuals = shapes;
+  for (const Index i : which)
+  {
+    const MultiVector phi{shapes.comm, equations.modes.shapes.entries.middleCols(2 * i, 2)};
+    append(shapes, phi);
+    append(residuals, dynamic_image(equations.harmonic.of(ResponseEnd::read),
+                                    equations.modes.lambda[static_cast<std::size_t>(i)], phi));
+  }
+  if (which.empty()) return shapes;
+  append(shapes, P.solve_transposed(residuals));
+  orthonormalise(shapes, negligible * negligible);
+  return shapes;
+}
+
 /// P^-1 r of each force, at the frequency of its largest residual. Small ones are left out unless all are small.
 MultiVector corrections(const HarmonicBasis& basis, const std::vector<double>& omega, const HarmonicScan& found,
                         const PencilFactor& P)
 {
-  const bool all_small = found.defects.maxCoeff() <= 1;
-  const Index driven = basis.problem.of(ResponseEnd::driven).forces.columns();
+  const bool all_small = found.means_of(found.defects).maxCoeff() <= 1;
+  const Index driven = found.driven;
+  const Eigen::RowVectorXd of_driven = found.defects.topRows(driven).colwise().maxCoeff(),
+                           of_read = found.defects.bottomRows(found.defects.rows() - driven).colwise().maxCoeff();
   std::array<MultiVector, 2> residuals = {basis.V, basis.V};
   for (MultiVector& part : residuals) part.entries.resize(Eigen::NoChange, 0);
+  std::map<Index, std::array<MatrixXcd, 2>> solved; // by frequency
   for (Index force = 0; force < found.defects.rows(); ++force)
   {
     Index worst = 0;
-    if (found.defects.row(force).maxCoeff(&worst) <= 1 && !all_small) continue;
+    const Eigen::RowVectorXd squares = found.defects.row(force).cwiseProduct(force < driven ? of_read : of_driven);
+    if (squares.maxCoeff(&worst) <= 1 && !all_small) continue;
     const ResponseEnd side = force < driven ? ResponseEnd::driven : ResponseEnd::read;
-    append(residuals[static_cast<std::size_t>(side)],
-           residual_at(basis, side, side == ResponseEnd::driven ? force : force - driven,
-                       omega[static_cast<std::size_t>(worst)]));
+    const auto which = static_cast<std::size_t>(side);
+    const Index own = side == ResponseEnd::driven ? force : force - driven;
+    const double at = omega[static_cast<std::size_t>(worst)];
+    if (!solved.contains(worst)) solved[worst] = solve_at(at, basis, basis.size());
+    append(residuals[which], residual_of(basis, side, own, at, solved[worst][which].col(own)));
   }
   MultiVector result = P.solve(residuals[0]);
   append(result, P.solve_transposed(residuals[1]));
@@ -130,36 +194,46 @@ struct PartResponse
 };
 
 /// Extends a basis until its residuals are small, or no correction adds to it. Nothing where it would grow too large.
-std::optional<PartResponse> solve_part(const HarmonicProblem& problem, const std::vector<double>& omega,
+std::optional<PartResponse> solve_part(const Equations& equations, const std::vector<double>& omega,
                                        ShiftInvert& pencil, const ResponseOptions& options)
 {
+  const HarmonicProblem& problem = equations.harmonic;
+  const std::vector<Index> near = modes_near(equations.modes, omega.front(), omega.back());
+  if (3 * static_cast<Index>(near.size()) > options.shapes && omega.size() > 1) return std::nullopt;
   HarmonicBasis basis = make_harmonic_basis(problem);
   move_to(pencil, (omega.front() * omega.front() + omega.back() * omega.back()) / 2);
   MultiVector start = pencil.factor->solve(problem.sides[0].forces);
   append(start, pencil.factor->solve_transposed(problem.sides[1].forces));
+  append(start, shapes_of(equations, near, *pencil.factor));
   extend(basis, std::move(start));
+  MatrixXcd earlier; // H at all frequencies of the part, on the first `before` shapes
   for (Index before = 0;;)
   {
     end_if_asked(basis.V.comm);
     std::vector<double> at = thinned(omega, few);
     HarmonicScan found = scan(basis, at, basis.size(), options.tolerance);
-    if (found.defects.maxCoeff() <= 1 && at.size() < omega.size())
+    if (found.means_of(found.defects).maxCoeff() <= 1 && at.size() < omega.size())
     {
       at = omega;
       found = scan(basis, at, basis.size(), options.tolerance);
     }
-    const bool small = found.defects.maxCoeff() <= 1, large = basis.size() > options.shapes;
+    const bool small = found.means_of(found.defects).maxCoeff() <= 1, large = basis.size() > options.shapes;
     if (!small && large && omega.size() > 1) return std::nullopt;
     const Index size = basis.size();
     bool ended = (small && before > 0) || (large && basis.size() > 2 * options.shapes);
     if (!ended)
     {
       ended = extend(basis, corrections(basis, at, found, *pencil.factor)) == 0;
-      if (!ended || before == 0) before = size;
+      if (!ended || before == 0)
+      {
+        before = size;
+        earlier = at.size() == omega.size() ? found.receptance : MatrixXcd();
+      }
     }
     if (!ended) continue;
     if (at.size() < omega.size()) found = scan(basis, omega, basis.size(), options.tolerance);
-    return PartResponse{found, scan(basis, omega, before, options.tolerance).receptance, basis.size()};
+    if (earlier.size() == 0) earlier = scan(basis, omega, before, options.tolerance).receptance;
+    return PartResponse{found, earlier, basis.size()};
   }
 }
 
@@ -206,7 +280,7 @@ void solve_band(const ResponseProblem& problem, const Equations& equations, Resp
     parts.pop_back();
     std::vector<double> omega;
     for (std::size_t f = part.first; f < part.end; ++f) omega.push_back(two_pi * problem.frequency_hz[f]);
-    const auto solved = solve_part(equations.harmonic, omega, pencil, problem.options);
+    const auto solved = solve_part(equations, omega, pencil, problem.options);
     if (!solved)
     {
       const std::size_t middle = (part.first + part.end) / 2;
@@ -218,8 +292,8 @@ void solve_band(const ResponseProblem& problem, const Equations& equations, Resp
     response.change =
         std::max(response.change,
                  largest_change(before, found.receptance, equations.harmonic.of(ResponseEnd::read).forces.columns()));
-    response.outcome.residual = std::max(response.outcome.residual, found.residuals.maxCoeff());
-    if (found.defects.maxCoeff() > 1) response.outcome.kind = OutcomeKind::not_converged;
+    response.outcome.residual = std::max(response.outcome.residual, found.means_of(found.residuals).maxCoeff());
+    if (found.means_of(found.defects).maxCoeff() > 1) response.outcome.kind = OutcomeKind::not_converged;
     response.parts += 1;
     response.shapes = std::max(response.shapes, static_cast<int>(shapes));
     progress.update(static_cast<double>(part.end), format("%d shapes", static_cast<int>(shapes)));

@@ -3,19 +3,21 @@
 /// force at a probe, along its direction. With p_i the row of probe i and Q of section 13,
 ///     H_ji(omega) = p_j'Z q_i,     Q(omega) q_i = Y'p_i.
 ///
-/// All frequencies of a part of the band are solved on one basis. Residuals of the full problem and of its transpose
-/// extend it until all are small. So the error of H is the product of both. Where modes are unstable, H is formal: no
-/// vibration settles on it.
+/// All frequencies of a part of the band are solved on one basis, which starts from the modes of the equilibrium that
+/// lie there. Residuals of the full problem and of its transpose extend it. The error of H is the product of both.
+/// Where modes are unstable, H is formal: no vibration settles on it.
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
+#include "squeal/modes/modes.hpp"
 
 #include <complex>
+#include <span>
 
 namespace squeal
 {
 
 /// outcome: "converged", "not converged" (a residual stays above the tolerance), "skipped", "off".
-/// residual: the largest |Q q - Y'p| of unit forces and of the transposed problem [-].
+/// residual: the largest geometric mean of |Q q_i - Y'p_i| and of that of the transposed problem, for unit forces [-].
 struct Response
 {
   Outcome outcome;
@@ -30,8 +32,8 @@ struct Response
 /// Options -response_...
 struct ResponseOptions
 {
-  double tolerance = 1e-5; // of the residuals, over a unit force
-  PetscInt shapes = 150;   // of a basis; where more are needed the band is parted
+  double tolerance = 1e-5; // of the geometric mean of both residuals, over a unit force
+  PetscInt shapes = 300;   // of a basis; where more are needed the band is parted
 };
 
 OptionList options_of(ResponseOptions& options);
@@ -41,8 +43,9 @@ struct ResponseProblem
 {
   const Structure& structure;
   const LinearisedSliding& linearised;
-  Mat probes = nullptr;         // a row a probe
-  std::vector<int> excitations; // their rows
+  std::span<const ComplexMode> modes; // known ones; may be empty
+  Mat probes = nullptr;               // a row a probe
+  std::vector<int> excitations;       // their rows
   std::vector<double> frequency_hz;
   const ResponseOptions& options;
   const PencilOptions& pencil;
