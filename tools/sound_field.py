@@ -13,6 +13,7 @@ from surface import triangles
 RHO, C = 1.204, 343.2  # [kg/m3], [m/s] of air at 20 degrees Celsius
 REFERENCE = 20e-6  # [Pa] of sound pressure levels
 AUDIBLE = 20000.0  # [Hz]
+RATE = 48000  # [Hz] of sound.wav
 PARTS = 4  # a wavelength is at least so many sides of a triangle with one quadrature
 BANDS = np.arange(-17, 14)  # third octaves about 1000 * 10^(n/10) Hz: 20 Hz to 20 kHz
 NAMES = ("20", "25", "31.5", "40", "50", "63", "80", "100", "125", "160", "200", "250", "315", "400", "500", "630", "800",
@@ -51,6 +52,17 @@ class Radiator:
             points = np.einsum("qc,nci->nqi", coordinates, corners[which])
             distance = np.linalg.norm(microphone - points, axis=2)
             self.groups.append((which, area[which], coordinates, weights, distance))
+
+    def sources(self, shapes):
+        """Of all points of the quadrature: distances [m], and of real shapes (shape, node, component) what each point adds to
+        the integral of v_n / R, as (point, shape)."""
+        distances, fluxes = [], []
+        corners = np.stack([np.concatenate([triangles(shape[rim]) for rim in self.faces]) for shape in shapes], axis=-1)
+        for which, area, coordinates, weights, distance in self.groups:
+            flux = np.einsum("ncis,ni,qc->nqs", corners[which], area, coordinates, optimize=True) * (weights / distance)[:, :, None]
+            distances.append(distance.ravel())
+            fluxes.append(flux.reshape(-1, len(shapes)))
+        return np.concatenate(distances), np.concatenate(fluxes)
 
     def pressure(self, velocity, omega):
         """Complex amplitude [Pa] of nodes' complex velocities (node, component) [m/s]."""
@@ -91,16 +103,21 @@ def third_octaves(frequency, pressure):
     return np.array([level(pressure[place == band]) if (place == band).any() else np.nan for band in BANDS])
 
 
-def write_wave(file, frequency, pressure, seconds, rate=48000):
-    """The tones as 16 bits, faded in and out; returns the pressure [Pa] of full scale, twice the peak."""
-    time = np.arange(round(seconds * rate)) / rate
-    signal = sum((p * np.exp(2j * np.pi * f * time)).real for f, p in zip(frequency, pressure))
+def tones(frequency, pressure, seconds):
+    """Sound pressure in time [Pa] of complex amplitudes, at RATE."""
+    time = np.arange(round(seconds * RATE)) / RATE
+    return sum((p * np.exp(2j * np.pi * f * time)).real for f, p in zip(frequency, pressure))
+
+
+def write_wave(file, signal):
+    """A signal at RATE as 16 bits, faded in and out; returns the pressure [Pa] of full scale, twice the peak."""
+    time = np.arange(len(signal)) / RATE
     scale = 2 * np.abs(signal).max()
     fade = np.minimum(1, np.minimum(time, time[::-1]) / 0.05)
     samples = np.round(signal / scale * np.sin(np.pi / 2 * fade) ** 2 * 32767).astype("<i2")
     with wave.open(str(file), "wb") as out:
         out.setnchannels(1)
         out.setsampwidth(2)
-        out.setframerate(rate)
+        out.setframerate(RATE)
         out.writeframes(samples.tobytes())
     return scale

@@ -232,6 +232,13 @@ class Results:
         time = np.ceil(np.arange(1, count + 1) * steps / count) * cycle["period"] / steps
         return time, np.stack([self.field(f"cycle/displacement_{i}") for i in range(count)])
 
+    def settled_shapes(self):
+        """Times [s], coordinates [m/s kg^1/2] as (sample, shape) and shapes [kg^-1/2] as (shape, node, component) of a settled
+        motion: its velocity is the sum of coordinates times shapes."""
+        self.stage("settled")
+        time, coordinates = self.series("settled", "shapes/time"), self.series("settled", "shapes/coordinate")
+        return time, coordinates, np.stack([self.field(f"settled/shape_{k + 1}") for k in range(coordinates.shape[1])])
+
     def modes(self):
         """A row a mode: frequency_hz, growth_rate, damping_ratio, backward_error, unstable."""
         return table_of(self.stage("modes").get("modes", []))

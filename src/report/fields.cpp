@@ -289,6 +289,23 @@ void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Mode
   }
 }
 
+constexpr Eigen::Index shown_shapes = 6; // of a settled motion in ParaView
+
+void write_motion_shapes(std::optional<Hdf5File>& file, const Gather& gather, const MotionShapes& shapes, Vec like,
+                         Layout& layout, MPI_Comm comm)
+{
+  const Owned<Vec> shape = zeros_like(like);
+  for (Eigen::Index i = 0; i < shapes.V.columns(); ++i)
+  {
+    copy_column(shapes.V, i, shape);
+    const std::string number = std::to_string(i + 1), data = "settled/shape_" + number;
+    const std::vector<double> nodal = gather.nodal(shape);
+    on_rank_zero(comm, [&] { file->write(data, {nodal.size() / 3, 3}, nodal, "kg^-1/2"); });
+    if (i < shown_shapes)
+      layout.still.push_back({"shape " + number + " of the settled motion [kg^-1/2]", data, Center::node, 3});
+  }
+}
+
 /// Samples are spread evenly over the steps of the period and end with its last one [s].
 double sample_time(const LimitCycle& cycle, std::size_t sample)
 {
@@ -326,6 +343,8 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
                    file->write("modes/" + std::to_string(++number) + "/pair_power", {causes.pair_powers.size()},
                                causes.pair_powers, "1/s");
                });
+  if (has_run(report.settled.outcome))
+    write_motion_shapes(file, gather, report.settled.shapes, nodes.structure.load, layout, comm);
   const auto& samples = report.cycle.measured.displacements;
   for (std::size_t i = 0; i < samples.size(); ++i)
   {

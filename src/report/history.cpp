@@ -52,6 +52,22 @@ void write_spectrum(Hdf5File& file, const Spectrum& spectrum, const std::string&
   write("line_amplitude", amplitude, unit);
 }
 
+/// The motion on its shapes, one sample a row.
+void write_coordinates(Hdf5File& file, const SettledMotion& settled)
+{
+  const auto& coordinates = settled.shapes.coordinates;
+  if (coordinates.empty()) return;
+  std::vector<double> time, rows;
+  for (std::size_t i = 0; i < settled.shapes.squares.size(); ++i)
+  {
+    const auto every = static_cast<std::size_t>(settled.sampled_steps);
+    time.push_back(settled.history.time[(i + 1) * every - 1]);
+    for (const auto& coordinate : coordinates) rows.push_back(coordinate[i]);
+  }
+  file.write("settled/shapes/time", {time.size()}, time, "s");
+  file.write("settled/shapes/coordinate", {time.size(), coordinates.size()}, rows, "m/s kg^1/2");
+}
+
 /// Steps in rows, pairs in columns; 0 open, 1 stick, 2 slip.
 void write_statuses(Hdf5File& file, const std::vector<std::vector<ContactStatus>>& statuses)
 {
@@ -77,6 +93,7 @@ void write_history(const Report& report, const Scene& scene, const std::filesyst
   {
     write_group(file, "settled", report.settled.history, scene);
     write_spectrum(file, report.settled.examined.spectrum, report.settled.spectrum_probe < 0 ? "N" : "m");
+    if (!scene.matrices) write_coordinates(file, report.settled);
   }
   if (has_run(report.response.outcome)) write_response(file, report.response, scene);
   if (has_run(report.branch.outcome)) write_branch(file, report.branch, scene);

@@ -222,6 +222,8 @@ Json settled_entry(const Report& report, const Scene& scene)
   entry["step_error"] = settled.step_error;
   entry["least_energy"] = settled.least_energy;
   entry["greatest_energy"] = settled.greatest_energy;
+  entry["shapes"] = settled.shapes.coordinates.size();
+  entry["energy_beside_shapes"] = settled.shapes.left_out;
   entry["damping_power"] = estimated(settled.damping_power);
   entry["contact_power"] = estimated(settled.contact_power);
   entry["load_power"] = estimated(settled.load_power);

@@ -39,6 +39,43 @@ std::string growth_name(std::size_t i)
   return "growth " + std::to_string(i);
 }
 
+std::string coordinate_name(std::size_t i)
+{
+  return "coordinate " + std::to_string(i);
+}
+
+std::string shape_name(std::size_t i)
+{
+  return "shape " + std::to_string(i);
+}
+
+void put_shapes(const MotionShapes& shapes, const FileOrder& order, Vec like, Checkpoint& checkpoint)
+{
+  const Owned<Vec> shape = zeros_like(like);
+  for (std::size_t i = 0; i < shapes.coordinates.size(); ++i)
+  {
+    copy_column(shapes.V, static_cast<Eigen::Index>(i), shape);
+    checkpoint.set(shape_name(i), order.gather(shape));
+    checkpoint.set(coordinate_name(i), shapes.coordinates[i]);
+  }
+  checkpoint.set("squares", shapes.squares);
+  checkpoint.set("largest square", shapes.largest);
+}
+
+void take_shapes(const Checkpoint& checkpoint, const FileOrder& order, Mat M, Vec like, MotionShapes& shapes)
+{
+  const Owned<Vec> shape = zeros_like(like);
+  shapes = no_shapes(M);
+  for (std::size_t i = 0; checkpoint.has(shape_name(i)); ++i)
+  {
+    order.scatter(checkpoint.list(shape_name(i)), shape);
+    append(shapes.V, shape);
+    shapes.coordinates.push_back(checkpoint.list(coordinate_name(i)));
+  }
+  shapes.squares = checkpoint.list("squares");
+  shapes.largest = checkpoint.number("largest square");
+}
+
 bool is_of_this_motion(const Checkpoint& checkpoint, const SettledMotion& motion)
 {
   const double period = checkpoint.number("period");
@@ -63,6 +100,7 @@ void keep_settled(const SettledProgress& progress)
   checkpoint.set("unconverged", static_cast<double>(map.unconverged));
   checkpoint.set("spectrum probe", motion.spectrum_probe);
   put_history(motion.history, checkpoint);
+  put_shapes(motion.shapes, order, map.sliding.structure.load, checkpoint);
   for (std::size_t i = 0; i < now.motion.channels.size(); ++i) checkpoint.set(channel_name(i), now.motion.channels[i]);
   for (std::size_t i = 0; i < now.bundle.growth.size(); ++i) checkpoint.set(growth_name(i), now.bundle.growth[i]);
   checkpoint.set("coordinate", now.motion.coordinate);
@@ -82,6 +120,8 @@ void restore_settled(const SettledProgress& progress)
   map.unconverged = static_cast<long>(checkpoint->number("unconverged"));
   motion.spectrum_probe = static_cast<int>(checkpoint->number("spectrum probe"));
   take_history(*checkpoint, motion.history);
+  const Structure& structure = map.sliding.structure;
+  take_shapes(*checkpoint, order, structure.M, structure.load, motion.shapes);
   now.motion.channels.clear();
   for (std::size_t i = 0; checkpoint->has(channel_name(i)); ++i)
     now.motion.channels.push_back(checkpoint->list(channel_name(i)));

@@ -71,8 +71,9 @@ PeriodSample sample_of(const History& history, int probe)
   return sample;
 }
 
-/// Integrates one period of the brake, recorded for its tangent, and appends its history to the motion's.
-PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, SettledMotion& motion)
+/// Integrates one period of the brake, recorded for its tangent. Appends its history to the motion's, and samples to
+/// its shapes.
+PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, PetscInt shapes, SettledMotion& motion)
 {
   History& all = motion.history;
   const bool first = all.time.empty();
@@ -82,9 +83,20 @@ PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, Settled
   map.records.resize(static_cast<std::size_t>(map.steps));
   map.recorded_start = {};
   History history;
+  const std::size_t sampled_before = motion.shapes.squares.size();
+  long step = 0;
+  const Monitor keep_sample = [&](const State& at, const StepReport&, const StepWork& work)
+  {
+    if (shapes > 0 && ++step % motion.sampled_steps == 0)
+      add_sample(motion.shapes, map.sliding.structure.M, at.v, work.Mv, shapes);
+  };
   const MarchSummary summary =
-      march(map.step, map.sliding, map.steps, now, {probe_rows, history, nullptr, map.records});
-  if (summary.interrupted) throw Interrupted{};
+      march(map.step, map.sliding, map.steps, now, {probe_rows, history, keep_sample, map.records});
+  if (summary.interrupted)
+  {
+    cut_samples(motion.shapes, sampled_before);
+    throw Interrupted{};
+  }
   map.unconverged += summary.unconverged;
   map.reactions = now.reactions;
   check(VecCopy(now.u, displacement(state)));
@@ -156,7 +168,9 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
   motion.steps_per_period = cycle.steps_per_period;
   motion.period = cycle.free.period;
   Owned<Vec> state = copy_of(cycle.free.state.get());
-  const auto sampler = [&](Vec now) { return integrate_period(map, problem.probes, now, motion); };
+  motion.shapes = no_shapes(problem.sliding.structure.M);
+  motion.sampled_steps = steps_between_samples(motion.steps_per_period, motion.period / motion.steps_per_period);
+  const auto sampler = [&](Vec now) { return integrate_period(map, problem.probes, now, options.shapes, motion); };
   const MotionKeeper keeper{[&](const MotionProgress& now) {
                               restore_settled({map, motion, now});
                             },
@@ -165,6 +179,8 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
                             }};
   motion.examined = examine_motion(flow, sampler, keeper, state, motion.period, options);
   name_means(motion, problem.sliding.interface.pairs);
+  const std::size_t windows = motion.examined.periods(), samples = motion.shapes.squares.size() / windows;
+  keep_strongest(motion.shapes, motion.examined.discarded % windows * samples);
   motion.step_error =
       std::abs(energy_by_half_the_steps(problem, motion, cycle.theta, state).value - motion.fluctuating_energy.value);
   const MotionVerdict& verdict = motion.examined.verdict;

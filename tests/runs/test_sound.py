@@ -12,6 +12,7 @@ from conftest import INPUTS, ROOT
 sys.path.insert(0, str(ROOT / "tools"))
 import plot_spectra  # noqa: E402
 import sound_field  # noqa: E402
+import sound_record  # noqa: E402
 import squeal  # noqa: E402
 from sound_field import C, RHO  # noqa: E402
 
@@ -106,13 +107,98 @@ def test_the_spectrum_of_the_wave_is_the_probes_times_the_piston(tmp_path):
     frequency = np.arange(1, 9) / period
     radiator = sound_field.Radiator(nodes, faces, [], (0, 0, z), frequency[-1])
     pressure = np.array([radiator.pressure(velocity[k], 2 * np.pi * frequency[k]) for k in range(8)])
-    scale = sound_field.write_wave(tmp_path / "sound.wav", frequency, pressure, 2)
+    scale = sound_field.write_wave(tmp_path / "sound.wav", sound_field.tones(frequency, pressure, 2))
     found = scale * lines_of(tmp_path / "sound.wav", frequency)
     expected, amplitude = plot_spectra.harmonics(probe, period)
     assert expected[:8] == pytest.approx(frequency, rel=1e-12)
     for k in heard:
         assert found[k] / abs(amplitude[k]) == pytest.approx(on_axis(1, frequency[k], z), rel=0.01)
     assert max(found[k] for k in range(8) if k not in heard) < 1e-3 * found[0]  # 16 bits and their fades
+
+
+def torus(time):
+    """Velocity [m/s] of a motion of two frequencies, and its tones [Hz] with their amplitudes."""
+    tones = {2431.7: 1e-3, 2431.7 - 171.3: 3e-4, 2431.7 + 171.3: 2e-4, 4863.4: 1e-4, 171.3: 5e-5}
+    return sum(v * np.cos(2 * np.pi * f * time + k) for k, (f, v) in enumerate(tones.items())), tones
+
+
+def recorded_piston(seconds, z, step=1 / 100e3):
+    """The sound in time of a piston that moves as the torus, recorded on two shapes of which one is a rotation of no flux."""
+    nodes, faces = piston(6)
+    v, tones = torus(step * np.arange(round(seconds / step)))
+    tilt = np.column_stack([np.zeros((len(nodes), 2)), nodes[:, 0]])
+    heard = sound_record.Heard(sound_field.Radiator(nodes, faces, [], (0, 0, z), 20000), np.stack([moving(nodes, 1).real, tilt]),
+                               np.column_stack([v, 0.1 * v]), step)
+    return heard, tones
+
+
+def test_the_record_of_a_torus_sounds_as_its_tones_through_the_piston(tmp_path):
+    """Each line of the record and of its .wav is that of the velocity by the closed form, to 1 %; levels are sums of
+    tones, to 0.1 dB. Neither lines of sum nor of difference appear."""
+    z = 0.3
+    heard, tones = recorded_piston(0.7, z)
+    wanted = {f: on_axis(v, f, z) for f, v in tones.items()}
+    found = dict(zip(*heard.lines()))
+    for f, p in wanted.items():
+        if p > 0.02 * max(wanted.values()):
+            nearest = min(found, key=lambda g: abs(g - f))
+            assert nearest == pytest.approx(f, abs=0.02) and found[nearest] == pytest.approx(p, rel=0.01)
+    scale = sound_field.write_wave(tmp_path / "sound.wav", sound_record.repeated(heard.sampled(sound_field.RATE), 2 * sound_field.RATE))
+    once = scale * lines_of(tmp_path / "sound.wav", list(wanted))
+    assert once[0] == pytest.approx(wanted[2431.7], rel=0.02)  # the joints cost the rest some of their length
+    sums = np.array(list(wanted.values()))
+    weights = 10 ** (sound_field.a_weight(np.array(list(wanted))) / 20)
+    for signal, amplitudes in ((heard.pressure(), sums), (heard.weighted(), sums * weights)):
+        level, low, high = sound_record.mean_level(signal)
+        assert level == pytest.approx(sound_field.level(amplitudes), abs=0.1) and low <= level <= high < level + 1
+    bands = [band if band is None else sound_record.mean_level(band)[0] for band in heard.third_octaves()]
+    of = dict(zip(sound_field.NAMES, bands))
+    assert of["2.5k"] == pytest.approx(sound_field.level(sums[:3]), abs=0.1)
+    assert of["5k"] == pytest.approx(sound_field.level(sums[3:4]), abs=0.1)
+    assert of["160"] == pytest.approx(sound_field.level(sums[4:]), abs=0.1)
+    assert max(of[name] for name in ("500", "1k", "10k")) < of["2.5k"] - 50 and of["20"] is None
+
+
+def test_levels_that_vary_have_bars_that_hold_other_records():
+    """Noise of one level in 40 records: the bar of 95 % of one holds the mean of all, in 33 of them at least."""
+    random = np.random.default_rng(1)
+    slow = np.exp(np.convolve(random.normal(size=42000), np.ones(2000) / 45, "valid"))[:40000]  # correlated over 2000 samples
+    records = [np.roll(slow, k) * random.normal(size=40000) for k in range(0, 40000, 1000)]
+    records = [r * np.exp(0.3 * np.repeat(random.normal(size=80), 500)) for r in records]
+    levels = [sound_record.mean_level(r) for r in records]
+    middle = 10 * np.log10(np.mean([np.mean(r**2) for r in records]) / sound_field.REFERENCE**2)
+    assert sum(low <= middle <= high for _, low, high in levels) >= 33
+
+
+def levels_of(folder):
+    """Of all and A-weighted [dB], and by third octaves, from sound.txt that the tool has just written."""
+    done = subprocess.run([sys.executable, ROOT / "tools" / "sound", folder, "--seconds", "1"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    numbers = re.findall(r"([\d.]+) dB", done.stdout.splitlines()[0])
+    bands = {name: float(db) for name, db in re.findall(r"^ +(\S+) Hz third octave +([\d.]+) dB", done.stdout, re.M)}
+    return float(numbers[0]), float(numbers[1]), bands, done.stdout
+
+
+def test_a_settled_periodic_motion_is_as_loud_as_the_cycle(tmp_path):
+    """The pin's cycle attracts. A search that is cut short goes on from beside it: levels are the cycle's to 0.3 dB, since slow
+    modes still decay."""
+    pin = {"modes.method": "full", "cycle.steps_per_period": 60}
+    cycle = squeal.run(INPUTS / "pin_on_disc", pin | {"transient.enabled": False}, options=["-cycle_multipliers", "0"], output=tmp_path / "cycle")
+    near = {"transient.start": "estimate", "transient.periods": 100, "transient.steps_per_period": 60, "cycle.start": "transient",
+            "fidelity": "full", "cycle.tolerance": 1e-10}
+    settled = squeal.run(INPUTS / "pin_on_disc", pin | near, output=tmp_path / "settled", options=[
+        "-cycle_multipliers", "0", "-cycle_free_periods", "6", "-cycle_max_periods", "12", "-settled_periods", "64", "-settled_exponents", "1"])
+    entry = settled.report["settled"]
+    assert entry["outcome"] == "settled" and entry["shapes"] > 10 and entry["energy_beside_shapes"] < 1e-3
+    time, coordinates, shapes = settled.settled_shapes()
+    assert len(time) == 64 * 20 and time[-1] == settled.series("settled", "time")[-1]
+    weighted, whole, bands, text = levels_of(settled.folder)
+    of_cycle = levels_of(cycle.folder)
+    assert weighted == pytest.approx(of_cycle[0], abs=0.3) and whole == pytest.approx(of_cycle[1], abs=0.3)
+    for name, level in of_cycle[2].items():
+        if level > of_cycle[1] - 20:
+            assert bands[name] == pytest.approx(level, abs=0.3)
+    assert "Levels are means over" in text and "rigid plane" in text
 
 
 def test_a_run_sounds_at_the_harmonics_of_its_cycle(tmp_path):

@@ -33,6 +33,7 @@ struct SettledOptions
 {
   PetscInt periods = 0;   // integrated at most; 0: 2048, and 512 of a large model, where a period costs seconds
   PetscInt exponents = 4; // Lyapunov exponents
+  PetscInt shapes = 100;  // at most, that the motion is kept on
 };
 
 OptionList options_of(SettledOptions& options);

@@ -2,6 +2,7 @@
 /// The settled motion of the brake where no cycle attracts (src/README.md, section 7.10).
 #include "squeal/cycle/limit_cycle.hpp"
 #include "squeal/settled/motion.hpp"
+#include "squeal/settled/motion_shapes.hpp"
 
 namespace squeal
 {
@@ -22,6 +23,8 @@ struct SettledMotion
   MeanValue open_fraction, stick_fraction, slip_fraction;
   std::vector<MeanValue> peak_to_peak; // [m] within a period, of each probe
   History history;                     // of all periods
+  MotionShapes shapes;                 // of all periods, the strongest of those that were stationary
+  int sampled_steps = 1;               // between two samples of the shapes
 };
 
 /// Where the motion answers, the outcome of the search for a cycle becomes "settled". Not collective.
