@@ -126,7 +126,7 @@ RUNS = {
                    "transient.periods=20", "--set", "transient.steps_per_period=50", "--set", "fidelity=auto",
                    "--set", "branch.key=friction.coefficient", "--set", "branch.from=0.28", "--set", "branch.to=0.32",
                    "--set", "branch.points=4", "--set", "cycle.starts=2", "--set", "sweep.key=friction.coefficient", "--set",
-                   "sweep.from=0.1", "--set", "sweep.to=0.3", "--set", "sweep.points=3", "--set",
+                   "sweep.from=0.1", "--set", "sweep.to=0.3", "--set", "sweep.points=3", "--set", "sweep.stages=cycle", "--set",
                    "change=[{probe='pad_y',mass=1e-3}]", "--set", "robustness.samples=10", "--set", "robustness.checks=2",
                    "--set", "uncertain=[{key='friction.coefficient', deviation=0.01}]", "--set", "response.from=0.01",
                    "--set", "response.to=1", "--set", "response.count=20", "--set",
@@ -173,7 +173,7 @@ def data_sets_of(file):
 # Written with a verdict that is unstable or undecided, or by Arnoldi in place of a projection: no run here ends so.
 UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide", "cycle.multipliers.refusal"}
 # Written of points of a sweep that fail.
-UNLESS_STABLE |= {"sweep.points[].reason"}
+UNLESS_STABLE |= {"sweep.points[].reason", "sweep.points[].motion.reason"}
 # Written of cycle.start = "coarse", which takes longer; test_coarse_start reads them.
 UNLESS_STABLE |= {f"coarse.{key}" for key in ("dofs", "pairs", "residual", "frequency_hz", "mean_fluctuating_energy", "periods")}
 # Written of branches with events, where a stable cycle stands beside a stable equilibrium, and of reduced models, which
