@@ -37,7 +37,8 @@ def draw_column(above, below, lines, unit):
 
 def draw_response(runs):
     found = those_with(runs, lambda run: run.responses())
-    driven = list(dict.fromkeys(i for _, (_, table) in found for i, _ in table))[:MOST_COLUMNS]
+    every = list(dict.fromkeys(i for _, (_, table) in found for i, _ in table))
+    driven, left_out = every[:MOST_COLUMNS], every[MOST_COLUMNS:]
     size, unit = frequency_unit(max(frequency[-1] for _, (frequency, _) in found))
     figure, axes = plt.subplots(2, len(driven), figsize=(max(8, 5.4 * len(driven)), 6.8), squeeze=False, sharex=True,
                                 height_ratios=[2.4, 1], layout="constrained")
@@ -47,5 +48,6 @@ def draw_response(runs):
         draw_column(*axes[:, column], lines[:MOST_LINES], unit)
     unstable = any(run.report.get("modes", {}).get("unstable_count", 0) for run, _ in found)
     figure.suptitle(heading([run for run, _ in found], "frequency responses about sliding" +
-                            (", formal: a mode is unstable" if unstable else "")))
+                            (", formal: a mode is unstable" if unstable else "") +
+                            (f"; not drawn: driven at {', '.join(left_out)}" if left_out else "")))
     return figure
