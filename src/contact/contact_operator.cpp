@@ -4,7 +4,6 @@
 #include "squeal/algebra/panel.hpp"
 #include "squeal/algebra/simd.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/contact/complementarity.hpp"
 
 #include <algorithm>
 #include <cmath>

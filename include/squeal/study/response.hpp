@@ -4,7 +4,7 @@
 ///     H_ji(omega) = p_j'Z q_i,     Q(omega) q_i = Y'p_i.
 ///
 /// All frequencies of a part of the band are solved on one basis, which starts from the modes of the equilibrium that
-/// lie there. Residuals of the full problem and of its transpose extend it. The error of H is the product of both.
+/// are there. Residuals of the full problem and of its transpose extend it. The error of H is the product of both.
 /// Where modes are unstable, H is formal: no vibration settles on it.
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
