@@ -40,16 +40,15 @@ std::vector<double> pair_forces(const Interface& interface, const std::vector<do
   return forces;
 }
 
-/// K' u = F + B' forces, with one step of iterative refinement.
+/// u + K'^-1 (F + B' forces - K' u): the solution of K' u = F + B' forces, and a step of iterative refinement from near
+/// it.
 void displace(const Held& held, const Structure& structure, const Interface& interface,
               const std::vector<double>& forces, Vec u)
 {
   const auto rhs = copy_of(structure.load);
   if (interface.pairs > 0) add_reactions(interface, forces, rhs);
   const auto residual = zeros_like(rhs), correction = zeros_like(rhs);
-  Mat K = held.augmented ? held.augmented.get() : structure.K.get();
-  solve(held.factor, rhs, u);
-  check(MatMult(K, u, residual));
+  check(MatMult(held.augmented ? held.augmented.get() : structure.K.get(), u, residual));
   check(VecAYPX(residual, -1, rhs));
   solve(held.factor, residual, correction);
   check(VecAXPY(u, 1, correction));
@@ -189,7 +188,7 @@ struct Search
   double rho = 0; // 1/lambda_max(D_nn)
 };
 
-/// u, and gaps and reactions corrected by what u's own gaps say: the rounding of D drops out.
+/// u, and gaps and reactions corrected by what u's own gaps say: the rounding of D drops out. Each pass refines u, too.
 void settle(const Held& held, const Structure& structure, const Interface& interface, Search& search,
             Equilibrium& equilibrium, MPI_Comm comm)
 {

@@ -264,10 +264,6 @@ Owned<Mat> project(Mat A, Mat Y, Mat Z)
   return result;
 }
 
-namespace
-{
-
-/// damping of sliding_friction at -v_d for the pairs that are closed, on the rows of B; null if it is zero.
 Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>& closed,
                             const std::vector<double>& reactions, FrictionDamping part)
 {
@@ -301,8 +297,6 @@ Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>&
   check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
   return result;
 }
-
-} // namespace
 
 Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,
                             const std::vector<double>& reactions, FrictionDamping part)

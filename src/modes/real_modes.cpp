@@ -263,12 +263,21 @@ RealModes search_from_below_zero(Mat M, Mat K, double limit, PetscInt count, con
   return modes;
 }
 
-/// The modes with low <= theta < high, of which there are `count`, found from the middle.
-void append_between(double low, double high, int count, ShiftInvert& pencil, RealModes& modes)
+/// The modes with low <= theta < high, found from the middle, about `expected` of them. Where they are too many for one
+/// space, by halves.
+void append_between(double low, double high, int expected, ShiftInvert& pencil, RealModes& modes)
 {
-  if (count <= 0) return;
-  move_to(pencil, (low + high) / 2);
-  const RealPairs found = ritz_pairs(solve_nearest(pencil, count, 0, 1e-4).space, pencil.M, pencil.K);
+  const double middle = (low + high) / 2;
+  move_to(pencil, middle);
+  const double radius = (high - low) / 2 + std::abs(pencil.shift - middle);
+  const Nearest nearest = solve_nearest(pencil, std::max(expected, 1), radius, 1e-4);
+  if (!nearest.converged)
+  {
+    append_between(middle, high, expected / 2, pencil, modes);
+    append_between(low, middle, expected / 2, pencil, modes);
+    return;
+  }
+  const RealPairs found = ritz_pairs(nearest.space, pencil.M, pencil.K);
   for (Index k = 0; k < found.theta.size(); ++k)
   {
     if (!(found.theta[k] >= low && found.theta[k] < high)) continue;
@@ -278,14 +287,12 @@ void append_between(double low, double high, int count, ShiftInvert& pencil, Rea
   }
 }
 
-/// The modes with low <= theta < high, found from the middle by what the counts at both ends leave. A basis can do
-/// without one that is missed.
+/// The modes with low <= theta < high. No count by inertia assures them: a basis can do without one that is missed.
 RealModes search_between(Mat M, Mat K, double low, double high, const PencilOptions& options)
 {
   ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
-  const Inertia first = inertia_at(low, pencil), last = inertia_at(high, pencil);
   RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
-  append_between(low, high, last.below - first.below, pencil, modes);
+  append_between(low, high, 1, pencil, modes);
   return modes;
 }
 
@@ -293,17 +300,15 @@ RealModes search_between(Mat M, Mat K, double low, double high, const PencilOpti
 /// square of their number.
 RealModes search_in_slices(Mat M, Mat K, double omega, const PencilOptions& options)
 {
-  constexpr int slice = 70;
+  constexpr int slice = 100;
   ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
-  Inertia high = inertia_at(omega * omega, pencil);
-  const int slices = (high.below + slice - 1) / slice;
+  const Inertia end = inertia_at(omega * omega, pencil);
+  const int slices = std::max(1, (end.below + slice - 1) / slice);
   RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
-  for (int k = slices - 1; k >= 0; --k)
+  for (int k = slices; k > 0; --k)
   {
-    const double edge = k == 0 ? shift_below_zero(M, K) : std::pow(omega * k / slices, 2);
-    const Inertia low = k == 0 ? Inertia{edge, 0} : inertia_at(edge, pencil);
-    append_between(low.limit, high.limit, high.below - low.below, pencil, modes);
-    high = low;
+    const double low = k == 1 ? shift_below_zero(M, K) : end.limit * std::pow((k - 1.) / slices, 2);
+    append_between(low, end.limit * std::pow(1. * k / slices, 2), end.below / slices, pencil, modes);
   }
   return modes;
 }

@@ -35,12 +35,12 @@ MatrixXcd form(const PointModes& lefts, const PointModes& rights, const PointMod
 {
   const Index rows = matrices.M.rows();
   const MatrixXcd left = padded(lefts, &TwoSidedPair::left, rows), right = padded(rights, &TwoSidedPair::right, rows);
-  MatrixXcd result = left.transpose() * (matrices.M * right);
+  MatrixXcd result = left.transpose() * real_times(matrices.M, right);
   for (Index i = 0; i < result.rows(); ++i)
     for (Index j = 0; j < result.cols(); ++j)
       result(i, j) *=
           lefts.pairs[static_cast<std::size_t>(i)].lambda + rights.pairs[static_cast<std::size_t>(j)].lambda;
-  return result + left.transpose() * (matrices.C * right);
+  return result + left.transpose() * real_times(matrices.C, right);
 }
 
 /// left'A right of vectors given by their real, then their imaginary parts.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 namespace squeal
 {
@@ -22,17 +23,18 @@ constexpr Index sketched = 32;     // random vectors: their mean square is off b
 constexpr double basis_band = 1.1; // of the real modes, over the band
 constexpr std::size_t fewest = 20; // real modes
 constexpr double share = 0.02;     // directions of corrections below this part of the largest wait for the next pass
+constexpr Index mixtures = 64;     // of the residuals of a side: more directions than that wait for the next pass
 constexpr Index small_basis = 120; // shapes: such a problem is solved whole at once
 constexpr double undamped_reach = 1.2; // undamped modes on which a large basis is solved first, over the window
 constexpr double slow = 0.8;           // ratio of errors before and after a correction that did not help
 constexpr std::size_t few = 4;         // pairs refined one by one; six take as long as solving the whole
 constexpr double spurious = 1e-8;      // backward error of what is no mode
 
-/// The closed pairs taken out, and the damping of the friction direction; null where there is none.
+/// The closed pairs taken out, and the damping of the friction direction on the rows of B; null where there is none.
 struct LinearisedPoint
 {
   ClosedContact contact;
-  Owned<Mat> Cf{};
+  Owned<Mat> damping{};
 };
 
 LinearisedPoint linearise_point(const SlidingEquilibrium& sliding)
@@ -40,7 +42,7 @@ LinearisedPoint linearise_point(const SlidingEquilibrium& sliding)
   const auto& [structure, interface, equilibrium] = sliding;
   LinearisedPoint point{eliminate_closed_pairs(structure, interface, equilibrium.closed)};
   const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
-  point.Cf = friction_damping(interface, equilibrium.closed, equilibrium.reactions, part);
+  point.damping = damping_of_pairs(interface, equilibrium.closed, equilibrium.reactions, part);
   return point;
 }
 
@@ -71,7 +73,7 @@ void attach(ModesBasis& modes, const Interface& interface, const std::vector<cha
 /// The two-norms of the parts of vectors that are no pivots.
 VectorXd kept_norms(const MatrixXcd& a, const MatrixXd& kept)
 {
-  return (a.conjugate().cwiseProduct(kept * a)).colwise().sum().real().cwiseMax(0).cwiseSqrt();
+  return (a.conjugate().cwiseProduct(real_times(kept, a))).colwise().sum().real().cwiseMax(0).cwiseSqrt();
 }
 
 /// The vectors of one side, one a column.
@@ -112,7 +114,8 @@ std::vector<double> backward_errors(const ModesBasis& modes, const ProjectedSlid
     return A.bottomLeftCorner(shapes, tests).transpose();
   };
   const MatrixXcd a = vectors_of(pairs, side);
-  const MatrixXcd M = block(on_basis.M) * a, C = block(on_basis.C) * a, K = block(on_basis.K) * a;
+  const MatrixXcd M = real_times(block(on_basis.M), a), C = real_times(block(on_basis.C), a),
+                  K = real_times(block(on_basis.K), a);
   const VectorXd sizes = kept_norms(a, on_basis.kept);
   std::vector<double> errors;
   for (Index k = 0; k < a.cols(); ++k)
@@ -126,40 +129,49 @@ std::vector<double> backward_errors(const ModesBasis& modes, const ProjectedSlid
   return errors;
 }
 
-/// Appends to `residuals` the real and imaginary parts of the residuals of some vectors, over their backward error's
-/// scale, with zeros at the pivots.
+/// Complex weights, alike on every rank: columns mix the rows' vectors at random. As many columns as rows or more would
+/// mix nothing: then they are the real and the imaginary part of each.
+MatrixXcd random_weights(Index rows, Index columns)
+{
+  constexpr Complex i{0, 1};
+  MatrixXcd weights = MatrixXcd::Zero(rows, std::min(2 * rows, columns));
+  if (2 * rows <= columns)
+    weights << MatrixXcd::Identity(rows, rows), -i * MatrixXcd::Identity(rows, rows);
+  else
+  {
+    std::mt19937_64 generator(1);
+    std::normal_distribution<double> normal;
+    for (Index k = 0; k < weights.size(); ++k) weights.data()[k] = {normal(generator), normal(generator)};
+  }
+  return weights;
+}
+
+/// Appends to `residuals` those of some vectors, over their backward error's scale, with zeros at the pivots. Of many,
+/// random mixtures of real and imaginary parts span the same leading directions.
 void append_residuals(const ModesBasis& modes, const PointProblem& problem, const LinearisedPoint& point,
                       const std::vector<TwoSidedPair>& pairs, Side side, MultiVector& residuals)
 {
   if (pairs.empty()) return;
-  const auto count = static_cast<Index>(pairs.size());
-  const Structure& structure = problem.sliding.structure;
-  const MatrixXcd a = vectors_of(pairs, side);
-  const MultiVector shapes = columns_from(modes.basis.T, modes.basis.sketched);
-  const MultiVector kept = kept_rows(shapes, point.contact);
+  const auto& [structure, interface, equilibrium] = problem.sliding;
   const Mat lift = side == Side::right ? point.contact.Z : point.contact.Y;
   const Owned<Mat> test = transpose_of(side == Side::right ? point.contact.Y : point.contact.Z);
-  MatrixXd parts(a.rows(), 2 * count);
-  parts << a.real(), a.imag();
-  const MultiVector x = product(lift, combination(kept, parts));
-  MultiVector Cx = product(structure.C, x);
-  if (point.Cf.get()) Cx.entries += product(point.Cf, x).entries;
-  const MultiVector Mx = product(structure.M, x), Kx = product(structure.K, x);
-  MultiVector force{x.comm, MatrixXd(x.entries.rows(), 2 * count)};
-  for (Index k = 0; k < count; ++k)
+  MatrixXcd weights = random_weights(static_cast<Index>(pairs.size()), mixtures);
+  for (std::size_t k = 0; k < pairs.size(); ++k) weights.row(static_cast<Index>(k)) /= scale_of(modes, pairs[k].lambda);
+  const MatrixXcd a = vectors_of(pairs, side);
+  // lambda^2 M x + lambda C x + K x, the powers of lambda within the weights
+  const auto times_lambda = [&]
   {
-    const Complex lambda = pairs[static_cast<std::size_t>(k)].lambda, square = lambda * lambda;
-    const double scale = scale_of(modes, lambda);
-    const Index re = k, im = count + k;
-    const auto& m = Mx.entries;
-    const auto& c = Cx.entries;
-    force.entries.col(re) = (square.real() * m.col(re) - square.imag() * m.col(im) + lambda.real() * c.col(re) -
-                             lambda.imag() * c.col(im) + Kx.entries.col(re)) /
-                            scale;
-    force.entries.col(im) = (square.real() * m.col(im) + square.imag() * m.col(re) + lambda.real() * c.col(im) +
-                             lambda.imag() * c.col(re) + Kx.entries.col(im)) /
-                            scale;
-  }
+    for (std::size_t k = 0; k < pairs.size(); ++k) weights.row(static_cast<Index>(k)) *= pairs[k].lambda;
+  };
+  const auto mixed = [&]
+  { return product(lift, kept_rows(combination_of_shapes(modes.basis, (a * weights).real()), point.contact)); };
+  MultiVector force = product(structure.K, mixed());
+  times_lambda();
+  const MultiVector x = mixed();
+  force.entries += product(structure.C, x).entries;
+  if (point.damping.get()) force.entries += product(project(point.damping, interface.B, interface.B), x).entries;
+  times_lambda();
+  force.entries += product(structure.M, mixed()).entries;
   append(residuals, with_zero_pivots(product(test, force), point.contact));
 }
 
@@ -258,11 +270,15 @@ SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_
   std::vector<TwoSidedPair> pairs = solve_two_sided_shared(comm, M, C, K);
   std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); });
   if (extent == Extent::near_band)
-    for (TwoSidedPair& pair : pairs)
+  {
+    const MatrixXcd right = real_times(spaces.right, vectors_of(pairs, Side::right)),
+                    left = real_times(spaces.left, vectors_of(pairs, Side::left));
+    for (std::size_t k = 0; k < pairs.size(); ++k)
     {
-      pair.right = (spaces.right * pair.right).eval();
-      pair.left = (spaces.left * pair.left).eval();
+      pairs[k].right = right.col(static_cast<Index>(k));
+      pairs[k].left = left.col(static_cast<Index>(k));
     }
+  }
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const TwoSidedPair& a, const TwoSidedPair& b) { return a.lambda.real() > b.lambda.real(); });
   return with_errors(modes, on_basis, std::move(pairs));
@@ -299,6 +315,14 @@ PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const Proj
 }
 
 } // namespace
+
+MatrixXcd real_times(const MatrixXd& A, const MatrixXcd& x)
+{
+  MatrixXcd result(A.rows(), x.cols());
+  result.real() = A * x.real();
+  result.imag() = A * x.imag();
+  return result;
+}
 
 ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>& closed)
 {
@@ -354,8 +378,8 @@ MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, cons
   const MatrixXcd a = vectors_of(pairs, side);
   MatrixXd parts(a.rows(), 2 * a.cols());
   parts << a.real(), a.imag();
-  const MultiVector shapes{modes.basis.T.comm, modes.basis.T.entries.middleCols(modes.basis.sketched, a.rows())};
-  return product(side == Side::right ? contact.Z : contact.Y, combination(kept_rows(shapes, contact), parts));
+  const MultiVector x = kept_rows(combination_of_shapes(modes.basis, parts), contact);
+  return product(side == Side::right ? contact.Z : contact.Y, x);
 }
 
 PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
@@ -370,7 +394,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   double before = HUGE_VAL;
   for (PetscInt pass = 0;; ++pass)
   {
-    const ProjectedSliding on_basis = project(modes.basis, point.contact, point.Cf);
+    const ProjectedSliding on_basis = project(modes.basis, point.contact, interface.B, point.damping);
     SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
     if (extent == Extent::near_band) refine_few(modes, on_basis, problem, solved);
     double now = largest_excess(solved, problem);

@@ -146,19 +146,29 @@ MatrixXd projected(const BasisImage& image, const MultiVector& by_Y)
   return image.lifted_products + inner_products(by_Y, image.lifted_rows);
 }
 
-/// T'Cf T of the lifted T. Only degrees of freedom of the contact have entries in Cf.
-MatrixXd projected_damping(const SlidingBasis& basis, const MultiVector& by_Y, Mat Cf)
+/// T'C_f T of the lifted T, C_f = B'D B. Most rows of D are zero: those of normals and, mostly, along the drive.
+MatrixXd projected_damping(const SlidingBasis& basis, const MultiVector& by_Y, Mat B, Mat damping)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(Cf, &first, &last));
-  std::vector<PetscInt> rows;
-  for (const Index dof : basis.contact_dofs) rows.push_back(first + static_cast<PetscInt>(dof));
-  const Owned<IS> contact = set_of(comm_of(Cf), rows);
-  MultiVector right{basis.T.comm, basis.T.entries(basis.contact_dofs, Eigen::all)};
-  MatrixXd left = right.entries;
-  right.entries(basis.by_Z.in_contact, Eigen::all) += basis.by_Z.change.entries;
-  left(basis.by_Z.in_contact, Eigen::all) += by_Y.entries;
-  return shared_sum(left.transpose() * product(part_of(Cf, contact, contact), right).entries, basis.T.comm);
+  PetscInt first = 0, last = 0, first_row = 0, last_row = 0;
+  check(MatGetOwnershipRangeColumn(B, &first, &last));
+  check(MatGetOwnershipRange(B, &first_row, &last_row));
+  std::vector<PetscInt> dofs, rows;
+  for (const Index dof : basis.contact_dofs) dofs.push_back(first + static_cast<PetscInt>(dof));
+  for_each_row(damping,
+               [&](PetscInt row, std::span<const PetscInt>, std::span<const PetscScalar> values)
+               {
+                 if (std::ranges::any_of(values, [](PetscScalar value) { return value != 0; })) rows.push_back(row);
+               });
+  const Owned<IS> damped = set_of(comm_of(B), rows);
+  const Owned<Mat> part = part_of(B, damped, set_of(comm_of(B), dofs));
+  const auto sliding = [&](const MultiVector& change)
+  {
+    MultiVector x{basis.T.comm, basis.T.entries(basis.contact_dofs, Eigen::all)};
+    x.entries(basis.by_Z.in_contact, Eigen::all) += change.entries;
+    return product(part, x);
+  };
+  const MultiVector force = product(part_of(damping, damped, damped), sliding(basis.by_Z.change));
+  return inner_products(sliding(by_Y), force);
 }
 
 } // namespace
@@ -221,6 +231,11 @@ void set_structure(SlidingBasis& basis, const Structure& structure)
   set_matrix(basis, basis.K, structure.K);
 }
 
+MultiVector combination_of_shapes(const SlidingBasis& basis, const MatrixXd& a)
+{
+  return {basis.T.comm, basis.T.entries.middleCols(basis.sketched, a.rows()) * a};
+}
+
 Index extend(SlidingBasis& basis, MultiVector X)
 {
   MultiVector shapes = columns_from(basis.T, basis.sketched);
@@ -241,12 +256,12 @@ Index extend(SlidingBasis& basis, MultiVector X)
   return gained;
 }
 
-ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat Cf)
+ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping)
 {
   lift_by_Z(basis, contact);
   const MultiVector by_Y = change_by_lift(basis, contact, basis.by_Z.pivots, contact.Y);
   ProjectedSliding result{projected(basis.M, by_Y), projected(basis.C, by_Y), projected(basis.K, by_Y)};
-  if (Cf) result.C += projected_damping(basis, by_Y, Cf);
+  if (damping) result.C += projected_damping(basis, by_Y, B, damping);
   result.kept = basis.by_Z.kept;
   return result;
 }

@@ -46,6 +46,9 @@ struct SlidingBasis
 
 SlidingBasis make_basis(const Structure& structure, const Interface& interface, Eigen::Index sketched);
 
+/// T a of the first shapes, as many as a has rows.
+MultiVector combination_of_shapes(const SlidingBasis& basis, const Eigen::MatrixXd& a);
+
 /// Appends what the shapes X add to the span. Returns the number of columns gained.
 Eigen::Index extend(SlidingBasis& basis, MultiVector X);
 
@@ -62,8 +65,8 @@ struct ProjectedSliding
   Eigen::MatrixXd M{}, C{}, K{}, kept{};
 };
 
-/// `Cf`: the damping of the friction direction; may be null.
-ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat Cf);
+/// `damping`: of the friction direction, on the rows of B; may be null.
+ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping);
 
 /// The degrees of freedom of x that are no pivots.
 MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact);

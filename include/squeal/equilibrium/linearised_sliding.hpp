@@ -44,6 +44,10 @@ enum class FrictionDamping
   of_speed,
 };
 
+/// The same on the rows of B: C_f = B'D B. Null if it is zero. Collective.
+Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>& closed,
+                            const std::vector<double>& reactions, FrictionDamping part);
+
 /// C_f from the reactions of the closed pairs. Collective.
 Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,
                             const std::vector<double>& reactions, FrictionDamping part);
