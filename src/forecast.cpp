@@ -37,8 +37,6 @@ constexpr double vectors_of_modes_kept = 200; // of the same 100 pairs
 constexpr double vectors_of_shooting = 100;   // pairs of differences, work of a step, columns of the multipliers
 // A basis grows beyond its limit by what one pass adds; with it its copy while it grows, and the random vectors:
 constexpr double passes_of_response = 40;
-constexpr double near_part =
-    0.15; // of W's entries that the near field has: 0.11 on the brake of 33 224 degrees of freedom
 constexpr double start_of_libraries = 400e6; // [byte] OpenBLAS's buffer of 128 MB, those of MPI and of PETSc
 
 double steps_of_transient(const TransientSettings& transient)
@@ -206,11 +204,11 @@ bool stays_in_factor(const Sizes& sizes, OperatorStorage storage, double free)
          squeal::stays_in_factor(sizes.contact, sizes.factor.border_entries, free - memory_of_factor(sizes));
 }
 
-/// M and K together, the factor, and the near field in single precision with its blocks while it is made. A whole W is
-/// on rank 0, and the others share half of it.
+/// M and K together, the factor, and the near field in single precision, which may be all of W: 0.11 of it on the brake
+/// of 33 224 degrees of freedom. A whole W is on rank 0, and the others share half of it.
 double memory_of_step(const Sizes& sizes, bool in_factor)
 {
-  const double whole = sizes.condensed_operator(), near_field = 2 * near_part * whole / 2;
+  const double whole = sizes.condensed_operator(), near_field = whole / 2;
   return (2 * number + sizeof(PetscInt)) * sizes.entries / 2 + matrix_entry * sizes.entries + memory_of_factor(sizes) +
          near_field + (in_factor ? 0 : whole * (1 + (1 - 1 / sizes.ranks) / 2)) +
          number * vectors_of_modes_kept * sizes.dofs;

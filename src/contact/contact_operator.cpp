@@ -42,10 +42,10 @@ SQUEAL_SIMD void add_whole_rows(const double* rows, std::size_t length, std::siz
 SQUEAL_SIMD void add_runs(const NearField& near, std::size_t pair, std::size_t number, const PairVector& factors,
                           float* target)
 {
-  const float* values = &near.values[near.values_of[pair]];
-  for (std::size_t run = near.runs_of[pair]; run < near.runs_of[pair + 1]; ++run)
+  const NearField::PairRow& row = near.rows[pair];
+  const float* values = row.values.data();
+  for (const auto& [first, count] : row.runs)
   {
-    const auto [first, count] = near.runs[run];
     add_block(values, count, number, factors, target + first);
     values += number * count;
   }
@@ -94,7 +94,7 @@ void ContactOperator::add_near_product(std::size_t pair, const PairVector& chang
 double ContactOperator::near_share() const
 {
   const auto n = static_cast<double>(size());
-  return n == 0 ? 0 : static_cast<double>(near_.values.size()) / (n * n);
+  return n == 0 ? 0 : static_cast<double>(near_.entries()) / (n * n);
 }
 
 double ContactOperator::largest_eigenvalue(int iterations) const

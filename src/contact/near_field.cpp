@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace squeal
 {
@@ -76,55 +77,66 @@ double NearFieldBuilder::limit_of(std::size_t pair) const
   return unit_ * std::exp2((std::min(bin, largest) + bins_above_unit - bins) / static_cast<double>(bins_of_octave));
 }
 
-/// Blocks that are negligible in both pairs' rows are left out, so that no row misses more than its share.
+void NearFieldBuilder::append(Blocks& blocks, std::size_t column, const PairBlock& block, bool transposed) const
+{
+  blocks.columns.push_back(column);
+  for (std::size_t k = 0; k < rows_.per_pair(); ++k)
+    for (std::size_t l = 0; l < rows_.per_pair(); ++l)
+      blocks.values.push_back(static_cast<float>(transposed ? block[l][k] : block[k][l]));
+}
+
+/// The blocks side by side in each run.
+NearField::PairRow NearFieldBuilder::row_of(const Blocks& blocks) const
+{
+  NearField::PairRow row;
+  const std::size_t n = rows_.per_pair();
+  const auto& [columns, values] = blocks;
+  row.values.reserve(values.size());
+  for (std::size_t p = 0, end = 0; p < columns.size(); p = end)
+  {
+    for (end = p + 1; end < columns.size() && columns[end] == columns[end - 1] + 1;) ++end;
+    row.runs.push_back({rows_.normal(columns[p]), (end - p) * n});
+    for (std::size_t k = 0; k < n; ++k)
+      for (std::size_t q = p; q < end; ++q)
+        for (std::size_t l = 0; l < n; ++l) row.values.push_back(values[(q * n + k) * n + l]);
+  }
+  return row;
+}
+
+/// Blocks that are negligible in both pairs' rows are left out, so that no row misses more than its share. The column
+/// of a pair completes its rows: what is left of the diagonal has waited, and the rest is this column transposed.
 void NearFieldBuilder::collect(const CondensedStrip& strip)
 {
   if (limits_.empty())
+  {
     for (std::size_t pair = 0; pair < pairs_; ++pair) limits_.push_back(limit_of(pair));
-  sizes_ = {};
+    sizes_ = {};
+    waiting_.resize(pairs_);
+  }
   for (std::size_t j = rows_.pair_of(strip.first); j < rows_.pair_of(strip.last); ++j)
+  {
+    Blocks own = std::exchange(waiting_[j], {});
     for (std::size_t i = j; i < pairs_; ++i)
     {
       const PairBlock now = block(strip, i, j);
       if (i != j && !(size_of(now) > 0 && size_of(now) >= std::min(limits_[i], limits_[j]))) continue;
-      blocks_.push_back({i, j});
-      for (std::size_t k = 0; k < rows_.per_pair(); ++k)
-        for (std::size_t l = 0; l < rows_.per_pair(); ++l) values_.push_back(static_cast<float>(now[k][l]));
+      append(own, i, now, i != j);
+      if (i != j) append(waiting_[i], j, now, false);
     }
+    near_.rows.push_back(row_of(own));
+  }
 }
 
 NearField NearFieldBuilder::finish()
 {
-  struct Place
-  {
-    std::size_t column, block;
-    bool turned; // the block is that of the transposed place
-  };
-  std::vector<std::vector<Place>> places(pairs_); // of each row, by rising column
-  for (std::size_t b = 0; b < blocks_.size(); ++b)
-  {
-    const auto [i, j] = blocks_[b];
-    places[i].push_back({j, b, false});
-    if (i != j) places[j].push_back({i, b, true});
-  }
-  NearField near;
-  const std::size_t n = rows_.per_pair();
-  for (const std::vector<Place>& row : places)
-  {
-    near.runs_of.push_back(near.runs.size());
-    near.values_of.push_back(near.values.size());
-    for (std::size_t p = 0, end = 0; p < row.size(); p = end)
-    {
-      for (end = p + 1; end < row.size() && row[end].column == row[end - 1].column + 1;) ++end;
-      near.runs.push_back({rows_.normal(row[p].column), (end - p) * n});
-      for (std::size_t k = 0; k < n; ++k)
-        for (std::size_t q = p; q < end; ++q)
-          for (std::size_t l = 0; l < n; ++l)
-            near.values.push_back(values_[(row[q].block * n + (row[q].turned ? l : k)) * n + (row[q].turned ? k : l)]);
-    }
-  }
-  near.runs_of.push_back(near.runs.size());
-  return near;
+  return std::move(near_);
+}
+
+std::size_t NearField::entries() const
+{
+  std::size_t entries = 0;
+  for (const PairRow& row : rows) entries += row.values.size();
+  return entries;
 }
 
 } // namespace squeal

@@ -31,10 +31,15 @@ private:
   static constexpr int bins = 512;
   using Sizes = std::array<double, bins>;
 
-  struct Block // of the lower triangle
+  /// Blocks in a pair's rows, by rising column.
+  struct Blocks
   {
-    std::size_t row, column; // pairs
+    std::vector<std::size_t> columns{}; // pairs
+    std::vector<float> values{};        // block by block, row by row
   };
+
+  void append(Blocks& blocks, std::size_t column, const PairBlock& block, bool transposed) const;
+  NearField::PairRow row_of(const Blocks& blocks) const;
 
   PairBlock block(const CondensedStrip& strip, std::size_t i, std::size_t j) const;
   int bin_of(double size) const;
@@ -46,8 +51,8 @@ private:
   std::vector<Sizes> sizes_;
   std::vector<double> limits_; // sizes of blocks that are left out of a pair's rows
   std::vector<PairBlock> diagonal_;
-  std::vector<Block> blocks_;
-  std::vector<float> values_; // of these, one after the other
+  std::vector<Blocks> waiting_; // left of the diagonal, of the pairs whose column has not come
+  NearField near_;
 };
 
 } // namespace squeal

@@ -30,7 +30,7 @@ struct ScaledProducts
   std::vector<double> diagonal; // that is added, of every row; empty: none
 };
 
-/// Row by row, runs of neighbouring pairs.
+/// The large blocks of W in single precision, in the rows of each pair by runs of neighbouring columns.
 struct NearField
 {
   /// Of a pair's own block, in a row: a larger share makes sweeps cheaper and products with W more frequent.
@@ -39,9 +39,14 @@ struct NearField
   {
     std::size_t first, count; // of w's entries
   };
-  std::vector<std::size_t> runs_of, values_of; // of each pair: where its runs and its values begin
-  std::vector<Run> runs;
-  std::vector<float> values; // run after run, the pair's rows of each run one after the other
+  struct PairRow
+  {
+    std::vector<Run> runs{};
+    std::vector<float> values{}; // run after run, the pair's rows of each run one after the other
+  };
+  std::vector<PairRow> rows;
+
+  std::size_t entries() const;
 };
 
 /// Where W is stored. automatic: whole, but where stays_in_factor says so.
@@ -88,7 +93,7 @@ public:
 
   /// The same by the near field, which small operators do not have.
   void add_near_product(std::size_t pair, const PairVector& change, std::span<float> w) const;
-  bool has_near_field() const { return !near_.runs.empty(); }
+  bool has_near_field() const { return !near_.rows.empty(); }
   double near_share() const; // entries of the near field over those of W
 
   /// Gives every rank its part of the columns of a large whole W. From now on products with one vector are formed from
