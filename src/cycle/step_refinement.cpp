@@ -26,18 +26,33 @@ double largest_step_error(const Fidelity& fidelity)
   return std::max(fidelity.step_frequency_error, fidelity.step_energy_error);
 }
 
-/// The order at which three energies converge: 2 where the motion is smooth, less through impacts, never below 1.
-double observed_order(const CycleAtSteps& coarse, const CycleAtSteps& middle, const CycleAtSteps& fine)
+/// The relative error of a cycle's quantity at n steps a period: first/n + second/n^2.
+struct StepError
 {
-  const double seen = (coarse.energy - middle.energy) / (middle.energy - fine.energy);
-  double order = 1;
-  const auto expected = [&](double p)
-  {
-    return (std::pow(coarse.steps, -p) - std::pow(middle.steps, -p)) /
-           (std::pow(middle.steps, -p) - std::pow(fine.steps, -p));
-  };
-  while (order < 2 && expected(order) < seen) order += 0.05;
-  return order;
+  double first = 0, second = 0;
+
+  double at(double steps) const { return (first + second / steps) / steps; }
+
+  /// The number of steps with such an error.
+  double steps_for(double error) const { return (first + std::sqrt(first * first + 4 * error * second)) / (2 * error); }
+
+  /// Of the power of n with which the error falls there: 1 to 2.
+  double order(double steps) const { return std::log2(at(steps) / at(2 * steps)); }
+};
+
+/// Of the last three cycles, a parabola in 1/n. Impacts and onsets of stick have errors of first order, which depend on
+/// where in their steps they come: two cycles may agree by chance. So both terms count by their size. Of two cycles, an
+/// error of the order given.
+StepError step_error(const std::vector<CycleAtSteps>& cycles, double CycleAtSteps::*quantity, int order)
+{
+  const CycleAtSteps &fine = cycles.back(), &middle = cycles[cycles.size() - 2];
+  const auto slope = [&](const CycleAtSteps& a, const CycleAtSteps& b)
+  { return (a.*quantity / (fine.*quantity) - b.*quantity / (fine.*quantity)) / (1. / a.steps - 1. / b.steps); };
+  const double sum = 1. / middle.steps + 1. / fine.steps, last = slope(middle, fine);
+  if (cycles.size() == 2) return order == 1 ? StepError{std::abs(last), 0} : StepError{0, std::abs(last / sum)};
+  const CycleAtSteps& coarse = cycles[cycles.size() - 3];
+  const double second = (slope(coarse, middle) - last) / (1. / coarse.steps - 1. / fine.steps);
+  return {std::abs(last - second * sum), std::abs(second)};
 }
 
 /// The flow whose every period is measured, on contact as exact as the accuracy needs.
@@ -138,27 +153,29 @@ std::string shoot_extrapolated(FullShooting& shooting, Orbit& last, double beyon
 }
 
 /// From the cycle at few steps a period to twice as many and on. Returns why the accuracy was not reached, or nothing.
-std::string refine(FullShooting& shooting, CycleAtSteps coarse)
+std::string refine(FullShooting& shooting, const CycleAtSteps& coarse)
 {
   Fidelity& fidelity = shooting.correction.fidelity;
   Orbit last = copy_of(shooting.orbit);
   restart(shooting, last.state, last.period, 2 * coarse.steps);
   if (const std::string problem = shoot_to_accuracy(shooting); !problem.empty()) return problem;
-  CycleAtSteps fine = shooting.cycle();
-  double sure = 1, likely = 2; // orders, until a third number of steps tells
+  std::vector<CycleAtSteps> cycles{coarse, shooting.cycle()};
   for (int tries = 0;; ++tries)
   {
-    estimate_step_errors(fidelity, coarse, fine, likely);
-    const double needed = fine.steps * std::pow(3 * largest_step_error(fidelity) / fidelity.accuracy, 1 / likely);
-    estimate_step_errors(fidelity, coarse, fine, sure);
+    const int before = cycles[cycles.size() - 2].steps, now = cycles.back().steps;
+    fidelity.step_frequency_error = step_error(cycles, &CycleAtSteps::period, 1).at(now);
+    fidelity.step_energy_error = step_error(cycles, &CycleAtSteps::energy, 1).at(now);
     if (largest_step_error(fidelity) <= fidelity.accuracy / 2) return {};
-    if (tries == 5) return "the accuracy needs more than " + std::to_string(fine.steps) + " steps a period";
-    const int steps = 4 * static_cast<int>(std::ceil(std::max(needed, 1.5 * fine.steps) / 4));
-    const double beyond = error_fraction(coarse.steps, fine.steps, fine.steps, likely) -
-                          error_fraction(coarse.steps, fine.steps, steps, likely);
+    if (tries == 5) return "the accuracy needs more than " + std::to_string(now) + " steps a period";
+    const StepError of_period = step_error(cycles, &CycleAtSteps::period, 2),
+                    of_energy = step_error(cycles, &CycleAtSteps::energy, 2);
+    const double needed =
+        std::max(of_period.steps_for(fidelity.accuracy / 3), of_energy.steps_for(fidelity.accuracy / 3));
+    const int steps = 4 * static_cast<int>(std::ceil(std::clamp(needed, 1.5 * now, 4. * now) / 4));
+    const double order = of_energy.order(now),
+                 beyond = error_fraction(before, now, now, order) - error_fraction(before, now, steps, order);
     if (const std::string problem = shoot_extrapolated(shooting, last, beyond, steps); !problem.empty()) return problem;
-    sure = likely = observed_order(coarse, fine, shooting.cycle());
-    coarse = std::exchange(fine, shooting.cycle());
+    cycles.push_back(shooting.cycle());
   }
 }
 
@@ -177,9 +194,9 @@ void note_model_errors(Fidelity& fidelity, const Multisecant& multisecant)
 
 } // namespace
 
-void estimate_step_errors(Fidelity& fidelity, const CycleAtSteps& other, const CycleAtSteps& cycle, double order)
+void estimate_step_errors(Fidelity& fidelity, const CycleAtSteps& other, const CycleAtSteps& cycle)
 {
-  const double fraction = std::abs(error_fraction(other.steps, cycle.steps, cycle.steps, order));
+  const double fraction = std::abs(error_fraction(other.steps, cycle.steps, cycle.steps, 1));
   fidelity.step_frequency_error = fraction * std::abs(other.period / cycle.period - 1);
   fidelity.step_energy_error = fraction * std::abs(other.energy / cycle.energy - 1);
 }

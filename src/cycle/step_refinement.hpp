@@ -33,7 +33,7 @@ struct CycleAtSteps
   double period = 0, energy = 0; // [s], [J]
 };
 
-/// Errors of a cycle of this order from another with more or fewer steps.
-void estimate_step_errors(Fidelity& fidelity, const CycleAtSteps& other, const CycleAtSteps& cycle, double order);
+/// Errors of a cycle from another with more or fewer steps, of first order.
+void estimate_step_errors(Fidelity& fidelity, const CycleAtSteps& other, const CycleAtSteps& cycle);
 
 } // namespace squeal

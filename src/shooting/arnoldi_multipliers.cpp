@@ -143,11 +143,14 @@ FloquetAnalysis multipliers_by_arnoldi(Monodromy& monodromy, Owned<Vec> start, P
          {leading_converged(krylov, pairs),
           "the largest multiplier has not converged: a larger -cycle_multipliers would decide"},
          1);
-  result.fastest = zeros_like(orbit.state);
-  const Eigen::VectorXd fastest = real_part(pairs.front().y);
-  for (std::size_t i = 0; i < krylov.base.size(); ++i)
-    check(VecAXPY(result.fastest, fastest(static_cast<Eigen::Index>(i)), krylov.base[i]));
-  normalise(monodromy.flow, result.fastest);
+  const auto combined = [&](const Eigen::VectorXd& y)
+  {
+    Owned<Vec> state = zeros_like(orbit.state);
+    for (std::size_t i = 0; i < krylov.base.size(); ++i)
+      check(VecAXPY(state, y(static_cast<Eigen::Index>(i)), krylov.base[i]));
+    return state;
+  };
+  result.fastest = fastest_motion(monodromy.flow, pairs.front(), combined);
   return result;
 }
 

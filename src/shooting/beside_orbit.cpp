@@ -4,9 +4,10 @@
 /// a distance; two motions tell it.
 #include "beside_orbit.hpp"
 
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace squeal
 {
@@ -39,14 +40,45 @@ SeenGrowth fit_growth(const std::vector<double>& logarithms)
   return {static_cast<long>(logarithms.size()), std::exp(slope), error * std::exp(slope)};
 }
 
-/// The number of periods after which the distance of a motion that turns in the plane of a complex pair has swung once:
-/// its states are on an ellipse, and half a turn brings the same distance.
-double periods_of_a_swing(std::complex<double> multiplier)
+/// Distances from an orbit, without their part along the flow. The states of a motion along a complex pair turn on an
+/// ellipse, on which they would come nearer and go away again whatever the pair does. So the ellipse is made a circle:
+/// x = Re(z (r + i s)) + rest is |z| |r| and |rest| away, at a right angle.
+class Distance
 {
-  if (multiplier.imag() == 0) return 0;
-  const double angle = std::abs(std::arg(multiplier));
-  return std::numbers::pi / std::min(angle, std::numbers::pi - angle);
-}
+public:
+  Distance(const Flow& flow, const Orbit& orbit, const FastestMotion& fastest)
+      : flow_(flow), along_(copy_of(orbit.rate.get())), parts_{copy_of(fastest.real.get()), {}}
+  {
+    normalise(flow_, along_);
+    without_flow(parts_.real);
+    if (!fastest.imaginary.get()) return;
+    parts_.imaginary = copy_of(fastest.imaginary.get());
+    without_flow(parts_.imaginary);
+    const double a = energy_product(flow_, parts_.real, parts_.real),
+                 b = energy_product(flow_, parts_.imaginary, parts_.imaginary),
+                 c = energy_product(flow_, parts_.real, parts_.imaginary);
+    products_ << a, c, c, b;
+  }
+
+  double operator()(const Owned<Vec>& away) const
+  {
+    without_flow(away);
+    const double size = energy_norm(flow_, away);
+    constexpr double flat = 1e-6; // an ellipse that is a line
+    if (!parts_.imaginary.get() || !(products_.determinant() > std::pow(flat * products_(0, 0), 2))) return size;
+    const Eigen::Vector2d seen(energy_product(flow_, parts_.real, away), energy_product(flow_, parts_.imaginary, away));
+    const Eigen::Vector2d z = products_.inverse() * seen;
+    return std::sqrt(products_(0, 0) * z.squaredNorm() + std::max(0., size * size - z.dot(seen)));
+  }
+
+private:
+  void without_flow(Vec x) const { check(VecAXPY(x, -energy_product(flow_, along_, x), along_)); }
+
+  const Flow& flow_;
+  Owned<Vec> along_; // the flow, of energy norm 1
+  FastestMotion parts_;
+  Eigen::Matrix2d products_ = Eigen::Matrix2d::Zero();
+};
 
 /// The first quarter is left out, where other motions decay, and what comes after the bounds: the shift in time that a
 /// motion ends with leaves the flow's direction by its square, and far away growth ends.
@@ -74,11 +106,11 @@ Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fas
   return state;
 }
 
-std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit, Vec fastest,
-                                     const BesideMotion& motion)
+std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
+                                     const FastestMotion& fastest, const BesideMotion& motion)
 {
-  const Owned<Vec> state = state_beside(problem, orbit, fastest, motion.first), flow = copy_of(orbit.rate.get());
-  normalise(problem.flow, flow);
+  const Owned<Vec> state = state_beside(problem, orbit, fastest.real, motion.first);
+  const Distance distance(problem.flow, orbit, fastest);
   std::vector<double> distances;
   for (long k = 0; k < motion.periods; ++k)
   {
@@ -86,8 +118,7 @@ std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog
     check(VecAXPY(state, 1, now.defect));
     const Owned<Vec> away = copy_of(state.get());
     check(VecAXPY(away, -1, orbit.state));
-    check(VecAXPY(away, -energy_product(problem.flow, flow, away), flow));
-    distances.push_back(energy_norm(problem.flow, away) / orbit.fluctuation);
+    distances.push_back(distance(away) / orbit.fluctuation);
     if (!(distances.back() < motion.highest) || distances.back() < motion.lowest) break;
   }
   return distances;
@@ -97,16 +128,14 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
                                        const FloquetAnalysis& floquet, long periods)
 {
   std::vector<SeenGrowth> seen;
-  if (!floquet.fastest.get() || floquet.multipliers.values.empty()) return seen;
+  if (!floquet.fastest.real.get() || floquet.multipliers.values.empty()) return seen;
   const double largest = std::abs(floquet.multipliers.values.front()), bar = floquet.multipliers.errors.front();
-  const double swing = periods_of_a_swing(floquet.multipliers.values.front());
   double part = first_part, highest = 1. / 3;
   for (int k = 0; k < motions; ++k)
   {
     // the square of the shift in time is to the distance as the distance is to the fluctuation
     const BesideMotion motion{part, std::max(part * part / 0.3, 10 * orbit.residual), highest, periods};
     SeenGrowth now = growth_of(motion, distances_beside(problem, log, orbit, floquet.fastest, motion), orbit.residual);
-    if (0.75 * static_cast<double>(now.periods) < swing) now.periods = 0; // a part of a swing looks like growth
     // the change of a growth is proportional to the part at least, and 1 - smaller of it is between the two
     if (now.periods > 0 && !seen.empty())
       now.error += std::abs(now.growth - seen.back().growth) * smaller / (1 - smaller);

@@ -17,9 +17,10 @@ struct BesideMotion
   long periods = 0;               // at most
 };
 
-/// Distances from the orbit at the ends of periods, without their part along the flow.
-std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit, Vec fastest,
-                                     const BesideMotion& motion);
+/// Distances from the orbit at the ends of periods, without their part along the flow. Where the tangent holds they are
+/// multiplied by |m| in every period, of a complex multiplier m too.
+std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
+                                     const FastestMotion& fastest, const BesideMotion& motion);
 
 /// What the distance of a motion from the orbit grows by, from smaller and smaller parts of the fluctuation until that
 /// is what the largest multiplier says. The largest part comes first.

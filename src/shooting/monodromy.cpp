@@ -26,12 +26,28 @@ void multiply(const Monodromy& monodromy, std::span<const Owned<Vec>> states)
   }
 }
 
-Eigen::VectorXd real_part(Eigen::VectorXcd y)
+FastestMotion fastest_motion(const Flow& flow, const DenseEigenpair& pair,
+                             const std::function<Owned<Vec>(const Eigen::VectorXd&)>& state)
 {
   Eigen::Index largest = 0;
-  y.cwiseAbs().maxCoeff(&largest);
-  y *= std::conj(y(largest)) / std::abs(y(largest));
-  return y.real();
+  pair.y.cwiseAbs().maxCoeff(&largest);
+  const Eigen::VectorXcd y = pair.y * (std::conj(pair.y(largest)) / std::abs(pair.y(largest)));
+  FastestMotion motion{state(y.real()), {}};
+  if (pair.lambda.imag() != 0)
+  {
+    motion.imaginary = state(y.imag());
+    const double a = energy_product(flow, motion.real, motion.real),
+                 b = energy_product(flow, motion.imaginary, motion.imaginary),
+                 c = energy_product(flow, motion.real, motion.imaginary);
+    // |Re(e^{i p} y)|^2 = (a + b)/2 + (a - b)/2 cos 2p - c sin 2p
+    const double phase = std::atan2(-c, (a - b) / 2) / 2;
+    const Owned<Vec> real = copy_of(motion.real.get());
+    check(VecAXPBY(motion.real, -std::sin(phase), std::cos(phase), motion.imaginary));
+    check(VecAXPBY(motion.imaginary, std::sin(phase), std::cos(phase), real));
+    check(VecScale(motion.imaginary, 1 / energy_norm(flow, motion.real)));
+  }
+  normalise(flow, motion.real);
+  return motion;
 }
 
 std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::VectorXd& flow)

@@ -20,8 +20,9 @@ struct Monodromy
 /// x_k = dPhi_T/dx x_k
 void multiply(const Monodromy& monodromy, std::span<const Owned<Vec>> states);
 
-/// The real part of a vector whose largest entry is made real.
-Eigen::VectorXd real_part(Eigen::VectorXcd y);
+/// `state`: of the coordinates that the pair's vector has.
+FastestMotion fastest_motion(const Flow& flow, const DenseEigenpair& pair,
+                             const std::function<Owned<Vec>(const Eigen::VectorXd&)>& state);
 
 /// The place of the shift in time among the pairs: near 1, with the vector that is closest to the flow.
 std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::VectorXd& flow);

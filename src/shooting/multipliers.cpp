@@ -60,8 +60,8 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   }
   if (pairs.empty()) return result;
   decide(multipliers, {true, ""}, multipliers.values.size());
-  result.fastest = state_at(real_part(pairs.front().y), orbit);
-  normalise(monodromy.flow, result.fastest);
+  result.fastest =
+      fastest_motion(monodromy.flow, pairs.front(), [&](const Eigen::VectorXd& y) { return state_at(y, orbit); });
   return result;
 }
 

@@ -311,9 +311,9 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
   if (std::abs(search.largest) - 2 * search.residual > 1) add_value(multipliers, search.largest, 2 * search.residual);
   decide(multipliers, coverage, multipliers.values.size());
   if (passes.pairs.empty()) return result;
-  const MatrixXd fastest = real_part(passes.pairs[order.front()].y);
-  result.fastest = std::move(states_of(combination(passes.space.V, fastest), orbit.state).front());
-  normalise(monodromy.flow, result.fastest);
+  const auto combined = [&](const Eigen::VectorXd& y)
+  { return std::move(states_of(combination(passes.space.V, y), orbit.state).front()); };
+  result.fastest = fastest_motion(monodromy.flow, passes.pairs[order.front()], combined);
   return result;
 }
 

@@ -95,7 +95,7 @@ void hold_against_motion(const Search& search, Attempt& attempt)
   Multipliers& multipliers = attempt.floquet.multipliers;
   const double largest = multipliers.values.empty() ? 0 : std::abs(multipliers.values.front());
   const bool unstable = multipliers.stability == Stability::unstable;
-  if (!attempt.floquet.fastest.get() || !(largest > 1) || multipliers.stability == Stability::stable) return;
+  if (!attempt.floquet.fastest.real.get() || !(largest > 1) || multipliers.stability == Stability::stable) return;
   const PetscInt dofs = dofs_of(attempt.found.orbit.state);
   const long at_most = dofs > large_model ? many_of_large : many;
   if (!(std::log(4) / std::log(largest) <= static_cast<double>(at_most))) return;
@@ -190,7 +190,7 @@ Attempt search_on(const Search& search, Attempt best, int done, Orbit& free)
     if (best.repels() && (side == 0 || other_side))
     {
       side = other_side ? -1 : 1;
-      state = state_beside(problem, best.found.orbit, best.floquet.fastest,
+      state = state_beside(problem, best.found.orbit, best.floquet.fastest.real,
                            0.1 * side); // far enough to leave it in a few periods
       period = best.found.orbit.period;
       collapses = 0;

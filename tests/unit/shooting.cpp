@@ -166,6 +166,26 @@ TEST_CASE("a cycle that motions leave by a thousandth only is not called unstabl
   CHECK(cycle.multipliers.values[0].real() == doctest::Approx(std::exp(0.1 * two_pi)).epsilon(2e-3));
 }
 
+TEST_CASE("a cycle that repels along a flat ellipse is called unstable")
+{
+  // x has a circle of radius 1 and period 2 pi that attracts. y beside it turns by 0.28 of a turn a period and
+  // grows 1.3 times, on an ellipse that the energy norm makes 50 times as long as wide: its distance may fall to a
+  // quarter first.
+  const double growth = std::log(1.3) / two_pi, omega = 0.28;
+  const auto rate_of = [=](const std::vector<double>& x, std::vector<double>& rate)
+  {
+    const double e = std::hypot(x[0], x[2]) - 1;
+    rate = {x[2] - e * x[0], x[3], -x[0] - e * x[2],
+            2 * growth * (1 - x[1] * x[1]) * x[3] - (omega * omega + growth * growth) * x[1]};
+  };
+  const SmoothModel model = make_smooth_model(rate_of, {1, std::pow(50 * omega, 2)});
+  const ShootingResult cycle = shoot_from(model, {1, 0}, two_pi, 0, {});
+  CHECK(cycle.outcome.kind == OutcomeKind::unstable_cycle);
+  CHECK(cycle.multipliers.stability == Stability::unstable);
+  CHECK(cycle.multipliers.crossing == Crossing::neimark_sacker);
+  CHECK(std::abs(cycle.multipliers.values.front()) == doctest::Approx(1.3).epsilon(1e-4)); // difference quotients
+}
+
 TEST_CASE("an orbit gone round twice is taken for one that closes in half the period")
 {
   const SmoothModel model = make_smooth_model(van_der_pol, {1});

@@ -75,11 +75,18 @@ struct Multipliers
   std::vector<SeenGrowth> seen{};                        // from smaller and smaller parts; the last is the smallest
 };
 
+/// The motion of the largest multiplier: Re(z (real + i imaginary)), z multiplied by it in every period. No other phase
+/// makes the real part longer. Its energy norm is 1.
+struct FastestMotion
+{
+  Owned<Vec> real, imaginary; // null: none was examined; the imaginary part alone: the multiplier is real
+};
+
 /// The multipliers and the motion that grows most.
 struct FloquetAnalysis
 {
   Multipliers multipliers;
-  Owned<Vec> fastest; // the motion of the largest multiplier, of energy norm 1; null if none was examined
+  FastestMotion fastest;
 };
 
 /// All multipliers of a system of up to 100 degrees of freedom, or 25 without an exact tangent. Of a larger one those
