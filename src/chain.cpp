@@ -27,7 +27,7 @@ const State* given_start(const Chain& chain)
 /// Why the search for the cycle cannot run; empty if it can.
 std::string no_cycle_start(const Chain& chain)
 {
-  const std::string reason = no_mode_to_follow(chain.report);
+  const std::string reason = no_mode_to_follow(chain.report, chain.scene);
   if (reason.empty() && chain.coarse && !chain.carried)
     return "no cycle to start from was found on the coarse mesh: take a finer one, or start = \"estimate\"";
   if (!reason.empty() || chain.scene.cycle.start.kind != CycleStartKind::transient) return reason;
@@ -57,11 +57,19 @@ bool follows_a_mode(const TransientSettings& settings)
   return settings.enabled && (!starts_without_a_mode(settings) || settings.steps == 0);
 }
 
-std::string no_mode_to_follow(const Report& report)
+std::span<const ComplexMode> followed_modes(const Report& report, const Scene& scene)
+{
+  const CycleStartKind start = scene.cycle.start.kind;
+  const bool given = scene.cycle.enabled && (start == CycleStartKind::file || start == CycleStartKind::transient);
+  if (report.modes.unstable_count > 0 || !given || report.modes.modes.empty()) return report.modes.unstable();
+  return std::span(report.modes.modes).first(1);
+}
+
+std::string no_mode_to_follow(const Report& report, const Scene& scene)
 {
   if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "there is no equilibrium to start from";
   if (report.modes.modes.empty()) return "no mode was found in the band";
-  if (report.modes.unstable_count == 0) return "the equilibrium is stable: no mode grows in the band";
+  if (followed_modes(report, scene).empty()) return "the equilibrium is stable: no mode grows in the band";
   if (report.modes.modes.front().frequency_hz() == 0) return "the equilibrium diverges without oscillating";
   return {};
 }
@@ -99,7 +107,7 @@ std::vector<Estimate> run_estimates(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   std::vector<Estimate> estimates;
-  const std::string reason = no_mode_to_follow(chain.report);
+  const std::string reason = no_mode_to_follow(chain.report, chain.scene);
   if (!scene.estimate.enabled && !scene.cycle.enabled && !follows_a_mode(scene.transient))
     estimates.push_back(not_run<Estimate>(OutcomeKind::off, "the scene turns it off"));
   else if (!reason.empty())
@@ -107,7 +115,7 @@ std::vector<Estimate> run_estimates(const Chain& chain)
   else if (chain.model.interface.pairs == 0)
     estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, "there is no contact that would limit the growth"));
   else
-    for (const ComplexMode& mode : chain.report.modes.unstable())
+    for (const ComplexMode& mode : followed_modes(chain.report, chain.scene))
       estimates.push_back(estimate_amplitude(chain.sliding(), *chain.linearised, mode, chain.options.estimate));
   return estimates;
 }
@@ -115,7 +123,7 @@ std::vector<Estimate> run_estimates(const Chain& chain)
 Trajectory run_transient(const Chain& chain)
 {
   const TransientSettings& settings = chain.scene.transient;
-  const std::string reason = no_mode_to_follow(chain.report);
+  const std::string reason = no_mode_to_follow(chain.report, chain.scene);
   if (!settings.enabled) return not_run<Trajectory>(OutcomeKind::off, "the scene has no [transient], or turns it off");
   if (chain.report.equilibrium.outcome.kind != OutcomeKind::converged ||
       (!reason.empty() && !starts_without_a_mode(settings)))
@@ -141,7 +149,7 @@ FittedCycle run_cycle(const Chain& chain)
 
 CoarseStart run_coarse(Chain& fine)
 {
-  const std::string reason = no_mode_to_follow(fine.report);
+  const std::string reason = no_mode_to_follow(fine.report, fine.scene);
   if (!reason.empty()) return not_run<CoarseStart>(OutcomeKind::skipped, reason);
   Scene scene = fine.coarse->scene;
   const CycleSettings chosen = chosen_settings(cycle_problem(fine), scene.fidelity);
@@ -187,7 +195,7 @@ Attractors run_attractors(const Chain& chain)
   const CycleSettings& settings = chain.scene.cycle;
   if (!settings.enabled || settings.starts == 0)
     return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
-  const std::string reason = no_mode_to_follow(chain.report);
+  const std::string reason = no_mode_to_follow(chain.report, chain.scene);
   if (!reason.empty()) return not_run<Attractors>(OutcomeKind::skipped, reason);
   return find_attractors({chain.sliding(), chain.report.modes.modes, chain.unstable(), settings, chain.options.step},
                          chain.options.attractors);

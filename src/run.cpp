@@ -108,7 +108,7 @@ Sensitivity run_sensitivity(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   if (!scene.sensitivity) return not_run<Sensitivity>(OutcomeKind::off, "the scene has no [sensitivity]");
-  const std::string reason = no_mode_to_follow(chain.report), part = part_beyond_sweeps(chain.model);
+  const std::string reason = no_mode_to_follow(chain.report, chain.scene), part = part_beyond_sweeps(chain.model);
   if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
   if (!part.empty()) return not_run<Sensitivity>(OutcomeKind::refused, part);
   const auto model_at = [&](const SceneNumber& number)

@@ -8,6 +8,10 @@
 namespace squeal
 {
 
+/// The unstable modes. Where none is, and the cycle is sought from a state that the scene gives, the one that decays
+/// slowest: a cycle may attract beside a stable equilibrium.
+std::span<const ComplexMode> followed_modes(const Report& report, const Scene& scene);
+
 /// The chain so far. Stages never call the next one: what they hand on stands here.
 struct Chain
 {
@@ -21,7 +25,7 @@ struct Chain
   std::optional<CarriedCycle> carried{}; // its cycle, on this mesh
 
   SlidingEquilibrium sliding() const { return {model.structure, model.interface, report.equilibrium}; }
-  UnstableModes unstable() const { return {report.modes.unstable(), report.estimates}; }
+  UnstableModes unstable() const { return {followed_modes(report, scene), report.estimates}; }
 };
 
 /// The result of a stage that did not run, with the reason.
@@ -32,8 +36,8 @@ template <class Result> Result not_run(OutcomeKind kind, const std::string& reas
   return result;
 }
 
-/// Why a stage that follows an unstable mode cannot run; empty if it can.
-std::string no_mode_to_follow(const Report& report);
+/// Why a stage that follows a mode cannot run; empty if it can.
+std::string no_mode_to_follow(const Report& report, const Scene& scene);
 
 /// Linearises about the equilibrium, and finds the modes or takes those of the run that is gone on with.
 Modes run_modes(Chain& chain);

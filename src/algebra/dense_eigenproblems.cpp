@@ -319,6 +319,13 @@ std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)
   return all;
 }
 
+std::vector<std::complex<double>> values_of(const std::vector<DenseEigenpair>& pairs)
+{
+  std::vector<std::complex<double>> values;
+  for (const DenseEigenpair& pair : pairs) values.push_back(pair.lambda);
+  return values;
+}
+
 std::vector<std::size_t> nearest_places(const std::vector<std::complex<double>>& references,
                                         const std::vector<std::complex<double>>& values)
 {

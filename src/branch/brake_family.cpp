@@ -97,7 +97,7 @@ void BrakeFamily::parameter_column(double period, Vec start, Vec column)
     difference_column(flows(), at_->parameter, range_, period, start, column);
     return;
   }
-  at_->flow.record_period(period, start, 0);
+  at_->flow.record_period(period, start, {});
   const Vec load = at_->model.structure.load;
   TangentColumn change{zeros_like(load), zeros_like(load), 0, 1};
   PeriodMap& map = at_->map;
@@ -136,8 +136,8 @@ FlowFamily BrakeFamily::flows()
   { at_->flow.integrate(period, start, end, rate); };
   family.flow.integrate_many = [this](double period, std::span<const Vec> starts, std::span<const Vec> ends)
   { at_->flow.integrate_many(period, starts, ends); };
-  family.flow.record_period = [this](double period, Vec start, double shift)
-  { at_->flow.record_period(period, start, shift); };
+  family.flow.record_period = [this](double period, Vec start, const TimeGrid& grid)
+  { at_->flow.record_period(period, start, grid); };
   family.flow.apply_tangent = [this](std::span<const Vec> states) { at_->flow.apply_tangent(states); };
   family.set_parameter = [this](double parameter) { set_parameter(parameter); };
   family.rest = [this] { return rest(); };

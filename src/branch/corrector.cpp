@@ -208,7 +208,7 @@ void form_jacobian(BranchCorrector& corrector, const Orbit& orbit)
 {
   if (!corrector.parameter_column.get()) corrector.parameter_column = zeros_like(orbit.state);
   corrector.family.parameter_column(orbit.period, orbit.state, corrector.parameter_column);
-  corrector.family.flow.record_period(orbit.period, orbit.state, 0);
+  corrector.family.flow.record_period(orbit.period, orbit.state, {});
   if (corrector.family.renew_preconditioner) corrector.family.renew_preconditioner(orbit.period, orbit.state);
   corrector.log.convergence.periods += 2;
 }

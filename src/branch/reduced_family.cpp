@@ -401,11 +401,12 @@ FlowFamily ReducedFamily::flows()
     if (is_asked_here()) throw Interrupted{}; // every rank follows the branch by itself
     at_->flow.integrate(period, start, end, rate);
   };
-  family.flow.record_period = [this](double period, Vec start, double shift)
+  family.flow.record_period = [this](double period, Vec start, const TimeGrid& grid)
   {
     const double step = period / at_->map.steps;
     const ReducedState state = reduced_state(start);
-    recorded_ = record_contacts(at_->map, period, shift > 0 ? moved_on(at_->map, shift * step, state) : state);
+    recorded_ =
+        record_contacts(at_->map, period, grid.shift > 0 ? moved_on(at_->map, grid.shift * step, state) : state);
   };
   family.flow.apply_tangent = [this](std::span<const Vec> states)
   {

@@ -32,13 +32,6 @@ std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
   return reason.empty() ? friction_refusal(problem.sliding, &mode, theta, h, problem.step, 1) : reason;
 }
 
-/// The problem with other settings.
-CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
-{
-  return {problem.sliding, problem.linearised,    problem.modes,  problem.unstable, settings,
-          problem.step,    problem.modes_options, problem.probes, problem.given,    problem.given_period};
-}
-
 /// The full model's cycle from the reduced model's, whose derivative is the preconditioner, and the finer steps that
 /// the accuracy needs. Returns why there is none, or nothing.
 std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& reduced, StepChoice steps,

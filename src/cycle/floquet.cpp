@@ -67,8 +67,6 @@ PairRoles roles_of(const std::vector<PairHistory>& pairs, const Interface& inter
   return roles;
 }
 
-constexpr int enough_steps = 128; // a period; with fewer the step's error is looked at
-
 /// The recorded periods of a cycle: its own, one with the grid of time moved by half a step, one of other steps.
 struct RecordedPeriods
 {
@@ -90,12 +88,12 @@ RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, V
   {
     PeriodMap other{map.sliding, map.options, other_steps, map.theta};
     other.reactions = map.reactions;
-    record_period(other, period, start, 0);
+    record_period(other, period, start, {});
     result.records[RecordedPeriods::other] = std::move(other.records);
   }
-  record_period(map, period, start, 0.5);
+  record_period(map, period, start, {0.5});
   result.records[RecordedPeriods::moved] = std::move(map.records);
-  record_period(map, period, start, 0);
+  record_period(map, period, start, {});
   for (const StepRecord& record : map.records)
     result.records[RecordedPeriods::own].push_back(
         {record.wanted, record.reactions, record.contact_velocity, record.opposes_theta, {}, {}, {}});

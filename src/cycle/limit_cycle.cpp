@@ -70,6 +70,12 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   return cycle;
 }
 
+CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
+{
+  return {problem.sliding, problem.linearised,    problem.modes,  problem.unstable, settings,
+          problem.step,    problem.modes_options, problem.probes, problem.given,    problem.given_period};
+}
+
 std::vector<State> other_unstable_motions(const CycleProblem& problem)
 {
   const UnstableModes& unstable = problem.unstable;

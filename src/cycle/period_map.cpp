@@ -187,16 +187,16 @@ void move_by_part(const PeriodMap& map, double part, State& state)
 
 } // namespace
 
-void record_period(PeriodMap& map, double period, Vec start, double shift)
+void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& grid)
 {
   integrate_replayed(map);
-  set_period(map, period);
-  if (shift == 0 && is_recorded(map, start)) return;
+  const int steps = grid.finer * map.steps;
+  set_step(map, period / steps);
+  if (grid.shift == 0 && grid.finer == 1 && is_recorded(map, start)) return;
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
-  if (shift > 0) move_by_part(map, shift, state);
+  if (grid.shift > 0) move_by_part(map, grid.shift, state);
   map.recorded_start = {};
-  map.records =
-      record_steps(map.step, map.sliding.structure, map.sliding.interface, state, map.steps, Recorded::contact);
+  map.records = record_steps(map.step, map.sliding.structure, map.sliding.interface, state, steps, Recorded::contact);
 }
 
 namespace
@@ -218,7 +218,8 @@ void apply_tangent(const PeriodMap& map, std::span<const Vec> states)
 
 void add_tangent(PeriodMap& map, Flow& flow)
 {
-  flow.record_period = [&map](double period, Vec start, double shift) { record_period(map, period, start, shift); };
+  flow.record_period = [&map](double period, Vec start, const TimeGrid& grid)
+  { record_period(map, period, start, grid); };
   flow.apply_tangent = [&map](std::span<const Vec> states) { apply_tangent(map, states); };
 }
 
@@ -230,6 +231,7 @@ Flow flow_of(PeriodMap& map)
   { integrate_periods(map, period, starts, ends); };
   Flow flow{integrate, map.sliding.structure.M, map.sliding.structure.K, integrate_many};
   add_tangent(map, flow);
+  flow.few_steps = map.steps <= enough_steps;
   return flow;
 }
 

@@ -2,11 +2,13 @@
 
 #include "floquet.hpp"
 
+#include "squeal/base/constants.hpp"
 #include "squeal/cycle/period_log.hpp"
 #include "squeal/shooting/multisecant.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 namespace squeal
@@ -152,14 +154,15 @@ std::string shoot_extrapolated(FullShooting& shooting, Orbit& last, double beyon
   return shoot_to_accuracy(shooting);
 }
 
+/// Appends the cycle at so many steps a period. `beyond`: how far past the last cycle its start is foretold, on the
+/// line from the one before it. Returns why there is none, or nothing.
+using AppendCycle = std::function<std::string(std::vector<CycleAtSteps>& cycles, int steps, double beyond)>;
+
 /// From the cycle at few steps a period to twice as many and on. Returns why the accuracy was not reached, or nothing.
-std::string refine(FullShooting& shooting, const CycleAtSteps& coarse)
+std::string refine(Fidelity& fidelity, const CycleAtSteps& coarse, const AppendCycle& append)
 {
-  Fidelity& fidelity = shooting.correction.fidelity;
-  Orbit last = copy_of(shooting.orbit);
-  restart(shooting, last.state, last.period, 2 * coarse.steps);
-  if (const std::string problem = shoot_to_accuracy(shooting); !problem.empty()) return problem;
-  std::vector<CycleAtSteps> cycles{coarse, shooting.cycle()};
+  std::vector<CycleAtSteps> cycles{coarse};
+  if (const std::string problem = append(cycles, 2 * coarse.steps, 0); !problem.empty()) return problem;
   for (int tries = 0;; ++tries)
   {
     const int before = cycles[cycles.size() - 2].steps, now = cycles.back().steps;
@@ -174,9 +177,76 @@ std::string refine(FullShooting& shooting, const CycleAtSteps& coarse)
     const int steps = 4 * static_cast<int>(std::ceil(std::clamp(needed, 1.5 * now, 4. * now) / 4));
     const double order = of_energy.order(now),
                  beyond = error_fraction(before, now, now, order) - error_fraction(before, now, steps, order);
-    if (const std::string problem = shoot_extrapolated(shooting, last, beyond, steps); !problem.empty()) return problem;
-    cycles.push_back(shooting.cycle());
+    if (const std::string problem = append(cycles, steps, beyond); !problem.empty()) return problem;
   }
+}
+
+/// What was done before comes first.
+Convergence joined(Convergence before, const Convergence& after)
+{
+  for (NewtonRecord record : after.records)
+  {
+    record.periods += before.periods;
+    before.records.push_back(record);
+  }
+  before.iterations += after.iterations;
+  before.periods += after.periods;
+  return before;
+}
+
+/// The cycle of a small model at so many steps a period, with its verdict, from the cycle at hand. Where that begins at
+/// an event of contact Newton may fail: then from the scene's start, as if the scene gave the steps. The cycle at hand
+/// stays where none is found. Returns why the refinement ends there, or nothing.
+std::string find_anew(const CycleCorrection& correction, int steps, LimitCycle& cycle)
+{
+  const CycleProblem& problem = correction.problem;
+  CycleSettings settings = problem.settings;
+  settings.steps_per_period = steps;
+  const Vec state = cycle.orbit.state;
+  ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), cycle.orbit.period};
+  start.is_cycle = true;
+  for (const State& motion : other_unstable_motions(problem))
+    start.other_unstable.push_back(state_of(motion.u, motion.v));
+  const CycleProblem finer = with_settings(problem, settings);
+  CycleOptions at_once = correction.options;
+  at_once.shooting.free_periods = 0;
+  at_once.shooting.max_periods = 20; // Newton takes three to six
+  LimitCycle next = find_cycle_from(finer, at_once, start, correction.preconditioner, 0);
+  if (next.outcome.kind != OutcomeKind::converged)
+  {
+    Convergence before = std::move(next.convergence);
+    next = find_cycle_from_start(finer, correction.options);
+    next.convergence = joined(std::move(before), next.convergence);
+  }
+  next.convergence = joined(std::move(cycle.convergence), next.convergence);
+  const OutcomeKind kind = next.outcome.kind;
+  if (kind != OutcomeKind::converged && kind != OutcomeKind::unstable_cycle)
+  {
+    cycle.convergence = std::move(next.convergence);
+    return format("at %d steps a period no cycle was found: %s", steps, next.outcome.reason.c_str());
+  }
+  cycle = std::move(next);
+  correction.fidelity.verdict_steps = steps;
+  return kind == OutcomeKind::converged ? "" : format("at %d steps a period the cycle repels", steps);
+}
+
+/// A small model's cycle is found anew at each number of steps: Newton on its whole tangent takes a few periods.
+/// Secants may leave a cycle whose contacts hit and stick.
+void refine_small(const CycleCorrection& correction, LimitCycle& cycle)
+{
+  Fidelity& fidelity = correction.fidelity;
+  const auto at_hand = [&] {
+    return CycleAtSteps{cycle.steps_per_period, cycle.orbit.period, cycle.measured.mean_fluctuating_energy};
+  };
+  const auto append = [&](std::vector<CycleAtSteps>& cycles, int steps, double /*beyond*/)
+  {
+    std::string problem = find_anew(correction, steps, cycle);
+    if (problem.empty()) cycles.push_back(at_hand());
+    return problem;
+  };
+  if (const std::string problem = refine(fidelity, at_hand(), append); !problem.empty()) fidelity.reason = problem;
+  if (cycle.outcome.kind == OutcomeKind::converged) estimate_model_errors(correction, cycle);
+  fidelity.full_periods = cycle.convergence.periods;
 }
 
 /// Of no tolerance: the accuracy ends the iteration.
@@ -206,6 +276,7 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
   Fidelity& fidelity = correction.fidelity;
   if (cycle.outcome.kind != OutcomeKind::converged) return;
   const CycleProblem& problem = correction.problem;
+  if (dofs_of(cycle.orbit.state) <= small_model) return refine_small(correction, cycle);
   MeasuredFlow flow{{problem.sliding, problem.step, cycle.steps_per_period, problem.settings.theta}};
   make_flow(correction, flow);
   Progress progress(comm_of(problem.sliding.structure.load), "cycle, finer steps", 20);
@@ -214,8 +285,15 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
   FullShooting shooting{correction, orbit, log, flow, correction.options.shooting};
   shooting.options.max_periods = log.convergence.periods + correction.options.reduced.corrections;
   shooting.orbit = copy_of(cycle.orbit);
+  Orbit last = copy_of(shooting.orbit);
+  const auto append = [&](std::vector<CycleAtSteps>& cycles, int steps, double beyond)
+  {
+    std::string problem_met = shoot_extrapolated(shooting, last, beyond, steps);
+    if (problem_met.empty()) cycles.push_back(shooting.cycle());
+    return problem_met;
+  };
   const std::string problem_met =
-      refine(shooting, {cycle.steps_per_period, cycle.orbit.period, cycle.measured.mean_fluctuating_energy});
+      refine(fidelity, {cycle.steps_per_period, cycle.orbit.period, cycle.measured.mean_fluctuating_energy}, append);
   if (!problem_met.empty()) fidelity.reason = problem_met;
   note_model_errors(fidelity, shooting.multisecant);
   cycle.convergence = std::move(log.convergence);

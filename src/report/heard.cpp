@@ -106,7 +106,8 @@ std::string cycle_text(const Report& report, const Scene& scene)
   const double frequency = 1 / cycle.orbit.period;
   return format("squeals at %.5g Hz", frequency) + beside_mode(report, frequency) +
          largest_swing(scene, cycle.measured.peak_to_peak, [](double swing) { return swing; }) +
-         stability_text(cycle.multipliers);
+         stability_text(cycle.multipliers) +
+         (report.modes.unstable_count == 0 ? ", beside a stable equilibrium that another start leads to" : "");
 }
 
 /// Without a cycle.
@@ -128,6 +129,8 @@ std::string heard(const Report& report, const Scene& scene)
   const Outcome& outcome = report.cycle.outcome;
   if (outcome.kind == OutcomeKind::converged) return cycle_text(report, scene);
   if (!has_run(outcome)) return linear_text(report);
+  if (outcome.kind == OutcomeKind::collapsed_to_equilibrium && report.modes.unstable_count == 0)
+    return linear_text(report) + ", and the motion from cycle.start falls to rest";
   if (outcome.kind == OutcomeKind::unstable_cycle && !report.cycle.multipliers.values.empty())
     return format("passes by a cycle at %.5g Hz", 1 / report.cycle.orbit.period) +
            beside_mode(report, 1 / report.cycle.orbit.period) + stability_text(report.cycle.multipliers) +

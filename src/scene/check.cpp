@@ -305,6 +305,12 @@ private:
     const bool sought = c.enabled || (scene_.sweep && scene_.sweep->stages == SweepStages::cycle);
     if (c.start.kind == CycleStartKind::transient && sought && !scene_.transient.enabled)
       fail(&c.start, "[cycle] start = 'transient' needs the [transient] that it starts from the end of");
+    if (!(c.tolerance < 1)) fail(&c.tolerance, "[cycle] tolerance is a part of the fluctuation: give less than 1");
+    constexpr int fewest = 8; // show three harmonics
+    if (c.steps_per_period > 0 && c.steps_per_period < fewest)
+      fail(&c.steps_per_period,
+           "[cycle] steps_per_period must be at least " + std::to_string(fewest) + ", or 0, which lets squeal choose");
+    if (!(scene_.accuracy < 1)) fail(&scene_.accuracy, "accuracy is a relative error: give less than 1, such as 1e-3");
     if (c.amplitude > 0 && c.start.kind != CycleStartKind::mode)
       fail(&c.amplitude, "[cycle] amplitude belongs to start = \"mode\": give that too, or leave it out");
     check_coarse_start();

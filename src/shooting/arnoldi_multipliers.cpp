@@ -124,7 +124,7 @@ FloquetAnalysis multipliers_by_arnoldi(Monodromy& monodromy, Owned<Vec> start, P
   const Orbit& orbit = monodromy.orbit;
   if (monodromy.exact())
   {
-    monodromy.flow.record_period(orbit.period, orbit.state, 0);
+    monodromy.flow.record_period(orbit.period, orbit.state, {});
     check(VecAXPY(start, energy_norm(monodromy.flow, start) / energy_norm(monodromy.flow, orbit.rate), orbit.rate));
   }
   else

@@ -1,5 +1,6 @@
 #include "exact_newton.hpp"
 
+#include "squeal/base/constants.hpp"
 #include "whole_matrix.hpp"
 
 #include <algorithm>
@@ -15,8 +16,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr PetscInt largest = 50; // degrees of freedom: a hundred columns cost a few periods
-
 /// A correction of the orbit.
 struct Correction
 {
@@ -29,7 +28,7 @@ struct Correction
 Correction newton_step(const OrbitProblem& problem, double clamp, const Orbit& orbit)
 {
   const Flow& flow = problem.flow;
-  flow.record_period(orbit.period, orbit.state, 0);
+  flow.record_period(orbit.period, orbit.state, {});
   const MatrixXd M = whole_matrix(orbit, [&](std::span<const Owned<Vec>> states)
                                   { flow.apply_tangent(std::vector<Vec>(states.begin(), states.end())); });
   const Index n = M.rows();
@@ -62,7 +61,7 @@ Correction newton_step(const OrbitProblem& problem, double clamp, const Orbit& o
 
 bool has_small_tangent(const OrbitProblem& problem)
 {
-  return problem.flow.apply_tangent && dofs_of(problem.equilibrium) <= largest;
+  return problem.flow.apply_tangent && dofs_of(problem.equilibrium) <= small_model;
 }
 
 StageResult shoot_by_exact_newton(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,

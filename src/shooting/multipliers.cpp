@@ -13,6 +13,8 @@ namespace squeal
 namespace
 {
 
+using Complex = std::complex<double>;
+
 /// The sum of a change of amplitude and the other unstable motions, each of energy norm 1.
 Owned<Vec> motions_that_may_grow(const OrbitProblem& problem, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable)
@@ -23,41 +25,65 @@ Owned<Vec> motions_that_may_grow(const OrbitProblem& problem, const Orbit& orbit
   return start;
 }
 
-/// All multipliers. Bars: the change of each when the grid of time moves by half a step.
+/// What the grid of time changes: of each of the values the distance to its partner, and the rise of its modulus.
+struct GridErrors
+{
+  std::vector<double> errors, rises;
+};
+
+/// Adds the parts of the changes that are taken for errors.
+void add_changes(const std::vector<Complex>& values, const std::vector<Complex>& others, double part,
+                 GridErrors& errors)
+{
+  const std::vector<std::size_t> places = nearest_places(values, others);
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    const Complex other = others[places[i]];
+    errors.errors[i] += part * std::abs(other - values[i]);
+    errors.rises[i] += part * std::max(0., std::abs(other) - std::abs(values[i]));
+  }
+}
+
+/// All multipliers. Bars: the change of each when the grid of time moves by half a step; of a grid of few steps 4/3 of
+/// the change on one of twice as many, too, which is the error of a step of order 2.
 FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
 {
   FloquetAnalysis result;
   Multipliers& multipliers = result.multipliers;
   multipliers.method = MultiplierMethod::whole;
   const Orbit& orbit = monodromy.orbit;
-  std::vector<DenseEigenpair> moved;
-  const auto by_multiplying = [&](std::span<const Owned<Vec>> states) { multiply(monodromy, states); };
+  const auto find_pairs = [&]
+  {
+    multipliers.periods += 2 * dofs;
+    return solve_dense_unsymmetric(
+        whole_matrix(orbit, [&](std::span<const Owned<Vec>> states) { multiply(monodromy, states); }));
+  };
+  const auto pairs_on = [&](const TimeGrid& grid)
+  {
+    monodromy.flow.record_period(orbit.period, orbit.state, grid);
+    return find_pairs();
+  };
+  std::vector<DenseEigenpair> pairs = monodromy.exact() ? pairs_on({}) : find_pairs();
+  const std::vector<Complex> values = values_of(pairs);
+  GridErrors grid{std::vector<double>(values.size(), 0.), std::vector<double>(values.size(), 0.)};
   if (monodromy.exact())
   {
-    monodromy.flow.record_period(orbit.period, orbit.state, 0.5);
-    moved = solve_dense_unsymmetric(whole_matrix(orbit, by_multiplying));
-    monodromy.flow.record_period(orbit.period, orbit.state, 0);
-    multipliers.periods += 2 * dofs;
+    add_changes(values, values_of(pairs_on({0.5, 1})), 1, grid);
+    if (monodromy.flow.few_steps) add_changes(values, values_of(pairs_on({0, 2})), 4. / 3, grid);
+    monodromy.flow.record_period(orbit.period, orbit.state, {});
   }
-  std::vector<DenseEigenpair> pairs = solve_dense_unsymmetric(whole_matrix(orbit, by_multiplying));
-  multipliers.periods += 2 * dofs;
   const std::size_t shift = find_shift(pairs, coordinates_of(orbit.rate, orbit.period));
-  multipliers.trivial_error = std::abs(pairs[shift].lambda - 1.);
-  pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
-  for (const DenseEigenpair& pair : pairs)
+  multipliers.trivial_error = std::abs(values[shift] - 1.);
+  for (std::size_t i = 0; i < values.size(); ++i)
   {
-    double error = multipliers.trivial_error; // of the differences
-    if (!moved.empty())
-    {
-      const auto nearest =
-          std::min_element(moved.begin(), moved.end(),
-                           [&](const DenseEigenpair& a, const DenseEigenpair& b)
-                           { return std::abs(a.lambda - pair.lambda) < std::abs(b.lambda - pair.lambda); });
-      error = std::abs(nearest->lambda - pair.lambda);
-    }
-    multipliers.values.push_back(pair.lambda);
-    multipliers.errors.push_back(std::max(error, 1e-9));
+    if (i == shift) continue;
+    constexpr double rounding = 1e-9;
+    const double of_differences = monodromy.exact() ? rounding : multipliers.trivial_error;
+    multipliers.values.push_back(values[i]);
+    multipliers.errors.push_back(std::max(grid.errors[i], of_differences));
+    multipliers.upper.push_back(std::abs(values[i]) + std::max(grid.rises[i], of_differences));
   }
+  pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
   if (pairs.empty()) return result;
   decide(multipliers, {true, ""}, multipliers.values.size());
   result.fastest =

@@ -27,13 +27,6 @@ constexpr double largest_condition = 1e6; // of W'V: beyond, an error of 1e-10 i
 // A pass leaves some 0.6 of the error: the pin needed 17. On a large model, where the bar holds more, 8 are enough.
 constexpr int passes_at_most = 24, passes_of_large_model = 8;
 
-std::vector<Complex> values_of(const std::vector<DenseEigenpair>& pairs)
-{
-  std::vector<Complex> values;
-  for (const DenseEigenpair& pair : pairs) values.push_back(pair.lambda);
-  return values;
-}
-
 /// The passes: what the last one found of each wanted value, in the order of the reduced model's.
 struct Passes
 {

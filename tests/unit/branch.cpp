@@ -52,7 +52,7 @@ std::unique_ptr<SmoothFamily> family_of(const FamilyRate& rate_of, const std::ve
   family.flow = made->model.flow;
   family.set_parameter = [self](double parameter) { self->parameter = parameter; };
   family.rest = [self] { return state_of(self->model.zero, self->model.zero); };
-  family.flow.record_period = [self](double period, Vec start, double)
+  family.flow.record_period = [self](double period, Vec start, const TimeGrid&)
   {
     self->period = period;
     self->recorded = copy_of(start);
@@ -176,12 +176,12 @@ TEST_CASE("bars that reach across the unit circle at some points make up no even
 {
   const auto made = family_of(with_slow_bystander, {1, 3});
   SmoothFamily* const self = made.get();
-  made->family.flow.record_period = [self](double period, Vec start, double shift)
+  made->family.flow.record_period = [self](double period, Vec start, const TimeGrid& grid)
   {
     self->period = period;
     self->recorded = copy_of(start);
     // a bar is what a shift changes: here what 1/20 of p does, in every other interval of a length of 1/500
-    self->moved = shift > 0 && static_cast<long>(std::floor(500 * self->parameter)) % 2 == 0 ? 0.05 : 0;
+    self->moved = grid.shift > 0 && static_cast<long>(std::floor(500 * self->parameter)) % 2 == 0 ? 0.05 : 0;
   };
   const Branch branch = branch_from(*made, {1, 0}, 2 * pi, -0.07, {-0.1, 0.1, 40, 1e-9});
   CHECK(branch.points.back().parameter == 0.1);

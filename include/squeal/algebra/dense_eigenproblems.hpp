@@ -67,6 +67,8 @@ std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Ei
 /// All eigenpairs of A, the largest modulus first, of a complex pair first the one with Im(lambda) > 0.
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const Eigen::MatrixXd& A);
 
+std::vector<std::complex<double>> values_of(const std::vector<DenseEigenpair>& pairs);
+
 /// For each reference the place of a value of its own. No two references come nearer to their values, by the sum of
 /// both distances, when they exchange them. There are at least as many values.
 std::vector<std::size_t> nearest_places(const std::vector<std::complex<double>>& references,

@@ -45,6 +45,9 @@ struct CycleProblem
   double given_period = 0;      // [s] of the cycle that is given; 0: none is, and the mode's is taken
 };
 
+/// The problem with other settings, which it borrows.
+CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings);
+
 /// Those of the unstable modes that are not followed, at their estimated amplitudes, about the equilibrium.
 std::vector<State> other_unstable_motions(const CycleProblem& problem);
 

@@ -48,11 +48,13 @@ struct PeriodMap
   KeptStep kept{};
 };
 
+inline constexpr int enough_steps = 128; // a period: with as many at most, what finer ones change is in the bars
+
 /// Makes A and W those of h = T/N, unless they are already.
 void set_period(PeriodMap& map, double period);
 
-/// Records the contact of each step of a period; `shift`: the part of a step by which the grid of time is moved.
-void record_period(PeriodMap& map, double period, Vec start, double shift);
+/// Records the contact of each step of a period.
+void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& grid);
 
 /// Gives the flow the exact tangent of the map. Borrows the map.
 void add_tangent(PeriodMap& map, Flow& flow);

@@ -30,6 +30,13 @@ struct SlowMotions
   long periods = 0;                // integrated to find them
 };
 
+/// The steps in which a period is recorded.
+struct TimeGrid
+{
+  double shift = 0; // the part of a step by which it is moved
+  int finer = 1;    // times as many steps as the flow takes
+};
+
 /// The period map Phi_T: the state a time T after a start.
 struct Flow
 {
@@ -38,13 +45,13 @@ struct Flow
   Mat M = nullptr, K = nullptr; // of the energy product
   /// end_k = Phi_period(start_k), all at once. Empty: starts are integrated one after the other.
   std::function<void(double period, std::span<const Vec> starts, std::span<const Vec> ends)> integrate_many{};
-  /// Integrates a period and keeps what its tangent needs. `shift`: the part of a step by which the grid of time is
-  /// moved. Empty: difference quotients take the tangent's place.
-  std::function<void(double period, Vec start, double shift)> record_period{};
+  /// Integrates a period and keeps what its tangent needs. Empty: difference quotients take the tangent's place.
+  std::function<void(double period, Vec start, const TimeGrid& grid)> record_period{};
   /// x_k = dPhi_period/dx x_k along the period recorded last, all at once, in place.
   std::function<void(std::span<const Vec> states)> apply_tangent{};
   /// The slow motions of this period, which becomes the one recorded last. Empty: none are known.
   std::function<SlowMotions(double period, Vec start)> slow_motions{};
+  bool few_steps = false; // a period takes so few that multipliers depend on their number
 };
 
 /// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; x and y are states. Empty: P = -I.
