@@ -90,3 +90,15 @@ def test_several_unstable_modes_are_refused(squeal):
     run = squeal(*PIN, "--set", "damping.beta=3e-8", "--set", "fidelity=reduced", ranks=1)
     assert run.code == 2 and run.report["modes"]["unstable_count"] > 1
     assert run.report["cycle"]["outcome"] == "refused" and "several modes" in run.report["cycle"]["reason"]
+
+
+@pytest.mark.parametrize("speed, exact", [(0.3, 0.773368), (2, 4.627213)])
+def test_steps_of_a_small_model_are_enough_for_the_accuracy(module_run, speed, exact):
+    """Exact energies, by matrix exponentials between events. Each number of steps has a cycle and a verdict of its own."""
+    run = module_run(INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=0",
+                     "--set", "cycle.tolerance=0", "--set", f"contact.0.velocity=[{float(speed)},0,0]", ranks=1)
+    estimates, cycle = run["fidelity"]["error_estimates"], run["cycle"]
+    assert cycle["outcome"] == "converged" and cycle["residual_full"] <= 1e-5
+    assert cycle["multipliers"]["stability"] == "stable" and cycle["periods_integrated"] <= 60
+    off = abs(cycle["mean_energy"] - exact) / energy(run)
+    assert off <= estimates["energy"] + estimates["step_energy"] <= 1e-3
