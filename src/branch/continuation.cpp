@@ -2,6 +2,8 @@
 
 #include "events.hpp"
 
+#include <Eigen/Core>
+
 #include <algorithm>
 #include <cmath>
 
@@ -82,6 +84,32 @@ BranchVector direction_between(const BranchCorrector& corrector, const Corrected
   add(-1, vector_of(from), direction);
   scale(1 / std::sqrt(scaled_product(corrector, direction, direction)), direction);
   return direction;
+}
+
+/// What does not depend on the phase at which an orbit begins: parameter over its range, ln T, ln E.
+Eigen::Vector3d without_phase(const BranchCorrector& corrector, const ExaminedOrbit& orbit)
+{
+  return {orbit.corrected.parameter / corrector.scales.parameter, std::log(orbit.corrected.orbit.period),
+          std::log(orbit.measures.mean_fluctuating_energy)};
+}
+
+/// Whether the last orbit is on a part of the side that was passed before, at another phase. A corrector comes to it
+/// where contact events leave no orbit of this many steps beyond.
+bool went_back(const BranchCorrector& corrector, const BranchSide& side)
+{
+  constexpr double close = 0.1; // of a segment, from it
+  constexpr std::size_t looked_at = 8;
+  if (!(side.orbits.back().measures.mean_fluctuating_energy > 0)) return false;
+  const std::size_t count = side.orbits.size() - 1;
+  const Eigen::Vector3d last = without_phase(corrector, side.orbits.back());
+  for (std::size_t i = count - std::min(count, looked_at); i + 1 < count; ++i)
+  {
+    const Eigen::Vector3d from = without_phase(corrector, side.orbits[i]),
+                          along = without_phase(corrector, side.orbits[i + 1]) - from, away = last - from;
+    const double part = along.dot(away) / along.squaredNorm();
+    if (part > 0 && part < 1 && (away - part * along).norm() < close * along.norm()) return true;
+  }
+  return false;
 }
 
 void note_events(BranchCorrector& corrector, BranchSide& side)
@@ -175,6 +203,12 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Branch
     refer_to(corrector, *next);
     walk.tangent = direction_between(corrector, side.orbits.back().corrected, *next);
     side.orbits.push_back(examine(corrector, std::move(*next), Examined::multipliers_too));
+    if (went_back(corrector, side))
+    {
+      side.orbits.pop_back();
+      side.ending = BranchEnding::step_too_small;
+      return side;
+    }
     note_events(corrector, side);
     if (const auto ending = natural_end(corrector.settings, side))
     {

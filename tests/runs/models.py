@@ -149,3 +149,15 @@ def write_matrices(folder, B, gap, drive, F, **matrices):
     for name, values in {"gap": gap, "drive": drive, "F": F}.items():
         (folder / f"{name}.petsc").write_bytes(_vector(values))
     return folder
+
+
+def write_coexistence(folder, friction, cycle, **tables):
+    """Four degrees of freedom on two pairs. Between mu = 0.45 and 0.5 equilibrium and a cycle attract: slip that reverses makes
+    the cycle, which a small motion never reaches."""
+    B = [[-0.452, 0.509, -0.503, -0.532], [-0.425, -0.115, -0.514, 0.737], [0.78, 0.143, -0.608, 0.048], [0.084, 0.841, 0.337, 0.415]]
+    K = np.array([[0.703, -0.02, -0.257, 0.015], [0, 0.175, -0.036, 0.02], [0, 0, 2.853, -0.101], [0, 0, 0, 0.1186]])
+    C = 1e-3 * np.array([[6.32, -0.0865, -1.105, 0.0613], [0, 1.291, -0.134, 0.0803], [0, 0, 23.2, -0.428], [0, 0, 0, 1.058]])
+    write_matrices(folder / "matrices", np.array(B), [0.0, 0.0], [0.8746, -0.209], [-0.412, -0.492, 0.923, 0.33],
+                   M=np.diag([0.3, 0.05, 1, 0.05]), C=C + np.triu(C, 1).T, K=K + np.triu(K, 1).T)
+    return write_scene(folder, matrices={"folder": "matrices"}, friction=friction, modes={"band": 0.36},
+                       cycle={"steps_per_period": 128, **cycle}, **tables)

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 from conftest import INPUTS, ROOT
+from models import write_coexistence
 
 SCENE = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=200",
          "--set", "fidelity=full"]
@@ -127,6 +128,19 @@ def test_a_number_that_no_reduced_model_holds_is_followed_on_the_full_one(conver
     branch = run.report["branch"]
     assert branch["model"] == "full" and "contact.0.gap moves the contact itself" in branch["not_reduced"]
     assert "followed on the full model: contact.0.gap" in run.printed
+
+
+def test_a_branch_ends_where_its_cycle_does(squeal, tmp_path):
+    """Below mu = 0.45 no cycle is left, and the multiplier is 0.97 there: it ends at an event of contact. The branch does not
+    go back along itself at other phases, which it did once; the equilibrium is stable up to 0.5."""
+    scene = write_coexistence(tmp_path, {"coefficient": 0.55}, cycle={"tolerance": 1e-7})
+    run = squeal(scene, *branch_of("friction.coefficient", 0.36, 0.6), "--set", "branch.points=12", ranks=1)
+    branch = run.report["branch"]
+    assert run.code == 2 and branch["ends"] == {"backward": "step too small", "forward": "bound"}
+    parameters = [point["parameter"] for point in branch["points"]]
+    assert parameters == sorted(parameters) and 0.445 < parameters[0] < 0.455
+    assert all(point["stability"] == "stable" for point in branch["points"])
+    assert branch["coexistence"] == [{"from": pytest.approx(parameters[0]), "to": pytest.approx(0.5, abs=5e-3)}]
 
 
 @pytest.mark.parametrize("key, start, end, words", [

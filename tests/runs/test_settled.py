@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 from conftest import INPUTS
-from models import write_matrices, write_scene
+from models import write_coexistence, write_scene
 
 OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false"]
 PERIOD, ENERGY = 5.954461004653, 1.77650678461  # exact, at V = 0.6
@@ -141,14 +141,7 @@ def test_where_no_cycle_of_the_pin_attracts_the_settled_motion_answers(converged
 
 def test_a_given_state_leads_to_a_cycle_beside_a_stable_equilibrium(converged, tmp_path):
     """Between mu = 0.45 and 0.5 both attract. Slip that reverses makes the cycle, which a small motion never reaches."""
-    B = [[-0.452, 0.509, -0.503, -0.532], [-0.425, -0.115, -0.514, 0.737], [0.78, 0.143, -0.608, 0.048], [0.084, 0.841, 0.337, 0.415]]
-    K = np.array([[0.703, -0.02, -0.257, 0.015], [0, 0.175, -0.036, 0.02], [0, 0, 2.853, -0.101], [0, 0, 0, 0.1186]])
-    C = 1e-3 * np.array([[6.32, -0.0865, -1.105, 0.0613], [0, 1.291, -0.134, 0.0803], [0, 0, 23.2, -0.428], [0, 0, 0, 1.058]])
-    whole = lambda upper: upper + np.triu(upper, 1).T
-    write_matrices(tmp_path / "matrices", np.array(B), [0.0, 0.0], [0.8746, -0.209], [-0.412, -0.492, 0.923, 0.33],
-                   M=np.diag([0.3, 0.05, 1, 0.05]), C=whole(C), K=whole(K))
-    scene = write_scene(tmp_path, matrices={"folder": "matrices"}, friction={"coefficient": 0.55}, modes={"band": 0.36},
-                        cycle={"steps_per_period": 128, "save_state": str(tmp_path / "cycle.state")})
+    scene = write_coexistence(tmp_path, {"coefficient": 0.55}, cycle={"save_state": str(tmp_path / "cycle.state")})
     unstable = converged(scene, ranks=1).report
     assert unstable["modes"]["unstable_count"] == 1 and unstable["cycle"]["multipliers"]["stability"] == "stable"
     start = ["--set", "cycle.save_state=", "--set", f"cycle.start={tmp_path}/cycle.state"]
