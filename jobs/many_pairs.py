@@ -31,8 +31,8 @@ enabled = false
 [transient]
 start = "rest"
 steps = 10
-step_size = 1e-5 # s
-load_factor = [[0, 0], [2e-5, 1]]
+step_size = 1e-6 # s: a wave crosses two and a half elements
+load_factor = [[0, 0], [2e-6, 1]]
 """
 
 if __name__ == "__main__":

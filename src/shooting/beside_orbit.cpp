@@ -4,6 +4,8 @@
 /// a distance; two motions tell it.
 #include "beside_orbit.hpp"
 
+#include "monodromy.hpp"
+
 #include <Eigen/LU>
 
 #include <algorithm>
@@ -146,6 +148,22 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
     if (part < 100 * orbit.residual) break; // no part that the orbit's own error does not hide
   }
   return seen;
+}
+
+void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers)
+{
+  if (seen.empty() || multipliers.stability != Stability::undecided || !multipliers.complete) return;
+  const auto bound = [&](std::size_t i) {
+    return multipliers.upper.empty() ? std::abs(multipliers.values[i]) + multipliers.errors[i] : multipliers.upper[i];
+  };
+  for (std::size_t i = 1; i < multipliers.values.size(); ++i)
+    if (multipliers.values[i] != std::conj(multipliers.values[0]) && !(bound(i) < 1)) return;
+  const SeenGrowth& nearest = seen.back();
+  if (!(std::abs(nearest.growth - 1) > nearest.error)) return;
+  const bool grows = nearest.growth > 1;
+  multipliers.stability = grows ? Stability::unstable : Stability::stable;
+  if (grows) multipliers.crossing = crossing_of(multipliers.values.front());
+  multipliers.would_decide.clear();
 }
 
 } // namespace squeal

@@ -27,4 +27,8 @@ std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog
 std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
                                        const FloquetAnalysis& floquet, long periods);
 
+/// Decides what only the bar of the largest multiplier leaves undecided, where a motion along it was seen to grow or to
+/// decay beyond its own bar.
+void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers);
+
 } // namespace squeal

@@ -64,8 +64,15 @@ std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::Ve
   return place;
 }
 
+Crossing crossing_of(std::complex<double> multiplier)
+{
+  if (multiplier.imag() != 0) return Crossing::neimark_sacker;
+  return multiplier.real() < 0 ? Crossing::period_doubling : Crossing::fold;
+}
+
 void decide(Multipliers& multipliers, const Completeness& coverage, std::size_t converged)
 {
+  multipliers.complete = coverage.complete;
   multipliers.stability = coverage.complete ? Stability::stable : Stability::undecided;
   multipliers.would_decide = coverage.complete ? "" : coverage.would_decide;
   for (std::size_t i = 0; i < multipliers.values.size(); ++i)
@@ -75,9 +82,7 @@ void decide(Multipliers& multipliers, const Completeness& coverage, std::size_t 
     if (size - error > 1)
     {
       multipliers.stability = Stability::unstable;
-      multipliers.crossing = value.imag() != 0  ? Crossing::neimark_sacker
-                             : value.real() < 0 ? Crossing::period_doubling
-                                                : Crossing::fold;
+      multipliers.crossing = crossing_of(value);
       multipliers.would_decide.clear();
       return;
     }

@@ -34,6 +34,9 @@ struct Completeness
   std::string would_decide; // of one that is not
 };
 
+/// How an orbit lost its stability by this multiplier.
+Crossing crossing_of(std::complex<double> multiplier);
+
 /// Says what the bars allow. Only the `converged` largest values can leave it undecided: an Arnoldi space always holds
 /// smaller ones that have not converged.
 void decide(Multipliers& multipliers, const Completeness& coverage, std::size_t converged);

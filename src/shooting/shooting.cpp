@@ -282,6 +282,7 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   if (options.watched_periods > 0 && found.converged())
     seen = growths_beside(problem, log, found.found.orbit, found.floquet, options.watched_periods);
   result.multipliers = std::move(found.floquet.multipliers);
+  decide_by_growth(seen, result.multipliers);
   result.multipliers.seen = std::move(seen);
   refuse_repelling(result.multipliers, start.other_unstable.size(), result.outcome);
   if (found.beside != Beside::not_seen && result.outcome.kind == OutcomeKind::converged)

@@ -66,6 +66,7 @@ struct Multipliers
   std::vector<double> errors;               // error bar of each
   std::vector<double> upper;                // bounds of the moduli, where a grid of time only lowers some; or empty
   Stability stability = Stability::not_examined;
+  bool complete = true;               // larger ones than these are unlikely
   Crossing crossing = Crossing::none; // of an unstable orbit
   std::string would_decide;           // of an undecided one, in a sentence
   double trivial_error = 0;           // distance of the shift's own multiplier from 1
