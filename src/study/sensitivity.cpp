@@ -169,6 +169,14 @@ void find_powers(const SlidingEquilibrium& sliding, const Vectors& vectors, cons
   }
 }
 
+/// Whether two interfaces of one B put the same conditions on an equilibrium: friction by its value at each drive
+/// speed, whichever number of the law gives it.
+bool same_contact(const Interface& a, const Interface& b)
+{
+  return a.gap == b.gap && a.compliance == b.compliance && drive_friction(a) == drive_friction(b) &&
+         drive_directions(a) == drive_directions(b);
+}
+
 /// The equilibrium of a model that differs in one number, with as little work as it needs.
 class NearbyEquilibria
 {
@@ -186,9 +194,7 @@ public:
     PetscBool same_load = PETSC_FALSE;
     check(VecEqual(model.structure.load, structure.load, &same_load));
     const bool same = equal(model.structure.K, structure.K) && equal(model.interface.B, interface.B);
-    if (interface.pairs == 0 ||
-        (same && same_load == PETSC_TRUE && model.interface.friction.coefficient == interface.friction.coefficient &&
-         drive_directions(model.interface) == drive_directions(interface)))
+    if (interface.pairs == 0 || (same && same_load == PETSC_TRUE && same_contact(model.interface, interface)))
       return std::nullopt;
     if (same && !compliance_) compliance_.emplace(structure, interface, options_);
     if (!same || !compliance_->serves(model.interface))

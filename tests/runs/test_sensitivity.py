@@ -4,11 +4,38 @@ import h5py
 import numpy as np
 import pytest
 from conftest import INPUTS
+from models import write_scene
 
 OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"]
 # Two directions, so that friction turns and the equilibrium enters; two unstable modes.
 PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
        "--set", "modes.method=full", "--set", "modes.band=20000", "--set", "friction.coefficient=0.5"]
+
+SCENES = {"oscillator": OSCILLATOR, "pin": PIN}
+
+
+def two_pads(folder, **friction):
+    """A disc between two pads of a caliper, all of them points: two contacts of different drive, two tangents each."""
+    ground = [("disc", "z", 1.2e7, 15), ("disc", "x", 9e8, 50), ("disc", "y", 6e8, 50), ("top", "y", 1e7, 8),
+              ("top", "x", 1.3e7, 8), ("top", [0.05, 1, -1], 4e6, 9), ("bottom", "y", 2.3e7, 5), ("bottom", "x", 1.7e7, 5),
+              ("bottom", "z", 3e6, 5), ("bottom", [0.1, 1, 1], 5e6, 5), ("caliper", [1, 0, 0.3], 3e7, 30),
+              ("caliper", [0, 1, -0.4], 4e7, 30), ("caliper", [0.2, 0.3, 1], 8e6, 10)]
+    springs = [{"from": a, "direction": d, "stiffness": k, "damping": c} for a, d, k, c in ground]
+    springs.append({"from": "top", "to": "caliper", "direction": "z", "stiffness": 4e6, "damping": 6})
+    masses = {"disc": 0.3, "top": 0.4, "bottom": 0.55, "caliper": 0.9}
+    return write_scene(folder, point=[{"name": name, "at": [0.1, 0, 0], "mass": m, "free": "x y z"} for name, m in masses.items()],
+                       spring=springs, force=[{"on": "caliper", "vector": [20, 0, -900]}, {"on": "bottom", "vector": [0, 15, 850]}],
+                       contact=[{"rotor": "disc", "stator": "top", "normal": [0, 0, 1], "velocity": [0.3, 2, 0]},
+                                {"rotor": "disc", "stator": "bottom", "normal": [0, 0, -1], "velocity": [-0.5, 1.7, 0]}],
+                       friction={"coefficient": 0.5, **friction}, damping={"alpha": 2.0}, modes={"band": 5000})
+
+
+@pytest.fixture
+def scene_of(tmp_path):
+    """Arguments by the name of a scene: of an input, or of two pads, whose friction falls from 0.6 with the speed."""
+    def find(name):
+        return SCENES.get(name) or [two_pads(tmp_path, static_coefficient=0.6, decay_speed=1.5)]
+    return find
 
 
 def sensitivity_of(*numbers):
@@ -28,11 +55,14 @@ def overridden(key, value):
 
 
 @pytest.mark.parametrize("scene, keys", [
-    (OSCILLATOR, ["friction.coefficient", "spring.0.stiffness", "spring.0.damping", "point.pad.mass", "point.disc.mass"]),
-    (PIN, ["friction.coefficient", "part.pin.young", "part.disc.young", "part.pin.density", "damping.beta",
+    ("oscillator", ["friction.coefficient", "spring.0.stiffness", "spring.0.damping", "point.pad.mass", "point.disc.mass"]),
+    ("pin", ["friction.coefficient", "part.pin.young", "part.disc.young", "part.pin.density", "damping.beta",
            "rigid_body.holder.mass", "spring.0.stiffness", "contact.0.rotation.rate", "part.pin.poisson"]),
+    ("falling friction", ["friction.coefficient", "friction.static_coefficient", "friction.decay_speed", "contact.0.velocity.1",
+                          "contact.1.velocity.0", "force.0.vector.2"]),
 ])
-def test_derivatives_are_central_differences(scene, keys, converged):
+def test_derivatives_are_central_differences(scene, keys, scene_of, converged):
+    scene = scene_of(scene)
     entry = converged(*scene, *sensitivity_of(*keys), ranks=1).report["sensitivity"]
     mode = entry["modes"][0]
     own = complex(mode["growth_rate"], 2 * np.pi * mode["frequency_hz"])
