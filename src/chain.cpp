@@ -65,13 +65,28 @@ std::span<const ComplexMode> followed_modes(const Report& report, const Scene& s
   return std::span(report.modes.modes).first(1);
 }
 
-std::string no_mode_to_follow(const Report& report, const Scene& scene)
+namespace
+{
+
+std::string no_mode_among(const Report& report, std::span<const ComplexMode> modes)
 {
   if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "there is no equilibrium to start from";
   if (report.modes.modes.empty()) return "no mode was found in the band";
-  if (followed_modes(report, scene).empty()) return "the equilibrium is stable: no mode grows in the band";
-  if (report.modes.modes.front().frequency_hz() == 0) return "the equilibrium diverges without oscillating";
+  if (modes.empty()) return "the equilibrium is stable: no mode grows in the band";
+  if (modes.front().frequency_hz() == 0) return "the equilibrium diverges without oscillating";
   return {};
+}
+
+} // namespace
+
+std::string no_unstable_mode(const Report& report)
+{
+  return no_mode_among(report, report.modes.unstable());
+}
+
+std::string no_mode_to_follow(const Report& report, const Scene& scene)
+{
+  return no_mode_among(report, followed_modes(report, scene));
 }
 
 Modes run_modes(Chain& chain)
@@ -195,7 +210,7 @@ Attractors run_attractors(const Chain& chain)
   const CycleSettings& settings = chain.scene.cycle;
   if (!settings.enabled || settings.starts == 0)
     return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
-  const std::string reason = no_mode_to_follow(chain.report, chain.scene);
+  const std::string reason = no_unstable_mode(chain.report);
   if (!reason.empty()) return not_run<Attractors>(OutcomeKind::skipped, reason);
   return find_attractors({chain.sliding(), chain.report.modes.modes, chain.unstable(), settings, chain.options.step},
                          chain.options.attractors);

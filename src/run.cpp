@@ -108,11 +108,12 @@ Sensitivity run_sensitivity(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   if (!scene.sensitivity) return not_run<Sensitivity>(OutcomeKind::off, "the scene has no [sensitivity]");
-  const std::string reason = no_mode_to_follow(chain.report, chain.scene), part = part_beyond_sweeps(chain.model);
+  const std::string reason = no_unstable_mode(chain.report);
   if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
-  if (!part.empty()) return not_run<Sensitivity>(OutcomeKind::refused, part);
+  if (chain.model.structure.H.get())
+    return not_run<Sensitivity>(OutcomeKind::refused, "the structure has a circulatory part");
   const auto model_at = [&](const SceneNumber& number)
-  { return model_with(chain.model, scene, std::span(&number, 1), comm_of(chain.model.structure.load)); };
+  { return model_with(chain.model, scene, from_zero(scene, number), comm_of(chain.model.structure.load)); };
   std::vector<int> probes;
   for (const Change& change : scene.changes)
     probes.push_back(

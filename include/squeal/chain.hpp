@@ -36,6 +36,9 @@ template <class Result> Result not_run(OutcomeKind kind, const std::string& reas
   return result;
 }
 
+/// Why a stage of unstable modes cannot run; empty if it can.
+std::string no_unstable_mode(const Report& report);
+
 /// Why a stage that follows a mode cannot run; empty if it can.
 std::string no_mode_to_follow(const Report& report, const Scene& scene);
 

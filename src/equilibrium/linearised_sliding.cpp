@@ -202,9 +202,11 @@ Owned<Mat> assemble_basis(const Elimination& elimination, double Coefficients::*
   return result;
 }
 
-// R'[pivots] lambda = f[pivots], and the elimination found T with T R[pivots] = I: lambda = T' f[pivots].
-Owned<Mat> assemble_reaction(const std::vector<Row>& rows, const std::vector<PetscInt>& pivots,
-                             const std::vector<int>& pairs, const Interface& interface)
+// R'[pivots] lambda = f[pivots], and the elimination found T with T R[pivots] = I: lambda = T' f[pivots]. Likewise of
+// B_n.
+Owned<Mat> assemble_reaction(const std::vector<Row>& rows, double Coefficients::*kind,
+                             const std::vector<PetscInt>& pivots, const std::vector<int>& pairs,
+                             const Interface& interface)
 {
   PetscInt first = 0, last = 0, dofs = 0;
   check(MatGetOwnershipRangeColumn(interface.B, &first, &last));
@@ -218,8 +220,8 @@ Owned<Mat> assemble_reaction(const std::vector<Row>& rows, const std::vector<Pet
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (pivots[i] >= first && pivots[i] < last)
       for (auto entry = rows[i].lower_bound(dofs); entry != rows[i].end(); ++entry)
-        check(MatSetValue(result, pairs[static_cast<std::size_t>(entry->first - dofs)], pivots[i],
-                          entry->second.sliding, INSERT_VALUES));
+        check(MatSetValue(result, pairs[static_cast<std::size_t>(entry->first - dofs)], pivots[i], entry->second.*kind,
+                          INSERT_VALUES));
   check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
   return result;
@@ -243,7 +245,8 @@ ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface
   std::sort(elimination.pivots.begin(), elimination.pivots.end());
   result.Z = assemble_basis(elimination, &Coefficients::normal, structure.K);
   result.Y = assemble_basis(elimination, &Coefficients::sliding, structure.K);
-  result.reaction = assemble_reaction(rows, pivots, result.pairs, interface);
+  result.reaction = assemble_reaction(rows, &Coefficients::sliding, pivots, result.pairs, interface);
+  result.normal_reaction = assemble_reaction(rows, &Coefficients::normal, pivots, result.pairs, interface);
   result.pivots = elimination.pivots;
   return result;
 }
@@ -327,16 +330,24 @@ Owned<Mat> sum_of(Mat A, Mat B)
   return result;
 }
 
+Owned<Mat> sliding_damping(const SlidingEquilibrium& sliding)
+{
+  const auto& [structure, interface, equilibrium] = sliding;
+  const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
+  Owned<Mat> result;
+  check(MatDuplicate(structure.C, MAT_COPY_VALUES, result.put()));
+  if (const Owned<Mat> Cf = friction_damping(interface, equilibrium.closed, equilibrium.reactions, part); Cf.get())
+    check(MatAXPY(result, 1, Cf, UNKNOWN_NONZERO_PATTERN));
+  if (structure.G.get()) result = sum_of(result, structure.G);
+  return result;
+}
+
 LinearisedSliding linearise(const SlidingEquilibrium& sliding)
 {
   const auto& [structure, interface, equilibrium] = sliding;
   LinearisedSliding result;
   result.contact = eliminate_closed_pairs(structure, interface, equilibrium.closed);
-  check(MatDuplicate(structure.C, MAT_COPY_VALUES, result.C.put()));
-  const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
-  if (const Owned<Mat> Cf = friction_damping(interface, equilibrium.closed, equilibrium.reactions, part); Cf.get())
-    check(MatAXPY(result.C, 1, Cf, UNKNOWN_NONZERO_PATTERN));
-  if (structure.G.get()) result.C = sum_of(result.C, structure.G);
+  result.C = sliding_damping(sliding);
   if (structure.H.get()) result.K = sum_of(structure.K, structure.H);
   if (const auto stiffness = contact_stiffness(interface, equilibrium.closed, PairForces::with_friction);
       stiffness.get())

@@ -1,9 +1,9 @@
 #include "loss.hpp"
 
+#include "complex_subspace.hpp"
 #include "squeal/algebra/shift_invert.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <Eigen/LU>
 #include <limits>
@@ -29,16 +29,6 @@ constexpr double settled = 1e-12;     // last change of lambda over |lambda|: be
 
 constexpr double oscillating = 1e-6; // Im(lambda) over |lambda|: below it is the rounding of two real ones
 
-/// The matrices of a problem on a subspace V, with their products A V: M, C_0, K, K_loss.
-struct Projected
-{
-  std::array<Mat, 4> matrices{};
-  std::array<double, 4> norms{};
-  MultiVector V;
-  std::array<MultiVector, 4> images{};
-  std::array<MatrixXd, 4> entries{};
-};
-
 enum class Stiffness
 {
   viscous, // K + lambda K_loss/omega
@@ -46,37 +36,16 @@ enum class Stiffness
 };
 
 /// Factors of M, C_0, K and K_loss in the problem at lambda.
-std::array<Complex, 4> factors(Stiffness stiffness, Complex lambda)
+ComplexFactors factors(Stiffness stiffness, Complex lambda)
 {
   const Complex loss = stiffness == Stiffness::viscous ? lambda / lambda.imag() : Complex(0, 1);
   return {lambda * lambda, lambda, 1, loss};
 }
 
 /// Their derivatives in lambda, at a constant omega.
-std::array<Complex, 4> derivatives(Stiffness stiffness, Complex lambda)
+ComplexFactors derivatives(Stiffness stiffness, Complex lambda)
 {
   return {2. * lambda, 1, 0, stiffness == Stiffness::viscous ? 1 / lambda.imag() : 0};
-}
-
-Eigen::MatrixXcd sum(const std::array<MatrixXd, 4>& A, const std::array<Complex, 4>& factor)
-{
-  Eigen::MatrixXcd result = factor[0] * A[0];
-  for (std::size_t k = 1; k < 4; ++k) result += factor[k] * A[k];
-  return result;
-}
-
-/// V gains what X adds to its span. Returns whether that is anything.
-bool extend(Projected& space, MultiVector X)
-{
-  const Index gained = extend_orthonormal(space.V, std::move(X));
-  if (gained == 0) return false;
-  const MultiVector W = columns_from(space.V, space.V.columns() - gained);
-  for (std::size_t k = 0; k < 4; ++k)
-  {
-    append(space.images[k], product(space.matrices[k], W));
-    space.entries[k] = inner_products(space.V, space.images[k]);
-  }
-  return true;
 }
 
 /// A pair on the subspace.
@@ -88,13 +57,13 @@ struct SmallPair
 
 /// Newton's method on (lambda, a) with a share of K_loss, and with omega taken from the last lambda. Returns whether it
 /// found a pair that oscillates.
-bool solve_small(const Projected& space, Stiffness stiffness, double share, SmallPair& pair)
+bool solve_small(const ComplexSubspace& space, Stiffness stiffness, double share, SmallPair& pair)
 {
   double last = HUGE_VAL;
   for (int step = 0; step < newton_steps && last > 1e-15; ++step)
   {
     if (!(pair.lambda.imag() > settled * std::abs(pair.lambda))) return false;
-    std::array<Complex, 4> factor = factors(stiffness, pair.lambda), slope = derivatives(stiffness, pair.lambda);
+    ComplexFactors factor = factors(stiffness, pair.lambda), slope = derivatives(stiffness, pair.lambda);
     factor[3] *= share;
     slope[3] *= share;
     const VectorXcd x =
@@ -112,7 +81,7 @@ bool solve_small(const Projected& space, Stiffness stiffness, double share, Smal
 
 /// The pair of all losses that a pair without them becomes as they grow; nothing where it ends on the way. The steps
 /// move lambda by about an eighth of its imaginary part.
-std::optional<SmallPair> grown(const Projected& space, Stiffness stiffness, SmallPair pair)
+std::optional<SmallPair> grown(const ComplexSubspace& space, Stiffness stiffness, SmallPair pair)
 {
   const auto form = [&](const MatrixXd& A) { return std::abs(pair.a.dot(A * pair.a)); };
   const double loss = form(space.entries[3]) / form(space.entries[2]);
@@ -120,25 +89,6 @@ std::optional<SmallPair> grown(const Projected& space, Stiffness stiffness, Smal
   for (int step = 1; step <= steps; ++step)
     if (!solve_small(space, stiffness, static_cast<double>(step) / steps, pair)) return std::nullopt;
   return pair;
-}
-
-/// The residual of a pair in the whole problem, its real and imaginary part, over the sizes of its terms.
-MultiVector residual_of(const Projected& space, Stiffness stiffness, const SmallPair& pair, double& backward_error)
-{
-  const std::array<Complex, 4> factor = factors(stiffness, pair.lambda);
-  MultiVector result{space.V.comm, MatrixXd::Zero(space.V.entries.rows(), 2)};
-  double scale = 0;
-  for (std::size_t k = 0; k < 4; ++k)
-  {
-    const VectorXcd a = factor[k] * pair.a;
-    MatrixXd parts(a.size(), 2);
-    parts << a.real(), a.imag();
-    result.entries.noalias() += space.images[k].entries * parts;
-    scale += std::abs(factor[k]) * space.norms[k];
-  }
-  result.entries /= scale; // |a| = 1, and V is orthonormal
-  backward_error = column_norms(result).norm();
-  return result;
 }
 
 /// A mode: as it is without loss factors in, of its own frequency and of the complex problem out.
@@ -168,7 +118,7 @@ bool is_equivalent(const SmallPair& viscous, const SmallPair& complex)
 }
 
 /// Both problems' pairs of each mode on the first subspace.
-void start(const Projected& space, Group& group)
+void start(const ComplexSubspace& space, Group& group)
 {
   for (LossyPair& mode : group)
   {
@@ -180,7 +130,7 @@ void start(const Projected& space, Group& group)
 }
 
 /// Solves both problems of each mode on the subspace; residuals that are not small join it, until none is left.
-void solve_group(Projected& space, Group& group, const PencilFactor& P)
+void solve_group(ComplexSubspace& space, Group& group, const PencilFactor& P)
 {
   start(space, group);
   for (int pass = 0;; ++pass)
@@ -191,7 +141,7 @@ void solve_group(Projected& space, Group& group, const PencilFactor& P)
       widen(pair.a, space.V.columns());
       const bool found = solve_small(space, stiffness, 1, pair);
       double error = 0;
-      const MultiVector residual = residual_of(space, stiffness, pair, error);
+      const MultiVector residual = residual_of(space, factors(stiffness, pair.lambda), pair.a, error);
       if (found && error > tolerance) append(residuals, residual);
       return found ? error : HUGE_VAL;
     };
@@ -221,21 +171,12 @@ std::vector<std::size_t> by_frequency(const std::vector<Eigenpair>& pairs)
   return order;
 }
 
-double one_norm(Mat A)
-{
-  double norm = 0;
-  check(MatNorm(A, NORM_1, &norm));
-  return norm;
-}
-
 } // namespace
 
 std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
                                    const PencilOptions& options)
 {
-  const std::array<Mat, 4> matrices = {problem.M, problem.C, problem.K, K_loss};
-  std::array<double, 4> norms{};
-  std::transform(matrices.begin(), matrices.end(), norms.begin(), one_norm);
+  const ComplexSubspace empty = empty_subspace({problem.M, problem.C, problem.K, K_loss});
   std::vector<ModeLoss> losses(solution.pairs.size());
   const std::vector<std::size_t> order = by_frequency(solution.pairs);
   ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
@@ -243,9 +184,8 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
   {
     const std::size_t end = std::min(first + in_group, order.size());
     const std::size_t from = first < neighbours ? 0 : first - neighbours, to = std::min(end + neighbours, order.size());
-    const MultiVector none = empty_multivector(problem.K);
-    Projected space{matrices, norms, none, {none, none, none, none}, {}};
-    MultiVector shapes = none;
+    ComplexSubspace space = empty;
+    MultiVector shapes = empty.V;
     for (std::size_t k = from; k < to; ++k)
       for (const Vec part : {solution.pairs[order[k]].real.get(), solution.pairs[order[k]].imaginary.get()})
         append(shapes, part);
@@ -256,8 +196,8 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
     {
       const auto column = static_cast<Index>(2 * (k - from));
       const VectorXcd y = a.col(column).cast<Complex>() + Complex(0, 1) * a.col(column + 1);
-      const SmallPair start{solution.pairs[order[k]].lambda, y.normalized()};
-      group.push_back({start, start});
+      const SmallPair found{solution.pairs[order[k]].lambda, y.normalized()};
+      group.push_back({found, found});
     }
     const double middle = solution.pairs[order[(first + end - 1) / 2]].lambda.imag();
     move_to(pencil, 1.0001 * middle * middle);
@@ -267,9 +207,7 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
       Eigenpair& pair = solution.pairs[order[k]];
       const LossyPair& mode = group[k - first];
       const SmallPair& own = mode.pair();
-      MatrixXd parts(own.a.size(), 2);
-      parts << own.a.real(), own.a.imag();
-      const MultiVector y = combination(space.V, parts);
+      const MultiVector y = vector_of(space, own.a);
       copy_column(y, 0, pair.real);
       copy_column(y, 1, pair.imaginary);
       pair.lambda = own.lambda;

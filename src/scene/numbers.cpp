@@ -51,8 +51,9 @@ double number_at(const Scene& scene, const std::string& key, const std::string& 
   if (std::find(physical.begin(), physical.end(), first) == physical.end())
     throw refusal("is not a number of the structure, its contact or its loads" + hint_or_list(first, physical) +
                   ", such as " + friction_coefficient_key);
-  if (table != "[branch]" && is_beyond_sweeps(key))
-    throw refusal("is followed by a [branch] only: sweeps and random numbers are for rigid pairs and for matrices that "
+  if (table != "[branch]" && table != "[sensitivity]" && is_beyond_sweeps(key))
+    throw refusal("is followed by a [branch] and derived by in [sensitivity] only: sweeps and random numbers are for "
+                  "rigid pairs and for matrices that "
                   "neither spin nor have loss factors");
   toml::table document = document_of(scene);
   const toml::node* node = find_value(document, key);
@@ -132,6 +133,10 @@ private:
       if (sweep_.key.size() > 1) fail(&sweep_.values, "values belong to a single key: give from, to and points");
       if (!sweep_.from.empty() || !sweep_.to.empty() || sweep_.samples > 0 || places_.given.count(&sweep_.points))
         fail(&sweep_.values, "values exclude from, to, points and samples: keep one form");
+      std::vector<double> sorted = sweep_.values;
+      std::ranges::sort(sorted);
+      if (const auto twice = std::ranges::adjacent_find(sorted); twice != sorted.end())
+        fail(&sweep_.values, "values holds " + text_of_number(*twice) + " twice: take one of them out");
       return;
     }
     need_length(sweep_.from, "from");
@@ -220,6 +225,7 @@ void add_named(const Scene& scene, std::vector<SceneNumber>& numbers)
       const Part& part = scene.parts[i];
       numbers.push_back({key_of("part", i, "young"), part.material.young});
       numbers.push_back({key_of("part", i, "density"), part.material.density});
+      numbers.push_back({key_of("part", i, "loss_factor"), part.loss_factor});
       if (part.damping) numbers.push_back({key_of("part", i, "alpha"), part.damping->alpha});
       if (part.damping) numbers.push_back({key_of("part", i, "beta"), part.damping->beta});
     }
@@ -255,12 +261,46 @@ std::vector<SceneNumber> sensitive_numbers(const Scene& scene)
   return numbers;
 }
 
+std::vector<SceneNumber> from_zero(const Scene& scene, const SceneNumber& number)
+{
+  std::vector<SceneNumber> numbers{number};
+  if (number.key.ends_with(".loss_factor") && scene.damping.loss_frequency == 0)
+    numbers.push_back({"damping.loss_frequency", scene.modes.band});
+  return numbers;
+}
+
+namespace
+{
+
+/// Each number once, and with values beside its own. Throws Error.
+void check_numbers(const Scene& scene)
+{
+  const std::vector<SceneNumber> numbers = sensitive_numbers(scene);
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+  {
+    const std::string& key = numbers[i].key;
+    if (std::ranges::count(std::span(numbers).first(i), key, &SceneNumber::key) > 0)
+      throw Error("[sensitivity] numbers names \"" + key + "\" twice: take one of them out");
+    if (numbers[i].value == 0) try
+      {
+        constexpr double little = 1e-9; // beside any number of use
+        (void)scene_with(scene, from_zero(scene, {key, little}));
+      }
+      catch (const Error& error)
+      {
+        throw Error("[sensitivity] " + key + " is 0, and nothing beside that is a scene: leave it out, or give it a " +
+                    "value. " + error.what());
+      }
+  }
+}
+
+} // namespace
+
 void check_sensitivity(const Scene& scene, const Places& places)
 {
   if (scene.sensitivity) try
     {
-      for (const SceneNumber& number : sensitive_numbers(scene))
-        if (number.value == 0) throw Error("[sensitivity] " + number.key + " is 0: leave it out, or give it a value");
+      check_numbers(scene);
     }
     catch (const Error& error)
     {

@@ -16,9 +16,10 @@ namespace squeal
 /// Bases that keep the closed pairs closed.
 struct ClosedContact
 {
-  Owned<Mat> Z, Y;        // dofs x (dofs - closed pairs)
-  Owned<Mat> reaction;    // pairs x dofs: lambda_n = reaction f of forces f = R' lambda_n + g, g = 0 on the pivots
-  std::vector<int> pairs; // the closed ones, ascending
+  Owned<Mat> Z, Y;            // dofs x (dofs - closed pairs)
+  Owned<Mat> reaction;        // pairs x dofs: lambda_n = reaction f of forces f = R' lambda_n + g, g = 0 on the pivots
+  Owned<Mat> normal_reaction; // the same of forces f = B_n' lambda + g
+  std::vector<int> pairs;     // the closed ones, ascending
   std::vector<PetscInt> pivots; // the degrees of freedom that are eliminated, ascending
 };
 
@@ -76,11 +77,14 @@ struct ReactionOperator
 std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
                                                    Vec imaginary);
 
+/// C with G, and with C_f where the interface has it on. Collective.
+Owned<Mat> sliding_damping(const SlidingEquilibrium& sliding);
+
 /// The equations of small motions about sliding, made once for the modes, the estimate and the preconditioner.
 struct LinearisedSliding
 {
   ClosedContact contact;
-  Owned<Mat> C; // with G, and with C_f where the interface has it on
+  Owned<Mat> C; // sliding_damping
   Owned<Mat> K; // with H and with pairs that have a compliance; null: the structure's
   ReactionOperator reaction;
   Owned<Mat> M_z, K_z; // Z'M Z, Z'K Z, symmetric: the frictionless bilateral problem

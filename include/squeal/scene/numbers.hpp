@@ -20,6 +20,10 @@ inline constexpr const char* friction_coefficient_key = "friction.coefficient";
 /// Returns the scene with other values of numbers that it has. Throws Error if that is no scene.
 Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers);
 
+/// A number that is zero in the scene, with what it needs to be another one: a first loss factor has to have a
+/// frequency of its equivalent in time, on which modes do not depend.
+std::vector<SceneNumber> from_zero(const Scene& scene, const SceneNumber& number);
+
 /// The numbers with respect to which eigenvalues are derived, with the scene's values. They are those that it names,
 /// else friction and what is not zero of parts, points, bodies, springs, damping and rates of rotation.
 std::vector<SceneNumber> sensitive_numbers(const Scene& scene);

@@ -1,0 +1,67 @@
+#pragma once
+/// A mode with its left vector, of the whole problem whatever its matrices (src/README.md, section 11.1):
+///     Q(lambda) y = 0,   Q(lambda)'x = 0,   Q = lambda^2 M + lambda C + K + f K_loss
+/// f is lambda/Im(lambda) where loss factors have their viscous equivalent at the mode's own frequency, else i; 0 of a
+/// real lambda.
+///
+/// Both vectors are sought on subspaces of their own. Residuals r join them as P^-1 r and P'^-1 r, P = K - tau M,
+/// tau = -Re(lambda^2), until both are small; the two-sided Rayleigh quotient then moves lambda.
+#include "squeal/algebra/shift_invert.hpp"
+#include "squeal/modes/modes.hpp"
+#include "squeal/modes/quadratic.hpp"
+
+namespace squeal
+{
+
+/// What loss factors are in a mode.
+enum class LossKind
+{
+  none,    // the mode does not oscillate
+  viscous, // of the mode's own frequency
+  complex, // i K_loss: there is no viscous equivalent
+};
+
+LossKind loss_kind_of(const ComplexMode& mode);
+
+/// f
+std::complex<double> loss_factor_of(LossKind kind, std::complex<double> lambda);
+
+/// x'Q'(lambda) y d lambda, whose derivative of f K_loss is by Im(lambda) as well: `slope` d lambda + `turn` Im(d
+/// lambda).
+struct EigenvalueSlope
+{
+  std::complex<double> slope, turn;
+};
+
+/// From the products of left and right vectors with M, C and K_loss.
+EigenvalueSlope slope_of(LossKind kind, std::complex<double> lambda, std::complex<double> mass,
+                         std::complex<double> damping, std::complex<double> loss);
+
+/// The change of lambda that takes away a residual x'Q y.
+std::complex<double> eigenvalue_change(const EigenvalueSlope& slope, std::complex<double> residual);
+
+/// The problem and its transposed one.
+struct TwoSidedProblem
+{
+  const QuadraticProblem& matrices;
+  Mat K_loss = nullptr;               // of one layout with them; null: none
+  Owned<Mat> M_t, C_t, K_t, K_loss_t; // transposed
+  ShiftInvert pencil{};               // of K and M
+};
+
+/// Borrows the matrices. Collective.
+TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, const PencilOptions& options);
+
+/// Vectors by their real and imaginary parts, in the rows of the problem.
+struct TwoSidedMode
+{
+  std::complex<double> lambda;
+  MultiVector right, left;
+  double backward_error = 0; // the larger one of both vectors
+};
+
+/// The mode near a lambda with a right vector. Collective. Error: memory runs out.
+TwoSidedMode find_two_sided(TwoSidedProblem& problem, LossKind kind, std::complex<double> lambda,
+                            const MultiVector& right);
+
+} // namespace squeal

@@ -1,0 +1,149 @@
+#include "squeal/modes/two_sided.hpp"
+
+#include "complex_subspace.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Complex = std::complex<double>;
+using Eigen::MatrixXcd;
+using Eigen::VectorXcd;
+
+constexpr double tolerance = 1e-13; // backward error: derivatives are off by it to first order
+constexpr double near = 1e-6;       // backward errors from which on lambda follows the vectors
+constexpr int passes = 60;          // each adds two vectors to a side, with which small problems stay small
+constexpr double beside = 1e-4;     // of tau from -Re(lambda^2), which is an eigenvalue of the pencil without damping
+
+ComplexFactors factors(LossKind kind, Complex lambda)
+{
+  return {lambda * lambda, lambda, 1, loss_factor_of(kind, lambda)};
+}
+
+/// The vector that the problem on the subspace takes nearest to zero.
+VectorXcd null_vector(const ComplexSubspace& space, const ComplexFactors& factor)
+{
+  const Eigen::BDCSVD<MatrixXcd> svd(sum(space.entries, factor), Eigen::ComputeFullV);
+  return svd.matrixV().col(svd.matrixV().cols() - 1);
+}
+
+/// x'y without conjugation, of real and imaginary parts.
+Complex bilinear(const MultiVector& x, const MultiVector& y)
+{
+  const Eigen::MatrixXd products = inner_products(x, y);
+  return {products(0, 0) - products(1, 1), products(0, 1) + products(1, 0)};
+}
+
+/// By the two-sided Rayleigh quotient.
+Complex change_of_lambda(const ComplexSubspace& space, LossKind kind, Complex lambda, const MultiVector& left,
+                         const MultiVector& right)
+{
+  std::array<Complex, 4> products{};
+  Complex residual = 0;
+  const ComplexFactors factor = factors(kind, lambda);
+  for (std::size_t k = 0; k < 4; ++k)
+    if (space.matrices[k])
+    {
+      products[k] = bilinear(left, product(space.matrices[k], right));
+      residual += factor[k] * products[k];
+    }
+  return eigenvalue_change(slope_of(kind, lambda, products[0], products[1], products[3]), residual);
+}
+
+Owned<Mat> transposed(Mat A)
+{
+  Owned<Mat> result;
+  if (A) check(MatTranspose(A, MAT_INITIAL_MATRIX, result.put()));
+  return result;
+}
+
+} // namespace
+
+LossKind loss_kind_of(const ComplexMode& mode)
+{
+  if (mode.lambda.imag() == 0) return LossKind::none;
+  return std::isnan(mode.loss_error) ? LossKind::complex : LossKind::viscous;
+}
+
+Complex loss_factor_of(LossKind kind, Complex lambda)
+{
+  switch (kind)
+  {
+  case LossKind::none:
+    return 0;
+  case LossKind::viscous:
+    return lambda / lambda.imag();
+  case LossKind::complex:
+    return {0, 1};
+  }
+  return 0;
+}
+
+EigenvalueSlope slope_of(LossKind kind, Complex lambda, Complex mass, Complex damping, Complex loss)
+{
+  EigenvalueSlope result{2. * lambda * mass + damping, 0};
+  if (kind != LossKind::viscous) return result;
+  const double omega = lambda.imag();
+  result.slope += loss / omega;
+  result.turn = -lambda / (omega * omega) * loss;
+  return result;
+}
+
+Complex eigenvalue_change(const EigenvalueSlope& slope, Complex residual)
+{
+  const Complex of_imaginary = Complex(0, 1) * slope.slope + slope.turn; // the equation is real-linear in d lambda
+  Eigen::Matrix2d A;
+  A << slope.slope.real(), of_imaginary.real(), slope.slope.imag(), of_imaginary.imag();
+  const Eigen::Vector2d change = -(A.inverse() * Eigen::Vector2d(residual.real(), residual.imag()));
+  return {change(0), change(1)};
+}
+
+TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, const PencilOptions& options)
+{
+  return {matrices,
+          K_loss,
+          transposed(matrices.M),
+          transposed(matrices.C),
+          transposed(matrices.K),
+          transposed(K_loss),
+          make_shift_invert(matrices.K, matrices.M, Symmetry::none, options)};
+}
+
+TwoSidedMode find_two_sided(TwoSidedProblem& problem, LossKind kind, Complex lambda, const MultiVector& start)
+{
+  const auto& [M, C, K] = problem.matrices;
+  move_to(problem.pencil, -(1 + beside) * (lambda * lambda).real());
+  const PencilFactor& P = *problem.pencil.factor;
+  ComplexSubspace right = empty_subspace({M, C, K, problem.K_loss}),
+                  left = empty_subspace({problem.M_t, problem.C_t, problem.K_t, problem.K_loss_t});
+  extend(right, start);
+  extend(left, P.solve_transposed(product(problem.M_t, start)));
+  TwoSidedMode mode{lambda, {}, {}, HUGE_VAL};
+  for (int pass = 0;; ++pass)
+  {
+    const ComplexFactors before = factors(kind, mode.lambda);
+    const VectorXcd y = null_vector(right, before), x = null_vector(left, before);
+    mode.right = vector_of(right, y);
+    mode.left = vector_of(left, x);
+    const bool follows = mode.backward_error < near;
+    if (follows) mode.lambda += change_of_lambda(right, kind, mode.lambda, mode.left, mode.right);
+    if (kind == LossKind::none) mode.lambda.imag(0);
+    double of_right = 0, of_left = 0;
+    const ComplexFactors now = factors(kind, mode.lambda);
+    const MultiVector r = residual_of(right, now, y, of_right), s = residual_of(left, now, x, of_left);
+    mode.backward_error = std::max(of_right, of_left);
+    if ((follows && mode.backward_error <= tolerance) || pass == passes) return mode;
+    const bool wider_right = of_right > tolerance && extend(right, P.solve(r)),
+               wider_left = of_left > tolerance && extend(left, P.solve_transposed(s));
+    if (!wider_right && !wider_left && follows) return mode;
+  }
+}
+
+} // namespace squeal
