@@ -141,6 +141,8 @@ CASES = {
     "contact twice": (block_scene("[friction]", '[[contact]]\nrotor = "over"\nstator = "under"\nvelocity = [1, 0, 0]\n[friction]'),
                       ["scene.toml", '"over" and "under" are in contact already', "remove one"]),
     "missing scene file": (lambda folder: [folder / "absent.toml"], ["absent.toml"]),
+    "value twice in a sweep": (point_scene("[cycle]\n", '[sweep]\nkey = "friction.coefficient"\nvalues = [0.3, 0.2, 0.3]\n[cycle]\n'),
+                               ["scene.toml, line", "[sweep] values", "0.3", "twice", "take one of them out"]),
     "cycle from no transient": (point_scene('periods = 10\nsteps_per_period = 400\n\n[cycle]\n',
                                             'periods = 10\nenabled = false\n\n[cycle]\nstart = "transient"\n'),
                                 ["[cycle] start", "[transient]"]),

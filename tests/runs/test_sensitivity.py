@@ -11,10 +11,12 @@ OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=
 PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
        "--set", "modes.method=full", "--set", "modes.band=20000", "--set", "friction.coefficient=0.5"]
 
-SCENES = {"oscillator": OSCILLATOR, "pin": PIN}
+LOSSY = [*PIN, "--set", "part.pin.loss_factor=0.01", "--set", "part.disc.loss_factor=1e-6", "--set", "damping.loss_frequency=5000"]
+SPINNING = [*PIN, "--set", "part.disc.rotation={axis='z',rate=300}"]
+SCENES = {"oscillator": OSCILLATOR, "pin": PIN, "lossy pin": LOSSY, "spinning disc": SPINNING}
 
 
-def two_pads(folder, **friction):
+def two_pads(folder, compliance=0, **friction):
     """A disc between two pads of a caliper, all of them points: two contacts of different drive, two tangents each."""
     ground = [("disc", "z", 1.2e7, 15), ("disc", "x", 9e8, 50), ("disc", "y", 6e8, 50), ("top", "y", 1e7, 8),
               ("top", "x", 1.3e7, 8), ("top", [0.05, 1, -1], 4e6, 9), ("bottom", "y", 2.3e7, 5), ("bottom", "x", 1.7e7, 5),
@@ -25,16 +27,21 @@ def two_pads(folder, **friction):
     masses = {"disc": 0.3, "top": 0.4, "bottom": 0.55, "caliper": 0.9}
     return write_scene(folder, point=[{"name": name, "at": [0.1, 0, 0], "mass": m, "free": "x y z"} for name, m in masses.items()],
                        spring=springs, force=[{"on": "caliper", "vector": [20, 0, -900]}, {"on": "bottom", "vector": [0, 15, 850]}],
-                       contact=[{"rotor": "disc", "stator": "top", "normal": [0, 0, 1], "velocity": [0.3, 2, 0]},
+                       contact=[{"rotor": "disc", "stator": "top", "normal": [0, 0, 1], "velocity": [0.3, 2, 0],
+                                 "compliance": compliance},
                                 {"rotor": "disc", "stator": "bottom", "normal": [0, 0, -1], "velocity": [-0.5, 1.7, 0]}],
                        friction={"coefficient": 0.5, **friction}, damping={"alpha": 2.0}, modes={"band": 5000})
 
 
 @pytest.fixture
 def scene_of(tmp_path):
-    """Arguments by the name of a scene: of an input, or of two pads, whose friction falls from 0.6 with the speed."""
+    """Arguments by the name of a scene: of an input, or of two pads."""
     def find(name):
-        return SCENES.get(name) or [two_pads(tmp_path, static_coefficient=0.6, decay_speed=1.5)]
+        if name == "compliant pads":
+            return [two_pads(tmp_path, compliance=2e-9)]
+        if name == "falling friction":
+            return [two_pads(tmp_path, static_coefficient=0.6, decay_speed=1.5)]
+        return SCENES[name]
     return find
 
 
@@ -60,6 +67,9 @@ def overridden(key, value):
            "rigid_body.holder.mass", "spring.0.stiffness", "contact.0.rotation.rate", "part.pin.poisson"]),
     ("falling friction", ["friction.coefficient", "friction.static_coefficient", "friction.decay_speed", "contact.0.velocity.1",
                           "contact.1.velocity.0", "force.0.vector.2"]),
+    ("compliant pads", ["friction.coefficient", "contact.0.compliance", "spring.3.stiffness", "force.0.vector.2"]),
+    ("lossy pin", ["part.pin.loss_factor", "part.pin.young", "friction.coefficient"]),
+    ("spinning disc", ["part.disc.rotation.rate", "part.disc.density"]),
 ])
 def test_derivatives_are_central_differences(scene, keys, scene_of, converged):
     scene = scene_of(scene)
@@ -79,6 +89,28 @@ def test_derivatives_are_central_differences(scene, keys, scene_of, converged):
         assert abs(found - wanted) <= 1e-6 * max(abs(wanted), 1e-2 * abs(own)), (d["key"], found, wanted)
 
 
+@pytest.mark.parametrize("scene, key, step, needs", [
+    ("pin", "part.pin.loss_factor", 1e-5, ["damping.loss_frequency=5000"]),
+    ("pin", "spring.0.damping", 300.0, []),
+    ("lossy pin", "part.disc.loss_factor", 1e-4, []), # 1e-6: a ten-thousandth of it would drown in rounding
+    ("falling friction", "contact.0.compliance", 1e-10, []),
+    ("falling friction", "contact.0.normal.0", 1e-3, []),
+    ("falling friction", "contact.0.gap", 1e-7, []),
+])
+def test_derivatives_at_zero_are_one_sided_differences(scene, key, step, needs, scene_of, converged):
+    scene = scene_of(scene)
+    mode = converged(*scene, *sensitivity_of(key), ranks=1).report["sensitivity"]["modes"][0]
+    own = complex(mode["growth_rate"], 2 * np.pi * mode["frequency_hz"])
+    [d] = mode["derivatives"]
+    assert d["known"]
+    found = complex(d["growth_rate_by"], 2 * np.pi * d["frequency_hz_by"])
+    needed = [word for need in needs for word in ("--set", need)]
+    sides = [lambda_of(converged(*scene, *(needed if i else []), "--set", overridden(key, d["value"] + i * step), ranks=1).report, own)
+             for i in range(5)]
+    wanted = np.dot([-25, 48, -36, 16, -3], sides) / (12 * step) # of fourth order
+    assert abs(found - wanted) <= 1e-6 * abs(wanted), (key, found, wanted)
+
+
 @pytest.fixture(scope="module")
 def pin(tmp_path_factory):
     from conftest import Run
@@ -87,6 +119,12 @@ def pin(tmp_path_factory):
     run = Run([*PIN, *changes], 1, tmp_path_factory.mktemp("pin"))
     assert run.code == 0, run.printed[-2000:] + run.errors[-2000:]
     return run
+
+
+@pytest.mark.parametrize("scene", ["compliant pads", "lossy pin", "spinning disc"])
+def test_powers_sum_beyond_rigid_pairs_and_symmetric_matrices(scene, scene_of, converged):
+    for mode in converged(*scene_of(scene), *sensitivity_of("friction.coefficient"), ranks=1).report["sensitivity"]["modes"]:
+        assert abs(sum(mode["contact_powers"]) - mode["damping_power"] - 2 * mode["growth_rate"]) <= 1e-10 * 2 * np.pi * mode["frequency_hz"]
 
 
 def test_powers_sum_to_twice_the_growth_rate(pin):
@@ -149,7 +187,8 @@ def test_a_stable_scene_has_nothing_to_explain(converged):
 
 @pytest.mark.parametrize("lines, words", [
     ("[sensitivity]\nnumbers = ['friction.coefficent']", "not in the scene"),
-    ("[sensitivity]\nnumbers = ['damping.beta']", "is 0"),
+    ("[sensitivity]\nnumbers = ['friction.decay_speed']", "is 0, and nothing beside that is a scene"),
+    ("[sensitivity]\nnumbers = ['point.0.mass', 'damping.beta', 'point.0.mass']", 'names "point.0.mass" twice'),
     ("[[change]]\nprobe = 'pad_y'\nmass = 1", "give that table too"),
     ("[sensitivity]\n[[change]]\nprobe = 'pad_z'\nmass = 1", "is not defined"),
     ("[sensitivity]\n[[change]]\nprobe = 'pad_y'", "neither mass, damping nor stiffness"),

@@ -1,5 +1,5 @@
 #pragma once
-/// A mode with its left vector, of the whole problem whatever its matrices (src/README.md, section 11.1):
+/// A mode with its left vector, of the whole problem whatever its matrices (src/README.md, sections 3.11 and 11.1):
 ///     Q(lambda) y = 0,   Q(lambda)'x = 0,   Q = lambda^2 M + lambda C + K + f K_loss
 /// f is lambda/Im(lambda) where loss factors have their viscous equivalent at the mode's own frequency, else i; 0 of a
 /// real lambda.
