@@ -11,6 +11,18 @@ struct Match
   int to = -1;      // place among the modes of the next point; -1: unclear
   double mac = 0;   // of the mode, or of the subspace
   int subspace = 1; // number of modes that are matched together
+  int cluster = -1; // the first of them
+};
+
+/// A point with its modes on the basis, and the track of each.
+struct Followed
+{
+  std::vector<double> values;
+  bool reversed = false;
+  bool inserted = false;
+  int closed = 0; // pairs
+  PointModes modes{};
+  std::vector<int> tracks{}; // -1: none
 };
 
 /// At least this much of a mode, or of a subspace, must be found again.

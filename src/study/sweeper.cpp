@@ -1,12 +1,12 @@
 #include "sweeper.hpp"
 
 #include "following.hpp"
-#include "squeal/algebra/root.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "sweep_checkpoint.hpp"
 #include "swept_model.hpp"
+#include "thresholds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -21,28 +21,6 @@ namespace
 /// of those at 1e-10, half of them within 7e-8.
 constexpr double large_tolerance = 1e-6;
 constexpr double threshold_tolerance = 1e-5; // of the number's larger end
-
-/// A point with its modes on the basis, and the track of each.
-struct Followed
-{
-  std::vector<double> values;
-  bool reversed = false;
-  bool inserted = false;
-  int closed = 0; // pairs
-  PointModes modes{};
-  std::vector<int> tracks{}; // -1: none
-};
-
-bool in_band(const TwoSidedPair& pair, double band)
-{
-  return std::abs(pair.lambda) < two_pi * band;
-}
-
-/// Positive where the mode counts as unstable.
-double instability(std::complex<double> lambda)
-{
-  return lambda.real() - 1e-8 * std::abs(lambda);
-}
 
 class Sweeper
 {
@@ -233,7 +211,6 @@ private:
     }
     if (!all_clear(before, matches)) matches = follow(between_both, least_clear(before, now));
     take_tracks(before, now, matches);
-    seek_thresholds(before, now, matches);
     record(now, matches_at(now, matches));
   }
 
@@ -245,18 +222,34 @@ private:
     return true;
   }
 
+  /// Seeks the thresholds on the way. The modes found meanwhile are nearer to each other than those of both ends, so
+  /// that tracks go by them; where one of those is unclear, by both ends.
   void take_tracks(const Followed& before, Followed& now, const std::vector<Match>& matches)
   {
-    now.tracks.assign(now.modes.pairs.size(), -1);
+    const double size = std::max(std::abs(before.values[0]), std::abs(now.values[0]));
+    const auto point_at = [&](double value)
+    {
+      std::vector<double> values = now.values;
+      values[0] = value;
+      return evaluate({values, now.reversed, true});
+    };
+    const auto match = [&](const Followed& from, const Followed& to)
+    { return follow(forms(from, to), least_clear(from, to)); };
+    for (Threshold& threshold : find_thresholds(
+             {point_at, match, problem_.modes.band, threshold_tolerance * size, sweep_.tracks}, before, now, matches))
+      sweep_.thresholds.push_back(std::move(threshold));
+    const auto has = [&](int track) { return std::ranges::find(now.tracks, track) != now.tracks.end(); };
     for (std::size_t i = 0; i < matches.size(); ++i)
+    {
       if (matches[i].to >= 0)
       {
-        now.tracks[static_cast<std::size_t>(matches[i].to)] = before.tracks[i];
+        int& track = now.tracks[static_cast<std::size_t>(matches[i].to)];
+        if (track < 0 && !has(before.tracks[i])) track = before.tracks[i];
         double& least = matches[i].mac < clear_mac ? sweep_.least_mac_across : sweep_.least_mac;
         least = std::min(least, matches[i].mac);
       }
-      else if (in_band(before.modes.pairs[i], problem_.modes.band))
-        ++sweep_.lost;
+      if (in_band(before.modes.pairs[i], problem_.modes.band) && !has(before.tracks[i])) ++sweep_.lost;
+    }
     for (int& track : now.tracks)
       if (track < 0) track = sweep_.tracks++;
   }
@@ -284,58 +277,6 @@ private:
     }
     sweep_.outcome.residual = std::max(sweep_.outcome.residual, now.modes.outcome.residual);
     sweep_.points.push_back(std::move(point));
-  }
-
-  void seek_thresholds(const Followed& before, const Followed& now, const std::vector<Match>& matches)
-  {
-    for (std::size_t i = 0; i < matches.size(); ++i)
-    {
-      if (matches[i].to < 0 || !in_band(before.modes.pairs[i], problem_.modes.band)) continue;
-      const double from = instability(before.modes.pairs[i].lambda),
-                   to = instability(now.modes.pairs[static_cast<std::size_t>(matches[i].to)].lambda);
-      if ((from > 0) != (to > 0))
-        seek_threshold(before, now, before.tracks[i], {before.values[0], now.values[0], from, to});
-    }
-  }
-
-  /// Every value on the way is matched with the nearest point that is known.
-  void seek_threshold(const Followed& before, const Followed& now, int track, const Bracket& bracket)
-  {
-    std::vector<Followed> between;
-    double frequency = 0;
-    const auto growth = [&](double value) -> std::optional<double>
-    {
-      const Followed* nearest = &before;
-      const auto nearer = [&](const Followed& point)
-      { return std::abs(point.values[0] - value) < std::abs(nearest->values[0] - value); };
-      if (nearer(now)) nearest = &now;
-      for (const Followed& point : between)
-        if (nearer(point)) nearest = &point;
-      std::vector<double> values = now.values;
-      values[0] = value;
-      std::optional<Followed> here = evaluate({values, now.reversed, true});
-      if (!here) return std::nullopt;
-      const std::vector<Match> matches = follow(forms(*nearest, *here), least_clear(*nearest, *here));
-      here->tracks.assign(here->modes.pairs.size(), -1);
-      std::optional<double> result;
-      for (std::size_t i = 0; i < matches.size(); ++i)
-        if (matches[i].to >= 0)
-        {
-          const auto place = static_cast<std::size_t>(matches[i].to);
-          here->tracks[place] = nearest->tracks[i];
-          if (nearest->tracks[i] != track) continue;
-          frequency = frequency_hz_of(here->modes.pairs[place].lambda);
-          result = instability(here->modes.pairs[place].lambda);
-        }
-      between.push_back(std::move(*here));
-      return result;
-    };
-    const double size = std::max(std::abs(bracket.a), std::abs(bracket.b));
-    const Root root = find_root(growth, bracket, threshold_tolerance * size);
-    Threshold threshold{now.values, now.reversed, track,
-                        root.error, frequency,    (bracket.value_b > 0) == (bracket.b > bracket.a) ? 1 : -1};
-    threshold.values[0] = root.x;
-    sweep_.thresholds.push_back(std::move(threshold));
   }
 
   const SweepProblem& problem_;

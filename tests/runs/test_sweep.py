@@ -106,14 +106,20 @@ def test_a_large_tolerance_keeps_the_threshold(pin, converged):
         same_modes(modes_at(rows, mu), modes_at(exact, mu), 1e-3)
 
 
-@pytest.mark.parametrize("points", [2, 3, 12])
-def test_the_exact_threshold_of_the_oscillator(points, converged):
-    """Whatever the points: lock-in lies between two of them, and the growth rate is flat before it."""
-    run = converged(*OSCILLATOR, *sweep_of(points=points), ranks=1)
+@pytest.mark.parametrize("values", ["[0.05,0.5]", "[0.05,0.275,0.5]", "[0.1,0.3]", "[0.1,2.5]", "[0.1,1.3,2.5]",
+                                    "[0.1,0.9,1.7,2.5]", "[0.1,0.3,0.9,1.6,2.5]"])
+def test_the_exact_threshold_of_the_oscillator(values, converged):
+    """Whatever the points: lock-in lies between two of them, where modes cannot be told apart, and the growth rate is
+    flat before it. The mode that it names is the unstable one at every later point."""
+    run = converged(*OSCILLATOR, "--set", "sweep.key=friction.coefficient", "--set", f"sweep.values={values}", ranks=1)
     sweep = run.report["sweep"]
     assert [t["change"] for t in sweep["thresholds"]] == [1]
-    assert sweep["thresholds"][0]["values"][0] == pytest.approx(HOPF, abs=1e-5 * 0.5 + 1e-8)
+    threshold = sweep["thresholds"][0]
+    assert threshold["values"][0] == pytest.approx(HOPF, abs=threshold["error"])
+    assert threshold["error"] <= 1e-5 * json.loads(values)[-1]
     assert sweep["lost_modes"] == 0 and sweep["least_mac"] >= 0.9
+    unstable = {row["track"] for row in rows_of(run.output) if float(row["growth_rate"]) > 1e-6}
+    assert unstable == {str(threshold["track"])}
 
 
 @pytest.mark.parametrize("key, value, override", [
