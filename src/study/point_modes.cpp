@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <ranges>
 
 namespace squeal
 {
@@ -225,11 +226,29 @@ struct DenseSliding
   MatrixXd M, C, K;
 };
 
-/// On the shapes alone, which come after the sketched columns.
+/// On the independent combinations of the shapes, which come after the sketched columns.
 DenseSliding without_sketch(const ProjectedSliding& on_basis, Index shapes)
 {
-  return {on_basis.M.bottomRightCorner(shapes, shapes), on_basis.C.bottomRightCorner(shapes, shapes),
-          on_basis.K.bottomRightCorner(shapes, shapes)};
+  const MatrixXd& V = on_basis.independent;
+  const auto on_shapes = [&](const MatrixXd& A) -> MatrixXd
+  {
+    const auto corner = A.bottomRightCorner(shapes, shapes);
+    return V.size() > 0 ? MatrixXd(V.transpose() * corner * V) : MatrixXd(corner);
+  };
+  return {on_shapes(on_basis.M), on_shapes(on_basis.C), on_shapes(on_basis.K)};
+}
+
+/// Vectors of pairs on other coordinates.
+void transform(std::vector<TwoSidedPair>& pairs, const MatrixXd& of_right, const MatrixXd& of_left)
+{
+  if (pairs.empty()) return;
+  const MatrixXcd right = real_times(of_right, vectors_of(pairs, Side::right)),
+                  left = real_times(of_left, vectors_of(pairs, Side::left));
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+  {
+    pairs[k].right = right.col(static_cast<Index>(k));
+    pairs[k].left = left.col(static_cast<Index>(k));
+  }
 }
 
 /// Where a few pairs alone miss their tolerance, they are refined on the whole basis.
@@ -243,7 +262,10 @@ void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const
   if (places.empty() || places.size() > few) return;
   for (const std::size_t k : places) pairs.push_back(solved.pairs[k]);
   const DenseSliding on_shapes = without_sketch(on_basis, modes.basis.shapes());
+  const MatrixXd &V = on_basis.independent, V_transposed = V.transpose();
+  if (V.size() > 0) transform(pairs, V_transposed, V_transposed);
   refine_pairs_shared(modes.basis.T.comm, on_shapes.M, on_shapes.C, on_shapes.K, pairs);
+  if (V.size() > 0) transform(pairs, V, V);
   SolvedPairs refined = with_errors(modes, on_basis, std::move(pairs));
   for (std::size_t i = 0; i < places.size(); ++i)
   {
@@ -269,16 +291,8 @@ SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_
   }
   std::vector<TwoSidedPair> pairs = solve_two_sided_shared(comm, M, C, K);
   std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); });
-  if (extent == Extent::near_band)
-  {
-    const MatrixXcd right = real_times(spaces.right, vectors_of(pairs, Side::right)),
-                    left = real_times(spaces.left, vectors_of(pairs, Side::left));
-    for (std::size_t k = 0; k < pairs.size(); ++k)
-    {
-      pairs[k].right = right.col(static_cast<Index>(k));
-      pairs[k].left = left.col(static_cast<Index>(k));
-    }
-  }
+  if (extent == Extent::near_band) transform(pairs, spaces.right, spaces.left);
+  if (const MatrixXd& V = on_basis.independent; V.size() > 0) transform(pairs, V, V);
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const TwoSidedPair& a, const TwoSidedPair& b) { return a.lambda.real() > b.lambda.real(); });
   return with_errors(modes, on_basis, std::move(pairs));
@@ -296,11 +310,35 @@ bool correct(ModesBasis& modes, MultiVector residuals)
   return extend(modes.basis, product(modes.contact.Z, responses)) > 0;
 }
 
+/// All of the space joins the basis where the problem is small. Returns whether that adds anything.
+bool complete(ModesBasis& modes, const PointProblem& problem)
+{
+  PetscInt size = 0, first = 0;
+  check(MatGetSize(problem.sliding.structure.K, &size, nullptr));
+  check(MatGetOwnershipRange(problem.sliding.structure.K, &first, nullptr));
+  if (size > problem.whole) return false;
+  MultiVector all{modes.basis.T.comm, MatrixXd::Zero(modes.basis.T.entries.rows(), size)};
+  all.entries.middleCols(first, all.entries.rows()).setIdentity();
+  modes.whole = true;
+  return extend(modes.basis, std::move(all)) > 0;
+}
+
 /// The result of a point, without what is no mode.
 PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const ProjectedSliding& on_basis, Index shapes)
 {
   PointModes result;
   result.outcome.kind = OutcomeKind::converged;
+  const auto inexact =
+      std::ranges::count_if(std::views::iota(std::size_t{0}, solved.pairs.size()), [&](std::size_t k)
+                            { return !(solved.backward_error(k) <= tolerance_of(solved.pairs[k], problem)); });
+  if (inexact > 0)
+  {
+    result.outcome.kind = OutcomeKind::not_converged;
+    result.outcome.reason =
+        format("%d of %zu eigenvalues have backward errors above %.0e, the largest %.0f times its "
+               "tolerance: allow more corrections by -sweep_passes",
+               static_cast<int>(inexact), solved.pairs.size(), problem.tolerance, largest_excess(solved, problem));
+  }
   for (std::size_t k = 0; k < solved.pairs.size(); ++k)
   {
     const double error = solved.backward_error(k);
@@ -413,6 +451,11 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
       for (const Side side : {Side::right, Side::left})
         append_residuals(modes, problem, point, inexact(solved, problem, side), side, residuals);
     if (correct(modes, std::move(residuals))) continue;
+    if (now > 1 && complete(modes, problem))
+    {
+      extent = Extent::whole;
+      continue;
+    }
     if (extent == Extent::near_band && now > 1) solved = solve_projected(modes, on_basis, window, Extent::whole);
     PointModes result = modes_of(solved, problem, on_basis, modes.basis.shapes());
     result.outcome.iterations = static_cast<int>(pass);

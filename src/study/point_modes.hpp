@@ -60,9 +60,12 @@ struct PointProblem
   double band = 0;      // [Hz]
   double tolerance = 0; // on the backward error of right and left vectors
   PetscInt passes = 0;  // corrections of the basis, at most
+  PetscInt whole = 0;   // up to this size a problem that these leave inexact is solved on all degrees of freedom
 };
 
 /// Vectors are coefficients of the basis; those of earlier points lack the shapes that came later.
+/// outcome: "converged", or "not converged": an eigenvalue of the basis exceeds the tolerance. Then those that exceed
+/// 1e-8 as well are left out.
 struct PointModes
 {
   Outcome outcome;

@@ -1,7 +1,10 @@
 #include "sliding_basis.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
+
 #include <algorithm>
 #include <array>
+#include <Eigen/Cholesky>
 
 namespace squeal
 {
@@ -115,6 +118,18 @@ MultiVector change_by_lift(const SlidingBasis& basis, const ClosedContact& conta
   return change;
 }
 
+/// Orthonormal combinations of the shapes that hold more than a trace of other degrees of freedom than the pivots, by
+/// the inner products without these; empty: every combination does. What a lift makes of the others is rounding: its
+/// projection is singular, with any number for an eigenvalue.
+MatrixXd independent_part(const MatrixXd& kept)
+{
+  constexpr double trace = 1e-12; // square of a part of 1e-6: rounding leaves it a relative error of 1e-10
+  const MatrixXd shifted = kept - trace * MatrixXd::Identity(kept.rows(), kept.cols());
+  if (shifted.llt().info() == Eigen::Success) return {}; // as mostly, at a tenth of the work
+  const SymmetricEigenpairs parts = solve_dense_symmetric(kept);
+  return parts.y.rightCols((parts.lambda.array() >= trace).count());
+}
+
 /// Sets the lift by Z where it has changed.
 void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact)
 {
@@ -130,6 +145,7 @@ void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact)
   const MatrixXd at_pivots = basis.T.entries(lift.pivots, Eigen::all).rightCols(basis.shapes());
   lift.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) -
               shared_sum(at_pivots.transpose() * at_pivots, basis.T.comm); // shapes are orthonormal
+  lift.independent = independent_part(lift.kept);
   for (BasisImage* image : {&basis.M, &basis.C, &basis.K})
   {
     const MatrixXd rows = image->contact_rows.entries(lift.in_contact, Eigen::all);
@@ -263,6 +279,7 @@ ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat 
   ProjectedSliding result{projected(basis.M, by_Y), projected(basis.C, by_Y), projected(basis.K, by_Y)};
   if (damping) result.C += projected_damping(basis, by_Y, B, damping);
   result.kept = basis.by_Z.kept;
+  result.independent = basis.by_Z.independent;
   return result;
 }
 

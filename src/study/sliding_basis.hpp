@@ -29,6 +29,7 @@ struct LiftByZ
   std::vector<Eigen::Index> pivots{};     // local rows
   std::vector<Eigen::Index> in_contact{}; // their places among the contact's degrees of freedom
   Eigen::MatrixXd kept{};                 // inner products of the shapes without the pivots
+  Eigen::MatrixXd independent{};          // combinations of shapes that stay so without the pivots; empty: all do
 };
 
 /// The first columns of T are random vectors, `sketched` of them. They only test: the products with a residual show its
@@ -58,11 +59,11 @@ SlidingBasis leading_part(const SlidingBasis& basis, Eigen::Index shapes);
 /// Takes over the matrices of a structure where they have changed.
 void set_structure(SlidingBasis& basis, const Structure& structure);
 
-/// The structure at a point, on T: Y'M Z, Y'(C + C_f) Z, Y'K Z, and the inner products of the shapes without the
-/// pivots.
+/// The structure at a point, on T: Y'M Z, Y'(C + C_f) Z, Y'K Z, with the inner products and the independent
+/// combinations of the lift.
 struct ProjectedSliding
 {
-  Eigen::MatrixXd M{}, C{}, K{}, kept{};
+  Eigen::MatrixXd M{}, C{}, K{}, kept{}, independent{};
 };
 
 /// `damping`: of the friction direction, on the rows of B; may be null.

@@ -145,6 +145,7 @@ private:
     if (at.outcome.kind == OutcomeKind::converged && problem_.settings.stages >= SweepStages::modes)
       point.modes = model_.modes_at({point.values, point.reversed}, tolerance_);
     if (point.modes.outcome.kind == OutcomeKind::converged) return point;
+    point.modes.pairs.clear(); // of which some may be no modes
     record(point, {});
     return std::nullopt;
   }
@@ -275,7 +276,8 @@ private:
       point.modes.push_back({pair.lambda, now.modes.errors[k], now.tracks.empty() ? -1 : now.tracks[k],
                              match.to >= 0 ? match.mac : 1, match.subspace});
     }
-    sweep_.outcome.residual = std::max(sweep_.outcome.residual, now.modes.outcome.residual);
+    if (point.outcome.kind == OutcomeKind::converged)
+      sweep_.outcome.residual = std::max(sweep_.outcome.residual, point.outcome.residual);
     sweep_.points.push_back(std::move(point));
   }
 

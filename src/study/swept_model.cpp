@@ -126,9 +126,11 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
     if (basis_reversed_ != place.reversed) turn_round(*basis_);
     basis_reversed_ = place.reversed;
     if (common != basis_->closed) rebase(*basis_, basis_problem(), common);
-    modes = find_point_modes(
-        *basis_,
-        {{model_->structure, model_->interface, equilibrium}, problem_.modes.band, tolerance, problem_.options.passes});
+    modes = find_point_modes(*basis_, {{model_->structure, model_->interface, equilibrium},
+                                       problem_.modes.band,
+                                       tolerance,
+                                       problem_.options.passes,
+                                       problem_.modes_options.dense_limit});
   }
   catch (const LibraryError&)
   {

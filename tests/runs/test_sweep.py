@@ -95,6 +95,28 @@ def test_thresholds_of_the_pin_are_where_single_runs_change(pin, converged):
     assert counts[1] - counts[0] == change
 
 
+def test_pairs_that_open_leave_no_mode_of_rounding(converged):
+    """Three of nine pairs open on the way. Shapes that lie on pivots alone gave eigenvalues of any size, and a basis that
+    grew in search of them, to 398 shapes of 475 degrees of freedom."""
+    small = [*PIN, "--set", "damping.beta=6e-7", "--set", "modes.band=8000"]
+    run = converged(*small, *sweep_of(end=0.6, points=7, directions="both"), ranks=1)
+    assert run.report["sweep"]["basis_shapes"] < 475 / 2
+    single = converged(*small, "--set", "friction.coefficient=0.6", "--set", "contact.0.rotation={axis='z', rate=-20}",
+                       ranks=1).report
+    same_modes(modes_at(rows_of(run.output), 0.6, -1), lambdas(single), 1e-9)
+
+
+def test_what_misses_its_tolerance_fails_or_is_solved_whole(squeal, converged):
+    ask = [*PIN, "--set", "modes.band=8000", "--set", "sweep.key=friction.coefficient", "--set", "sweep.values=[0.05,0.3]",
+           "-sweep_passes", "0"]
+    run = squeal(*ask, ranks=1)
+    assert run.code == 2 and "2 of 2 points failed" in run.report["sweep"]["reason"]
+    assert "backward errors above 1e-10" in run.report["sweep"]["reason"] and modes_at(rows_of(run.output), 0.3) == []
+    whole = converged(*ask, "-modes_dense_limit", "500", ranks=1)
+    single = converged(*PIN, "--set", "modes.band=8000", "--set", "friction.coefficient=0.3", ranks=1).report
+    same_modes(modes_at(rows_of(whole.output), 0.3), lambdas(single), 1e-9)
+
+
 def test_a_large_tolerance_keeps_the_threshold(pin, converged):
     """As on large models, with real modes in slices. Near the limit of stability pairs are a hundred times as exact."""
     run = converged(*PIN, *sweep_of(end=0.35, points=4), "-sweep_tolerance", "1e-6", "-modes_dense_limit", "100", ranks=1)
