@@ -127,7 +127,7 @@ Cluster linked(const MatrixXd& macs, Index start, const Places& open_from, const
   return cluster;
 }
 
-/// Matches the members of a cluster, the largest MACs first; among equals those of nearest lambda.
+/// Matches the members of a cluster, the largest MACs first.
 void match_within(const Cluster& cluster, const MatrixXd& macs, double mac, std::vector<Match>& matches)
 {
   Places from = cluster.from, to = cluster.to;
@@ -200,6 +200,14 @@ ModeForms forms_between(const PointModes& from, const PointModes& to)
 {
   const PointModes& last = from.M.rows() > to.M.rows() ? from : to; // has all shapes
   return {form(from, to, last), form(to, from, last), form(from, from, last), form(to, to, last)};
+}
+
+ModeForms overlaps_between(const PointModes& from, const PointModes& to)
+{
+  const MatrixXd& M = (from.M.rows() > to.M.rows() ? from : to).M;
+  const MatrixXcd a = padded(from, &TwoSidedPair::right, M.rows()), b = padded(to, &TwoSidedPair::right, M.rows());
+  const MatrixXcd M_a = real_times(M, a), M_b = real_times(M, b);
+  return {a.adjoint() * M_b, b.adjoint() * M_a, a.adjoint() * M_a, b.adjoint() * M_b};
 }
 
 ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, const Structure& structure, Mat Cf)

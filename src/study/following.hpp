@@ -31,6 +31,10 @@ inline constexpr double clear_mac = 0.9;
 /// The same where other pairs are closed: modes jump there. More than half of a mode is in one other alone.
 inline constexpr double clear_mac_across = 0.6;
 
+/// The same for the overlap of modes of opposite directions of rotation, which falls near lock-in. On the pin with two
+/// divisions at mu = 0.05 modes share at least 0.33 with themselves, and less than 0.05 with others [6ea0b68].
+inline constexpr double clear_overlap = 0.25;
+
 /// The form b of section 10.3 between the modes of two points, with the matrices of one of them.
 struct ModeForms
 {
@@ -40,6 +44,10 @@ struct ModeForms
 
 /// On the basis that both points share; equal pairs are closed. Not collective.
 ModeForms forms_between(const PointModes& from, const PointModes& to);
+
+/// Products y^H M y' of right vectors, in place of b: between opposite directions of rotation. Turning friction round
+/// turns right into left vectors, so that b would match a mode with its partner near lock-in. Not collective.
+ModeForms overlaps_between(const PointModes& from, const PointModes& to);
 
 /// Modes in the structure's degrees of freedom, as `expanded` gives them.
 struct ExpandedModes

@@ -163,7 +163,7 @@ private:
           break;
         }
     if (first_)
-      for (std::size_t i = 0; const Match& match : follow(forms_with_first(now), clear_mac))
+      for (std::size_t i = 0; const Match& match : matches_with_first(now))
       {
         const int track = first_->tracks[i++];
         if (match.to >= 0) now.tracks[static_cast<std::size_t>(match.to)] = track;
@@ -174,12 +174,13 @@ private:
     if (!first_) first_ = now;
   }
 
-  /// Between the first point of all and one whose basis may be that of the other direction of rotation.
-  ModeForms forms_with_first(const Followed& now) const
+  /// Between the first point of all and that of a line. The basis of the other direction of rotation is another one.
+  std::vector<Match> matches_with_first(const Followed& now) const
   {
-    if (first_->reversed == now.reversed) return forms_between(first_->modes, now.modes);
+    if (first_->reversed == now.reversed) return follow(forms_between(first_->modes, now.modes), clear_mac);
     const Eigen::Index shapes = model_.shared_shapes();
-    return forms_between(leading_part(first_->modes, shapes), leading_part(now.modes, shapes));
+    return follow(overlaps_between(leading_part(first_->modes, shapes), leading_part(now.modes, shapes)),
+                  clear_overlap);
   }
 
   ModeForms forms(const Followed& before, const Followed& now)

@@ -86,6 +86,18 @@ def test_modes_are_followed(pin):
         assert frequency.shape == (len(sweep["points"]), sweep["followed_modes"])
 
 
+def test_a_mode_has_one_number_in_both_directions(pin):
+    """The pin is its own mirror image, so that each mode of one direction is one of the other, also beside lock-in."""
+    sweep, modes = pin.report["sweep"], names(rows_of(pin.output))
+    mu = min(float(value) for value, _ in modes)
+    first, second = ([tracks for (value, turned), tracks in modes.items() if float(value) == mu and turned == direction]
+                     for direction in ("1", "-1"))
+    assert first == second
+    forward, back = ([(t["track"], t["change"]) for t in sweep["thresholds"] if t["direction"] == direction]
+                     for direction in (1, -1))
+    assert forward == back
+
+
 def test_thresholds_of_the_pin_are_where_single_runs_change(pin, converged):
     thresholds = [t for t in pin.report["sweep"]["thresholds"] if t["direction"] == 1]
     assert thresholds
