@@ -45,12 +45,28 @@ def draw_motions(above, energy, motions, size):
 
 
 def sweep_of(results):
+    """Of two numbers, what a map shows stands at the points; of one, modes must be followed."""
     sweep = results.stage("sweep")
-    if sweep["stages"] == "equilibrium":
+    if not any("growth_rate" in point for point in sweep["points"]):
         raise Missing("the sweep has no modes")
-    if sweep["followed_modes"] == 0:
-        raise Missing("no mode of the sweep was followed")
+    if len(sweep["keys"]) == 1 and sweep["followed_modes"] == 0:
+        raise Missing("modes are not followed through random points of one number")
     return sweep
+
+
+def labels_of(sweep):
+    """The swept numbers with their units."""
+    return [key if unit == "-" else f"{key} [{unit}]" for key, unit in zip(sweep["keys"], sweep["units"])]
+
+
+def strongest_tracks(sweep):
+    """Modes that are unstable somewhere, each with the entry of the direction of rotation in which it grows most."""
+    strongest = {}
+    for entry in sweep["unstable_tracks"]:
+        known = strongest.setdefault(entry["track"], entry)
+        if entry["greatest_growth_rate"] > known["greatest_growth_rate"]:
+            strongest[entry["track"]] = entry
+    return strongest
 
 
 def ordered_rows(table, choice):
@@ -63,18 +79,19 @@ def draw_column(axes, table, rows, sweep, size):
     """One direction of rotation: frequencies above, growth rates below; modes that are unstable somewhere in colour."""
     above, below = axes
     number = table["value"][rows, 0]
-    coloured = [entry["track"] for entry in sweep["unstable_tracks"]]
+    coloured = strongest_tracks(sweep)
     for track in range(table["frequency"].shape[1]):
         frequency, growth = table["frequency"][rows, track], table["growth_rate"][rows, track]
         if track not in coloured:
             above.plot(number, frequency / size, "-", color="0.75", lw=0.8)
             below.plot(number, growth, "-", color="0.8", lw=0.8)
-    for place, track in enumerate(coloured):
+    for place, (track, strongest) in enumerate(coloured.items()):
         frequency, growth = table["frequency"][rows, track], table["growth_rate"][rows, track]
         if np.isnan(frequency).all():
             continue
         colour, mark = COLOURS[place % len(COLOURS)], MARKS[place // len(COLOURS) % len(MARKS)]
-        label = f"mode {track}, {np.nanmean(frequency):.0f} Hz" if size == 1000 else f"mode {track}, {np.nanmean(frequency):.3g} Hz"
+        hertz = f"{strongest['frequency_hz']:.0f}" if size == 1000 else f"{strongest['frequency_hz']:.3g}"
+        label = f"mode {track}, {hertz} Hz where it grows most"
         above.plot(number, frequency / size, "-", color=colour, marker=mark, ms=3.5, lw=1.4, label=label)
         below.plot(number, growth, "-", color=colour, marker=mark, ms=3.5, lw=1.4)
     below.axhline(0, color="0.3", lw=0.8)
@@ -106,7 +123,7 @@ def draw_chart(results, sweep, table):
             if threshold["direction"] == direction:
                 for ax in axes[:, column]:
                     ax.axvline(threshold["values"][0], color="0.4", lw=0.8, ls=":")
-        axes[-1, column].set_xlabel(sweep["keys"][0])
+        axes[-1, column].set_xlabel(labels_of(sweep)[0])
         if len(directions) > 1:
             axes[0, column].set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
     axes[0, 0].set_ylabel(f"frequency [{unit}]")
@@ -116,13 +133,12 @@ def draw_chart(results, sweep, table):
         energies = [m["mean_fluctuating_energy"] for pairs in motions.values() for _, m in pairs if m["frequency_hz"]]
         if max(energies) > 10 * min(energies) > 0:
             axes[2, 0].set_yscale("log")
-    coloured = [entry["track"] for entry in sweep["unstable_tracks"]]
+    coloured = list(strongest_tracks(sweep))
     limit_growth(axes[1, 0], table["growth_rate"][:, coloured] if coloured else table["growth_rate"])
     legend = {}
     for ax in axes[0]:  # a mode keeps its colour: one label each
         for handle, label in zip(*ax.get_legend_handles_labels()):
-            if ax is axes[0, 0] or not label.startswith("mode "):
-                legend[label] = handle
+            legend.setdefault(label, handle)
     if legend:
         labels, handles = list(legend), list(legend.values())
         figure.get_layout_engine().set(rect=(0, 0.06, 1, 0.94))  # the legend is below
@@ -131,42 +147,44 @@ def draw_chart(results, sweep, table):
     return figure
 
 
-def draw_map(results, sweep, table):
+def draw_map(results, sweep):
     """Largest growth rate over the plane of two numbers; points as dots, the thresholds of each mode as its colour."""
-    directions = [d for d in (1, -1) if (table["direction"] == d).any()]
+    found = [p for p in sweep["points"] if "growth_rate" in p]
+    directions = [d for d in (1, -1) if any(p["direction"] == d for p in found)]
     figure, axes = plt.subplots(1, len(directions), figsize=(3.4 + 3.6 * len(directions), 4.6), sharey=True, squeeze=False)
-    growth = np.nanmax(table["growth_rate"], axis=1)
-    limit = max(np.nanmax(growth), 1e-12)
-    tracks = [entry["track"] for entry in sweep["unstable_tracks"]]
+    limit = max(max(p["growth_rate"] for p in found), 1e-12)
     for ax, direction in zip(axes[0], directions):
-        rows = np.flatnonzero(table["direction"] == direction)
-        first, second, level = table["value"][rows, 0], table["value"][rows, 1], np.clip(growth[rows], 0, limit)
-        shade = ax.tripcolor(first, second, level, cmap="YlOrRd", vmin=0, vmax=limit, shading="gouraud")
-        stable = table["unstable_modes"][rows] == 0
-        ax.plot(first[stable], second[stable], "o", ms=3, mfc="white", mec="0.5", label="stable")
-        ax.plot(first[~stable], second[~stable], "o", ms=3, color="0.2", label="unstable")
-        for place, track in enumerate(tracks):
-            crossings = sorted((t["values"][1], t["values"][0]) for t in sweep["thresholds"]
-                               if t["track"] == track and t["direction"] == direction)
-            if crossings:
-                y, x = zip(*crossings)
-                ax.plot(x, y, "-", marker=MARKS[place % len(MARKS)], ms=4, lw=1.2, color=COLOURS[place % len(COLOURS)],
-                        label=f"threshold of mode {track}")
-        ax.set_xlabel(sweep["keys"][0])
+        points = [p for p in found if p["direction"] == direction]
+        values = np.array([p["values"] for p in points])
+        level = np.clip([p["growth_rate"] for p in points], 0, limit)
+        if np.linalg.matrix_rank(values - values[0]) == 2:  # else no triangle joins them
+            ax.tripcolor(*values.T, level, cmap="YlOrRd", vmin=0, vmax=limit, shading="gouraud")
+        stable = np.array([p["unstable_modes"] == 0 for p in points])
+        ax.plot(*values[stable].T, "o", ms=3, mfc="white", mec="0.5", label="stable")
+        ax.plot(*values[~stable].T, "o", ms=3, color="0.2", label="unstable")
+        for place, track in enumerate(strongest_tracks(sweep)):
+            for change in (1, -1):  # the ends of an unstable range are two lines
+                crossings = sorted((t["values"][1], t["values"][0]) for t in sweep["thresholds"]
+                                   if t["track"] == track and t["direction"] == direction and t["change"] == change)
+                if crossings:
+                    y, x = zip(*crossings)
+                    ax.plot(x, y, "-", marker=MARKS[place % len(MARKS)], ms=4, lw=1.2,
+                            color=COLOURS[place % len(COLOURS)], label=f"threshold of mode {track}")
+        ax.set_xlabel(labels_of(sweep)[0])
         if len(directions) > 1:
             ax.set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
-    axes[0, 0].set_ylabel(sweep["keys"][1])
-    handles, labels = axes[0, 0].get_legend_handles_labels()
+    axes[0, 0].set_ylabel(labels_of(sweep)[1])
+    legend = {label: handle for ax in axes[0] for handle, label in zip(*ax.get_legend_handles_labels())}
     figure.get_layout_engine().set(rect=(0, 0.06, 1, 0.94))  # the legend is below
-    figure.legend(handles, labels, loc="lower center", ncols=min(4, len(labels)), fontsize=8)
-    figure.colorbar(shade, ax=axes, label="largest growth rate [1/s]")
+    figure.legend(legend.values(), legend, loc="lower center", ncols=min(4, len(legend)), fontsize=8)
+    shades = plt.cm.ScalarMappable(plt.Normalize(0, limit), "YlOrRd")
+    figure.colorbar(shades, ax=axes, label="largest growth rate [1/s]")
     figure.suptitle(heading([results], "stability"))
     return figure
 
 
 def draw_sweep(runs):
     (results, sweep), *_ = those_with(runs, sweep_of)
-    table = tables_of(results)
     if len(sweep["keys"]) == 2:
-        return draw_map(results, sweep, table)
-    return draw_chart(results, sweep, table)
+        return draw_map(results, sweep)
+    return draw_chart(results, sweep, tables_of(results))

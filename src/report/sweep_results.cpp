@@ -1,10 +1,12 @@
 #include "sweep_results.hpp"
 
+#include "squeal/scene/numbers.hpp"
 #include "sweep_motion_results.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 
 namespace squeal
@@ -21,23 +23,26 @@ template <class At> int direction_of(const At& at)
   return at.reversed ? -1 : 1;
 }
 
-/// A followed mode where it grows most.
+/// A followed mode in one direction of rotation, where it grows most.
 struct Track
 {
+  int number = 0;
   const SweepPoint* point = nullptr;
   const SweptMode* mode = nullptr;
   int points = 0, unstable = 0; // where it was found, and where it is unstable
   double least_mac = 1;
 };
 
-std::vector<Track> tracks_of(const Sweep& sweep)
+/// Those that are unstable somewhere, by rising number.
+std::vector<Track> unstable_tracks(const Sweep& sweep)
 {
-  std::vector<Track> tracks(static_cast<std::size_t>(sweep.tracks));
+  std::map<std::pair<int, bool>, Track> tracks;
   for (const SweepPoint& point : sweep.points)
     for (const SweptMode& mode : point.modes)
     {
       if (mode.track < 0) continue;
-      Track& track = tracks[static_cast<std::size_t>(mode.track)];
+      Track& track = tracks[{mode.track, point.reversed}];
+      track.number = mode.track;
       ++track.points;
       track.unstable += is_unstable(mode.lambda);
       track.least_mac = std::min(track.least_mac, mode.mac);
@@ -45,7 +50,10 @@ std::vector<Track> tracks_of(const Sweep& sweep)
       track.point = &point;
       track.mode = &mode;
     }
-  return tracks;
+  std::vector<Track> unstable;
+  for (const auto& [key, track] : tracks)
+    if (track.unstable > 0) unstable.push_back(track);
+  return unstable;
 }
 
 Json point_entry(const SweepPoint& point)
@@ -82,6 +90,7 @@ void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
 {
   const SweepSettings& settings = *scene.sweep;
   entry["keys"] = settings.key;
+  for (const std::string& key : settings.key) entry["units"].push_back(unit_of_number(key));
   entry["stages"] = word(settings.stages);
   entry["directions"] = word(settings.directions);
   entry["followed_modes"] = sweep.tracks;
@@ -99,19 +108,15 @@ void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
     if (point.motion) added["motion"] = motion_entry(*point.motion, scene);
   }
   entry["unstable_tracks"] = Json::array();
-  for (int number = 0; const Track& track : tracks_of(sweep))
-  {
-    if (track.unstable > 0)
-      entry["unstable_tracks"].push_back({{"track", number},
-                                          {"points", track.points},
-                                          {"unstable_points", track.unstable},
-                                          {"least_mac", track.least_mac},
-                                          {"greatest_growth_rate", track.mode->lambda.real()},
-                                          {"frequency_hz", frequency_hz_of(track.mode->lambda)},
-                                          {"values", track.point->values},
-                                          {"direction", direction_of(*track.point)}});
-    ++number;
-  }
+  for (const Track& track : unstable_tracks(sweep))
+    entry["unstable_tracks"].push_back({{"track", track.number},
+                                        {"points", track.points},
+                                        {"unstable_points", track.unstable},
+                                        {"least_mac", track.least_mac},
+                                        {"greatest_growth_rate", track.mode->lambda.real()},
+                                        {"frequency_hz", frequency_hz_of(track.mode->lambda)},
+                                        {"values", track.point->values},
+                                        {"direction", direction_of(*track.point)}});
   entry["thresholds"] = Json::array();
   for (const Threshold& threshold : sweep.thresholds)
     entry["thresholds"].push_back({{"values", threshold.values},
@@ -192,15 +197,14 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
         format("%d modes followed, MAC %.3f at least, %d lost on the way", sweep.tracks, sweep.least_mac, sweep.lost));
   if (sweep.least_mac_across < 1)
     lines.back() += format("; MAC %.3f at least where pairs open or close", sweep.least_mac_across);
-  std::size_t unstable = 0;
-  for (int number = 0; const Track& track : tracks_of(sweep))
+  const std::vector<Track> unstable = unstable_tracks(sweep);
+  for (std::size_t i = 0; i < std::min(shown, unstable.size()); ++i)
   {
-    if (track.unstable > 0 && ++unstable <= shown)
-      lines.push_back(format("mode %d unstable at %d of %d points, most at %s%s: %.7g Hz, growth %.6g 1/s", number,
-                             track.unstable, track.points, text_of(track.point->values).c_str(),
-                             track.point->reversed ? " reversed" : "", frequency_hz_of(track.mode->lambda),
-                             track.mode->lambda.real()));
-    ++number;
+    const Track& track = unstable[i];
+    lines.push_back(format("mode %d unstable at %d of %d points%s, most at %s: %.7g Hz, growth %.6g 1/s", track.number,
+                           track.unstable, track.points, track.point->reversed ? " reversed" : "",
+                           text_of(track.point->values).c_str(), frequency_hz_of(track.mode->lambda),
+                           track.mode->lambda.real()));
   }
   for (std::size_t i = 0; i < std::min(shown, sweep.thresholds.size()); ++i)
   {
@@ -208,7 +212,7 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
     lines.push_back(format("threshold of mode %d at %s%s +- %.1e, %.7g Hz (%+d)", t.track, text_of(t.values).c_str(),
                            t.reversed ? " reversed" : "", t.error, t.frequency_hz, t.change));
   }
-  if (sweep.thresholds.size() > shown || unstable > shown)
+  if (sweep.thresholds.size() > shown || unstable.size() > shown)
     lines.emplace_back("the rest is in report.json and sweep.csv");
   for (std::string& line : motion_lines(sweep)) lines.push_back(std::move(line));
   return lines;

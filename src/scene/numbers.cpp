@@ -1,12 +1,14 @@
 /// Numbers of a scene that a branch follows or a sweep varies, found in the scene's own text and replaced there.
 #include "squeal/scene/numbers.hpp"
 
+#include "scene_keys.hpp"
 #include "scene_numbers.hpp"
 #include "squeal/base/error.hpp"
 #include "toml_values.hpp"
 
 #include <algorithm>
 #include <charconv>
+#include <sstream>
 
 namespace squeal
 {
@@ -39,6 +41,37 @@ toml::table document_of(const Scene& scene)
 {
   return toml::parse(resolved_scene(scene), std::string_view("scene"));
 }
+
+/// Finds the keys of a table, and how many words of a number's key come before one of them.
+struct KeysFinder
+{
+  const std::string& table;
+  SceneKeys& keys;
+  std::size_t& words;
+
+  template <class T> void operator()(const std::string& key, std::vector<T>&, const char*) const
+  {
+    T entry{};
+    take(key, keys_of(entry), 2);
+  }
+  template <class T> void operator()(const std::string& key, std::optional<T>&, const char*) const
+  {
+    T entry{};
+    take(key, keys_of(entry), 1);
+  }
+  template <class T> void operator()(const std::string& key, T& member, const char*) const
+  {
+    take(key, keys_of(member), 1);
+  }
+
+private:
+  void take(const std::string& key, SceneKeys found, std::size_t before) const
+  {
+    if (key != table) return;
+    keys = std::move(found);
+    words = before;
+  }
+};
 
 } // namespace
 
@@ -158,6 +191,29 @@ private:
 };
 
 } // namespace
+
+std::string unit_of_number(const std::string& key)
+{
+  std::vector<std::string> words;
+  std::istringstream text(key);
+  for (std::string word; std::getline(text, word, '.');) words.push_back(word);
+  Scene scene;
+  Rotation rotation;
+  Orthotropy orthotropy;
+  SceneKeys keys;
+  std::size_t place = 0;
+  for_each_table(scene, KeysFinder{words.front(), keys, place});
+  for (; place < words.size(); ++place)
+  {
+    const auto found = std::ranges::find(keys, words[place], &SceneKey::name);
+    if (found == keys.end()) break;
+    if (has_unit(found->unit)) return found->unit;
+    keys = found->name == "rotation"      ? keys_of(rotation)
+           : found->name == "orthotropic" ? keys_of(orthotropy)
+                                          : SceneKeys();
+  }
+  return "-";
+}
 
 Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)
 {

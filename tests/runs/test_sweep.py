@@ -96,6 +96,9 @@ def test_a_mode_has_one_number_in_both_directions(pin):
     forward, back = ([(t["track"], t["change"]) for t in sweep["thresholds"] if t["direction"] == direction]
                      for direction in (1, -1))
     assert forward == back
+    for entry in sweep["unstable_tracks"]:
+        there = [p for p in sweep["points"] if p["direction"] == entry["direction"]]
+        assert 0 < entry["unstable_points"] < entry["points"] <= len(there)
 
 
 def test_thresholds_of_the_pin_are_where_single_runs_change(pin, converged):
@@ -156,17 +159,18 @@ def test_the_exact_threshold_of_the_oscillator(values, converged):
     assert unstable == {str(threshold["track"])}
 
 
-@pytest.mark.parametrize("key, value, override", [
-    ("spring.0.damping", 0.03, "spring.0.damping={}"),
-    ("spring.1.stiffness", 0.5, "spring.1.stiffness={}"),
-    ("contact.0.velocity.0", 0.9, "contact.0.velocity=[{},0,0]"),
-    ("force.0.vector.1", -2.0, "force.0.vector=[0,{},0]"),
-    ("point.pad.mass", 1.3, "point.pad.mass={}"),
+@pytest.mark.parametrize("key, value, override, unit", [
+    ("spring.0.damping", 0.03, "spring.0.damping={}", "N s/m"),
+    ("spring.1.stiffness", 0.5, "spring.1.stiffness={}", "N/m"),
+    ("contact.0.velocity.0", 0.9, "contact.0.velocity=[{},0,0]", "m/s"),
+    ("force.0.vector.1", -2.0, "force.0.vector=[0,{},0]", "N"),
+    ("point.pad.mass", 1.3, "point.pad.mass={}", "kg"),
 ])
-def test_any_number_of_the_scene(key, value, override, converged):
+def test_any_number_of_the_scene(key, value, override, unit, converged):
     run = converged(*OSCILLATOR, "--set", f"sweep.key={key}", "--set", f"sweep.values=[{0.9 * value}, {value}]", ranks=1)
     single = converged(*OSCILLATOR, "--set", override.format(value), ranks=1).report
     same_modes(modes_at(rows_of(run.output), value, key=key), lambdas(single), 1e-10)
+    assert run.report["sweep"]["units"] == [unit]
 
 
 def test_a_modulus_of_the_pin(converged):
@@ -179,6 +183,7 @@ def test_a_modulus_of_the_pin(converged):
 def test_two_numbers(converged):
     run = converged(*OSCILLATOR, *sweep_of(TWO, "[0.1,0.02]", "[0.3,0.05]", points="[3,2]"), ranks=1)
     points = run.report["sweep"]["points"]
+    assert run.report["sweep"]["units"] == ["-", "N s/m"]
     grid = {tuple(np.round(p["values"], 12)) for p in points if not p["inserted"]}
     assert grid == {(mu, damping) for mu in (0.1, 0.2, 0.3) for damping in (0.02, 0.05)}
     thresholds = {t["values"][1]: t["values"][0] for t in run.report["sweep"]["thresholds"]}
@@ -369,7 +374,8 @@ def test_a_start_that_motions_need_is_asked_for(squeal):
 def test_the_pictures_are_drawn(pin, cycles, converged):
     two = converged(*OSCILLATOR, *sweep_of(TWO, "[0.1,0.02]", "[0.3,0.05]", points="[5,4]"),
                     ranks=1)
-    for run in (pin, two, cycles):
+    at_random = converged(*OSCILLATOR, *sweep_of(TWO, "[0.1,0.02]", "[0.3,0.05]", samples=9, directions="both"), ranks=1)
+    for run in (pin, two, at_random, cycles):
         subprocess.run([sys.executable, ROOT / "tools" / "plot", run.output], check=True, capture_output=True)
         assert (run.output / "sweep.png").stat().st_size > 10000
 
