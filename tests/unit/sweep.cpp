@@ -1,7 +1,9 @@
-// What a sweep is made of: zeros in brackets, eigenvalues with both of their vectors.
+// What a sweep is made of: zeros in brackets, eigenvalues with both of their vectors, thresholds of modes.
+#include "../../src/study/thresholds.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/root.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <doctest/doctest.h>
 #include <random>
@@ -70,5 +72,63 @@ TEST_CASE("left and right vectors of unsymmetric quadratic problems solve them, 
         if (i == j) CHECK(std::abs(form) > 1e-3);
       }
     }
+  }
+}
+
+namespace
+{
+
+/// Modes of these growth rates at a value.
+Followed followed(double value, const std::vector<double>& growth)
+{
+  Followed point{{value}};
+  for (std::size_t k = 0; k < growth.size(); ++k) point.modes.pairs.push_back({{growth[k], 1.0 + k}, {}, {}});
+  return point;
+}
+
+/// Three that are matched as one subspace: its members are told apart on short steps alone, and swapped on long ones.
+std::vector<Match> as_subspace(const Followed& from, const Followed& to)
+{
+  const bool near = std::abs(from.values[0] - to.values[0]) < 0.1;
+  return {{near ? 0 : 1, 1, 3, 0}, {near ? 1 : 0, 1, 3, 0}, {2, 1, 3, 0}};
+}
+
+} // namespace
+
+TEST_CASE("thresholds of a subspace are where numbers of unstable modes change, however its members are matched")
+{
+  // one mode becomes unstable at 0.3 and another stable at 0.7; then one at 0.3 beside one that is unstable throughout
+  const auto growths = {+[](double x) -> std::vector<double> {
+                          return {x - 0.3, -0.1 - x, 0.7 - x};
+                        },
+                        +[](double x) -> std::vector<double> {
+                          return {std::cbrt(x - 0.3), 2 + x, -1};
+                        }};
+  const std::vector<std::vector<std::pair<double, int>>> wanted = {{{0.3, 1}, {0.7, -1}}, {{0.3, 1}}};
+  for (std::size_t way = 0; const auto growth : growths)
+  {
+    for (const auto& [a, b] : {std::pair{0.0, 1.0}, {1.0, 0.0}})
+    {
+      int tracks = 3, points = 0;
+      const auto point_at = [&](double x) -> std::optional<Followed>
+      {
+        ++points;
+        return followed(x, growth(x));
+      };
+      Followed before = followed(a, growth(a)), now = followed(b, growth(b));
+      before.tracks = {0, 1, 2};
+      std::vector<Threshold> found =
+          find_thresholds({point_at, as_subspace, 10, 1e-5, tracks}, before, now, as_subspace(before, now));
+      std::ranges::sort(found, {}, [](const Threshold& threshold) { return threshold.values[0]; });
+      REQUIRE(found.size() == wanted[way].size());
+      for (std::size_t k = 0; k < found.size(); ++k)
+      {
+        CHECK(std::abs(found[k].values[0] - wanted[way][k].first) <= found[k].error);
+        CHECK(found[k].error <= 1.1e-5);
+        CHECK(found[k].change == wanted[way][k].second);
+      }
+      CHECK(points < 100);
+    }
+    ++way;
   }
 }
