@@ -96,7 +96,7 @@ struct Sweep
 struct SweepOptions
 {
   double tolerance = 0; // backward error of right and left vectors on the basis; 0: chosen
-  PetscInt passes = 8;  // corrections at a point, at most
+  PetscInt passes = 20; // corrections at a point, at most: the first one of a brake may need more than 8
   PetscInt depth = 6;   // times that a step is halved, at most
   PetscInt groups = 0;  // of ranks, at most one a rank or a point; 0: chosen
 };
