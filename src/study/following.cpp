@@ -266,4 +266,31 @@ std::vector<Match> follow(const ModeForms& forms, double clear)
   return matches;
 }
 
+void match_coincident(std::vector<Match>& matches, const std::vector<TwoSidedPair>& from,
+                      const std::vector<TwoSidedPair>& to)
+{
+  constexpr double coincidence = 1e-5; // of |lambda|: the least tolerance leaves most within 7e-8
+  std::vector<char> kept_from(from.size(), 0), kept_to(to.size(), 0);
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    if (matches[i].to >= 0 && matches[i].mac >= clear_mac)
+      kept_from[i] = kept_to[static_cast<std::size_t>(matches[i].to)] = 1;
+  const auto nearest =
+      [](const TwoSidedPair& pair, const std::vector<TwoSidedPair>& others, const std::vector<char>& taken)
+  {
+    const Places open = places_left(static_cast<Index>(others.size()), taken);
+    const auto distance = [&](Index j) { return std::abs(others[static_cast<std::size_t>(j)].lambda - pair.lambda); };
+    const auto found = std::ranges::min_element(open, {}, distance);
+    return found != open.end() && distance(*found) < coincidence * std::abs(pair.lambda) ? *found : Index{-1};
+  };
+  for (std::size_t i = 0; i < from.size(); ++i)
+  {
+    if (kept_from[i]) continue;
+    const Index j = nearest(from[i], to, kept_to);
+    if (j < 0 || nearest(to[static_cast<std::size_t>(j)], from, kept_from) != static_cast<Index>(i)) continue;
+    for (Match& match : matches)
+      if (match.to == static_cast<int>(j)) match.to = -1;
+    matches[i].to = static_cast<int>(j);
+  }
+}
+
 } // namespace squeal

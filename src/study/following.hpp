@@ -49,6 +49,11 @@ ModeForms forms_between(const PointModes& from, const PointModes& to);
 /// turns right into left vectors, so that b would match a mode with its partner near lock-in. Not collective.
 ModeForms overlaps_between(const PointModes& from, const PointModes& to);
 
+/// Of modes that share less than `clear_mac`, those are matched whose eigenvalues are each other's nearest and coincide
+/// to 1e-5, as in the mirror image of a scene. Between opposite directions of rotation. Not collective.
+void match_coincident(std::vector<Match>& matches, const std::vector<TwoSidedPair>& from,
+                      const std::vector<TwoSidedPair>& to);
+
 /// Modes in the structure's degrees of freedom, as `expanded` gives them.
 struct ExpandedModes
 {

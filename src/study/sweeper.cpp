@@ -179,8 +179,10 @@ private:
   {
     if (first_->reversed == now.reversed) return follow(forms_between(first_->modes, now.modes), clear_mac);
     const Eigen::Index shapes = model_.shared_shapes();
-    return follow(overlaps_between(leading_part(first_->modes, shapes), leading_part(now.modes, shapes)),
-                  clear_overlap);
+    std::vector<Match> matches =
+        follow(overlaps_between(leading_part(first_->modes, shapes), leading_part(now.modes, shapes)), clear_overlap);
+    match_coincident(matches, first_->modes.pairs, now.modes.pairs);
+    return matches;
   }
 
   ModeForms forms(const Followed& before, const Followed& now)
