@@ -23,6 +23,7 @@ Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers);
 /// A number that is zero in the scene, with what it needs to be another one: a first loss factor has to have a
 /// frequency of its equivalent in time, on which modes do not depend.
 std::vector<SceneNumber> from_zero(const Scene& scene, const SceneNumber& number);
+
 /// The unit of a number of a scene, "-" where it has none.
 std::string unit_of_number(const std::string& key);
 
