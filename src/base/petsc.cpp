@@ -92,6 +92,13 @@ Owned<Vec> zeros_like(Vec pattern)
   return result;
 }
 
+Owned<Mat> transpose_of(Mat A)
+{
+  Owned<Mat> result;
+  check(MatTranspose(A, MAT_INITIAL_MATRIX, result.put()));
+  return result;
+}
+
 Owned<Vec> copy_of(Vec source)
 {
   Owned<Vec> result;

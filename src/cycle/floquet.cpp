@@ -366,9 +366,7 @@ FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& opti
   const Preconditioner none;
   const OrbitProblem found = problem_of(
       flow, none, {u0, displacement(orbit.state), velocity(orbit.state), orbit.period}, problem.settings.tolerance);
-  std::vector<Owned<Vec>> other_unstable;
-  for (const State& motion : other_unstable_motions(problem)) other_unstable.push_back(state_of(motion.u, motion.v));
-  return find_multipliers(found, options, orbit, other_unstable);
+  return find_multipliers(found, options, orbit, other_unstable_states(problem));
 }
 
 } // namespace squeal

@@ -240,8 +240,8 @@ void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cyc
 {
   Fidelity& fidelity = search.fidelity;
   const ReducedCycle twice = find_reduced_cycle(search, cycle, 2 * search.steps);
-  estimate_step_errors(fidelity, {2 * search.steps, twice.period, twice.energy},
-                       {search.steps, cycle.period, cycle.energy});
+  estimate_step_errors(fidelity,
+                       {{2 * search.steps, twice.period, twice.energy}, {search.steps, cycle.period, cycle.energy}});
   if (!twice.converged) fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
 }
 

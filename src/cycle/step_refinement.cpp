@@ -166,8 +166,7 @@ std::string refine(Fidelity& fidelity, const CycleAtSteps& coarse, const AppendC
   for (int tries = 0;; ++tries)
   {
     const int before = cycles[cycles.size() - 2].steps, now = cycles.back().steps;
-    fidelity.step_frequency_error = step_error(cycles, &CycleAtSteps::period, 1).at(now);
-    fidelity.step_energy_error = step_error(cycles, &CycleAtSteps::energy, 1).at(now);
+    estimate_step_errors(fidelity, cycles);
     if (largest_step_error(fidelity) <= fidelity.accuracy / 2) return {};
     if (tries == 5) return "the accuracy needs more than " + std::to_string(now) + " steps a period";
     const StepError of_period = step_error(cycles, &CycleAtSteps::period, 2),
@@ -205,8 +204,7 @@ std::string find_anew(const CycleCorrection& correction, int steps, LimitCycle& 
   const Vec state = cycle.orbit.state;
   ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), cycle.orbit.period};
   start.is_cycle = true;
-  for (const State& motion : other_unstable_motions(problem))
-    start.other_unstable.push_back(state_of(motion.u, motion.v));
+  start.other_unstable = other_unstable_states(problem);
   const CycleProblem finer = with_settings(problem, settings);
   CycleOptions at_once = correction.options;
   at_once.shooting.free_periods = 0;
@@ -264,11 +262,11 @@ void note_model_errors(Fidelity& fidelity, const Multisecant& multisecant)
 
 } // namespace
 
-void estimate_step_errors(Fidelity& fidelity, const CycleAtSteps& other, const CycleAtSteps& cycle)
+void estimate_step_errors(Fidelity& fidelity, const std::vector<CycleAtSteps>& cycles)
 {
-  const double fraction = std::abs(error_fraction(other.steps, cycle.steps, cycle.steps, 1));
-  fidelity.step_frequency_error = fraction * std::abs(other.period / cycle.period - 1);
-  fidelity.step_energy_error = fraction * std::abs(other.energy / cycle.energy - 1);
+  const int steps = cycles.back().steps;
+  fidelity.step_frequency_error = step_error(cycles, &CycleAtSteps::period, 1).at(steps);
+  fidelity.step_energy_error = step_error(cycles, &CycleAtSteps::energy, 1).at(steps);
 }
 
 void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)

@@ -33,7 +33,7 @@ struct CycleAtSteps
   double period = 0, energy = 0; // [s], [J]
 };
 
-/// Errors of a cycle from another with more or fewer steps, of first order.
-void estimate_step_errors(Fidelity& fidelity, const CycleAtSteps& other, const CycleAtSteps& cycle);
+/// Errors of the last of two cycles, of first order, or of the last of three and more, of both orders.
+void estimate_step_errors(Fidelity& fidelity, const std::vector<CycleAtSteps>& cycles);
 
 } // namespace squeal

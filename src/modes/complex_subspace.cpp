@@ -20,6 +20,11 @@ MatrixXd parts_of(const VectorXcd& a)
 
 } // namespace
 
+ComplexFactors loss_factors(LossKind kind, std::complex<double> lambda)
+{
+  return {lambda * lambda, lambda, 1, loss_factor_of(kind, lambda)};
+}
+
 ComplexSubspace empty_subspace(const std::array<Mat, 4>& matrices)
 {
   const MultiVector none = empty_multivector(matrices[0]);

@@ -2,6 +2,7 @@
 /// The problem (f_0 M + f_1 C + f_2 K + f_3 K_loss) y = 0 with complex factors f on a subspace of real vectors, and
 /// what its solutions there leave over in the whole problem.
 #include "squeal/algebra/multivector.hpp"
+#include "squeal/modes/two_sided.hpp"
 
 #include <array>
 #include <complex>
@@ -21,6 +22,9 @@ struct ComplexSubspace
   std::array<MultiVector, 4> images{};
   std::array<Eigen::MatrixXd, 4> entries{}; // V'A V
 };
+
+/// At lambda, f_3 by what loss factors are in the mode.
+ComplexFactors loss_factors(LossKind kind, std::complex<double> lambda);
 
 /// Without vectors yet. Collective.
 ComplexSubspace empty_subspace(const std::array<Mat, 4>& matrices);

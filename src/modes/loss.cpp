@@ -2,6 +2,7 @@
 
 #include "complex_subspace.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/modes/two_sided.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -29,23 +30,10 @@ constexpr double settled = 1e-12;     // last change of lambda over |lambda|: be
 
 constexpr double oscillating = 1e-6; // Im(lambda) over |lambda|: below it is the rounding of two real ones
 
-enum class Stiffness
+/// Derivatives of the factors in lambda, at a constant omega.
+ComplexFactors derivatives(LossKind kind, Complex lambda)
 {
-  viscous, // K + lambda K_loss/omega
-  complex, // K + i K_loss
-};
-
-/// Factors of M, C_0, K and K_loss in the problem at lambda.
-ComplexFactors factors(Stiffness stiffness, Complex lambda)
-{
-  const Complex loss = stiffness == Stiffness::viscous ? lambda / lambda.imag() : Complex(0, 1);
-  return {lambda * lambda, lambda, 1, loss};
-}
-
-/// Their derivatives in lambda, at a constant omega.
-ComplexFactors derivatives(Stiffness stiffness, Complex lambda)
-{
-  return {2. * lambda, 1, 0, stiffness == Stiffness::viscous ? 1 / lambda.imag() : 0};
+  return {2. * lambda, 1, 0, kind == LossKind::viscous ? 1 / lambda.imag() : 0};
 }
 
 /// A pair on the subspace.
@@ -57,13 +45,13 @@ struct SmallPair
 
 /// Newton's method on (lambda, a) with a share of K_loss, and with omega taken from the last lambda. Returns whether it
 /// found a pair that oscillates.
-bool solve_small(const ComplexSubspace& space, Stiffness stiffness, double share, SmallPair& pair)
+bool solve_small(const ComplexSubspace& space, LossKind kind, double share, SmallPair& pair)
 {
   double last = HUGE_VAL;
   for (int step = 0; step < newton_steps && last > 1e-15; ++step)
   {
     if (!(pair.lambda.imag() > settled * std::abs(pair.lambda))) return false;
-    ComplexFactors factor = factors(stiffness, pair.lambda), slope = derivatives(stiffness, pair.lambda);
+    ComplexFactors factor = loss_factors(kind, pair.lambda), slope = derivatives(kind, pair.lambda);
     factor[3] *= share;
     slope[3] *= share;
     const VectorXcd x =
@@ -81,13 +69,13 @@ bool solve_small(const ComplexSubspace& space, Stiffness stiffness, double share
 
 /// The pair of all losses that a pair without them becomes as they grow; nothing where it ends on the way. The steps
 /// move lambda by about an eighth of its imaginary part.
-std::optional<SmallPair> grown(const ComplexSubspace& space, Stiffness stiffness, SmallPair pair)
+std::optional<SmallPair> grown(const ComplexSubspace& space, LossKind kind, SmallPair pair)
 {
   const auto form = [&](const MatrixXd& A) { return std::abs(pair.a.dot(A * pair.a)); };
   const double loss = form(space.entries[3]) / form(space.entries[2]);
   const int steps = 1 + static_cast<int>(std::min(8 * loss * std::abs(pair.lambda) / pair.lambda.imag(), 40.));
   for (int step = 1; step <= steps; ++step)
-    if (!solve_small(space, stiffness, static_cast<double>(step) / steps, pair)) return std::nullopt;
+    if (!solve_small(space, kind, static_cast<double>(step) / steps, pair)) return std::nullopt;
   return pair;
 }
 
@@ -95,10 +83,10 @@ std::optional<SmallPair> grown(const ComplexSubspace& space, Stiffness stiffness
 struct LossyPair
 {
   SmallPair viscous, complex;
-  Stiffness taken = Stiffness::viscous; // complex where there is no fixed point
-  double backward_error = 0;            // of the pair taken
+  LossKind taken = LossKind::viscous; // complex where there is no fixed point
+  double backward_error = 0;          // of the pair taken
 
-  const SmallPair& pair() const { return taken == Stiffness::viscous ? viscous : complex; }
+  const SmallPair& pair() const { return taken == LossKind::viscous ? viscous : complex; }
 };
 
 using Group = std::vector<LossyPair>;
@@ -122,9 +110,9 @@ void start(const ComplexSubspace& space, Group& group)
 {
   for (LossyPair& mode : group)
   {
-    const std::optional<SmallPair> viscous = grown(space, Stiffness::viscous, mode.viscous);
-    mode.complex = grown(space, Stiffness::complex, mode.complex).value_or(mode.complex);
-    mode.taken = viscous && is_equivalent(*viscous, mode.complex) ? Stiffness::viscous : Stiffness::complex;
+    const std::optional<SmallPair> viscous = grown(space, LossKind::viscous, mode.viscous);
+    mode.complex = grown(space, LossKind::complex, mode.complex).value_or(mode.complex);
+    mode.taken = viscous && is_equivalent(*viscous, mode.complex) ? LossKind::viscous : LossKind::complex;
     if (viscous) mode.viscous = *viscous;
   }
 }
@@ -136,24 +124,24 @@ void solve_group(ComplexSubspace& space, Group& group, const PencilFactor& P)
   for (int pass = 0;; ++pass)
   {
     MultiVector residuals{space.V.comm, MatrixXd(space.V.entries.rows(), 0)};
-    const auto improve = [&](Stiffness stiffness, SmallPair& pair)
+    const auto improve = [&](LossKind kind, SmallPair& pair)
     {
       widen(pair.a, space.V.columns());
-      const bool found = solve_small(space, stiffness, 1, pair);
+      const bool found = solve_small(space, kind, 1, pair);
       double error = 0;
-      const MultiVector residual = residual_of(space, factors(stiffness, pair.lambda), pair.a, error);
+      const MultiVector residual = residual_of(space, loss_factors(kind, pair.lambda), pair.a, error);
       if (found && error > tolerance) append(residuals, residual);
       return found ? error : HUGE_VAL;
     };
     for (LossyPair& mode : group)
     {
-      mode.backward_error = improve(Stiffness::complex, mode.complex);
-      if (mode.taken == Stiffness::complex) continue;
-      const double error = improve(Stiffness::viscous, mode.viscous);
+      mode.backward_error = improve(LossKind::complex, mode.complex);
+      if (mode.taken == LossKind::complex) continue;
+      const double error = improve(LossKind::viscous, mode.viscous);
       if (std::isfinite(error) && is_equivalent(mode.viscous, mode.complex))
         mode.backward_error = error;
       else
-        mode.taken = Stiffness::complex;
+        mode.taken = LossKind::complex;
     }
     if (residuals.columns() == 0 || pass == passes) return;
     if (!extend(space, P.solve(residuals))) return;
@@ -213,8 +201,8 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
       pair.lambda = own.lambda;
       pair.backward_error = mode.backward_error;
       const double error = std::abs(own.lambda - mode.complex.lambda) / std::abs(own.lambda);
-      losses[order[k]] = {factors(mode.taken, own.lambda)[3],
-                          mode.taken == Stiffness::viscous ? error : std::numeric_limits<double>::quiet_NaN()};
+      losses[order[k]] = {loss_factor_of(mode.taken, own.lambda),
+                          mode.taken == LossKind::viscous ? error : std::numeric_limits<double>::quiet_NaN()};
     }
   }
   solution.outcome.residual = 0;

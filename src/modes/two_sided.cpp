@@ -22,11 +22,6 @@ constexpr double near = 1e-6;       // backward errors from which on lambda foll
 constexpr int passes = 60;          // each adds two vectors to a side, with which small problems stay small
 constexpr double beside = 1e-4;     // of tau from -Re(lambda^2), which is an eigenvalue of the pencil without damping
 
-ComplexFactors factors(LossKind kind, Complex lambda)
-{
-  return {lambda * lambda, lambda, 1, loss_factor_of(kind, lambda)};
-}
-
 /// The vector that the problem on the subspace takes nearest to zero.
 VectorXcd null_vector(const ComplexSubspace& space, const ComplexFactors& factor)
 {
@@ -47,7 +42,7 @@ Complex change_of_lambda(const ComplexSubspace& space, LossKind kind, Complex la
 {
   std::array<Complex, 4> products{};
   Complex residual = 0;
-  const ComplexFactors factor = factors(kind, lambda);
+  const ComplexFactors factor = loss_factors(kind, lambda);
   for (std::size_t k = 0; k < 4; ++k)
     if (space.matrices[k])
     {
@@ -55,13 +50,6 @@ Complex change_of_lambda(const ComplexSubspace& space, LossKind kind, Complex la
       residual += factor[k] * products[k];
     }
   return eigenvalue_change(slope_of(kind, lambda, products[0], products[1], products[3]), residual);
-}
-
-Owned<Mat> transposed(Mat A)
-{
-  Owned<Mat> result;
-  if (A) check(MatTranspose(A, MAT_INITIAL_MATRIX, result.put()));
-  return result;
 }
 
 } // namespace
@@ -109,10 +97,10 @@ TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, con
 {
   return {matrices,
           K_loss,
-          transposed(matrices.M),
-          transposed(matrices.C),
-          transposed(matrices.K),
-          transposed(K_loss),
+          transpose_of(matrices.M),
+          transpose_of(matrices.C),
+          transpose_of(matrices.K),
+          K_loss ? transpose_of(K_loss) : Owned<Mat>{},
           make_shift_invert(matrices.K, matrices.M, Symmetry::none, options)};
 }
 
@@ -128,7 +116,7 @@ TwoSidedMode find_two_sided(TwoSidedProblem& problem, LossKind kind, Complex lam
   TwoSidedMode mode{lambda, {}, {}, HUGE_VAL};
   for (int pass = 0;; ++pass)
   {
-    const ComplexFactors before = factors(kind, mode.lambda);
+    const ComplexFactors before = loss_factors(kind, mode.lambda);
     const VectorXcd y = null_vector(right, before), x = null_vector(left, before);
     mode.right = vector_of(right, y);
     mode.left = vector_of(left, x);
@@ -136,7 +124,7 @@ TwoSidedMode find_two_sided(TwoSidedProblem& problem, LossKind kind, Complex lam
     if (follows) mode.lambda += change_of_lambda(right, kind, mode.lambda, mode.left, mode.right);
     if (kind == LossKind::none) mode.lambda.imag(0);
     double of_right = 0, of_left = 0;
-    const ComplexFactors now = factors(kind, mode.lambda);
+    const ComplexFactors now = loss_factors(kind, mode.lambda);
     const MultiVector r = residual_of(right, now, y, of_right), s = residual_of(left, now, x, of_left);
     mode.backward_error = std::max(of_right, of_left);
     if ((follows && mode.backward_error <= tolerance) || pass == passes) return mode;

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
 #include <sstream>
 
 namespace squeal
@@ -75,19 +76,20 @@ private:
 
 } // namespace
 
-double number_at(const Scene& scene, const std::string& key, const std::string& table)
+double number_at(const Scene& scene, const std::string& key, NumberTable table)
 {
-  const auto refusal = [&](const std::string& why) { return Error(table + " key = \"" + key + "\" " + why); };
+  const auto refusal = [&](const std::string& why)
+  { return Error(std::string(word(table)) + " key = \"" + key + "\" " + why); };
   const std::string first = key.substr(0, key.find('.'));
   if (std::ranges::find(of_the_mesh, first) != of_the_mesh.end())
     throw refusal("would change the mesh; name a number of " + joined(physical));
   if (std::find(physical.begin(), physical.end(), first) == physical.end())
     throw refusal("is not a number of the structure, its contact or its loads" + hint_or_list(first, physical) +
                   ", such as " + friction_coefficient_key);
-  if (table != "[branch]" && table != "[sensitivity]" && is_beyond_sweeps(key))
+  const bool sampled = table == NumberTable::sweep || table == NumberTable::uncertain;
+  if (sampled && is_beyond_sweeps(key))
     throw refusal("is followed by a [branch] and derived by in [sensitivity] only: sweeps and random numbers are for "
-                  "rigid pairs and for matrices that "
-                  "neither spin nor have loss factors");
+                  "rigid pairs and for matrices that neither spin nor have loss factors");
   toml::table document = document_of(scene);
   const toml::node* node = find_value(document, key);
   if (!node)
@@ -129,7 +131,7 @@ public:
       fail(&sweep_.key, "names \"" + sweep_.key[0] + "\" twice: give two different numbers");
     for (const std::string& key : sweep_.key) try
       {
-        (void)number_at(scene_, key, "[sweep]");
+        (void)number_at(scene_, key, NumberTable::sweep);
       }
       catch (const Error& error)
       {
@@ -200,6 +202,7 @@ std::string unit_of_number(const std::string& key)
   Scene scene;
   Rotation rotation;
   Orthotropy orthotropy;
+  const std::map<std::string, SceneKeys> nested{{"rotation", keys_of(rotation)}, {"orthotropic", keys_of(orthotropy)}};
   SceneKeys keys;
   std::size_t place = 0;
   for_each_table(scene, KeysFinder{words.front(), keys, place});
@@ -208,9 +211,8 @@ std::string unit_of_number(const std::string& key)
     const auto found = std::ranges::find(keys, words[place], &SceneKey::name);
     if (found == keys.end()) break;
     if (has_unit(found->unit)) return found->unit;
-    keys = found->name == "rotation"      ? keys_of(rotation)
-           : found->name == "orthotropic" ? keys_of(orthotropy)
-                                          : SceneKeys();
+    const auto below = nested.find(found->name);
+    keys = below == nested.end() ? SceneKeys() : below->second;
   }
   return "-";
 }
@@ -234,7 +236,7 @@ void resolve_branch(Scene& scene, const Places& places)
   const auto fail = [&](const void* member, const std::string& text) { throw Error(places.at(member) + ": " + text); };
   try
   {
-    branch.own = number_at(scene, branch.key, "[branch]");
+    branch.own = number_at(scene, branch.key, NumberTable::branch);
   }
   catch (const Error& error)
   {
@@ -299,7 +301,7 @@ std::vector<SceneNumber> sensitive_numbers(const Scene& scene)
 {
   std::vector<SceneNumber> numbers;
   for (const std::string& key : scene.sensitivity->numbers)
-    numbers.push_back({key, number_at(scene, key, "[sensitivity]")});
+    numbers.push_back({key, number_at(scene, key, NumberTable::sensitivity)});
   if (!numbers.empty()) return numbers;
   numbers.push_back({friction_coefficient_key, scene.friction.coefficient});
   if (!scene.matrices) numbers.push_back({"damping.alpha", scene.damping.alpha});

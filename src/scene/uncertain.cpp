@@ -70,7 +70,7 @@ void resolve_robustness(Scene& scene, const Places& places)
   for (UncertainNumber& number : scene.uncertain) try
     {
       if (!keys.insert(number.key).second) throw Error("[[uncertain]] " + number.key + " is there twice: keep one");
-      const double own = number_at(scene, number.key, "[[uncertain]]");
+      const double own = number_at(scene, number.key, NumberTable::uncertain);
       if (number.mean == 0 && number.distribution != Distribution::uniform) number.mean = own;
       check_form(number, places);
       if (number.distribution == Distribution::lognormal && number.mean <= 0)

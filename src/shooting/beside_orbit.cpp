@@ -153,11 +153,8 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
 void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers)
 {
   if (seen.empty() || multipliers.stability != Stability::undecided || !multipliers.complete) return;
-  const auto bound = [&](std::size_t i) {
-    return multipliers.upper.empty() ? std::abs(multipliers.values[i]) + multipliers.errors[i] : multipliers.upper[i];
-  };
   for (std::size_t i = 1; i < multipliers.values.size(); ++i)
-    if (multipliers.values[i] != std::conj(multipliers.values[0]) && !(bound(i) < 1)) return;
+    if (multipliers.values[i] != std::conj(multipliers.values[0]) && !(multipliers.upper_bound(i) < 1)) return;
   const SeenGrowth& nearest = seen.back();
   if (!(std::abs(nearest.growth - 1) > nearest.error)) return;
   const bool grows = nearest.growth > 1;

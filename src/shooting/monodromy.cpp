@@ -86,8 +86,7 @@ void decide(Multipliers& multipliers, const Completeness& coverage, std::size_t 
       multipliers.would_decide.clear();
       return;
     }
-    const double upper = multipliers.upper.empty() ? size + error : multipliers.upper[i];
-    if (i >= converged || upper < 1 || multipliers.stability == Stability::undecided) continue;
+    if (i >= converged || multipliers.upper_bound(i) < 1 || multipliers.stability == Stability::undecided) continue;
     multipliers.stability = Stability::undecided;
     multipliers.would_decide =
         format("a multiplier of %.6f with an error of %.1e reaches across 1: a smaller tolerance "

@@ -45,8 +45,7 @@ double maximum(double local, MPI_Comm comm)
 /// Returns (A + sign A')/2: the symmetric or the skew part.
 Owned<Mat> part_of(Mat A, double sign)
 {
-  Owned<Mat> result;
-  check(MatTranspose(A, MAT_INITIAL_MATRIX, result.put()));
+  Owned<Mat> result = transpose_of(A);
   check(MatAYPX(result, sign, A, DIFFERENT_NONZERO_PATTERN));
   check(MatScale(result, 0.5));
   return result;

@@ -1,7 +1,7 @@
 #include "squeal/study/sensitivity.hpp"
 
+#include "held_vectors.hpp"
 #include "sliding_basis.hpp"
-#include "squeal/modes/two_sided.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,224 +13,11 @@ namespace
 {
 
 using Complex = std::complex<double>;
-using Eigen::Index;
-using Eigen::MatrixXcd;
-using Eigen::MatrixXd;
 
 constexpr double relative_step = 1e-4; // of central differences: most numbers enter M, C and K linearly
 
-/// Modes with both vectors in the structure's degrees of freedom: real parts of all, then imaginary parts. The vectors
-/// solve
-///     Q right = R' reactions,   B_n right + c reactions = 0,   Q'left + B_n' sides = 0,   R left = c sides
-/// on the closed pairs, R = B_n + mu e.B_t, c their compliance.
-struct Vectors
-{
-  std::vector<Complex> lambda{};
-  std::vector<LossKind> loss{};
-  MultiVector right, left;
-  std::vector<std::vector<Complex>> reactions{}, sides{}; // by modes and pairs; 0 on open pairs
-
-  std::size_t count() const { return lambda.size(); }
-};
-
-/// x'A y of each mode, without conjugation, from the products of all parts.
-Complex bilinear(const MatrixXd& products, std::size_t mode, std::size_t count)
-{
-  const auto re = static_cast<Index>(mode), im = static_cast<Index>(mode + count);
-  return {products(re, re) - products(im, im), products(re, im) + products(im, re)};
-}
-
-/// x^H A x of each mode, A symmetric.
-double hermitian(const MatrixXd& products, std::size_t mode, std::size_t count)
-{
-  const auto re = static_cast<Index>(mode), im = static_cast<Index>(mode + count);
-  return products(re, re) + products(im, im);
-}
-
-Owned<Vec> column(const MultiVector& X, std::size_t j, Vec pattern)
-{
-  Owned<Vec> x = zeros_like(pattern);
-  copy_column(X, static_cast<Index>(j), x);
-  return x;
-}
-
-/// B_n x and mu e.B_t x of every pair: their sum is R x.
-struct PairMotions
-{
-  std::vector<Complex> normal, friction;
-};
-
-PairMotions pair_motions(const Interface& interface, const MultiVector& X, std::size_t mode, std::size_t count,
-                         Vec pattern)
-{
-  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
-  const TangentView e(directions, interface.directions);
-  const std::vector<double> re = relative(interface, column(X, mode, pattern)),
-                            im = relative(interface, column(X, mode + count, pattern));
-  const PairView real(re, interface.directions), imaginary(im, interface.directions);
-  PairMotions result{{}, std::vector<Complex>(mu.size())};
-  for (std::size_t i = 0; i < mu.size(); ++i)
-  {
-    result.normal.emplace_back(real.normal(i), imaginary.normal(i));
-    for (std::size_t k = 0; k < e.of(i).size(); ++k)
-      result.friction[i] += mu[i] * e.of(i)[k] * Complex(real.tangential(i)[k], imaginary.tangential(i)[k]);
-  }
-  return result;
-}
-
-/// What one model makes of vectors that are held.
-struct AtHeldVectors
-{
-  std::vector<Complex> residual;       // left'(Q right - R' reactions) + sides'(B_n right + c reactions)
-  std::vector<EigenvalueSlope> slopes; // of left' Q right
-  // right^H A right, C with that of the friction direction, K with the springs of the pairs, and that of loss factors
-  std::vector<double> mass, damping, stiffness, loss;
-};
-
-/// A matrix of a structure that may lack it, as products with vectors.
-MultiVector product_or_zero(Mat A, const MultiVector& X)
-{
-  return A ? product(A, X) : MultiVector{X.comm, MatrixXd::Zero(X.entries.rows(), X.columns())};
-}
-
-AtHeldVectors at_held_vectors(const SlidingEquilibrium& sliding, const Vectors& vectors)
-{
-  const auto& [structure, interface, equilibrium] = sliding;
-  const std::size_t count = vectors.count();
-  const MultiVector M_right = product(structure.M, vectors.right), K_right = product(structure.K, vectors.right),
-                    loss_right = product_or_zero(structure.K_loss, vectors.right);
-  MultiVector C_right = product(sliding_damping(sliding), vectors.right);
-  if (structure.K_loss.get()) C_right.entries -= loss_right.entries / structure.loss_omega;
-  const MatrixXd M = inner_products(vectors.left, M_right), C = inner_products(vectors.left, C_right),
-                 K = inner_products(vectors.left, K_right), L = inner_products(vectors.left, loss_right);
-  const MatrixXd m = inner_products(vectors.right, M_right), c = inner_products(vectors.right, C_right),
-                 k = inner_products(vectors.right, K_right), l = inner_products(vectors.right, loss_right);
-  AtHeldVectors held;
-  for (std::size_t j = 0; j < count; ++j)
-  {
-    const Complex lambda = vectors.lambda[j], mass = bilinear(M, j, count), damping = bilinear(C, j, count),
-                  loss = bilinear(L, j, count);
-    Complex residual =
-        lambda * (lambda * mass + damping) + bilinear(K, j, count) + loss_factor_of(vectors.loss[j], lambda) * loss;
-    double stiffness = hermitian(k, j, count);
-    const PairMotions of_left = pair_motions(interface, vectors.left, j, count, structure.load),
-                      of_right = pair_motions(interface, vectors.right, j, count, structure.load);
-    for (std::size_t i = 0; i < of_left.normal.size(); ++i)
-    {
-      const double compliance = compliance_of(interface, i);
-      const Complex reaction = vectors.reactions[j][i], side = vectors.sides[j][i];
-      residual +=
-          side * (of_right.normal[i] + compliance * reaction) - reaction * (of_left.normal[i] + of_left.friction[i]);
-      if (equilibrium.closed[i] && compliance > 0) stiffness += std::norm(of_right.normal[i]) / compliance;
-    }
-    held.residual.push_back(residual);
-    held.slopes.push_back(slope_of(vectors.loss[j], lambda, mass, damping, loss));
-    held.mass.push_back(hermitian(m, j, count));
-    held.damping.push_back(hermitian(c, j, count));
-    held.stiffness.push_back(stiffness);
-    held.loss.push_back(hermitian(l, j, count));
-  }
-  return held;
-}
-
-/// Sets the reactions and the sides of the vectors of one mode.
-void set_multipliers(const SensitivityProblem& problem, std::size_t mode, Vectors& vectors)
-{
-  const auto& [structure, interface, equilibrium] = problem.sliding;
-  const LinearisedSliding& linearised = problem.linearised;
-  const std::size_t count = vectors.count();
-  const Complex lambda = vectors.lambda[mode];
-  // of linearised.C, which holds the loss at its own frequency
-  const Complex loss =
-      structure.K_loss.get() ? loss_factor_of(vectors.loss[mode], lambda) - lambda / structure.loss_omega : 0;
-  const std::array matrices{std::pair{structure.M.get(), lambda * lambda}, std::pair{linearised.C.get(), lambda},
-                            std::pair{linearised.K.get() ? linearised.K.get() : structure.K.get(), Complex(1)},
-                            std::pair{structure.K_loss.get(), loss}};
-  const std::vector<Index> parts{static_cast<Index>(mode), static_cast<Index>(mode + count)};
-  /// Of the pairs without a compliance, from the forces Q x or Q'x on their pivots.
-  const auto rigid = [&](const MultiVector& X, Mat operation, bool transposed)
-  {
-    const MultiVector x{X.comm, X.entries(Eigen::all, parts)};
-    MatrixXcd force = MatrixXcd::Zero(x.entries.rows(), 1);
-    for (const auto& [A, factor] : matrices)
-    {
-      if (!A) continue;
-      const MultiVector image = transposed ? product(transpose_of(A), x) : product(A, x);
-      force += factor * (image.entries.col(0) + Complex(0, 1) * image.entries.col(1));
-    }
-    MatrixXd both(force.rows(), 2);
-    both << force.real(), force.imag();
-    const MatrixXd of_pairs = whole_product(operation, {x.comm, both});
-    std::vector<Complex> result;
-    for (Index i = 0; i < of_pairs.rows(); ++i) result.emplace_back(of_pairs(i, 0), of_pairs(i, 1));
-    return result;
-  };
-  std::vector<Complex> reactions = rigid(vectors.right, linearised.contact.reaction, false),
-                       sides = rigid(vectors.left, linearised.contact.normal_reaction, true);
-  const PairMotions of_right = pair_motions(interface, vectors.right, mode, count, structure.load),
-                    of_left = pair_motions(interface, vectors.left, mode, count, structure.load);
-  for (std::size_t i = 0; i < reactions.size(); ++i)
-  {
-    const double compliance = compliance_of(interface, i);
-    sides[i] *= -1;
-    if (!equilibrium.closed[i] || compliance == 0) continue;
-    reactions[i] = -of_right.normal[i] / compliance;
-    sides[i] = (of_left.normal[i] + of_left.friction[i]) / compliance;
-  }
-  vectors.reactions.push_back(std::move(reactions));
-  vectors.sides.push_back(std::move(sides));
-}
-
-/// The real parts of all vectors, then the imaginary ones, in the structure's degrees of freedom.
-MultiVector lifted(Mat lift, const std::vector<TwoSidedMode>& modes, MultiVector TwoSidedMode::*side)
-{
-  MultiVector x = empty_multivector(lift);
-  for (const Index part : {0, 1})
-    for (const TwoSidedMode& mode : modes) append(x, {x.comm, (mode.*side).entries.col(part)});
-  return product(lift, x);
-}
-
-/// The unstable modes with their left vectors.
-Vectors unstable_vectors(const SensitivityProblem& problem, Sensitivity& result)
-{
-  constexpr double exact = 1e-10; // backward error
-  constexpr double same = 1e-7;   // of lambda, which the modes have with their own tolerance
-  const auto& [structure, interface, equilibrium] = problem.sliding;
-  const ClosedContact& contact = problem.linearised.contact;
-  const QuadraticProblem matrices = sliding_problem(structure, problem.linearised);
-  const Owned<Mat> K_loss = structure.K_loss.get() ? project(structure.K_loss, contact.Y, contact.Z) : Owned<Mat>{};
-  TwoSidedProblem two_sided = make_two_sided(matrices, K_loss, problem.modes_options.pencil);
-  Vectors vectors{{}, {}, empty_multivector(structure.K), empty_multivector(structure.K)};
-  std::vector<TwoSidedMode> modes;
-  for (const ComplexMode& mode : problem.modes.unstable())
-  {
-    const LossKind kind = loss_kind_of(mode);
-    const std::array shape{mode.real.get(), mode.imaginary.get()};
-    modes.push_back(find_two_sided(two_sided, kind, mode.lambda, kept_rows(columns_of(shape), contact)));
-    const auto& [lambda, right, left, error] = modes.back();
-    if (!(error < exact) || !(std::abs(lambda - mode.lambda) < same * std::abs(lambda)))
-    {
-      result.modes.clear();
-      result.outcome = {OutcomeKind::not_converged,
-                        format("the left vector of the unstable mode at %.6g Hz was not found", mode.frequency_hz()), 0,
-                        error};
-      return {{}, {}, empty_multivector(structure.K), empty_multivector(structure.K)};
-    }
-    vectors.lambda.push_back(lambda);
-    vectors.loss.push_back(kind);
-    ModeCauses& causes = result.modes.emplace_back();
-    causes.lambda = lambda;
-    causes.backward_error = error;
-    result.outcome.residual = std::max(result.outcome.residual, error);
-  }
-  vectors.right = lifted(contact.Z, modes, &TwoSidedMode::right);
-  vectors.left = lifted(contact.Y, modes, &TwoSidedMode::left);
-  for (std::size_t j = 0; j < vectors.count(); ++j) set_multipliers(problem, j, vectors);
-  return vectors;
-}
-
 /// Powers of the pairs and of damping: their difference is twice the growth rate.
-void find_powers(const SlidingEquilibrium& sliding, const Vectors& vectors, const AtHeldVectors& held,
+void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, const AtHeldVectors& held,
                  Sensitivity& result)
 {
   const Interface& interface = sliding.interface;
@@ -302,7 +89,7 @@ private:
 class NumberDerivatives
 {
 public:
-  NumberDerivatives(const SensitivityProblem& problem, const Vectors& vectors, const AtHeldVectors& held)
+  NumberDerivatives(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held)
       : problem_(problem), vectors_(vectors), held_(held), equilibria_(problem)
   {
   }
@@ -417,13 +204,13 @@ private:
   }
 
   const SensitivityProblem& problem_;
-  const Vectors& vectors_;
+  const HeldVectors& vectors_;
   const AtHeldVectors& held_;
   NearbyEquilibria equilibria_;
 };
 
 /// By the change of the residual, with vectors and reactions held and the equilibrium free to change.
-void find_number_derivatives(const SensitivityProblem& problem, const Vectors& vectors, const AtHeldVectors& held,
+void find_number_derivatives(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held,
                              Sensitivity& result)
 {
   NumberDerivatives derivatives(problem, vectors, held);
@@ -432,7 +219,7 @@ void find_number_derivatives(const SensitivityProblem& problem, const Vectors& v
       result.modes[j++].numbers.push_back(derivative);
 }
 
-void find_probe_derivatives(const SensitivityProblem& problem, const Vectors& vectors, const AtHeldVectors& held,
+void find_probe_derivatives(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held,
                             Sensitivity& result)
 {
   PetscInt probes = 0;
@@ -532,7 +319,7 @@ Sensitivity find_sensitivity(const SensitivityProblem& problem)
 {
   Sensitivity result;
   result.outcome.kind = OutcomeKind::converged;
-  const Vectors vectors = unstable_vectors(problem, result);
+  const HeldVectors vectors = unstable_vectors(problem, result);
   if (vectors.count() == 0) return result;
   const AtHeldVectors held = at_held_vectors(problem.sliding, vectors);
   find_powers(problem.sliding, vectors, held, result);

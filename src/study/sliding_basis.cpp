@@ -209,13 +209,6 @@ Owned<Mat> copy_of(Mat A)
   return result;
 }
 
-Owned<Mat> transpose_of(Mat A)
-{
-  Owned<Mat> result;
-  check(MatTranspose(A, MAT_INITIAL_MATRIX, result.put()));
-  return result;
-}
-
 SlidingBasis make_basis(const Structure& structure, const Interface& interface, Index sketched)
 {
   SlidingBasis basis{random_multivector(structure.K, static_cast<PetscInt>(sketched)), sketched,

@@ -79,6 +79,5 @@ MultiVector with_zero_pivots(const MultiVector& kept, const ClosedContact& conta
 bool equal(Mat A, Mat B);
 
 Owned<Mat> copy_of(Mat A);
-Owned<Mat> transpose_of(Mat A);
 
 } // namespace squeal

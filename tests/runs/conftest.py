@@ -26,6 +26,10 @@ def load_tool(name):
     return module
 
 
+# A run that is refused ends together on all ranks; mpirun would wait two seconds for those that have ended.
+NO_WAIT = {"OMPI_MCA_odls_base_sigkill_timeout": "0"}
+
+
 class Run:
     """One finished run: exit code, what it printed, and report.json when there is one."""
 
@@ -34,9 +38,7 @@ class Run:
         self.output = Path(folder)
         # The caller's arguments come last, so that its own --output wins.
         command += ["--output", str(folder), *map(str, arguments)]
-        # A run that is refused ends together on all ranks; mpirun would wait two seconds for those that have ended.
-        environment = {**os.environ, "OMPI_MCA_odls_base_sigkill_timeout": "0"}
-        done = subprocess.run(command, capture_output=True, text=True, timeout=500, env=environment)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=500, env={**os.environ, **NO_WAIT})
         self.code, self.printed, self.errors = done.returncode, done.stdout, done.stderr
 
     @property

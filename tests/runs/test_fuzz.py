@@ -5,13 +5,12 @@ import re
 import subprocess
 import sys
 
-from conftest import ROOT
+from conftest import NO_WAIT, ROOT
 
 
 def test_malformed_input_ends_in_one_message(tmp_path):
     done = subprocess.run([sys.executable, ROOT / "tools" / "fuzz", "--cases", "60", "--seed", "11", "--keep", tmp_path],
-                          capture_output=True, text=True, timeout=550,
-                          env={**os.environ, "OMPI_MCA_odls_base_sigkill_timeout": "0"})  # as in conftest.py
+                          capture_output=True, text=True, timeout=550, env={**os.environ, **NO_WAIT})
     assert done.returncode == 0, done.stdout + done.stderr
     ends = dict((end, int(count)) for count, end in re.findall(r"(\d+) with (exit code \d|long)", done.stdout))
     assert ends["exit code 1"] >= 20 and ends["exit code 0"] >= 5, done.stdout  # it refuses, and not everything

@@ -70,6 +70,9 @@ private:
 /// Returns a vector of the same layout with zero entries.
 Owned<Vec> zeros_like(Vec pattern);
 
+/// A'. Collective.
+Owned<Mat> transpose_of(Mat A);
+
 /// Returns a vector of the same layout and entries.
 Owned<Vec> copy_of(Vec source);
 

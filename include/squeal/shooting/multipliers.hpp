@@ -74,6 +74,9 @@ struct Multipliers
   MultiplierMethod method = MultiplierMethod::automatic; // that was used
   std::string refusal;                                   // why the oblique projection did not serve
   std::vector<SeenGrowth> seen{};                        // from smaller and smaller parts; the last is the smallest
+
+  /// Of the modulus of a value.
+  double upper_bound(std::size_t i) const { return upper.empty() ? std::abs(values[i]) + errors[i] : upper[i]; }
 };
 
 /// The motion of the largest multiplier: Re(z (real + i imaginary)), z multiplied by it in every period. No other phase
