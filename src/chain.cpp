@@ -13,7 +13,7 @@ namespace
 
 bool starts_without_a_mode(const TransientSettings& settings)
 {
-  return settings.start.kind == StartKind::file || settings.start.kind == StartKind::rest;
+  return settings.start.kind != StartKind::mode && settings.start.kind != StartKind::estimate;
 }
 
 /// The state that the cycle's search starts from, where it is none of the modes'.

@@ -226,6 +226,8 @@ State transient_start(const SlidingEquilibrium& sliding, const UnstableModes& un
   if (settings.start.kind == StartKind::file) return read_state(settings.start.file, sliding.structure);
   if (settings.start.kind == StartKind::rest)
     return {zeros_like(sliding.structure.load), zeros_like(sliding.structure.load), 0, {}};
+  if (settings.start.kind == StartKind::equilibrium)
+    return {copy_of(sliding.equilibrium.u), zeros_like(sliding.structure.load), 0, sliding.equilibrium.reactions};
   const ComplexMode& followed = unstable.modes.front();
   const Estimate& estimate = unstable.estimates.front();
   if (settings.start.kind == StartKind::mode)

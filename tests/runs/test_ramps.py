@@ -54,6 +54,17 @@ def test_ranks_and_given_factors_of_one_agree(converged):
     np.testing.assert_array_equal(other["pad_x"], one["pad_x"])
 
 
+def test_an_equilibrium_stays_until_a_factor_leads_away_from_it(converged):
+    still = {"start": '"equilibrium"', "steps": 50, "load_factor": [[0, 1]], "speed_factor": [[0, 1]]}
+    for ranks in (1, 2):
+        stays = history_of(converged(*arguments(**still, friction_factor=[[0, 1]]), ranks=ranks))
+        moves = history_of(converged(*arguments(**still, friction_factor=[[2, 1], [3, 0.5]]), ranks=ranks))
+        stretch = np.abs(stays["pad_x"]).max()
+        # the equilibrium is solved to 1e-10 of its forces, and grows by a hundredth in these 5 s
+        assert np.ptp(stays["pad_x"]) < 1e-9 * stretch and stays["stick"].max() == 0
+        assert np.ptp(moves["pad_x"][moves["time"] < 1.95]) < 1e-9 * stretch < 1e-3 * np.ptp(moves["pad_x"])
+
+
 @pytest.mark.parametrize("load, friction", [([[0, 1], [1, 2]], [[0, 1], [1, 2]]), ([[0, 0.105], [1, 3.9]], [[0, 3.9], [1, 0.105]])])
 def test_the_refusal_of_steep_friction_knows_the_ramps(squeal, load, friction):
     """mu r_n reaches four times the scene's own: in the end, or between two times at which it has 0.41 of it."""

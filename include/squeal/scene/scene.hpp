@@ -40,13 +40,14 @@ inline Words words_of(CycleModel)
 /// Origin of the initial state of a motion.
 enum class StartKind
 {
-  mode,     // the unstable mode at a given amplitude
-  estimate, // the unstable modes at their estimated amplitudes
-  rest,     // no displacement and no velocity
-  file,     // a state file
+  mode,        // the unstable mode at a given amplitude
+  estimate,    // the unstable modes at their estimated amplitudes
+  equilibrium, // sliding, without vibration
+  rest,        // no displacement and no velocity
+  file,        // a state file
 };
 
-inline constexpr std::array start_kind_words = {"mode", "estimate", "rest", "file"};
+inline constexpr std::array start_kind_words = {"mode", "estimate", "equilibrium", "rest", "file"};
 
 inline Words words_of(StartKind)
 {
