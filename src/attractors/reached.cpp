@@ -57,6 +57,29 @@ Window window_of(const std::vector<double>& values)
   return window;
 }
 
+/// Whether the second half of the motion comes nearer to its last mean in every quarter, as on the way to a cycle.
+bool approaches(const std::vector<double>& values)
+{
+  constexpr double nearer = 0.7; // a motion that wanders has three such ratios in a row in a few percent of all cases
+  const std::size_t quarter = values.size() / 8, first = values.size() - 4 * quarter;
+  const double last = mean_of(values, first + 3 * quarter, quarter);
+  const auto distance = [&](std::size_t k)
+  {
+    double squares = 0;
+    for (std::size_t i = first + k * quarter; i < first + (k + 1) * quarter; ++i)
+      squares += (values[i] - last) * (values[i] - last);
+    return std::sqrt(squares);
+  };
+  double before = distance(0);
+  for (const std::size_t k : {1U, 2U, 3U})
+  {
+    const double now = distance(k);
+    if (!(now < nearer * before)) return false;
+    before = now;
+  }
+  return true;
+}
+
 /// From the crossings of the second half of the motion, and of its quarters.
 MeanValue frequency_of(const std::vector<double>& crossings)
 {
@@ -97,9 +120,12 @@ ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<
   // three standard errors: a motion without trend shows such a one in a percent of all cases (t, 8 degrees of freedom)
   const bool has_trend =
       std::abs(window.trend) > std::max(trend_allowed * window.mean, 3.4 * window.trend_error) || !(window.mean > 0);
-  reached.kind = has_trend                                         ? ReachedKind::unsettled
-                 : window.largest_deviation < steady * window.mean ? ReachedKind::steady
-                                                                   : ReachedKind::varying;
+  if (has_trend)
+    reached.kind = ReachedKind::unsettled;
+  else if (window.largest_deviation < steady * window.mean)
+    reached.kind = ReachedKind::steady;
+  else
+    reached.kind = approaches(energies) ? ReachedKind::unsettled : ReachedKind::varying;
   return reached;
 }
 

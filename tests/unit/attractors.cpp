@@ -40,6 +40,17 @@ TEST_CASE("a decay towards a constant is unsettled while its trend shows, and st
   CHECK(late.frequency.value == doctest::Approx(50));
 }
 
+TEST_CASE("a swinging approach to a cycle is unsettled, a steady swing is not")
+{
+  const auto swinging = [](double left)
+  { return [left](int i) { return 1 + 0.3 * std::pow(left, i) * std::cos(two_pi * i / 3.7); }; };
+  CHECK(reached_by(series(250, swinging(0.99)), crossings(50), 1e-4).kind != ReachedKind::varying);
+  const auto late = [](int i) { return i < 125 ? 3 : 1 + std::pow(0.95, i - 125) * std::cos(two_pi * i / 90); };
+  CHECK(reached_by(series(250, late), crossings(50), 1e-4).kind == ReachedKind::unsettled);
+  const auto steady = [](int i) { return 1 + 0.5 * std::cos(two_pi * i / 53.1); };
+  CHECK(reached_by(series(400, steady), crossings(50), 1e-4).kind == ReachedKind::varying);
+}
+
 TEST_CASE("a motion that dies out is at rest, one that wanders without a trend is varying")
 {
   CHECK(reached_by(series(200, [](int i) { return std::exp(-i / 10.); }), crossings(50), 1e-4).kind ==

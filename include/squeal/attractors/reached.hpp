@@ -17,7 +17,7 @@ enum class ReachedKind
   rest,      // the motion decayed
   steady,    // the mean energy of every tenth of the window is within half a percent
   varying,   // it is not, but it has no trend: no cycle attracts there
-  unsettled, // the energy still has a trend
+  unsettled, // the energy still has a trend, or its distance from the last mean falls
 };
 
 inline constexpr std::array reached_words = {"rest", "steady", "varying", "unsettled"};
