@@ -355,13 +355,13 @@ int steps_to_compare(const Structure& structure, int steps)
 }
 
 FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, const PeriodMap& map,
-                        const Orbit& orbit)
+                        const Orbit& orbit, int most_steps)
 {
-  PeriodMap examined{map.sliding, map.options, std::min(map.steps, enough_steps), map.theta};
+  PeriodMap examined{map.sliding, map.options, std::min(map.steps, most_steps), map.theta};
   examined.reactions = map.reactions;
   Flow flow = flow_of(examined);
   add_slow_motions(problem, examined,
-                   map.steps > enough_steps ? map.steps : steps_to_compare(map.sliding.structure, map.steps), flow);
+                   map.steps > most_steps ? map.steps : steps_to_compare(map.sliding.structure, map.steps), flow);
   const Vec u0 = problem.sliding.equilibrium.u;
   const Preconditioner none;
   const OrbitProblem found = problem_of(

@@ -13,8 +13,8 @@ void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_ste
 /// The number of steps a period that tells the error of another: twice as many of a large model with few, else 0.
 int steps_to_compare(const Structure& structure, int steps);
 
-/// Of a converged cycle of the map, by at most 128 steps a period: what the others change is in the bars.
+/// Of a converged cycle of the map, by at most `most_steps` a period: what the others change is in the bars.
 FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, const PeriodMap& map,
-                        const Orbit& orbit);
+                        const Orbit& orbit, int most_steps);
 
 } // namespace squeal

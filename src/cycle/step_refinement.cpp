@@ -247,6 +247,17 @@ void refine_small(const CycleCorrection& correction, LimitCycle& cycle)
   fidelity.full_periods = cycle.convergence.periods;
 }
 
+/// The verdict at the finer steps: impacts may make a cycle repel that attracts at few. Of a large model that would
+/// take longer than the cycle; there the bars hold what twice as many steps change.
+void examine_refined(const CycleCorrection& correction, const PeriodMap& map, LimitCycle& cycle)
+{
+  const CycleProblem& problem = correction.problem;
+  FloquetAnalysis found = examine(problem, correction.options.shooting, map, cycle.orbit, enough_steps);
+  cycle.multipliers = std::move(found.multipliers);
+  correction.fidelity.verdict_steps = std::min(map.steps, enough_steps);
+  refuse_repelling(cycle.multipliers, problem.unstable.modes.size() - 1, cycle.outcome);
+}
+
 /// Of no tolerance: the accuracy ends the iteration.
 OrbitProblem orbit_problem(const CycleCorrection& correction, const Flow& flow, double period)
 {
@@ -302,6 +313,7 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
   cycle.orbit = std::move(shooting.orbit);
   cycle.measured = std::move(last_measured(flow));
   cycle.costs = {flow.map.step.factor_seconds, flow.map.step.condensed_seconds};
+  if (!is_large(problem.sliding.structure)) examine_refined(correction, flow.map, cycle);
 }
 
 void estimate_model_errors(const CycleCorrection& correction, const LimitCycle& cycle)
@@ -327,7 +339,7 @@ LimitCycle measure_reduced_cycle(const CycleCorrection& correction, const Shooti
   record_full(log, ShootingStage::full_period, cycle.orbit);
   estimate_model_errors(correction, cycle);
   cycle.outcome = {OutcomeKind::converged, "", 0, cycle.orbit.residual};
-  cycle.multipliers = examine(problem, correction.options.shooting, flow.map, cycle.orbit).multipliers;
+  cycle.multipliers = examine(problem, correction.options.shooting, flow.map, cycle.orbit, enough_steps).multipliers;
   refuse_repelling(cycle.multipliers, problem.unstable.modes.size() - 1, cycle.outcome);
   cycle.steps_per_period = flow.map.steps;
   cycle.theta = flow.map.theta;

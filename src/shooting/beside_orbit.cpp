@@ -152,10 +152,20 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
 
 void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers)
 {
-  if (seen.empty() || multipliers.stability != Stability::undecided || !multipliers.complete) return;
+  if (seen.empty()) return;
+  const SeenGrowth& nearest = seen.back();
+  if (multipliers.stability == Stability::stable && nearest.growth - nearest.error > 1)
+  {
+    multipliers.stability = Stability::undecided;
+    multipliers.would_decide =
+        format("by its multipliers it attracts, but a motion beside it was seen to grow %.4g "
+               "times a period: -cycle_multiplier_method whole or arnoldi, or other steps a period",
+               nearest.growth);
+    return;
+  }
+  if (multipliers.stability != Stability::undecided || !multipliers.complete) return;
   for (std::size_t i = 1; i < multipliers.values.size(); ++i)
     if (multipliers.values[i] != std::conj(multipliers.values[0]) && !(multipliers.upper_bound(i) < 1)) return;
-  const SeenGrowth& nearest = seen.back();
   if (!(std::abs(nearest.growth - 1) > nearest.error)) return;
   const bool grows = nearest.growth > 1;
   multipliers.stability = grows ? Stability::unstable : Stability::stable;

@@ -28,7 +28,7 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
                                        const FloquetAnalysis& floquet, long periods);
 
 /// Decides what only the bar of the largest multiplier leaves undecided, where a motion along it was seen to grow or to
-/// decay beyond its own bar.
+/// decay beyond its own bar. "Stable" is undecided where one was seen to grow.
 void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers);
 
 } // namespace squeal

@@ -2,6 +2,8 @@
 /// The largest Ritz values of (1 - V (W'V)^-1 W') dPhi_T/dx, in a block Arnoldi space (src/README.md, section 6.9).
 #include "oblique_projector.hpp"
 
+#include <optional>
+
 namespace squeal
 {
 
@@ -11,6 +13,7 @@ struct DeflatedSearch
   bool bounded = false;             // its largest Ritz value is below 1 by more than its residual
   std::complex<double> largest = 0; // that value
   double residual = 0;              // of that value
+  std::optional<StateBlock> vector; // of that value, real and imaginary part; where it is not bounded
   long columns = 0;                 // products with the monodromy matrix
 };
 

@@ -30,16 +30,16 @@ constexpr int passes_at_most = 24, passes_of_large_model = 8;
 /// The passes: what the last one found of each wanted value, in the order of the reduced model's.
 struct Passes
 {
-  Projector space{};                   // its V is Q
-  StateBlock image{};                  // A Q
-  Projector wanted{};                  // on the wanted vectors alone
-  StateBlock W{};                      // energy images of the left vectors alone
-  std::vector<DenseEigenpair> pairs{}; // vectors in the coordinates of Q
-  std::vector<double> changes{};       // when a pair was refined last
-  std::vector<double> bars{}, rises{}; // rises: the bars upwards
-  std::size_t shift = 0;               // the place of the shift in time; the number of pairs: it is not there
-  DenseEigenpair shift_pair{};         // the shift itself
-  double shift_distance = 0;           // of its multiplier from 1
+  Projector space{};                        // its V is Q
+  StateBlock image{};                       // A Q
+  Projector wanted{};                       // on the wanted vectors alone
+  std::vector<DenseEigenpair> pairs{};      // vectors in the coordinates of Q; first the reduced model's
+  std::vector<double> changes{};            // when a pair was refined last
+  std::vector<double> grid{}, grid_rises{}; // what the grid of time changes; of newcomers the most that is known
+  std::vector<double> bars{}, rises{};      // rises: the bars upwards
+  std::size_t shift = 0;                    // the place of the shift in time; the number of pairs: it is not there
+  DenseEigenpair shift_pair{};              // the shift itself
+  double shift_distance = 0;                // of its multiplier from 1
 };
 
 /// Whether a bar, or what a modulus may rise by, reaches across 1.
@@ -70,14 +70,28 @@ std::string begin_passes(const Monodromy& monodromy, const SlowMotions& slow, Pa
   const Flow& flow = monodromy.flow;
   Projector& space = passes.space;
   space.V = orthonormal(flow, block_of(slow.right), least_part);
-  passes.W = energy_images(flow, orthonormal(flow, block_of(slow.left), least_part));
-  space.W = passes.W;
+  space.W = energy_images(flow, orthonormal(flow, block_of(slow.left), least_part));
+  passes.grid = slow.errors;
+  passes.grid_rises = slow.rises;
   if (const double condition = fit(space); !(condition <= largest_condition))
     return format("right and left vectors of the reduced model do not fit together: condition %.0e", condition);
   passes.image = image_of(monodromy, space.V);
   const Owned<Vec> rate = copy_of(monodromy.orbit.rate.get());
   extend(monodromy, block_of(std::span(&rate, 1)), passes);
   return {};
+}
+
+/// Places in `all` of values that may be multipliers next to 1 or above and that nobody has taken: the reduced model
+/// has none like them.
+std::vector<std::size_t> newcomers(const std::vector<DenseEigenpair>& all, const std::vector<std::size_t>& taken,
+                                   std::size_t shift)
+{
+  constexpr double large = 0.95;
+  std::vector<std::size_t> places;
+  for (std::size_t k = 0; k < all.size(); ++k)
+    if (k != shift && std::abs(all[k].lambda) > large && std::ranges::find(taken, k) == taken.end())
+      places.push_back(k);
+  return places;
 }
 
 /// The wanted pairs and their bars. `refined`: those that the last block was made for; empty: all.
@@ -88,29 +102,36 @@ void project(const Monodromy& monodromy, const SlowMotions& slow, const std::vec
   fit(space);
   const std::vector<DenseEigenpair> all = solve_dense_unsymmetric(coefficients(space, passes.image));
   const std::vector<Complex> last = passes.pairs.empty() ? slow.values : values_of(passes.pairs);
-  const std::vector<std::size_t> places = nearest_places(last, values_of(all));
+  std::vector<std::size_t> places = nearest_places(last, values_of(all));
   const Owned<Vec> rate = copy_of(monodromy.orbit.rate.get());
   const StateBlock flow = block_of(std::span(&rate, 1));
   const std::size_t shift = find_shift(all, inner_products(space.V, energy_images(monodromy.flow, flow)).col(0));
   passes.shift_pair = all[shift];
   passes.shift_distance = std::abs(passes.shift_pair.lambda - 1.);
-  passes.shift = last.size();
   passes.pairs.clear();
   passes.changes.resize(last.size(), 0);
   for (std::size_t i = 0; i < last.size(); ++i)
   {
-    passes.pairs.push_back(all[places[i]]);
-    if (places[i] == shift) passes.shift = i;
     const double change = std::abs(all[places[i]].lambda - last[i]);
     const bool own = refined.empty() || std::find(refined.begin(), refined.end(), i) != refined.end();
     passes.changes[i] = own ? change : std::max(passes.changes[i], change);
   }
-  passes.bars.assign(last.size(), 0);
-  passes.rises = passes.bars;
-  for (std::size_t i = 0; i < last.size(); ++i)
+  for (const std::size_t place : newcomers(all, places, shift))
   {
-    passes.bars[i] = std::max(2 * passes.changes[i] + slow.errors[i], 1e-9);
-    passes.rises[i] = std::max(2 * passes.changes[i] + slow.rises[i], 1e-9);
+    places.push_back(place);
+    passes.changes.push_back(1); // not known
+    for (std::vector<double>* part : {&passes.grid, &passes.grid_rises})
+      part->push_back(part->empty() ? 0 : *std::ranges::max_element(*part));
+  }
+  passes.shift = places.size();
+  passes.bars.assign(places.size(), 0);
+  passes.rises = passes.bars;
+  for (std::size_t i = 0; i < places.size(); ++i)
+  {
+    passes.pairs.push_back(all[places[i]]);
+    if (places[i] == shift) passes.shift = i;
+    passes.bars[i] = std::max(2 * passes.changes[i] + passes.grid[i], 1e-9);
+    passes.rises[i] = std::max(2 * passes.changes[i] + passes.grid_rises[i], 1e-9);
   }
 }
 
@@ -173,6 +194,35 @@ MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Index size)
   return result;
 }
 
+/// The wanted pairs and the shift in time, complex pairs whole.
+std::vector<DenseEigenpair> with_shift(const Passes& passes)
+{
+  std::vector<DenseEigenpair> pairs = passes.pairs;
+  if (passes.shift < pairs.size()) return pairs;
+  const DenseEigenpair& shift = passes.shift_pair;
+  pairs.push_back(shift);
+  const std::vector<Complex> values = values_of(passes.pairs);
+  if (shift.lambda.imag() != 0 && std::ranges::find(values, std::conj(shift.lambda)) == values.end())
+    pairs.push_back({std::conj(shift.lambda), shift.y.conjugate()});
+  return pairs;
+}
+
+/// The projector on the wanted vectors, along their left ones: with C = (W'Q)^-1 W'A Q and z'C = m z' these act as
+/// z'(W'Q)^-1 W'.
+void set_wanted(const Monodromy& monodromy, Passes& passes)
+{
+  Projector& space = passes.space;
+  const MatrixXd C = coefficients(space, passes.image), gram = inner_products(space.W, space.V);
+  const std::vector<DenseEigenpair> adjoint = solve_dense_unsymmetric(C.transpose());
+  const std::vector<DenseEigenpair> right = with_shift(passes);
+  std::vector<DenseEigenpair> left;
+  for (const std::size_t place : nearest_places(values_of(right), values_of(adjoint))) left.push_back(adjoint[place]);
+  const Index size = space.V.columns();
+  passes.wanted.V = orthonormal(monodromy.flow, combination(space.V, real_columns(right, size)), least_part);
+  passes.wanted.W = combination(space.W, gram.transpose().colPivHouseholderQr().solve(real_columns(left, size)));
+  fit(passes.wanted);
+}
+
 /// Whether values that matter still change so much that they cannot be taken for multipliers.
 bool meaningless(const Passes& passes)
 {
@@ -182,11 +232,11 @@ bool meaningless(const Passes& passes)
   return false;
 }
 
-/// Two passes or more, until the pairs that decide have settled. The first change is the reduced model's error, and
-/// says little of what the projection has. Returns why the vectors do not serve, or nothing.
+/// Two passes or more, until the pairs that decide have settled. The first change of all is the reduced model's error,
+/// and says little of what the projection has. Returns why the vectors do not serve, or nothing.
 std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Passes& passes)
 {
-  if (std::string refusal = begin_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
+  const bool first = passes.pairs.empty();
   constexpr double settled = 2.5e-7; // what other ranks or starts may add up to: below 1e-6
   const PetscInt dofs = dofs_of(monodromy.orbit.state);
   const auto is_settled = [&](std::size_t i)
@@ -196,23 +246,20 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
     if (beyond > passes.bars[i] && 2 * passes.changes[i] <= 0.1 * beyond) return true;
     // of the grid's error, which the bar holds as well: as much as that, where the verdict stands already
     const double part = reaches_across(passes, i) ? 0.05 : 0.5;
-    return passes.changes[i] <= std::max(settled, part * slow.errors[i]);
+    return passes.changes[i] <= std::max(settled, part * passes.grid[i]);
   };
   std::vector<std::size_t> refined;
   for (int pass = 1;; ++pass)
   {
     project(monodromy, slow, refined, passes);
     refined = deciding_pairs(passes);
-    if (pass > 1) std::erase_if(refined, is_settled);
+    if (pass > 1 || !first) std::erase_if(refined, is_settled);
     if (refined.empty() || pass == (dofs > large_model ? passes_of_large_model : passes_at_most)) break;
     if (extend(monodromy, corrections(monodromy, slow, refined, passes), passes) == 0) break;
   }
   if (meaningless(passes) && !repels(passes))
     return "the reduced model's multipliers differ too much from the full model's";
-  passes.wanted.V = orthonormal(
-      monodromy.flow, combination(passes.space.V, real_columns(passes.pairs, passes.space.V.columns())), least_part);
-  passes.wanted.W = passes.W;
-  fit(passes.wanted);
+  set_wanted(monodromy, passes);
   return {};
 }
 
@@ -254,15 +301,24 @@ Completeness coverage_of(const SlowMotions& slow, const DeflatedSearch& search)
                         std::abs(search.largest), search.residual)};
 }
 
-/// Values stay sorted, the largest first.
-void add_value(Multipliers& multipliers, Complex value, double error)
+/// The passes, and the search beside them. What that finds joins Q: a motion that the reduced model has not becomes one
+/// of the pairs, and what comes of pairs that have not settled goes. Returns why the vectors do not serve, or nothing.
+std::string make_complete(const Monodromy& monodromy, const SlowMotions& slow, Index columns, Passes& passes,
+                          Completeness& coverage, long& searched)
 {
-  const auto place = std::find_if(multipliers.values.begin(), multipliers.values.end(),
-                                  [&](Complex other) { return std::abs(other) < std::abs(value); }) -
-                     multipliers.values.begin();
-  multipliers.values.insert(multipliers.values.begin() + place, value);
-  multipliers.errors.insert(multipliers.errors.begin() + place, error);
-  multipliers.upper.insert(multipliers.upper.begin() + place, std::abs(value) + error);
+  constexpr int rounds = 3;
+  if (std::string refusal = begin_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
+  for (int round = 1;; ++round)
+  {
+    if (std::string refusal = make_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
+    coverage = {true, ""}; // a multiplier above 1 needs no other
+    if (repels(passes)) return {};
+    DeflatedSearch search = search_beside(monodromy, passes.wanted, slow.others, columns);
+    searched += search.columns;
+    coverage = coverage_of(slow, search);
+    if (search.bounded || !search.vector || round == rounds) return {};
+    if (extend(monodromy, std::move(*search.vector), passes) == 0) return {};
+  }
 }
 
 } // namespace
@@ -278,18 +334,12 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
   Multipliers& multipliers = result.multipliers;
   multipliers.method = MultiplierMethod::oblique;
   Passes passes;
-  refusal = make_passes(monodromy, slow, passes);
+  Completeness coverage;
+  refusal = make_complete(monodromy, slow, columns > 0 ? columns : 96, passes, coverage, multipliers.periods);
   if (!refusal.empty()) return std::nullopt;
   take_out_shift(passes);
   multipliers.trivial_error = passes.shift_distance;
-  DeflatedSearch search;
-  Completeness coverage{true, ""}; // a multiplier above 1 needs no other
-  if (!repels(passes))
-  {
-    search = search_beside(monodromy, passes.wanted, slow.others, columns > 0 ? columns : 96);
-    coverage = coverage_of(slow, search);
-  }
-  multipliers.periods = slow.periods + static_cast<long>(passes.image.columns()) + search.columns;
+  multipliers.periods += slow.periods + static_cast<long>(passes.image.columns());
   std::vector<std::size_t> order(passes.pairs.size());
   std::iota(order.begin(), order.end(), 0U);
   std::stable_sort(order.begin(), order.end(),
@@ -301,7 +351,6 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
     multipliers.errors.push_back(passes.bars[i]);
     multipliers.upper.push_back(std::abs(passes.pairs[i].lambda) + passes.rises[i]);
   }
-  if (std::abs(search.largest) - 2 * search.residual > 1) add_value(multipliers, search.largest, 2 * search.residual);
   decide(multipliers, coverage, multipliers.values.size());
   if (passes.pairs.empty()) return result;
   const auto combined = [&](const Eigen::VectorXd& y)

@@ -161,3 +161,47 @@ def write_coexistence(folder, friction, cycle, **tables):
                    M=np.diag([0.3, 0.05, 1, 0.05]), C=C + np.triu(C, 1).T, K=K + np.triu(K, 1).T)
     return write_scene(folder, matrices={"folder": "matrices"}, friction=friction, modes={"band": 0.36},
                        cycle={"steps_per_period": 128, **cycle}, **tables)
+
+
+BLOCK_ON_PLATE = """Mesh.ElementOrder = 1;
+Point(1) = {-0.06, -0.02, 0}; Point(2) = {0.06, -0.02, 0}; Point(3) = {0.06, 0.02, 0}; Point(4) = {-0.06, 0.02, 0};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1};
+Curve Loop(1) = {1, 2, 3, 4}; Plane Surface(1) = {1};
+Transfinite Curve{1, 3} = 7; Transfinite Curve{2, 4} = 3; Transfinite Surface{1}; Recombine Surface{1};
+plate[] = Extrude {0, 0, -0.008} { Surface{1}; Layers{2}; Recombine; };
+z = 0.5; // apart, so that the contact faces share no nodes
+Point(101) = {-0.01, -0.01, z}; Point(102) = {0.01, -0.01, z}; Point(103) = {0.01, 0.01, z}; Point(104) = {-0.01, 0.01, z};
+Line(101) = {101, 102}; Line(102) = {102, 103}; Line(103) = {103, 104}; Line(104) = {104, 101};
+Curve Loop(101) = {101, 102, 103, 104}; Plane Surface(101) = {101};
+Transfinite Curve{101, 102, 103, 104} = 3; Transfinite Surface{101}; Recombine Surface{101};
+block[] = Extrude {0, 0, 0.02} { Surface{101}; Layers{2}; Recombine; };
+Geometry.AutoCoherence = 0;
+Translate {0, 0, -z} { Volume{block[1]}; }
+Physical Volume("plate") = plate[1];
+Physical Volume("block") = block[1];
+Physical Surface("plate_face") = 1;
+Physical Surface("plate_end") = {plate[3], plate[5]};
+Physical Surface("block_face") = 101;
+Physical Surface("block_back") = block[0];
+"""
+
+
+def write_block_on_plate(folder):
+    """A scene of 190 degrees of freedom and 9 pairs, a soft block on a clamped plate that slides below it, whose contact
+    hits hard: its cycles have multipliers that no model with few shapes has."""
+    (folder / "plate.geo").write_text(BLOCK_ON_PLATE)
+    (folder / "scene.toml").write_text("""
+mesh = { file = "plate.geo" }
+part = [ { name = "plate", young = 210e9, poisson = 0.3, density = 7850 },
+         { name = "block", young = 3e9, poisson = 0.25, density = 4000 } ]
+support = [ { on = "plate_end", fixed = "all" } ]
+rigid_body = [ { name = "holder", surfaces = "block_back", at = [0, 0, 0.02], mass = 0.1, free = "z" } ]
+force = [ { on = "holder", vector = [0, 0, -100] } ]
+contact = [ { rotor = "plate_face", stator = "block_face", velocity = [1, 0, 0] } ]
+friction = { coefficient = 0.46 }
+damping = { beta = 2e-7 }
+modes = { band = 12000 }
+probe = [ { name = "b", on = "block_face", at = [0, 0, 0], direction = "x" } ]
+cycle = { enabled = true, steps_per_period = 64 }
+""")
+    return folder / "scene.toml"

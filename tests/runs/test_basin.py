@@ -4,6 +4,7 @@ import re
 
 import pytest
 from conftest import INPUTS
+from models import write_block_on_plate
 
 SLOWER = 1.2720196495  # square root of the golden ratio: no common period within any number of turns that matters
 
@@ -95,3 +96,18 @@ def test_the_projection_finds_the_multiplier_of_arnoldi(squeal):
     largest = found["values"][0]
     assert abs(abs(complex(largest["real"], largest["imaginary"])) - 1.000122) < 1e-4
     assert largest["error"] > 1.2e-4 and "reaches across 1" in found["would_decide"]
+
+
+@pytest.mark.parametrize("change", [[], ["friction.coefficient=0.5", "contact.0.velocity.0=0.5"],
+                                    ["friction.coefficient=0.48", "damping.beta=4e-7"]])
+def test_the_projection_finds_a_multiplier_that_its_reduced_model_lacks(squeal, tmp_path, change):
+    """1.1995, 1.195 and 1.276 by the whole matrix, all complex. The reduced model of the recorded contact has none above
+    0.96. 1e-4: passes end when a multiplier changes by 2.5e-7, and the cycle's residual of 1e-5 is amplified."""
+    scene = [write_block_on_plate(tmp_path), "-cycle_free_periods", "0", "-settled_periods", "1"]
+    scene += [word for key in change for word in ("--set", key)]
+    moduli = []
+    for method in ("whole", "oblique"):
+        found = squeal(*scene, "-cycle_multiplier_method", method, ranks=1).report["cycle"]["multipliers"]
+        assert found["method"] == method and found["stability"] == "unstable", found
+        moduli.append(abs(complex(found["values"][0]["real"], found["values"][0]["imaginary"])))
+    assert moduli[0] > 1.1 and abs(moduli[1] - moduli[0]) < 1e-4

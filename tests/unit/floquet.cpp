@@ -1,5 +1,6 @@
 // Multipliers by oblique projection against the whole monodromy matrix, on random frictional oscillators.
 // ranks: 1 2
+#include "../../src/shooting/beside_orbit.hpp"
 #include "../support/cycle_of.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 
@@ -111,6 +112,24 @@ TEST_CASE("a motion beside a cycle grows or decays as the largest multiplier say
     ++watched;
   }
   CHECK(watched >= 3);
+}
+
+TEST_CASE("growth that is seen decides what the largest bar leaves open, and denies \"stable\"")
+{
+  const auto decided = [](Stability stability, double bar, double growth)
+  {
+    Multipliers multipliers;
+    multipliers.values = {0.99, 0.5};
+    multipliers.errors = {bar, 1e-3};
+    multipliers.stability = stability;
+    decide_by_growth({{60, growth, 0.02, 0.03}}, multipliers);
+    return multipliers.stability;
+  };
+  CHECK(decided(Stability::stable, 1e-4, 1.01) == Stability::stable); // within the error of what was seen
+  CHECK(decided(Stability::stable, 1e-4, 1.05) == Stability::undecided);
+  CHECK(decided(Stability::undecided, 0.05, 1.05) == Stability::unstable);
+  CHECK(decided(Stability::undecided, 0.05, 0.9) == Stability::stable);
+  CHECK(decided(Stability::undecided, 0.05, 1.01) == Stability::undecided);
 }
 
 TEST_CASE("a state of the cycle is a start from which its own period is found at once")
