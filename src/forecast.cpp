@@ -1,7 +1,7 @@
 /// Memory by what each stage holds at its peak: what is resident after the model is made, by the system's own count,
-/// and copies of matrices, factors by their symbolic analysis, dense operators and vectors (src/README.md,
-/// section 8.9). Time by the speed at which memory is read; its constants are fitted to runs of the TGV brake at two
-/// sizes.
+/// and copies of matrices, factors by their symbolic analysis, dense operators and vectors. Time by the operations of
+/// factors and products, and by the memory that steps read (src/README.md, section 8.9). The constants of time are
+/// fitted to runs of the TGV brake.
 #include "squeal/forecast.hpp"
 
 #include "squeal/algebra/factor_forecast.hpp"
@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <Eigen/Core>
 #include <fstream>
 #include <functional>
 #include <numeric>
@@ -24,9 +25,17 @@ namespace squeal
 namespace
 {
 
-constexpr double seconds_per_byte = 1.4e-10;   // of a step, which reads factor and W: 1.45e-10 and 1.4e-10
-constexpr double seconds_of_no_model = 2.5e-5; // a step of inputs/oscillator, which is all overhead
-constexpr double periods_to_a_cycle = 50;      // of shooting from the estimate: 41 to 47
+// Of operations and of memory read, by runs of the TGV brake with 5048, 33 224 and 97 742 degrees of freedom:
+constexpr double equilibrium_factors = 2, equilibrium_passes = 140; // over K: ordering, springs, residuals
+constexpr double modes_factors = 13, modes_vectors = 11;
+constexpr double read_passes = 1.3, made_factors = 2; // over factor and W; of what they take to be made
+constexpr double dense_operations = 10;               // of a cube of twice the degrees of freedom
+constexpr double seconds_of_no_model = 2.5e-5;        // a step of inputs/oscillator, which is all overhead
+constexpr double periods_to_a_cycle = 50;             // of shooting from the estimate: 41 to 47
+constexpr double periods_of_multipliers = 60;
+constexpr double periods_beside_reduced = 100; // of the full model, with those of the multipliers
+constexpr double reduction_products = 16;      // of dofs x shapes by shapes
+constexpr double reduced_steps = 20000;        // over a matrix of shapes
 constexpr int usual_steps = 128;               // a period, where they are chosen
 constexpr double day = 86400;                  // [s]
 constexpr double dense_copies = 24; // of n x n numbers in a dense quadratic problem: a pencil of size 2 n, six times
@@ -59,12 +68,17 @@ double motions_of(const Scene& scene)
   return scene.sweep && scene.sweep->stages == SweepStages::cycle ? points_of(*scene.sweep) : 0;
 }
 
+double steps_of_period(const Scene& scene)
+{
+  return scene.cycle.steps_per_period > 0 ? scene.cycle.steps_per_period : usual_steps;
+}
+
 double steps_of(const Scene& scene, const ProgramOptions& options)
 {
   double steps = steps_of_transient(scene.transient);
   const double motions = motions_of(scene);
   if (!scene.cycle.enabled && motions == 0) return steps;
-  const double a_period = scene.cycle.steps_per_period > 0 ? scene.cycle.steps_per_period : usual_steps;
+  const double a_period = steps_of_period(scene);
   const double cycle = a_period * std::min(periods_to_a_cycle, static_cast<double>(options.cycle.shooting.max_periods));
   const double starts = scene.cycle.starts, points = scene.branch ? scene.branch->points : 0;
   const double of_scene = scene.cycle.enabled ? cycle * (1 + starts + points) + a_period * scene.cycle.free_periods : 0;
@@ -232,6 +246,60 @@ double memory_of_points(double points)
   return number * numbers_of_point * points;
 }
 
+/// One factorisation of K bordered by B, and the dense work of the pairs, which is rank 0's.
+double seconds_of_equilibrium(const Sizes& sizes, const Speed& speed)
+{
+  return (equilibrium_factors * sizes.factor.operations + std::pow(sizes.pairs, 3)) / speed.operations +
+         equilibrium_passes * matrix_entry * sizes.entries / sizes.ranks / speed.bytes;
+}
+
+/// The count's L D L', the search's factor and what a slice of 100 pairs does with its vectors. How many slices the
+/// band takes is not known before.
+double seconds_of_modes(const Sizes& sizes, const ModesSettings& settings, PetscInt dense_limit, const Speed& speed)
+{
+  if (sizes.dofs <= static_cast<double>(dense_limit))
+    return dense_operations * std::pow(2 * sizes.dofs, 3) / speed.operations;
+  const double factors = settings.method == ModesMethod::projection ? 2 : 3; // an L U takes two L L'
+  return (modes_factors * factors * sizes.factor.inner_operations +
+          modes_vectors * vectors_of_modes * vectors_of_modes * sizes.dofs) /
+         speed.operations / sizes.ranks;
+}
+
+/// To a cycle and its multipliers: periods of the full model, and before them, where the scene leaves it open, the
+/// making of a reduced model and its motion to a cycle.
+double seconds_of_cycle(const Sizes& sizes, const Scene& scene, double step_seconds, const Speed& speed)
+{
+  const double a_period = steps_of_period(scene) * step_seconds;
+  if (scene.fidelity == CycleModel::full) return (periods_to_a_cycle + periods_of_multipliers) * a_period;
+  const double shapes = std::min(sizes.pairs + vectors_of_modes_kept, sizes.dofs);
+  const double making = reduction_products * sizes.dofs * shapes * shapes / speed.operations / sizes.ranks;
+  const double moving = reduced_steps * number * shapes * shapes / speed.bytes;
+  return making + moving + (scene.fidelity == CycleModel::automatic ? periods_beside_reduced * a_period : 0);
+}
+
+Speed measured_speed(MPI_Comm comm)
+{
+  constexpr Eigen::Index size = 512, numbers = 8 << 20; // 64 MB, more than a cache
+  const Eigen::MatrixXd A = Eigen::MatrixXd::Ones(size, size);
+  const Eigen::VectorXd x = Eigen::VectorXd::Ones(numbers);
+  Eigen::MatrixXd product(size, size);
+  std::array<double, 2> times{HUGE_VAL, HUGE_VAL};
+  double sum = 0; // used, so that it is not left out
+  for (int pass = 0; pass < 4; ++pass)
+  {
+    MPI_Barrier(comm);
+    const double start = MPI_Wtime();
+    product.noalias() = A * A;
+    const double middle = MPI_Wtime();
+    sum += x.sum();
+    times[0] = std::min(times[0], middle - start);
+    times[1] = std::min(times[1], MPI_Wtime() - middle);
+  }
+  if (!(sum + product(0, 0) > 0)) return {};
+  MPI_Allreduce(MPI_IN_PLACE, times.data(), 2, MPI_DOUBLE, MPI_MAX, comm);
+  return {2. * size * size * size / times[0], number * static_cast<double>(numbers) / times[1]};
+}
+
 /// The least that a limit of the process may be.
 struct LeastLimit
 {
@@ -245,46 +313,70 @@ struct LeastLimit
 double Forecast::bytes() const
 {
   double most = held;
-  for (const StageMemory& stage : stages) most = std::max(most, stage.bytes);
+  for (const StageForecast& stage : stages) most = std::max(most, stage.bytes);
   return most;
 }
 
-Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options)
+double Forecast::seconds() const
+{
+  double sum = 0;
+  for (const StageForecast& stage : stages) sum += stage.seconds;
+  return sum;
+}
+
+Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options, SpeedTaken taken)
 {
   Forecast forecast;
   const Sizes sizes = sizes_of(model, options.factor);
   const MPI_Comm comm = comm_of(model.structure.K);
+  forecast.several_ranks = sizes.ranks > 1;
   forecast.held = sum_of_ranks(resident_memory(), comm);
+  if (taken == SpeedTaken::measured) forecast.speed = measured_speed(comm);
+  const Speed& speed = forecast.speed;
   const double free = free_memory(comm);
   const bool in_factor = stays_in_factor(sizes, options.step.storage, free);
   forecast.on_rank_zero = std::max(in_factor ? 0 : sizes.condensed_operator(), 4 * number * sizes.pairs * sizes.pairs);
-  const auto add = [&](Stage stage, double bytes) { forecast.stages.push_back({stage, forecast.held + bytes}); };
-  add(Stage::equilibrium, memory_of_equilibrium(sizes));
-  if (seeks_modes(scene)) add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes.dense_limit, comm));
+  // two products a step, each of which reads half of W, or the rows of E twice
+  const double contact = in_factor ? 4 * number * sizes.factor.border_entries : sizes.condensed_operator();
+  forecast.step_seconds =
+      seconds_of_no_model + read_passes * (sizes.factor.bytes + contact) / sizes.ranks / speed.bytes;
+  const auto add = [&](Stage stage, double bytes, double seconds = 0) {
+    forecast.stages.push_back({stage, forecast.held + bytes, seconds});
+  };
+  add(Stage::equilibrium, memory_of_equilibrium(sizes), seconds_of_equilibrium(sizes, speed));
+  if (seeks_modes(scene))
+    add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes.dense_limit, comm),
+        seconds_of_modes(sizes, scene.modes, options.modes.dense_limit, speed));
   if (scene.response) add(Stage::response, memory_of_response(sizes, scene, options.response, comm));
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
-    add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient));
+    add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient),
+        made_factors * sizes.factor.operations / speed.operations +
+            steps_of_transient(scene.transient) * forecast.step_seconds);
   const double cycle = memory_of_cycle(sizes, scene.fidelity, in_factor, free);
-  if (scene.cycle.enabled) add(Stage::cycle, cycle);
+  if (scene.cycle.enabled) add(Stage::cycle, cycle, seconds_of_cycle(sizes, scene, forecast.step_seconds, speed));
   if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)) + (motions_of(scene) > 0 ? cycle : 0));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
   forecast.steps = steps_of(scene, options);
-  // two products a step, each of which reads half of W, or the rows of E twice
-  const double contact = in_factor ? 4 * number * sizes.factor.border_entries : sizes.condensed_operator();
-  forecast.step_seconds = seconds_of_no_model + seconds_per_byte * (sizes.factor.bytes + contact);
   return forecast;
 }
 
 std::string text_of(const Forecast& forecast)
 {
   std::string text = format("  memory forecast, all ranks together: model %.3g MB", 1e-6 * forecast.held);
-  for (const StageMemory& stage : forecast.stages)
+  for (const StageForecast& stage : forecast.stages)
     text += format(", %s %.3g MB", word(stage.stage), 1e-6 * stage.bytes);
   text += format("; at most %.3g MB\n", 1e-6 * forecast.bytes());
+  if (forecast.several_ranks)
+    text += format("  of what follows the model, %.3g MB on rank 0 alone\n", 1e-6 * forecast.on_rank_zero);
+  text += format("  time forecast, by %.2g Gflop/s and %.2g GB/s a rank: about", 1e-9 * forecast.speed.operations,
+                 1e-9 * forecast.speed.bytes);
+  for (const StageForecast& stage : forecast.stages)
+    if (stage.seconds > 0) text += format(" %s %s,", word(stage.stage), duration(stage.seconds).c_str());
+  text += " in all " + duration(forecast.seconds()) + "; up to 120 modes, and a motion that settles on a cycle\n";
   if (forecast.steps > 0)
-    text += format("  time forecast: about %.3g time steps of %.2g s, %s\n", forecast.steps, forecast.step_seconds,
-                   duration(forecast.seconds()).c_str());
+    text += format("  at most %.3g time steps of %.2g s, %s\n", forecast.steps, forecast.step_seconds,
+                   duration(forecast.seconds_of_steps()).c_str());
   return text;
 }
 
@@ -298,9 +390,9 @@ std::string problem_of(const Forecast& forecast, MPI_Comm comm)
   else if (const double share = std::max(forecast.on_rank_zero, more / ranks_of(comm));
            rank_of(comm) == 0 && !can_take(share))
     problem = "memory: " + limit_text(share);
-  else if (forecast.seconds() > day)
+  else if (forecast.seconds_of_steps() > day)
     problem = format("the run would make about %.3g time steps of %.2g s, which take %s", forecast.steps,
-                     forecast.step_seconds, duration(forecast.seconds()).c_str());
+                     forecast.step_seconds, duration(forecast.seconds_of_steps()).c_str());
   if (!problem.empty()) problem += ": take a smaller model, fewer steps or a larger machine, or give --force to run it";
   return problem;
 }

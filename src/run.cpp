@@ -236,7 +236,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   make_coarse_model(scene, model, comm, coarse);
   std::optional<State> cycle_file = read_start_files(scene, model.structure);
   end_if_asked(comm);
-  if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options), comm));
+  if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options, SpeedTaken::usual), comm));
 
   Chain chain{scene, options, model, report, {}};
   chain.cycle_file = std::move(cycle_file);
@@ -303,7 +303,7 @@ void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
   std::optional<CoarseModel> coarse;
   make_coarse_model(scene, model, comm, coarse);
   (void)read_start_files(scene, model.structure);
-  const Forecast forecast = forecast_of(model, scene, options);
+  const Forecast forecast = forecast_of(model, scene, options, SpeedTaken::measured);
   if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());
   const std::string problem = problem_of(forecast, comm);
   if (rank_of(comm) == 0 && !problem.empty()) std::printf("  WARNING: here %s\n", problem.c_str());

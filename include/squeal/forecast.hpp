@@ -9,30 +9,45 @@
 namespace squeal
 {
 
-/// The resident memory of all ranks together at its peak in a stage [bytes].
-struct StageMemory
+/// The resident memory of all ranks together at its peak in a stage, and the stage's time.
+struct StageForecast
 {
   Stage stage;
-  double bytes = 0;
+  double bytes = 0, seconds = 0; // seconds 0: not known before
+};
+
+/// Of one rank while all work: operations of a matrix product [1/s], memory that is read [byte/s].
+struct Speed
+{
+  double operations = 3e10, bytes = 8e9; // of a usual core
+};
+
+enum class SpeedTaken
+{
+  usual,
+  measured, // by a product and by a sum of some milliseconds
 };
 
 /// For this number of ranks.
 struct Forecast
 {
-  double held = 0;                 // [bytes] resident already: libraries, mesh and matrices of all ranks
-  double on_rank_zero = 0;         // [bytes] of what follows, on rank 0 alone
-  std::vector<StageMemory> stages; // those that will run
-  double steps = 0;                // of time
-  double step_seconds = 0;         // one step
+  double held = 0;                   // [bytes] resident already: libraries, mesh and matrices of all ranks
+  double on_rank_zero = 0;           // [bytes] of what follows, on rank 0 alone
+  std::vector<StageForecast> stages; // those that will run
+  double steps = 0;                  // of time, at most
+  double step_seconds = 0;           // one step
+  bool several_ranks = false;
+  Speed speed;
 
   double bytes() const;
-  double seconds() const { return steps * step_seconds; }
+  double seconds() const; // of the stages whose time is known before
+  double seconds_of_steps() const { return steps * step_seconds; }
 };
 
 /// Collective. Analyses K bordered by B and counts steps; solves nothing.
-Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options);
+Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options, SpeedTaken taken);
 
-/// The forecast in two lines.
+/// The forecast in a line each of memory, time of stages and steps.
 std::string text_of(const Forecast& forecast);
 
 /// Collective. Why the run is not started without --force: it would take more memory than the machine and this

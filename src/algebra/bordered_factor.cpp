@@ -99,7 +99,22 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   return plan;
 }
 
-/// All but the bytes. MUMPS keeps the square of a front's pivots, and waiting updates and fronts are squares.
+/// Of a dense factor of n columns with so many rows below them.
+double operations_of(double columns, double below)
+{
+  return columns * (columns * columns / 3 + columns * below + below * below);
+}
+
+/// Of the supernodes, and of a rank's share of them.
+double operations_of(const SymbolicFactor& symbolic)
+{
+  double sum = 0;
+  for (const Supernode& supernode : symbolic.supernodes) sum += operations_of(supernode.columns, supernode.below);
+  return sum;
+}
+
+/// All but the bytes and the operations of all ranks. MUMPS keeps the square of a front's pivots, and waiting updates
+/// and fronts are squares.
 FactorForecast multifrontal_forecast(const SymbolicFactor& symbolic)
 {
   FactorForecast forecast;
@@ -117,6 +132,7 @@ FactorForecast multifrontal_forecast(const SymbolicFactor& symbolic)
     symmetric += columns * (columns + inner);
     forecast.entries += columns * ((columns + 1) / 2 + inner);
     forecast.border_entries += columns * supernode.border;
+    forecast.inner_operations += operations_of(columns, inner);
     not_symmetric += columns * (columns + 2 * inner);
   }
   return forecast;
@@ -325,19 +341,24 @@ FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
   if (plan.kind == FactorKind::dense)
   {
     const double n = dofs, rows = n + border;
-    return {sizeof(double) * n * rows, n * n, n * n, n * n / 2, 0};
+    return {sizeof(double) * n * rows, n * n, n * n, n * n / 2, 0, operations_of(n, border), operations_of(n, 0)};
   }
   FactorForecast forecast = multifrontal_forecast(plan.symbolic);
   MPI_Bcast(&forecast, sizeof forecast, MPI_BYTE, 0, comm);
   if (plan.kind == FactorKind::mumps)
   {
     forecast.border_entries = 0;
+    forecast.operations = operations_of(plan.symbolic) / ranks_of(comm);
+    MPI_Bcast(&forecast.operations, 1, MPI_DOUBLE, 0, comm);
     forecast.bytes = mumps_factor_memory({std::move(plan.entries), plan.symbolic.position, dofs, border, comm});
   }
   else
   {
-    forecast.bytes = cholesky_memory(share_tree(std::move(plan.symbolic), comm));
+    const TreeShare share = share_tree(std::move(plan.symbolic), comm);
+    forecast.bytes = cholesky_memory(share);
+    forecast.operations = operations_of(share.symbolic);
     MPI_Allreduce(MPI_IN_PLACE, &forecast.bytes, 1, MPI_DOUBLE, MPI_SUM, comm);
+    MPI_Allreduce(MPI_IN_PLACE, &forecast.operations, 1, MPI_DOUBLE, MPI_MAX, comm);
   }
   return forecast;
 }

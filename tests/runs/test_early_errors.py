@@ -195,7 +195,7 @@ def test_options_say_where_they_come_from(tmp_path):
 def test_the_forecast_is_printed_and_forced(squeal):
     steps = ["--set", "transient.steps=1000000000000", "--set", "transient.step_size=1e-3"]
     run = squeal(OSCILLATOR, "--dry-run", *steps, ranks=1)
-    assert run.code == 0 and "time forecast: about 1e+12 time steps" in run.printed and "--force" in run.printed
+    assert run.code == 0 and "1e+12 time steps" in run.printed and "--force" in run.printed
     run = squeal(OSCILLATOR, "--force", "--set", "cycle.enabled=false", "--set", "transient.steps=10", "--set",
                  "transient.step_size=1e-3", ranks=1)
     assert run.code == 0, run.errors

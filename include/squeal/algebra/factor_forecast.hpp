@@ -13,6 +13,8 @@ struct FactorForecast
   double symmetric = 0, not_symmetric = 0; // numbers in MUMPS's L D L' and L U of A while they are made
   double entries = 0;                      // of L of A alone
   double border_entries = 0;               // of E in a supernodal factor; 0: of another kind
+  double operations = 0;                   // to make a Factor, on the rank that has most to do
+  double inner_operations = 0;             // to make L L' of A alone, on one rank
 };
 
 /// Of a Factor of A and B, and of MUMPS's factors of A in the same order. B may be null. Collective.
