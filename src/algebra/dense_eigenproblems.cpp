@@ -1,5 +1,6 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <cmath>
@@ -96,8 +97,8 @@ std::vector<TwoSidedPair> solve_two_sided(const MatrixXd& M, const MatrixXd& C, 
 }
 
 /// Gives every rank the pairs of rank 0, whose vectors have the names `vectors` and `rows` entries.
-template <class Pair>
-void share(MPI_Comm comm, std::vector<Pair>& pairs, Index rows, std::initializer_list<Eigen::VectorXcd Pair::*> vectors)
+template <class Pair> void share_pairs(MPI_Comm comm, std::vector<Pair>& pairs, Index rows,
+                                       std::initializer_list<Eigen::VectorXcd Pair::*> vectors)
 {
   int count = to_int(pairs.size());
   MPI_Bcast(&count, 1, MPI_INT, 0, comm);
@@ -148,11 +149,20 @@ InvariantSubspaces invariant_subspaces_shared(MPI_Comm comm, const MatrixXd& M, 
   return spaces;
 }
 
+void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Index rows)
+{
+  std::vector<LossKind> losses;
+  for (const TwoSidedPair& pair : pairs) losses.push_back(pair.loss);
+  share_pairs(comm, pairs, rows, {&TwoSidedPair::right, &TwoSidedPair::left});
+  broadcast(losses, comm);
+  for (std::size_t k = 0; k < pairs.size(); ++k) pairs[k].loss = losses[k];
+}
+
 std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
 {
   std::vector<TwoSidedPair> pairs;
   on_rank_zero(comm, [&] { pairs = solve_two_sided(M, C, K); });
-  share(comm, pairs, K.rows(), {&TwoSidedPair::right, &TwoSidedPair::left});
+  share(comm, pairs, K.rows());
   return pairs;
 }
 
@@ -189,7 +199,7 @@ std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Ma
 {
   std::vector<DenseEigenpair> pairs;
   on_rank_zero(comm, [&] { pairs = solve_dense_quadratic(M, C, K); });
-  share(comm, pairs, K.rows(), {&DenseEigenpair::y});
+  share_pairs(comm, pairs, K.rows(), {&DenseEigenpair::y});
   return pairs;
 }
 
@@ -294,7 +304,7 @@ void refine_pairs_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C, co
     }
   };
   on_rank_zero(comm, refine);
-  share(comm, pairs, K.rows(), {&TwoSidedPair::right, &TwoSidedPair::left});
+  share(comm, pairs, K.rows());
 }
 
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)

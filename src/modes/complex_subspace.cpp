@@ -7,7 +7,6 @@ namespace
 {
 
 using Eigen::Index;
-using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 
@@ -19,11 +18,6 @@ MatrixXd parts_of(const VectorXcd& a)
 }
 
 } // namespace
-
-ComplexFactors loss_factors(LossKind kind, std::complex<double> lambda)
-{
-  return {lambda * lambda, lambda, 1, loss_factor_of(kind, lambda)};
-}
 
 ComplexSubspace empty_subspace(const std::array<Mat, 4>& matrices)
 {
@@ -47,13 +41,6 @@ bool extend(ComplexSubspace& space, MultiVector X)
     space.entries[k] = inner_products(space.V, space.images[k]);
   }
   return true;
-}
-
-MatrixXcd sum(const std::array<MatrixXd, 4>& A, const ComplexFactors& factors)
-{
-  MatrixXcd result = factors[0] * A[0];
-  for (std::size_t k = 1; k < 4; ++k) result += factors[k] * A[k];
-  return result;
 }
 
 MultiVector vector_of(const ComplexSubspace& space, const VectorXcd& a)

@@ -55,15 +55,6 @@ QuadraticSolution solve_whole(const QuadraticProblem& problem, const Window& win
   return result;
 }
 
-/// C without the viscous equivalent of loss factors, under which modes would be overdamped far above its frequency.
-Owned<Mat> without_loss(Mat C, const Structure& structure)
-{
-  Owned<Mat> result;
-  check(MatDuplicate(C, MAT_COPY_VALUES, result.put()));
-  check(MatAXPY(result, -1 / structure.loss_omega, structure.K_loss, UNKNOWN_NONZERO_PATTERN));
-  return result;
-}
-
 Owned<PEP> make_solver(Mat M, Mat C, Mat K, PetscInt count, double shift)
 {
   Owned<PEP> pep;
@@ -137,6 +128,14 @@ QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSe
 }
 
 } // namespace
+
+Owned<Mat> without_loss(Mat C, const Structure& structure)
+{
+  Owned<Mat> result;
+  check(MatDuplicate(C, MAT_COPY_VALUES, result.put()));
+  check(MatAXPY(result, -1 / structure.loss_omega, structure.K_loss, UNKNOWN_NONZERO_PATTERN));
+  return result;
+}
 
 QuadraticProblem sliding_problem(const Structure& structure, const LinearisedSliding& linearised)
 {

@@ -60,39 +60,6 @@ LossKind loss_kind_of(const ComplexMode& mode)
   return std::isnan(mode.loss_error) ? LossKind::complex : LossKind::viscous;
 }
 
-Complex loss_factor_of(LossKind kind, Complex lambda)
-{
-  switch (kind)
-  {
-  case LossKind::none:
-    return 0;
-  case LossKind::viscous:
-    return lambda / lambda.imag();
-  case LossKind::complex:
-    return {0, 1};
-  }
-  return 0;
-}
-
-EigenvalueSlope slope_of(LossKind kind, Complex lambda, Complex mass, Complex damping, Complex loss)
-{
-  EigenvalueSlope result{2. * lambda * mass + damping, 0};
-  if (kind != LossKind::viscous) return result;
-  const double omega = lambda.imag();
-  result.slope += loss / omega;
-  result.turn = -lambda / (omega * omega) * loss;
-  return result;
-}
-
-Complex eigenvalue_change(const EigenvalueSlope& slope, Complex residual)
-{
-  const Complex of_imaginary = Complex(0, 1) * slope.slope + slope.turn; // the equation is real-linear in d lambda
-  Eigen::Matrix2d A;
-  A << slope.slope.real(), of_imaginary.real(), slope.slope.imag(), of_imaginary.imag();
-  const Eigen::Vector2d change = -(A.inverse() * Eigen::Vector2d(residual.real(), residual.imag()));
-  return {change(0), change(1)};
-}
-
 TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, const PencilOptions& options)
 {
   return {matrices,

@@ -24,12 +24,21 @@ struct DenseEigenpair
 std::vector<DenseEigenpair> solve_dense_quadratic(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
                                                   const Eigen::MatrixXd& K);
 
+/// What loss factors are in a mode.
+enum class LossKind
+{
+  none,    // the mode does not oscillate, or nothing has a loss factor
+  viscous, // of the mode's own frequency
+  complex, // i K_loss: there is no viscous equivalent
+};
+
 /// An eigenvalue with both of its vectors: Q(lambda) right = 0, left' Q(lambda) = 0, Q = lambda^2 M + lambda C + K; the
-/// prime transposes without conjugation. 2-norms are 1.
+/// prime transposes without conjugation. 2-norms are 1. Q may have loss factors too (dense_losses.hpp).
 struct TwoSidedPair
 {
   std::complex<double> lambda;
   Eigen::VectorXcd right, left;
+  LossKind loss = LossKind::none;
 };
 
 /// The eigenvalues of solve_dense_quadratic alone, which take a quarter of the time.
@@ -48,6 +57,9 @@ void refine_pairs_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::M
 /// The pairs of solve_dense_quadratic with their left vectors, from the matrices of rank 0, on every rank. Collective.
 std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
                                                  const Eigen::MatrixXd& K);
+
+/// Gives every rank the pairs of rank 0, whose vectors have so many rows. Collective.
+void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Eigen::Index rows);
 
 /// Orthonormal bases of the right and left invariant subspaces of K y = theta M y, neither symmetric, with
 /// |theta| <= limit. K + limit M is regular.

@@ -20,6 +20,10 @@ struct QuadraticProblem
   Owned<Mat> M, C, K; // AIJ, of one layout
 };
 
+/// C without the viscous equivalent of loss factors, under which modes would be overdamped far above its frequency. The
+/// structure has a K_loss. Collective.
+Owned<Mat> without_loss(Mat C, const Structure& structure);
+
 /// That of small motions about sliding, Y'.Z, with C without the viscous equivalent of loss factors. Collective.
 QuadraticProblem sliding_problem(const Structure& structure, const LinearisedSliding& linearised);
 

@@ -7,38 +7,14 @@
 /// Both vectors are sought on subspaces of their own. Residuals r join them as P^-1 r and P'^-1 r, P = K - tau M,
 /// tau = -Re(lambda^2), until both are small; the two-sided Rayleigh quotient then moves lambda.
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/modes/dense_losses.hpp"
 #include "squeal/modes/modes.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 namespace squeal
 {
 
-/// What loss factors are in a mode.
-enum class LossKind
-{
-  none,    // the mode does not oscillate
-  viscous, // of the mode's own frequency
-  complex, // i K_loss: there is no viscous equivalent
-};
-
 LossKind loss_kind_of(const ComplexMode& mode);
-
-/// f
-std::complex<double> loss_factor_of(LossKind kind, std::complex<double> lambda);
-
-/// x'Q'(lambda) y d lambda, whose derivative of f K_loss is by Im(lambda) as well: `slope` d lambda + `turn` Im(d
-/// lambda).
-struct EigenvalueSlope
-{
-  std::complex<double> slope, turn;
-};
-
-/// From the products of left and right vectors with M, C and K_loss.
-EigenvalueSlope slope_of(LossKind kind, std::complex<double> lambda, std::complex<double> mass,
-                         std::complex<double> damping, std::complex<double> loss);
-
-/// The change of lambda that takes away a residual x'Q y.
-std::complex<double> eigenvalue_change(const EigenvalueSlope& slope, std::complex<double> residual);
 
 /// The problem and its transposed one.
 struct TwoSidedProblem
