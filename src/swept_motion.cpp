@@ -2,6 +2,7 @@
 
 #include "squeal/base/run_control.hpp"
 #include "squeal/report/heard.hpp"
+#include "squeal/study/reversed.hpp"
 
 #include <cmath>
 
@@ -101,8 +102,7 @@ SweptMotion find_swept_motion(const Chain& chain, const SweptPlace& place, MPI_C
 {
   const Scene scene = scene_at(chain.scene, place.values);
   Model model = rebuild_model(chain.model, scene, comm);
-  if (place.reversed)
-    for (double& velocity : model.interface.drive) velocity = -velocity;
+  if (place.reversed) reverse_rotation(model.structure, model.interface);
   Report report;
   Chain at{scene, chain.options, model, report, {}};
   run_stages(at);

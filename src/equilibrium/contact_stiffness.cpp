@@ -1,14 +1,8 @@
-#include "contact_stiffness.hpp"
-
-#include "squeal/equilibrium/linearised_sliding.hpp"
+#include "squeal/equilibrium/contact_stiffness.hpp"
 
 namespace squeal
 {
 
-namespace
-{
-
-/// 1/c of the closed pairs on the rows of B, and mu e/c from normal to tangential ones; null without such pairs.
 Owned<Mat> stiffness_of_pairs(const Interface& interface, const std::vector<char>& closed, PairForces part)
 {
   const PairRows<PetscInt> rows(interface.directions);
@@ -38,8 +32,6 @@ Owned<Mat> stiffness_of_pairs(const Interface& interface, const std::vector<char
   check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
   return result;
 }
-
-} // namespace
 
 Owned<Mat> contact_stiffness(const Interface& interface, const std::vector<char>& closed, PairForces part)
 {

@@ -210,17 +210,15 @@ ModeForms overlaps_between(const PointModes& from, const PointModes& to)
   return {a.adjoint() * M_b, b.adjoint() * M_a, a.adjoint() * M_a, b.adjoint() * M_b};
 }
 
-ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, const Structure& structure, Mat Cf)
+ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, Mat M, Mat C)
 {
   ModeForms forms;
   for (const ExpandedModes* rights : {&from, &to})
   {
-    const MultiVector M = product(structure.M, rights->right);
-    MultiVector C = product(structure.C, rights->right);
-    if (Cf) C.entries += product(Cf, rights->right).entries;
+    const MultiVector M_right = product(M, rights->right), C_right = product(C, rights->right);
     const bool of_first = rights == &from;
-    (of_first ? forms.first : forms.there) = form(from, *rights, M, C);
-    (of_first ? forms.back : forms.second) = form(to, *rights, M, C);
+    (of_first ? forms.first : forms.there) = form(from, *rights, M_right, C_right);
+    (of_first ? forms.back : forms.second) = form(to, *rights, M_right, C_right);
   }
   return forms;
 }

@@ -61,9 +61,9 @@ struct ExpandedModes
   MultiVector right, left;
 };
 
-/// In the structure's degrees of freedom, whatever pairs are closed. `Cf`: damping of the friction direction at one of
-/// the points; may be null. Collective.
-ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, const Structure& structure, Mat Cf);
+/// In the structure's degrees of freedom, whatever pairs are closed. `C`: with G and C_f, without loss factors.
+/// Collective.
+ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, Mat M, Mat C);
 
 /// The first shapes of the basis alone.
 PointModes leading_part(const PointModes& modes, Eigen::Index shapes);

@@ -1,6 +1,7 @@
 #include "point_modes.hpp"
 
 #include "squeal/base/constants.hpp"
+#include "squeal/equilibrium/contact_stiffness.hpp"
 #include "squeal/modes/real_modes.hpp"
 
 #include <algorithm>
@@ -31,11 +32,12 @@ constexpr double slow = 0.8;           // ratio of errors before and after a cor
 constexpr std::size_t few = 4;         // pairs refined one by one; six take as long as solving the whole
 constexpr double spurious = 1e-8;      // backward error of what is no mode
 
-/// The closed pairs taken out, and the damping of the friction direction on the rows of B; null where there is none.
+/// The closed pairs taken out, and on the rows of B the damping of the friction direction and the stiffness of pairs
+/// with a compliance; null where there is none.
 struct LinearisedPoint
 {
   ClosedContact contact;
-  Owned<Mat> damping{};
+  Owned<Mat> damping{}, stiffness{};
 };
 
 LinearisedPoint linearise_point(const SlidingEquilibrium& sliding)
@@ -44,17 +46,18 @@ LinearisedPoint linearise_point(const SlidingEquilibrium& sliding)
   LinearisedPoint point{eliminate_closed_pairs(structure, interface, equilibrium.closed)};
   const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
   point.damping = damping_of_pairs(interface, equilibrium.closed, equilibrium.reactions, part);
+  point.stiffness = stiffness_of_pairs(interface, equilibrium.closed, PairForces::with_friction);
   return point;
 }
 
-/// Static shapes of forces on pairs that the basis takes for open.
-void attach(ModesBasis& modes, const Interface& interface, const std::vector<char>& closed)
+/// Static shapes of forces on eliminated pairs that the basis takes for open.
+void attach(ModesBasis& modes, const Interface& interface, const std::vector<int>& eliminated)
 {
   std::vector<int> pairs;
-  for (std::size_t i = 0; i < closed.size(); ++i)
-    if (closed[i] && !modes.closed[i] && !modes.attached[i])
+  for (const int pair : eliminated)
+    if (const auto i = static_cast<std::size_t>(pair); !modes.closed[i] && !modes.attached[i])
     {
-      pairs.push_back(static_cast<int>(i));
+      pairs.push_back(pair);
       modes.attached[i] = 1;
     }
   if (pairs.empty()) return;
@@ -115,16 +118,19 @@ std::vector<double> backward_errors(const ModesBasis& modes, const ProjectedSlid
     return A.bottomLeftCorner(shapes, tests).transpose();
   };
   const MatrixXcd a = vectors_of(pairs, side);
+  const bool lossy = on_basis.K_loss.size() > 0;
   const MatrixXcd M = real_times(block(on_basis.M), a), C = real_times(block(on_basis.C), a),
-                  K = real_times(block(on_basis.K), a);
+                  K = real_times(block(on_basis.K), a),
+                  L = lossy ? real_times(block(on_basis.K_loss), a) : MatrixXcd::Zero(K.rows(), K.cols());
   const VectorXd sizes = kept_norms(a, on_basis.kept);
   std::vector<double> errors;
   for (Index k = 0; k < a.cols(); ++k)
   {
-    const Complex lambda = pairs[static_cast<std::size_t>(k)].lambda;
+    const auto& pair = pairs[static_cast<std::size_t>(k)];
+    const Complex lambda = pair.lambda, f = loss_factor_of(pair.loss, lambda);
     // the random entries are spread evenly over (-1, 1): their mean square is 1/3
-    const double residual =
-        (lambda * (lambda * M.col(k) + C.col(k)) + K.col(k)).norm() * std::sqrt(3. / static_cast<double>(tests));
+    const double residual = (lambda * (lambda * M.col(k) + C.col(k)) + K.col(k) + f * L.col(k)).norm() *
+                            std::sqrt(3. / static_cast<double>(tests));
     errors.push_back(residual / (scale_of(modes, lambda) * sizes(k)));
   }
   return errors;
@@ -154,25 +160,42 @@ void append_residuals(const ModesBasis& modes, const PointProblem& problem, cons
 {
   if (pairs.empty()) return;
   const auto& [structure, interface, equilibrium] = problem.sliding;
-  const Mat lift = side == Side::right ? point.contact.Z : point.contact.Y;
-  const Owned<Mat> test = transpose_of(side == Side::right ? point.contact.Y : point.contact.Z);
+  const bool right = side == Side::right;
+  const double of_skew = right ? 1 : -1;
+  const Mat lift = right ? point.contact.Z : point.contact.Y;
+  const Owned<Mat> test = transpose_of(right ? point.contact.Y : point.contact.Z);
   MatrixXcd weights = random_weights(static_cast<Index>(pairs.size()), mixtures);
   for (std::size_t k = 0; k < pairs.size(); ++k) weights.row(static_cast<Index>(k)) /= scale_of(modes, pairs[k].lambda);
   const MatrixXcd a = vectors_of(pairs, side);
-  // lambda^2 M x + lambda C x + K x, the powers of lambda within the weights
-  const auto times_lambda = [&]
+  const auto times = [&](MatrixXcd x, auto factor_of)
   {
-    for (std::size_t k = 0; k < pairs.size(); ++k) weights.row(static_cast<Index>(k)) *= pairs[k].lambda;
+    for (std::size_t k = 0; k < pairs.size(); ++k) x.row(static_cast<Index>(k)) *= factor_of(pairs[k]);
+    return x;
   };
-  const auto mixed = [&]
-  { return product(lift, kept_rows(combination_of_shapes(modes.basis, (a * weights).real()), point.contact)); };
-  MultiVector force = product(structure.K, mixed());
-  times_lambda();
-  const MultiVector x = mixed();
-  force.entries += product(structure.C, x).entries;
-  if (point.damping.get()) force.entries += product(project(point.damping, interface.B, interface.B), x).entries;
-  times_lambda();
-  force.entries += product(structure.M, mixed()).entries;
+  const auto mixed = [&](const MatrixXcd& by)
+  { return product(lift, kept_rows(combination_of_shapes(modes.basis, (a * by).real()), point.contact)); };
+  const auto add_on_pairs = [&](MultiVector& force, Mat D, const MultiVector& x)
+  {
+    const Owned<Mat> of_side = right ? copy_of(D) : transpose_of(D);
+    force.entries += product(project(of_side, interface.B, interface.B), x).entries;
+  };
+  // lambda^2 M x + lambda C x + K x + f K_loss x, the factors within the weights
+  MultiVector x = mixed(weights), force = product(structure.K, x);
+  if (structure.H.get()) force.entries += of_skew * product(structure.H, x).entries;
+  if (point.stiffness.get()) add_on_pairs(force, point.stiffness, x);
+  if (structure.K_loss.get())
+  {
+    const auto f = [](const TwoSidedPair& pair) { return loss_factor_of(pair.loss, pair.lambda); };
+    force.entries += product(structure.K_loss, mixed(times(weights, f))).entries;
+  }
+  const auto lambda = [](const TwoSidedPair& pair) { return pair.lambda; };
+  weights = times(weights, lambda);
+  x = mixed(weights);
+  force.entries += product(modes.basis.C.matrix, x).entries;
+  if (structure.G.get()) force.entries += of_skew * product(structure.G, x).entries;
+  if (point.damping.get()) add_on_pairs(force, point.damping, x);
+  weights = times(weights, lambda);
+  force.entries += product(structure.M, mixed(weights)).entries;
   append(residuals, with_zero_pivots(product(test, force), point.contact));
 }
 
@@ -220,22 +243,18 @@ SolvedPairs with_errors(const ModesBasis& modes, const ProjectedSliding& on_basi
   return solved;
 }
 
-/// M, C and K of the projected problem.
-struct DenseSliding
-{
-  MatrixXd M, C, K;
-};
-
-/// On the independent combinations of the shapes, which come after the sketched columns.
-DenseSliding without_sketch(const ProjectedSliding& on_basis, Index shapes)
+/// The projected problem on the independent combinations of the shapes, which come after the sketched columns; K_loss
+/// is empty without loss factors.
+LossyMatrices without_sketch(const ProjectedSliding& on_basis, Index shapes)
 {
   const MatrixXd& V = on_basis.independent;
   const auto on_shapes = [&](const MatrixXd& A) -> MatrixXd
   {
+    if (A.size() == 0) return {};
     const auto corner = A.bottomRightCorner(shapes, shapes);
     return V.size() > 0 ? MatrixXd(V.transpose() * corner * V) : MatrixXd(corner);
   };
-  return {on_shapes(on_basis.M), on_shapes(on_basis.C), on_shapes(on_basis.K)};
+  return {on_shapes(on_basis.M), on_shapes(on_basis.C), on_shapes(on_basis.K), on_shapes(on_basis.K_loss)};
 }
 
 /// Vectors of pairs on other coordinates.
@@ -261,10 +280,14 @@ void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const
     if (solved.backward_error(k) > tolerance_of(solved.pairs[k], problem)) places.push_back(k);
   if (places.empty() || places.size() > few) return;
   for (const std::size_t k : places) pairs.push_back(solved.pairs[k]);
-  const DenseSliding on_shapes = without_sketch(on_basis, modes.basis.shapes());
+  const LossyMatrices on_shapes = without_sketch(on_basis, modes.basis.shapes());
+  const auto& [M, C, K, K_loss] = on_shapes;
   const MatrixXd &V = on_basis.independent, V_transposed = V.transpose();
   if (V.size() > 0) transform(pairs, V_transposed, V_transposed);
-  refine_pairs_shared(modes.basis.T.comm, on_shapes.M, on_shapes.C, on_shapes.K, pairs);
+  if (K_loss.size() > 0)
+    refine_lossy_shared(modes.basis.T.comm, on_shapes, pairs);
+  else
+    refine_pairs_shared(modes.basis.T.comm, M, C, K, pairs);
   if (V.size() > 0) transform(pairs, V, V);
   SolvedPairs refined = with_errors(modes, on_basis, std::move(pairs));
   for (std::size_t i = 0; i < places.size(); ++i)
@@ -282,15 +305,23 @@ SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_
                             Extent extent)
 {
   const MPI_Comm comm = modes.basis.T.comm;
-  auto [M, C, K] = without_sketch(on_basis, modes.basis.shapes());
+  LossyMatrices problem = without_sketch(on_basis, modes.basis.shapes());
+  const auto& [M, C, K, K_loss] = problem;
   InvariantSubspaces spaces;
   if (extent == Extent::near_band)
   {
     spaces = invariant_subspaces_shared(comm, M, K, undamped_reach * undamped_reach * window.limit);
-    for (MatrixXd* A : {&M, &C, &K}) *A = (spaces.left.transpose() * *A * spaces.right).eval();
+    for (MatrixXd& A : problem)
+      if (A.size() > 0) A = (spaces.left.transpose() * A * spaces.right).eval();
   }
   std::vector<TwoSidedPair> pairs = solve_two_sided_shared(comm, M, C, K);
-  std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); });
+  const auto beyond = [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); };
+  std::erase_if(pairs, beyond);
+  if (K_loss.size() > 0)
+  {
+    add_losses_shared(comm, problem, pairs);
+    std::erase_if(pairs, beyond);
+  }
   if (extent == Extent::near_band) transform(pairs, spaces.right, spaces.left);
   if (const MatrixXd& V = on_basis.independent; V.size() > 0) transform(pairs, V, V);
   std::stable_sort(pairs.begin(), pairs.end(),
@@ -386,9 +417,11 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   modes.attached.assign(closed.size(), 0);
   modes.contact = eliminate_closed_pairs(structure, problem.interface, closed);
   modes.M_z = project_symmetric(structure.M, modes.contact.Z);
-  modes.K_z = project_symmetric(structure.K, modes.contact.Z);
+  const Owned<Mat> springs = contact_stiffness(problem.interface, problem.closed, PairForces::normal);
+  const Owned<Mat> K = springs.get() ? sum_of(structure.K, springs) : Owned<Mat>{};
+  modes.K_z = project_symmetric(K.get() ? K.get() : structure.K.get(), modes.contact.Z);
   modes.Z_transposed = transpose_of(modes.contact.Z);
-  const Owned<Mat> C_z = project_symmetric(structure.C, modes.contact.Z);
+  const Owned<Mat> C_z = project_symmetric(modes.basis.C.matrix, modes.contact.Z);
   check(MatNorm(modes.M_z, NORM_1, &modes.norms.M));
   check(MatNorm(C_z, NORM_1, &modes.norms.C));
   check(MatNorm(modes.K_z, NORM_1, &modes.norms.K));
@@ -424,15 +457,15 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
 {
   const auto& [structure, interface, equilibrium] = problem.sliding;
   set_structure(modes.basis, structure);
-  attach(modes, interface, equilibrium.closed);
   const LinearisedPoint point = linearise_point(problem.sliding);
+  attach(modes, interface, point.contact.pairs);
   const double end = two_pi * followed_band * problem.band;
   const Window window{vibration_floor(modes.norms), end * end};
   Extent extent = modes.whole || modes.basis.shapes() <= small_basis ? Extent::whole : Extent::near_band;
   double before = HUGE_VAL;
   for (PetscInt pass = 0;; ++pass)
   {
-    const ProjectedSliding on_basis = project(modes.basis, point.contact, interface.B, point.damping);
+    const ProjectedSliding on_basis = project(modes.basis, point.contact, interface.B, point.damping, point.stiffness);
     SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
     if (extent == Extent::near_band) refine_few(modes, on_basis, problem, solved);
     double now = largest_excess(solved, problem);

@@ -2,8 +2,8 @@
 /// The modes of a sliding equilibrium on a basis that serves many, with left vectors, checked by the full residual
 /// (src/README.md, section 10.2).
 #include "sliding_basis.hpp"
-#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/modes/dense_losses.hpp"
 #include "squeal/modes/modes.hpp"
 #include "squeal/modes/quadratic.hpp"
 #include "squeal/study/sweep.hpp"
@@ -23,10 +23,10 @@ struct GrownBasis
 struct ModesBasis
 {
   SlidingBasis basis;
-  ClosedContact contact{};      // of the pairs that are closed at every point: without friction
+  ClosedContact contact{};      // of the pairs that are closed and rigid at every point: without friction
   std::vector<char> closed{};   // those pairs
   std::vector<char> attached{}; // other pairs whose static shapes the basis holds
-  Owned<Mat> M_z{}, K_z{};
+  Owned<Mat> M_z{}, K_z{};      // with the springs of pairs that have a compliance where the basis was made
   Owned<Mat> Z_transposed{};
   ShiftInvert pencil{};               // of K_z, M_z just below zero
   QuadraticNorms norms{};             // of M_z, C_z and K_z
@@ -36,15 +36,17 @@ struct ModesBasis
   std::optional<GrownBasis> turned{}; // of the other direction, once it is needed
 };
 
-/// The structure on which a basis is made, and the band of its modes [Hz].
+/// The structure on which a basis is made, with the pairs that are closed there, and the band of its modes [Hz].
 struct BasisProblem
 {
   const Structure& structure;
   const Interface& interface;
+  const std::vector<char>& closed;
   double band = 0;
   const ModesOptions& options;
 };
 
+/// `closed`: pairs that are closed and rigid at every point.
 ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>& closed);
 
 /// Goes over to fewer closed pairs: their modes join the basis, whose shapes keep their places.

@@ -1,6 +1,7 @@
 #include "sliding_basis.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>
 #include <array>
@@ -50,10 +51,24 @@ MatrixXd shared_sum(const MatrixXd& local, MPI_Comm comm)
   return inner_products({comm, MatrixXd::Identity(local.rows(), local.rows())}, {comm, local});
 }
 
+std::vector<BasisImage*> images_of(SlidingBasis& basis)
+{
+  std::vector<BasisImage*> images;
+  for (BasisImage* image : {&basis.M, &basis.C, &basis.K, &basis.K_loss, &basis.G, &basis.H})
+    if (image->matrix.get()) images.push_back(image);
+  return images;
+}
+
+/// `A` may be null.
 void set_matrix(SlidingBasis& basis, BasisImage& image, Mat A)
 {
-  if (image.matrix.get() && equal(image.matrix, A)) return;
+  if (image.matrix.get() && A ? equal(image.matrix, A) : !image.matrix.get() && !A) return;
   basis.by_Z.Z = {};
+  if (!A)
+  {
+    image = {image.sign};
+    return;
+  }
   image.matrix = copy_of(A);
   const MultiVector AT = product(A, basis.T);
   image.contact_rows = {AT.comm, AT.entries(basis.contact_dofs, Eigen::all)};
@@ -146,13 +161,14 @@ void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact)
   lift.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) -
               shared_sum(at_pivots.transpose() * at_pivots, basis.T.comm); // shapes are orthonormal
   lift.independent = independent_part(lift.kept);
-  for (BasisImage* image : {&basis.M, &basis.C, &basis.K})
+  for (BasisImage* image : images_of(basis))
   {
     const MatrixXd rows = image->contact_rows.entries(lift.in_contact, Eigen::all);
     const Owned<IS> pivots = pivot_set(image->matrix, contact);
     image->lifted_rows = product(part_of(image->matrix, pivots, pivots), lift.change);
     image->lifted_rows.entries += rows;
-    image->lifted_products = image->products + shared_sum(rows.transpose() * lift.change.entries, basis.T.comm);
+    image->lifted_products =
+        image->products + image->sign * shared_sum(rows.transpose() * lift.change.entries, basis.T.comm);
   }
 }
 
@@ -162,28 +178,28 @@ MatrixXd projected(const BasisImage& image, const MultiVector& by_Y)
   return image.lifted_products + inner_products(by_Y, image.lifted_rows);
 }
 
-/// T'C_f T of the lifted T, C_f = B'D B. Most rows of D are zero: those of normals and, mostly, along the drive.
-MatrixXd projected_damping(const SlidingBasis& basis, const MultiVector& by_Y, Mat B, Mat damping)
+/// T_Y'B'D B T_Z. Most rows of D are zero: of friction's damping those of normals and, mostly, along the drive.
+MatrixXd projected_on_pairs(const SlidingBasis& basis, const MultiVector& by_Y, Mat B, Mat D)
 {
   PetscInt first = 0, last = 0, first_row = 0, last_row = 0;
   check(MatGetOwnershipRangeColumn(B, &first, &last));
   check(MatGetOwnershipRange(B, &first_row, &last_row));
   std::vector<PetscInt> dofs, rows;
   for (const Index dof : basis.contact_dofs) dofs.push_back(first + static_cast<PetscInt>(dof));
-  for_each_row(damping,
+  for_each_row(D,
                [&](PetscInt row, std::span<const PetscInt>, std::span<const PetscScalar> values)
                {
                  if (std::ranges::any_of(values, [](PetscScalar value) { return value != 0; })) rows.push_back(row);
                });
-  const Owned<IS> damped = set_of(comm_of(B), rows);
-  const Owned<Mat> part = part_of(B, damped, set_of(comm_of(B), dofs));
+  const Owned<IS> taken = set_of(comm_of(B), rows);
+  const Owned<Mat> part = part_of(B, taken, set_of(comm_of(B), dofs));
   const auto sliding = [&](const MultiVector& change)
   {
     MultiVector x{basis.T.comm, basis.T.entries(basis.contact_dofs, Eigen::all)};
     x.entries(basis.by_Z.in_contact, Eigen::all) += change.entries;
     return product(part, x);
   };
-  const MultiVector force = product(part_of(damping, damped, damped), sliding(basis.by_Z.change));
+  const MultiVector force = product(part_of(D, taken, taken), sliding(basis.by_Z.change));
   return inner_products(sliding(by_Y), force);
 }
 
@@ -223,21 +239,26 @@ SlidingBasis leading_part(const SlidingBasis& basis, Index shapes)
   SlidingBasis part{{basis.T.comm, basis.T.entries.leftCols(columns)}, basis.sketched, basis.contact_dofs};
   const auto of_image = [&](const BasisImage& image)
   {
-    return BasisImage{copy_of(image.matrix),
+    return BasisImage{image.sign,
+                      copy_of(image.matrix),
                       {image.contact_rows.comm, image.contact_rows.entries.leftCols(columns)},
                       image.products.topLeftCorner(columns, columns)};
   };
-  part.M = of_image(basis.M);
-  part.C = of_image(basis.C);
-  part.K = of_image(basis.K);
+  for (const auto image : {&SlidingBasis::M, &SlidingBasis::C, &SlidingBasis::K, &SlidingBasis::K_loss,
+                           &SlidingBasis::G, &SlidingBasis::H})
+    if ((basis.*image).matrix.get()) part.*image = of_image(basis.*image);
   return part;
 }
 
 void set_structure(SlidingBasis& basis, const Structure& structure)
 {
+  const Owned<Mat> C_0 = structure.K_loss.get() ? without_loss(structure.C, structure) : Owned<Mat>{};
   set_matrix(basis, basis.M, structure.M);
-  set_matrix(basis, basis.C, structure.C);
+  set_matrix(basis, basis.C, C_0.get() ? C_0 : structure.C);
   set_matrix(basis, basis.K, structure.K);
+  set_matrix(basis, basis.K_loss, structure.K_loss);
+  set_matrix(basis, basis.G, structure.G);
+  set_matrix(basis, basis.H, structure.H);
 }
 
 MultiVector combination_of_shapes(const SlidingBasis& basis, const MatrixXd& a)
@@ -253,24 +274,28 @@ Index extend(SlidingBasis& basis, MultiVector X)
   basis.by_Z.Z = {};
   const MultiVector news = columns_from(shapes, shapes.columns() - gained);
   append(basis.T, news);
-  for (BasisImage* image : {&basis.M, &basis.C, &basis.K})
+  for (BasisImage* image : images_of(basis))
   {
     const MultiVector AX = product(image->matrix, news);
     append(image->contact_rows, {AX.comm, AX.entries(basis.contact_dofs, Eigen::all)});
     const MatrixXd inner = inner_products(basis.T, AX);
     image->products.conservativeResize(size, size);
     image->products.rightCols(gained) = inner;
-    image->products.bottomRows(gained) = inner.transpose();
+    image->products.bottomRows(gained) = image->sign * inner.transpose();
   }
   return gained;
 }
 
-ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping)
+ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness)
 {
   lift_by_Z(basis, contact);
   const MultiVector by_Y = change_by_lift(basis, contact, basis.by_Z.pivots, contact.Y);
   ProjectedSliding result{projected(basis.M, by_Y), projected(basis.C, by_Y), projected(basis.K, by_Y)};
-  if (damping) result.C += projected_damping(basis, by_Y, B, damping);
+  if (basis.K_loss.matrix.get()) result.K_loss = projected(basis.K_loss, by_Y);
+  if (basis.G.matrix.get()) result.C += projected(basis.G, by_Y);
+  if (basis.H.matrix.get()) result.K += projected(basis.H, by_Y);
+  if (damping) result.C += projected_on_pairs(basis, by_Y, B, damping);
+  if (stiffness) result.K += projected_on_pairs(basis, by_Y, B, stiffness);
   result.kept = basis.by_Z.kept;
   result.independent = basis.by_Z.independent;
   return result;

@@ -4,17 +4,18 @@
 /// The shapes T are kept in the structure's degrees of freedom. At a point with the bases Z and Y of its closed pairs,
 /// T is lifted. Its pivots are replaced by what Z or Y gives from the other degrees of freedom. Lifts change the rows
 /// of the pivots alone. So the projected matrices follow from T'A T and from the rows of A T at the contact:
-///     (T + D_Y)'A(T + D_Z) = T'A T + D_Y'(A T) + (A T)'D_Z + D_Y'A D_Z
+///     (T + D_Y)'A(T + D_Z) = T'A T + D_Y'(A T) + (A'T)'D_Z + D_Y'A D_Z,   A' = A or -A
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
 namespace squeal
 {
 
-/// A symmetric matrix on T.
+/// A symmetric or skew matrix on T.
 struct BasisImage
 {
-  Owned<Mat> matrix;                 // a copy of A
+  double sign = 1;                   // A' = sign A
+  Owned<Mat> matrix{};               // a copy of A; null: there is none
   MultiVector contact_rows{};        // of A T, at the degrees of freedom of the contact that this rank has
   Eigen::MatrixXd products{};        // T'A T
   MultiVector lifted_rows{};         // of A T_Z at the pivots, where T_Z is T lifted by Z
@@ -39,7 +40,8 @@ struct SlidingBasis
   MultiVector T;
   Eigen::Index sketched = 0;
   std::vector<Eigen::Index> contact_dofs{}; // local rows, ascending
-  BasisImage M{}, C{}, K{};
+  BasisImage M{}, C{}, K{}, K_loss{};       // C without the viscous equivalent of loss factors
+  BasisImage G{-1}, H{-1};
   LiftByZ by_Z{};
 
   Eigen::Index shapes() const { return T.columns() - sketched; }
@@ -59,15 +61,15 @@ SlidingBasis leading_part(const SlidingBasis& basis, Eigen::Index shapes);
 /// Takes over the matrices of a structure where they have changed.
 void set_structure(SlidingBasis& basis, const Structure& structure);
 
-/// The structure at a point, on T: Y'M Z, Y'(C + C_f) Z, Y'K Z, with the inner products and the independent
-/// combinations of the lift.
+/// The structure at a point, on T: Y'M Z, Y'(C + G + C_f) Z, Y'(K + H + B'S B) Z, with the inner products and the
+/// independent combinations of the lift.
 struct ProjectedSliding
 {
-  Eigen::MatrixXd M{}, C{}, K{}, kept{}, independent{};
+  Eigen::MatrixXd M{}, C{}, K{}, K_loss{}, kept{}, independent{}; // K_loss is empty without loss factors
 };
 
-/// `damping`: of the friction direction, on the rows of B; may be null.
-ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping);
+/// `damping`, `stiffness`: of the friction direction and S of pairs with a compliance, on the rows of B; may be null.
+ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness);
 
 /// The degrees of freedom of x that are no pivots.
 MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact);

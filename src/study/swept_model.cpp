@@ -1,6 +1,7 @@
 #include "swept_model.hpp"
 
 #include "squeal/scene/numbers.hpp"
+#include "squeal/study/reversed.hpp"
 
 #include <algorithm>
 
@@ -46,8 +47,7 @@ void SweptModel::go_to(const SweptPlace& place)
   Interface& interface = model_->interface;
   if (const int friction = friction_place(settings); friction >= 0)
     interface.friction.coefficient = place.values[static_cast<std::size_t>(friction)];
-  if (at_.reversed != place.reversed)
-    for (double& velocity : interface.drive) velocity = -velocity;
+  if (at_.reversed != place.reversed) reverse_rotation(model_->structure, interface);
   at_ = place;
 }
 
@@ -92,18 +92,27 @@ const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
   return equilibria_[place] = std::move(equilibrium);
 }
 
-void SweptModel::prepare(const SweptPlace& place)
+const std::vector<char>& SweptModel::rigid_at(const SweptPlace& place)
 {
-  const Equilibrium& equilibrium = equilibrium_at(place);
-  if (equilibrium.outcome.kind != OutcomeKind::converged) return;
-  if (at_every_.empty()) at_every_ = equilibrium.closed;
-  for (std::size_t i = 0; i < at_every_.size(); ++i)
-    at_every_[i] = at_every_[i] && i < equilibrium.closed.size() && equilibrium.closed[i];
+  const auto known = rigid_.find(place);
+  if (known != rigid_.end()) return known->second;
+  std::vector<char> rigid = equilibrium_at(place).closed;
+  go_to(place);
+  for (std::size_t i = 0; i < rigid.size(); ++i) rigid[i] = rigid[i] && compliance_of(model_->interface, i) == 0;
+  return rigid_[place] = std::move(rigid);
 }
 
-BasisProblem SweptModel::basis_problem() const
+void SweptModel::prepare(const SweptPlace& place)
 {
-  return {model_->structure, model_->interface, problem_.modes.band, problem_.modes_options};
+  if (equilibrium_at(place).outcome.kind != OutcomeKind::converged) return;
+  const std::vector<char>& rigid = rigid_at(place);
+  if (at_every_.empty()) at_every_ = rigid;
+  for (std::size_t i = 0; i < at_every_.size(); ++i) at_every_[i] = at_every_[i] && i < rigid.size() && rigid[i];
+}
+
+BasisProblem SweptModel::basis_problem(const Equilibrium& equilibrium) const
+{
+  return {model_->structure, model_->interface, equilibrium.closed, problem_.modes.band, problem_.modes_options};
 }
 
 PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
@@ -113,19 +122,19 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
   try
   {
     go_to(place);
+    const std::vector<char>& rigid = rigid_at(place);
     std::vector<char> common = basis_ ? basis_->closed : at_every_;
-    if (common.size() != equilibrium.closed.size())
-      throw Error(
-          format("the number of contact pairs changes from %zu to %zu", common.size(), equilibrium.closed.size()));
-    for (std::size_t i = 0; i < common.size(); ++i) common[i] = common[i] && equilibrium.closed[i];
+    if (common.size() != rigid.size())
+      throw Error(format("the number of contact pairs changes from %zu to %zu", common.size(), rigid.size()));
+    for (std::size_t i = 0; i < common.size(); ++i) common[i] = common[i] && rigid[i];
     if (!basis_)
     {
-      basis_ = make_modes_basis(basis_problem(), common);
+      basis_ = make_modes_basis(basis_problem(equilibrium), common);
       basis_reversed_ = place.reversed;
     }
     if (basis_reversed_ != place.reversed) turn_round(*basis_);
     basis_reversed_ = place.reversed;
-    if (common != basis_->closed) rebase(*basis_, basis_problem(), common);
+    if (common != basis_->closed) rebase(*basis_, basis_problem(equilibrium), common);
     modes = find_point_modes(*basis_, {{model_->structure, model_->interface, equilibrium},
                                        problem_.modes.band,
                                        tolerance,
@@ -145,7 +154,7 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
 
 bool SweptModel::same_pairs_closed(const SweptPlace& a, const SweptPlace& b)
 {
-  return equilibrium_at(a).closed == equilibrium_at(b).closed;
+  return equilibrium_at(a).closed == equilibrium_at(b).closed && rigid_at(a) == rigid_at(b);
 }
 
 ModeForms SweptModel::forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to,
@@ -158,11 +167,10 @@ ModeForms SweptModel::forms(const SweptPlace& from, const PointModes& first, con
     return ExpandedModes{modes.pairs, vectors(modes, Side::right), vectors(modes, Side::left)};
   };
   const ExpandedModes before = expand(from, first), now = expand(to, second);
-  const Equilibrium& at = equilibria_.at(to);
-  const Interface& interface = model_->interface;
-  const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
-  const Owned<Mat> Cf = friction_damping(interface, at.closed, at.reactions, part);
-  return forms_between(before, now, model_->structure, Cf);
+  const Structure& structure = model_->structure;
+  Owned<Mat> C = sliding_damping({structure, model_->interface, equilibria_.at(to)});
+  if (structure.K_loss.get()) C = without_loss(C, structure);
+  return forms_between(before, now, structure.M, C);
 }
 
 Eigen::Index SweptModel::shapes() const

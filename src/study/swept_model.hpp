@@ -26,7 +26,7 @@ public:
   /// all, then the imaginary ones.
   MultiVector vectors(const PointModes& modes, Side side) const;
 
-  /// Whether the same pairs are closed at two points.
+  /// Whether the same pairs are closed at two points, and the same of them rigid.
   bool same_pairs_closed(const SweptPlace& a, const SweptPlace& b);
 
   /// Between the modes of two points of a line, the second one being that of the modes found last.
@@ -46,7 +46,8 @@ private:
   void go_to(const SweptPlace& place);
   Equilibrium find(const SweptPlace& place);
   const PairCompliance& compliance();
-  BasisProblem basis_problem() const;
+  BasisProblem basis_problem(const Equilibrium& equilibrium) const;
+  const std::vector<char>& rigid_at(const SweptPlace& place);
 
   const SweepProblem& problem_;
   MPI_Comm comm_;
@@ -54,8 +55,9 @@ private:
   std::optional<BrakeModel> model_{}; // at the point visited last
   SweptPlace at_{};
   std::map<SweptPlace, Equilibrium> equilibria_{};
-  std::vector<char> closed_{};   // at the equilibrium found last
-  std::vector<char> at_every_{}; // pairs closed at every point prepared
+  std::map<SweptPlace, std::vector<char>> rigid_{}; // closed pairs without a compliance
+  std::vector<char> closed_{};                      // at the equilibrium found last
+  std::vector<char> at_every_{};                    // pairs closed and rigid at every point prepared
   std::optional<PairCompliance> compliance_{};
   Owned<Mat> K_{}, B_{}; // of the compliance
   std::optional<ModesBasis> basis_{};

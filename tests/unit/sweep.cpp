@@ -1,11 +1,12 @@
-// What a sweep is made of: zeros in brackets, eigenvalues with both of their vectors, thresholds of modes.
+// What a sweep is made of: zeros in brackets, eigenvalues with both vectors and with losses, thresholds of modes.
 #include "../../src/study/thresholds.hpp"
-#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/root.hpp"
+#include "squeal/modes/dense_losses.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <doctest/doctest.h>
+#include <Eigen/QR>
 #include <random>
 
 using namespace squeal;
@@ -42,6 +43,45 @@ TEST_CASE("a function without a value ends the search with the bracket that is k
   CHECK(root.x == doctest::Approx(0.25));
 }
 
+TEST_CASE("pairs take losses at their own frequency, with both vectors, whatever the bases of the two sides")
+{
+  std::mt19937 generator(5);
+  std::uniform_real_distribution<double> random(-1, 1);
+  const int n = 40;
+  const auto matrix = [&] { return MatrixXd::NullaryExpr(n, n, [&] { return random(generator); }).eval(); };
+  const auto rotation = [&] { return MatrixXd(Eigen::HouseholderQR<MatrixXd>(matrix()).householderQ()); };
+  const MatrixXd M = MatrixXd::Identity(n, n) + 0.2 / n * matrix(), C = 0.05 * matrix(), part = matrix();
+  MatrixXd K = 3 * matrix();
+  K.diagonal() += Eigen::VectorXd::LinSpaced(n, 10, 400);
+  const MatrixXd P = rotation(), R = rotation(), K_loss = 0.2 * K + part * part.transpose() / n;
+  const LossyMatrices problem{P * M * R, P * C * R, P * K * R, P * K_loss * R};
+  std::vector<TwoSidedPair> pairs = solve_two_sided_shared(PETSC_COMM_WORLD, problem[0], problem[1], problem[2]);
+  const std::size_t count = pairs.size();
+  add_losses_shared(PETSC_COMM_WORLD, problem, pairs);
+  REQUIRE(pairs.size() == count);
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    const auto& [lambda, right, left, loss] = pairs[i];
+    REQUIRE(loss == LossKind::viscous);
+    const MatrixXcd Q = sum(problem, loss_factors(loss, lambda));
+    const double rounding = 1e-12 * (std::norm(lambda) * M.norm() + K.norm()); // of LU, beside the sizes of the terms
+    CHECK((Q * right).norm() < rounding);
+    CHECK((left.transpose() * Q).norm() < rounding);
+    for (std::size_t j = 0; j < i; ++j) CHECK(std::abs(lambda - pairs[j].lambda) > 1e-6 * std::abs(lambda));
+  }
+}
+
+TEST_CASE("one loss factor everywhere gives the closed form of its viscous equivalent")
+{
+  const MatrixXd one = MatrixXd::Identity(1, 1);
+  const double eta = 0.3, w = 7;
+  std::vector<TwoSidedPair> pairs = {{Complex(0, w), Eigen::VectorXcd::Ones(1), Eigen::VectorXcd::Ones(1)}};
+  add_losses_shared(PETSC_COMM_WORLD, {one, 0 * one, w * w * one, eta * w * w * one}, pairs);
+  const double omega = w * std::sqrt((1 + std::sqrt(1 - eta * eta)) / 2); // lambda^2 + eta w^2/omega lambda + w^2 = 0
+  CHECK(pairs[0].lambda.imag() == doctest::Approx(omega).epsilon(1e-13));
+  CHECK(pairs[0].lambda.real() == doctest::Approx(-eta * w * w / (2 * omega)).epsilon(1e-13));
+}
+
 TEST_CASE("left and right vectors of unsymmetric quadratic problems solve them, and are biorthogonal")
 {
   std::mt19937 generator(11);
@@ -58,7 +98,7 @@ TEST_CASE("left and right vectors of unsymmetric quadratic problems solve them, 
     REQUIRE(right_only.size() == pairs.size());
     for (std::size_t i = 0; i < pairs.size(); ++i)
     {
-      const auto& [lambda, right, left] = pairs[i];
+      const auto& [lambda, right, left, loss] = pairs[i];
       const MatrixXcd Q = lambda * lambda * M + lambda * C + K;
       // the QR algorithm is backward stable: a modest multiple of 1e-16 times the sizes of the three terms
       const double rounding =
