@@ -1,6 +1,7 @@
 #include "polynomial_model.hpp"
 
 #include "sliding_basis.hpp"
+#include "squeal/modes/quadratic.hpp"
 #include "squeal/scene/numbers.hpp"
 
 #include <algorithm>
@@ -60,31 +61,51 @@ void drop_if_zero(Owned<Mat>& A, Mat reference)
   if (size_of(A) <= rounding * size_of(reference)) A = {};
 }
 
-/// The sum of factor times model over a few models, as a term; M, C and K that vanish are dropped.
+/// A model with C without the viscous equivalent of loss factors.
+BrakeModel without_equivalent(BrakeModel model)
+{
+  Structure& structure = model.structure;
+  if (!structure.K_loss.get()) return model;
+  structure.C = without_loss(structure.C, structure);
+  check(MatSetOption(structure.C, MAT_SYMMETRIC, PETSC_TRUE));
+  structure.loss_omega = 0;
+  return model;
+}
+
+/// The sum of factor times model over a few models, as a term; matrices that vanish are dropped.
 ModelTerm sum_of(const std::vector<std::pair<double, const BrakeModel*>>& parts, const BrakeModel& reference)
 {
   ModelTerm term;
-  term.M = copy_of(reference.structure.M);
-  term.C = copy_of(reference.structure.C);
-  term.K = copy_of(reference.structure.K);
-  term.load = zeros_like(reference.structure.load);
-  for (Mat A : {term.M.get(), term.C.get(), term.K.get()}) check(MatZeroEntries(A));
+  for (const auto matrix : matrices_of_structure)
+    if ((reference.structure.*matrix).get())
+    {
+      term.structure.*matrix = copy_of((reference.structure.*matrix).get());
+      check(MatZeroEntries((term.structure.*matrix).get()));
+    }
+  term.structure.load = zeros_like(reference.structure.load);
   term.gap.assign(reference.interface.gap.size(), 0.);
   term.drive.assign(reference.interface.drive.size(), 0.);
+  term.compliance.assign(reference.interface.compliance.size(), 0.);
   for (const auto& [factor, model] : parts)
   {
     if (reference.interface.pairs > 0 && differ(model->interface.B, reference.interface.B))
       throw Error("a random number changes the rows of contact: take it out of [[uncertain]]");
-    add(term.M, factor, model->structure.M);
-    add(term.C, factor, model->structure.C);
-    add(term.K, factor, model->structure.K);
-    check(VecAXPY(term.load, factor, model->structure.load));
+    for (const auto matrix : matrices_of_structure)
+    {
+      const Mat A = (model->structure.*matrix).get();
+      if ((A != nullptr) != ((reference.structure.*matrix).get() != nullptr))
+        throw Error("a random number brings or takes away what spins: keep its rate on one side of 0");
+      if (A) add((term.structure.*matrix).get(), factor, A);
+    }
+    if (model->interface.compliance.size() != term.compliance.size())
+      throw Error("a random number brings or takes away the compliance of contacts: keep it above 0");
+    check(VecAXPY(term.structure.load, factor, model->structure.load));
     add(term.gap, factor, model->interface.gap);
     add(term.drive, factor, model->interface.drive);
+    add(term.compliance, factor, model->interface.compliance);
   }
-  drop_if_zero(term.M, reference.structure.M);
-  drop_if_zero(term.C, reference.structure.C);
-  drop_if_zero(term.K, reference.structure.K);
+  for (const auto matrix : matrices_of_structure)
+    if (Owned<Mat>& A = term.structure.*matrix; A.get()) drop_if_zero(A, (reference.structure.*matrix).get());
   return term;
 }
 
@@ -100,14 +121,14 @@ PolynomialModel::PolynomialModel(const RobustnessProblem& problem) : problem_(pr
     scale_.push_back((quantile(number, 0.99) - quantile(number, 0.01)) / 2);
     if (!is_friction(number.key)) places.push_back(i);
   }
-  reference_ = problem.model_at(centre_);
-  model_ = problem.model_at(centre_);
+  reference_ = model_at(centre_);
+  model_ = model_at(centre_);
   terms_.push_back(sum_of({{1, &reference_}}, reference_));
   const auto at = [&](std::initializer_list<std::pair<std::size_t, double>> steps)
   {
     std::vector<double> values = centre_;
     for (const auto& [place, step] : steps) values[place] += step * scale_[place];
-    return problem.model_at(values);
+    return model_at(values);
   };
   std::vector<BrakeModel> above;
   for (const std::size_t i : places)
@@ -134,18 +155,23 @@ PolynomialModel::PolynomialModel(const RobustnessProblem& problem) : problem_(pr
     throw Error(format("the matrices are no polynomials of second order of the random numbers: off by %.1e", error_));
 }
 
+BrakeModel PolynomialModel::model_at(const std::vector<double>& values) const
+{
+  return without_equivalent(problem_.model_at(values));
+}
+
 double PolynomialModel::error_at(const std::vector<double>& values)
 {
-  const BrakeModel exact = problem_.model_at(values);
+  const BrakeModel exact = model_at(values);
   const std::vector<double> x = coefficients(values);
   double error = 0;
-  for (const auto& [term, whole] :
-       {std::pair{&ModelTerm::M, exact.structure.M.get()}, std::pair{&ModelTerm::C, exact.structure.C.get()},
-        std::pair{&ModelTerm::K, exact.structure.K.get()}})
+  for (const auto matrix : matrices_of_structure)
   {
+    const Mat whole = (exact.structure.*matrix).get();
+    if (!whole) continue;
     const Owned<Mat> difference = copy_of(whole);
     for (std::size_t k = 0; k < terms_.size(); ++k)
-      if ((terms_[k].*term).get()) add(difference, -x[k], terms_[k].*term);
+      if (const Mat term = (terms_[k].structure.*matrix).get()) add(difference, -x[k], term);
     if (const double size = size_of(whole); size > 0) error = std::max(error, size_of(difference) / size);
   }
   return error;
@@ -184,13 +210,15 @@ const BrakeModel& PolynomialModel::at(const std::vector<double>& values)
   check(VecSet(structure.load, 0));
   std::ranges::fill(interface.gap, 0.);
   std::ranges::fill(interface.drive, 0.);
+  std::ranges::fill(interface.compliance, 0.);
   for (std::size_t k = 0; k < terms_.size(); ++k)
   {
     const ModelTerm& term = terms_[k];
-    if (stiffness_changes() && term.K.get()) add(structure.K, x[k], term.K);
-    check(VecAXPY(structure.load, x[k], term.load));
+    if (stiffness_changes() && term.structure.K.get()) add(structure.K, x[k], term.structure.K);
+    check(VecAXPY(structure.load, x[k], term.structure.load));
     add(interface.gap, x[k], term.gap);
     add(interface.drive, x[k], term.drive);
+    add(interface.compliance, x[k], term.compliance);
   }
   set_friction(values);
   return model_;
@@ -198,7 +226,8 @@ const BrakeModel& PolynomialModel::at(const std::vector<double>& values)
 
 bool PolynomialModel::stiffness_changes() const
 {
-  return std::ranges::any_of(terms_, [](const ModelTerm& term) { return !term.factors.empty() && term.K.get(); });
+  return std::ranges::any_of(terms_,
+                             [](const ModelTerm& term) { return !term.factors.empty() && term.structure.K.get(); });
 }
 
 } // namespace squeal

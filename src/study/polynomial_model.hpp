@@ -3,16 +3,22 @@
 /// assembled at a few values. It lives on one rank.
 #include "squeal/study/robustness.hpp"
 
+#include <array>
+
 namespace squeal
 {
 
-/// What a product of numbers contributes. Matrices without a contribution are null.
+/// What the numbers change in a structure.
+inline constexpr std::array matrices_of_structure = {&Structure::M, &Structure::C, &Structure::K,
+                                                     &Structure::G, &Structure::H, &Structure::K_loss};
+
+/// What a product of numbers contributes. Matrices without a contribution are null; C is that without the viscous
+/// equivalent of loss factors.
 struct ModelTerm
 {
   std::vector<std::size_t> factors{}; // none: the constant; twice the same: its square
-  Owned<Mat> M{}, C{}, K{};
-  Owned<Vec> load{};
-  std::vector<double> gap{}, drive{};
+  Structure structure{};              // its matrices and load
+  std::vector<double> gap{}, drive{}, compliance{};
 };
 
 class PolynomialModel
@@ -26,7 +32,7 @@ public:
   /// The factors of the terms at some values of the numbers.
   std::vector<double> coefficients(const std::vector<double>& values) const;
 
-  /// K, load, gap, drive and friction at these values; M and C stay those of the medians.
+  /// K, load, gap, drive, compliance and friction at these values; all else stays that of the medians.
   const BrakeModel& at(const std::vector<double>& values);
 
   const BrakeModel& reference() const { return reference_; }
@@ -34,6 +40,7 @@ public:
   double error() const { return error_; } // relative, at a corner of the numbers' ranges
 
 private:
+  BrakeModel model_at(const std::vector<double>& values) const;
   void set_friction(const std::vector<double>& values);
   double error_at(const std::vector<double>& values);
 

@@ -5,6 +5,8 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 
+#include <algorithm>
+
 namespace squeal
 {
 
@@ -127,17 +129,15 @@ ReducedSliding::ReducedSliding(const PolynomialModel& model, const MultiVector& 
     : BT_(product(model.reference().interface.B, T).entries), BW_(pairs.BW)
 {
   for (const ModelTerm& term : model.terms())
-  {
-    terms_.M.push_back(on_shapes(term.M, T, pairs.W));
-    terms_.C.push_back(on_shapes(term.C, T, pairs.W));
-    terms_.K.push_back(on_shapes(term.K, T, pairs.W));
-  }
+    for (std::size_t k = 0; k < terms_.size(); ++k)
+      terms_[k].push_back(on_shapes((term.structure.*matrices_of_structure[k]).get(), T, pairs.W));
 }
 
 namespace
 {
 
-/// The pairs of a point, and the rows B_n + part e.B_t of the closed ones on shapes.
+/// The pairs of a point: closed and rigid ones, which are eliminated, and the others. With the rows B_n + part e.B_t of
+/// the first ones on shapes.
 struct PairsOfPoint
 {
   const Interface& interface;
@@ -166,7 +166,7 @@ PairsOfPoint pairs_of(const Interface& interface, const std::vector<char>& close
 {
   PairsOfPoint pairs{interface};
   for (std::size_t i = 0; i < closed.size(); ++i)
-    (closed[i] ? pairs.closed : pairs.open).push_back(static_cast<Index>(i));
+    (closed[i] && compliance_of(interface, i) == 0 ? pairs.closed : pairs.open).push_back(static_cast<Index>(i));
   return pairs;
 }
 
@@ -188,42 +188,60 @@ Lifts make_lifts(const PairsOfPoint& pairs, const MatrixXd& BS, const MatrixXd& 
   return {lift(mu), lift(frictionless)};
 }
 
-/// (S + W Y)'A (S + W Z)
-MatrixXd lifted(const OnShapes& A, const PairsOfPoint& pairs, const Lifts& lifts)
+/// (S + W Y)'A (S + W Z), A' = sign A
+MatrixXd lifted(const OnShapes& A, double sign, const PairsOfPoint& pairs, const Lifts& lifts)
 {
   const std::vector<Index>&closed = pairs.closed, &open = pairs.open;
   const Index shapes = A.TT.rows(), opened = static_cast<Index>(open.size());
   MatrixXd result(shapes + opened, shapes + opened), WS(static_cast<Index>(closed.size()), shapes + opened);
   const MatrixXd of_open = A.WT(open, Eigen::all);
-  result << A.TT, of_open.transpose(), of_open, A.WW(open, open);
+  result << A.TT, sign * of_open.transpose(), of_open, A.WW(open, open);
   WS << A.WT(closed, Eigen::all), A.WW(closed, open);
   result.noalias() += lifts.Y.transpose() * WS;
   if (opened == 0) return result; // B_n S = 0
   const MatrixXd coupled = A.WW(closed, closed) * lifts.Z;
-  result.noalias() += WS.transpose() * lifts.Z;
+  result.noalias() += sign * WS.transpose() * lifts.Z;
   result.noalias() += lifts.Y.transpose() * coupled;
   return result;
 }
 
-/// S_Y'C_f S_Z
-MatrixXd friction_damping(const PairsOfPoint& pairs, const Equilibrium& equilibrium, const MatrixXd& left,
+/// S_Y'C_f S_Z, from the rows of B on both.
+MatrixXd friction_damping(const Interface& interface, const Equilibrium& equilibrium, const MatrixXd& left,
                           const MatrixXd& right)
 {
-  const Interface& interface = pairs.interface;
   const PairRows<Index> rows(interface.directions);
   const TangentView drive(interface.drive, interface.directions);
   const PairView reactions(equilibrium.reactions, interface.directions);
   MatrixXd force = MatrixXd::Zero(right.rows(), right.cols());
-  for (const Index pair : pairs.closed)
+  for (std::size_t i = 0; i < equilibrium.closed.size(); ++i)
   {
-    const auto i = static_cast<std::size_t>(pair);
-    if (reactions.normal(i) <= 0) continue;
+    if (!equilibrium.closed[i] || reactions.normal(i) <= 0) continue;
     const SlidingFriction friction = sliding_friction(interface.friction, reactions.normal(i), drive.of(i));
     const auto& D = interface.friction.direction_damping ? friction.damping : friction.damping_of_speed;
-    const Index first = rows.tangential(pair);
+    const Index first = rows.tangential(static_cast<Index>(i));
     for (Index k = 0; k < rows.directions; ++k)
       for (Index l = 0; l < rows.directions; ++l)
         force.row(first + k) += D[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)] * right.row(first + l);
+  }
+  return left.transpose() * force;
+}
+
+/// S_Y'B'S B S_Z of the closed pairs with a compliance, from the rows of B on both.
+MatrixXd stiffness_of_pairs(const Interface& interface, const Equilibrium& equilibrium, const MatrixXd& left,
+                            const MatrixXd& right)
+{
+  const PairRows<Index> rows(interface.directions);
+  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
+  const TangentView e(directions, interface.directions);
+  MatrixXd force = MatrixXd::Zero(right.rows(), right.cols());
+  for (std::size_t i = 0; i < equilibrium.closed.size(); ++i)
+  {
+    const double c = compliance_of(interface, i);
+    if (!equilibrium.closed[i] || c == 0) continue;
+    const Index normal = rows.normal(static_cast<Index>(i)), first = rows.tangential(static_cast<Index>(i));
+    force.row(normal) = right.row(normal) / c;
+    for (std::size_t d = 0; d < e.of(i).size(); ++d)
+      force.row(first + static_cast<Index>(d)) = mu[i] * e.of(i)[d] / c * right.row(normal);
   }
   return left.transpose() * force;
 }
@@ -238,16 +256,23 @@ ReducedMatrices ReducedSliding::at(const std::vector<double>& coefficients, cons
   if (interface.pairs > 0) BS << BT_, BW_(Eigen::all, pairs.open);
   const MatrixXd at_closed = BW_(Eigen::all, pairs.closed);
   const Lifts lifts = make_lifts(pairs, BS, at_closed);
-  const auto projected = [&](const std::vector<OnShapes>& terms) -> MatrixXd
+  const auto& [M, C, K, G, H, K_loss] = terms_;
+  const auto projected = [&](const std::vector<OnShapes>& terms, double sign) -> MatrixXd
   {
     const OnShapes A = sum_of(terms, coefficients);
     if (A.TT.size() == 0) return MatrixXd::Zero(BS.cols(), BS.cols());
-    return lifted(A, pairs, lifts);
+    return lifted(A, sign, pairs, lifts);
   };
-  ReducedMatrices result{projected(terms_.M), projected(terms_.C), projected(terms_.K), shapes()};
+  const auto has = [](const std::vector<OnShapes>& terms)
+  { return std::ranges::any_of(terms, [](const OnShapes& term) { return term.TT.size() > 0; }); };
+  ReducedMatrices result{projected(M, 1), projected(C, 1), projected(K, 1), {}, shapes()};
+  if (has(G)) result.C += projected(G, -1);
+  if (has(H)) result.K += projected(H, -1);
+  if (has(K_loss)) result.K_loss = projected(K_loss, 1);
   if (interface.pairs == 0) return result;
   const MatrixXd left = BS + at_closed * lifts.Y, right = pairs.open.empty() ? BS : (BS + at_closed * lifts.Z).eval();
-  result.C += friction_damping(pairs, equilibrium, left, right);
+  result.C += friction_damping(interface, equilibrium, left, right);
+  if (!interface.compliance.empty()) result.K += stiffness_of_pairs(interface, equilibrium, left, right);
   return result;
 }
 

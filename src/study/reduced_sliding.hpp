@@ -2,9 +2,10 @@
 /// Small motions about sliding on a few shapes, for many values of the numbers (src/README.md, section 12.2).
 ///
 /// The shapes T come from modes of other points, without their motion along the normals of the pairs: B_n T = 0. W are
-/// responses to a normal force on each pair. S = [T, W of the open pairs] is lifted by W of the closed ones to what
-/// contact allows, with the rows B_n and R of the closed pairs:
+/// responses to a normal force on each pair. S = [T, W of the other pairs] is lifted by W of the closed rigid ones to
+/// what contact allows, with the rows B_n and R of those:
 ///     S_Z = S - W (B_n W)^-1 B_n S,   S_Y = S - W (R W)^-1 R S,   (lambda^2 S_Y'M S_Z + ...) y = 0
+/// Closed pairs with a compliance are springs.
 #include "polynomial_model.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/multivector.hpp"
@@ -12,16 +13,16 @@
 namespace squeal
 {
 
-/// A symmetric matrix on T and W; empty where the term has none.
+/// A symmetric or skew matrix on T and W; empty where the term has none.
 struct OnShapes
 {
   Eigen::MatrixXd TT{}, WT{}, WW{};
 };
 
-/// S_Y'M S_Z, S_Y'(C + C_f) S_Z, S_Y'K S_Z.
+/// S_Y'M S_Z, S_Y'(C + G + C_f) S_Z, S_Y'(K + H + B'S B) S_Z, and K_loss, empty without loss factors.
 struct ReducedMatrices
 {
-  Eigen::MatrixXd M{}, C{}, K{};
+  Eigen::MatrixXd M{}, C{}, K{}, K_loss{};
   Eigen::Index common = 0; // shapes of T, which come first
 };
 
@@ -61,20 +62,15 @@ class ReducedSliding
 public:
   ReducedSliding(const PolynomialModel& model, const MultiVector& T, const PairShapes& pairs);
 
-  /// `interface`: with the friction and the drive of the point. Error: friction jams a closed pair.
+  /// `interface`: with the friction, the drive and the compliance of the point. Error: friction jams a closed pair.
   ReducedMatrices at(const std::vector<double>& coefficients, const Interface& interface,
                      const Equilibrium& equilibrium) const;
 
   Eigen::Index shapes() const { return BT_.cols(); }
 
 private:
-  struct Terms
-  {
-    std::vector<OnShapes> M{}, C{}, K{};
-  };
-
-  Terms terms_;
-  Eigen::MatrixXd BT_, BW_; // rows of B on the shapes
+  std::array<std::vector<OnShapes>, matrices_of_structure.size()> terms_{}; // of each matrix
+  Eigen::MatrixXd BT_, BW_;                                                 // rows of B on the shapes
 };
 
 } // namespace squeal

@@ -5,6 +5,7 @@
 #include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/modes/dense_losses.hpp"
 #include "swept_model.hpp"
 
 #include <algorithm>
@@ -87,16 +88,29 @@ bool in_band(Complex lambda, double band)
   return lambda.imag() >= 0 && std::abs(lambda) < two_pi * band;
 }
 
+/// The modes in the band with both vectors.
+std::vector<TwoSidedPair> two_sided_modes(const ReducedMatrices& at, double band)
+{
+  std::vector<TwoSidedPair> pairs = solve_two_sided_shared(MPI_COMM_SELF, at.M, at.C, at.K);
+  const auto keep_below = [&](double end)
+  { std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !in_band(pair.lambda, end); }); };
+  if (at.K_loss.size() > 0)
+  {
+    keep_below(followed_band * band);
+    add_losses_shared(MPI_COMM_SELF, {at.M, at.C, at.K, at.K_loss}, pairs);
+  }
+  keep_below(band);
+  return pairs;
+}
+
 /// Modes of the reference, on the reduced model's shapes.
 class Reference
 {
 public:
   Reference() = default;
 
-  Reference(const ReducedMatrices& at, double band)
+  Reference(const ReducedMatrices& at, double band) : pairs_(two_sided_modes(at, band))
   {
-    for (TwoSidedPair& pair : solve_two_sided_shared(MPI_COMM_SELF, at.M, at.C, at.K))
-      if (in_band(pair.lambda, band)) pairs_.push_back(std::move(pair));
     for (const TwoSidedPair& pair : pairs_) own_.push_back(form(at, pair, pair));
   }
 
@@ -171,14 +185,25 @@ public:
     return reduced_->at(model_.coefficients(values), interface, equilibrium);
   }
 
-  /// The modes in the band; nothing without an equilibrium.
-  std::vector<Complex> modes_of(const ReducedMatrices& at) const
+  /// The modes in the band; without loss factors without their vectors, which take longer.
+  std::vector<TwoSidedPair> pairs_of(const ReducedMatrices& at) const
   {
     const auto norm = [](const Eigen::MatrixXd& A) { return A.cwiseAbs().colwise().sum().maxCoeff(); };
-    const double floor = 1e-12 * norm(at.K) / norm(at.M); // of a free body's motion, as in section 3.4
-    std::vector<Complex> modes = dense_quadratic_eigenvalues(at.M, at.C, at.K);
-    std::erase_if(modes,
-                  [&](Complex lambda) { return !in_band(lambda, problem_.modes.band) || std::norm(lambda) < floor; });
+    const double floor = 1e-12 * norm(at.K) / norm(at.M), band = problem_.modes.band; // as in section 3.4
+    std::vector<TwoSidedPair> pairs;
+    if (at.K_loss.size() > 0)
+      pairs = two_sided_modes(at, band);
+    else
+      for (const Complex lambda : dense_quadratic_eigenvalues(at.M, at.C, at.K))
+        if (in_band(lambda, band)) pairs.push_back({lambda, {}, {}});
+    std::erase_if(pairs, [&](const TwoSidedPair& pair) { return std::norm(pair.lambda) < floor; });
+    return pairs;
+  }
+
+  std::vector<Complex> modes_of(const ReducedMatrices& at) const
+  {
+    std::vector<Complex> modes;
+    for (const TwoSidedPair& pair : pairs_of(at)) modes.push_back(pair.lambda);
     return modes;
   }
 
@@ -190,13 +215,15 @@ public:
     sample.known = true;
     sample.closed = static_cast<int>(std::ranges::count(closed_, 1));
     Complex worst;
-    for (const Complex lambda : modes_of(*at))
+    for (const TwoSidedPair& pair : pairs_of(*at))
     {
+      const Complex lambda = pair.lambda;
       const bool first = worst == 0. || lambda.real() / std::abs(lambda) > worst.real() / std::abs(worst);
       if (first) worst = lambda;
       if (!is_unstable(lambda)) continue;
       ++sample.unstable;
-      const int mode = reference_.nearest(*at, two_sided_pair(at->M, at->C, at->K, lambda));
+      const bool known = pair.right.size() > 0;
+      const int mode = reference_.nearest(*at, known ? pair : two_sided_pair(at->M, at->C, at->K, lambda));
       if (first) sample.mode = mode;
       unstable.push_back({place, mode, lambda});
     }
