@@ -98,12 +98,6 @@ BrakeBranch run_branch(const Chain& chain)
                       chain.options.cycle.shooting});
 }
 
-/// Why left vectors and sweeps are refused; empty if they are not.
-std::string part_beyond_sweeps(const Model& model)
-{
-  return model.interface.compliance.empty() ? unsymmetric_part(model.structure) : "contacts have a compliance";
-}
-
 Sensitivity run_sensitivity(const Chain& chain)
 {
   const Scene& scene = chain.scene;
@@ -127,8 +121,9 @@ Sweep run_scene_sweep(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   if (!scene.sweep) return not_run<Sweep>(OutcomeKind::off, "the scene has no [sweep]");
-  const std::string part = part_beyond_sweeps(chain.model);
-  if (!part.empty()) return not_run<Sweep>(OutcomeKind::refused, part);
+  if (chain.model.structure.H.get() && scene.sweep->directions == SweepDirections::both)
+    return not_run<Sweep>(OutcomeKind::refused, "the structure has a circulatory part, which the other direction of "
+                                                "rotation would change: sweep one direction");
   const auto model_at = [&](std::span<const double> values, MPI_Comm comm)
   {
     std::vector<SceneNumber> numbers;
@@ -145,8 +140,6 @@ Robustness run_robustness(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   if (!scene.robustness) return not_run<Robustness>(OutcomeKind::off, "the scene has no [robustness]");
-  const std::string part = part_beyond_sweeps(chain.model);
-  if (!part.empty()) return not_run<Robustness>(OutcomeKind::refused, part);
   const auto model_at = [&](std::span<const double> values)
   {
     std::vector<SceneNumber> numbers;

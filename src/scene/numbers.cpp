@@ -24,13 +24,6 @@ const std::vector<std::string> physical = {"part",     "point",   "rigid_body", 
 /// Tables on which the mesh or the given matrices depend.
 constexpr std::array of_the_mesh = {"mesh", "matrices"};
 
-/// Numbers that can bring what keeps a problem from being that of rigid pairs and symmetric matrices.
-bool is_beyond_sweeps(const std::string& key)
-{
-  return key.ends_with(".compliance") || key.ends_with(".loss_factor") ||
-         (key.starts_with("part.") && key.find(".rotation.") != std::string::npos);
-}
-
 std::string text_of_number(double value)
 {
   char digits[32];
@@ -86,10 +79,6 @@ double number_at(const Scene& scene, const std::string& key, NumberTable table)
   if (std::find(physical.begin(), physical.end(), first) == physical.end())
     throw refusal("is not a number of the structure, its contact or its loads" + hint_or_list(first, physical) +
                   ", such as " + friction_coefficient_key);
-  const bool sampled = table == NumberTable::sweep || table == NumberTable::uncertain;
-  if (sampled && is_beyond_sweeps(key))
-    throw refusal("is followed by a [branch] and derived by in [sensitivity] only: sweeps and random numbers are for "
-                  "rigid pairs and for matrices that neither spin nor have loss factors");
   toml::table document = document_of(scene);
   const toml::node* node = find_value(document, key);
   if (!node)
