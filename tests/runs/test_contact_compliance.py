@@ -133,7 +133,6 @@ def test_reduced_matrices_keep_the_compliance(converged):
 
 @pytest.mark.parametrize("words, parts", [
     (["--set", "contact.0.compliance=-1e-12"], ["compliance", "zero or a positive number"]),
-    (["--set", "sweep.key=contact.0.compliance", "--set", "sweep.from=0", "--set", "sweep.to=1e-12"], ["contact.0.compliance", "followed by a [branch]"]),
     (["--set", "contact.0.compliance=1e-12", "-transient_contact_law", "velocity"], ["-transient_contact_law velocity", "displacement"]),
 ])
 def test_bad_compliances_are_refused(squeal, words, parts):

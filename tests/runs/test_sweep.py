@@ -30,7 +30,7 @@ def rows_of(folder):
 def modes_at(rows, value, direction=1, key="friction.coefficient"):
     """Eigenvalues at a point, by falling growth rate."""
     return [complex(float(row["growth_rate"]), 2 * np.pi * float(row["frequency_hz"])) for row in rows
-            if row["frequency_hz"] and abs(float(row[key]) - value) < 1e-12 and int(row["direction"]) == direction]
+            if row["frequency_hz"] and abs(float(row[key]) - value) <= 1e-12 * abs(value) and int(row["direction"]) == direction]
 
 
 def lambdas(report):

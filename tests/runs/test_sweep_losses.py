@@ -1,0 +1,151 @@
+"""Sweeps and random numbers of scenes with loss factors, contacts with a compliance and parts that spin, against single runs."""
+
+import numpy as np
+import pytest
+from conftest import INPUTS
+from models import write_matrices, write_scene
+from test_robustness import random
+from test_robustness import rows_of as samples_of
+from test_sensitivity import overridden, two_pads
+from test_sweep import lambdas, modes_at, rows_of, same_modes, sweep_of
+
+PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
+       "--set", "modes.method=full", "--set", "modes.band=10000", "--set", "estimate.enabled=false"]
+LOSSY = [*PIN, "--set", "part.pin.loss_factor=0.1", "--set", "part.disc.loss_factor=0.002", "--set",
+         "damping.loss_frequency=5000"]
+SOFT = [*PIN, "--set", "contact.0.compliance=5e-13"]
+SPINNING = [*PIN, "--set", "part.disc.rotation={axis='z',rate=300}"]
+ALL = [*LOSSY, "--set", "contact.0.compliance=5e-13", "--set", "part.disc.rotation={axis='z',rate=300}"]
+
+
+def set_to(key, value):
+    return ["--set", overridden(key, value)]
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("scene, key, values", [
+    (LOSSY, "part.pin.loss_factor", [0.0, 0.2, 0.6]),
+    (LOSSY, "friction.coefficient", [0.1, 0.4]),
+    (SOFT, "contact.0.compliance", [0.0, 2e-13, 1e-12]),
+    (SOFT, "friction.coefficient", [0.1, 0.4]),
+    (SPINNING, "part.disc.rotation.rate", [0.0, 200.0, 500.0]),
+    (SPINNING, "friction.coefficient", [0.1, 0.4]),
+    (ALL, "friction.coefficient", [0.1, 0.4]),
+], ids=["loss factor", "friction with losses", "compliance", "friction with compliance", "rate", "friction with spin",
+        "friction with all"])
+def test_points_are_single_runs(scene, key, values, ranks, converged):
+    run = converged(*scene, "--set", f"sweep.key={key}", "--set", f"sweep.values={values}", ranks=ranks)
+    rows = rows_of(run.output)
+    assert run.report["sweep"]["lost_modes"] == 0
+    for value in values:
+        single = converged(*scene, *set_to(key, value), ranks=1).report
+        # backward errors of both vectors are below 1e-10; lambda is off by their product, times at most 1e9 here
+        same_modes(modes_at(rows, value, key=key), lambdas(single), 1e-9)
+
+
+def test_losses_beyond_a_viscous_equivalent(converged):
+    """Beyond eta = 1 modes are those of the complex problem: the threshold between both is on the way."""
+    run = converged(*LOSSY, "--set", "sweep.key=part.pin.loss_factor", "--set", "sweep.values=[0.8, 1.6]", ranks=1)
+    for eta in (0.8, 1.6):
+        single = converged(*LOSSY, "--set", f"part.pin.loss_factor={eta}", ranks=1).report
+        errors = [mode["loss_error"] for mode in single["modes"]["modes"]]
+        assert (None in errors) == (eta > 1), errors
+        same_modes(modes_at(rows_of(run.output), eta, key="part.pin.loss_factor"), lambdas(single), 1e-9)
+
+
+def test_the_other_direction_turns_parts_that_spin_round(converged):
+    run = converged(*ALL, "--set", "sweep.key=friction.coefficient", "--set", "sweep.values=[0.2, 0.35]", "--set",
+                    "sweep.directions=both", ranks=1)
+    single = converged(*ALL, "--set", "friction.coefficient=0.35", "--set", "contact.0.rotation={axis='z', rate=-20}",
+                       "--set", "part.disc.rotation={axis='z', rate=-300}", ranks=1).report
+    same_modes(modes_at(rows_of(run.output), 0.35, -1), lambdas(single), 1e-9)
+
+
+@pytest.mark.parametrize("key, values", [
+    ("contact.0.compliance", [0.0, 1e-8, 1e-6]),
+    ("friction.coefficient", [0.1, 0.3, 0.6]),
+])
+def test_single_runs_change_at_the_thresholds(key, values, tmp_path, converged):
+    scene = two_pads(tmp_path, compliance=2e-9)
+    run = converged(scene, "--set", f"sweep.key={key}", "--set", f"sweep.values={values}", ranks=1)
+    thresholds = run.report["sweep"]["thresholds"]
+    assert thresholds
+    for threshold in thresholds:
+        value = threshold["values"][0]
+        counts = [converged(scene, "--set", f"{key}={value + step!r}", ranks=1).report["modes"]["unstable_count"]
+                  for step in (-1e-4 * value, 1e-4 * value)]
+        assert counts[1] - counts[0] == threshold["change"]
+
+
+def test_a_single_run_changes_at_the_loss_factor_that_stabilises(converged):
+    """Friction makes a mode at 17 974 Hz unstable; losses of the pin take it away."""
+    ask = [*LOSSY, "--set", "modes.band=20000", "--set", "friction.coefficient=0.3"]
+    run = converged(*ask, *sweep_of("part.pin.loss_factor", 0.0, 0.5, points=3), ranks=1)
+    (threshold,) = run.report["sweep"]["thresholds"]
+    eta = threshold["values"][0]
+    counts = [converged(*ask, "--set", f"part.pin.loss_factor={eta + step!r}", ranks=1).report["modes"]["unstable_count"]
+              for step in (-1e-4 * eta, 1e-4 * eta)]
+    assert counts[1] - counts[0] == threshold["change"] == -1
+
+
+def test_groups_of_ranks_agree(converged):
+    ask = [*ALL, *sweep_of(end=0.35, points=8)]
+    one, two = (converged(*ask, "-sweep_groups", str(ranks), ranks=ranks) for ranks in (1, 2))
+    assert two.report["sweep"]["groups"] == 2
+    for value in np.linspace(0.05, 0.35, 8):
+        same_modes(*(modes_at(rows_of(run.output), value) for run in (one, two)), 1e-9)
+
+
+def gyroscopic(folder, circulatory):
+    """Three masses on springs; G couples two of them, H too where it is asked for."""
+    M, K = np.diag([1.0, 2.0, 1.5]), 1e4 * np.array([[3.0, -1, 0], [-1, 4, -1], [0, -1, 2]])
+    G = 30 * np.array([[0.0, 1, 0], [-1, 0, 0.5], [0, -0.5, 0]])
+    H = 800 * np.array([[0.0, 1, -1], [-1, 0, 0], [1, 0, 0]])
+    model = write_matrices(folder / "model", np.eye(3), [], [], np.zeros(3), M=M, K=K, G=G, **({"H": H} if circulatory else {}))
+    for name in ("B", "gap", "drive"):
+        (model / f"{name}.petsc").unlink()
+    return write_scene(folder, matrices={"folder": "model"}, damping={"alpha": 2.0}, modes={"band": 100})
+
+
+@pytest.mark.parametrize("circulatory", [False, True])
+def test_matrices_with_gyroscopic_and_circulatory_parts(circulatory, tmp_path, converged, squeal):
+    scene = gyroscopic(tmp_path, circulatory)
+    run = converged(scene, "--set", "sweep.key=damping.alpha", "--set", "sweep.values=[0.5,4.0]", ranks=1)
+    for alpha in (0.5, 4.0):
+        single = converged(scene, "--set", f"damping.alpha={alpha}", ranks=1).report
+        same_modes(modes_at(rows_of(run.output), alpha, key="damping.alpha"), lambdas(single), 1e-9)
+    if circulatory:
+        both = squeal(scene, *sweep_of("damping.alpha", 0.5, 4.0, directions="both"), ranks=1)
+        assert both.report["sweep"]["outcome"] == "refused" and "circulatory" in both.report["sweep"]["reason"]
+
+
+LOSSES = "{key='part.pin.loss_factor', distribution='uniform', from=0.05, to=0.3}"
+COMPLIANCE = "{key='contact.0.compliance', distribution='uniform', from=2e-13, to=1e-12}"
+RATE = "{key='part.disc.rotation.rate', deviation=50}"
+FRICTION = "{key='friction.coefficient', distribution='uniform', from=0.1, to=0.5}"
+
+
+@pytest.mark.parametrize("scene, numbers", [
+    (LOSSY, [LOSSES, FRICTION, "{key='part.pin.young', deviation=2e8}"]),
+    (SOFT, [COMPLIANCE, FRICTION]),
+    (SPINNING, [RATE, FRICTION]),
+    (ALL, [LOSSES, COMPLIANCE, RATE, FRICTION]),
+], ids=["losses", "compliance", "spin", "all"])
+def test_random_numbers_are_single_runs(scene, numbers, converged):
+    """Growth within 1e-3 of |lambda|, as it is asked for; the losses move it by some hundredths."""
+    run = converged(*scene, "--set", "modes.band=20000", *random(*numbers, samples=12, checks=6), ranks=2)
+    robustness = run.report["robustness"]
+    assert robustness["growth_error"] < 1e-3 and robustness["model_error"] < 1e-9
+    assert all(check["known"] for check in robustness["checks"])
+    assert any(check["unstable_modes"] > 0 for check in robustness["checks"])
+    row = max(samples_of(run), key=lambda row: float(row["growth_rate"]))
+    changes = [word for key, value in row.items() if "." in key for word in set_to(key, float(value))]
+    single = lambdas(converged(*scene, "--set", "modes.band=20000", *changes, ranks=1).report)
+    found = complex(float(row["growth_rate"]), 2 * np.pi * float(row["frequency_hz"]))
+    assert min(abs(found.real - one.real) / abs(one) for one in single if abs(one - found) < 0.01 * abs(one)) < 1e-3
+
+
+def test_a_number_that_brings_what_the_medians_lack_is_refused(squeal):
+    run = squeal(*SPINNING, *random("{key='part.disc.rotation.rate', distribution='uniform', from=-100, to=100}", samples=10,
+                                    checks=0), ranks=1)
+    assert run.report["robustness"]["outcome"] == "refused" and "what spins" in run.report["robustness"]["reason"]
