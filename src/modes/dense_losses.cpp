@@ -160,11 +160,11 @@ namespace
 void refine(const LossyMatrices& problem, TwoSidedPair& pair)
 {
   constexpr int steps = 10;
-  constexpr double last = 1e-9; // change of lambda: the error that it leaves is its square, at most
+  constexpr double last = 1e-12;   // change of lambda: vectors are off by it
+  constexpr double beside = 1e-13; // of lambda, so that no pivot vanishes
   for (int step = 0; step < steps; ++step)
   {
-    const Eigen::PartialPivLU<MatrixXcd> factor(
-        sum(problem, loss_factors(pair.loss, pair.lambda * (1 + 1e-10)))); // so that no pivot vanishes
+    const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, loss_factors(pair.loss, pair.lambda * (1 + beside))));
     for (int iteration = 0; iteration < 2; ++iteration)
     {
       pair.right = factor.solve(pair.right).normalized();

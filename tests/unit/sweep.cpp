@@ -64,9 +64,9 @@ TEST_CASE("pairs take losses at their own frequency, with both vectors, whatever
     const auto& [lambda, right, left, loss] = pairs[i];
     REQUIRE(loss == LossKind::viscous);
     const MatrixXcd Q = sum(problem, loss_factors(loss, lambda));
-    const double rounding = 1e-12 * (std::norm(lambda) * M.norm() + K.norm()); // of LU, beside the sizes of the terms
-    CHECK((Q * right).norm() < rounding);
-    CHECK((left.transpose() * Q).norm() < rounding);
+    const double settled = 1e-11 * (std::norm(lambda) * M.norm() + K.norm()); // lambda moved by 1e-12 of itself at last
+    CHECK((Q * right).norm() < settled);
+    CHECK((left.transpose() * Q).norm() < settled);
     for (std::size_t j = 0; j < i; ++j) CHECK(std::abs(lambda - pairs[j].lambda) > 1e-6 * std::abs(lambda));
   }
 }
