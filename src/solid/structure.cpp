@@ -257,10 +257,4 @@ bool is_large(const Structure& structure)
   return dofs > large_model;
 }
 
-std::string unsymmetric_part(const Structure& structure)
-{
-  if (structure.G.get() || structure.H.get()) return "the structure has gyroscopic or circulatory parts";
-  return structure.K_loss.get() ? "parts have loss factors" : "";
-}
-
 } // namespace squeal

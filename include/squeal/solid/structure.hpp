@@ -38,10 +38,6 @@ Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm);
 /// Whether the structure has more degrees of freedom than large_model. Not collective.
 bool is_large(const Structure& structure);
 
-/// What keeps the matrices without contact from being those of a real symmetric problem, in a sentence; empty if
-/// nothing does. Not collective.
-std::string unsymmetric_part(const Structure& structure);
-
 /// Declares to PETSc that A stays symmetric and that its pattern is complete. Not collective.
 void mark_symmetric(Mat A);
 
