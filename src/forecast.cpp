@@ -228,15 +228,16 @@ double memory_of_step(const Sizes& sizes, bool in_factor)
          number * vectors_of_modes_kept * sizes.dofs;
 }
 
-/// A reduced model has at most a shape for each pair, and those of the modes. Where the full model alone is followed,
-/// it serves the multipliers, and is done without where it does not fit what is `free`. The tangent needs a whole W.
+/// A reduced model has at most a shape for each pair, and those of the modes. Two may be held: that of the start, which
+/// takes no more than its part of what is `free`, and that of the multipliers. The latter is done without where it does
+/// not fit. The tangent needs a whole W.
 double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, bool in_factor, double free)
 {
   const double least = memory_of_step(sizes, in_factor) + (in_factor ? sizes.condensed_operator() : 0) +
                        number * vectors_of_shooting * sizes.dofs;
   const double reduced = memory_of_reduction(sizes.dofs, sizes.pairs + vectors_of_modes_kept);
-  if (fidelity == CycleModel::full && least + reduced > free) return least;
-  return least + reduced;
+  const double start = fidelity == CycleModel::full ? 0 : std::min(reduced, memory_for_shapes(free));
+  return least + start + reduced <= free ? least + start + reduced : least + start;
 }
 
 /// What the points of a sweep and the samples of a robustness study are laid out in. Their modes come on top.

@@ -202,13 +202,14 @@ std::string lack_of_memory(const Structure& structure, Index shapes)
   const double needed = memory_of_reduction(dofs, static_cast<double>(shapes)),
                free = free_memory(comm_of(structure.load));
   if (needed <= free) return {};
-  return format("a reduced model of %ld shapes takes %.3g GB, and %.3g GB are free: a larger machine would decide",
+  return format("a reduced model of %ld shapes takes %.3g GB, and %.3g GB are free: a larger machine would decide, or "
+                "-reduced_attachments for the leading shapes alone",
                 static_cast<long>(shapes), 1e-9 * needed, 1e-9 * free);
 }
 
 /// The reduced model for the recorded periods; null where it does not fit the memory, with the reason.
-std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const RecordedPeriods& periods,
-                                              std::string& missing)
+std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const ReducedOptions& options,
+                                              const RecordedPeriods& periods, std::string& missing)
 {
   const Interface& interface = problem.sliding.interface;
   const std::vector<PairHistory> pairs = histories(interface, periods.records);
@@ -220,14 +221,15 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   const std::size_t rows = PairRows<std::size_t>(interface.directions).rows_of(roles.active.size());
   const bool follow = slide && rows > 150; // friction, the normal force
   const RealModes beyond = modes_beyond_band(problem);
-  const std::size_t forces = follow ? roles.active.size() : rows;
+  const PetscInt taken = options.attachments > 0 ? options.attachments : all_attachments;
+  const std::size_t forces = std::min(follow ? roles.active.size() : rows, static_cast<std::size_t>(taken));
   missing = lack_of_memory(problem.sliding.structure,
                            static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces));
   if (!missing.empty()) return nullptr;
   constexpr double highest = 0.25; // of the modes: what they change says what those beyond them may
   return std::make_shared<const ReducedModel>(
       reduce(problem.sliding, problem.modes, roles,
-             {static_cast<int>(problem.modes.size()), 1e-5, follow, &beyond, problem.step.factor, highest}));
+             {static_cast<int>(problem.modes.size()), 1e-5, taken, follow, &beyond, problem.step.factor, highest}));
 }
 
 /// What the grid of time changes the modulus of each value of the spectrum by. A step of order 2 on grids of n and 2 n
@@ -302,13 +304,14 @@ void correct(const ReducedModel& model, const Structure& structure, const Matrix
   add(y.imag(), imaginary);
 }
 
-SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int other_steps, double period, Vec start)
+SlowMotions slow_motions_of(const CycleProblem& problem, const ReducedOptions& options, PeriodMap& map, int other_steps,
+                            double period, Vec start)
 {
   const MPI_Comm comm = comm_of(problem.sliding.structure.load);
   const RecordedPeriods periods = record_periods(map, other_steps, period, start);
   SlowMotions slow;
   slow.periods = other_steps > 0 ? 3 : 2;
-  const auto model = model_for(problem, periods, slow.missing);
+  const auto model = model_for(problem, options, periods, slow.missing);
   if (!model) return slow;
   const auto contacts = [&](int which)
   {
@@ -343,10 +346,11 @@ SlowMotions slow_motions_of(const CycleProblem& problem, PeriodMap& map, int oth
 
 } // namespace
 
-void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_steps, Flow& flow)
+void add_slow_motions(const CycleProblem& problem, const ReducedOptions& options, PeriodMap& map, int other_steps,
+                      Flow& flow)
 {
-  flow.slow_motions = [&problem, &map, other_steps](double period, Vec start)
-  { return slow_motions_of(problem, map, other_steps, period, start); };
+  flow.slow_motions = [&problem, &options, &map, other_steps](double period, Vec start)
+  { return slow_motions_of(problem, options, map, other_steps, period, start); };
 }
 
 int steps_to_compare(const Structure& structure, int steps)
@@ -354,19 +358,19 @@ int steps_to_compare(const Structure& structure, int steps)
   return is_large(structure) && steps <= enough_steps ? 2 * steps : 0;
 }
 
-FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, const PeriodMap& map,
-                        const Orbit& orbit, int most_steps)
+FloquetAnalysis examine(const CycleProblem& problem, const CycleOptions& options, const PeriodMap& map,
+                        const Orbit& orbit)
 {
-  PeriodMap examined{map.sliding, map.options, std::min(map.steps, most_steps), map.theta};
+  PeriodMap examined{map.sliding, map.options, std::min(map.steps, enough_steps), map.theta};
   examined.reactions = map.reactions;
   Flow flow = flow_of(examined);
-  add_slow_motions(problem, examined,
-                   map.steps > most_steps ? map.steps : steps_to_compare(map.sliding.structure, map.steps), flow);
+  add_slow_motions(problem, options.reduced, examined,
+                   map.steps > enough_steps ? map.steps : steps_to_compare(map.sliding.structure, map.steps), flow);
   const Vec u0 = problem.sliding.equilibrium.u;
   const Preconditioner none;
   const OrbitProblem found = problem_of(
       flow, none, {u0, displacement(orbit.state), velocity(orbit.state), orbit.period}, problem.settings.tolerance);
-  return find_multipliers(found, options, orbit, other_unstable_states(problem));
+  return find_multipliers(found, options.shooting, orbit, other_unstable_states(problem));
 }
 
 } // namespace squeal

@@ -7,14 +7,15 @@ namespace squeal
 {
 
 /// Gives the flow the slow motions of the map. Errors hold what `other_steps` steps a period change; 0: none are
-/// compared. Borrows problem and map.
-void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_steps, Flow& flow);
+/// compared. Borrows problem, options and map.
+void add_slow_motions(const CycleProblem& problem, const ReducedOptions& options, PeriodMap& map, int other_steps,
+                      Flow& flow);
 
 /// The number of steps a period that tells the error of another: twice as many of a large model with few, else 0.
 int steps_to_compare(const Structure& structure, int steps);
 
-/// Of a converged cycle of the map, by at most `most_steps` a period: what the others change is in the bars.
-FloquetAnalysis examine(const CycleProblem& problem, const ShootingOptions& options, const PeriodMap& map,
-                        const Orbit& orbit, int most_steps);
+/// Of a converged cycle of the map, by at most 128 steps a period: what the others change is in the bars.
+FloquetAnalysis examine(const CycleProblem& problem, const CycleOptions& options, const PeriodMap& map,
+                        const Orbit& orbit);
 
 } // namespace squeal

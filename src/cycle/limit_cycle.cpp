@@ -49,7 +49,7 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   map.reactions = problem.sliding.equilibrium.reactions;
   map.keeps_step = is_large(problem.sliding.structure);
   Flow flow = flow_of(map);
-  add_slow_motions(problem, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
+  add_slow_motions(problem, options.reduced, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
   ShootingResult found = shoot(flow, preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
                    settings.steps_per_period,

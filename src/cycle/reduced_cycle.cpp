@@ -46,6 +46,8 @@ void describe_model(const ReducedSearch& search)
   fidelity.size = search.model.size();
   fidelity.modes = search.model.modes;
   fidelity.attachment_shapes = search.model.attachments;
+  fidelity.left_out_shapes = search.model.left_out;
+  fidelity.lost_compliance = search.model.lost_compliance;
   fidelity.active_pairs = static_cast<int>(search.active.size());
   fidelity.sliding_pairs = 0;
   for (int pair = 0; pair < search.problem.sliding.interface.pairs; ++pair)
@@ -74,8 +76,10 @@ void build_model(ReducedSearch& search, double amplitude)
   const bool sliding =
       search.fidelity.asked != CycleModel::reduced &&
       pairs_that_may_turn(problem.sliding.interface, problem.unstable.modes.front(), amplitude).empty();
-  search.model = reduce(problem.sliding, problem.modes, search.active,
-                        {options.modes, options.threshold, sliding, &search.real, problem.step.factor});
+  search.model = {}; // before the next one takes memory
+  search.model =
+      reduce(problem.sliding, problem.modes, search.active,
+             {options.modes, options.threshold, options.attachments, sliding, &search.real, problem.step.factor});
   search.energy = energy_matrices(search.model);
   describe_model(search);
   search.fidelity.reduction_seconds += MPI_Wtime() - clock;

@@ -252,7 +252,7 @@ void refine_small(const CycleCorrection& correction, LimitCycle& cycle)
 void examine_refined(const CycleCorrection& correction, const PeriodMap& map, LimitCycle& cycle)
 {
   const CycleProblem& problem = correction.problem;
-  FloquetAnalysis found = examine(problem, correction.options.shooting, map, cycle.orbit, enough_steps);
+  FloquetAnalysis found = examine(problem, correction.options, map, cycle.orbit);
   cycle.multipliers = std::move(found.multipliers);
   correction.fidelity.verdict_steps = std::min(map.steps, enough_steps);
   refuse_repelling(cycle.multipliers, problem.unstable.modes.size() - 1, cycle.outcome);
@@ -339,7 +339,7 @@ LimitCycle measure_reduced_cycle(const CycleCorrection& correction, const Shooti
   record_full(log, ShootingStage::full_period, cycle.orbit);
   estimate_model_errors(correction, cycle);
   cycle.outcome = {OutcomeKind::converged, "", 0, cycle.orbit.residual};
-  cycle.multipliers = examine(problem, correction.options.shooting, flow.map, cycle.orbit, enough_steps).multipliers;
+  cycle.multipliers = examine(problem, correction.options, flow.map, cycle.orbit).multipliers;
   refuse_repelling(cycle.multipliers, problem.unstable.modes.size() - 1, cycle.outcome);
   cycle.steps_per_period = flow.map.steps;
   cycle.theta = flow.map.theta;

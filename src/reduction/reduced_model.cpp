@@ -1,7 +1,7 @@
 #include "squeal/reduction/reduced_model.hpp"
 
 #include "reduction_basis.hpp"
-#include "squeal/equilibrium/linearised_sliding.hpp"
+#include "squeal/base/free_memory.hpp"
 
 #include <algorithm>
 #include <array>
@@ -45,25 +45,34 @@ struct LeftPart
   MatrixXd on_pairs;          // B (Y - Z) y, B of the active pairs
 };
 
-LeftPart left_part(const ClosedContact& contact, Mat B, const MultiVector& y)
+/// The rows of A that are not empty anywhere, without the others. `rows`: own ones.
+Owned<Mat> only_rows(Mat A, const std::vector<PetscInt>& rows)
 {
-  Owned<Mat> difference, on_rows, on_pairs;
-  Owned<IS> rows, columns;
   PetscInt first = 0, first_column = 0, last_column = 0;
+  check(MatGetOwnershipRange(A, &first, nullptr));
+  check(MatGetOwnershipRangeColumn(A, &first_column, &last_column));
+  std::vector<PetscInt> global = rows;
+  for (PetscInt& row : global) row += first;
+  const MPI_Comm comm = comm_of(A);
+  Owned<IS> taken, columns;
+  Owned<Mat> result;
+  check(ISCreateGeneral(comm, static_cast<PetscInt>(global.size()), global.data(), PETSC_COPY_VALUES, taken.put()));
+  check(ISCreateStride(comm, last_column - first_column, first_column, 1, columns.put()));
+  check(MatCreateSubMatrix(A, taken, columns, MAT_INITIAL_MATRIX, result.put()));
+  return result;
+}
+
+/// Of shapes X = Z y.
+LeftPart left_part(const ClosedContact& contact, Mat B, const MultiVector& X)
+{
+  Owned<Mat> difference, of_motions, on_pairs;
   check(MatDuplicate(contact.Y, MAT_COPY_VALUES, difference.put()));
   check(MatAXPY(difference, -1, contact.Z, DIFFERENT_NONZERO_PATTERN));
-  check(MatGetOwnershipRange(difference, &first, nullptr));
-  check(MatGetOwnershipRangeColumn(difference, &first_column, &last_column));
-  LeftPart part{own_rows(difference), {}, {}};
-  std::vector<PetscInt> global = part.rows;
-  for (PetscInt& row : global) row += first;
-  const MPI_Comm comm = comm_of(difference);
-  check(ISCreateGeneral(comm, static_cast<PetscInt>(global.size()), global.data(), PETSC_COPY_VALUES, rows.put()));
-  check(ISCreateStride(comm, last_column - first_column, first_column, 1, columns.put()));
-  check(MatCreateSubMatrix(difference, rows, columns, MAT_INITIAL_MATRIX, on_rows.put()));
-  check(MatMatMult(B, difference, MAT_INITIAL_MATRIX, PETSC_DEFAULT, on_pairs.put()));
-  part.entries = product(on_rows, y);
-  part.on_pairs = whole_product(on_pairs, y);
+  check(MatMatMult(difference, kept_rows(contact), MAT_INITIAL_MATRIX, PETSC_DEFAULT, of_motions.put()));
+  check(MatMatMult(B, of_motions, MAT_INITIAL_MATRIX, PETSC_DEFAULT, on_pairs.put()));
+  LeftPart part{own_rows(of_motions), {}, {}};
+  part.entries = product(only_rows(of_motions, part.rows), X);
+  part.on_pairs = whole_product(on_pairs, X);
   return part;
 }
 
@@ -85,7 +94,7 @@ MultiVector left_rows(const Shapes& shapes, const std::vector<PetscInt>& rows)
   return result;
 }
 
-/// M, C and K on X, tested by X and by the left shapes.
+/// M, C and K on X, tested by X and by the left shapes. Adds the gyroscopic part to C.
 void project(ReducedModel& model, const Structure& structure, const Shapes& shapes)
 {
   const auto& [X, left] = shapes;
@@ -99,6 +108,10 @@ void project(ReducedModel& model, const Structure& structure, const Shapes& shap
     *symmetric = symmetric_inner_products(X, matrix, keep);
     *unsymmetric = *symmetric + inner_products(left.entries, followed);
   }
+  if (!structure.G.get()) return;
+  MatrixXd skew = symmetric_inner_products(X, structure.G, keep); // below the diagonal
+  skew.triangularView<Eigen::StrictlyUpper>() = -skew.transpose();
+  model.C += skew + inner_products(left.entries, followed);
 }
 
 Eigen::SparseMatrix<double> identity_of_rows(Mat A)
@@ -107,20 +120,6 @@ Eigen::SparseMatrix<double> identity_of_rows(Mat A)
   check(MatGetSize(A, &rows, nullptr));
   Eigen::SparseMatrix<double> result(rows, rows);
   result.setIdentity();
-  return result;
-}
-
-/// X'E X of modes and attachments X = [modes, E^-1 F]. `of_modes`: that of the modes. `on_forces`: F'X, the other
-/// blocks: no product with all columns is needed.
-MatrixXd energies(const MatrixXd& of_modes, const MatrixXd& on_forces)
-{
-  const Index modes = of_modes.rows(), forces = on_forces.rows();
-  MatrixXd result(modes + forces, modes + forces);
-  result.topLeftCorner(modes, modes) = of_modes;
-  result.bottomLeftCorner(forces, modes) = on_forces.leftCols(modes);
-  result.topRightCorner(modes, forces) = on_forces.leftCols(modes).transpose();
-  const MatrixXd among = on_forces.rightCols(forces);
-  result.bottomRightCorner(forces, forces) = (among + among.transpose()) / 2;
   return result;
 }
 
@@ -199,8 +198,7 @@ struct ClosedPairs
   const std::vector<double>& reactions; // [N] a contact vector
 };
 
-/// Adds to K the springs of pairs with a compliance, with the friction that follows. Adds to C friction that turns and
-/// the gyroscopic part.
+/// Adds to K the springs of pairs with a compliance, with the friction that follows. Adds to C friction that turns.
 void add_unsymmetric_parts(ReducedModel& model, const SlidingEquilibrium& sliding, const ClosedPairs& pairs,
                            const Shapes& shapes)
 {
@@ -208,9 +206,8 @@ void add_unsymmetric_parts(ReducedModel& model, const SlidingEquilibrium& slidin
   const auto add = [&](Mat A, MatrixXd& reduced)
   {
     const std::vector<PetscInt> rows = own_rows(A);
-    reduced += inner_products(left_rows(shapes, rows), rows_of(product(A, shapes.X), rows));
+    reduced += inner_products(left_rows(shapes, rows), product(only_rows(A, rows), shapes.X));
   };
-  if (sliding.structure.G.get()) add(sliding.structure.G, model.C);
   if (const Owned<Mat> forces = contact_stiffness(interface, pairs.sliding, PairForces::with_friction); forces.get())
     add(forces, model.K);
   if (const Owned<Mat> turning = friction_damping(interface, pairs.follows, pairs.reactions, FrictionDamping::whole);
@@ -224,6 +221,32 @@ void set_matrices(ReducedModel& model, const SlidingEquilibrium& sliding, const 
 {
   project(model, sliding.structure, shapes);
   add_unsymmetric_parts(model, sliding, pairs, shapes);
+}
+
+} // namespace
+
+namespace
+{
+
+/// E = Z'(K + omega^2 M)Z, factored.
+Factor energy_factor(Mat K, Mat M, double omega, Mat Z, const FactorOptions& options)
+{
+  const Owned<Mat> E = project_symmetric(K, Z);
+  check(MatAXPY(E, omega * omega, project_symmetric(M, Z), UNKNOWN_NONZERO_PATTERN));
+  check(MatSetOption(E, MAT_SYMMETRIC, PETSC_TRUE));
+  Factor factor(E, nullptr, options);
+  if (factor.failed()) throw Error("reduced model: K + omega^2 M is not positive definite with the active pairs open");
+  return factor;
+}
+
+/// The most attachments that a model takes: as many as asked for, or as the free memory has room for.
+Index most_attachments(const Structure& structure, PetscInt asked, Index modes)
+{
+  if (asked > 0) return asked;
+  PetscInt dofs = 0;
+  check(VecGetSize(structure.load, &dofs));
+  const double room = memory_for_shapes(free_memory(comm_of(structure.load))) / memory_of_reduction(dofs, 1);
+  return std::max<Index>(0, static_cast<Index>(std::min<double>(room, all_attachments)) - modes);
 }
 
 } // namespace
@@ -245,32 +268,32 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   const ClosedContact contact = eliminate_closed_pairs(structure, interface, roles.sliding);
   const double omega = modes.front().lambda.imag();
 
-  // the modes and the shapes of the pairs' forces, as they come
+  // the modes, and what solves for the shapes of the pairs' forces
   const Owned<Mat> springs = contact_stiffness(interface, roles.sliding, PairForces::normal);
-  const Owned<Mat> K = springs.get() ? sum_of(structure.K, springs) : Owned<Mat>();
-  Owned<Mat> E = project_symmetric(K.get() ? K.get() : structure.K.get(), contact.Z), BZ;
-  const Owned<Mat> M_z = project_symmetric(structure.M, contact.Z);
-  check(MatAXPY(E, omega * omega, M_z, UNKNOWN_NONZERO_PATTERN));
-  check(MatSetOption(E, MAT_SYMMETRIC, PETSC_TRUE));
+  const Owned<Mat> with_springs = springs.get() ? sum_of(structure.K, springs) : Owned<Mat>();
+  const Mat K = with_springs.get() ? with_springs.get() : structure.K.get();
   const Owned<Mat> B = rows_of(interface, active, RowsTaken::all);
+  Owned<Mat> BZ;
   check(MatMatMult(B, contact.Z, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BZ.put()));
   Eigen::SparseMatrix<double> forces;
   if (reduction.sliding)
     forces = sliding_forces(interface, active);
   else
     forces = identity_of_rows(BZ);
-  ModeColumns of_modes = mode_columns(modes, reduction, contact.Z);
-  MultiVector& columns = of_modes.columns;
-  const Index modal = columns.columns();
-  const MatrixXd of_modes_alone = symmetric_inner_products(columns, E);
-  append(columns, attachment_columns(E, BZ, forces, reduction.factor));
   model.omega = omega;
-  const MatrixXd energy = energies(of_modes_alone, forces.transpose() * whole_product(BZ, columns));
-  choose_basis(model, energy, M_z, columns, {modal, of_modes.more, of_modes.apart}, reduction.threshold);
+  MultiVector X;
+  {
+    const ModeColumns of_modes = mode_columns(modes, reduction, contact);
+    const Factor factor = energy_factor(K, structure.M, omega, contact.Z, reduction.factor);
+    const MultiVector& shapes = of_modes.columns;
+    const MatrixXd energy =
+        symmetric_inner_products(shapes, K) + omega * omega * symmetric_inner_products(shapes, structure.M);
+    const Index at_most = most_attachments(structure, reduction.attachments, shapes.columns());
+    X = make_basis(model, {factor, contact.Z, BZ, forces}, of_modes, energy, whole_product(B, shapes), structure.M,
+                   {reduction.threshold, at_most});
+  }
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
-  MultiVector X = product(contact.Z, columns);
-  const LeftPart left = left_part(contact, B, columns);
-  columns.entries.resize(0, 0);
+  const LeftPart left = left_part(contact, B, X);
   std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
   if (reduction.sliding)
     for (const int pair : active) follows[static_cast<std::size_t>(pair)] = 1; // no reaction while open
@@ -323,10 +346,9 @@ ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibr
                                 const SlidingEquilibrium& other, const PairRoles& roles)
 {
   const ClosedContact contact = eliminate_closed_pairs(other.structure, other.interface, roles.sliding);
-  const MultiVector columns = kept_entries(model.shapes, contact.Z, other.structure.load);
   ReducedModel result;
   const Owned<Mat> B = rows_of(other.interface, model.active, RowsTaken::all);
-  const LeftPart left = left_part(contact, B, columns);
+  const LeftPart left = left_part(contact, B, model.shapes);
   const Shapes shapes{model.shapes, left};
   set_matrices(result, other, {roles.sliding, roles.sliding, other.equilibrium.reactions}, shapes);
   result.G = whole_product(B, model.shapes);

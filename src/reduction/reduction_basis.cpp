@@ -16,32 +16,6 @@ namespace
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// y of du = Z y: Z is the identity on the kept degrees of freedom, found by a row of a single one. (A pivot's row may
-/// look the same; du is the same there.)
-Owned<VecScatter> to_kept(Mat Z, Vec u, Vec y)
-{
-  PetscInt own = 0;
-  const Owned<Vec> row_of = zeros_like(y);
-  for_each_row(Z,
-               [&](PetscInt row, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
-               {
-                 if (columns.size() == 1 && values[0] == 1) check(VecSetValue(row_of, columns[0], row, INSERT_VALUES));
-               });
-  check(VecAssemblyBegin(row_of));
-  check(VecAssemblyEnd(row_of));
-  check(VecGetLocalSize(y, &own));
-  const PetscScalar* rows = nullptr;
-  check(VecGetArrayRead(row_of, &rows));
-  std::vector<PetscInt> from(static_cast<std::size_t>(own));
-  std::transform(rows, rows + own, from.begin(), [](double row) { return static_cast<PetscInt>(row); });
-  check(VecRestoreArrayRead(row_of, &rows));
-  Owned<IS> source;
-  check(ISCreateGeneral(comm_of(Z), own, from.data(), PETSC_COPY_VALUES, source.put()));
-  Owned<VecScatter> scatter;
-  check(VecScatterCreate(u, source, y, nullptr, scatter.put()));
-  return scatter;
-}
-
 /// A column of the modes.
 struct ModeShape
 {
@@ -68,11 +42,18 @@ struct Orthonormal
   double smallest = 1; // part of a direction that was new when it came, squared: rounding is larger by its inverse
 };
 
-/// Takes in what the next `count` columns of X hold that is new. Directions of which less than `threshold` of the
-/// columns' own size is new are dropped. Returns how many came.
-int extend(Orthonormal& basis, Index count, double threshold)
+/// What became of columns that a basis was to take in.
+struct Extension
 {
-  if (count == 0) return 0;
+  Index taken = 0, left_out = 0; // directions; left out: by the cap alone
+  double lost = 0;               // part of the columns' energy, on average, that the cap left out
+};
+
+/// Takes in what the next `count` columns of X hold that is new. Directions of which less than `threshold` of the
+/// columns' own size is new are dropped, and of the others all but the `at_most` largest.
+Extension extend(Orthonormal& basis, Index count, double threshold, Index at_most = std::numeric_limits<Index>::max())
+{
+  if (count == 0) return {};
   const MatrixXd& E = basis.E;
   MatrixXd columns = MatrixXd::Zero(E.rows(), count), image;
   for (Index j = 0; j < count; ++j)
@@ -90,13 +71,65 @@ int extend(Orthonormal& basis, Index count, double threshold)
   constexpr double widest = 1e-9;
   const double of_sums = static_cast<double>(E.rows()) * std::numeric_limits<double>::epsilon();
   const double rounding = std::max(-sizes.minCoeff(), std::min(of_sums / basis.smallest, widest));
-  const auto kept = (sizes.array() > std::max(threshold * threshold, rounding)).count();
+  const Index fresh_ones = (sizes.array() > std::max(threshold * threshold, rounding)).count();
+  const Index kept = std::min(fresh_ones, at_most), left_out = fresh_ones - kept;
   if (kept > 0) basis.smallest = std::min(basis.smallest, sizes(sizes.size() - kept));
   basis.T.conservativeResize(Eigen::NoChange, basis.T.cols() + kept);
   basis.T.rightCols(kept) =
       columns * (directions.rightCols(kept) * sizes.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal());
   basis.seen += count;
-  return static_cast<int>(kept);
+  return {kept, left_out, sizes.segment(sizes.size() - fresh_ones, left_out).sum() / static_cast<double>(count)};
+}
+
+/// Solves for the attachments of the columns of `forces` and shows them to `visit`, some at a time, in the coordinates
+/// that Z keeps.
+template <class Forces, class Visit>
+void solve_attachments(const Attachments& attachments, const Forces& forces, Visit visit)
+{
+  Owned<Vec> pattern, on_rows;
+  check(MatCreateVecs(attachments.BZ, pattern.put(), on_rows.put()));
+  PetscInt first_row = 0;
+  check(VecGetOwnershipRange(on_rows, &first_row, nullptr));
+  constexpr Index at_once = 64;
+  for (Index first = 0; first < forces.cols(); first += at_once)
+  {
+    const MatrixXd some = forces.middleCols(first, std::min(at_once, forces.cols() - first));
+    std::vector<Owned<Vec>> force, shape;
+    for (const auto column : some.colwise())
+    {
+      PetscInt own = 0;
+      PetscScalar* entries = nullptr;
+      check(VecGetLocalSize(on_rows, &own));
+      check(VecGetArrayWrite(on_rows, &entries));
+      Eigen::VectorXd::Map(entries, own) = column.segment(first_row, own);
+      check(VecRestoreArrayWrite(on_rows, &entries));
+      force.push_back(zeros_like(pattern));
+      shape.push_back(zeros_like(pattern));
+      check(MatMultTranspose(attachments.BZ, on_rows, force.back()));
+    }
+    (void)attachments.factor.forward(std::vector<Vec>(force.begin(), force.end()));
+    attachments.factor.backward({}, std::vector<Vec>(shape.begin(), shape.end()));
+    visit(first, columns_of(std::vector<Vec>(shape.begin(), shape.end())));
+  }
+}
+
+/// X'E X of modes and attachments X = [modes, E^-1 F], from that of the modes and F'X of the modes.
+MatrixXd energies(const Attachments& attachments, const MatrixXd& energy_of_modes, const MatrixXd& of_modes)
+{
+  const Index modes = of_modes.cols(), count = attachments.forces.cols();
+  MatrixXd result(modes + count, modes + count);
+  result.topLeftCorner(modes, modes) = energy_of_modes;
+  result.bottomLeftCorner(count, modes) = attachments.forces.transpose() * of_modes;
+  result.topRightCorner(modes, count) = result.bottomLeftCorner(count, modes).transpose();
+  MatrixXd among(count, count);
+  solve_attachments(attachments, attachments.forces,
+                    [&](Index first, const MultiVector& shapes)
+                    {
+                      among.middleCols(first, shapes.columns()) =
+                          attachments.forces.transpose() * whole_product(attachments.BZ, shapes);
+                    });
+  result.bottomRightCorner(count, count) = (among + among.transpose()) / 2;
+  return result;
 }
 
 } // namespace
@@ -108,29 +141,24 @@ double highest_frequency(const std::vector<ComplexMode>& modes)
   return highest;
 }
 
-MultiVector kept_entries(const MultiVector& X, Mat Z, Vec pattern)
+Owned<Mat> kept_rows(const ClosedContact& contact)
 {
-  Owned<Vec> y;
-  check(MatCreateVecs(Z, y.put(), nullptr));
-  const Owned<VecScatter> scatter = to_kept(Z, pattern, y);
-  const Owned<Vec> x = zeros_like(pattern);
-  PetscInt own = 0;
-  check(VecGetLocalSize(y, &own));
-  MultiVector result{X.comm, MatrixXd(own, X.columns())};
-  for (Index j = 0; j < X.columns(); ++j)
-  {
-    copy_column(X, j, x);
-    check(VecScatterBegin(scatter, x, y, INSERT_VALUES, SCATTER_FORWARD));
-    check(VecScatterEnd(scatter, x, y, INSERT_VALUES, SCATTER_FORWARD));
-    const PetscScalar* entries = nullptr;
-    check(VecGetArrayRead(y, &entries));
-    result.entries.col(j) = Eigen::VectorXd::Map(entries, own);
-    check(VecRestoreArrayRead(y, &entries));
-  }
-  return result;
+  PetscInt first = 0, last = 0, column = 0, last_column = 0;
+  check(MatGetOwnershipRange(contact.Z, &first, &last));
+  check(MatGetOwnershipRangeColumn(contact.Z, &column, &last_column));
+  Owned<Mat> S;
+  check(MatCreateAIJ(comm_of(contact.Z), last_column - column, last - first, PETSC_DETERMINE, PETSC_DETERMINE, 1,
+                     nullptr, 0, nullptr, S.put()));
+  for (PetscInt row = first; row < last; ++row) // y holds them in their order
+    if (!std::binary_search(contact.pivots.begin(), contact.pivots.end(), row))
+      check(MatSetValue(S, column++, row, 1, INSERT_VALUES));
+  check(MatAssemblyBegin(S, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(S, MAT_FINAL_ASSEMBLY));
+  return S;
 }
 
-ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction, Mat Z)
+ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction,
+                         const ClosedContact& contact)
 {
   const double omega = modes.front().lambda.imag();
   std::vector<const ComplexMode*> taken;
@@ -154,19 +182,12 @@ ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction&
     std::stable_partition(shapes.begin() + 2, shapes.end(),
                           [limit](const ModeShape& shape) { return shape.frequency < limit; });
   }
-  ModeColumns result{empty_multivector(Z), static_cast<Index>(reduction.more.size()),
-                     std::min(count, static_cast<std::ptrdiff_t>(shapes.size()) - 2)};
-  for (const Vec shape : reduction.more) shapes.push_back({0, shape});
-  Owned<Vec> y;
-  check(MatCreateVecs(Z, y.put(), nullptr));
-  const Owned<VecScatter> scatter = to_kept(Z, modes.front().real, y);
-  for (const ModeShape& mode : shapes)
-  {
-    check(VecScatterBegin(scatter, mode.shape, y, INSERT_VALUES, SCATTER_FORWARD));
-    check(VecScatterEnd(scatter, mode.shape, y, INSERT_VALUES, SCATTER_FORWARD));
-    append(result.columns, y);
-  }
-  return result;
+  const Index of_apart = std::min(count, static_cast<std::ptrdiff_t>(shapes.size()) - 2);
+  std::vector<Vec> columns;
+  for (const ModeShape& shape : shapes) columns.push_back(shape.shape);
+  columns.insert(columns.end(), reduction.more.begin(), reduction.more.end());
+  const Owned<Mat> S = kept_rows(contact);
+  return {product(contact.Z, product(S, columns_of(columns))), static_cast<Index>(reduction.more.size()), of_apart};
 }
 
 Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std::vector<int>& active)
@@ -187,35 +208,6 @@ Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std
   return forces;
 }
 
-MultiVector attachment_columns(Mat A, Mat rows, const Eigen::SparseMatrix<double>& forces, const FactorOptions& options)
-{
-  const Factor factor(A, nullptr, options);
-  if (factor.failed()) throw Error("reduced model: K + omega^2 M is not positive definite with the active pairs open");
-  Owned<Vec> pattern, on_rows;
-  check(MatCreateVecs(rows, pattern.put(), on_rows.put()));
-  MultiVector result = empty_multivector(A);
-  constexpr Index at_once = 64;
-  for (Index begin = 0; begin < forces.cols(); begin += at_once)
-  {
-    std::vector<Owned<Vec>> force, shape;
-    for (Index i = begin; i < std::min(begin + at_once, forces.cols()); ++i)
-    {
-      check(VecSet(on_rows, 0));
-      for (Eigen::SparseMatrix<double>::InnerIterator entry(forces, i); entry && rank_of(result.comm) == 0; ++entry)
-        check(VecSetValue(on_rows, static_cast<PetscInt>(entry.row()), entry.value(), INSERT_VALUES));
-      check(VecAssemblyBegin(on_rows));
-      check(VecAssemblyEnd(on_rows));
-      force.push_back(zeros_like(pattern));
-      shape.push_back(zeros_like(pattern));
-      check(MatMultTranspose(rows, on_rows, force.back()));
-    }
-    (void)factor.forward(std::vector<Vec>(force.begin(), force.end()));
-    factor.backward({}, std::vector<Vec>(shape.begin(), shape.end()));
-    for (const Owned<Vec>& column : shape) append(result, column);
-  }
-  return result;
-}
-
 MatrixXd by_falling_period(const MatrixXd& mass, double omega, Index& slow)
 {
   const SymmetricEigenpairs spectrum = solve_dense_symmetric((mass + mass.transpose()) / 2);
@@ -224,23 +216,41 @@ MatrixXd by_falling_period(const MatrixXd& mass, double omega, Index& slow)
   return spectrum.y.rowwise().reverse();
 }
 
-void choose_basis(ReducedModel& model, const MatrixXd& energy, Mat M_z, MultiVector& columns, const ModeCounts& counts,
-                  double threshold)
+MultiVector make_basis(ReducedModel& model, const Attachments& attachments, const ModeColumns& modes,
+                       const MatrixXd& energy_of_modes, const MatrixXd& of_modes, Mat M, const AttachmentLimits& limits)
 {
-  const auto [of_modes, more, apart] = counts;
   constexpr double new_shape = 1e-3; // part of further shapes that must be new
-  Orthonormal basis{energy, MatrixXd(columns.columns(), 0)};
-  model.modes = extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
-  model.modes += extend(basis, of_modes - more - apart - 2, 1e-6);
-  model.modes += extend(basis, more, new_shape);
-  const int before = model.modes;
-  const int last = extend(basis, apart, 1e-6);
-  model.modes += last;
-  model.attachments = extend(basis, columns.columns() - of_modes, threshold);
-  combine(columns, basis.T);
-  const MatrixXd turn = by_falling_period(symmetric_inner_products(columns, M_z), model.omega, model.slow);
+  const Index modal = modes.columns.columns(), count = attachments.forces.cols();
+  const MatrixXd energy = energies(attachments, energy_of_modes, of_modes);
+  Orthonormal basis{energy, MatrixXd(energy.rows(), 0)};
+  extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
+  extend(basis, modal - modes.more - modes.apart - 2, 1e-6);
+  extend(basis, modes.more, new_shape);
+  const Index before = basis.T.cols(), last = extend(basis, modes.apart, 1e-6).taken;
+  const Extension attached = extend(basis, count, limits.threshold, limits.at_most);
+  const Index of_modes_alone = before + last;
+  model.modes = static_cast<int>(of_modes_alone);
+  model.attachments = static_cast<int>(attached.taken);
+  model.left_out = static_cast<int>(attached.left_out);
+  model.lost_compliance = attached.lost;
+
+  // The basis is solved for, not combined from attachments: they would have to be held, those left out as well.
+  const auto [of_shapes, of_forces] =
+      std::pair{basis.T.topRows(modal), basis.T.bottomRightCorner(count, attached.taken)};
+  MultiVector X{modes.columns.comm, MatrixXd(modes.columns.entries.rows(), basis.T.cols())};
+  X.entries.leftCols(of_modes_alone).noalias() = modes.columns.entries * of_shapes.leftCols(of_modes_alone);
+  solve_attachments(attachments, MatrixXd(attachments.forces * of_forces),
+                    [&](Index first, const MultiVector& shapes)
+                    {
+                      const Index at = of_modes_alone + first, some = shapes.columns();
+                      X.entries.middleCols(at, some) = product(attachments.Z, shapes).entries;
+                      X.entries.middleCols(at, some).noalias() +=
+                          modes.columns.entries * of_shapes.middleCols(at, some);
+                    });
+  const MatrixXd turn = by_falling_period(symmetric_inner_products(X, M), model.omega, model.slow);
   model.apart = turn.middleRows(before, last).transpose();
-  combine(columns, turn);
+  combine(X, turn);
+  return X;
 }
 
 } // namespace squeal

@@ -257,6 +257,8 @@ Json fidelity_entry(const Fidelity& fidelity)
   entry["size"] = fidelity.size;
   entry["modes"] = fidelity.modes;
   entry["attachment_shapes"] = fidelity.attachment_shapes;
+  entry["left_out_shapes"] = fidelity.left_out_shapes;
+  entry["lost_compliance"] = fidelity.lost_compliance;
   entry["active_pairs"] = fidelity.active_pairs;
   entry["sliding_pairs"] = fidelity.sliding_pairs;
   entry["steps_per_period"] = fidelity.steps_per_period;

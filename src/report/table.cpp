@@ -210,6 +210,10 @@ std::string fidelity_text(const Fidelity& fidelity)
         row("", format("%d shapes: %d of modes, %d of attachment; %d pairs in contact with friction, %d taken to slide",
                        fidelity.size, fidelity.modes, fidelity.attachment_shapes, fidelity.active_pairs,
                        fidelity.sliding_pairs));
+  if (fidelity.left_out_shapes > 0)
+    text +=
+        row("", format("%d more attachment shapes were left out, with %.1e of these pairs' own compliance on average",
+                       fidelity.left_out_shapes, fidelity.lost_compliance));
   text += row("", format("%ld periods of the reduced model, %ld of the full one", fidelity.reduced_periods,
                          fidelity.full_periods));
   if (std::isfinite(fidelity.frequency_error))

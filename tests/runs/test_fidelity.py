@@ -64,6 +64,18 @@ def test_few_modes_show_in_the_residual(module_run, reduced):
     assert run["cycle"]["residual_full"] > 2 * reduced[0]["cycle"]["residual_full"]
 
 
+def test_leading_attachments_alone(module_run, reduced):
+    """A cap leaves out what is beyond it, says so with the compliance that goes, and the full model's period tells."""
+    whole = reduced[0]["fidelity"]
+    assert whole["left_out_shapes"] == whole["lost_compliance"] == 0
+    cap = whole["attachment_shapes"] // 4
+    run = module_run(*PIN, "--set", "fidelity=reduced", "-reduced_attachments", str(cap), "-cycle_multipliers", "0", ranks=2)
+    capped = run["fidelity"]
+    assert capped["attachment_shapes"] == cap and capped["size"] == capped["modes"] + cap
+    assert capped["left_out_shapes"] > 0 and 0 < capped["lost_compliance"] < 1
+    assert run["cycle"]["residual_full"] > reduced[0]["cycle"]["residual_full"]
+
+
 def test_small_model_is_not_reduced(module_run, tmp_path):
     """Three degrees of freedom: the oscillator is shot at as it is, to its own tolerance."""
     scene = INPUTS / "oscillator" / "scene.toml"

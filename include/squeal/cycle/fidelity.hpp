@@ -34,6 +34,8 @@ struct Fidelity
   std::string reason;                                           // in a sentence
   double accuracy = 0;                                          // asked for
   int size = 0, modes = 0, attachment_shapes = 0;
+  int left_out_shapes = 0;                     // attachments beyond the cap
+  double lost_compliance = 0;                  // mean part of the active pairs' own compliance that is theirs
   int active_pairs = 0, sliding_pairs = 0;     // sliding: eliminated; the rest stays open
   int steps_per_period = 0, verdict_steps = 0; // of the cycle; where its stability was judged
   double contact_tolerance = 0;

@@ -10,6 +10,7 @@ struct ReducedOptions
 {
   double margin = 1.5;         // pairs that part at this many times the motion's amplitude keep their contact
   double threshold = 1e-5;     // an attachment shape is dropped when less than this part of it is new
+  PetscInt attachments = 0;    // attachment shapes at most, the leading ones; 0: what half of the free memory holds
   double band_factor = -1;     // frictionless modes above the band reach this many times the squeal's frequency
   PetscInt modes = 100000;     // complex modes taken at most, the followed one and the nearest in frequency
   PetscInt free_periods = 100; // at most, until the reduced model's motion is periodic

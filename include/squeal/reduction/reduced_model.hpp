@@ -24,6 +24,7 @@
 #include "squeal/modes/modes.hpp"
 
 #include <Eigen/Dense>
+#include <limits>
 #include <span>
 
 namespace squeal
@@ -47,6 +48,8 @@ struct ReducedModel
   MultiVector shapes;             // Z V, dofs x size: u = u0 + shapes q
   double omega = 0;               // [rad/s] of the followed mode
   int modes = 0, attachments = 0; // columns that V came from
+  int left_out = 0;               // attachments that it has no room for
+  double lost_compliance = 0;     // [-] mean part of the active pairs' own compliance that is theirs
   Eigen::Index slow = 0;          // those that swing by less than four times omega, the first ones
   Eigen::MatrixXd apart;          // coordinates of what the modes kept apart add to all others, orthonormal columns
 
@@ -64,13 +67,16 @@ std::vector<int> pairs_that_may_change(const Interface& interface, const Equilib
 /// Pairs that may come to rest or turn round in that motion's velocity. Ascending. Collective.
 std::vector<int> pairs_that_may_turn(const Interface& interface, const ComplexMode& mode, double amplitude);
 
+inline constexpr PetscInt all_attachments = std::numeric_limits<PetscInt>::max();
+
 /// How a model is reduced.
 struct Reduction
 {
   PetscInt modes = 0;      // complex modes taken, nearest in frequency to the followed one, which is the first of all
   double threshold = 1e-5; // an attachment shape is dropped when less than this part of it is new
-  bool sliding = false;    // the active pairs slide along the drive throughout
-  const RealModes* real = nullptr; // frictionless ones; those above the complex modes are taken, too. Null: none
+  PetscInt attachments = all_attachments; // the leading ones taken at most; 0: what the free memory has room for
+  bool sliding = false;                   // the active pairs slide along the drive throughout
+  const RealModes* real = nullptr;        // frictionless ones; those above the complex modes are taken, too. Null: none
   FactorOptions factor{};
   double apart = 0;            // part of the modes, those of highest frequency, that `apart` of the model holds
   std::span<const Vec> more{}; // further shapes, which a model with modes kept apart does not take
@@ -81,10 +87,16 @@ struct Reduction
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, std::vector<int> active,
                     const Reduction& reduction);
 
-/// Memory of all ranks at the making of a model [byte], whose shapes are then held twice.
+/// Memory of all ranks for a model's shapes [byte], which are held once, at its making, too.
 inline double memory_of_reduction(double dofs, double shapes)
 {
-  return 2 * sizeof(double) * dofs * shapes;
+  return sizeof(double) * dofs * shapes;
+}
+
+/// Of the free memory, what a model's shapes may take [byte]: its matrices and the steps of the full model need room.
+inline double memory_for_shapes(double free)
+{
+  return free / 2;
 }
 
 /// What each pair does in the motion that a model is made for. Pairs that are neither active nor sliding stay open.
