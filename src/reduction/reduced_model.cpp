@@ -239,14 +239,16 @@ Factor energy_factor(Mat K, Mat M, double omega, Mat Z, const FactorOptions& opt
   return factor;
 }
 
-/// The most attachments that a model takes: as many as asked for, or as the free memory has room for.
-Index most_attachments(const Structure& structure, PetscInt asked, Index modes)
+/// The limits asked for, or those of the free memory.
+AttachmentLimits limits_of(const Reduction& reduction, const Structure& structure, Index modes)
 {
-  if (asked > 0) return asked;
+  if (reduction.attachments > 0) return {reduction.threshold, reduction.attachments, 1};
+  constexpr double most_lost = 0.1; // of compliance that no one chose to lose: 0.05 changes the cycle's energy by 4 %
   PetscInt dofs = 0;
   check(VecGetSize(structure.load, &dofs));
   const double room = memory_for_shapes(free_memory(comm_of(structure.load))) / memory_of_reduction(dofs, 1);
-  return std::max<Index>(0, static_cast<Index>(std::min<double>(room, all_attachments)) - modes);
+  const auto fitting = static_cast<Index>(std::min<double>(room, all_attachments));
+  return {reduction.threshold, std::max<Index>(0, fitting - modes), most_lost};
 }
 
 } // namespace
@@ -288,9 +290,8 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
     const MultiVector& shapes = of_modes.columns;
     const MatrixXd energy =
         symmetric_inner_products(shapes, K) + omega * omega * symmetric_inner_products(shapes, structure.M);
-    const Index at_most = most_attachments(structure, reduction.attachments, shapes.columns());
     X = make_basis(model, {factor, contact.Z, BZ, forces}, of_modes, energy, whole_product(B, shapes), structure.M,
-                   {reduction.threshold, at_most});
+                   limits_of(reduction, structure, shapes.columns()));
   }
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
   const LeftPart left = left_part(contact, B, X);

@@ -228,6 +228,11 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
   extend(basis, modes.more, new_shape);
   const Index before = basis.T.cols(), last = extend(basis, modes.apart, 1e-6).taken;
   const Extension attached = extend(basis, count, limits.threshold, limits.at_most);
+  if (attached.lost > limits.most_lost)
+    throw Error(format("reduced model: half of the free memory holds %ld of %ld attachment shapes, and %.2g of the "
+                       "pairs' own compliance would be lost: a larger machine, or -reduced_attachments to take as many",
+                       static_cast<long>(attached.taken), static_cast<long>(attached.taken + attached.left_out),
+                       attached.lost));
   const Index of_modes_alone = before + last;
   model.modes = static_cast<int>(of_modes_alone);
   model.attachments = static_cast<int>(attached.taken);

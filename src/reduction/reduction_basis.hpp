@@ -42,12 +42,13 @@ struct AttachmentLimits
 {
   double threshold = 0;     // one is dropped when less than this part of it is new
   Eigen::Index at_most = 0; // the leading ones are taken
+  double most_lost = 0;     // mean part of the forces' own compliance that the others may hold
 };
 
 /// The basis: the modes, the attachments next to them, all by falling period, as motions. `energy_of_modes`: X'E X of
 /// the modes X; `of_modes`: B X. Sets the model's counts, what it leaves out, `slow` and `apart`. No attachment is
 /// stored before it is known what the basis holds of it: they are solved for twice, for their energies and for the
-/// basis.
+/// basis. Error: more compliance would be lost than may be.
 MultiVector make_basis(ReducedModel& model, const Attachments& attachments, const ModeColumns& modes,
                        const Eigen::MatrixXd& energy_of_modes, const Eigen::MatrixXd& of_modes, Mat M,
                        const AttachmentLimits& limits);
