@@ -149,7 +149,11 @@ PolynomialModel::PolynomialModel(const RobustnessProblem& problem) : problem_(pr
       terms_.back().factors = {places[j], places[i]};
     }
   std::vector<double> corner = centre_;
-  for (const std::size_t i : places) corner[i] -= 1.3 * scale_[i];
+  for (const std::size_t i : places)
+  {
+    const double outer = centre_[i] - 1.3 * scale_[i]; // which may be no scene
+    corner[i] = outer >= quantile(problem.numbers[i], 0) ? outer : centre_[i] - 0.6 * scale_[i];
+  }
   error_ = error_at(corner);
   if (error_ > accepted)
     throw Error(format("the matrices are no polynomials of second order of the random numbers: off by %.1e", error_));
