@@ -300,7 +300,7 @@ RealModes search_between(Mat M, Mat K, double low, double high, const PencilOpti
 /// square of their number.
 RealModes search_in_slices(Mat M, Mat K, double omega, const PencilOptions& options)
 {
-  constexpr int slice = 100;
+  constexpr int slice = 150;
   ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
   const Inertia end = inertia_at(omega * omega, pencil);
   const int slices = std::max(1, (end.below + slice - 1) / slice);
