@@ -66,6 +66,12 @@ SQUEAL_SIMD void add_products(const PairedRows& matrices, std::size_t count, con
   count == 4 ? add_product<2, double, Four>(matrices, x, y) : add_product<2, double, Eight>(matrices, x, y);
 }
 
+/// M alone, 4 or 8 trajectories.
+SQUEAL_SIMD void add_mass_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
+{
+  count == 4 ? add_product<1, double, Four>(matrices, x, y) : add_product<1, double, Eight>(matrices, x, y);
+}
+
 /// y += A x for columns of other ranks; Entry, Vector and the rows of x as above.
 template <std::size_t parts, class Entry, class Vector>
 SQUEAL_INLINE void add_foreign(const PairedRows& matrices, const double* x, double* y)
@@ -98,6 +104,11 @@ SQUEAL_SIMD void add_foreign_products(const PairedRows& matrices, std::size_t co
   count == 4 ? add_foreign<2, double, Four>(matrices, x, y) : add_foreign<2, double, Eight>(matrices, x, y);
 }
 
+SQUEAL_SIMD void add_foreign_mass_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
+{
+  count == 4 ? add_foreign<1, double, Four>(matrices, x, y) : add_foreign<1, double, Eight>(matrices, x, y);
+}
+
 bool is_sparse(Mat A)
 {
   PetscBool sparse = PETSC_FALSE;
@@ -106,12 +117,12 @@ bool is_sparse(Mat A)
 }
 
 /// Columns of other ranks in this rank's rows, ascending.
-std::vector<PetscInt> foreign_columns(Mat M, Mat K)
+std::vector<PetscInt> foreign_columns(const std::vector<Mat>& matrices)
 {
   PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(M, &first, &last));
+  check(MatGetOwnershipRange(matrices.front(), &first, &last));
   std::vector<PetscInt> columns;
-  for (Mat A : {M, K})
+  for (Mat A : matrices)
     for_each_row(A,
                  [&](PetscInt, std::span<const PetscInt> of_row, std::span<const PetscScalar>)
                  {
@@ -197,10 +208,11 @@ private:
 
 std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
 {
-  if (!is_sparse(M) || !is_sparse(K)) return std::nullopt;
+  if (!is_sparse(M) || (K && !is_sparse(K))) return std::nullopt;
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(M, &first, &last));
-  const std::vector<PetscInt> others = foreign_columns(M, K);
+  const std::vector<Mat> both = K ? std::vector{M, K} : std::vector{M};
+  const std::vector<PetscInt> others = foreign_columns(both);
   PairedMatrices matrices{comm_of(M), {}, {}, exchange_of(others, row_layout(M), comm_of(M))};
   RowJoiner own(matrices.own, static_cast<std::size_t>(last - first)), foreign(matrices.foreign, others.size());
   const auto enter = [&](Mat A, PetscInt i, std::size_t which)
@@ -210,7 +222,9 @@ std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
     const PetscScalar* values = nullptr;
     check(MatGetRow(A, i, &count, &columns, &values));
     for (PetscInt k = 0; k < count; ++k)
-      if (columns[k] < first || columns[k] >= last)
+      if (!K && values[k] == 0)
+        continue; // most of M's, in a pattern that it shares with K
+      else if (columns[k] < first || columns[k] >= last)
         foreign.add(static_cast<PetscInt>(std::lower_bound(others.begin(), others.end(), columns[k]) - others.begin()),
                     which, values[k]);
       else if (columns[k] >= i)
@@ -221,50 +235,77 @@ std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
   {
     own.add(i - first, 0, 0.); // a row begins with its diagonal entry, be it zero
     enter(M, i, 0);
-    enter(K, i, 1);
+    if (K) enter(K, i, 1);
     own.end_row();
     foreign.end_row();
   }
   return matrices;
 }
 
+namespace
+{
+
+/// Products of the first of `from.size()` matrices with the vectors of from[0], of the next with those of from[1], for
+/// `lanes` trajectories at once.
+template <class Add, class AddForeign>
+void multiply(const PairedMatrices& matrices, std::size_t lanes, std::span<const std::span<const Vec>> from,
+              std::span<const std::span<const Vec>> to, Add add, AddForeign add_others)
+{
+  const std::size_t rows = matrices.own.starts.size() - 1, parts = from.size(), stride = parts * lanes;
+  std::vector<double> x(stride * rows), y;
+  for (std::size_t first = 0; first < from[0].size(); first += lanes)
+  {
+    const std::size_t count = std::min(lanes, from[0].size() - first);
+    std::vector<const double*> read(parts * count);
+    std::vector<double*> written(parts * count);
+    for (std::size_t k = 0; k < parts * count; ++k)
+    {
+      check(VecGetArrayRead(from[k / count][first + k % count], &read[k]));
+      check(VecGetArrayWrite(to[k / count][first + k % count], &written[k]));
+    }
+    for (std::size_t i = 0; i < rows; ++i)
+      for (std::size_t k = 0; k < parts * count; ++k) x[i * stride + k / count * lanes + k % count] = read[k][i];
+    y.assign(x.size(), 0.);
+    add(matrices.own, x.data(), y.data());
+    if (ranks_of(matrices.comm) > 1)
+    {
+      const std::vector<double> z = rows_of_others(matrices.exchange, x, stride, matrices.comm);
+      add_others(matrices.foreign, z.data(), y.data());
+    }
+    for (std::size_t i = 0; i < rows; ++i)
+      for (std::size_t k = 0; k < parts * count; ++k) written[k][i] = y[i * stride + k / count * lanes + k % count];
+    for (std::size_t k = 0; k < parts * count; ++k)
+    {
+      check(VecRestoreArrayRead(from[k / count][first + k % count], &read[k]));
+      check(VecRestoreArrayWrite(to[k / count][first + k % count], &written[k]));
+    }
+  }
+}
+
+} // namespace
+
 void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> u,
                    std::span<const Vec> Mv, std::span<const Vec> Ku)
 {
-  const std::size_t rows = matrices.own.starts.size() - 1, lanes = std::min<std::size_t>(8, lanes_for(v.size()));
-  std::vector<double> x(2 * lanes * rows), y;
-  for (std::size_t first = 0; first < v.size(); first += lanes)
-  {
-    const std::size_t count = std::min(lanes, v.size() - first);
-    std::vector<const double*> from(2 * count);
-    std::vector<double*> to(2 * count);
-    for (std::size_t k = 0; k < count; ++k)
-    {
-      check(VecGetArrayRead(v[first + k], &from[k]));
-      check(VecGetArrayRead(u[first + k], &from[count + k]));
-      check(VecGetArrayWrite(Mv[first + k], &to[k]));
-      check(VecGetArrayWrite(Ku[first + k], &to[count + k]));
-    }
-    for (std::size_t i = 0; i < rows; ++i)
-      for (std::size_t k = 0; k < 2 * count; ++k) x[i * 2 * lanes + k / count * lanes + k % count] = from[k][i];
-    y.assign(x.size(), 0.);
-    lanes == 1 ? add_both(matrices.own, x.data(), y.data()) : add_products(matrices.own, lanes, x.data(), y.data());
-    if (ranks_of(matrices.comm) > 1)
-    {
-      const std::vector<double> z = rows_of_others(matrices.exchange, x, 2 * lanes, matrices.comm);
-      lanes == 1 ? add_foreign_both(matrices.foreign, z.data(), y.data())
-                 : add_foreign_products(matrices.foreign, lanes, z.data(), y.data());
-    }
-    for (std::size_t i = 0; i < rows; ++i)
-      for (std::size_t k = 0; k < 2 * count; ++k) to[k][i] = y[i * 2 * lanes + k / count * lanes + k % count];
-    for (std::size_t k = 0; k < count; ++k)
-    {
-      check(VecRestoreArrayRead(v[first + k], &from[k]));
-      check(VecRestoreArrayRead(u[first + k], &from[count + k]));
-      check(VecRestoreArrayWrite(Mv[first + k], &to[k]));
-      check(VecRestoreArrayWrite(Ku[first + k], &to[count + k]));
-    }
-  }
+  const std::array from{v, u}, to{Mv, Ku};
+  const std::size_t lanes = std::min<std::size_t>(8, lanes_for(v.size()));
+  if (lanes == 1)
+    multiply(matrices, lanes, from, to, add_both, add_foreign_both);
+  else
+    multiply(
+        matrices, lanes, from, to,
+        [&](const PairedRows& own, const double* x, double* y) { add_products(own, lanes, x, y); },
+        [&](const PairedRows& foreign, const double* x, double* y) { add_foreign_products(foreign, lanes, x, y); });
+}
+
+void multiply_first(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> Mv)
+{
+  const std::array from{v}, to{Mv};
+  const std::size_t lanes = v.size() <= 4 ? 4 : 8;
+  multiply(
+      matrices, lanes, from, to,
+      [&](const PairedRows& own, const double* x, double* y) { add_mass_products(own, lanes, x, y); },
+      [&](const PairedRows& foreign, const double* x, double* y) { add_foreign_mass_products(foreign, lanes, x, y); });
 }
 
 } // namespace squeal

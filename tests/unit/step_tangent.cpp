@@ -201,3 +201,52 @@ TEST_CASE("the unilateral oscillator's period has the tangent of central differe
   }
   CHECK(met.compared > 5);
 }
+
+TEST_CASE("proportional damping spares products with K and leaves the tangent as it is")
+{
+  // 200 steps take K du from differences and multiply it anew, twice; a dashpot that is no sum of M and K has all
+  // products made, and changes the tangent itself by its size
+  constexpr double dashpot = 1e-9;
+  std::mt19937 random(11);
+  for (const int directions : {1, 2})
+    for (const double theta : {0.5, 0.7})
+    {
+      CAPTURE(directions);
+      CAPTURE(theta);
+      SmallModel model = two_masses(random, directions, 0.6);
+      Mat C = model.structure.C;
+      check(MatCopy(model.structure.M, C, SAME_NONZERO_PATTERN));
+      check(MatScale(C, 0.02));
+      check(MatAXPY(C, 0.03, model.structure.K, SAME_NONZERO_PATTERN));
+      const State start = random_state(model, random, 0.4), direction = random_state(model, random, 1);
+      const Run middle = run(model, start, 0.15, theta, 200);
+      std::array<std::array<TangentColumn, 2>, 2> columns;
+      for (auto& pair : columns)
+      {
+        for (TangentColumn& column : pair) column = {zeros_like(start.u), zeros_like(start.v), 0, 0};
+        pair[0].u = copy_of(direction.u.get());
+        pair[0].v = copy_of(direction.v.get());
+        pair[1].step_size = 1;
+        const ThetaStep step = make_theta_step(model.structure, model.interface, 0.15, theta, {});
+        advance_tangents(step, model.structure, model.interface, middle.records, pair);
+        PetscInt first = 0, last = 0;
+        check(MatGetOwnershipRange(C, &first, &last));
+        if (first == 0 && last > 0) check(MatSetValue(C, 0, 0, dashpot, ADD_VALUES));
+        check(MatAssemblyBegin(C, MAT_FINAL_ASSEMBLY));
+        check(MatAssemblyEnd(C, MAT_FINAL_ASSEMBLY));
+      }
+      for (std::size_t k = 0; k < 2; ++k)
+      {
+        const auto by_mass = entries_of(columns[0][k].u, columns[0][k].v),
+                   by_both = entries_of(columns[1][k].u, columns[1][k].v);
+        double error = 0, size = 1;
+        for (std::size_t i = 0; i < by_mass.size(); ++i)
+        {
+          error = std::max(error, std::abs(by_mass[i] - by_both[i]));
+          size = std::max(size, std::abs(by_both[i]));
+        }
+        CHECK(error <= 30 * dashpot * size); // of 30 units of time
+        CHECK(error > 0);
+      }
+    }
+}
