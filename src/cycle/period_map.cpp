@@ -231,7 +231,6 @@ Flow flow_of(PeriodMap& map)
   { integrate_periods(map, period, starts, ends); };
   Flow flow{integrate, map.sliding.structure.M, map.sliding.structure.K, integrate_many};
   add_tangent(map, flow);
-  flow.few_steps = map.steps <= enough_steps;
   return flow;
 }
 

@@ -44,8 +44,8 @@ void add_changes(const std::vector<Complex>& values, const std::vector<Complex>&
   }
 }
 
-/// All multipliers. Bars: the change of each when the grid of time moves by half a step; of a grid of few steps 4/3 of
-/// the change on one of twice as many, too, which is the error of a step of order 2.
+/// All multipliers. Bars: the change of each when the grid of time moves by half a step, and 4/3 of the change on one
+/// of twice as many steps, which is the error of a step of order 2.
 FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
 {
   FloquetAnalysis result;
@@ -69,7 +69,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   if (monodromy.exact())
   {
     add_changes(values, values_of(pairs_on({0.5, 1})), 1, grid);
-    if (monodromy.flow.few_steps) add_changes(values, values_of(pairs_on({0, 2})), 4. / 3, grid);
+    add_changes(values, values_of(pairs_on({0, 2})), 4. / 3, grid);
     monodromy.flow.record_period(orbit.period, orbit.state, {});
   }
   const std::size_t shift = find_shift(pairs, coordinates_of(orbit.rate, orbit.period));
