@@ -68,8 +68,7 @@ def drum_brake(folder, stiffness):
                        friction={"coefficient": 0.3}, modes={"band": 3.0}, cycle={"steps_per_period": 800, "tolerance": 1e-6})
 
 
-@pytest.mark.parametrize("stiffness, ratio", [(0.3, 0.026), (1.0, 0.073), (3.0, 0.110)])
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("stiffness, ratio, ranks", [(0.3, 0.026, 1), (1.0, 0.073, 1), (3.0, 0.110, 1), (3.0, 0.110, 2)])
 def test_massless_feet_and_strong_growth_lead_to_a_cycle(converged, tmp_path, stiffness, ratio, ranks):
     """8 degrees of freedom, six of them without mass; the equilibrium grows by up to 11 % of the frequency a radian."""
     report = converged(drum_brake(tmp_path, stiffness), ranks=ranks).report
@@ -83,11 +82,11 @@ def test_the_cycle_starts_from_a_mode_a_transient_or_a_file(converged, squeal, t
     state = tmp_path / "end.state"
     after = converged(*base, "--set", "transient.start=estimate", "--set", "transient.periods=40", "--set",
                       "transient.steps_per_period=100", "--set", f"transient.save_state={state}", "--set",
-                      "cycle.start=transient", "--set", "cycle.free_periods=0").report["cycle"]
+                      "cycle.start=transient", "--set", "cycle.free_periods=0", ranks=1).report["cycle"]
     filed = converged(*base, "--set", "transient.enabled=false", "--set", f"cycle.start={state}", "--set",
-                      "cycle.free_periods=0").report["cycle"]
+                      "cycle.free_periods=0", ranks=1).report["cycle"]
     small = converged(*base, "--set", "transient.enabled=false", "--set", "cycle.start=mode", "--set",
-                      "cycle.amplitude=0.2").report["cycle"]
+                      "cycle.amplitude=0.2", ranks=1).report["cycle"]
     for cycle in (after, filed, small):
         assert cycle["period"] == pytest.approx(PERIOD, rel=1e-3) and cycle["mean_energy"] == pytest.approx(ENERGY, rel=0.01)
     # the same state, once in memory and once from the file
@@ -95,7 +94,7 @@ def test_the_cycle_starts_from_a_mode_a_transient_or_a_file(converged, squeal, t
     assert filed["newton"][0]["residual_full"] < 0.05  # 40 periods have settled
 
     refused = squeal(INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
-                     f"cycle.start={state}")
+                     f"cycle.start={state}", ranks=1)
     assert refused.code == 1 and len(refused.messages) == 1
     assert "end.state" in refused.messages[0] and "degrees of freedom" in refused.messages[0]
     assert "equilibrium" not in refused.printed  # found before the first stage
@@ -109,10 +108,9 @@ def test_a_skipped_transient_is_no_start(squeal):
 
 
 def test_where_no_cycle_of_the_pin_attracts_the_settled_motion_answers(converged):
-    """At mu = 0.4 direct integration settles on no cycle: its energy wanders by factors. The means of another window, from
-    another start, agree within both bars."""
+    """At mu = 0.4 direct integration settles on no cycle: its energy wanders by factors, on this coarse mesh as on finer ones."""
     pin = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "modes.method=full", "--set", "friction.coefficient=0.4", "--set",
-           "fidelity=full"]
+           "fidelity=full", "--set", "mesh.parameters.divisions=2", "--set", "damping.beta=6e-7"]
     run = converged(*pin, "-cycle_free_periods", "80", "-settled_periods", "256", ranks=1)
     report = run.report
     settled = report["settled"]
