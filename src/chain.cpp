@@ -73,7 +73,8 @@ std::string no_mode_among(const Report& report, std::span<const ComplexMode> mod
   if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "there is no equilibrium to start from";
   if (report.modes.modes.empty()) return "no mode was found in the band";
   if (modes.empty()) return "the equilibrium is stable: no mode grows in the band";
-  if (modes.front().frequency_hz() == 0) return "the equilibrium diverges without oscillating";
+  if (modes.front().frequency_hz() == 0)
+    return "the equilibrium diverges without oscillating: a [transient] from a state file beside it shows where to";
   return {};
 }
 
@@ -131,7 +132,9 @@ std::vector<Estimate> run_estimates(const Chain& chain)
     estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, "there is no contact that would limit the growth"));
   else
     for (const ComplexMode& mode : followed_modes(chain.report, chain.scene))
-      estimates.push_back(estimate_amplitude(chain.sliding(), *chain.linearised, mode, chain.options.estimate));
+      estimates.push_back(mode.frequency_hz() > 0
+                              ? estimate_amplitude(chain.sliding(), *chain.linearised, mode, chain.options.estimate)
+                              : not_run<Estimate>(OutcomeKind::skipped, "the mode does not oscillate"));
   return estimates;
 }
 

@@ -197,6 +197,8 @@ void assess(Modes& modes)
   std::stable_partition(modes.modes.begin(), modes.modes.end(),
                         [](const ComplexMode& mode) { return is_unstable(mode.lambda); });
   modes.unstable_count = unstable_in(modes.modes);
+  std::stable_partition(modes.modes.begin(), modes.modes.begin() + modes.unstable_count,
+                        [](const ComplexMode& mode) { return mode.frequency_hz() > 0; }); // the first one is followed
   modes.routes_disagree = modes.method == ModesMethod::both && unstable_in(modes.projected) != modes.unstable_count;
   modes.count_check = describe_count(modes);
   if (modes.outcome.residual <= 1e-8 || modes.outcome.kind != OutcomeKind::converged) return;

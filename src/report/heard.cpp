@@ -36,9 +36,11 @@ std::string largest_swing(const Scene& scene, const Swings& swings, const Size& 
 std::string beside_mode(const Report& report, double frequency_hz)
 {
   const auto unstable = report.modes.unstable();
-  if (unstable.empty()) return {};
+  const auto end = // those that oscillate come first
+      std::find_if(unstable.begin(), unstable.end(), [](const ComplexMode& mode) { return mode.frequency_hz() == 0; });
+  if (end == unstable.begin()) return {};
   const auto nearest =
-      std::min_element(unstable.begin(), unstable.end(),
+      std::min_element(unstable.begin(), end,
                        [&](const ComplexMode& a, const ComplexMode& b) {
                          return std::abs(a.frequency_hz() - frequency_hz) < std::abs(b.frequency_hz() - frequency_hz);
                        });
@@ -84,10 +86,10 @@ std::string settled_text(const Report& report, const Scene& scene)
     if (motion.base.closes_after > 1) text += format(", closing after %d periods", motion.base.closes_after);
     break;
   case MotionKind::quasi_periodic:
-    text = format("no cycle attracts: quasi-periodic, %.5g and %.5g Hz", first, second);
+    text = format("no cycle attracts that was found: quasi-periodic, %.5g and %.5g Hz", first, second);
     break;
   case MotionKind::irregular:
-    text = format("no cycle attracts: irregular, strongest line %.5g Hz", first);
+    text = format("no cycle attracts that was found: irregular, strongest line %.5g Hz", first);
     break;
   case MotionKind::undecided:
     text = "no cycle attracts that was found: undecided between " + verdict.between +
@@ -100,13 +102,33 @@ std::string settled_text(const Report& report, const Scene& scene)
          largest_swing(scene, report.settled.peak_to_peak, [](const MeanValue& swing) { return swing.value; });
 }
 
+/// Of the scene's other starts, if there are any, how many lead to the cycle; empty: all.
+std::string starts_text(const Report& report)
+{
+  const Attractors& attractors = report.attractors;
+  const LimitCycle& cycle = report.cycle;
+  if (!has_run(attractors.outcome) || attractors.motions.empty()) return {};
+  std::size_t all = 0, here = 0;
+  for (const ReachedMotion& motion : attractors.motions)
+  {
+    const double energy = cycle.measured.mean_fluctuating_energy, frequency = 1 / cycle.orbit.period;
+    const bool same = std::abs(motion.energy.value - energy) <= motion.energy.error + 0.02 * energy &&
+                      std::abs(motion.frequency.value - frequency) <= motion.frequency.error + 0.002 * frequency;
+    all += motion.starts.size();
+    if (same && (motion.kind == ReachedKind::steady || motion.kind == ReachedKind::unsettled))
+      here += motion.starts.size();
+  }
+  if (here == all) return {};
+  return format(", which %zu of %zu other starts lead%s to", here, all, here == 1 ? "s" : "");
+}
+
 std::string cycle_text(const Report& report, const Scene& scene)
 {
   const LimitCycle& cycle = report.cycle;
   const double frequency = 1 / cycle.orbit.period;
   return format("squeals at %.5g Hz", frequency) + beside_mode(report, frequency) +
          largest_swing(scene, cycle.measured.peak_to_peak, [](double swing) { return swing; }) +
-         stability_text(cycle.multipliers) +
+         stability_text(cycle.multipliers) + starts_text(report) +
          (report.modes.unstable_count == 0 ? ", beside a stable equilibrium that another start leads to" : "");
 }
 
@@ -118,7 +140,10 @@ std::string linear_text(const Report& report)
   if (report.modes.unstable_count == 0)
     return report.modes.outcome.kind == OutcomeKind::converged ? "silent: no mode grows in the band"
                                                                : "nothing is known: the modes are incomplete";
-  return format("the equilibrium is unstable at %.5g Hz", report.modes.modes.front().frequency_hz());
+  const ComplexMode& mode = report.modes.modes.front();
+  if (mode.frequency_hz() == 0)
+    return format("the equilibrium diverges without oscillating, by a factor e in %.3g s", 1 / mode.growth_rate());
+  return format("the equilibrium is unstable at %.5g Hz", mode.frequency_hz());
 }
 
 } // namespace

@@ -127,8 +127,10 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
                                   [](const MeanValue& one) { return std::abs(one.value) <= together * one.error; });
   if (positive > 0) return judge_irregular(energies);
   if (zero == 1) return {MotionKind::periodic, "", ""};
-  // slow motions that die out have exponents within their bars of zero, too
-  if (zero > 1 && steady(energies)) return {MotionKind::periodic, "", ""};
+  // slow motions that die out have exponents within their bars of zero, too; of a torus whose parts hardly know of each
+  // other the energies are as steady, and the second frequency tells
+  if (zero > 1 && steady(energies) && (base.second == 0 || base.closes_after > 0))
+    return {MotionKind::periodic, "", ""};
   if (zero == 2) return judge_torus(energies, base);
   if (zero == 0) return {MotionKind::undecided, "a cycle and rest: no exponent is zero within its bar", more};
   return {MotionKind::undecided, "quasi-periodic with more than two frequencies and weakly irregular",

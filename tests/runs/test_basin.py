@@ -1,5 +1,6 @@
 """Where shooting leads from a start: to the cycle heard, to another, or to the statement that the motion is no cycle."""
 
+import math
 import re
 
 import pytest
@@ -39,7 +40,7 @@ def test_a_torus_is_what_the_motion_settles_on(squeal, tmp_path, ranks):
     assert abs(first["mean"]) <= first["error"] and abs(second["mean"]) <= second["error"]
     assert third["mean"] < -third["error"]
     # the mean of each oscillator's own fluctuating energy, the slower one's being the same
-    assert "no cycle attracts: quasi-periodic" in run.printed and report["heard"] in run.printed
+    assert "no cycle attracts that was found: quasi-periodic" in run.printed and report["heard"] in run.printed
 
 
 def test_beside_a_neighbour_that_is_stable_the_cycle_is_found(squeal, tmp_path):
@@ -48,6 +49,75 @@ def test_beside_a_neighbour_that_is_stable_the_cycle_is_found(squeal, tmp_path):
     cycle = run.report["cycle"]
     assert cycle["outcome"] == "converged" and cycle["multipliers"]["stability"] == "stable"
     assert cycle["period"] == pytest.approx(5.954461004653, rel=1e-3)  # exact; 100 steps a period leave 3e-4
+
+
+SLIDER = """
+[[point]]
+name = "slider"
+at = [0, 0, 0]
+mass = 1
+free = "x y"
+
+[[point]]
+name = "belt"
+at = [0, 0, 0]
+mass = 0.5
+free = "y"
+
+[[spring]]
+from = "slider"
+to = "ground"
+direction = "x"
+stiffness = 1.0
+damping = 0.02
+
+[[spring]]
+from = "slider"
+to = "ground"
+direction = "y"
+stiffness = 1.0
+damping = 0.02
+
+[[spring]]
+from = "belt"
+to = "ground"
+direction = "y"
+stiffness = 1.0
+damping = 0.02
+
+[[force]]
+on = "slider"
+vector = [0, -4, 0]
+
+[[contact]]
+rotor = "belt"
+stator = "slider"
+normal = [0, 1, 0]
+tangents = [[1, 0, 0]]
+velocity = [0.08, 0, 0]
+
+[friction]
+static_coefficient = 0.8
+decay_speed = 0.1
+"""
+
+
+def test_a_slider_that_diverges_hides_no_squeal_beside_it(squeal, tmp_path):
+    """Friction falls so steeply at the slider's speed that its eigenvalues are real and positive: a mass and a stiffness
+    of 1, and a damping of 0.02 - 5 exp(-0.8) N at half the force, N = 2. The oscillator beside it grows more slowly, and
+    is what is shot at."""
+    text = (INPUTS / "oscillator" / "scene.toml").read_text()
+    scene = tmp_path / "scene.toml"
+    scene.write_text(text.replace("[friction]\n", SLIDER.lstrip()))
+    run = squeal(scene, "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=100", "-settled_periods", "1",
+                 ranks=1)
+    modes = run.report["modes"]
+    assert modes["unstable_count"] == 3
+    assert [mode["frequency_hz"] > 0 for mode in modes["modes"][:3]] == [True, False, False]
+    c = 0.02 - 10 * math.exp(-0.8)
+    assert modes["modes"][1]["growth_rate"] == pytest.approx(-c / 2 + math.sqrt(c**2 / 4 - 1), rel=1e-9)  # of eigenvalues
+    assert modes["modes"][1]["growth_rate"] > 10 * modes["modes"][0]["growth_rate"] > 0
+    assert run.report["cycle"]["outcome"] not in ("skipped", "converged")  # nothing that leaves the slider at rest lasts
 
 
 def amplitude_of(converged, *arguments):

@@ -188,6 +188,17 @@ TEST_CASE(
   CHECK(wandering.kind == MotionKind::undecided);
 }
 
+TEST_CASE("steady energies are a cycle's, unless the spectrum has a second frequency that is no fraction of the first")
+{
+  std::mt19937 random(4);
+  std::vector<double> energies = noise_with_memory(random, 0);
+  for (double& energy : energies) energy = 1 + 1e-5 * energy;
+  const std::vector<MeanValue> two_zeros{{1e-4, 1e-2}, {-1e-4, 1e-2}};
+  CHECK(judge_motion(two_zeros, energies, {1, 0, 0, 1}).kind == MotionKind::periodic);
+  CHECK(judge_motion(two_zeros, energies, {1, 0.5, 2, 1}).kind == MotionKind::periodic);
+  CHECK(judge_motion(two_zeros, energies, {1, 0.97, 0, 1}).kind != MotionKind::periodic);
+}
+
 TEST_CASE("a drift is not stationary, a beat is; what comes before the motion has settled is left out")
 {
   std::mt19937 random(3);

@@ -90,7 +90,7 @@ struct Modes
   ModesMethod method = ModesMethod::both;
   ModeShapes shapes = ModeShapes::unstable;
   double band = 0;                    // [Hz] covered: every mode below is here
-  std::vector<ComplexMode> modes;     // Im(lambda) >= 0, unstable ones first, then by growth
+  std::vector<ComplexMode> modes;     // Im(lambda) >= 0, by falling growth; of unstable ones those that oscillate first
   std::vector<ComplexMode> projected; // the other route's, when both ran
   std::vector<double> beyond_band;    // [Hz] pairs between the band and count.frequency
   int unstable_count = 0;             // of is_unstable, the first ones
