@@ -102,7 +102,7 @@ std::string settled_text(const Report& report, const Scene& scene)
          largest_swing(scene, report.settled.peak_to_peak, [](const MeanValue& swing) { return swing.value; });
 }
 
-/// Of the scene's other starts, if there are any, how many lead to the cycle; empty: all.
+/// How many of the scene's other starts lead to the cycle; empty: all that have settled.
 std::string starts_text(const Report& report)
 {
   const Attractors& attractors = report.attractors;
@@ -114,9 +114,9 @@ std::string starts_text(const Report& report)
     const double energy = cycle.measured.mean_fluctuating_energy, frequency = 1 / cycle.orbit.period;
     const bool same = std::abs(motion.energy.value - energy) <= motion.energy.error + 0.02 * energy &&
                       std::abs(motion.frequency.value - frequency) <= motion.frequency.error + 0.002 * frequency;
+    if (motion.kind == ReachedKind::unsettled && !same) continue; // it may still come there
     all += motion.starts.size();
-    if (same && (motion.kind == ReachedKind::steady || motion.kind == ReachedKind::unsettled))
-      here += motion.starts.size();
+    if (same && motion.kind != ReachedKind::varying) here += motion.starts.size();
   }
   if (here == all) return {};
   return format(", which %zu of %zu other starts lead%s to", here, all, here == 1 ? "s" : "");

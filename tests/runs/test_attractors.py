@@ -10,7 +10,7 @@ SCENE = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false
 def test_all_starts_lead_to_the_cycle_that_attracts(converged):
     report = converged(*SCENE, "--set", "cycle.starts=6", ranks=1).report
     found, cycle = report["attractors"], report["cycle"]
-    assert found["outcome"] == "completed"
+    assert found["outcome"] == "completed" and "other start" not in report["heard"]
     assert found["starts"] == ["mode 1"] + [f"random {i}" for i in range(1, 6)]
     (motion,) = found["motions"]
     assert motion["kind"] == "steady" and sorted(motion["starts"]) == list(range(6))
