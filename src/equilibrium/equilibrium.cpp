@@ -188,33 +188,17 @@ struct Search
   double rho = 0; // 1/lambda_max(D_nn)
 };
 
-/// Whether reactions that were corrected from `before` would change by no more than rounding if they were corrected
-/// again: by the square of this change.
-bool is_settled(const std::vector<double>& before, const std::vector<double>& reaction)
-{
-  constexpr double small = 1e-8; // its square is rounding
-  double change = 0, largest = 0;
-  for (std::size_t i = 0; i < reaction.size(); ++i)
-  {
-    change = std::max(change, std::abs(reaction[i] - before[i]));
-    largest = std::max(largest, reaction[i]);
-  }
-  return change <= small * largest;
-}
-
 /// u, and gaps and reactions corrected by what u's own gaps say: the rounding of D drops out. Each pass refines u, too.
 void settle(const Held& held, const Structure& structure, const Interface& interface, Search& search,
             Equilibrium& equilibrium, MPI_Comm comm)
 {
   auto& [outcome, iterations, closed, gap, reaction] = search.solution;
   std::optional<SplitSolver> solver; // on rank 0
-  bool settled = interface.pairs == 0;
   for (int pass = 0;; ++pass)
   {
     const std::vector<double> geometric = add_compliance(interface, -1, reaction, gap);
     displace(held, structure, interface, pair_forces(interface, reaction, geometric, held.kappa), equilibrium.u);
-    if (pass == 2 || settled) break;
-    const std::vector<double> before = reaction;
+    if (pass == 2 || interface.pairs == 0) break;
     std::vector<double> error = add_compliance(interface, 1, reaction, gaps_of(interface, equilibrium.u));
     for (std::size_t i = 0; i < error.size(); ++i) error[i] -= gap[i];
     on_rank_zero_with_lent_cores(comm, static_cast<std::size_t>(interface.pairs),
@@ -230,7 +214,6 @@ void settle(const Held& held, const Structure& structure, const Interface& inter
                                  });
     broadcast(gap, comm);
     broadcast(reaction, comm);
-    settled = is_settled(before, reaction);
   }
 }
 
