@@ -99,10 +99,15 @@ bool agree(const MeanValue& a, const MeanValue& b, double relative)
 bool same(const ReachedMotion& a, const ReachedMotion& b)
 {
   if (a.kind != b.kind) return false;
-  return a.kind == ReachedKind::rest || (agree(a.energy, b.energy, 0.01) && agree(a.frequency, b.frequency, 1e-3));
+  return a.kind == ReachedKind::rest || agree(a, b);
 }
 
 } // namespace
+
+bool agree(const ReachedMotion& a, const ReachedMotion& b)
+{
+  return agree(a.energy, b.energy, 0.01) && agree(a.frequency, b.frequency, 1e-3);
+}
 
 ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<double>& crossings, double rest)
 {

@@ -108,12 +108,12 @@ std::string starts_text(const Report& report)
   const Attractors& attractors = report.attractors;
   const LimitCycle& cycle = report.cycle;
   if (!has_run(attractors.outcome) || attractors.motions.empty()) return {};
+  const ReachedMotion found{
+      ReachedKind::steady, {cycle.measured.mean_fluctuating_energy, 0}, {1 / cycle.orbit.period, 0}, {}};
   std::size_t all = 0, here = 0;
   for (const ReachedMotion& motion : attractors.motions)
   {
-    const double energy = cycle.measured.mean_fluctuating_energy, frequency = 1 / cycle.orbit.period;
-    const bool same = std::abs(motion.energy.value - energy) <= motion.energy.error + 0.02 * energy &&
-                      std::abs(motion.frequency.value - frequency) <= motion.frequency.error + 0.002 * frequency;
+    const bool same = agree(motion, found);
     if (motion.kind == ReachedKind::unsettled && !same) continue; // it may still come there
     all += motion.starts.size();
     if (same && motion.kind != ReachedKind::varying) here += motion.starts.size();

@@ -40,8 +40,10 @@ struct ReachedMotion
 /// `rest`: an energy below it is that of a motion at rest.
 ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<double>& crossings, double rest);
 
-/// Joins motions of one kind whose energies and frequencies agree within their bars, or within a percent and a
-/// thousandth. Those that most starts lead to come first.
+/// Whether energies and frequencies agree within their bars, or within a percent and a thousandth.
+bool agree(const ReachedMotion& a, const ReachedMotion& b);
+
+/// Joins motions of one kind that agree. Those that most starts lead to come first.
 std::vector<ReachedMotion> joined(std::vector<ReachedMotion> motions);
 
 } // namespace squeal
