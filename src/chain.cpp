@@ -1,9 +1,12 @@
 #include "squeal/chain.hpp"
 
+#include "squeal/attractors/reached.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/modes/modes_checkpoint.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace squeal
 {
@@ -19,15 +22,55 @@ bool starts_without_a_mode(const TransientSettings& settings)
 /// The state that the cycle's search starts from, where it is none of the modes'.
 const State* given_start(const Chain& chain)
 {
-  if (chain.cycle_file) return &*chain.cycle_file;
   if (chain.carried) return &chain.carried->state;
-  return chain.scene.cycle.start.kind == CycleStartKind::transient ? &chain.report.transient.end : nullptr;
+  if (chain.cycle_file) return &*chain.cycle_file;
+  if (chain.scene.cycle.start.kind == CycleStartKind::transient) return &chain.report.transient.end;
+  return chain.paced ? &chain.paced->start : nullptr;
+}
+
+std::string no_mode_among(const Report& report, std::span<const ComplexMode> modes)
+{
+  if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "there is no equilibrium to start from";
+  if (report.modes.modes.empty()) return "no mode was found in the band";
+  if (modes.empty()) return "the equilibrium is stable: no mode grows in the band";
+  return {};
+}
+
+/// Unstable modes that oscillate come first.
+bool only_diverges(std::span<const ComplexMode> unstable)
+{
+  return !unstable.empty() && unstable.front().lambda.real() > 0 && unstable.front().frequency_hz() == 0;
+}
+
+std::string no_oscillation_among(const Report& report, std::span<const ComplexMode> modes)
+{
+  const std::string reason = no_mode_among(report, modes);
+  return reason.empty() && only_diverges(modes) ? "the equilibrium diverges without oscillating" : reason;
+}
+
+/// Paces the mode that diverges by a frequency [rad/s].
+void pace(Chain& chain, double omega)
+{
+  constexpr double part = 0.01; // of the equilibrium's own displacement, in the norm of its energy
+  const ComplexMode& diverging = chain.report.modes.modes.front();
+  const Equilibrium& equilibrium = chain.report.equilibrium;
+  const Structure& structure = chain.model.structure;
+  double amplitude =
+      part * std::sqrt(potential_energy(structure, equilibrium.u) / potential_energy(structure, diverging.real));
+  if (!std::isfinite(amplitude)) amplitude = part;
+  chain.paced.emplace();
+  PacedDivergence& paced = *chain.paced;
+  paced.mode = {{0, omega},          copy_of(diverging.real.get()), zeros_like(equilibrium.u),
+                diverging.reactions, diverging.backward_error,      diverging.loss_error};
+  paced.none.outcome = {OutcomeKind::skipped, "the mode grows without vibrating", 0, 0};
+  paced.none.lift_off_amplitude = paced.none.reversal_amplitude = amplitude; // what grows from there is not at rest
+  paced.start = mode_state(equilibrium, diverging, amplitude, 0);
 }
 
 /// Why the search for the cycle cannot run; empty if it can.
 std::string no_cycle_start(const Chain& chain)
 {
-  const std::string reason = no_mode_to_follow(chain.report, chain.scene);
+  const std::string reason = no_mode_among(chain.report, followed_modes(chain.report, chain.scene));
   if (reason.empty() && chain.coarse && !chain.carried)
     return "no cycle to start from was found on the coarse mesh: take a finer one, or start = \"estimate\"";
   if (!reason.empty() || chain.scene.cycle.start.kind != CycleStartKind::transient) return reason;
@@ -65,29 +108,14 @@ std::span<const ComplexMode> followed_modes(const Report& report, const Scene& s
   return std::span(report.modes.modes).first(1);
 }
 
-namespace
-{
-
-std::string no_mode_among(const Report& report, std::span<const ComplexMode> modes)
-{
-  if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "there is no equilibrium to start from";
-  if (report.modes.modes.empty()) return "no mode was found in the band";
-  if (modes.empty()) return "the equilibrium is stable: no mode grows in the band";
-  if (modes.front().frequency_hz() == 0)
-    return "the equilibrium diverges without oscillating: a [transient] from a state file beside it shows where to";
-  return {};
-}
-
-} // namespace
-
 std::string no_unstable_mode(const Report& report)
 {
-  return no_mode_among(report, report.modes.unstable());
+  return no_oscillation_among(report, report.modes.unstable());
 }
 
 std::string no_mode_to_follow(const Report& report, const Scene& scene)
 {
-  return no_mode_among(report, followed_modes(report, scene));
+  return no_oscillation_among(report, followed_modes(report, scene));
 }
 
 Modes run_modes(Chain& chain)
@@ -151,7 +179,7 @@ Trajectory run_transient(const Chain& chain)
                    transient_start(chain.sliding(), chain.unstable(), settings), chain.model.probes);
 }
 
-FittedCycle run_cycle(const Chain& chain)
+FittedCycle run_cycle(Chain& chain)
 {
   const Scene& scene = chain.scene;
   FittedCycle result;
@@ -161,8 +189,43 @@ FittedCycle run_cycle(const Chain& chain)
   else if (!reason.empty())
     result.cycle = not_run<LimitCycle>(OutcomeKind::skipped, reason);
   else
+  {
+    const std::span<const ComplexMode> modes = chain.unstable().modes;
+    if (only_diverges(modes)) pace(chain, modes.front().growth_rate());
     result = find_fitted_cycle(cycle_problem(chain), {scene.fidelity, scene.accuracy}, chain.options.cycle);
+  }
   return result;
+}
+
+bool settles_on_another_cycle(const Report& report)
+{
+  const SettledMotion& settled = report.settled;
+  if (settled.outcome.kind != OutcomeKind::settled || settled.examined.verdict.kind != MotionKind::periodic)
+    return false;
+  const LimitCycle& cycle = report.cycle;
+  const ReachedMotion found{
+      ReachedKind::steady, {cycle.measured.mean_fluctuating_energy, 0}, {1 / cycle.orbit.period, 0}, {}};
+  const ReachedMotion seen{
+      ReachedKind::steady, settled.fluctuating_energy, {1 / period_of(settled.examined.base), 0}, {}};
+  return !agree(found, seen);
+}
+
+FittedCycle run_cycle_from_settled(Chain& chain)
+{
+  const SettledMotion& settled = chain.report.settled;
+  const double period = period_of(settled.examined.base);
+  chain.carried = CarriedCycle{copy_of(settled.end), period};
+  if (chain.paced) pace(chain, two_pi / period);
+  CycleSettings settings = chain.scene.cycle;
+  if (settings.steps_per_period > 0) // the steps that it was seen at
+    settings.steps_per_period =
+        static_cast<int>(std::lround(period / settled.period * static_cast<double>(settled.steps_per_period)));
+  const CycleProblem problem = cycle_problem(chain);
+  FittedCycle found = find_fitted_cycle(with_settings(problem, settings), {chain.scene.fidelity, chain.scene.accuracy},
+                                        chain.options.cycle);
+  found.cycle.convergence.periods +=
+      chain.report.cycle.convergence.periods + static_cast<int>(settled.examined.periods());
+  return found;
 }
 
 CoarseStart run_coarse(Chain& fine)
@@ -206,6 +269,14 @@ SettledMotion run_settled(const Chain& chain)
   if (succeeded(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::skipped, "the cycle is the answer");
   if (!motion_goes_on(cycle)) return not_run<SettledMotion>(OutcomeKind::skipped, "there is no motion to go on from");
   return find_settled_motion(cycle_problem(chain), cycle, chain.options.settled);
+}
+
+void take_cycle_as_answer(Report& report, FittedCycle found)
+{
+  if (found.cycle.outcome.kind != OutcomeKind::converged) return;
+  report.cycle = std::move(found.cycle);
+  report.fidelity = std::move(found.fidelity);
+  report.settled = not_run<SettledMotion>(OutcomeKind::skipped, "it is the cycle, which is the answer");
 }
 
 Attractors run_attractors(const Chain& chain)

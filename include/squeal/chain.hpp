@@ -12,6 +12,15 @@ namespace squeal
 /// slowest: a cycle may attract beside a stable equilibrium.
 std::span<const ComplexMode> followed_modes(const Report& report, const Scene& scene);
 
+/// What the search for a cycle follows where the equilibrium diverges without oscillating: the mode that diverges, with
+/// a frequency that it does not have. A motion that has left the equilibrium far behind is paced by it.
+struct PacedDivergence
+{
+  ComplexMode mode; // its eigenvalue is imaginary
+  Estimate none;    // of no amplitude
+  State start;      // beside the equilibrium
+};
+
 /// The chain so far. Stages never call the next one: what they hand on stands here.
 struct Chain
 {
@@ -20,12 +29,17 @@ struct Chain
   const Model& model;
   Report& report;
   std::optional<LinearisedSliding> linearised; // once there is an equilibrium and a stage needs it
-  std::optional<State> cycle_file{};     // the state that the scene starts the cycle's search from, if it is a file
-  const CoarseModel* coarse = nullptr;   // of cycle.start = "coarse"
-  std::optional<CarriedCycle> carried{}; // its cycle, on this mesh
+  std::optional<State> cycle_file{};      // the state that the scene starts the cycle's search from, if it is a file
+  const CoarseModel* coarse = nullptr;    // of cycle.start = "coarse"
+  std::optional<CarriedCycle> carried{};  // its cycle, on this mesh; or that on which the motion has settled
+  std::optional<PacedDivergence> paced{}; // where no unstable mode oscillates, once a cycle is sought
 
   SlidingEquilibrium sliding() const { return {model.structure, model.interface, report.equilibrium}; }
-  UnstableModes unstable() const { return {followed_modes(report, scene), report.estimates}; }
+  UnstableModes unstable() const
+  {
+    if (paced) return {std::span(&paced->mode, 1), std::span(&paced->none, 1)};
+    return {followed_modes(report, scene), report.estimates};
+  }
 };
 
 /// The result of a stage that did not run, with the reason.
@@ -57,8 +71,18 @@ Trajectory run_transient(const Chain& chain);
 /// The whole chain on the coarse mesh, to a cycle at the steps a period with which this mesh's search begins.
 CoarseStart run_coarse(Chain& fine);
 
-/// The cycle on the model that the scene's accuracy allows.
-FittedCycle run_cycle(const Chain& chain);
+/// The cycle on the model that the scene's accuracy allows. Where no unstable mode oscillates, the search starts beside
+/// the equilibrium.
+FittedCycle run_cycle(Chain& chain);
+
+/// Whether the motion has settled on a cycle that is not the one found.
+bool settles_on_another_cycle(const Report& report);
+
+/// The cycle from the end of the settled motion.
+FittedCycle run_cycle_from_settled(Chain& chain);
+
+/// Where it has converged, it answers in the settled motion's stead. Not collective.
+void take_cycle_as_answer(Report& report, FittedCycle found);
 
 /// What the motion settles on where no cycle attracts.
 SettledMotion run_settled(const Chain& chain);

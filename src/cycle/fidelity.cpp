@@ -135,7 +135,8 @@ CycleSettings chosen_settings(const CycleProblem& problem, CycleModel model)
   const bool chooses = model == CycleModel::automatic;
   if (settings.tolerance == 0) settings.tolerance = plain_tolerance;
   if (settings.steps_per_period > 0) return settings;
-  settings.steps_per_period = chooses ? first_steps : plain_steps;
+  const double turns = problem.given_period * problem.unstable.modes.front().frequency_hz(); // of the mode, if given
+  settings.steps_per_period = (chooses ? first_steps : plain_steps) * std::max(1, static_cast<int>(std::lround(turns)));
   while (chooses && settings.steps_per_period < most_steps &&
          !step_refusal_of(problem, settings.steps_per_period).empty())
     settings.steps_per_period *= 2;

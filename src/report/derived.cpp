@@ -13,6 +13,7 @@ StepBias bias_of(const Report& report, std::complex<double> discrete)
 {
   if (report.modes.modes.empty()) return {};
   const std::complex<double> lambda = report.modes.modes.front().lambda;
+  if (lambda.imag() == 0) return {};
   return {discrete.real() / lambda.real() - 1, discrete.imag() / lambda.imag() - 1};
 }
 

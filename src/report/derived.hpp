@@ -16,7 +16,7 @@ struct NormalForces
 
 NormalForces normal_forces(const Equilibrium& equilibrium);
 
-/// What theta and the step do to the followed mode by the theory of the scheme, relative; NaN without a mode.
+/// What theta and the step do to the followed mode by the theory of the scheme, relative; NaN where none oscillates.
 struct StepBias
 {
   double growth = std::numeric_limits<double>::quiet_NaN();

@@ -52,8 +52,11 @@ std::string beside_mode(const Report& report, double frequency_hz)
 std::string stability_text(const Multipliers& multipliers)
 {
   if (multipliers.values.empty()) return ", whether it lasts was not examined";
-  const std::string largest =
-      format(" (largest multiplier %.4f +- %.0e)", std::abs(multipliers.values.front()), multipliers.errors.front());
+  const double modulus = std::abs(multipliers.values.front()), error = multipliers.errors.front();
+  std::string largest = format(" (largest multiplier %.4f +- %.0e", modulus, error);
+  const double bound = largest_upper_bound(multipliers);
+  if (modulus + error >= 1 && bound < 1) largest += format(", at most %.6f", bound);
+  largest += ")";
   switch (multipliers.stability)
   {
   case Stability::stable:

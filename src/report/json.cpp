@@ -147,11 +147,9 @@ Json newton_list(const std::vector<NewtonRecord>& records)
 
 Json multiplier_entry(const Multipliers& multipliers)
 {
-  Json entry = {{"stability", word(multipliers.stability)},
-                {"method", word(multipliers.method)},
-                {"trivial_error", multipliers.trivial_error},
-                {"periods_integrated", multipliers.periods},
-                {"values", multiplier_list(multipliers)}};
+  Json entry = {{"stability", word(multipliers.stability)},        {"method", word(multipliers.method)},
+                {"trivial_error", multipliers.trivial_error},      {"periods_integrated", multipliers.periods},
+                {"upper_bound", largest_upper_bound(multipliers)}, {"values", multiplier_list(multipliers)}};
   if (multipliers.crossing != Crossing::none) entry["crossing"] = word(multipliers.crossing);
   if (!multipliers.refusal.empty()) entry["refusal"] = multipliers.refusal;
   for (const SeenGrowth& seen : multipliers.seen)

@@ -146,7 +146,8 @@ std::string cycle_text(const Report& report, const Scene& scene)
                            seen.periods, 100 * seen.part, seen.growth, seen.error));
   if (cycle.outcome.kind != OutcomeKind::converged) return text; // the figures of no cycle would mislead
   text += row("", format("period %.10g s, frequency %.8g Hz", cycle.orbit.period, 1 / cycle.orbit.period));
-  text += row("", format("the step's own error of the period: about %+.1e", -cycle_bias(report).frequency));
+  if (const double bias = cycle_bias(report).frequency; std::isfinite(bias))
+    text += row("", format("the step's own error of the period: about %+.1e", -bias));
   text += row("", format("mean energy %.7g J, fluctuating %.7g J", cycle.measured.mean_energy,
                          cycle.measured.mean_fluctuating_energy));
   text +=

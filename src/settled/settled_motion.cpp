@@ -179,6 +179,7 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
                             }};
   motion.examined = examine_motion(flow, sampler, keeper, state, motion.period, options);
   name_means(motion, problem.sliding.interface.pairs);
+  motion.end = {copy_of(displacement(state)), copy_of(velocity(state)), motion.history.time.back(), map.reactions};
   const std::size_t windows = motion.examined.periods(), samples = motion.shapes.squares.size() / windows;
   keep_strongest(motion.shapes, motion.examined.discarded % windows * samples);
   motion.step_error =

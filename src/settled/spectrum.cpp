@@ -117,4 +117,9 @@ BaseFrequencies base_frequencies(const Spectrum& spectrum, double first)
   return base;
 }
 
+double period_of(const BaseFrequencies& base)
+{
+  return std::max(base.closes_after, 1) / base.first;
+}
+
 } // namespace squeal

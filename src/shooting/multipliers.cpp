@@ -103,6 +103,13 @@ MultiplierMethod chosen_method(const ShootingOptions& options, const Flow& flow,
 
 } // namespace
 
+double largest_upper_bound(const Multipliers& multipliers)
+{
+  double largest = multipliers.values.empty() ? std::numeric_limits<double>::quiet_NaN() : 0;
+  for (std::size_t i = 0; i < multipliers.values.size(); ++i) largest = std::max(largest, multipliers.upper_bound(i));
+  return largest;
+}
+
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable)
 {

@@ -4,6 +4,7 @@ import math
 import re
 
 import pytest
+from scipy.integrate import solve_ivp
 from conftest import INPUTS
 from models import write_block_on_plate
 
@@ -118,6 +119,43 @@ def test_a_slider_that_diverges_hides_no_squeal_beside_it(squeal, tmp_path):
     assert modes["modes"][1]["growth_rate"] == pytest.approx(-c / 2 + math.sqrt(c**2 / 4 - 1), rel=1e-9)  # of eigenvalues
     assert modes["modes"][1]["growth_rate"] > 10 * modes["modes"][0]["growth_rate"] > 0
     assert run.report["cycle"]["outcome"] not in ("skipped", "converged")  # nothing that leaves the slider at rest lasts
+
+
+def stick_slip_period(speed, static=0.8, sliding=0.3, decay=0.1, damping=0.02, force=2.0):
+    """[s] of the slider by events: it sticks until its spring and dashpot take the static friction, and slips, in one
+    direction, until it has the belt's speed again."""
+    def pull(_, state):
+        x, v = state
+        slip = speed - v
+        return [v, -damping * v - x + force * (sliding + (static - sliding) * math.exp(-slip / decay))]
+
+    def catches_up(_, state):
+        return speed - state[1]
+
+    catches_up.terminal, catches_up.direction = True, -1
+    leaves = static * force - damping * speed
+    slip = solve_ivp(pull, [0, 100], [leaves + 1e-9, speed - 1e-7], events=catches_up, rtol=1e-10, atol=1e-12)
+    return slip.t[-1] + (leaves - slip.y[0, -1]) / speed
+
+
+@pytest.mark.parametrize("ranks, speed, arguments", [(1, 0.05, []), (2, 0.15, ["cycle.steps_per_period=60"])])
+def test_an_equilibrium_that_only_diverges_leads_to_stick_slip(converged, tmp_path, ranks, speed, arguments):
+    """No mode gives a period to shoot with: the motion that has settled does. Within the error of the step that is
+    reported, or 6e-4 where the steps are given: at 2000 and 460 a period 2e-5 and 4e-4 are seen."""
+    text = (INPUTS / "oscillator" / "scene.toml").read_text()
+    scene = tmp_path / "scene.toml"
+    law = SLIDER.replace("[friction]", "[friction]\ncoefficient = 0.3").replace("[0.08", f"[{speed}")
+    probe = text[text.index("[[probe]]"):text.rindex("[[probe]]")].replace('"pad"', '"slider"')
+    scene.write_text(f'title = "slider"\n{law}\n[modes]\nband = 1\n\n[cycle]\ntolerance = 1e-7\n\n{probe}')
+    settings = [part for setting in arguments for part in ("--set", setting)]
+    run = converged(scene, *settings, ranks=ranks)
+    report = run.report
+    assert [mode["frequency_hz"] for mode in report["modes"]["modes"][:2]] == [0, 0]
+    cycle = report["cycle"]
+    assert cycle["outcome"] == "converged" and cycle["multipliers"]["stability"] == "stable"
+    assert report["heard"].startswith("squeals at") and "nan" not in run.printed
+    error = 6e-4 if arguments else report["fidelity"]["error_estimates"]["step_frequency"]
+    assert error <= 1e-3 and cycle["period"] == pytest.approx(stick_slip_period(speed), rel=error)
 
 
 def amplitude_of(converged, *arguments):

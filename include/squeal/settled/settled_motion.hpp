@@ -22,6 +22,7 @@ struct SettledMotion
   MeanValue damping_power, contact_power, load_power; // [W]
   MeanValue open_fraction, stick_fraction, slip_fraction;
   std::vector<MeanValue> peak_to_peak; // [m] within a period, of each probe
+  State end;                           // of the last period
   History history;                     // of all periods
   MotionShapes shapes;                 // of all periods, the strongest of those that were stationary
   int sampled_steps = 1;               // between two samples of the shapes

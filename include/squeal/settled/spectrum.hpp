@@ -39,4 +39,7 @@ BaseFrequencies base_frequencies(const Spectrum& spectrum);
 /// The same with the first frequency given.
 BaseFrequencies base_frequencies(const Spectrum& spectrum, double first);
 
+/// [s] after which a motion of these comes back; that of the first where the second is no fraction of it.
+double period_of(const BaseFrequencies& base);
+
 } // namespace squeal

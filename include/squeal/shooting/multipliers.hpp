@@ -79,6 +79,10 @@ struct Multipliers
   double upper_bound(std::size_t i) const { return upper.empty() ? std::abs(values[i]) + errors[i] : upper[i]; }
 };
 
+/// Of the moduli of all; NaN where none was examined. An orbit is stable where it is below 1, though the bar of a value
+/// that the grid of time lowers may reach across.
+double largest_upper_bound(const Multipliers& multipliers);
+
 /// The motion of the largest multiplier: Re(z (real + i imaginary)), z multiplied by it in every period. No other phase
 /// makes the real part longer. Its energy norm is 1.
 struct FastestMotion
