@@ -17,6 +17,11 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
 {
   const MeanValue decay = decay_of_spread(energies);
   const double length = static_cast<double>(energies.size());
+  if (base.second == 0)
+    return {
+        MotionKind::undecided, "quasi-periodic and weakly irregular",
+        "neither the probe that swings most nor the normal force shows a second frequency: a [[probe]] elsewhere, or "
+        "more periods (-settled_periods)"};
   if (base.explained < 0.8)
     return {MotionKind::undecided, "quasi-periodic and weakly irregular",
             format("%.0f %% of the side bands are at combinations of two frequencies: more periods would decide "
