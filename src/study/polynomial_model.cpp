@@ -118,7 +118,8 @@ PolynomialModel::PolynomialModel(const RobustnessProblem& problem) : problem_(pr
   {
     const UncertainNumber& number = problem.numbers[i];
     centre_.push_back(quantile(number, 0.5));
-    scale_.push_back((quantile(number, 0.99) - quantile(number, 0.01)) / 2);
+    const double spread = (quantile(number, 0.99) - quantile(number, 0.01)) / 2;
+    scale_.push_back(std::min(spread, centre_.back() - quantile(number, 0))); // x = -1 is a scene: skewed ones end near
     if (!is_friction(number.key)) places.push_back(i);
   }
   reference_ = model_at(centre_);

@@ -121,7 +121,7 @@ public:
     return values;
   }
 
-  /// The mode that an unstable one of a sample shares most with.
+  /// The mode that an unstable one of a sample shares most with, and whose frequency is not far from its own.
   int nearest(const ReducedMatrices& at, const TwoSidedPair& pair) const
   {
     const Complex own = form(at, pair, pair);
@@ -131,14 +131,32 @@ public:
     {
       const double share = std::abs(form(at, pairs_[i], pair) * form(at, pair, pairs_[i]) / (own_[i] * own));
       const double folded = share > 1 ? 1 / share : share;
-      if (!(folded > most)) continue;
-      most = folded;
+      // Where only one of two shapes moves with the pairs, T may show them alike. To be one mode, its stiffness over
+      // its mass would have to have changed by so much.
+      const double ratio = std::norm(pairs_[i].lambda) / std::norm(pair.lambda),
+                   alike = folded * std::min(ratio, 1 / ratio);
+      if (!(alike > most)) continue;
+      most = alike;
       result = static_cast<int>(i);
     }
-    return result;
+    return result == unmatched ? unmatched : unstable_partner(result);
   }
 
 private:
+  /// Of two modes locked in at one frequency, of which one grows: that one, whichever it is of the two.
+  int unstable_partner(int mode) const
+  {
+    const Complex own = pairs_[static_cast<std::size_t>(mode)].lambda;
+    const auto locked =
+        std::ranges::find_if(pairs_,
+                             [own](const TwoSidedPair& other)
+                             {
+                               const Complex apart = other.lambda - own;
+                               return is_unstable(other.lambda) && std::abs(apart.imag()) < std::abs(apart.real());
+                             });
+    return is_unstable(own) || locked == pairs_.end() ? mode : static_cast<int>(locked - pairs_.begin());
+  }
+
   /// left'((lambda + lambda') M + C) right, of T alone: points have different pairs open
   static Complex form(const ReducedMatrices& at, const TwoSidedPair& a, const TwoSidedPair& b)
   {

@@ -57,6 +57,53 @@ def test_the_checks_agree(friction):
     assert robustness["wrong_verdicts"] == 0 and robustness["growth_error"] < 1e-9 and len(robustness["checks"]) == 10
 
 
+def test_a_skewed_number_is_taken_as_it_is(converged):
+    """Its median less half its spread is below zero, where no sample lies."""
+    spring = "{key='spring.2.stiffness', distribution='lognormal', mean=0.2, deviation=0.15}"
+    run = converged(*OSCILLATOR, *random(FRICTION, spring, samples=100, checks=10), ranks=1)
+    robustness = run.report["robustness"]
+    assert robustness["wrong_verdicts"] == 0 and robustness["growth_error"] < 1e-9
+
+
+POINTS = """title = "a pad on a caliper, on a disc"
+point = [{name = "pad", at = [0, 0, 0], mass = 0.4, free = "x y"}, {name = "disc", at = [0, 0, 0], mass = 1.3, free = "x y"},
+         {name = "caliper", at = [0, 0.1, 0], mass = 0.2, free = "x y"}]
+spring = [{from = "pad", to = "caliper", direction = [1, -1, 0], stiffness = 3e6, damping = 5},
+          {from = "pad", to = "ground", direction = "x", stiffness = 1.35e7, damping = 10},
+          {from = "pad", to = "ground", direction = "y", stiffness = 9e6, damping = 8},
+          {from = "caliper", to = "ground", direction = "y", stiffness = 1e6, damping = 1},
+          {from = "caliper", to = "ground", direction = "x", stiffness = 4e6, damping = 2},
+          {from = "disc", to = "ground", direction = "y", stiffness = 1.5e7, damping = 4},
+          {from = "disc", to = "ground", direction = "x", stiffness = 2e7, damping = 4}]
+force = [{on = "pad", vector = [3, -200, 0]}, {on = "caliper", vector = [0, -40, 0]}]
+friction = {coefficient = 0.6, static_coefficient = 0.8, decay_speed = 2}
+modes = {band = 5000}
+
+[[contact]]
+rotor = "disc"
+stator = "pad"
+normal = [0, 1, 0]
+tangents = [[1, 0, 0]]
+velocity = [1.5, 0, 0]
+compliance = 2e-9
+"""
+
+
+def test_a_mode_keeps_its_number_where_shapes_alone_do_not_tell(converged, tmp_path):
+    """The pairs' compliance shows a mode at 4351 Hz as it shows one at 624 Hz, which alone is ever unstable."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(POINTS)
+    numbers = ["{key='friction.coefficient', deviation=0.08}",
+               "{key='contact.0.compliance', distribution='uniform', from=1e-9, to=8e-9}",
+               "{key='contact.0.velocity.0', distribution='uniform', from=0.5, to=3}",
+               "{key='spring.2.stiffness', distribution='lognormal', deviation=1e6}"]
+    run = converged(scene, *random(*numbers, samples=1000, checks=5), ranks=1)
+    modes = run.report["robustness"]["modes"]
+    assert sum(mode["unstable_samples"] for mode in modes) > 100
+    for mode in modes:
+        assert abs(mode["median_frequency_hz"] / mode["frequency_hz_50"] - 1) < 0.1
+
+
 def test_files_hold_the_same(friction):
     rows = rows_of(friction)
     with h5py.File(friction.output / "history.h5") as file:
