@@ -50,18 +50,39 @@ void append(const std::vector<double>& numbers, std::vector<double>& list)
   list.insert(list.end(), numbers.begin(), numbers.end());
 }
 
+void append_modes(const std::vector<SweptMode>& modes, std::vector<double>& list)
+{
+  list.push_back(static_cast<double>(modes.size()));
+  for (const SweptMode& mode : modes)
+    list.insert(list.end(), {mode.lambda.real(), mode.lambda.imag(), mode.backward_error,
+                             static_cast<double>(mode.track), mode.mac, static_cast<double>(mode.subspace)});
+}
+
+std::vector<SweptMode> modes_from(List& list)
+{
+  std::vector<SweptMode> modes(static_cast<std::size_t>(list.integer()));
+  for (SweptMode& mode : modes)
+  {
+    const double real = list.number(), imaginary = list.number();
+    mode.lambda = {real, imaginary};
+    mode.backward_error = list.number();
+    mode.track = list.integer();
+    mode.mac = list.number();
+    mode.subspace = list.integer();
+  }
+  return modes;
+}
+
 void append(const SweepPoint& point, std::vector<double>& list)
 {
   append(point.values, list);
-  for (const int value :
-       {static_cast<int>(point.reversed), static_cast<int>(point.inserted), static_cast<int>(point.outcome.kind),
-        point.closed, point.unstable, static_cast<int>(point.modes.size())})
+  for (const int value : {static_cast<int>(point.reversed), static_cast<int>(point.inserted),
+                          static_cast<int>(point.outcome.kind), point.closed, point.unstable})
     list.push_back(value);
   list.push_back(point.outcome.residual);
   append({point.outcome.reason.begin(), point.outcome.reason.end()}, list);
-  for (const SweptMode& mode : point.modes)
-    list.insert(list.end(), {mode.lambda.real(), mode.lambda.imag(), mode.backward_error,
-                             static_cast<double>(mode.track), mode.mac, static_cast<double>(mode.subspace)});
+  append_modes(point.modes, list);
+  append_modes(point.beyond, list);
 }
 
 SweepPoint point_from(List& list)
@@ -73,18 +94,10 @@ SweepPoint point_from(List& list)
   point.outcome.kind = static_cast<OutcomeKind>(list.integer());
   point.closed = list.integer();
   point.unstable = list.integer();
-  point.modes.resize(static_cast<std::size_t>(list.integer()));
   point.outcome.residual = list.number();
   point.outcome.reason = list.text();
-  for (SweptMode& mode : point.modes)
-  {
-    const double real = list.number(), imaginary = list.number();
-    mode.lambda = {real, imaginary};
-    mode.backward_error = list.number();
-    mode.track = list.integer();
-    mode.mac = list.number();
-    mode.subspace = list.integer();
-  }
+  point.modes = modes_from(list);
+  point.beyond = modes_from(list);
   return point;
 }
 

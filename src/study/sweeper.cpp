@@ -128,11 +128,13 @@ private:
     if (!again) return again;
     again->tracks.assign(again->modes.pairs.size(), -1);
     std::vector<std::complex<double>> known, found;
-    for (const SweptMode& mode : point.modes) known.push_back(mode.lambda);
+    std::vector<int> tracks;
+    for (const auto* modes : {&point.modes, &point.beyond})
+      for (const SweptMode& mode : *modes) known.push_back(mode.lambda), tracks.push_back(mode.track);
     for (const TwoSidedPair& pair : again->modes.pairs) found.push_back(pair.lambda);
     if (known.size() > found.size()) return again;
     const std::vector<std::size_t> places = nearest_places(known, found);
-    for (std::size_t i = 0; i < places.size(); ++i) again->tracks[places[i]] = point.modes[i].track;
+    for (std::size_t i = 0; i < places.size(); ++i) again->tracks[places[i]] = tracks[i];
     return again;
   }
 
@@ -273,11 +275,12 @@ private:
     for (std::size_t k = 0; k < now.modes.pairs.size(); ++k)
     {
       const TwoSidedPair& pair = now.modes.pairs[k];
-      if (!in_band(pair, problem_.modes.band)) continue;
-      point.unstable += is_unstable(pair.lambda);
+      const bool inside = in_band(pair, problem_.modes.band);
+      point.unstable += inside && is_unstable(pair.lambda);
       const Match match = matches.empty() ? Match{0, 1, 1} : matches[k];
-      point.modes.push_back({pair.lambda, now.modes.errors[k], now.tracks.empty() ? -1 : now.tracks[k],
-                             match.to >= 0 ? match.mac : 1, match.subspace});
+      (inside ? point.modes : point.beyond)
+          .push_back({pair.lambda, now.modes.errors[k], now.tracks.empty() ? -1 : now.tracks[k],
+                      match.to >= 0 ? match.mac : 1, match.subspace});
     }
     if (point.outcome.kind == OutcomeKind::converged)
       sweep_.outcome.residual = std::max(sweep_.outcome.residual, point.outcome.residual);

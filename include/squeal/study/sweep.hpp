@@ -61,6 +61,7 @@ struct SweepPoint
   int closed = 0;                      // pairs
   int unstable = 0;                    // modes in the band
   std::vector<SweptMode> modes;        // in the band, falling growth rate
+  std::vector<SweptMode> beyond{};     // its end, by a little: they may come back
   std::optional<SweptMotion> motion{}; // where it was sought
 };
 
