@@ -229,15 +229,16 @@ double memory_of_step(const Sizes& sizes, bool in_factor)
 }
 
 /// A reduced model has at most a shape for each pair, and those of the modes. Two may be held: that of the start, which
-/// takes no more than its part of what is `free`, and that of the multipliers. The latter is done without where it does
-/// not fit. The tangent needs a whole W.
+/// takes no more than its part of what is `free`, and that of the multipliers, of fewer shapes. The latter is done
+/// without where it does not fit. The tangent needs a whole W.
 double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, bool in_factor, double free)
 {
   const double least = memory_of_step(sizes, in_factor) + (in_factor ? sizes.condensed_operator() : 0) +
                        number * vectors_of_shooting * sizes.dofs;
-  const double reduced = memory_of_reduction(sizes.dofs, sizes.pairs + vectors_of_modes_kept);
-  const double start = fidelity == CycleModel::full ? 0 : std::min(reduced, memory_for_shapes(free));
-  return least + start + reduced <= free ? least + start + reduced : least + start;
+  const auto shapes = [&](double pairs) { return memory_of_reduction(sizes.dofs, pairs + vectors_of_modes_kept); };
+  const double start = fidelity == CycleModel::full ? 0 : std::min(shapes(sizes.pairs), memory_for_shapes(free));
+  const double multipliers = shapes(std::min<double>(sizes.pairs, attachments_of_multipliers));
+  return least + start + multipliers <= free ? least + start + multipliers : least + start;
 }
 
 /// What the points of a sweep and the samples of a robustness study are laid out in. Their modes come on top.
@@ -354,7 +355,8 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
     add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient),
         made_factors * sizes.factor.operations / speed.operations +
             steps_of_transient(scene.transient) * forecast.step_seconds);
-  const double cycle = memory_of_cycle(sizes, scene.fidelity, in_factor, free);
+  const bool as_full = scene.fidelity == CycleModel::automatic && scene.cycle.start.kind == CycleStartKind::coarse;
+  const double cycle = memory_of_cycle(sizes, as_full ? CycleModel::full : scene.fidelity, in_factor, free);
   if (scene.cycle.enabled) add(Stage::cycle, cycle, seconds_of_cycle(sizes, scene, forecast.step_seconds, speed));
   if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)) + (motions_of(scene) > 0 ? cycle : 0));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));

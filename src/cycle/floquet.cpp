@@ -221,7 +221,7 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   const std::size_t rows = PairRows<std::size_t>(interface.directions).rows_of(roles.active.size());
   const bool follow = slide && rows > 150; // friction, the normal force
   const RealModes beyond = modes_beyond_band(problem);
-  const PetscInt taken = options.attachments > 0 ? options.attachments : all_attachments;
+  const PetscInt taken = options.attachments > 0 ? options.attachments : attachments_of_multipliers;
   const std::size_t forces = std::min(follow ? roles.active.size() : rows, static_cast<std::size_t>(taken));
   missing = lack_of_memory(problem.sliding.structure,
                            static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces));
