@@ -1,5 +1,7 @@
 """Runs the squeal program as a user does: mpirun, a scene file, its output folder."""
 
+import contextlib
+import fcntl
 import importlib.machinery
 import importlib.util
 import json
@@ -9,6 +11,8 @@ import shutil
 import struct
 import subprocess
 import sys
+import tempfile
+import time
 from pathlib import Path
 
 import pytest
@@ -30,6 +34,32 @@ def load_tool(name):
 NO_WAIT = {"OMPI_MCA_odls_base_sigkill_timeout": "0"}
 
 
+@contextlib.contextmanager
+def cores(count):
+    """Waits for as many cores that no other test takes, of those that the machine has. Ranks wait for each other at every
+    message: beside a run that leaves one of them no core, each message takes a slice of the scheduler's, milliseconds."""
+    folder = Path(tempfile.gettempdir()) / f"squeal_cores_{os.getuid()}"
+    folder.mkdir(exist_ok=True)
+    there = len(os.sched_getaffinity(0))
+    with contextlib.ExitStack() as taken:
+        # one at a time gathers its cores, so that no two wait for what the other has
+        with open(folder / "gathering", "w") as gathering:
+            fcntl.flock(gathering, fcntl.LOCK_EX)
+            free = {number: taken.enter_context(open(folder / str(number), "w")) for number in range(there)}
+            missing = min(count, there)
+            while missing:
+                for number, core in list(free.items()):
+                    with contextlib.suppress(BlockingIOError):
+                        fcntl.flock(core, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                        del free[number]
+                        missing -= 1
+                        if not missing:
+                            break
+                else:
+                    time.sleep(0.01)
+        yield
+
+
 class Run:
     """One finished run: exit code, what it printed, and report.json when there is one."""
 
@@ -38,7 +68,8 @@ class Run:
         self.output = Path(folder)
         # The caller's arguments come last, so that its own --output wins.
         command += ["--output", str(folder), *map(str, arguments)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=500, env={**os.environ, **NO_WAIT})
+        with cores(ranks):
+            done = subprocess.run(command, capture_output=True, text=True, timeout=500, env={**os.environ, **NO_WAIT})
         self.code, self.printed, self.errors = done.returncode, done.stdout, done.stderr
 
     @property
