@@ -10,7 +10,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from conftest import INPUTS, ROOT, Run
+from conftest import INPUTS, ROOT, Run, cores
 from test_basin import two_oscillators
 from test_mesher import brick_scene
 
@@ -18,7 +18,8 @@ OSCILLATOR = INPUTS / "oscillator" / "scene.toml"
 ENDLESS = ["--set", "transient.periods=1e5"]
 # a transient and the free periods and Newton steps of a cycle, about a second each
 TRANSIENT_AND_CYCLE = ["--set", "transient.periods=100", "--set", "fidelity=full", "--set", "cycle.steps_per_period=2000"]
-PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "damping.beta=6e-7"]
+WITH_VERDICT = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "damping.beta=6e-7"]
+PIN = [*WITH_VERDICT, "-cycle_multipliers", "0"]  # the verdict takes as long as the cycle, and longer on ranks
 OF_THE_CLOCK = {"run", "timings", "processor_seconds", "exit_code", "memory_bytes"}
 
 
@@ -27,6 +28,22 @@ def start(output, *arguments, ranks=1, scene=OSCILLATOR, stdout=subprocess.PIPE)
     command = [*launcher, os.environ["SQUEAL"], scene, "--output", output, *arguments]
     return subprocess.Popen([str(word) for word in command], stdout=stdout, stderr=subprocess.PIPE, text=True,
                             env=os.environ)
+
+
+ON_TWO_RANKS = ("test_the_wrapper_passes_signals_on", "test_a_terminal_that_closes_ends_two_ranks_in_order",
+                "test_two_ranks_go_on_too", "test_ranks_end_with_their_launcher")
+
+
+@pytest.fixture(autouse=True)
+def own_cores(request):
+    """Of the ranks that a test starts: it waits for signals and kills, which must not wait for other tests."""
+    given = request.node.callspec.params if hasattr(request.node, "callspec") else {}
+    if "where" in given:
+        ranks = UNDER_WAY[given["where"]][0]
+    else:
+        ranks = given.get("ranks", 2 if request.node.name in ON_TWO_RANKS else 1)
+    with cores(ranks):
+        yield
 
 
 def wait_for(condition, seconds=60):
@@ -67,7 +84,7 @@ def assert_same_results(one, other):
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_repeats_are_bitwise_equal(converged, ranks):
-    one, other = (converged(*PIN, ranks=ranks).output for _ in range(2))
+    one, other = (converged(*(WITH_VERDICT if ranks == 2 else PIN), ranks=ranks).output for _ in range(2))
     assert_same_results(one, other)
 
 
@@ -109,7 +126,7 @@ UNDER_WAY = {  # where a library or another process is at work: ranks, scene and
     "basis of the samples": (1, [*MODES_ONLY, "--set", "robustness.samples=1000", "--set", "uncertain=[{key='friction.coefficient', "
                                  "distribution='uniform', from=0.4, to=0.6}]"], "robustness …"),
     # each rank follows it by itself, so that none may wait for another
-    "branch on a reduced model": (2, [*PIN, "--set", "cycle.steps_per_period=32", "--set", "transient.enabled=false", "--set",
+    "branch on a reduced model": (2, [*WITH_VERDICT, "--set", "cycle.steps_per_period=32", "--set", "transient.enabled=false", "--set",
                                       "branch={key='friction.coefficient', from=0.29, to=0.32, points=600}"], "branch   "),
 }
 
@@ -194,7 +211,7 @@ def test_a_killed_run_goes_on_to_the_straight_runs_numbers(straight, tmp_path, s
 
 STAGES = {  # scene and arguments, what the log of the run or the checkpoints show when it is killed, what the restart says
     "modes": ([OSCILLATOR, *TRANSIENT_AND_CYCLE], "transient", "of the checkpoint"),
-    "finer steps": ([*PIN, "--set", "cycle.steps_per_period=0", "--set", "accuracy=5e-5"], "cycle, finer steps",
+    "finer steps": ([*WITH_VERDICT, "--set", "cycle.steps_per_period=0", "--set", "accuracy=5e-5"], "cycle, finer steps",
                     "of the checkpoint"),
     "settled": (["two oscillators"], "settled", "goes on from the checkpoint after"),
     "starts": ([OSCILLATOR, "--set", "transient.enabled=false", "--set", "cycle.starts=6", "--set",
