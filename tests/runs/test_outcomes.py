@@ -51,7 +51,7 @@ def read_state(file):
 def test_a_state_goes_on_at_any_number_of_ranks(converged, squeal, tmp_path):
     """From the saved cycle on 1 and 2 ranks: the same state afterwards, to what the contact tolerance leaves."""
     cycle = converged(*PIN, "--set", "cycle.steps_per_period=40", "--set", f"cycle.save_state={tmp_path}/cycle.state",
-                      ranks=1).report["cycle"]
+                      "-cycle_multipliers", "0", ranks=1).report["cycle"]
     ends = []
     for ranks in (1, 2):
         end = tmp_path / f"end{ranks}.state"
