@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import INPUTS, ROOT
+from conftest import INPUTS, ROOT, cores
 
 sys.path.insert(0, str(ROOT / "tools"))
 import squeal  # noqa: E402
@@ -15,9 +15,10 @@ COARSE = {"mesh.parameters.divisions": 2, "damping.beta": 6e-7, "cycle.steps_per
 
 @pytest.fixture(scope="module")
 def pin(tmp_path_factory):
-    return squeal.run(INPUTS / "pin_on_disc", COARSE | {"force.0.vector": [0, 0, -120], "cycle.enabled": True}, ranks=2,
-                      options=["-modes_shapes", "all", "-cycle_multipliers", "0", "-cycle_samples", "8"],
-                      output=tmp_path_factory.mktemp("pin"))
+    with cores(2):
+        return squeal.run(INPUTS / "pin_on_disc", COARSE | {"force.0.vector": [0, 0, -120], "cycle.enabled": True}, ranks=2,
+                          options=["-modes_shapes", "all", "-cycle_multipliers", "0", "-cycle_samples", "8"],
+                          output=tmp_path_factory.mktemp("pin"))
 
 
 def test_overrides_reach_the_run(pin):

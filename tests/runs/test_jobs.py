@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import time
 
-from conftest import INPUTS, ROOT
+from conftest import INPUTS, ROOT, cores
 
 
 def job(folder, name="mu_sweep.sh", wait=True, arguments=(), **knobs):
@@ -76,7 +76,8 @@ QUICK = [word for stage in ("modes", "estimate", "cycle") for word in ("--set", 
 
 
 def test_scaling_jobs_tabulate_and_draw(tmp_path):
-    run, printed, errors = job(tmp_path / "strong", "strong_scaling.sh", arguments=QUICK, COUNTS="1 2", **PIN)
+    with cores(2):
+        run, printed, errors = job(tmp_path / "strong", "strong_scaling.sh", arguments=QUICK, COUNTS="1 2", **PIN)
     assert run.returncode == 0, errors
     strong = columns_of(tmp_path / "strong")
     assert strong["ranks"] == ["1", "2"] and strong["dofs"] == ["2821", "2821"] and float(strong["whole run eff."][0]) == 1
@@ -84,8 +85,9 @@ def test_scaling_jobs_tabulate_and_draw(tmp_path):
     assert [r["model"]["ranks"] for r in reports] == [1, 2]
     t = [sum(r["timings"].values()) for r in reports]
     assert abs(float(strong["whole run eff."][1]) - t[0] / t[1] / 2) < 0.006  # of two decimals
-    run, printed, errors = job(tmp_path / "weak", "weak_scaling.sh", arguments=QUICK, COUNTS="1 2", PER_RANK="2",
-                               KEY="mesh.parameters.divisions", **PIN)
+    with cores(2):
+        run, printed, errors = job(tmp_path / "weak", "weak_scaling.sh", arguments=QUICK, COUNTS="1 2", PER_RANK="2",
+                                   KEY="mesh.parameters.divisions", **PIN)
     assert run.returncode == 0, errors
     weak = columns_of(tmp_path / "weak")
     assert weak["dofs"][1] == "2821" and int(weak["dofs"][0]) < 1000
@@ -95,7 +97,8 @@ def test_scaling_jobs_tabulate_and_draw(tmp_path):
 
 def test_many_runs_go_side_by_side_and_skip_those_that_are_done(tmp_path):
     knobs = {"KEY": "friction.coefficient", "VALUES": "0.1 0.2 0.3", "SIDE": "2", **PIN}
-    run, printed, errors = job(tmp_path, "many_runs.sh", arguments=QUICK, **knobs)
+    with cores(2):
+        run, printed, errors = job(tmp_path, "many_runs.sh", arguments=QUICK, **knobs)
     assert run.returncode == 0, errors
     assert columns_of(tmp_path)["value"] == ["0.1", "0.2", "0.3"]
     times = {line.split()[0]: tuple(map(float, line.split()[1:])) for line in (tmp_path / "times.txt").read_text().splitlines()}

@@ -9,7 +9,7 @@ import subprocess
 import time
 
 import pytest
-from conftest import INPUTS, ROOT
+from conftest import INPUTS, ROOT, cores
 
 SCENE = INPUTS / "oscillator" / "scene.toml"
 SHORT = ["--set", "transient.periods=5", "--set", "cycle.enabled=false"]
@@ -210,7 +210,8 @@ def test_a_reader_that_is_gone_costs_no_results(tmp_path, ranks):
     os.close(read)
     output = tmp_path / "results"
     launcher = [os.environ.get("MPIEXEC", "mpirun"), "-n", "2"] if ranks == 2 else []
-    run = subprocess.run([*launcher, os.environ["SQUEAL"], SCENE, *SHORT, "--output", output], stdout=write, stderr=subprocess.DEVNULL)
+    with cores(ranks):
+        run = subprocess.run([*launcher, os.environ["SQUEAL"], SCENE, *SHORT, "--output", output], stdout=write, stderr=subprocess.DEVNULL)
     os.close(write)
     assert json.loads((output / "report.json").read_text())["exit_code"] in (0, 3)
     assert run.returncode == 0 or ranks == 2
@@ -265,8 +266,9 @@ def small_disk(tmp_path):
 def test_a_full_file_system_too(small_disk, kilobytes):
     """HDF5 fails neither when it closes its file nor when MPI ends."""
     disk = small_disk(kilobytes)
-    done = subprocess.run(["mpirun", "-n", "2", os.environ["SQUEAL"], SCENE, "--set", "cycle.enabled=false", "--output",
-                           disk / "results"], capture_output=True, text=True)
+    with cores(2):
+        done = subprocess.run(["mpirun", "-n", "2", os.environ["SQUEAL"], SCENE, "--set", "cycle.enabled=false", "--output",
+                               disk / "results"], capture_output=True, text=True)
     messages = [line for line in done.stderr.splitlines() if line.startswith("squeal: ")]
     assert done.returncode == 1 and len(messages) == 1, done.stderr
     assert "No space left" in messages[0] and "MB are free" in messages[0] and "--output" in messages[0]
