@@ -84,7 +84,7 @@ def main():
         columns, efficiency = ranks_columns(folder, counts)
         draw_ranks(axes, kind, counts, efficiency)
     table = squeal.table(columns)
-    print(table)
+    print(table.to_string(index=False))
     table.to_csv(folder / "table.csv", index=False)
     common.save_small(figure, folder / "chart.png")
 

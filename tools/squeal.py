@@ -5,12 +5,12 @@
 
     results = squeal.run("inputs/pin_on_disc", {"friction.coefficient": 0.25}, ranks=2)
     results.report["cycle"]["frequency_hz"]  # every number of report.json
-    results.modes()                          # tables: of modes, pairs, multipliers and iterations of the shooting
+    results.modes()                          # tables: of modes, pairs, sweep, thresholds, derivatives, samples …
     results.shape(1)                         # complex displacements of a mode, node by node
     results.probes("cycle")                  # arrays against results.series("cycle", "time")
 
-results = squeal.Results("results/pin_on_disc") reads a run made before. Tables are pandas' DataFrames where pandas is
-installed, else Tables of numpy arrays by name. What a run did not compute raises Missing, what goes wrong SquealError.
+results = squeal.Results("results/pin_on_disc") reads a run made before. Tables are pandas' DataFrames. What a run did not
+compute raises Missing, what goes wrong SquealError.
 """
 
 import functools
@@ -37,44 +37,23 @@ class TookTooLong(SquealError):
     """A run was stopped at its limit of time."""
 
 
-class Table:
-    """Columns by name, as arrays of one length."""
-
-    def __init__(self, columns):
-        self.columns = list(columns)
-        self._columns = {name: np.asarray(values) for name, values in columns.items()}
-
-    def __getitem__(self, name):
-        return self._columns[name]
-
-    def __len__(self):
-        return len(next(iter(self._columns.values()), ()))
-
-    def rows(self):
-        return zip(*self._columns.values())
-
-    def to_csv(self, file, index=False):
-        lines = [",".join(map(str, row)) for row in (self.columns, *self.rows())]
-        Path(file).write_text("\n".join(lines) + "\n")
-
-    def __str__(self):
-        text = [self.columns, *([f"{v:.6g}" if isinstance(v, float) else str(v) for v in row] for row in self.rows())]
-        widths = [max(map(len, column)) for column in zip(*text)]
-        return "\n".join("  ".join(word.rjust(width) for word, width in zip(row, widths)) for row in text)
+def pandas():
+    """The module, where a table is asked for: tools that make none do without."""
+    try:
+        import pandas
+    except ImportError:
+        raise SquealError("tables need the python module pandas; tools/setup installs it") from None
+    return pandas
 
 
 def table(columns):
-    """pandas.DataFrame where pandas is installed, else a Table."""
-    if importlib.util.find_spec("pandas"):
-        import pandas
-
-        return pandas.DataFrame({name: list(values) for name, values in columns.items()})
-    return Table(columns)
+    """A pandas.DataFrame of columns by name."""
+    return pandas().DataFrame({name: list(values) for name, values in columns.items()})
 
 
 def table_of(records):
-    """A table of dicts that have the same keys."""
-    return table({key: [record[key] for record in records] for key in (records[0] if records else ())})
+    """A table of dicts, a row each; what one lacks is NaN."""
+    return pandas().DataFrame.from_records(records)
 
 
 @functools.cache
@@ -116,11 +95,16 @@ def run(scene, overrides=None, ranks=1, options=(), output=None, limit=None):
 
 
 def toml(value):
-    """A value of Python's as --set takes it; a text stays as it is."""
-    if isinstance(value, bool):
+    """A value of Python's as --set takes it; a text stays as it is, but within lists and tables."""
+    def inner(part):
+        return json.dumps(part) if isinstance(part, str) else toml(part)
+
+    if isinstance(value, (bool, np.bool_)):
         return str(value).lower()
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {inner(part)}" for key, part in value.items()) + "}"
     if isinstance(value, (list, tuple, np.ndarray)):
-        return "[" + ",".join(map(toml, value)) + "]"
+        return "[" + ",".join(map(inner, value)) + "]"
     return str(value)
 
 
@@ -198,6 +182,7 @@ class Results:
 
     def probes(self, run):
         """Displacements of the probes [m], by name."""
+        self.stage(run)
         return {name: self.series(run, f"probes/{name}") for name in self._names("history.h5", f"{run}/probes")}
 
     def responses(self):
@@ -219,7 +204,8 @@ class Results:
     def shape(self, number):
         """Complex displacements of a mode, one node a row; modes count from 1, by falling growth rate."""
         if number not in self.mode_numbers():
-            raise Missing(f"there is no shape of mode {number}: -modes_shapes all keeps those of all modes")
+            remedy = "-modes_shapes all keeps those of all modes" if self._names("fields.h5", "mesh") else "a scene of matrices has none"
+            raise Missing(f"there is no shape of mode {number}: {remedy}")
         return self.field(f"modes/{number}/real") + 1j * self.field(f"modes/{number}/imaginary")
 
     def motion(self):
@@ -250,6 +236,41 @@ class Results:
     def iterations(self):
         """A row an iteration of the shooting: stage, periods, period and residuals."""
         return table_of(self.stage("cycle").get("newton", []))
+
+    def _csv(self, stage):
+        """The table of a stage in a file of its own."""
+        self.stage(stage)
+        return pandas().read_csv(self.folder / f"{stage}.csv")
+
+    def sweep(self):
+        """A row a mode of a point: the swept numbers, direction, track, frequency_hz, growth_rate and more."""
+        return self._csv("sweep")
+
+    def thresholds(self):
+        """A row a threshold of a sweep: the swept numbers, direction, error, track, frequency_hz, change."""
+        sweep = self.stage("sweep")
+        return table_of([dict(zip(sweep["keys"], entry["values"])) | {k: v for k, v in entry.items() if k != "values"}
+                         for entry in sweep.get("thresholds", [])])
+
+    def derivatives(self):
+        """A row a number of the scene for each unstable mode: mode, key, value, growth_rate_by, frequency_hz_by, shares."""
+        return self._of_sensitive_modes("derivatives")
+
+    def changes(self):
+        """A row a [[change]] for each unstable mode: mode, probe, what is added, predicted and computed growth rate."""
+        return self._of_sensitive_modes("changes")
+
+    def _of_sensitive_modes(self, what):
+        return table_of([{"mode": number} | entry for number, mode in enumerate(self.stage("sensitivity")["modes"], 1)
+                         for entry in mode.get(what, [])])
+
+    def samples(self):
+        """A row a random sample: its numbers, unstable_modes, growth_rate, frequency_hz and mode."""
+        return self._csv("robustness")
+
+    def squeal_probabilities(self):
+        """A row a mode that is unstable in some sample: probability with its bounds, growth rates and frequencies."""
+        return table_of(self.stage("robustness")["modes"])
 
     def pairs(self):
         """A row a contact pair: node, contact, place, normal, area, gap, pressure and reactions at equilibrium."""

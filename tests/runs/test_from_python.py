@@ -47,8 +47,8 @@ def test_the_pairs_carry_the_load(pin):
     total = equilibrium["normal_force_sum"]
     assert sum(pairs["normal_reaction"]) == pytest.approx(total, rel=1e-12)
     assert np.dot(pairs["pressure"], pairs["area"]) == pytest.approx(total, rel=1e-12)
-    friction = np.hypot(pairs["friction_1"], pairs["friction_2"])
-    assert friction == pytest.approx(0.3 * np.array(pairs["normal_reaction"]), rel=1e-9)  # all slide
+    friction = np.hypot(pairs["friction_1"], pairs["friction_2"]).to_numpy()
+    assert friction == pytest.approx(0.3 * pairs["normal_reaction"].to_numpy(), rel=1e-9)  # all slide
 
 
 def test_the_motion_is_that_of_the_probes(pin):
@@ -75,11 +75,22 @@ def test_errors_are_sentences(tmp_path):
         stable.iterations()
 
 
-def test_tables_without_pandas(tmp_path):
-    table = squeal.Table({"a": [1, 2], "b": ["x", "y"]})
-    table.to_csv(tmp_path / "t.csv", index=False)
-    assert (tmp_path / "t.csv").read_text() == "a,b\n1,x\n2,y\n"
-    assert len(table) == 2 and list(table["a"]) == [1, 2] and str(table).split() == ["a", "b", "1", "x", "2", "y"]
+def test_tables_of_a_study(tmp_path):
+    """Two swept numbers, random ones and a change, given as Python's lists and tables."""
+    ask = {"sweep.key": ["friction.coefficient", "damping.beta"], "sweep.from": [0.1, 0], "sweep.to": [0.3, 1e-3],
+           "sweep.points": [5, 2], "uncertain": [{"key": "friction.coefficient", "deviation": 0.05}], "robustness.samples": 20,
+           "sensitivity.numbers": ["friction.coefficient"], "change": [{"probe": "pad_x", "mass": 0.01}],
+           "transient.enabled": False, "cycle.enabled": False}
+    results = squeal.run(INPUTS / "oscillator", ask, output=tmp_path / "study")
+    assert results.exit_code == 0
+    sweep, thresholds = results.sweep(), results.thresholds()
+    assert len(sweep.groupby(["friction.coefficient", "damping.beta"])) >= 10
+    at = thresholds[thresholds["damping.beta"] == 0].iloc[0]
+    assert at["friction.coefficient"] == pytest.approx(0.17649288, abs=2 * at["error"])  # exact
+    assert set(results.derivatives()["key"]) == {"friction.coefficient"} and len(results.changes()) == 1
+    assert len(results.samples()) == 20 and results.squeal_probabilities()["probability"][0] > 0.9
+    with pytest.raises(squeal.Missing, match="cycle off"):
+        results.probes("cycle")
 
 
 def test_settings_of_the_environment_are_those_of_the_tools():
