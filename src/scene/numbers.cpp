@@ -145,8 +145,9 @@ private:
   {
     if (list.size() != sweep_.key.size())
       fail(places_.given.count(&list) ? static_cast<const void*>(&list) : &sweep_.key,
-           std::string(name) + " holds " + std::to_string(list.size()) + " numbers for " +
-               std::to_string(sweep_.key.size()) + " keys: give one a key");
+           list.empty() ? std::string(name) + " is missing: give one a key"
+                        : std::string(name) + " holds " + std::to_string(list.size()) + " numbers for " +
+                              std::to_string(sweep_.key.size()) + " keys: give one a key");
   }
 
   /// A list of values, a grid, or samples of a range.

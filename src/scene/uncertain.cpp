@@ -41,6 +41,16 @@ void check_form(const UncertainNumber& number, const Places& places)
     throw Error(places.at(&number) + ": " + label + "needs a deviation, in the number's own unit");
 }
 
+/// How far a number is taken, and what keeps it nearer, to go before what is wrong with that.
+std::string reach_of(const UncertainNumber& number, double end)
+{
+  if (number.distribution == Distribution::uniform) return format(" is taken to %g: ", end);
+  return format(
+      " is taken to %g, %g deviations from its middle; a smaller deviation, or distribution \"uniform\"%s, keeps "
+      "it nearer: ",
+      end, cut_off, number.distribution == Distribution::normal ? " or \"lognormal\"" : "");
+}
+
 } // namespace
 
 double quantile(const UncertainNumber& number, double part)
@@ -77,7 +87,7 @@ void resolve_robustness(Scene& scene, const Places& places)
         throw Error("[[uncertain]] " + number.key + " is lognormal: its mean must be positive");
       for (const double part : {0., 1.})
         need_scene(scene, {number.key, quantile(number, part)}, places.at(&number),
-                   "[[uncertain]] this end of " + number.key + " is no scene: ");
+                   "[[uncertain]] " + number.key + reach_of(number, quantile(number, part)));
     }
     catch (const Error& error)
     {

@@ -357,7 +357,7 @@ def test_interrupted_motions_go_on_where_they_were(ranks, squeal, tmp_path):
     (sweep_of(TWO), "give one a key"),
     (sweep_of(directions="all"), "none of one, both"),
     (sweep_of(stages="squeal"), "none of equilibrium, modes, cycle"),
-    (["--set", "sweep.key=friction.coefficient"], "from holds 0 numbers"),
+    (["--set", "sweep.key=friction.coefficient"], "from is missing: give one a key"),
 ])
 def test_bad_sweeps_are_refused_before_the_first_stage(settings, words, squeal):
     run = squeal(*OSCILLATOR, *settings, "--dry-run", ranks=1)
