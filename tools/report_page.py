@@ -1,7 +1,6 @@
 """The page of tools/report, put together from what runs found: text, tables and pictures as one HTML document."""
 
 import base64
-import html
 import io
 import tempfile
 from pathlib import Path
@@ -13,37 +12,11 @@ from plot_all import ANIMATION, FIGURES, figures
 from plot_basis import length_unit
 from plot_shape import animate
 from report_style import STYLE
+from report_tables import number, numbers, probability, rotation, strongest, table, text, values_of
 from squeal import Missing
 
-STAGES = ("equilibrium", "modes", "estimate", "transient", "cycle", "settled", "attractors", "branch")
-ROWS = 12  # of a table that stand open; the rest is folded away
-
-
-def text(value):
-    return html.escape(str(value))
-
-
-def number(value, digits=5):
-    """A number as people write it, a word as it is."""
-    if value is None:
-        return "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.{digits}g}"
-    return text(value)
-
-
-def table(head, rows, summary=""):
-    """Rows beyond some are folded away."""
-    def body(part):
-        lines = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in part)
-        heads = "".join(f"<th>{cell}</th>" for cell in head)
-        return f'<div class="wide"><table><thead><tr>{heads}</tr></thead><tbody>{lines}</tbody></table></div>'
-
-    rows = list(rows)
-    folded = f"<details><summary>{summary or 'the rest'}, {len(rows) - ROWS} more</summary>{body(rows[ROWS:])}</details>"
-    return body(rows[:ROWS]) + (folded if len(rows) > ROWS else "")
+STAGES = ("equilibrium", "modes", "estimate", "response", "transient", "coarse", "cycle", "settled", "attractors", "branch",
+          "sensitivity", "sweep", "robustness")
 
 
 def data(content, kind):
@@ -108,6 +81,30 @@ def facts(run):
         found["motion it settles on"] = settled["kind"]
         if settled.get("lines"):
             found["strongest line"] = f"{settled['lines'][0]['frequency_hz']:.5g} Hz"
+    return found | study_facts(report)
+
+
+def study_facts(report):
+    """The same of sensitivity, sweep and random numbers."""
+    found = {}
+    causes = report.get("sensitivity", {}).get("modes", [])
+    shown = strongest(causes[0]["derivatives"])[0] if causes else []
+    if shown and shown[0]["value"]:
+        effect = 0.01 * shown[0]["value"] * shown[0]["growth_rate_by"]
+        found["what moves that mode most"] = f"{shown[0]['key']}: {effect:+.3g} 1/s for 1 %"
+    sweep = report.get("sweep", {})
+    if sweep.get("points"):
+        failed = sum(p["outcome"] != "converged" for p in sweep["points"])
+        name = f"sweep of {' and '.join(sweep['keys'])}"
+        found[name] = f"unstable at {sum(p['unstable_modes'] > 0 for p in sweep['points'])} of {len(sweep['points'])} points"
+        found[name] += f", {failed} failed" if failed else ""
+        rising = [t for t in sweep["thresholds"] if t["change"] > 0]
+        if rising:
+            first = min(rising, key=lambda t: t["values"][0])
+            found["first threshold"] = f"{values_of(first)}, at {first['frequency_hz']:.5g} Hz" + (
+                f", rotation {rotation(first)}" if sweep["directions"] == "both" else "")
+    if report.get("robustness", {}).get("samples"):
+        found["probability of an unstable mode [%]"] = probability(report["robustness"]["any"])
     return found
 
 
@@ -135,37 +132,6 @@ def stages(run):
     rows = [[stage, text(entry.get("outcome", "–")), text(entry.get("reason", "")), number(run.report["timings"].get(stage), 3)]
             for stage, entry in ((stage, run.report.get(stage, {})) for stage in STAGES) if entry]
     return "<h3>Stages</h3>" + table(["stage", "outcome", "why", "time [s]"], rows)
-
-
-def numbers(run):
-    """Tables of modes, contacts, probes and multipliers."""
-    report, parts = run.report, []
-    if report.get("modes", {}).get("modes"):
-        rows = [[k, number(m["frequency_hz"], 7), number(m["growth_rate"]), number(100 * m["damping_ratio"], 3),
-                 number(m["backward_error"], 2), "<b>unstable</b>" if m["unstable"] else ""]
-                for k, m in enumerate(report["modes"]["modes"], 1)]
-        head = ["mode", "frequency [Hz]", "growth rate [1/s]", "damping [%]", "backward error", ""]
-        parts.append("<h3>Modes</h3>" + table(head, rows, "less unstable modes"))
-    contacts = report.get("equilibrium", {}).get("contacts", [])
-    if contacts:
-        rows = [[text(c["stator"]), text(c["rotor"]), number(c["normal_force_sum"]), number(c.get("torque"))] for c in contacts]
-        parts.append("<h3>Contacts at rest</h3>" + table(["stator", "rotor", "normal force [N]", "braking torque [N m]"], rows))
-    cycle = report.get("cycle", {})
-    if cycle.get("peak_to_peak"):
-        rows = [[text(name), number(1e6 * swing)] for name, swing in cycle["peak_to_peak"].items()]
-        parts.append("<h3>Swings in the cycle</h3>" + table(["probe", "peak to peak [µm]"], rows))
-    if cycle.get("period"):
-        rows = [["full residual", number(cycle["residual_full"], 2)], ["steps a period", cycle["steps_per_period"]],
-                ["periods integrated", cycle["periods_integrated"]]]
-        rows += [[f"error of the {name.replace('_', ' ')}", number(value, 2)]
-                 for name, value in report.get("fidelity", {}).get("error_estimates", {}).items()]
-        parts.append("<h3>Accuracy of the cycle</h3>" + table(["measure", "value"], rows))
-    multipliers = cycle.get("multipliers", {}).get("values", [])
-    if multipliers:
-        rows = [[number(float(np.hypot(m["real"], m["imaginary"])), 6), number(m["real"], 6), number(m["imaginary"], 6),
-                 number(m["error"], 2)] for m in multipliers]
-        parts.append("<h3>Floquet multipliers</h3>" + table(["modulus", "real", "imaginary", "error bar"], rows, "smaller ones"))
-    return "".join(parts)
 
 
 def sound(run):
@@ -202,7 +168,7 @@ def page(runs):
         if len(runs) > 1:
             parts.append(f"<h2 class='run'>{text(run.folder.name)}: {text(run.report.get('heard', ''))}</h2>")
         parts += [warnings(run), f'<section><h2>Pictures</h2><div class="pictures">{pictures([run])}</div>{sound(run)}</section>',
-                  f"<section><h2>Numbers</h2>{numbers(run)}{stages(run)}{again(run)}</section>"]
+                  f"<section><h2>Numbers</h2>{numbers(run.report)}{stages(run)}{again(run)}</section>"]
     # The policy keeps a browser from asking the network for anything.
     policy = "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
     script = "addEventListener('beforeprint', () => document.querySelectorAll('details.print').forEach(d => d.open = true))"

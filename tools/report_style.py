@@ -10,6 +10,8 @@ h1 { margin: 0 0 1rem; font-size: 1.7rem; line-height: 1.25; }
 h2 { margin: 0 0 0.8rem; font-size: 1.25rem; }
 h2.run { margin-top: 2.5rem; border-top: 3px solid var(--blue); padding-top: 0.8rem; }
 h3 { margin: 1.6rem 0 0.5rem; font-size: 1.02rem; }
+h4 { margin: 1.1rem 0 0.4rem; font-size: 0.95rem; }
+section p { margin: 0.4rem 0; }
 section { background: var(--paper); border: 1px solid var(--line); border-radius: 6px; padding: 1.1rem 1.2rem; margin: 0 0 1.2rem; }
 .heard { margin: 0 0 1rem; font-size: 1.25rem; line-height: 1.4; }
 .cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(190px, 1fr)); gap: 0.7rem; margin: 0; }
@@ -50,7 +52,7 @@ summary { cursor: pointer; color: var(--blue); }
   section { border: 0; padding: 0; margin: 0 0 6mm; }
   .warnings { border-left: 1.2mm solid var(--red); padding-left: 3mm; }
   figure, tr { break-inside: avoid; }
-  h2, h3 { break-after: avoid; }
+  h2, h3, h4 { break-after: avoid; }
   img { max-height: 200mm; }
   .wide { overflow: visible; }
   audio { display: none; }

@@ -92,6 +92,52 @@ def test_how_to_run_it_again_runs_it_again(brake, tmp_path):
     assert again.report["cycle"]["frequency_hz"] == brake.report["cycle"]["frequency_hz"]
 
 
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory):
+    """The oscillator with every stage that studies a number; two changes at one probe."""
+    values = {"transient.enabled": False, "cycle.enabled": False, "sweep.key": "friction.coefficient", "sweep.from": 0.1, "sweep.to": 0.3,
+              "sweep.points": 3, "sensitivity.numbers": "['friction.coefficient', 'spring.0.stiffness']",
+              "change": "[{probe='pad_x', mass=0.002}, {probe='pad_x', stiffness=0.003}]", "response.from": 0.05, "response.to": 0.5,
+              "response.count": 20, "robustness.samples": 100, "robustness.checks": 2, "uncertain": "[{key='friction.coefficient', deviation=0.03}]"}
+    return squeal.run(INPUTS / "oscillator", values, output=tmp_path_factory.mktemp("studies") / "run")
+
+
+def words_of(run):
+    report(run.folder)
+    return " ".join(" ".join(Page(run.folder / "report.html").text).split())
+
+
+def test_the_page_has_what_studies_of_a_number_found(studies):
+    text, found = words_of(studies), studies.report
+    (threshold,) = found["sweep"]["thresholds"]
+    assert f"{threshold['values'][0]:.7g}" in text and "Modes that are unstable somewhere" in text
+    any_mode = found["robustness"]["any"]
+    assert f"{100 * any_mode['probability']:.3g} ({100 * any_mode['lower']:.3g} to {100 * any_mode['upper']:.3g})" in text
+    (mode,) = found["sensitivity"]["modes"]
+    for derivative in mode["derivatives"]:
+        assert f"{derivative['key']} {derivative['value']:.5g} {0.01 * derivative['value'] * derivative['growth_rate_by']:.3g}" in text
+    assert f"{mode['contact_powers'][0]:.5g} {mode['damping_power']:.5g}" in text
+    for change, what in zip(mode["changes"], ("mass of 0.002 kg at pad_x", "spring of 0.003 N/m at pad_x")):
+        assert f"{what} {mode['growth_rate']:.6g} {change['predicted']['growth_rate']:.6g} {change['computed']['growth_rate']:.6g}" in text
+    peak = max(found["response"]["peaks"], key=lambda peak: peak["receptance"])
+    assert f"{peak['frequency_hz']:.6g} {peak['receptance']:.4g}" in text
+    assert all(words in text[: text.index("Pictures")] for words in found["response"]["warnings"])
+
+
+def test_the_page_says_which_points_of_a_sweep_failed_and_why(studies, tmp_path):
+    """Of the same results with a point that failed."""
+    shutil.copytree(studies.folder, tmp_path / "run")
+    found = json.loads((tmp_path / "run" / "report.json").read_text())
+    point = found["sweep"]["points"][-1]
+    point |= {"outcome": "no equilibrium", "reason": "friction is <too> large"}
+    found["sweep"] |= {"outcome": "not converged", "reason": "1 of 3 points failed"}
+    (tmp_path / "run" / "report.json").write_text(json.dumps(found))
+    text = words_of(squeal.Results(tmp_path / "run"))
+    assert "1 of 3 points failed" in text[: text.index("Pictures")] and "1 failed" in text[: text.index("Warnings")]
+    assert f"{point['values'][0]:.7g} no equilibrium friction is <too> large" in text
+    assert "sweep not converged 1 of 3 points failed" in text  # the table of stages
+
+
 # Puts the page into a frame of each width, says what sticks out of it and which pictures are there.
 MEASURE = """<!DOCTYPE html><body><script>
 const page = %s, found = {};
