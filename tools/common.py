@@ -73,11 +73,28 @@ class SquealError(Exception):
 
 
 def tool(main):
-    """Runs a tool's main function; a SquealError ends it with that sentence."""
+    """Runs a tool's main function; a SquealError ends it with that sentence, and so does a file that cannot be used."""
     try:
         main()
     except SquealError as error:
         sys.exit(f"{TOOL}: {error}")
+    except BrokenPipeError:
+        raise  # whoever read what is printed has gone; no file is to blame
+    except OSError as error:
+        sys.exit(f"{TOOL}: {error.filename}: {error.strerror}" if error.filename else f"{TOOL}: {error}")
+
+
+def between(option, kind, low, high):
+    """Type of an option of a tool: a whole or a real number of this range."""
+    def read(word):
+        try:
+            value = kind(word)
+        except ValueError:
+            value = None
+        if value is None or not low <= value <= high:  # not a number is in no range
+            raise SquealError(f"{option} {word} is no {'whole ' if kind is int else ''}number from {low:g} to {high:g}")
+        return value
+    return read
 
 
 def petsc_bytes(array):

@@ -74,6 +74,18 @@ class Radiator:
         return 1j * omega * RHO / (2 * np.pi) * total
 
 
+def inside(nodes, faces, place):
+    """Whether a place is within closed outer faces, or on them: their solid angle there is 4 pi, 2 pi on a face, outside 0."""
+    if not faces:
+        return False
+    a, b, c = np.moveaxis(np.concatenate([triangles(nodes[rim]) for rim in faces]) - np.asarray(place, float), 1, 0)
+    x, y, z = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    dot = lambda p, q: np.einsum("ni,ni->n", p, q)
+    volume = dot(a, np.cross(b, c))  # van Oosterom and Strackee
+    angle = 2 * np.arctan2(volume, x * y * z + dot(a, b) * z + dot(a, c) * y + dot(b, c) * x)
+    return bool(abs(angle.sum()) > np.pi)
+
+
 def harmonics_of(time, motion, period):
     """Complex amplitudes of velocity (harmonic, node, component) of displacements at times over one period, by least
     squares on the harmonics that this many samples tell apart."""

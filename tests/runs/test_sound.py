@@ -219,3 +219,22 @@ def test_a_run_sounds_at_the_harmonics_of_its_cycle(tmp_path):
         if db > loudest - 50:  # what 16 bits hold well
             assert 20 * np.log10(amplitude / np.sqrt(2) / 20e-6) == pytest.approx(db, abs=0.1)
     assert "rigid plane" in (run.folder / "sound.txt").read_text() and (run.folder / "sound.png").exists()
+
+
+def test_what_is_inside_a_body():
+    """Two cubes that share a face: their middles, the face between them and the outer ones."""
+    import surface
+
+    cube = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
+    nodes = np.concatenate([cube + (0, 0, z) for z in range(3)])
+    faces, _ = surface.faces(np.array([9, *range(8), 9, *range(4, 12)]))
+    for place, expected in (((0.5, 0.5, 0.5), True), ((0.3, 0.6, 1), True), ((0.3, 0.6, 2), True), ((0.5, 0.5, 2.01), False), ((5, 0.2, 1), False)):
+        assert sound_field.inside(nodes, faces, place) == expected, place
+
+
+@pytest.mark.parametrize("words, message", [
+    (["--at", "0", "0", "nan"], "--at nan is no number"), (["--at", "0", "inf", "0"], "--at inf"), (["--seconds", "-1"], "--seconds -1 is no number"),
+    (["--seconds", "nan"], "--seconds nan")])
+def test_numbers_that_mean_nothing_are_refused(tmp_path, words, message):
+    done = subprocess.run([sys.executable, ROOT / "tools" / "sound", tmp_path, *words], capture_output=True, text=True)
+    assert done.returncode == 1 and message in done.stderr and done.stderr.count("\n") == 1 and not list(tmp_path.iterdir())

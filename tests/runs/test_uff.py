@@ -121,3 +121,22 @@ def test_responses_of_other_probes_are_refused(responses, tmp_path):
     (tmp_path / "other.uff").write_text(text.replace("pad_x", "other"))
     done = uff(responses.folder, "--measured", tmp_path / "other.uff")
     assert done.returncode == 1 and "other" in done.stderr and "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("word", ["nan", "1.2x3"])
+def test_numbers_that_are_none_are_refused_with_their_line(responses, tmp_path, word):
+    lines = (responses.folder / "squeal.uff").read_text().splitlines()
+    at = next(k for k, line in enumerate(lines) if line.strip() == "58") + 12
+    lines[at] = word.rjust(20) + lines[at][20:]
+    (tmp_path / "test.uff").write_text("\n".join(lines) + "\n")
+    done = uff(responses.folder, "--measured", tmp_path / "test.uff")
+    assert done.returncode == 1 and f"line {at + 1}, which has '{word}'" in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
+def test_what_is_no_file_of_datasets_is_refused(responses, tmp_path):
+    (tmp_path / "cut.uff").write_text((responses.folder / "squeal.uff").read_text()[:40])
+    for words, message in ((["--measured", tmp_path / "cut.uff"], "no whole dataset"), (["--measured", tmp_path], "no file"),
+                           (["--output", responses.folder / "report.json" / "x.uff"], "report.json")):
+        done = uff(responses.folder, *words)
+        assert done.returncode == 1 and message in done.stderr and done.stderr.count("\n") == 1, done.stderr
+    assert uff(responses.folder, "--output", tmp_path / "new" / "x.uff").returncode == 0
