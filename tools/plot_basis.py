@@ -93,9 +93,13 @@ def start_of(run, runs):
     return round(-np.angle(np.fft.rfft(values)[1]) / (2 * np.pi) * len(values)) % len(values)
 
 
-def velocity(values, step):
-    """Of a displacement over one period, by central differences."""
-    return (np.roll(values, -1) - np.roll(values, 1)) / (2 * step)
+def portrait(values, step, closed):
+    """Displacement and velocity over one period, by central differences. closed: the period ends where it began; one that
+    does not keeps its gap, since a difference across it is no velocity."""
+    if not closed:
+        return values, np.gradient(values, step)
+    speed = (np.roll(values, -1) - np.roll(values, 1)) / (2 * step)
+    return np.append(values, values[0]), np.append(speed, speed[0])
 
 
 def spread(places, gap):
@@ -120,6 +124,29 @@ def label_column(axes, points, texts):
     for place, at in zip(order, spread(np.array(height)[order], gap)):
         axes.annotate(texts[place], points[place], xytext=(1.05, at), textcoords=axes.transAxes, fontsize=8, va="center",
                       arrowprops={"arrowstyle": "-", "relpos": (0, 0.5), "color": "0.6", "lw": 0.7, "shrinkA": 1, "shrinkB": 4})
+
+
+def label_row(axes, places, texts, colours):
+    """Texts upright in a row above the axes, side by side, with lines to their places on the upper edge; those that fit."""
+    figure = axes.figure
+    figure.canvas.draw()  # scales are known
+    along = axes.transAxes.inverted().transform(axes.transData.transform([(place, 0) for place in places]))[:, 0]
+    gap = 1.4 * 7 / 72 * figure.dpi / axes.get_window_extent().width  # lines of 7 points
+    order = np.argsort(along, kind="stable")[: int(1 / gap)]
+    for place, at in zip(order, spread(along[order], gap)):
+        axes.annotate(texts[place], (along[place], 1), xycoords=axes.transAxes, xytext=(at, 1.05), textcoords=axes.transAxes,
+                      fontsize=7, rotation=90, ha="center", va="bottom", color=colours[place],
+                      arrowprops={"arrowstyle": "-", "relpos": (0.5, 0), "color": colours[place], "lw": 0.7, "shrinkA": 1, "shrinkB": 0})
+
+
+def legend_below(figure, legend):
+    """A legend of labels and handles below all axes, in as much of the figure as it needs."""
+    if not legend:
+        return
+    columns = max(1, min(len(legend), int(figure.get_figwidth() / (0.5 + 0.065 * max(map(len, legend))))))
+    height = (0.2 + 0.175 * -(-len(legend) // columns)) / figure.get_figheight()  # lines of 8 points
+    figure.get_layout_engine().set(rect=(0, height, 1, 1 - height))
+    figure.legend(legend.values(), legend, loc="lower center", ncols=columns, fontsize=8)
 
 
 def squeal_colours():

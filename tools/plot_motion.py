@@ -2,8 +2,8 @@
 
 import matplotlib
 import numpy as np
-from plot_basis import (RED, SLIP, STICK, colour, cycle_words, heading, label_of, length_unit, plt, start_of, state_colours,
-                        state_legend, those_with, unit_of, velocity)
+from plot_basis import (RED, SLIP, STICK, colour, cycle_words, heading, label_of, length_unit, plt, portrait, start_of,
+                        state_colours, state_legend, those_with, unit_of)
 from squeal import Missing
 
 
@@ -62,6 +62,10 @@ def draw_status(axes, run):
     state_legend(axes, loc="lower center", bbox_to_anchor=(0.5, 1))
 
 
+def is_closed(run):
+    return run.stage("cycle")["outcome"] in ("converged", "unstable cycle")
+
+
 def draw_cycle(runs):
     found = those_with(runs, cycle_of)
     shown = list(dict.fromkeys(name for _, (_, probes) in found for name in probes))[:5]
@@ -78,18 +82,23 @@ def draw_cycle(runs):
         size, unit = length_unit(np.concatenate([values for _, values in with_name]))
         for k, (run, values) in enumerate(with_name):
             time = run.series("cycle", "time")
-            speed = velocity(values, time[1] - time[0])
-            axes.plot(np.append(values, values[0]) / size, np.append(speed, speed[0]), lw=1.4,
-                      color=SLIP if len(found) == 1 else colour(k), label=label_of(run, runs))
+            closed = is_closed(run)
+            place, speed = portrait(values, time[1] - time[0], closed)
+            shade = SLIP if len(found) == 1 else colour(k)
+            axes.plot(place / size, speed, lw=1.4, color=shade, label=label_of(run, runs))
+            if not closed:
+                axes.plot(place[0] / size, speed[0], "o", ms=6, color=shade, label=label_of(run, runs, "start"))
+                axes.plot(place[-1] / size, speed[-1], "s", ms=6, mfc="none", color=shade, label=label_of(run, runs, "end"))
         axes.set(xlabel=f"displacement {name} [{unit}]", ylabel="velocity [m/s]")
     if with_status:
         draw_status(flat[len(shown)], found[0][0])
-    elif len(found) > 1:
+    if shown and flat[0].get_legend_handles_labels()[1]:
         flat[0].legend(fontsize=8)
     for axes in flat[panels:]:
         axes.remove()
     run, (cycle, _) = found[0]
-    figure.suptitle(heading(runs, f"{cycle_words(run)}, {cycle['frequency_hz']:.7g} Hz" if len(found) == 1 else "limit cycles"))
+    figure.suptitle(heading(runs, f"{cycle_words(run)}, {cycle['frequency_hz']:.7g} Hz" if len(found) == 1 else
+                            "limit cycles" if all(is_closed(run) for run, _ in found) else "periods kept, not all closed"))
     return figure
 
 

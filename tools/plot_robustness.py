@@ -13,16 +13,18 @@ def robustness_of(results):
     return robustness
 
 
-def name_of(mode):
+def name_of(mode, modes):
+    """By its frequency; of partners that have locked in by their growth rates too."""
     if mode["mode"] < 0:
         return "other modes"
-    frequency = mode["median_frequency_hz"]
-    return f"{frequency:.0f} Hz" if frequency >= 10 else f"{frequency:.3g} Hz"
+    words = lambda of: f"{of['median_frequency_hz']:.0f} Hz" if of["median_frequency_hz"] >= 10 else f"{of['median_frequency_hz']:.3g} Hz"
+    alike = sum(of["mode"] >= 0 and words(of) == words(mode) for of in modes) > 1
+    return words(mode) + (f", {mode['median_growth_rate']:+.3g} 1/s" if alike else "")
 
 
 def draw_probabilities(axes, robustness):
     """A bar for any mode and one for each mode, with its interval."""
-    entries = [("any mode", robustness["any"])] + [(name_of(mode), mode) for mode in robustness["modes"][:8]]
+    entries = [("any mode", robustness["any"])] + [(name_of(mode, robustness["modes"]), mode) for mode in robustness["modes"][:8]]
     for place, (_, entry) in enumerate(entries):
         middle = 100 * entry["probability"]
         error = [[middle - 100 * entry["lower"]], [100 * entry["upper"] - middle]]

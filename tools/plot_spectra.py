@@ -6,6 +6,7 @@ from squeal import Missing
 
 REFERENCE = 1e-9  # [m/s], of velocity levels by ISO 1683
 FLOOR = 90  # [dB] below the largest
+AUDIBLE = 20000.0  # [Hz]
 
 
 def decibel(amplitude):
@@ -27,6 +28,20 @@ def windowed(values, step):
     amplitude = 2 * np.abs(np.fft.rfft((values - values.mean()) * window)) / window.sum()
     frequency = np.fft.rfftfreq(len(values), step)
     return frequency, 2 * np.pi * frequency * amplitude
+
+
+def strongest_line(frequency, amplitude):
+    """Frequency [Hz] of the largest amplitude of velocity."""
+    return frequency[np.argmax(np.where(frequency > 0, np.abs(amplitude), 0))]
+
+
+def last_shown(lines):
+    """Where the axis of frequencies ends [Hz]: with what is within FLOOR of the largest, but no further than five times the
+    strongest line, or 20 kHz where that is heard beside it. lines: frequencies, amplitudes of velocity."""
+    top = max(decibel(amplitude).max() for _, amplitude in lines)
+    last = max(frequency[decibel(amplitude) > top - FLOOR].max(initial=0) for frequency, amplitude in lines)
+    strongest = strongest_line(*max(lines, key=lambda line: np.abs(line[1]).max()))
+    return min(last, max(5 * strongest, min(AUDIBLE, 25 * strongest)))
 
 
 def record_of(run, name):
@@ -69,8 +84,7 @@ def draw_spectrum(runs):
     figure, axes = plt.subplots(figsize=(8.5, 4.8))
     lines = [(run, name, *of) for run, (_, probes) in found for name, of in list(probes.items())[:6]]
     top = max(decibel(amplitude).max() for _, _, _, amplitude, _ in lines)
-    last = max(frequency[decibel(amplitude) > top - FLOOR].max(initial=0) for _, _, frequency, amplitude, _ in lines)
-    last = min(last, 25 * min(run.followed_frequency() for run, _ in found))
+    last = last_shown([(frequency, amplitude) for _, _, frequency, amplitude, _ in lines])
     last = max(last, 1.5 * min(frequency[frequency > 0].min() for _, _, frequency, _, _ in lines))
     size, unit = frequency_unit(last)
     for k, (run, name, frequency, amplitude, is_lines) in enumerate(lines):
@@ -105,7 +119,6 @@ def framed(values, step, period):
 
 def spectrogram_of(run, of):
     """Times, frequencies, powers and what they are of. of: "probe" (that which swings most), "energy" or a probe's name."""
-    period = run.followed_period()
     for name in ("transient", "settled"):
         try:
             run.stage(name)
@@ -116,10 +129,12 @@ def spectrogram_of(run, of):
     else:
         raise last
     step = (time[-1] - time[0]) / (len(time) - 1)
+    # Of the motion, not of the mode that grows most: another one may win.
+    probes = run.probes(name)
+    period = 1 / strongest_line(*windowed(strongest(probes)[1], step)) if probes else run.followed_period()
     if of == "energy":
         values, words = run.series(name, "energy"), "mechanical energy (quadratic: not the motion's own spectrum)"
     else:
-        probes = run.probes(name)
         if of != "probe" and of not in probes:
             raise Missing(f"there is no probe {of}: {', '.join(probes) or 'the scene has none'}")
         probe, values = strongest(probes) if of == "probe" else (of, probes[of])

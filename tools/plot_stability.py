@@ -15,6 +15,16 @@ def found_modes(run):
     return modes
 
 
+def symlog_ticks(scale, low, high):
+    """Zero and decades beyond scale, at most six a side: matplotlib's own ones near zero stand on one another's labels."""
+    ticks = [0.0]
+    for end in (low, high):
+        first, last = np.ceil(np.log10(2 * scale)), np.floor(np.log10(max(abs(end), 1e-300)))
+        sign = np.sign(end)
+        ticks += [sign * 10.0**k for k in np.arange(first, last + 1, max(1, np.ceil((last - first + 1) / 6)))]
+    return sorted(set(ticks))
+
+
 def draw_modes(runs):
     found = those_with(runs, found_modes)
     largest = max(mode["frequency_hz"] for _, modes in found for mode in modes["modes"])
@@ -29,8 +39,9 @@ def draw_modes(runs):
             axes.plot([m["frequency_hz"] / size for m in modes["projected"]], [m["growth_rate"] for m in modes["projected"]],
                       "s", ms=7, mfc="none", mec="0.6", label="projection on real modes")
         shades = (SLIP, RED) if len(found) == 1 else (colour(k), colour(k))
+        count = f"{unstable.sum()} of {len(unstable)}"
         axes.plot(frequency[~unstable] / size, growth[~unstable], "o", ms=4, color=shades[0], label=label_of(run, runs, "stable"))
-        axes.plot(frequency[unstable] / size, growth[unstable], "^", ms=8, color=shades[1], label=label_of(run, runs, "unstable"))
+        axes.plot(frequency[unstable] / size, growth[unstable], "^", ms=8, color=shades[1], label=label_of(run, runs, f"unstable, {count}"))
         points += [(f / size, g) for f, g in zip(frequency[unstable], growth[unstable])]
         texts += [f"{label_of(run, runs)} {mode_words(f, g)}".strip() for f, g in zip(frequency[unstable], growth[unstable])]
         growths.append(growth)
@@ -41,13 +52,14 @@ def draw_modes(runs):
     scale = max(min((g for _, g in points), default=np.median(np.abs(growths))), 1e-12)
     if np.abs(growths).max() > 20 * scale:
         axes.set_yscale("symlog", linthresh=scale)
+        axes.set_yticks(symlog_ticks(scale, growths.min(), growths.max()))
         axes.set_ylabel("real part, growth rate [1/s], log away from 0")
     axes.margins(y=0.12)
-    count = ", ".join(f"{modes['unstable_count']} unstable of {len(modes['modes'])}" for _, modes in found)
+    words = f", {found[0][1]['unstable_count']} unstable of {len(found[0][1]['modes'])}" if len(found) == 1 else ""
     if len(points) > LABELS:
-        count += f", the {LABELS} that grow fastest labelled"
-    axes.set(xlabel=f"frequency [{unit}]", xlim=(0, 1.05 * max(largest / size, 1e-9)), title=heading(runs, f"modes, {count}"))
-    axes.legend(loc="lower left", fontsize=8)
+        words += f", the {LABELS} that grow fastest labelled"
+    axes.set(xlabel=f"frequency [{unit}]", xlim=(0, 1.05 * max(largest / size, 1e-9)), title=heading(runs, f"modes{words}"))
+    axes.legend(fontsize=8)
     order = sorted(range(len(points)), key=lambda k: -points[k][1])[:LABELS]
     if order:
         label_column(axes, [points[k] for k in order], [texts[k] for k in order])

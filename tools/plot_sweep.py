@@ -2,11 +2,13 @@
 sought, and a map of stability for two numbers."""
 
 import numpy as np
-from plot_basis import frequency_unit, heading, plt, those_with
+from matplotlib.lines import Line2D
+from plot_basis import frequency_unit, heading, label_row, legend_below, plt, those_with
 from squeal import Missing
 
 COLOURS = ["#c0272d", "#1b6ca8", "#d95f02", "#2e8b57", "#7b3fa0", "#b5893a", "#008b8b", "#d6409f"]
 MARKS = "os^Dvp*X"
+SHADES = ["black", "#1b6ca8", "#7b3fa0"]  # of marks on the yellow and red of a map
 
 
 def tables_of(results):
@@ -75,7 +77,25 @@ def ordered_rows(table, choice):
     return rows[np.argsort(table["value"][rows, 0], kind="stable")]
 
 
-def draw_column(axes, table, rows, sweep, size):
+def look_of_mode(place):
+    """Colour and mark, different for 64 modes."""
+    return COLOURS[place % len(COLOURS)], MARKS[place // len(COLOURS) % len(MARKS)]
+
+
+def with_thresholds(number, frequency, growth, thresholds):
+    """A mode's values by rising number, with the points where its growth rate is zero: between the points of the sweep the
+    line would cross zero elsewhere."""
+    x = np.concatenate([number, [t["values"][0] for t in thresholds]])
+    order = np.argsort(x, kind="stable")
+    return (x[order], np.concatenate([frequency, [t["frequency_hz"] for t in thresholds]])[order],
+            np.concatenate([growth, np.zeros(len(thresholds))])[order])
+
+
+def thresholds_of(sweep, direction, track=None):
+    return [t for t in sweep["thresholds"] if t["direction"] == direction and track in (None, t["track"])]
+
+
+def draw_column(axes, table, rows, sweep, size, direction):
     """One direction of rotation: frequencies above, growth rates below; modes that are unstable somewhere in colour."""
     above, below = axes
     number = table["value"][rows, 0]
@@ -89,12 +109,40 @@ def draw_column(axes, table, rows, sweep, size):
         frequency, growth = table["frequency"][rows, track], table["growth_rate"][rows, track]
         if np.isnan(frequency).all():
             continue
-        colour, mark = COLOURS[place % len(COLOURS)], MARKS[place // len(COLOURS) % len(MARKS)]
+        colour, mark = look_of_mode(place)
         hertz = f"{strongest['frequency_hz']:.0f}" if size == 1000 else f"{strongest['frequency_hz']:.3g}"
         label = f"mode {track}, {hertz} Hz where it grows most"
-        above.plot(number, frequency / size, "-", color=colour, marker=mark, ms=3.5, lw=1.4, label=label)
-        below.plot(number, growth, "-", color=colour, marker=mark, ms=3.5, lw=1.4)
+        x, along, rising = with_thresholds(number, frequency, growth, thresholds_of(sweep, direction, track))
+        for ax, line, points in ((above, along / size, frequency / size), (below, rising, growth)):
+            ax.plot(x, line, "-", color=colour, lw=1.4)
+            ax.plot(number, points, ls="", color=colour, marker=mark, ms=3.5)
+        above.plot([], [], "-", color=colour, marker=mark, ms=3.5, lw=1.4, label=label)
     below.axhline(0, color="0.3", lw=0.8)
+
+
+def mark_thresholds(axes, sweep, direction):
+    """Dotted lines, with their values in a row above the lowest axes of modes; those that look equal have one label."""
+    places = {track: place for place, track in enumerate(strongest_tracks(sweep))}
+    values, colours = {}, {}
+    for threshold in thresholds_of(sweep, direction):
+        value, text = threshold["values"][0], f"{threshold['values'][0]:.4g}"
+        shade = look_of_mode(places[threshold["track"]])[0] if threshold["track"] in places else "0.4"
+        for ax in axes:
+            ax.axvline(value, color="0.4", lw=0.8, ls=":")
+        colours[text] = "0.3" if text in values else shade  # of several modes
+        values.setdefault(text, value)
+    if values:
+        axes[0].plot([], [], ls=":", color="0.4", lw=0.8, label="threshold, with its value")
+        label_row(axes[1], list(values.values()), list(values), list(colours.values()))
+
+
+def mark_failed(ax, sweep, direction):
+    """Points that failed, at the lower edge."""
+    failed = [p for p in sweep["points"] if p["outcome"] != "converged" and p["direction"] == direction]
+    for outcome in dict.fromkeys(p["outcome"] for p in failed):
+        x = [p["values"][0] for p in failed if p["outcome"] == outcome]
+        ax.plot(x, [0.03] * len(x), "x", ms=7, mew=1.8, color="black", transform=ax.get_xaxis_transform(), clip_on=False)
+    return {f"point that failed: {p['outcome']}": Line2D([], [], ls="", marker="x", ms=7, mew=1.8, color="black") for p in failed}
 
 
 def limit_growth(axes, growth):
@@ -116,13 +164,9 @@ def draw_chart(results, sweep, table):
                                 sharex=True, sharey="row", squeeze=False)
     for column, direction in enumerate(directions):
         rows = ordered_rows(table, table["direction"] == direction)
-        draw_column(axes[:2, column], table, rows, sweep, size)
+        draw_column(axes[:2, column], table, rows, sweep, size, direction)
         if rows_of_axes == 3:
             draw_motions(axes[0, column], axes[2, column], motions[direction], size)
-        for threshold in sweep["thresholds"]:
-            if threshold["direction"] == direction:
-                for ax in axes[:, column]:
-                    ax.axvline(threshold["values"][0], color="0.4", lw=0.8, ls=":")
         axes[-1, column].set_xlabel(labels_of(sweep)[0])
         if len(directions) > 1:
             axes[0, column].set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
@@ -136,50 +180,95 @@ def draw_chart(results, sweep, table):
     coloured = list(strongest_tracks(sweep))
     limit_growth(axes[1, 0], table["growth_rate"][:, coloured] if coloured else table["growth_rate"])
     legend = {}
-    for ax in axes[0]:  # a mode keeps its colour: one label each
-        for handle, label in zip(*ax.get_legend_handles_labels()):
-            legend.setdefault(label, handle)
-    if legend:
-        labels, handles = list(legend), list(legend.values())
-        figure.get_layout_engine().set(rect=(0, 0.06, 1, 0.94))  # the legend is below
-        figure.legend(handles, labels, loc="lower center", ncols=min(4, len(labels)), fontsize=8)
+    for column, direction in enumerate(directions):
+        legend |= mark_failed(axes[1, column], sweep, direction)
+        mark_thresholds(axes[:, column], sweep, direction)
+    # A mode keeps its colour: one label each.
+    legend = {label: handle for ax in axes[0] for handle, label in zip(*ax.get_legend_handles_labels())} | legend
     figure.suptitle(heading([results], "modes against " + sweep["keys"][0]))
+    legend_below(figure, legend)
     return figure
 
 
+def level_between(points, thresholds, fine):
+    """Largest growth rate on a fine grid of the first number, at one value of the second: between points in lines, that leave
+    zero at the threshold where a stable point has an unstable neighbour; unknown beside points that failed."""
+    x = [(p["values"][0], max(p["growth_rate"], 0) if "growth_rate" in p else np.nan) for p in points]
+    for left, right in zip(points, points[1:]):
+        stable = [p["unstable_modes"] == 0 for p in (left, right)]
+        crossed = [t["values"][0] for t in thresholds if left["values"][0] < t["values"][0] < right["values"][0]]
+        if crossed and stable[0] != stable[1]:
+            x.append((min(crossed) if stable[0] else max(crossed), 0.0))
+    x.sort()
+    return np.interp(fine, *zip(*x), left=np.nan, right=np.nan)
+
+
+def draw_levels(ax, points, thresholds, limit):
+    """Colours of the largest growth rate. Where the second number has a few values, each has a band, since modes are
+    followed along the first number alone; random points are joined by triangles."""
+    values = np.array([p["values"] for p in points])
+    style = {"cmap": "YlOrRd", "vmin": 0, "vmax": limit}
+    seconds = np.unique(values[:, 1])
+    if len(seconds) > len(points) / 2:
+        found = [p for p in points if "growth_rate" in p]
+        values = np.array([p["values"] for p in found])
+        if np.linalg.matrix_rank(values - values[0]) == 2:  # else no triangle joins them
+            ax.tripcolor(*values.T, np.clip([p["growth_rate"] for p in found], 0, limit), shading="gouraud", **style)
+        return
+    fine = np.linspace(values[:, 0].min(), values[:, 0].max(), 600)
+    middles = (seconds[1:] + seconds[:-1]) / 2
+    edges = np.concatenate([seconds[:1], middles, seconds[-1:]]) if len(seconds) > 1 else [seconds[0] - 0.5, seconds[0] + 0.5]
+    level = [level_between(sorted((p for p in points if p["values"][1] == second), key=lambda p: p["values"][0]),
+                           [t for t in thresholds if t["values"][1] == second], fine) for second in seconds]
+    ends = np.concatenate([fine[:1], (fine[1:] + fine[:-1]) / 2, fine[-1:]])
+    ax.pcolormesh(ends, edges, np.array(level), rasterized=True, **style)
+
+
+def lines_of_thresholds(sweep, share=0.02):
+    """Thresholds of like frequencies, by rising frequency: a mode has another number at each value of the second number."""
+    groups = []
+    for threshold in sorted(sweep["thresholds"], key=lambda t: t["frequency_hz"]):
+        if groups and threshold["frequency_hz"] <= (1 + share) * groups[-1][-1]["frequency_hz"]:
+            groups[-1].append(threshold)
+        else:
+            groups.append([threshold])
+    return groups
+
+
 def draw_map(results, sweep):
-    """Largest growth rate over the plane of two numbers; points as dots, the thresholds of each mode as its colour."""
+    """Largest growth rate over the plane of two numbers; points as dots, thresholds of like frequencies have one mark."""
     found = [p for p in sweep["points"] if "growth_rate" in p]
     directions = [d for d in (1, -1) if any(p["direction"] == d for p in found)]
-    figure, axes = plt.subplots(1, len(directions), figsize=(3.4 + 3.6 * len(directions), 4.6), sharey=True, squeeze=False)
+    figure, axes = plt.subplots(1, len(directions), figsize=(3.4 + 3.6 * len(directions), 5.2), sharey=True, squeeze=False)
     limit = max(max(p["growth_rate"] for p in found), 1e-12)
+    failures = {}
     for ax, direction in zip(axes[0], directions):
-        points = [p for p in found if p["direction"] == direction]
-        values = np.array([p["values"] for p in points])
-        level = np.clip([p["growth_rate"] for p in points], 0, limit)
-        if np.linalg.matrix_rank(values - values[0]) == 2:  # else no triangle joins them
-            ax.tripcolor(*values.T, level, cmap="YlOrRd", vmin=0, vmax=limit, shading="gouraud")
-        stable = np.array([p["unstable_modes"] == 0 for p in points])
-        ax.plot(*values[stable].T, "o", ms=3, mfc="white", mec="0.5", label="stable")
-        ax.plot(*values[~stable].T, "o", ms=3, color="0.2", label="unstable")
-        for place, track in enumerate(strongest_tracks(sweep)):
-            for change in (1, -1):  # the ends of an unstable range are two lines
-                crossings = sorted((t["values"][1], t["values"][0]) for t in sweep["thresholds"]
-                                   if t["track"] == track and t["direction"] == direction and t["change"] == change)
-                if crossings:
-                    y, x = zip(*crossings)
-                    ax.plot(x, y, "-", marker=MARKS[place % len(MARKS)], ms=4, lw=1.2,
-                            color=COLOURS[place % len(COLOURS)], label=f"threshold of mode {track}")
+        points = [p for p in sweep["points"] if p["direction"] == direction]
+        ax.grid(False)
+        draw_levels(ax, points, thresholds_of(sweep, direction), limit)
+        for label, style, chosen in (("stable", {"mfc": "white", "mec": "0.5"}, [p for p in points if "growth_rate" in p and not p["unstable_modes"]]),
+                                     ("unstable", {"color": "0.2"}, [p for p in points if p["unstable_modes"]])):
+            ax.plot([p["values"][0] for p in chosen], [p["values"][1] for p in chosen], "o", ms=3, label=label, **style)
+        failed = [p for p in points if p["outcome"] != "converged"]
+        if failed:
+            failures["point that failed"], = ax.plot(*zip(*(p["values"] for p in failed)), "x", ms=6, mew=1.6, color="black")
+        for place, group in enumerate(lines_of_thresholds(sweep)):
+            at = [t["values"] for t in group if t["direction"] == direction]
+            if at:
+                mark, shade = MARKS[1 + place % (len(MARKS) - 1)], SHADES[place // (len(MARKS) - 1) % len(SHADES)]  # a dot is a point
+                mean = np.mean([t["frequency_hz"] for t in group])
+                ax.plot(*zip(*at), ls="", marker=mark, ms=8, mew=1.2, mec="white", color=shade,
+                        label=f"threshold at {mean:.4g} Hz")
+        ax.use_sticky_edges = False  # points at the edge are seen whole
+        ax.margins(0.03)
         ax.set_xlabel(labels_of(sweep)[0])
         if len(directions) > 1:
             ax.set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
     axes[0, 0].set_ylabel(labels_of(sweep)[1])
-    legend = {label: handle for ax in axes[0] for handle, label in zip(*ax.get_legend_handles_labels())}
-    figure.get_layout_engine().set(rect=(0, 0.06, 1, 0.94))  # the legend is below
-    figure.legend(legend.values(), legend, loc="lower center", ncols=min(4, len(legend)), fontsize=8)
     shades = plt.cm.ScalarMappable(plt.Normalize(0, limit), "YlOrRd")
     figure.colorbar(shades, ax=axes, label="largest growth rate [1/s]")
     figure.suptitle(heading([results], "stability"))
+    legend_below(figure, {label: handle for ax in axes[0] for handle, label in zip(*ax.get_legend_handles_labels())} | failures)
     return figure
 
 

@@ -221,11 +221,11 @@ def robustness(report):
     if not found.get("samples"):
         return ""
     quantiles = lambda mode, name, digits: " / ".join(number(mode.get(f"{name}_{k}"), digits) for k in (5, 50, 95))
-    rows = [["any", probability(found["any"]), found["any"]["unstable_samples"], "", "", ""]]
+    rows = [["any", probability(found["any"]), found["any"]["unstable_samples"], "", "", "", ""]]
     rows += [["others" if m["mode"] < 0 else m["mode"], f"<b>{probability(m)}</b>", m["unstable_samples"],
-              number(m.get("median_frequency_hz"), 6) if m["mode"] >= 0 else "–", quantiles(m, "frequency_hz", 5), quantiles(m, "growth_rate", 4)]
+              *(number(m[f"median_{name}"], 6) if m["mode"] >= 0 else "–" for name in ("frequency_hz", "growth_rate")), quantiles(m, "frequency_hz", 5), quantiles(m, "growth_rate", 4)]
              for m in found["modes"]]
-    head = ["mode", f"probability of instability [%] ({100 * found['confidence']:.4g} % interval)", "unstable samples", "frequency at the medians [Hz]",
+    head = ["mode", f"probability of instability [%] ({100 * found['confidence']:.4g} % interval)", "unstable samples", "at the medians: frequency [Hz]", "growth rate [1/s]",
             "where unstable: frequency [Hz], 5 / 50 / 95 %", "growth rate [1/s], 5 / 50 / 95 %"]
     checks = len(found["checks"])
     words = (f"{found['samples']} random samples. {checks} of them were computed in full: growth rates are off by {found['growth_error']:.1e} "

@@ -169,3 +169,61 @@ def test_without_pyvista_a_word_says_so(pins, tmp_path, monkeypatch):
     monkeypatch.setenv("SQUEAL_PYTHON", str(tmp_path / "none"))
     printed = plot(pins[0], "--output", tmp_path, "--only", "shape", "modes")
     assert "shape left out: 3D pictures need PyVista" in printed and (tmp_path / "modes.png").exists()
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_phase_portrait_is_closed_where_the_period_is(closed):
+    """A drifting circle: no velocity of the open one comes from its gap."""
+    time = np.arange(200) / 200
+    place, speed = plot_basis.portrait(np.cos(2 * np.pi * time) + (0 if closed else 5 * time), 1 / 200, closed)
+    assert (len(place) == 201) == closed and (place[0] == place[-1]) == closed
+    assert np.abs(speed).max() <= 2 * np.pi + (0 if closed else 5)
+
+
+@pytest.mark.parametrize("line, last", [(0.17, 25 * 0.17), (600, 15000), (4000, 20000), (18000, 90000)])
+def test_the_axis_of_a_spectrum_ends_soon_beyond_its_line(line, last):
+    """Beside a floor 60 dB below that reaches to a thousand times its frequency."""
+    frequency = line * np.arange(1, 8001) / 8
+    amplitude = np.where(frequency == line, 1.0, 1e-3)
+    assert plot_spectra.last_shown([(frequency, amplitude), (frequency, 0.1 * amplitude)]) == pytest.approx(last)
+
+
+def test_a_cycle_keeps_its_harmonics_on_the_axis():
+    frequency = 4840.0 * np.arange(1, 100)
+    assert plot_spectra.last_shown([(frequency, 1e-3 * (4840 / frequency) ** 9)]) == 4840 * 3  # the fourth is 108 dB below
+
+
+@pytest.mark.parametrize("scale, low, high", [(0.011, -1e5, 3), (4.4, -5e3, 2e3), (1e-9, -1e4, 0.5), (1e-12, -3, -1)])
+def test_ticks_of_a_logarithm_away_from_zero_keep_apart(scale, low, high):
+    from plot_stability import symlog_ticks
+
+    ticks = np.array(symlog_ticks(scale, low, high))
+    assert 0 in ticks and len(ticks) <= 13 and np.abs(ticks[ticks != 0]).min() >= 2 * scale
+
+
+def test_the_line_of_a_mode_passes_through_its_thresholds():
+    import plot_sweep
+
+    x, frequency, growth = plot_sweep.with_thresholds([0.2, 0.3], [1580, 1590], [-50, 60], [{"values": [0.297], "frequency_hz": 1583}])
+    assert x.tolist() == [0.2, 0.297, 0.3] and frequency.tolist() == [1580, 1583, 1590] and growth.tolist() == [-50, 0, 60]
+
+
+def test_a_map_grows_from_its_thresholds_and_knows_nothing_of_points_that_failed():
+    import plot_sweep
+
+    point = lambda x, growth: {"values": [x, 1], "unstable_modes": int(growth > 0), "growth_rate": growth}
+    points = [point(0, -5), point(1, 10), point(2, 20), {"values": [3, 1], "unstable_modes": 0}]
+    level = plot_sweep.level_between(points, [{"values": [0.8, 1]}], np.array([0.5, 0.8, 0.9, 1.5, 2.5]))
+    assert level == pytest.approx([0, 0, 5, 15, np.nan], nan_ok=True)
+
+
+def test_modes_of_a_sweep_look_different():
+    import plot_sweep
+
+    assert len({plot_sweep.look_of_mode(place) for place in range(64)}) == 64
+
+
+@pytest.mark.parametrize("dots", ["-3", "0", "1e9", "nan"])
+def test_dots_that_are_no_resolution_are_refused(tmp_path, dots):
+    done = subprocess.run([sys.executable, ROOT / "tools" / "plot", tmp_path, "--dpi", dots], capture_output=True, text=True)
+    assert done.returncode == 1 and done.stderr == f"plot: --dpi {dots} is no whole number from 20 to 1200\n"
