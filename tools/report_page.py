@@ -12,7 +12,7 @@ from plot_all import ANIMATION, FIGURES, figures
 from plot_basis import length_unit
 from plot_shape import animate
 from report_style import STYLE
-from report_tables import number, numbers, probability, rotation, strongest, table, text, values_of
+from report_tables import number, numbers, paragraph, probability, rotation, strongest, table, text, values_of
 from squeal import Missing
 
 STAGES = ("equilibrium", "modes", "estimate", "response", "transient", "coarse", "cycle", "settled", "attractors", "branch",
@@ -129,9 +129,12 @@ def warnings(run):
 
 
 def stages(run):
+    found = {stage: run.report[stage] for stage in STAGES if run.report.get(stage)}
     rows = [[stage, text(entry.get("outcome", "–")), text(entry.get("reason", "")), number(run.report["timings"].get(stage), 3)]
-            for stage, entry in ((stage, run.report.get(stage, {})) for stage in STAGES) if entry]
-    return "<h3>Stages</h3>" + table(["stage", "outcome", "why", "time [s]"], rows)
+            for stage, entry in found.items() if entry.get("outcome") != "off"]
+    off = [stage for stage, entry in found.items() if entry.get("outcome") == "off"]
+    return ("<h3>Stages</h3>" + table(["stage", "outcome", "why", "time [s]"], rows, "later stages")
+            + (paragraph(f"Not asked for: {', '.join(off)}.") if off else ""))
 
 
 def sound(run):

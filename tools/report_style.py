@@ -28,14 +28,17 @@ img { display: block; max-width: 100%; height: auto; margin: 0 auto; }
 figcaption { color: var(--soft); font-size: 0.9rem; margin-top: 0.3rem; }
 audio { width: 100%; max-width: 480px; }
 .wide { overflow-x: auto; }
+.wide + .wide { margin-top: 0.8rem; }
 table { border-collapse: collapse; font-size: 0.9rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: 0.25rem 0.9rem 0.25rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
+td { white-space: nowrap; }
+td.words { white-space: normal; min-width: 16rem; overflow-wrap: anywhere; }
 th { color: var(--soft); font-weight: 600; }
 pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--ground); padding: 0.6rem 0.8rem; border-radius: 4px; font-size: 0.85rem; }
 details { margin: 0.5rem 0; }
 summary { cursor: pointer; color: var(--blue); }
 .pictures details { grid-column: 1 / -1; }
-@media (max-width: 720px) {
+@media screen and (max-width: 720px) {
   main { padding: 0.8rem 0.5rem 2rem; }
   h1 { font-size: 1.3rem; }
   .heard { font-size: 1.08rem; }
@@ -53,8 +56,13 @@ summary { cursor: pointer; color: var(--blue); }
   .warnings { border-left: 1.2mm solid var(--red); padding-left: 3mm; }
   figure, tr { break-inside: avoid; }
   h2, h3, h4 { break-after: avoid; }
-  img { max-height: 200mm; }
+  .pictures { grid-template-columns: minmax(0, 1fr); }
+  figure.broad { grid-column: auto; }
+  img { max-height: 120mm; }
   .wide { overflow: visible; }
+  table { font-size: 8pt; }
+  th, td { padding-right: 0.5rem; }
+  td.words { min-width: 0; }
   audio { display: none; }
 }
 """

@@ -5,6 +5,7 @@ import html
 import numpy as np
 
 ROWS = 12  # of a table that stand open; the rest is folded away
+WORDS = 40  # letters of a cell that stay on one line
 NUMBERS = 6  # of the scene that are shown for a mode: those that move its growth most
 MODES = 3  # unstable modes whose numbers stand open
 CHANGES = {"mass": ("mass", "kg"), "damping": ("dashpot", "N s/m"), "stiffness": ("spring", "N/m")}  # of a [[change]]
@@ -26,9 +27,11 @@ def number(value, digits=5):
 
 
 def table(head, rows, summary=""):
-    """Rows beyond some are folded away."""
+    """Rows beyond some are folded away. Only cells of many words go on over several lines."""
+    cell = lambda content: f'<td class="words">{content}</td>' if len(str(content)) > WORDS else f"<td>{content}</td>"
+
     def body(part):
-        lines = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in part)
+        lines = "".join("<tr>" + "".join(map(cell, row)) + "</tr>" for row in part)
         heads = "".join(f"<th>{cell}</th>" for cell in head)
         return f'<div class="wide"><table><thead><tr>{heads}</tr></thead><tbody>{lines}</tbody></table></div>'
 

@@ -136,6 +136,7 @@ def test_the_page_says_which_points_of_a_sweep_failed_and_why(studies, tmp_path)
     assert "1 of 3 points failed" in text[: text.index("Pictures")] and "1 failed" in text[: text.index("Warnings")]
     assert f"{point['values'][0]:.7g} no equilibrium friction is <too> large" in text
     assert "sweep not converged 1 of 3 points failed" in text  # the table of stages
+    assert "Not asked for: estimate" in text or "Not asked for: transient" in text
 
 
 # Puts the page into a frame of each width, says what sticks out of it and which pictures are there.
