@@ -40,6 +40,13 @@ template <class Function> Function* function_of_blas(const char* name)
   return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));
 }
 
+/// 0: BLAS does not tell.
+int threads_of_blas()
+{
+  auto* const get = function_of_blas<int()>("openblas_get_num_threads");
+  return get ? get() : 0;
+}
+
 void set_threads(int threads)
 {
   if (auto* const set = function_of_blas<void(int)>("openblas_set_num_threads")) set(threads);
@@ -51,9 +58,9 @@ LentCores::LentCores(MPI_Comm comm, std::size_t rows) : comm_(ranks_of(comm) > 1
 {
   if (comm_ == MPI_COMM_NULL) return;
   const int threads = std::min(ranks_of_node(comm), allowed_cores());
-  auto* const get = function_of_blas<int()>("openblas_get_num_threads");
-  if (rank_of(comm) != 0 || !get || get() >= threads) return;
-  threads_ = get();
+  const int before = threads_of_blas();
+  if (rank_of(comm) != 0 || before == 0 || before >= threads) return;
+  threads_ = before;
   set_threads(threads);
 }
 
@@ -72,6 +79,19 @@ LentCores::~LentCores()
   int done = 0;
   for (MPI_Test(&ended, &done, MPI_STATUS_IGNORE); !done; MPI_Test(&ended, &done, MPI_STATUS_IGNORE))
     std::this_thread::sleep_for(pause);
+}
+
+OneThread::OneThread()
+{
+  const int before = threads_of_blas();
+  if (before <= 1) return;
+  threads_ = before;
+  set_threads(1);
+}
+
+OneThread::~OneThread()
+{
+  if (threads_ > 0) set_threads(threads_);
 }
 
 } // namespace squeal

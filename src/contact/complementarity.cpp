@@ -125,7 +125,8 @@ StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vecto
   std::set<std::vector<char>> met; // while pairs change one at a time
   for (result.iterations = 1; result.iterations <= max_iterations; ++result.iterations)
   {
-    SplitSolution split = solve_split(problem, closed, problem.q);
+    auto solver = std::make_unique<SplitSolver>(problem, closed);
+    SplitSolution split = solver->solve(problem.q);
     std::vector<std::size_t> wrong = wrong_pairs(split, problem.compliance);
     if (wrong.empty())
     {
@@ -135,6 +136,7 @@ StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vecto
       for (double& value : result.gap) value = std::max(0., value);
       for (double& value : result.reaction) value = std::max(0., value);
       result.closed = std::move(closed);
+      result.solver = std::move(solver);
       return result;
     }
     tries = wrong.size() < fewest ? patience : tries - 1;

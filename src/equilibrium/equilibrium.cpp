@@ -63,6 +63,13 @@ std::vector<double> gaps_of(const Interface& interface, Vec u)
   return gap;
 }
 
+/// The displacement without reactions under a load. Points of a sweep mostly have one load.
+struct Unloaded
+{
+  Owned<Vec> load{}, u{}; // null until they are known
+  std::vector<double> gap{};
+};
+
 /// Whether each pair's drive is along its axis, which D was made for: 1, -1 against it, 0 without a drive.
 std::vector<double> senses(const Interface& interface, const std::vector<double>& axes)
 {
@@ -192,8 +199,7 @@ struct Search
 void settle(const Held& held, const Structure& structure, const Interface& interface, Search& search,
             Equilibrium& equilibrium, MPI_Comm comm)
 {
-  auto& [outcome, iterations, closed, gap, reaction] = search.solution;
-  std::optional<SplitSolver> solver; // on rank 0
+  auto& [outcome, iterations, closed, gap, reaction, solver] = search.solution; // the solver on rank 0
   for (int pass = 0;; ++pass)
   {
     const std::vector<double> geometric = add_compliance(interface, -1, reaction, gap);
@@ -204,7 +210,6 @@ void settle(const Held& held, const Structure& structure, const Interface& inter
     on_rank_zero_with_lent_cores(comm, static_cast<std::size_t>(interface.pairs),
                                  [&]
                                  {
-                                   if (!solver) solver.emplace(search.problem, closed);
                                    const auto change = solver->solve(error);
                                    for (std::size_t i = 0; i < error.size(); ++i)
                                    {
@@ -324,6 +329,7 @@ struct PairCompliance::Parts
   std::vector<double> axes; // of each pair, as TangentView reads them
   Held held;
   GapCompliance D;
+  mutable Unloaded unloaded{}; // of the last load
 };
 
 PairCompliance::PairCompliance(const Structure& structure, const Interface& interface,
@@ -360,19 +366,44 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   return equilibrium;
 }
 
+namespace
+{
+
+void displace_without_reactions(const PairCompliance::Parts& parts, const Structure& structure,
+                                const Interface& interface, Vec u)
+{
+  auto& [load, known, gap] = parts.unloaded;
+  PetscBool same = PETSC_FALSE;
+  if (load.get()) check(VecEqual(load, structure.load, &same));
+  if (!same || gap != interface.gap)
+  {
+    const std::vector<double> nothing(interface.gap.size(), 0.);
+    const Held& held = parts.held;
+    check(VecSet(u, 0));
+    displace(held, structure, interface, pair_forces(interface, nothing, nothing, held.kappa), u);
+    load = copy_of(structure.load);
+    known = copy_of(u);
+    gap = interface.gap;
+    return;
+  }
+  check(VecCopy(known, u));
+}
+
+} // namespace
+
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const PairCompliance& compliance,
                              const std::vector<char>& expected, const EquilibriumOptions& options)
 {
   const MPI_Comm comm = comm_of(structure.load);
   const auto pairs = static_cast<std::size_t>(interface.pairs);
-  const Held& held = compliance.parts().held;
+  const PairCompliance::Parts& parts = compliance.parts();
+  const Held& held = parts.held;
 
   Equilibrium equilibrium;
   equilibrium.u = zeros_like(structure.load);
   equilibrium.directions = interface.directions;
   equilibrium.auxiliary_stiffness = held.kappa;
-  const std::vector<double> nothing(pairs, 0.);
-  displace(held, structure, interface, pair_forces(interface, nothing, nothing, held.kappa), equilibrium.u);
+  displace_without_reactions(parts, structure, interface, equilibrium.u);
   const std::vector<double> q = gaps_of(interface, equilibrium.u);
 
   Search search;

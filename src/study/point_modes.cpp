@@ -174,28 +174,36 @@ void append_residuals(const ModesBasis& modes, const PointProblem& problem, cons
   };
   const auto mixed = [&](const MatrixXcd& by)
   { return product(lift, kept_rows(combination_of_shapes(modes.basis, (a * by).real()), point.contact)); };
-  const auto add_on_pairs = [&](MultiVector& force, Mat D, const MultiVector& x)
+  const auto on_pairs = [&](Mat D, const MultiVector& x)
   {
     const Owned<Mat> of_side = right ? copy_of(D) : transpose_of(D);
-    force.entries += product(project(of_side, interface.B, interface.B), x).entries;
+    return product(transpose_of(interface.B), product(of_side, product(interface.B, x)));
   };
   // lambda^2 M x + lambda C x + K x + f K_loss x, the factors within the weights
-  MultiVector x = mixed(weights), force = product(structure.K, x);
-  if (structure.H.get()) force.entries += of_skew * product(structure.H, x).entries;
-  if (point.stiffness.get()) add_on_pairs(force, point.stiffness, x);
+  const auto lambda = [](const TwoSidedPair& pair) { return pair.lambda; };
+  const MatrixXcd rates = times(weights, lambda);
+  MultiVector x = mixed(weights), v = mixed(rates), acceleration = mixed(times(rates, lambda));
+  MultiVector force = empty_multivector(structure.K);
+  force.entries.setZero(x.entries.rows(), x.columns());
+  const auto add = [&](double factor, const MultiVector& part) { force.entries += factor * part.entries; };
+  if (structure.H.get()) add(of_skew, product(structure.H, x));
+  if (point.stiffness.get()) add(1, on_pairs(point.stiffness, x));
   if (structure.K_loss.get())
   {
     const auto f = [](const TwoSidedPair& pair) { return loss_factor_of(pair.loss, pair.lambda); };
-    force.entries += product(structure.K_loss, mixed(times(weights, f))).entries;
+    add(1, product(structure.K_loss, mixed(times(weights, f))));
   }
-  const auto lambda = [](const TwoSidedPair& pair) { return pair.lambda; };
-  weights = times(weights, lambda);
-  x = mixed(weights);
-  force.entries += product(modes.basis.C.matrix, x).entries;
-  if (structure.G.get()) force.entries += of_skew * product(structure.G, x).entries;
-  if (point.damping.get()) add_on_pairs(force, point.damping, x);
-  weights = times(weights, lambda);
-  force.entries += product(structure.M, mixed(weights)).entries;
+  if (structure.G.get()) add(of_skew, product(structure.G, v));
+  if (point.damping.get()) add(1, on_pairs(point.damping, v));
+  if (const auto& rayleigh = modes.basis.rayleigh)
+  {
+    x.entries += rayleigh->of_stiffness * v.entries;
+    acceleration.entries += rayleigh->of_mass * v.entries;
+  }
+  else
+    add(1, product(modes.basis.C.matrix, v));
+  add(1, product(structure.K, x));
+  add(1, product(structure.M, acceleration));
   append(residuals, with_zero_pivots(product(test, force), point.contact));
 }
 
@@ -458,11 +466,13 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   const auto& [structure, interface, equilibrium] = problem.sliding;
   set_structure(modes.basis, structure);
   const LinearisedPoint point = linearise_point(problem.sliding);
+  const bool at_start = !modes.turned && modes.basis.shapes() == modes.shared;
   attach(modes, interface, point.contact.pairs);
+  if (at_start) modes.shared = modes.basis.shapes();
   const double end = two_pi * followed_band * problem.band;
   const Window window{vibration_floor(modes.norms), end * end};
   Extent extent = modes.whole || modes.basis.shapes() <= small_basis ? Extent::whole : Extent::near_band;
-  double before = HUGE_VAL;
+  double before = HUGE_VAL, first = 0;
   for (PetscInt pass = 0;; ++pass)
   {
     const ProjectedSliding on_basis = project(modes.basis, point.contact, interface.B, point.damping, point.stiffness);
@@ -479,11 +489,17 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
       now = of_whole;
     }
     before = now;
+    if (pass == 0) first = now;
+    const bool leads = !modes.turned && modes.basis.shapes() == modes.shared && now > std::sqrt(first);
     MultiVector residuals{modes.basis.T.comm, MatrixXd(modes.basis.T.entries.rows(), 0)};
     if (pass < problem.passes)
       for (const Side side : {Side::right, Side::left})
         append_residuals(modes, problem, point, inexact(solved, problem, side), side, residuals);
-    if (correct(modes, std::move(residuals))) continue;
+    if (correct(modes, std::move(residuals)))
+    {
+      if (leads) modes.shared = modes.basis.shapes();
+      continue;
+    }
     if (now > 1 && complete(modes, problem))
     {
       extent = Extent::whole;

@@ -52,7 +52,9 @@ ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>
 /// Goes over to fewer closed pairs: their modes join the basis, whose shapes keep their places.
 void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed);
 
-/// Goes over to the basis of the other direction of rotation, which begins with the shapes that both share.
+/// Goes over to the basis of the other direction of rotation, which begins with the shapes that both share. Those are
+/// the first corrections too, which hold the part of the friction's effect that is linear in mu: with a reversed
+/// rotation mu changes its sign.
 void turn_round(ModesBasis& modes);
 
 /// What modes are sought on, and how exactly.

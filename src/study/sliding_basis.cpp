@@ -51,28 +51,69 @@ MatrixXd shared_sum(const MatrixXd& local, MPI_Comm comm)
   return inner_products({comm, MatrixXd::Identity(local.rows(), local.rows())}, {comm, local});
 }
 
+/// Those of matrices that no others give.
 std::vector<BasisImage*> images_of(SlidingBasis& basis)
 {
   std::vector<BasisImage*> images;
   for (BasisImage* image : {&basis.M, &basis.C, &basis.K, &basis.K_loss, &basis.G, &basis.H})
-    if (image->matrix.get()) images.push_back(image);
+    if (image->matrix.get() && !(basis.rayleigh && image == &basis.C)) images.push_back(image);
   return images;
 }
 
-/// `A` may be null.
-void set_matrix(SlidingBasis& basis, BasisImage& image, Mat A)
+/// Both may be null.
+bool alike(Mat A, Mat B)
 {
-  if (image.matrix.get() && A ? equal(image.matrix, A) : !image.matrix.get() && !A) return;
+  return A && B ? equal(A, B) : !A && !B;
+}
+
+/// `A` may be null. Returns whether it is another one.
+bool set_matrix(SlidingBasis& basis, BasisImage& image, Mat A)
+{
+  if (alike(image.matrix, A)) return false;
   basis.by_Z.Z = {};
   if (!A)
   {
     image = {image.sign};
-    return;
+    return true;
   }
   image.matrix = copy_of(A);
   const MultiVector AT = product(A, basis.T);
   image.contact_rows = {AT.comm, AT.entries(basis.contact_dofs, Eigen::all)};
   image.products = inner_products(basis.T, AT);
+  return true;
+}
+
+/// Whether C is a combination of M and K, by what they make of two of the random vectors: another part of C would show
+/// in them, above the rounding with which C is stored.
+std::optional<Rayleigh> rayleigh_part(const SlidingBasis& basis, Mat M, Mat C, Mat K)
+{
+  constexpr double rounding = 1e-13;
+  const MultiVector tests{basis.T.comm, basis.T.entries.leftCols(std::min<Index>(2, basis.sketched))};
+  const auto image_of = [&](Mat A)
+  {
+    const MultiVector image = product(A, tests);
+    return MultiVector{image.comm, image.entries.reshaped(image.entries.size(), 1)};
+  };
+  const MultiVector of_M = image_of(M), of_C = image_of(C), of_K = image_of(K);
+  const auto inner = [](const MultiVector& x, const MultiVector& y) { return inner_products(x, y)(0, 0); };
+  const double mm = inner(of_M, of_M), kk = inner(of_K, of_K), mk = inner(of_M, of_K), mc = inner(of_M, of_C),
+               kc = inner(of_K, of_C), determinant = mm * kk - mk * mk;
+  if (!(determinant > 0)) return std::nullopt;
+  const Rayleigh result{(kk * mc - mk * kc) / determinant, (mm * kc - mk * mc) / determinant};
+  const MultiVector rest{of_C.comm, of_C.entries - result.of_mass * of_M.entries - result.of_stiffness * of_K.entries};
+  if (!(inner(rest, rest) <= rounding * rounding * inner(of_C, of_C))) return std::nullopt;
+  return result;
+}
+
+void set_damping(SlidingBasis& basis, Mat M, Mat C, Mat K)
+{
+  basis.rayleigh = rayleigh_part(basis, M, C, K);
+  basis.C = {};
+  basis.by_Z.Z = {};
+  if (basis.rayleigh)
+    basis.C.matrix = copy_of(C);
+  else
+    set_matrix(basis, basis.C, C);
 }
 
 /// The pivots of this rank, as local rows.
@@ -146,11 +187,15 @@ MatrixXd independent_part(const MatrixXd& kept)
 }
 
 /// Sets the lift by Z where it has changed.
-void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact)
+void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact, Mat B)
 {
   LiftByZ& lift = basis.by_Z;
   if (lift.Z.get() && equal(lift.Z, contact.Z)) return;
   lift.Z = copy_of(contact.Z);
+  lift.by_Y.clear();
+  PetscInt rows_of_B = 0;
+  check(MatGetSize(B, &rows_of_B, nullptr));
+  if (rows_of_B > 0) lift.of_B = product(B, basis.T);
   lift.pivots = local_pivots(contact);
   lift.in_contact.clear();
   lift.change = change_by_lift(basis, contact, lift.pivots, contact.Z);
@@ -172,35 +217,75 @@ void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact)
   }
 }
 
-/// T_Y'A T_Z
-MatrixXd projected(const BasisImage& image, const MultiVector& by_Y)
+/// T_Y'A T_Z of each image. Where no tangent moves a pivot D_Y is linear in mu, and two other points tell it: they are
+/// taken where they need not be extrapolated far, since that magnifies rounding.
+std::vector<MatrixXd> projected_images(SlidingBasis& basis, const MultiVector& by_Y)
 {
-  return image.lifted_products + inner_products(by_Y, image.lifted_rows);
+  constexpr double rounding = 1e-14, farthest = 8; // of the change; in steps from one point to the other
+  std::vector<LiftByY>& known = basis.by_Z.by_Y;
+  if (known.size() == 2)
+  {
+    const MatrixXd &first = known[0].change.entries, step = known[1].change.entries - first,
+                   here = by_Y.entries - first;
+    std::array<double, 3> sums{here.cwiseProduct(step).sum(), step.squaredNorm(), by_Y.entries.squaredNorm()};
+    MPI_Allreduce(MPI_IN_PLACE, sums.data(), 3, MPI_DOUBLE, MPI_SUM, by_Y.comm);
+    const double way = sums[1] > 0 ? sums[0] / sums[1] : HUGE_VAL;
+    double rest = std::abs(way) <= farthest ? (here - way * step).squaredNorm() : HUGE_VAL;
+    MPI_Allreduce(MPI_IN_PLACE, &rest, 1, MPI_DOUBLE, MPI_SUM, by_Y.comm);
+    if (rest <= rounding * rounding * sums[2])
+    {
+      std::vector<MatrixXd> result;
+      for (std::size_t k = 0; k < known[0].projected.size(); ++k)
+        result.push_back((1 - way) * known[0].projected[k] + way * known[1].projected[k]);
+      return result;
+    }
+    known.erase(known.begin());
+  }
+  std::vector<MatrixXd> result;
+  for (const BasisImage* image : images_of(basis))
+    result.push_back(image->lifted_products + inner_products(by_Y, image->lifted_rows));
+  known.push_back({by_Y, result});
+  return result;
 }
 
-/// T_Y'B'D B T_Z. Most rows of D are zero: of friction's damping those of normals and, mostly, along the drive.
-MatrixXd projected_on_pairs(const SlidingBasis& basis, const MultiVector& by_Y, Mat B, Mat D)
+/// On the rows of B, symmetric or not.
+struct PairMatrix
 {
-  PetscInt first = 0, last = 0, first_row = 0, last_row = 0;
-  check(MatGetOwnershipRangeColumn(B, &first, &last));
-  check(MatGetOwnershipRange(B, &first_row, &last_row));
-  std::vector<PetscInt> dofs, rows;
-  for (const Index dof : basis.contact_dofs) dofs.push_back(first + static_cast<PetscInt>(dof));
-  for_each_row(D,
+  Mat matrix = nullptr;
+  bool symmetric = false;
+};
+
+/// T_Y'B'D B T_Z. Most rows of D are zero: of friction's damping those of normals and, mostly, along the drive. The
+/// others may hold no pivot: then B T_Y and B T_Z are B T there.
+MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& contact, const MultiVector& by_Y, Mat B,
+                            const PairMatrix& D)
+{
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(B, &first, &last));
+  std::vector<PetscInt> rows;
+  std::vector<Index> places;
+  for_each_row(D.matrix,
                [&](PetscInt row, std::span<const PetscInt>, std::span<const PetscScalar> values)
                {
-                 if (std::ranges::any_of(values, [](PetscScalar value) { return value != 0; })) rows.push_back(row);
+                 if (std::ranges::all_of(values, [](PetscScalar value) { return value == 0; })) return;
+                 rows.push_back(row);
+                 places.push_back(row - first);
                });
   const Owned<IS> taken = set_of(comm_of(B), rows);
-  const Owned<Mat> part = part_of(B, taken, set_of(comm_of(B), dofs));
-  const auto sliding = [&](const MultiVector& change)
+  const Owned<Mat> D_taken = part_of(D.matrix, taken, taken),
+                   at_pivots = part_of(B, taken, pivot_set(basis.K.matrix, contact));
+  double entries = 0;
+  check(MatNorm(at_pivots, NORM_FROBENIUS, &entries));
+  const MultiVector sliding{basis.T.comm, basis.by_Z.of_B.entries(places, Eigen::all)};
+  if (entries == 0)
   {
-    MultiVector x{basis.T.comm, basis.T.entries(basis.contact_dofs, Eigen::all)};
-    x.entries(basis.by_Z.in_contact, Eigen::all) += change.entries;
-    return product(part, x);
+    const MultiVector force = product(D_taken, sliding);
+    return D.symmetric ? symmetric_inner_products(sliding, force) : inner_products(sliding, force);
+  }
+  const auto lifted = [&](const MultiVector& change) {
+    return MultiVector{change.comm, sliding.entries + product(at_pivots, change).entries};
   };
-  const MultiVector force = product(part_of(D, taken, taken), sliding(basis.by_Z.change));
-  return inner_products(sliding(by_Y), force);
+  return inner_products(lifted(by_Y), product(D_taken, lifted(basis.by_Z.change)));
 }
 
 } // namespace
@@ -246,16 +331,19 @@ SlidingBasis leading_part(const SlidingBasis& basis, Index shapes)
   };
   for (const auto image : {&SlidingBasis::M, &SlidingBasis::C, &SlidingBasis::K, &SlidingBasis::K_loss,
                            &SlidingBasis::G, &SlidingBasis::H})
-    if ((basis.*image).matrix.get()) part.*image = of_image(basis.*image);
+    if ((basis.*image).matrix.get() && !(basis.rayleigh && image == &SlidingBasis::C))
+      part.*image = of_image(basis.*image);
+  part.rayleigh = basis.rayleigh;
+  if (basis.rayleigh) part.C.matrix = copy_of(basis.C.matrix);
   return part;
 }
 
 void set_structure(SlidingBasis& basis, const Structure& structure)
 {
   const Owned<Mat> C_0 = structure.K_loss.get() ? without_loss(structure.C, structure) : Owned<Mat>{};
-  set_matrix(basis, basis.M, structure.M);
-  set_matrix(basis, basis.C, C_0.get() ? C_0 : structure.C);
-  set_matrix(basis, basis.K, structure.K);
+  const Mat C = C_0.get() ? C_0 : structure.C;
+  const bool other_M = set_matrix(basis, basis.M, structure.M), other_K = set_matrix(basis, basis.K, structure.K);
+  if (other_M || other_K || !alike(basis.C.matrix, C)) set_damping(basis, structure.M, C, structure.K);
   set_matrix(basis, basis.K_loss, structure.K_loss);
   set_matrix(basis, basis.G, structure.G);
   set_matrix(basis, basis.H, structure.H);
@@ -269,7 +357,7 @@ MultiVector combination_of_shapes(const SlidingBasis& basis, const MatrixXd& a)
 Index extend(SlidingBasis& basis, MultiVector X)
 {
   MultiVector shapes = columns_from(basis.T, basis.sketched);
-  const Index gained = extend_orthonormal(shapes, std::move(X)), before = basis.T.columns(), size = before + gained;
+  const Index gained = extend_orthonormal(shapes, std::move(X)), size = basis.T.columns() + gained;
   if (gained == 0) return 0;
   basis.by_Z.Z = {};
   const MultiVector news = columns_from(shapes, shapes.columns() - gained);
@@ -288,14 +376,22 @@ Index extend(SlidingBasis& basis, MultiVector X)
 
 ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness)
 {
-  lift_by_Z(basis, contact);
+  lift_by_Z(basis, contact, B);
   const MultiVector by_Y = change_by_lift(basis, contact, basis.by_Z.pivots, contact.Y);
-  ProjectedSliding result{projected(basis.M, by_Y), projected(basis.C, by_Y), projected(basis.K, by_Y)};
-  if (basis.K_loss.matrix.get()) result.K_loss = projected(basis.K_loss, by_Y);
-  if (basis.G.matrix.get()) result.C += projected(basis.G, by_Y);
-  if (basis.H.matrix.get()) result.K += projected(basis.H, by_Y);
-  if (damping) result.C += projected_on_pairs(basis, by_Y, B, damping);
-  if (stiffness) result.K += projected_on_pairs(basis, by_Y, B, stiffness);
+  std::vector<MatrixXd> projected = projected_images(basis, by_Y);
+  const std::vector<BasisImage*> images = images_of(basis);
+  const auto taken = [&](const BasisImage& image) -> MatrixXd
+  {
+    const auto place = std::ranges::find(images, &image);
+    if (place == images.end()) return {};
+    return std::move(projected[static_cast<std::size_t>(place - images.begin())]);
+  };
+  ProjectedSliding result{taken(basis.M), taken(basis.C), taken(basis.K), taken(basis.K_loss)};
+  if (basis.rayleigh) result.C = basis.rayleigh->of_mass * result.M + basis.rayleigh->of_stiffness * result.K;
+  if (basis.G.matrix.get()) result.C += taken(basis.G);
+  if (basis.H.matrix.get()) result.K += taken(basis.H);
+  if (damping) result.C += projected_on_pairs(basis, contact, by_Y, B, {damping, true});
+  if (stiffness) result.K += projected_on_pairs(basis, contact, by_Y, B, {stiffness, false});
   result.kept = basis.by_Z.kept;
   result.independent = basis.by_Z.independent;
   return result;

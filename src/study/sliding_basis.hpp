@@ -8,6 +8,8 @@
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
+#include <optional>
+
 namespace squeal
 {
 
@@ -22,6 +24,19 @@ struct BasisImage
   Eigen::MatrixXd lifted_products{}; // T'A T_Z
 };
 
+/// C = of_mass M + of_stiffness K
+struct Rayleigh
+{
+  double of_mass = 0, of_stiffness = 0; // [1/s, s]
+};
+
+/// D_Y of a point, and T_Y'A T_Z of each matrix there.
+struct LiftByY
+{
+  MultiVector change{};
+  std::vector<Eigen::MatrixXd> projected{};
+};
+
 /// The lift by Z, which stays while the closed pairs, T and the matrices do: friction changes Y alone.
 struct LiftByZ
 {
@@ -29,6 +44,8 @@ struct LiftByZ
   MultiVector change{};                   // D_Z, of the pivots' rows
   std::vector<Eigen::Index> pivots{};     // local rows
   std::vector<Eigen::Index> in_contact{}; // their places among the contact's degrees of freedom
+  MultiVector of_B{};                     // B T
+  std::vector<LiftByY> by_Y{};            // the latest, two at most
   Eigen::MatrixXd kept{};                 // inner products of the shapes without the pivots
   Eigen::MatrixXd independent{};          // combinations of shapes that stay so without the pivots; empty: all do
 };
@@ -41,6 +58,7 @@ struct SlidingBasis
   Eigen::Index sketched = 0;
   std::vector<Eigen::Index> contact_dofs{}; // local rows, ascending
   BasisImage M{}, C{}, K{}, K_loss{};       // C without the viscous equivalent of loss factors
+  std::optional<Rayleigh> rayleigh{};       // of C, whose image has then the matrix alone
   BasisImage G{-1}, H{-1};
   LiftByZ by_Z{};
 

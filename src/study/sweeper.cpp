@@ -1,6 +1,7 @@
 #include "sweeper.hpp"
 
 #include "following.hpp"
+#include "squeal/algebra/lent_cores.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
@@ -74,7 +75,7 @@ private:
     {
       end_if_asked_here();
       const SweptPlace at{line.points[place], line.reversed};
-      if (model_.equilibrium_at(at).outcome.kind == OutcomeKind::converged) model_.modes_at(at, tolerance_);
+      if (model_.equilibrium_at(at).outcome.kind == OutcomeKind::converged) model_.train_at(at, tolerance_);
     }
   }
 
@@ -302,6 +303,7 @@ private:
 
 Sweep visit(const SweepProblem& problem, const SharePlace& place, const std::vector<SweepLine>& lines)
 {
+  const OneThread alone; // points are many dense problems of a few hundred rows
   return Sweeper(problem, place).run(lines);
 }
 

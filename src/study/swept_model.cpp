@@ -134,7 +134,12 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
     }
     if (basis_reversed_ != place.reversed) turn_round(*basis_);
     basis_reversed_ = place.reversed;
-    if (common != basis_->closed) rebase(*basis_, basis_problem(equilibrium), common);
+    if (common != basis_->closed)
+    {
+      rebase(*basis_, basis_problem(equilibrium), common);
+      trained_.clear(); // their vectors are on the basis before
+    }
+    if (auto known = trained_.extract(place)) return std::move(known.mapped());
     modes = find_point_modes(*basis_, {{model_->structure, model_->interface, equilibrium},
                                        problem_.modes.band,
                                        tolerance,
@@ -150,6 +155,12 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
     modes.outcome = {OutcomeKind::not_converged, error.what(), 0, 0};
   }
   return modes;
+}
+
+void SweptModel::train_at(const SweptPlace& place, double tolerance)
+{
+  PointModes modes = modes_at(place, tolerance);
+  if (modes.outcome.kind == OutcomeKind::converged) trained_[place] = std::move(modes);
 }
 
 bool SweptModel::same_pairs_closed(const SweptPlace& a, const SweptPlace& b)

@@ -22,6 +22,9 @@ public:
   const Equilibrium& equilibrium_at(const SweptPlace& place);
   PointModes modes_at(const SweptPlace& place, double tolerance);
 
+  /// Makes the basis by a point, whose modes are then at hand when they are asked for next.
+  void train_at(const SweptPlace& place, double tolerance);
+
   /// The vectors of modes found at the point visited last, in the structure's degrees of freedom: the real parts of
   /// all, then the imaginary ones.
   MultiVector vectors(const PointModes& modes, Side side) const;
@@ -61,6 +64,7 @@ private:
   std::optional<PairCompliance> compliance_{};
   Owned<Mat> K_{}, B_{}; // of the compliance
   std::optional<ModesBasis> basis_{};
+  std::map<SweptPlace, PointModes> trained_{};
   bool basis_reversed_ = false; // the direction whose basis is at hand
 };
 

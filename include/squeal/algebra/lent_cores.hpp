@@ -1,5 +1,5 @@
 #pragma once
-/// Dense algebra of rank 0 on the cores of ranks that wait for it (src/README.md, section 8.8).
+/// How many cores dense algebra takes: those of ranks that wait for rank 0 (src/README.md, section 8.8), or one.
 #include "squeal/base/petsc.hpp"
 
 namespace squeal
@@ -18,6 +18,21 @@ public:
 
 private:
   MPI_Comm comm_;   // null: nothing changes
+  int threads_ = 0; // of BLAS before; 0: they were left alone
+};
+
+/// While it lives, this rank's BLAS has one thread: in products of a few hundred rows threads wait for each other about
+/// as long as they work, and for seconds where other programs want the cores. Nothing changes with BLAS libraries other
+/// than OpenBLAS.
+class OneThread
+{
+public:
+  OneThread();
+  OneThread(const OneThread&) = delete;
+  OneThread& operator=(const OneThread&) = delete;
+  ~OneThread();
+
+private:
   int threads_ = 0; // of BLAS before; 0: they were left alone
 };
 

@@ -8,6 +8,7 @@
 /// pivoting (Judice and Pires 1994) is finite when M is a P-matrix, which too much friction prevents. Beyond, a split
 /// met twice ends it. Arithmetic of one rank.
 #include <Eigen/LU>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -64,11 +65,12 @@ struct StatusSolution
   StatusOutcome outcome = StatusOutcome::not_converged;
   int iterations = 0;
   std::vector<char> closed;
-  std::vector<double> gap, reaction; // [m, N]; empty unless converged or singular
+  std::vector<double> gap, reaction;   // [m, N]; empty unless converged or singular
+  std::unique_ptr<SplitSolver> solver; // of this split; null unless converged or singular
 };
 
 /// Solves by status iteration from the split `closed`, in at most `max_iterations` splits. The outcome says how it
-/// ended. Error: an entry is not finite.
+/// ended; the solver borrows the problem. Error: an entry is not finite.
 StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, long max_iterations);
 
 /// Whether the symmetric part of M is positive definite, N being the identity: then there is one solution and no other.
