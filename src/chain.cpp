@@ -202,11 +202,13 @@ bool settles_on_another_cycle(const Report& report)
   const SettledMotion& settled = report.settled;
   if (settled.outcome.kind != OutcomeKind::settled || settled.examined.verdict.kind != MotionKind::periodic)
     return false;
+  constexpr double fewest = 8; // steps in a period
+  const double period = period_of(settled.examined.base), step = settled.period / settled.steps_per_period;
+  if (!std::isfinite(period) || period < fewest * step) return false; // rounding has lines, too
   const LimitCycle& cycle = report.cycle;
   const ReachedMotion found{
       ReachedKind::steady, {cycle.measured.mean_fluctuating_energy, 0}, {1 / cycle.orbit.period, 0}, {}};
-  const ReachedMotion seen{
-      ReachedKind::steady, settled.fluctuating_energy, {1 / period_of(settled.examined.base), 0}, {}};
+  const ReachedMotion seen{ReachedKind::steady, settled.fluctuating_energy, {1 / period, 0}, {}};
   return !agree(found, seen);
 }
 
