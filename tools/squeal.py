@@ -181,8 +181,7 @@ class Results:
         return values
 
     def probes(self, run):
-        """Displacements of the probes [m], by name."""
-        self.stage(run)
+        """Displacements of the probes [m], by name; empty where the run made no step."""
         return {name: self.series(run, f"probes/{name}") for name in self._names("history.h5", f"{run}/probes")}
 
     def responses(self):
