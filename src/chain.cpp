@@ -48,8 +48,8 @@ std::string no_oscillation_among(const Report& report, std::span<const ComplexMo
   return reason.empty() && only_diverges(modes) ? "the equilibrium diverges without oscillating" : reason;
 }
 
-/// Paces the mode that diverges by a frequency [rad/s].
-void pace(Chain& chain, double omega)
+/// Paces the mode that diverges by its rate of growth, and starts beside the equilibrium.
+void pace(Chain& chain)
 {
   constexpr double part = 0.01; // of the equilibrium's own displacement, in the norm of its energy
   const ComplexMode& diverging = chain.report.modes.modes.front();
@@ -60,8 +60,8 @@ void pace(Chain& chain, double omega)
   if (!std::isfinite(amplitude)) amplitude = part;
   chain.paced.emplace();
   PacedDivergence& paced = *chain.paced;
-  paced.mode = {{0, omega},          copy_of(diverging.real.get()), zeros_like(equilibrium.u),
-                diverging.reactions, diverging.backward_error,      diverging.loss_error};
+  paced.mode = {{0, diverging.growth_rate()}, copy_of(diverging.real.get()), zeros_like(equilibrium.u),
+                diverging.reactions,          diverging.backward_error,      diverging.loss_error};
   paced.none.outcome = {OutcomeKind::skipped, "the mode grows without vibrating", 0, 0};
   paced.none.lift_off_amplitude = paced.none.reversal_amplitude = amplitude; // what grows from there is not at rest
   paced.start = mode_state(equilibrium, diverging, amplitude, 0);
@@ -190,8 +190,7 @@ FittedCycle run_cycle(Chain& chain)
     result.cycle = not_run<LimitCycle>(OutcomeKind::skipped, reason);
   else
   {
-    const std::span<const ComplexMode> modes = chain.unstable().modes;
-    if (only_diverges(modes)) pace(chain, modes.front().growth_rate());
+    if (only_diverges(chain.unstable().modes)) pace(chain);
     result = find_fitted_cycle(cycle_problem(chain), {scene.fidelity, scene.accuracy}, chain.options.cycle);
   }
   return result;
@@ -217,7 +216,7 @@ FittedCycle run_cycle_from_settled(Chain& chain)
   const SettledMotion& settled = chain.report.settled;
   const double period = period_of(settled.examined.base);
   chain.carried = CarriedCycle{copy_of(settled.end), period};
-  if (chain.paced) pace(chain, two_pi / period);
+  if (chain.paced) chain.paced->mode.lambda = {0, two_pi / period};
   CycleSettings settings = chain.scene.cycle;
   if (settings.steps_per_period > 0) // the steps that it was seen at
     settings.steps_per_period =

@@ -14,7 +14,6 @@ compute raises Missing, what goes wrong SquealError.
 """
 
 import functools
-import importlib.util
 import json
 import subprocess
 from pathlib import Path

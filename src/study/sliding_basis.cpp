@@ -83,31 +83,9 @@ bool set_matrix(SlidingBasis& basis, BasisImage& image, Mat A)
   return true;
 }
 
-/// Whether C is a combination of M and K, by what they make of two of the random vectors: another part of C would show
-/// in them, above the rounding with which C is stored.
-std::optional<Rayleigh> rayleigh_part(const SlidingBasis& basis, Mat M, Mat C, Mat K)
-{
-  constexpr double rounding = 1e-13;
-  const MultiVector tests{basis.T.comm, basis.T.entries.leftCols(std::min<Index>(2, basis.sketched))};
-  const auto image_of = [&](Mat A)
-  {
-    const MultiVector image = product(A, tests);
-    return MultiVector{image.comm, image.entries.reshaped(image.entries.size(), 1)};
-  };
-  const MultiVector of_M = image_of(M), of_C = image_of(C), of_K = image_of(K);
-  const auto inner = [](const MultiVector& x, const MultiVector& y) { return inner_products(x, y)(0, 0); };
-  const double mm = inner(of_M, of_M), kk = inner(of_K, of_K), mk = inner(of_M, of_K), mc = inner(of_M, of_C),
-               kc = inner(of_K, of_C), determinant = mm * kk - mk * mk;
-  if (!(determinant > 0)) return std::nullopt;
-  const Rayleigh result{(kk * mc - mk * kc) / determinant, (mm * kc - mk * mc) / determinant};
-  const MultiVector rest{of_C.comm, of_C.entries - result.of_mass * of_M.entries - result.of_stiffness * of_K.entries};
-  if (!(inner(rest, rest) <= rounding * rounding * inner(of_C, of_C))) return std::nullopt;
-  return result;
-}
-
 void set_damping(SlidingBasis& basis, Mat M, Mat C, Mat K)
 {
-  basis.rayleigh = rayleigh_part(basis, M, C, K);
+  basis.rayleigh = rayleigh_part(M, C, K);
   basis.C = {};
   basis.by_Z.Z = {};
   if (basis.rayleigh)

@@ -7,8 +7,7 @@
 ///     (T + D_Y)'A(T + D_Z) = T'A T + D_Y'(A T) + (A'T)'D_Z + D_Y'A D_Z,   A' = A or -A
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
-
-#include <optional>
+#include "squeal/solid/rayleigh.hpp"
 
 namespace squeal
 {
@@ -22,12 +21,6 @@ struct BasisImage
   Eigen::MatrixXd products{};        // T'A T
   MultiVector lifted_rows{};         // of A T_Z at the pivots, where T_Z is T lifted by Z
   Eigen::MatrixXd lifted_products{}; // T'A T_Z
-};
-
-/// C = of_mass M + of_stiffness K
-struct Rayleigh
-{
-  double of_mass = 0, of_stiffness = 0; // [1/s, s]
 };
 
 /// D_Y of a point, and T_Y'A T_Z of each matrix there.

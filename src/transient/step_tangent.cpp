@@ -9,6 +9,7 @@
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/integers.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/solid/rayleigh.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -29,32 +30,21 @@ constexpr std::size_t at_once = 64; // columns: their work vectors take ten time
 /// Steps after which K du is multiplied anew. In n steps of differences the rounding of M dv is added up n^2 times.
 constexpr std::size_t fresh_after = 64;
 
-/// C = alpha M + beta K, [1/s] and [s], and M alone.
+/// C of M and K, and M alone.
 struct ProportionalDamping
 {
-  double alpha = 0, beta = 0;
+  Rayleigh rayleigh;
   PairedMatrices mass;
 };
 
-/// Nothing where C is no such sum to rounding, as its product with a random vector shows, or matrices are dense.
+/// Nothing where C is no such sum, or matrices are dense.
 std::optional<ProportionalDamping> proportional_damping(const Structure& structure)
 {
-  constexpr double rounding = 1e-12;
   std::optional<PairedMatrices> mass = pair_matrices(structure.M, nullptr);
   if (!mass) return std::nullopt;
-  const MultiVector x = random_multivector(structure.K, 1), Mx = product(structure.M, x), Kx = product(structure.K, x);
-  MultiVector Cx = product(structure.C, x);
-  const auto dot = [](const MultiVector& a, const MultiVector& b) { return inner_products(a, b)(0, 0); };
-  const double mass_part = std::sqrt(dot(Mx, Mx)), stiffness_part = std::sqrt(dot(Kx, Kx));
-  if (mass_part == 0 || stiffness_part == 0) return std::nullopt;
-  const double common = dot(Mx, Kx) / (mass_part * stiffness_part), rest = 1 - common * common;
-  if (rest < 1e-3) return std::nullopt; // M and K are alike: the parts cannot be told apart
-  const double of_mass = dot(Mx, Cx) / mass_part, of_stiffness = dot(Kx, Cx) / stiffness_part;
-  const double alpha = (of_mass - common * of_stiffness) / (rest * mass_part),
-               beta = (of_stiffness - common * of_mass) / (rest * stiffness_part), size = std::sqrt(dot(Cx, Cx));
-  Cx.entries -= alpha * Mx.entries + beta * Kx.entries;
-  if (!(std::sqrt(dot(Cx, Cx)) <= rounding * size)) return std::nullopt;
-  return ProportionalDamping{alpha, beta, std::move(*mass)};
+  const std::optional<Rayleigh> rayleigh = rayleigh_part(structure.M, structure.C, structure.K);
+  if (!rayleigh) return std::nullopt;
+  return ProportionalDamping{*rayleigh, std::move(*mass)};
 }
 
 /// The products of the columns at a step's start, and its work vectors.
@@ -246,7 +236,8 @@ void multiply_columns(const RecordedStep& of, std::span<const TangentColumn> col
   else
     multiply_first(damping->mass, v, Mv);
   if (!damping) return;
-  const double mass_part = 1 + h * theta * damping->alpha, stiffness_part = h * theta * (damping->beta + h * theta);
+  const double mass_part = 1 + h * theta * damping->rayleigh.of_mass,
+               stiffness_part = h * theta * (damping->rayleigh.of_stiffness + h * theta);
   for (std::size_t k = 0; k < columns.size(); ++k)
   {
     const Vec Kv = work.Kv[k];
