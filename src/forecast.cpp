@@ -186,15 +186,15 @@ double memory_of_equilibrium(const Sizes& sizes)
   return matrix_entry * sizes.entries + memory_of_factor(sizes) + 5 * number * sizes.pairs * sizes.pairs;
 }
 
-/// Six matrices: M and K of the frictionless problem, M, C and K of the sliding one, and C with friction. Two pencils:
-/// that of the count, and that of the search. The vectors: the largest subspace of a slice, and its products with M, C
-/// and K.
+/// Six matrices: M and K of the frictionless problem, M, C and K of the sliding one, and C with friction. The pencil of
+/// the search, which is made when that of the count, half as large, is gone. The vectors: the largest subspace of a
+/// slice, and its products with M, C and K.
 double memory_of_modes(const Sizes& sizes, const ModesSettings& settings, PetscInt dense_limit, MPI_Comm comm)
 {
   if (sizes.dofs <= static_cast<double>(dense_limit)) return dense_copies * number * sizes.dofs * sizes.dofs;
   const Symmetry search = settings.method == ModesMethod::projection ? Symmetry::symmetric : Symmetry::none;
-  return 6 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, Symmetry::symmetric, comm) +
-         forecast_pencil(sizes.factor, sizes.entries, search, comm) + number * vectors_of_modes * sizes.dofs;
+  return 6 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, search, comm) +
+         number * vectors_of_modes * sizes.dofs;
 }
 
 /// Eight matrices: M, C and K of the sliding problem, that of loss factors, and their transposes. The pencil, the

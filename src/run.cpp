@@ -1,5 +1,6 @@
 #include "squeal/run.hpp"
 
+#include "squeal/base/free_memory.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/chain.hpp"
@@ -32,6 +33,7 @@ template <class Work> auto timed(Report& report, Stage which, MPI_Comm comm, Wor
   if (rank_of(comm) == 0) std::printf("%s …\n", name), std::fflush(stdout);
   const double start = MPI_Wtime(), processor_start = processor_time();
   auto result = work();
+  return_freed_memory();
   const auto known = std::ranges::find(report.timings, which, &Timing::stage); // the cycle may be sought twice
   Timing& timing = known == report.timings.end() ? report.timings.emplace_back(Timing{which}) : *known;
   timing.seconds += MPI_Wtime() - start;

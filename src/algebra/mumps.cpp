@@ -1,5 +1,7 @@
 #include "mumps.hpp"
 
+#include "squeal/base/free_memory.hpp"
+
 #include <algorithm>
 #include <string>
 #include <type_traits>
@@ -52,6 +54,7 @@ void EndMumps::operator()(DMUMPS_STRUC_C* mumps) const
 {
   outcome_of(*mumps, MumpsJob::end);
   delete mumps;
+  return_freed_memory();
 }
 
 Mumps start_mumps(MPI_Comm comm, MumpsSymmetry symmetry)

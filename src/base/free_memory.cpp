@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 namespace squeal
 {
@@ -33,6 +36,13 @@ double free_memory(MPI_Comm comm)
   MPI_Comm_free(&node);
   MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_DOUBLE, MPI_SUM, comm);
   return bytes;
+}
+
+void return_freed_memory()
+{
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 } // namespace squeal

@@ -126,7 +126,9 @@ PairCount count_in_band(const QuadraticProblem& problem, const QuadraticSolution
 {
   const double end = two_pi * band;
   const int free = count_below(real, std::sqrt(vibration_floor(norms_of(problem))));
-  return count_pairs(solution, real, free, 0.8 * end, end);
+  std::vector<double> moduli;
+  for (const Eigenpair& pair : solution.pairs) moduli.push_back(std::abs(pair.lambda));
+  return count_pairs(std::move(moduli), real, free, 0.8 * end, end);
 }
 
 /// The slices' solution, or that of SLEPc's TOAR where they have fewer pairs than are expected. An overdamped mode is
@@ -309,6 +311,7 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
   }
   else
   {
+    found = {}; // before the slices take memory
     found = solve_full(problem, real);
     modes.modes = modes_of(found.solution, problem);
   }

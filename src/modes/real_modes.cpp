@@ -222,6 +222,12 @@ Inertia inertia_at(double limit, Mat K, Mat M, const PencilOptions& options)
   return inertia_at(limit, pencil);
 }
 
+ShiftInvert& pencil_of(RealCount& count)
+{
+  if (!count.pencil.factor) count.pencil = make_shift_invert(count.K, count.M, Symmetry::symmetric, count.options);
+  return count.pencil;
+}
+
 /// The modes with theta < limit, at most `count` of them. One factor just below zero finds them, and one above the last
 /// of them counts them. A space grown from one vector may miss copies of multiple modes; those are sought again.
 RealModes search_from_below_zero(Mat M, Mat K, double limit, PetscInt count, const ModesOptions& options)
@@ -335,22 +341,23 @@ RealCount make_real_count(Mat M, Mat K, const ModesOptions& options)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  if (n <= options.dense_limit)
-  {
-    const SymmetricEigenpairs all = solve_whole(M, K);
-    return {{}, {all.lambda.begin(), all.lambda.end()}, {}};
-  }
-  return {make_shift_invert(K, M, Symmetry::symmetric, options.pencil), {}, {{0, 0}}};
+  if (n > options.dense_limit) return {K, M, options.pencil, {}, {{0, 0}}};
+  const SymmetricEigenpairs all = solve_whole(M, K);
+  return {K, M, options.pencil, {all.lambda.begin(), all.lambda.end()}};
 }
 
 int count_below(RealCount& count, double omega)
 {
-  if (!count.pencil.K)
+  if (!count.all.empty())
     return static_cast<int>(std::lower_bound(count.all.begin(), count.all.end(), omega * omega) - count.all.begin());
   const auto [known, is_new] = count.below.try_emplace(omega);
   if (!is_new) return known->second;
-  move_to(count.pencil, omega * omega);
-  return known->second = count.pencil.factor->negative_pivots();
+  return known->second = inertia_at(omega * omega, pencil_of(count)).below;
+}
+
+void free_factor(RealCount& count)
+{
+  count.pencil = {};
 }
 
 std::vector<double> omegas_between(RealCount& count, double least, double top)
@@ -360,12 +367,13 @@ std::vector<double> omegas_between(RealCount& count, double least, double top)
   {
     if (theta >= least * least && theta < top * top) omega.push_back(std::sqrt(theta));
   };
-  if (!count.pencil.K)
+  if (!count.all.empty())
     std::for_each(count.all.begin(), count.all.end(), take);
   else
   {
-    if (count.pencil.shift != top * top) move_to(count.pencil, top * top);
-    const Nearest nearest = solve_nearest(count.pencil, 1, top * top - least * least, 1e-4);
+    ShiftInvert& pencil = pencil_of(count);
+    if (pencil.shift != top * top) move_to(pencil, top * top);
+    const Nearest nearest = solve_nearest(pencil, 1, top * top - least * least, 1e-4);
     for (const std::complex<double> theta : nearest.theta) take(theta.real());
   }
   std::sort(omega.rbegin(), omega.rend());

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace squeal
@@ -63,45 +64,41 @@ void find_pairs(Slice& slice, const QuadraticProblem& problem, ShiftInvert& penc
   const double least = slice.lower * slice.lower, limit = slice.upper * slice.upper, middle = (least + limit) / 2;
   move_to(pencil, middle);
   const double radius = std::abs(std::polar(limit, angle) - pencil.shift);
-  const Nearest nearest = solve_nearest(pencil, slice.expected, radius, subspace_tolerance);
+  Nearest nearest = solve_nearest(pencil, slice.expected, radius, subspace_tolerance);
   if (!nearest.converged) return;
   for (const std::complex<double> theta : nearest.theta) slice.smallest = std::min(slice.smallest, std::abs(theta));
   const Correction correction{{least, limit}, passes, std::numeric_limits<int>::max(),
                               tolerance,      sharp,  residual_share};
-  slice.pairs = solve_on_subspace(problem, nearest.space, *pencil.factor, correction).pairs;
+  slice.pairs = solve_on_subspace(problem, std::move(nearest.space), *pencil.factor, correction).pairs;
   std::erase_if(slice.pairs, [](const Eigenpair& pair) { return pair.backward_error > spurious; });
 }
 
-QuadraticSolution join(const std::vector<Slice>& slices)
+QuadraticSolution join(std::vector<Slice> slices)
 {
   QuadraticSolution solution;
   solution.outcome = {OutcomeKind::converged, "", static_cast<int>(slices.size()), 0};
-  for (const Slice& slice : slices)
-    for (const Eigenpair& pair : slice.pairs)
-      solution.pairs.push_back({pair.lambda, copy_of(pair.real), copy_of(pair.imaginary), pair.backward_error});
+  for (Slice& slice : slices) std::ranges::move(slice.pairs, std::back_inserter(solution.pairs));
   sort_and_measure(solution);
   return solution;
 }
 
 } // namespace
 
-PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, int free, double least, double top)
+PairCount count_pairs(std::vector<double> moduli, RealCount& real, int free, double least, double top)
 {
-  std::vector<double> sizes;
-  for (const Eigenpair& pair : solution.pairs) sizes.push_back(std::abs(pair.lambda));
-  std::sort(sizes.rbegin(), sizes.rend());
+  std::sort(moduli.rbegin(), moduli.rend());
   const auto number_from = [](double edge, const std::vector<double>& values) {
     return static_cast<int>(std::count_if(values.begin(), values.end(), [&](double value) { return value >= edge; }));
   };
-  const int all = static_cast<int>(sizes.size());
-  const PairCount whole{top / two_pi, count_below(real, top) - free, all - number_from(top, sizes)};
+  const int all = static_cast<int>(moduli.size());
+  const PairCount whole{top / two_pi, count_below(real, top) - free, all - number_from(top, moduli)};
   if (whole.expected == whole.found) return whole;
   const std::vector<double> omega = omegas_between(real, least, top);
-  for (std::size_t k = 1; k < sizes.size() && sizes[k - 1] > least; ++k)
+  for (std::size_t k = 1; k < moduli.size() && moduli[k - 1] > least; ++k)
   {
-    const double edge = std::max(least, (sizes[k - 1] + sizes[k]) / 2);
+    const double edge = std::max(least, (moduli[k - 1] + moduli[k]) / 2);
     if (edge >= top) continue;
-    const PairCount count{edge / two_pi, whole.expected - number_from(edge, omega), all - number_from(edge, sizes)};
+    const PairCount count{edge / two_pi, whole.expected - number_from(edge, omega), all - number_from(edge, moduli)};
     if (count.expected == count.found) return count;
   }
   return whole;
@@ -112,26 +109,29 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
 {
   const double floor = std::sqrt(vibration_floor(norms_of(problem))), end = two_pi * band, reach = reach_of_count * end;
   std::vector<Slice> slices = make_slices(real, floor, reach);
+  const int all = count_below(real, reach);
+  free_factor(real); // all counts that a complete search needs are known
   ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
   CountedSolution result;
-  const int all = count_below(real, reach);
   Progress progress(comm_of(problem.K), "modes", all);
   const auto search = [&](double angle)
   {
     bool rigid = false; // a body may be free
+    std::vector<double> moduli;
     for (Slice& slice : slices)
     {
       if (angle == usual_angle || static_cast<int>(slice.pairs.size()) < slice.expected)
         find_pairs(slice, problem, pencil, angle);
       progress.update(count_below(real, slice.upper), format("below %.4g Hz", slice.upper / two_pi));
       rigid = rigid || slice.smallest < rigid_share * reach * reach;
+      for (const Eigenpair& pair : slice.pairs) moduli.push_back(std::abs(pair.lambda));
     }
-    result.solution = join(slices);
-    result.count = count_pairs(result.solution, real, rigid ? count_below(real, floor) : 0, end, reach);
+    result.count = count_pairs(std::move(moduli), real, rigid ? count_below(real, floor) : 0, end, reach);
   };
   search(usual_angle);
   // Pairs may have moved from one slice to its neighbour, so that only the count of all slices is certain.
   if (result.count.found < result.count.expected) search(wide_angle);
+  result.solution = join(std::move(slices));
   return result;
 }
 

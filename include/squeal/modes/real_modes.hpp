@@ -19,9 +19,11 @@ double shift_below_zero(Mat M, Mat K);
 /// Counts are kept.
 struct RealCount
 {
-  ShiftInvert pencil;          // of a large problem
-  std::vector<double> all;     // eigenvalues omega^2 of a small problem
-  std::map<double, int> below; // the counts so far
+  Mat K = nullptr, M = nullptr; // borrowed
+  PencilOptions options{};
+  std::vector<double> all{};     // eigenvalues omega^2 of a small problem
+  std::map<double, int> below{}; // the counts so far
+  ShiftInvert pencil{};          // of a large problem, from the first count on
 };
 
 /// A count for K x = omega^2 M x. Borrows M and K.
@@ -29,6 +31,9 @@ RealCount make_real_count(Mat M, Mat K, const ModesOptions& options);
 
 /// The number of eigenvalues below omega [rad/s].
 int count_below(RealCount& count, double omega);
+
+/// Gives back the memory of the factor. A further count makes it again.
+void free_factor(RealCount& count);
 
 /// All omega from `least` to `top` [rad/s], in descending order. None if the search does not converge. An omega that is
 /// missed makes a count below some limit too large, not too small.

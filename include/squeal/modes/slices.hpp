@@ -27,8 +27,9 @@ struct PairCount
 };
 
 /// Counts both below `top` [rad/s]. Where they disagree, an edge between neighbouring pairs from `least` on serves: the
-/// highest below which they agree. `free`: motions of a free body, which are no vibrations.
-PairCount count_pairs(const QuadraticSolution& solution, RealCount& real, int free, double least, double top);
+/// highest below which they agree. `moduli`: |lambda| of the pairs [rad/s].
+/// `free`: motions of a free body, which are no vibrations.
+PairCount count_pairs(std::vector<double> moduli, RealCount& real, int free, double least, double top);
 
 /// solution.pairs reach up to count.frequency.
 struct CountedSolution
