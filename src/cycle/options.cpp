@@ -8,7 +8,7 @@ OptionList options_of(CycleOptions& options)
   ReducedOptions& reduced = options.reduced;
   OptionList list = {
       {"-cycle_band_factor", &options.band_factor, Range::not_negative,
-       "real modes of the preconditioner reach this many times the mode's frequency"},
+       "modes of the preconditioner reach this many times the mode's frequency"},
       {"-cycle_samples", &options.samples, Range::natural,
        "displacements kept over the last period, for the fields file"},
       {"-reduced_margin", &reduced.margin, Range::positive,

@@ -5,6 +5,7 @@
 #include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
+#include "squeal/reduction/reduced_model.hpp"
 
 #include <array>
 #include <cmath>
@@ -20,7 +21,7 @@ using Complex = std::complex<double>;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The sliding modes on the span of the real ones.
+/// The sliding modes on the span of Phi.
 struct SlidingModes
 {
   MultiVector shapes;          // Phi
@@ -31,40 +32,28 @@ struct SlidingModes
   double theta = 0.5;
 };
 
-/// mu e.B_t Phi, a column for each mode.
-MatrixXd friction_of(const Interface& interface, const std::vector<Owned<Vec>>& shapes)
+/// mu e.B_t Phi
+MatrixXd friction_of(const Interface& interface, const MultiVector& shapes)
 {
   const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
   const TangentView e(directions, interface.directions);
-  MatrixXd result = MatrixXd::Zero(interface.pairs, static_cast<Eigen::Index>(shapes.size()));
+  const MatrixXd motions = whole_product(interface.B, shapes);
+  MatrixXd result = MatrixXd::Zero(interface.pairs, shapes.columns());
   for (Eigen::Index j = 0; j < result.cols(); ++j)
   {
-    const std::vector<double> motion = relative(interface, shapes[static_cast<std::size_t>(j)]);
+    const std::span<const double> column(motions.col(j).data(), static_cast<std::size_t>(motions.rows()));
+    const PairView<const double> motion(column, interface.directions);
     for (std::size_t i = 0; i < mu.size(); ++i)
-      result(static_cast<Eigen::Index>(i), j) =
-          mu[i] * dot(e.of(i), PairView(motion, interface.directions).tangential(i));
+      result(static_cast<Eigen::Index>(i), j) = mu[i] * dot(e.of(i), motion.tangential(i));
   }
   return result;
 }
 
 /// Xc
-MatrixXd on_modes(const std::vector<Owned<Vec>>& shapes, const MatrixXd& friction, const ClosedContact& contact, Mat X)
+MatrixXd on_shapes(const MultiVector& shapes, const MatrixXd& friction, const ClosedContact& contact, Mat X)
 {
-  const auto n = static_cast<Eigen::Index>(shapes.size());
-  MatrixXd result(n, n);
-  const std::vector<Vec> all(shapes.begin(), shapes.end());
-  const Owned<Vec> force = zeros_like(shapes[0]);
-  Owned<Vec> reactions;
-  check(MatCreateVecs(contact.reaction, nullptr, reactions.put()));
-  for (Eigen::Index j = 0; j < n; ++j)
-  {
-    check(MatMult(X, shapes[static_cast<std::size_t>(j)], force));
-    check(VecMDot(force, static_cast<PetscInt>(n), all.data(), result.col(j).data()));
-    check(MatMult(contact.reaction, force, reactions));
-    const std::vector<double> lambda = all_entries(reactions);
-    result.col(j) -= friction.transpose() * VectorXd::Map(lambda.data(), static_cast<Eigen::Index>(lambda.size()));
-  }
-  return result;
+  const MultiVector forces = product(X, shapes);
+  return inner_products(shapes, forces) - friction.transpose() * whole_product(contact.reaction, forces);
 }
 
 /// The columns Re and Im of (y, lambda y) of every pair; the real vector alone of a real one.
@@ -116,12 +105,11 @@ VectorXd corrected(const SlidingModes& modes, double period, const VectorXd& z)
 }
 
 /// From sliding modes y in the coordinates of M-orthonormal shapes, all of them.
-SlidingModes make_sliding_modes(const std::vector<DenseEigenpair>& sliding, const std::vector<Owned<Vec>>& shapes,
+SlidingModes make_sliding_modes(const std::vector<DenseEigenpair>& sliding, MultiVector shapes,
                                 const CycleSettings& settings)
 {
-  const auto size = static_cast<Eigen::Index>(shapes.size());
-  const std::vector<Vec> all(shapes.begin(), shapes.end());
-  SlidingModes modes{columns_of(all), {}, 0, real_columns(sliding, size), {}, settings.steps_per_period,
+  const Eigen::Index size = shapes.columns();
+  SlidingModes modes{std::move(shapes), {}, 0, real_columns(sliding, size), {}, settings.steps_per_period,
                      settings.theta};
   for (const DenseEigenpair& pair : sliding)
   {
@@ -144,27 +132,50 @@ void apply_inverse(const SlidingModes& modes, Mat M, double period, Vec x, Vec y
   copy_column(sum, 1, velocity(y));
 }
 
-} // namespace
-
-Preconditioner sliding_preconditioner(const CycleProblem& problem, const RealModes& modes)
+/// Phi: M-orthonormal, of the modes' shapes below the band [Hz], and of real modes' where those end far below it.
+MultiVector shapes_below(const CycleProblem& problem, double band)
 {
-  if (modes.shapes.empty()) return {};
-  const Structure& structure = problem.sliding.structure;
-  const MatrixXd friction = friction_of(problem.sliding.interface, modes.shapes);
-  const auto on_shapes = [&](Mat X) { return on_modes(modes.shapes, friction, problem.linearised.contact, X); };
-  const std::vector<DenseEigenpair> sliding = solve_dense_quadratic_shared(
-      comm_of(structure.load), on_shapes(structure.M), on_shapes(problem.linearised.C),
-      on_shapes(problem.linearised.K.get() ? problem.linearised.K.get() : structure.K.get()));
-  SlidingModes inside = make_sliding_modes(sliding, modes.shapes, problem.settings);
-  return [inside = std::move(inside), M = structure.M.get()](double period, Vec x, Vec y)
-  { apply_inverse(inside, M, period, x, y); };
+  // Friction and damping turn most modes by less than this part of them: what is left of those is nearly real. Two that
+  // have locked in share a complex shape, and both its parts stay.
+  constexpr double least = 1e-2;
+  constexpr double far = 0.9; // the band's end is no sharp bound of what matters
+  const Mat M = problem.sliding.structure.M;
+  MultiVector shapes = empty_multivector(M);
+  for (const ComplexMode& mode : problem.modes)
+    if (mode.frequency_hz() < band)
+    {
+      MultiVector parts = columns_of(std::array{mode.real.get(), mode.imaginary.get()});
+      parts.entries /= std::sqrt(inner_products(parts, product(M, parts)).trace());
+      append(shapes, parts);
+    }
+  if (const double end = highest_frequency(problem.modes); end < far * band)
+  {
+    const RealModes beyond = find_real_modes_between(problem.linearised, end, band, problem.modes_options);
+    append(shapes, columns_of(std::vector<Vec>(beyond.shapes.begin(), beyond.shapes.end()))); // |x|_M = 1
+  }
+  if (shapes.columns() == 0) return shapes;
+  const auto [sizes, directions] = solve_dense_symmetric(inner_products(shapes, product(M, shapes)));
+  const Eigen::Index kept = (sizes.array() > least * least * sizes.maxCoeff()).count();
+  return combination(shapes, directions.rightCols(kept) * sizes.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal());
 }
+
+} // namespace
 
 Preconditioner estimated_preconditioner(const CycleProblem& problem, double band_factor)
 {
   if (!(band_factor > 0)) return {};
-  const double band = band_factor * problem.unstable.modes.front().frequency_hz();
-  return sliding_preconditioner(problem, find_real_modes_below(problem.linearised, band, problem.modes_options));
+  MultiVector shapes = shapes_below(problem, band_factor * problem.unstable.modes.front().frequency_hz());
+  if (shapes.columns() == 0) return {};
+  const auto& [structure, interface, equilibrium] = problem.sliding;
+  const LinearisedSliding& linearised = problem.linearised;
+  const MatrixXd friction = friction_of(interface, shapes);
+  const auto seen = [&](Mat X) { return on_shapes(shapes, friction, linearised.contact, X); };
+  const Mat K = linearised.K.get() ? linearised.K.get() : structure.K.get();
+  const std::vector<DenseEigenpair> sliding =
+      solve_dense_quadratic_shared(shapes.comm, seen(structure.M), seen(linearised.C), seen(K));
+  SlidingModes inside = make_sliding_modes(sliding, std::move(shapes), problem.settings);
+  return [inside = std::move(inside), M = structure.M.get()](double period, Vec x, Vec y)
+  { apply_inverse(inside, M, period, x, y); };
 }
 
 } // namespace squeal

@@ -1,8 +1,8 @@
 #pragma once
 /// An approximate inverse of dPhi_T/dx - I from sliding motion: P^-1 x = -x + E D E^+ x (src/README.md, section 6.6).
 ///
-/// The bulk of the period map is linear and known. A state outside the span of the frictionless bilateral real modes
-/// Phi is taken as damped out within a period (dPhi/dx = 0, inverse -1); inside it motion is sliding about equilibrium,
+/// The bulk of the period map is linear and known. A state outside the span of the modes' shapes Phi is taken as damped
+/// out within a period (dPhi/dx = 0, inverse -1); inside it motion is sliding about equilibrium,
 ///     u = u0 + Phi q,   Mc q'' + Cc q' + Kc q = 0,
 ///     Xc = Phi'X Phi - mu (e.B_t Phi)' L X Phi   for X = M, C + C_f, K;   L: reactions lambda_n of a force,
 /// with friction on the reactions that the motion takes. N theta steps multiply its eigenvectors (y, lambda y) by
@@ -15,10 +15,8 @@
 namespace squeal
 {
 
-/// On the real modes given; no preconditioner without any. Borrows the structure's M.
-Preconditioner sliding_preconditioner(const CycleProblem& problem, const RealModes& modes);
-
-/// On the real modes up to a multiple of the followed mode's frequency; none for a factor of 0.
+/// On the shapes of the modes up to a multiple of the followed mode's frequency, and on those of real modes where the
+/// band ends far below that; none for a factor of 0. Borrows the structure's M.
 Preconditioner estimated_preconditioner(const CycleProblem& problem, double band_factor);
 
 } // namespace squeal

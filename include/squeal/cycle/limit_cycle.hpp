@@ -39,7 +39,7 @@ struct CycleProblem
   UnstableModes unstable;                // the first of the modes; the cycle follows the very first
   const CycleSettings& settings;
   const StepOptions& step;
-  const ModesOptions& modes_options; // of the preconditioner's real modes
+  const ModesOptions& modes_options; // of real modes beyond the band
   Mat probes = nullptr;
   const State* given = nullptr; // where CycleStartKind::transient, ::coarse and ::file start
   double given_period = 0;      // [s] of the cycle that is given; 0: none is, and the mode's is taken

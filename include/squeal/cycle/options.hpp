@@ -21,7 +21,7 @@ struct ReducedOptions
 struct CycleOptions
 {
   ShootingOptions shooting;
-  double band_factor = 3; // the preconditioner's real modes reach this many times the mode's frequency; 0: none
+  double band_factor = 3; // the preconditioner's modes reach this many times the mode's frequency; 0: none
   PetscInt samples = 32;  // displacements kept over the last period
   ReducedOptions reduced;
 };
