@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace squeal
 {
@@ -191,7 +192,8 @@ FittedCycle run_cycle(Chain& chain)
   else
   {
     if (only_diverges(chain.unstable().modes)) pace(chain);
-    result = find_fitted_cycle(cycle_problem(chain), {scene.fidelity, scene.accuracy}, chain.options.cycle);
+    result = find_fitted_cycle(cycle_problem(chain), {scene.fidelity, scene.accuracy, chain.begin_steps},
+                               chain.options.cycle);
   }
   return result;
 }
@@ -222,8 +224,9 @@ FittedCycle run_cycle_from_settled(Chain& chain)
     settings.steps_per_period =
         static_cast<int>(std::lround(period / settled.period * static_cast<double>(settled.steps_per_period)));
   const CycleProblem problem = cycle_problem(chain);
-  FittedCycle found = find_fitted_cycle(with_settings(problem, settings), {chain.scene.fidelity, chain.scene.accuracy},
-                                        chain.options.cycle);
+  FittedCycle found =
+      find_fitted_cycle(with_settings(problem, settings),
+                        {chain.scene.fidelity, chain.scene.accuracy, chain.begin_steps}, chain.options.cycle);
   found.cycle.convergence.periods +=
       chain.report.cycle.convergence.periods + static_cast<int>(settled.examined.periods());
   return found;
@@ -234,7 +237,7 @@ CoarseStart run_coarse(Chain& fine)
   const std::string reason = no_mode_to_follow(fine.report, fine.scene);
   if (!reason.empty()) return not_run<CoarseStart>(OutcomeKind::skipped, reason);
   Scene scene = fine.coarse->scene;
-  const CycleSettings chosen = chosen_settings(cycle_problem(fine), scene.fidelity);
+  const CycleSettings chosen = chosen_settings(cycle_problem(fine), {scene.fidelity});
   constexpr double tolerance = 1e-3; // the mesh's own error is larger
   scene.cycle.steps_per_period = chosen.steps_per_period;
   scene.cycle.tolerance = std::max(chosen.tolerance, tolerance);
@@ -270,6 +273,41 @@ SettledMotion run_settled(const Chain& chain)
   if (succeeded(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::skipped, "the cycle is the answer");
   if (!motion_goes_on(cycle)) return not_run<SettledMotion>(OutcomeKind::skipped, "there is no motion to go on from");
   return find_settled_motion(cycle_problem(chain), cycle, chain.options.settled);
+}
+
+bool goes_on_with_finer_steps(Chain& chain)
+{
+  constexpr int finer = 4, finest = 1024;
+  const Scene& scene = chain.scene;
+  SettledMotion& settled = chain.report.settled;
+  const bool open = scene.fidelity == CycleModel::automatic && scene.cycle.steps_per_period == 0;
+  PetscInt dofs = 0;
+  check(VecGetSize(chain.model.structure.load, &dofs));
+  if (!open || chain.coarse || !has_run(settled.outcome) || dofs > small_model) return false;
+  MotionVerdict& verdict = settled.examined.verdict;
+  const auto& exponents = settled.examined.exponents;
+  const SettledBySteps now{verdict.kind, settled.fluctuating_energy,
+                           exponents.empty() ? MeanValue{} : exponents.front()};
+  const std::optional<SettledBySteps> before = std::exchange(chain.by_fewer_steps, now);
+  const auto alike = [](const MeanValue& a, const MeanValue& b)
+  { return std::abs(a.value - b.value) <= a.error + b.error; };
+  if (before && before->kind == now.kind && alike(before->energy, now.energy) && alike(before->exponent, now.exponent))
+    return false;
+  const bool wanders = now.kind == MotionKind::irregular || now.kind == MotionKind::undecided;
+  if (!before && !wanders && !depends_on_steps(settled)) return false;
+  if (finer * settled.steps_per_period > finest)
+  {
+    if (verdict.kind == MotionKind::undecided) return false;
+    verdict.between = std::string(word(verdict.kind)) + " and what finer steps than " +
+                      std::to_string(settled.steps_per_period) + " a period would show";
+    verdict.would_decide = "steps that change neither the energy nor the largest exponent (cycle.steps_per_period)";
+    verdict.kind = MotionKind::undecided;
+    settled.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
+    return false;
+  }
+  chain.begin_steps = finer * settled.steps_per_period;
+  chain.carried.reset(); // of what the motion had settled on
+  return true;
 }
 
 void take_cycle_as_answer(Report& report, FittedCycle found)

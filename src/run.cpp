@@ -56,6 +56,17 @@ Outcome& outcome_of(std::vector<Estimate>& estimates)
   return estimates.empty() ? estimates.emplace_back().outcome : estimates.front().outcome;
 }
 
+/// Whether the run was asked to end in a stage whose result stays.
+template <class Result> bool was_cut_short(Result& result)
+{
+  return outcome_of(result).kind == OutcomeKind::interrupted;
+}
+
+bool was_cut_short(FittedCycle& fitted)
+{
+  return fitted.fidelity.cut_short;
+}
+
 /// Runs one stage of the chain. Where the run is asked to end, the stage is left out or ends, and the later ones are
 /// left out.
 template <class Work> auto stage(Report& report, Stage which, MPI_Comm comm, Work work)
@@ -72,15 +83,15 @@ template <class Work> auto stage(Report& report, Stage which, MPI_Comm comm, Wor
   try
   {
     result = timed(report, which, comm, work);
-    if (outcome_of(result).kind == OutcomeKind::interrupted) report.ended_by = who_asked_to_end();
+    if (was_cut_short(result)) report.ended_by = who_asked_to_end();
   }
   catch (const Interrupted&)
   {
-    if (rank_of(comm) == 0) keep_period_log();
     result = {};
     report.ended_by = who_asked_to_end();
     leave_out(" in this stage");
   }
+  if (!report.ended_by.empty() && rank_of(comm) == 0) keep_period_log();
   return result;
 }
 
@@ -262,14 +273,17 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
     report.coarse = stage(report, Stage::coarse, comm, [&] { return run_coarse(chain); });
   else
     report.coarse = not_run<CoarseStart>(OutcomeKind::off, "the scene has no cycle.start = \"coarse\"");
-  FittedCycle fitted = stage(report, Stage::cycle, comm, [&] { return run_cycle(chain); });
-  report.cycle = std::move(fitted.cycle);
-  report.fidelity = std::move(fitted.fidelity);
-  if (has_run(report.cycle.outcome)) save();
-  if (checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
-  report.settled = stage(report, Stage::settled, comm, [&] { return run_settled(chain); });
-  if (settles_on_another_cycle(report))
-    take_cycle_as_answer(report, stage(report, Stage::cycle, comm, [&] { return run_cycle_from_settled(chain); }));
+  do
+  {
+    FittedCycle fitted = stage(report, Stage::cycle, comm, [&] { return run_cycle(chain); });
+    report.cycle = std::move(fitted.cycle);
+    report.fidelity = std::move(fitted.fidelity);
+    if (has_run(report.cycle.outcome)) save();
+    if (checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
+    report.settled = stage(report, Stage::settled, comm, [&] { return run_settled(chain); });
+    if (settles_on_another_cycle(report))
+      take_cycle_as_answer(report, stage(report, Stage::cycle, comm, [&] { return run_cycle_from_settled(chain); }));
+  } while (goes_on_with_finer_steps(chain));
   take_as_answer(report.settled, report.cycle.outcome);
   if (has_run(report.settled.outcome)) save();
   report.attractors = stage(report, Stage::attractors, comm, [&] { return run_attractors(chain); });

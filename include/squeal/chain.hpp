@@ -21,6 +21,14 @@ struct PacedDivergence
   State start;      // beside the equilibrium
 };
 
+/// What the motion had settled on at fewer steps a period.
+struct SettledBySteps
+{
+  MotionKind kind = MotionKind::undecided;
+  MeanValue energy;   // [J] fluctuating
+  MeanValue exponent; // a period, the largest
+};
+
 /// The chain so far. Stages never call the next one: what they hand on stands here.
 struct Chain
 {
@@ -33,6 +41,8 @@ struct Chain
   const CoarseModel* coarse = nullptr;    // of cycle.start = "coarse"
   std::optional<CarriedCycle> carried{};  // its cycle, on this mesh; or that on which the motion has settled
   std::optional<PacedDivergence> paced{}; // where no unstable mode oscillates, once a cycle is sought
+  int begin_steps = first_steps;          // a period, of the search for the cycle where the scene leaves them open
+  std::optional<SettledBySteps> by_fewer_steps{}; // of the search before this one
 
   SlidingEquilibrium sliding() const { return {model.structure, model.interface, report.equilibrium}; }
   UnstableModes unstable() const
@@ -80,6 +90,12 @@ bool settles_on_another_cycle(const Report& report);
 
 /// The cycle from the end of the settled motion.
 FittedCycle run_cycle_from_settled(Chain& chain);
+
+/// Whether the cycle is to be sought once more, at four times the steps a period: where "auto" chooses them for a small
+/// model, until a motion that settled on no cycle does as it did at the steps before. The grid of time alone can make a
+/// motion of impacts wander; it then diverges by the step, not by the period. Notes the motion and the steps. A motion
+/// that the finest steps still change becomes undecided. Not collective.
+bool goes_on_with_finer_steps(Chain& chain);
 
 /// Where it has converged, it answers in the settled motion's stead. Not collective.
 void take_cycle_as_answer(Report& report, FittedCycle found);

@@ -61,24 +61,53 @@ void widen(ParameterRange& range, double parameter)
   range.to = std::max(range.to, parameter);
 }
 
-/// Where a stable cycle stands beside a stable equilibrium: ranges of successive points, up to the Hopf point between
+/// A place on the branch, with a stable cycle or without.
+struct Place
+{
+  double parameter = 0;
+  bool stable = false;
+};
+
+/// The branch's points, and between a stable and another one the fold that parts them: up to there cycles are stable.
+std::vector<Place> places_along(const Branch& branch)
+{
+  std::vector<Place> places;
+  for (const BranchPoint& point : branch.points)
+  {
+    const Place place{point.parameter, point.multipliers.stability == Stability::stable};
+    if (!places.empty() && places.back().stable != place.stable)
+    {
+      const double from = places.back().parameter, length = std::abs(place.parameter - from);
+      for (const BranchEvent& event : branch.events)
+        if (event.kind == BranchEventKind::fold && std::abs(event.parameter - from) <= length + event.error &&
+            std::abs(event.parameter - place.parameter) <= length + event.error)
+        {
+          places.push_back({event.parameter, true});
+          break;
+        }
+    }
+    places.push_back(place);
+  }
+  return places;
+}
+
+/// Where a stable cycle stands beside a stable equilibrium: ranges of successive places, up to the Hopf point between
 /// stable cycles.
 std::vector<ParameterRange> coexistence_of(const BrakeBranch& found, const std::vector<BranchEvent>& hopf)
 {
   std::vector<ParameterRange> ranges;
-  const BranchPoint* before = nullptr; // a stable cycle
+  std::optional<double> before; // a stable cycle
   bool open = false;
-  for (const BranchPoint& point : found.branch.points)
+  for (const Place& place : places_along(found.branch))
   {
-    const bool stable = point.multipliers.stability == Stability::stable;
-    const bool both = stable && unstable_modes_at(point.parameter, found.equilibria, hopf) == 0;
-    if (both && !open) ranges.push_back({point.parameter, point.parameter});
-    if (both) widen(ranges.back(), point.parameter);
-    if (both != open && stable && before)
+    const bool both = place.stable && unstable_modes_at(place.parameter, found.equilibria, hopf) == 0;
+    if (both && !open) ranges.push_back({place.parameter, place.parameter});
+    if (both) widen(ranges.back(), place.parameter);
+    if (both != open && place.stable && before)
       for (const BranchEvent& event : hopf)
-        if ((event.parameter - before->parameter) * (event.parameter - point.parameter) < 0)
+        if ((event.parameter - *before) * (event.parameter - place.parameter) < 0)
           widen(ranges.back(), event.parameter);
-    before = stable ? &point : nullptr;
+    before = place.stable ? std::optional(place.parameter) : std::nullopt;
     open = both;
   }
   return ranges;

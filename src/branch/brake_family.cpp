@@ -124,6 +124,7 @@ PointMeasures BrakeFamily::measure(const Orbit& orbit)
   PointMeasures measures{measured.mean_energy, measured.mean_fluctuating_energy, std::move(measured.peak_to_peak),
                          measured.open_pairs_mean};
   count_statuses(measured.statuses, measures);
+  measures.slips_nonlinearly = at_->model.interface.friction.decay_speed > 0;
   return measures;
 }
 

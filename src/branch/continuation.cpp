@@ -124,10 +124,10 @@ void note_events(BranchCorrector& corrector, BranchSide& side)
   side.events.insert(side.events.end(), fresh.begin(), fresh.end());
 }
 
-/// Whether a pair opens, or comes to rest.
+/// Whether a pair opens, or comes to rest, or friction changes as it slips.
 bool is_nonlinear(const PointMeasures& measures)
 {
-  return measures.open_steps > 0 || measures.stick_steps > 0;
+  return measures.open_steps > 0 || measures.stick_steps > 0 || measures.slips_nonlinearly;
 }
 
 /// Whether the side has come to its natural end.
@@ -151,6 +151,23 @@ BranchEvent hopf_beyond(const ExaminedOrbit& before, const ExaminedOrbit& last)
                square2 = std::pow(last.corrected.orbit.fluctuation, 2);
   const double further = (p2 - p1) * square2 / (square1 - square2);
   return {BranchEventKind::hopf, p2 + further, std::abs(further), last.corrected.orbit.period, 0, 0};
+}
+
+void end_at_hopf(BranchSide& side)
+{
+  side.ending = BranchEnding::small_amplitude;
+  side.events.push_back(hopf_beyond(side.orbits[side.orbits.size() - 2], side.orbits.back()));
+}
+
+/// Whether the last orbits shrink, to a tenth of the start: the parameter is then within 1e-2 of its change to Hopf,
+/// and orbits of all sizes nearly solve the same equations.
+bool shrinks_to_a_point(const BranchSide& side)
+{
+  constexpr double small = 0.1;
+  if (side.orbits.size() < 2) return false;
+  const double last = side.orbits.back().corrected.orbit.fluctuation;
+  return last < side.orbits[side.orbits.size() - 2].corrected.orbit.fluctuation &&
+         last < small * side.orbits.front().corrected.orbit.fluctuation;
 }
 
 ExaminedOrbit copy_of(const ExaminedOrbit& orbit)
@@ -194,6 +211,7 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Branch
         walk.tangent = tangent_at(corrector, side.orbits.back().corrected, walk.tangent);
       if (walk.length >= walk.least) continue;
       side.ending = BranchEnding::step_too_small;
+      if (shrinks_to_a_point(side)) end_at_hopf(side);
       return side;
     }
     walk.length = std::clamp(length * (next->iterations <= 4  ? 1.5
@@ -207,14 +225,14 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Branch
     {
       side.orbits.pop_back();
       side.ending = BranchEnding::step_too_small;
+      if (shrinks_to_a_point(side)) end_at_hopf(side);
       return side;
     }
     note_events(corrector, side);
     if (const auto ending = natural_end(corrector.settings, side))
     {
       side.ending = *ending;
-      if (*ending == BranchEnding::small_amplitude)
-        side.events.push_back(hopf_beyond(side.orbits[side.orbits.size() - 2], side.orbits.back()));
+      if (*ending == BranchEnding::small_amplitude) end_at_hopf(side);
       return side;
     }
   }

@@ -384,6 +384,7 @@ PointMeasures ReducedFamily::measure(const Orbit& orbit)
     statuses.push_back(contact_status(PairView<const double>(contact.r, model.directions),
                                       PairView<const double>(contact.w, model.directions), model.friction));
   count_statuses(statuses, measures);
+  measures.slips_nonlinearly = model.friction.decay_speed > 0;
   double open = 0;
   for (const auto& status : statuses)
     open += static_cast<double>(std::count(status.begin(), status.end(), ContactStatus::open));

@@ -4,6 +4,8 @@
 #include "reduced_cycle.hpp"
 #include "step_refinement.hpp"
 
+#include "squeal/base/run_control.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -32,6 +34,20 @@ std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
   return reason.empty() ? friction_refusal(problem.sliding, &mode, theta, h, problem.step, 1) : reason;
 }
 
+/// Refines the steps. Where the run is asked to end meanwhile, the cycle that was found stays.
+void refine_or_cut_short(const CycleCorrection& correction, LimitCycle& cycle)
+{
+  try
+  {
+    refine_steps(correction, cycle);
+  }
+  catch (const Interrupted&) // on all ranks alike
+  {
+    correction.fidelity.cut_short = true;
+    correction.fidelity.reason = format("the run was ended at %d steps a period", cycle.steps_per_period);
+  }
+}
+
 /// The full model's cycle from the reduced model's, whose derivative is the preconditioner, and the finer steps that
 /// the accuracy needs. Returns why there is none, or nothing.
 std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& reduced, StepChoice steps,
@@ -55,7 +71,7 @@ std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& red
     return "the full model's shooting from the reduced model's cycle left it";
   if (cycle.outcome.kind != OutcomeKind::converged) return {}; // the free motion went on from there
   if (steps == StepChoice::by_accuracy)
-    refine_steps(correction, cycle);
+    refine_or_cut_short(correction, cycle);
   else
     estimate_model_errors(correction, cycle);
   return {};
@@ -91,7 +107,7 @@ void find_by_full_model(const CycleProblem& problem, const CycleOptions& options
   if (steps == StepChoice::by_accuracy)
   {
     const Preconditioner preconditioner = estimated_preconditioner(problem, options.band_factor);
-    refine_steps({problem, options, preconditioner, fidelity}, result.cycle);
+    refine_or_cut_short({problem, options, preconditioner, fidelity}, result.cycle);
   }
   fidelity.full_seconds += MPI_Wtime() - clock;
 }
@@ -129,14 +145,15 @@ void find_on_model(const CycleProblem& problem, const CycleOptions& options, Ste
 
 } // namespace
 
-CycleSettings chosen_settings(const CycleProblem& problem, CycleModel model)
+CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest& request)
 {
   CycleSettings settings = problem.settings;
-  const bool chooses = model == CycleModel::automatic;
+  const bool chooses = request.model == CycleModel::automatic;
   if (settings.tolerance == 0) settings.tolerance = plain_tolerance;
   if (settings.steps_per_period > 0) return settings;
   const double turns = problem.given_period * problem.unstable.modes.front().frequency_hz(); // of the mode, if given
-  settings.steps_per_period = (chooses ? first_steps : plain_steps) * std::max(1, static_cast<int>(std::lround(turns)));
+  settings.steps_per_period =
+      (chooses ? request.begin_steps : plain_steps) * std::max(1, static_cast<int>(std::lround(turns)));
   while (chooses && settings.steps_per_period < most_steps &&
          !step_refusal_of(problem, settings.steps_per_period).empty())
     settings.steps_per_period *= 2;
@@ -147,7 +164,7 @@ FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& 
 {
   declare_solver_options();
   FittedCycle result;
-  const CycleSettings settings = chosen_settings(given, request.model);
+  const CycleSettings settings = chosen_settings(given, request);
   const CycleProblem problem = with_settings(given, settings);
   if (const std::string refusal = step_refusal_of(problem, settings.steps_per_period); !refusal.empty())
   {

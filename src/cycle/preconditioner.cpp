@@ -142,7 +142,7 @@ MultiVector shapes_below(const CycleProblem& problem, double band)
   const Mat M = problem.sliding.structure.M;
   MultiVector shapes = empty_multivector(M);
   for (const ComplexMode& mode : problem.modes)
-    if (mode.frequency_hz() < band)
+    if (mode.frequency_hz() < band && mode.growth_rate() > -std::abs(mode.lambda.imag())) // others last no period
     {
       MultiVector parts = columns_of(std::array{mode.real.get(), mode.imaginary.get()});
       parts.entries /= std::sqrt(inner_products(parts, product(M, parts)).trace());

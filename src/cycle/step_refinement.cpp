@@ -193,6 +193,17 @@ Convergence joined(Convergence before, const Convergence& after)
   return before;
 }
 
+/// Unfinds a cycle that only its own steps know. Its state moves on at the finer ones.
+void leave(LimitCycle& cycle, int finer, const std::string& reason)
+{
+  cycle.outcome.kind = OutcomeKind::not_converged;
+  cycle.outcome.reason =
+      format("a cycle at %d steps a period that finer ones do not know: ", cycle.steps_per_period) + reason;
+  cycle.free = copy_of(cycle.orbit);
+  cycle.steps_per_period = finer;
+  cycle.multipliers = {};
+}
+
 /// The cycle of a small model at so many steps a period, with its verdict, from the cycle at hand. Where that begins at
 /// an event of contact Newton may fail: then from the scene's start, as if the scene gave the steps. The cycle at hand
 /// stays where none is found. Returns why the refinement ends there, or nothing.
@@ -239,6 +250,8 @@ void refine_small(const CycleCorrection& correction, LimitCycle& cycle)
   const auto append = [&](std::vector<CycleAtSteps>& cycles, int steps, double /*beyond*/)
   {
     std::string problem = find_anew(correction, steps, cycle);
+    const bool found = problem.empty() || cycle.steps_per_period == steps;
+    if (!found && cycles.size() == 1) leave(cycle, steps, problem);
     if (problem.empty()) cycles.push_back(at_hand());
     return problem;
   };
@@ -289,7 +302,7 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
   MeasuredFlow flow{{problem.sliding, problem.step, cycle.steps_per_period, problem.settings.theta}};
   make_flow(correction, flow);
   Progress progress(comm_of(problem.sliding.structure.load), "cycle, finer steps", 20);
-  ConvergenceLog log{progress, std::move(cycle.convergence)};
+  ConvergenceLog log{progress, cycle.convergence}; // which stays where the run is asked to end
   const OrbitProblem orbit = orbit_problem(correction, flow.flow, cycle.orbit.period);
   FullShooting shooting{correction, orbit, log, flow, correction.options.shooting};
   shooting.options.max_periods = log.convergence.periods + correction.options.reduced.corrections;

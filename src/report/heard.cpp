@@ -101,8 +101,13 @@ std::string settled_text(const Report& report, const Scene& scene)
   }
   MeanValue energy = report.settled.fluctuating_energy;
   energy.error += report.settled.step_error;
-  return text + beside_mode(report, first) + energy_text(energy) +
-         largest_swing(scene, report.settled.peak_to_peak, [](const MeanValue& swing) { return swing.value; });
+  text += beside_mode(report, first) + energy_text(energy) +
+          largest_swing(scene, report.settled.peak_to_peak, [](const MeanValue& swing) { return swing.value; });
+  if (!depends_on_steps(report.settled)) return text;
+  return text +
+         format("; by %d steps a period, and half as many change the energy by %.0f %%: more may change the kind",
+                report.settled.steps_per_period,
+                100 * report.settled.step_error / report.settled.fluctuating_energy.value);
 }
 
 /// How many of the scene's other starts lead to the cycle; empty: all that have settled.

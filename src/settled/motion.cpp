@@ -61,6 +61,14 @@ bool steady(std::span<const double> energies)
   return std::sqrt(squares / static_cast<double>(energies.size())) < 1e-3 * middle && decay.value + decay.error >= 0;
 }
 
+/// Whether the two largest exponents are apart by their bars: a wide bar holds zero and much else.
+bool parted(const std::vector<MeanValue>& exponents, double together)
+{
+  if (exponents.size() < 2) return true;
+  const MeanValue &first = exponents[0], &second = exponents[1];
+  return first.value - together * first.error > second.value + together * second.error;
+}
+
 /// Samples the next period. Where the run is asked to end within it, what came before is kept.
 PeriodSample sample_or_keep(const PeriodSampler& sampler, const MotionKeeper& keeper, const MotionProgress& now)
 {
@@ -131,7 +139,9 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
   const auto zero = std::count_if(exponents.begin(), exponents.end(),
                                   [](const MeanValue& one) { return std::abs(one.value) <= together * one.error; });
   if (positive > 0) return judge_irregular(energies);
-  if (zero == 1) return {MotionKind::periodic, "", ""};
+  if (zero == 1 && (parted(exponents, together) || steady(energies))) return {MotionKind::periodic, "", ""};
+  if (zero == 1)
+    return {MotionKind::undecided, "a cycle and an irregular motion: the exponents' bars overlap", more};
   // slow motions that die out have exponents within their bars of zero, too; of a torus whose parts hardly know of each
   // other the energies are as steady, and the second frequency tells
   if (zero > 1 && steady(energies) && (base.second == 0 || base.closes_after > 0))

@@ -150,6 +150,11 @@ MeanValue energy_by_half_the_steps(const CycleProblem& problem, const SettledMot
 
 } // namespace
 
+bool depends_on_steps(const SettledMotion& motion)
+{
+  return motion.step_error > 0.2 * motion.fluctuating_energy.value;
+}
+
 void take_as_answer(const SettledMotion& motion, Outcome& of_cycle)
 {
   if (motion.outcome.kind != OutcomeKind::settled) return;

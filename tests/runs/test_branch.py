@@ -3,9 +3,10 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from conftest import INPUTS, ROOT
-from models import write_coexistence
+from models import write_coexistence, write_matrices, write_scene
 
 SCENE = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=200",
          "--set", "fidelity=full"]
@@ -172,3 +173,22 @@ def test_the_picture_is_drawn(converged):
     run = converged(*SCENE, *branch_of("friction.coefficient", 0.28, 0.32), "--set", "branch.points=3", ranks=1)
     subprocess.run([sys.executable, ROOT / "tools" / "plot", run.output], check=True, capture_output=True)
     assert (run.output / "branch.png").stat().st_size > 10000
+
+
+def test_falling_friction_is_followed_round_its_fold_to_the_hopf_point(converged, tmp_path):
+    """Steps that only slide are not linear where friction falls. Own sweeps upwards: the sticking cycle attracts beside the
+    stable equilibrium and has gone beyond the fold."""
+    write_matrices(tmp_path / "m", [[0, 1, -1], [1, 0, 0]], [0], [0.13124423], [0, -1, 0], M=np.diag([1, 1, 0.82634314]),
+                   C=np.diag([0.00498815, 0.00498815, 0.00412192]),
+                   K=[[1.01375113, -0.31402273, 0], [-0.31402273, 1.11350367, 0], [0, 0, 2.79410604]])
+    scene = write_scene(tmp_path, matrices={"folder": "m"}, modes={"band": 1e9}, cycle={"steps_per_period": 200},
+                        friction={"coefficient": 0.12142547, "static_coefficient": 0.19125306, "decay_speed": 0.07532168})
+    branch = converged(scene, *branch_of("friction.coefficient", 0.1, 0.3), ranks=1).report["branch"]
+    assert branch["ends"]["forward"] == "small amplitude"
+    hopf, = [event for event in branch["events"] if event["kind"] == "Hopf" and event["parameter"] > 0.18][:1]
+    fold, = [event for event in branch["events"] if event["kind"] == "fold"]
+    assert fold["parameter"] > hopf["parameter"] + fold["error"]
+    both, = branch["coexistence"]
+    assert both == {"from": hopf["parameter"], "to": fold["parameter"]}
+    last = branch["points"][-1]
+    assert last["parameter"] == pytest.approx(hopf["parameter"], rel=1e-4)  # 1e-2 of its way from the fold

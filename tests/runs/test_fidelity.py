@@ -114,3 +114,12 @@ def test_steps_of_a_small_model_are_enough_for_the_accuracy(module_run, speed, e
     assert cycle["multipliers"]["stability"] == "stable" and cycle["periods_integrated"] <= 60
     off = abs(cycle["mean_energy"] - exact) / energy(run)
     assert off <= estimates["energy"] + estimates["step_energy"] <= 1e-3
+
+
+def test_a_cycle_stays_where_the_run_is_ended_while_finer_steps_are_tried(squeal):
+    """At theta 0.4 the error falls with the step alone, and 1e-6 takes more steps than the time allows. The cycle is found
+    within a second."""
+    run = squeal(INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=0",
+                 "--set", "cycle.theta=0.4", "--set", "accuracy=1e-6", "--time-limit", "4", ranks=1)
+    assert run.code == 3 and run.report["cycle"]["outcome"] == "converged"
+    assert "squeals at" in run.report["heard"] and "the run was ended at" in run.report["fidelity"]["reason"]

@@ -18,9 +18,10 @@ struct PointMeasures
   double mean_energy = 0, mean_fluctuating_energy = 0; // [J]
   std::vector<double> peak_to_peak;                    // [m] per probe
   double open_pairs_mean = 0;
-  int open_steps = 0;  // of pairs that open and close
-  int lift_offs = 0;   // uninterrupted times that these pairs are open
-  int stick_steps = 0; // of all pairs
+  int open_steps = 0;             // of pairs that open and close
+  int lift_offs = 0;              // uninterrupted times that these pairs are open
+  int stick_steps = 0;            // of all pairs
+  bool slips_nonlinearly = false; // mu depends on the speed
 };
 
 /// Flows that depend on a number. The states and the energy product are those of all its values.
@@ -84,9 +85,10 @@ struct BranchEvent
 /// Why a side of a branch ended.
 enum class BranchEnding
 {
-  not_followed,     // the start is at this bound
-  bound,            // the parameter reached its bound
-  linear_motion,    // no pair opens or sticks any more: the family is vertical from there to its Hopf point
+  not_followed,  // the start is at this bound
+  bound,         // the parameter reached its bound
+  linear_motion, // no pair opens or sticks any more, and mu is constant: the family is vertical from there to its Hopf
+                 // point
   small_amplitude,  // the orbit shrank to a point: Hopf
   step_too_small,   // no orbit closes within the smallest step
   number_of_points, // as many points as are allowed

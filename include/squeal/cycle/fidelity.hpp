@@ -24,7 +24,8 @@ inline constexpr double plain_tolerance = 1e-5;
 struct FidelityRequest
 {
   CycleModel model = CycleModel::full;
-  double accuracy = 0; // [-] of frequency and energy
+  double accuracy = 0;           // [-] of frequency and energy
+  int begin_steps = first_steps; // a period at which "auto" begins where the scene leaves them open
 };
 
 /// What was used, what was left out, and how that is known. Errors are relative; energy: the mean fluctuating one.
@@ -32,6 +33,7 @@ struct Fidelity
 {
   CycleModel asked = CycleModel::full, used = CycleModel::full; // used: full or reduced
   std::string reason;                                           // in a sentence
+  bool cut_short = false; // the run was asked to end while finer steps were tried: the cycle is that of the last ones
   double accuracy = 0;                                          // asked for
   int size = 0, modes = 0, attachment_shapes = 0;
   int left_out_shapes = 0;                     // attachments beyond the cap
@@ -54,7 +56,7 @@ struct FittedCycle
 };
 
 /// The settings, with steps and tolerance where the scene leaves them open.
-CycleSettings chosen_settings(const CycleProblem& problem, CycleModel model);
+CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest& request);
 
 /// Finds the cycle on the model that the request names, or for "auto" on the smallest one that its accuracy allows.
 /// Collective. A search that fails has its outcome and reason. Error: a reduced model that was asked for cannot be

@@ -28,6 +28,10 @@ struct SettledMotion
   int sampled_steps = 1;               // between two samples of the shapes
 };
 
+/// Whether half as many steps a period change the energy by a fifth, amplitudes by a tenth: the grid of time may then
+/// have a part in the kind of motion. Not collective.
+bool depends_on_steps(const SettledMotion& motion);
+
 /// Where the motion answers, the outcome of the search for a cycle becomes "settled". Not collective.
 void take_as_answer(const SettledMotion& motion, Outcome& of_cycle);
 
