@@ -323,10 +323,20 @@ Attractors run_attractors(const Chain& chain)
   const CycleSettings& settings = chain.scene.cycle;
   if (!settings.enabled || settings.starts == 0)
     return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
-  const std::string reason = no_unstable_mode(chain.report);
-  if (!reason.empty()) return not_run<Attractors>(OutcomeKind::skipped, reason);
-  return find_attractors({chain.sliding(), chain.report.modes.modes, chain.unstable(), settings, chain.options.step},
-                         chain.options.attractors);
+  const std::vector<ComplexMode>& modes = chain.report.modes.modes;
+  UnstableModes started = chain.unstable();
+  Estimate of_stable;
+  if (chain.report.modes.unstable_count == 0 && !modes.empty() && chain.model.interface.pairs > 0)
+  {
+    // a motion may go on beside a stable equilibrium: from the mode that decays slowest, and random sums of modes
+    of_stable = estimate_amplitude(chain.sliding(), *chain.linearised, modes.front(), chain.options.estimate);
+    started = {std::span(modes).first(1), std::span(&of_stable, 1)};
+  }
+  else if (const std::string reason = no_unstable_mode(chain.report); !reason.empty())
+    return not_run<Attractors>(OutcomeKind::skipped, reason);
+  if (!std::isfinite(started.estimates.front().start_amplitude) && chain.report.modes.unstable_count == 0)
+    return not_run<Attractors>(OutcomeKind::skipped, "no amplitude is known at which contact opens or slip reverses");
+  return find_attractors({chain.sliding(), modes, started, settings, chain.options.step}, chain.options.attractors);
 }
 
 } // namespace squeal

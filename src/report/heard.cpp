@@ -140,14 +140,29 @@ std::string cycle_text(const Report& report, const Scene& scene)
          (report.modes.unstable_count == 0 ? ", beside a stable equilibrium that another start leads to" : "");
 }
 
+/// The motion that most of the starts lead to beside a stable equilibrium; empty: all that have settled come to rest.
+std::string beside_rest(const Report& report)
+{
+  const Attractors& attractors = report.attractors;
+  if (!has_run(attractors.outcome)) return {};
+  const auto goes_on =
+      std::ranges::find_if(attractors.motions, // those that most starts lead to come first
+                           [](const ReachedMotion& motion)
+                           { return motion.kind == ReachedKind::steady || motion.kind == ReachedKind::varying; });
+  if (goes_on == attractors.motions.end()) return {};
+  return format(", but %zu of %zu starts lead to a motion at %.5g Hz", goes_on->starts.size(), attractors.starts.size(),
+                goes_on->frequency.value);
+}
+
 /// Without a cycle.
 std::string linear_text(const Report& report)
 {
   if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "nothing is known: there is no equilibrium";
   if (!has_run(report.modes.outcome)) return "nothing is known: the modes were not computed";
   if (report.modes.unstable_count == 0)
-    return report.modes.outcome.kind == OutcomeKind::converged ? "silent: no mode grows in the band"
-                                                               : "nothing is known: the modes are incomplete";
+    return report.modes.outcome.kind == OutcomeKind::converged
+               ? "silent: no mode grows in the band" + beside_rest(report)
+               : "nothing is known: the modes are incomplete";
   const ComplexMode& mode = report.modes.modes.front();
   if (mode.frequency_hz() == 0)
     return format("the equilibrium diverges without oscillating, by a factor e in %.3g s", 1 / mode.growth_rate());
