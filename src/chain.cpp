@@ -320,7 +320,10 @@ void take_cycle_as_answer(Report& report, FittedCycle found)
 
 Attractors run_attractors(const Chain& chain)
 {
-  const CycleSettings& settings = chain.scene.cycle;
+  constexpr int enough = 256; // steps a period to recognise a cycle of more steps by
+  CycleSettings settings = chain.scene.cycle;
+  if (settings.steps_per_period == 0)
+    settings.steps_per_period = std::clamp(chain.report.cycle.steps_per_period, first_steps, enough);
   if (!settings.enabled || settings.starts == 0)
     return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
   const std::vector<ComplexMode>& modes = chain.report.modes.modes;

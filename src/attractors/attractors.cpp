@@ -5,10 +5,10 @@
 
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/cycle/fidelity.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace squeal
 {
@@ -24,8 +24,7 @@ class Swarm
 {
 public:
   Swarm(const AttractorProblem& problem, std::vector<NamedStart> starts)
-      : problem_(problem),
-        steps_per_period_(problem.settings.steps_per_period > 0 ? problem.settings.steps_per_period : first_steps),
+      : problem_(problem), steps_per_period_(problem.settings.steps_per_period),
         rest_force_(zeros_like(problem.sliding.equilibrium.u)), watched_(starts.size())
   {
     const auto& [structure, interface, equilibrium] = problem.sliding;
@@ -53,7 +52,6 @@ public:
       const std::vector<StepReport> reports =
           advance(step_, problem_.sliding.structure, problem_.sliding.interface, works_, states_);
       for (std::size_t k = 0; k < states_.size(); ++k) watch(reports[k], k);
-      if (steps_ == end) note_energies();
       const Request asked = request(comm);
       if (asked != Request::none) keep_swarm(progress());
       if (asked == Request::end) throw Interrupted{};
@@ -75,24 +73,23 @@ public:
     {
       const Watched& watched = watched_[k];
       const auto moving = std::max_element(watched.squares.begin(), watched.squares.end()) - watched.squares.begin();
+      const std::vector<double>& crossings = watched.crossings[static_cast<std::size_t>(moving)];
       motions.push_back(
-          reached_by(watched.energies, watched.crossings[static_cast<std::size_t>(moving)], at_rest * least));
+          reached_by(means_over(watched.energies, own_period(crossings) / step_.h), crossings, at_rest * least));
       motions.back().starts = {k};
     }
     return motions;
   }
 
 private:
-  SwarmProgress progress() { return {problem_.sliding.structure, step_.h, steps_, states_, works_, watched_}; }
-
-  void note_energies()
+  /// [s] Two crossings apart, as some motions cross twice a period; the mode's where there are too few.
+  double own_period(const std::vector<double>& crossings) const
   {
-    for (Watched& watched : watched_)
-    {
-      watched.energies.push_back(watched.sum / steps_per_period_);
-      watched.sum = 0;
-    }
+    const MeanValue frequency = frequency_of(crossings);
+    return frequency.value > 0 ? 2 / frequency.value : step_.h * steps_per_period_;
   }
+
+  SwarmProgress progress() { return {problem_.sliding.structure, step_.h, steps_, states_, works_, watched_}; }
 
   /// Takes the energy of the fluctuation and the velocities along the modes.
   void watch(const StepReport& report, std::size_t k)
@@ -101,7 +98,7 @@ private:
     const double h = step_.h;
     double work = 0;
     check(VecDot(rest_force_, states_[k].u, &work));
-    watched.sum += report.energy - work + rest_energy_;
+    watched.energies.push_back(report.energy - work + rest_energy_);
     std::array<double, coordinates> now{};
     check(VecMDot(works_[k].Mv, static_cast<PetscInt>(shapes_.size()), shapes_.data(), now.data()));
     for (std::size_t i = 0; i < shapes_.size(); ++i)
@@ -114,7 +111,7 @@ private:
   }
 
   const AttractorProblem& problem_;
-  const int steps_per_period_; // where the scene leaves it open, the step's error of the energy is about a percent
+  const int steps_per_period_;
   ThetaStep step_;
   Owned<Vec> rest_force_; // K u0
   double rest_energy_ = 0;
@@ -125,10 +122,15 @@ private:
   long steps_ = 0;
 };
 
-bool all_settled(const std::vector<ReachedMotion>& motions)
+/// After so many periods. That no cycle attracts is not said of a short motion: it may still be on its way to one.
+bool all_settled(const std::vector<ReachedMotion>& motions, long periods)
 {
+  const bool is_short = periods < 200;
   return std::none_of(motions.begin(), motions.end(),
-                      [](const ReachedMotion& motion) { return motion.kind == ReachedKind::unsettled; });
+                      [&](const ReachedMotion& motion) {
+                        return motion.kind == ReachedKind::unsettled ||
+                               (is_short && motion.kind == ReachedKind::varying);
+                      });
 }
 
 } // namespace
@@ -155,10 +157,10 @@ Attractors find_attractors(const AttractorProblem& problem, const AttractorOptio
     found.periods = target;
     motions = swarm.reached();
     progress.update(static_cast<double>(target), format("%ld periods", target));
-    if (all_settled(motions) || target + block > options.periods) break;
+    if (all_settled(motions, target) || target + block > options.periods) break;
   }
   swarm.end();
-  const bool settled = all_settled(motions);
+  const bool settled = all_settled(motions, std::numeric_limits<long>::max());
   found.motions = joined(std::move(motions));
   found.outcome = {
       settled ? OutcomeKind::completed : OutcomeKind::not_converged,

@@ -80,17 +80,6 @@ bool approaches(const std::vector<double>& values)
   return true;
 }
 
-/// From the crossings of the second half of the motion, and of its quarters.
-MeanValue frequency_of(const std::vector<double>& crossings)
-{
-  const std::size_t count = crossings.size();
-  if (count < 8) return {};
-  const auto between = [&](std::size_t first, std::size_t last)
-  { return static_cast<double>(last - first) / (crossings[last] - crossings[first]); };
-  const std::size_t half = count / 2, quarter = (half + count - 1) / 2;
-  return {between(half, count - 1), std::abs(between(half, quarter) - between(quarter, count - 1))};
-}
-
 bool agree(const MeanValue& a, const MeanValue& b, double relative)
 {
   return std::abs(a.value - b.value) <= a.error + b.error + relative * std::max(std::abs(a.value), std::abs(b.value));
@@ -103,6 +92,31 @@ bool same(const ReachedMotion& a, const ReachedMotion& b)
 }
 
 } // namespace
+
+std::vector<double> means_over(const std::vector<double>& samples, double length)
+{
+  std::vector<double> before(samples.size() + 1, 0.); // sums
+  std::partial_sum(samples.begin(), samples.end(), before.begin() + 1);
+  const auto sum_to = [&](double place)
+  {
+    const auto whole = std::min(static_cast<std::size_t>(place), samples.size() - 1);
+    return before[whole] + (place - static_cast<double>(whole)) * samples[whole];
+  };
+  std::vector<double> means;
+  for (double end = length; end <= static_cast<double>(samples.size()); end += length)
+    means.push_back((sum_to(end) - sum_to(end - length)) / length);
+  return means;
+}
+
+MeanValue frequency_of(const std::vector<double>& crossings)
+{
+  const std::size_t count = crossings.size();
+  if (count < 8) return {};
+  const auto between = [&](std::size_t first, std::size_t last)
+  { return static_cast<double>(last - first) / (crossings[last] - crossings[first]); };
+  const std::size_t half = count / 2, quarter = (half + count - 1) / 2;
+  return {between(half, count - 1), std::abs(between(half, quarter) - between(quarter, count - 1))};
+}
 
 bool agree(const ReachedMotion& a, const ReachedMotion& b)
 {

@@ -25,7 +25,6 @@ void put_watched(const Watched& watched, const std::string& name, Checkpoint& ch
   checkpoint.set(name + "energies", watched.energies);
   checkpoint.set(name + "last", std::vector<double>(watched.last.begin(), watched.last.end()));
   checkpoint.set(name + "squares", std::vector<double>(watched.squares.begin(), watched.squares.end()));
-  checkpoint.set(name + "sum", watched.sum);
   for (std::size_t i = 0; i < coordinates; ++i)
     checkpoint.set(name + "crossings " + std::to_string(i), watched.crossings[i]);
 }
@@ -35,7 +34,6 @@ void take_watched(const Checkpoint& checkpoint, const std::string& name, Watched
   watched.energies = checkpoint.list(name + "energies");
   std::ranges::copy(checkpoint.list(name + "last"), watched.last.begin());
   std::ranges::copy(checkpoint.list(name + "squares"), watched.squares.begin());
-  watched.sum = checkpoint.number(name + "sum");
   for (std::size_t i = 0; i < coordinates; ++i)
     watched.crossings[i] = checkpoint.list(name + "crossings " + std::to_string(i));
 }

@@ -13,10 +13,9 @@ inline constexpr std::size_t coordinates = 4; // of the least stable modes
 /// What is seen of one trajectory.
 struct Watched
 {
-  std::vector<double> energies; // [J] fluctuating, mean of each period
+  std::vector<double> energies; // [J] fluctuating, of each step
   std::array<double, coordinates> last{}, squares{};
   std::array<std::vector<double>, coordinates> crossings; // [s] upwards through zero
-  double sum = 0;                                         // of the energies of the period at hand
 };
 
 /// What they have reached after a step.

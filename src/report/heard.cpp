@@ -51,7 +51,9 @@ std::string beside_mode(const Report& report, double frequency_hz)
 
 std::string stability_text(const Multipliers& multipliers)
 {
-  if (multipliers.values.empty()) return ", whether it lasts was not examined";
+  if (multipliers.values.empty())
+    return multipliers.stability == Stability::undecided ? ", whether it lasts is undecided"
+                                                         : ", whether it lasts was not examined";
   const double modulus = std::abs(multipliers.values.front()), error = multipliers.errors.front();
   std::string largest = format(" (largest multiplier %.4f +- %.0e", modulus, error);
   const double bound = largest_upper_bound(multipliers);

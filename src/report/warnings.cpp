@@ -147,7 +147,7 @@ Sentences of_cycle(const Report& report)
   add_chatter(cycle.measured.history, sentences);
   if (cycle.multipliers.stability == Stability::undecided)
     sentences.push_back("whether a vibration settles on this cycle is undecided: " + cycle.multipliers.would_decide);
-  if (cycle.multipliers.values.empty())
+  if (cycle.multipliers.stability == Stability::not_examined)
     sentences.push_back("whether this cycle attracts was not examined: -cycle_multipliers 20 does");
   return sentences;
 }

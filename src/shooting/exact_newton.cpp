@@ -31,25 +31,25 @@ Correction newton_step(const OrbitProblem& problem, double clamp, const Orbit& o
   flow.record_period(orbit.period, orbit.state, {});
   const MatrixXd M = whole_matrix(orbit, [&](std::span<const Owned<Vec>> states)
                                   { flow.apply_tangent(std::vector<Vec>(states.begin(), states.end())); });
-  const Index n = M.rows();
+  const MatrixXd Q = coordinates_with_mass(flow);
+  const Index n = Q.cols(), all = M.rows();
   const double scale = orbit.period / (2 * PETSC_PI), speed = energy_norm(flow, orbit.rate);
   const Owned<Vec> image = zeros_like(orbit.rate);
   energy_image(flow, orbit.rate, image);
   MatrixXd J = MatrixXd::Zero(n + 1, n + 1);
-  J.topLeftCorner(n, n) = M - MatrixXd::Identity(n, n);
-  const VectorXd rate = coordinates_of(orbit.rate, orbit.period);
+  J.topLeftCorner(n, n) = Q.transpose() * M * Q - MatrixXd::Identity(n, n);
+  const VectorXd rate = Q.transpose() * coordinates_of(orbit.rate, orbit.period);
   const double rate_norm = std::max(rate.norm(), 1e-300); // a motion of any size has a column of size 1
   J.col(n).head(n) = rate / rate_norm;
-  J.row(n).head(n / 2) = coordinates_of(image, orbit.period).head(n / 2).transpose() / speed;
-  // the image's velocities are forces: their coordinates are over the scale once more
-  J.row(n).segment(n / 2, n / 2) =
-      coordinates_of(image, orbit.period).tail(n / 2).transpose() / (speed * scale * scale);
+  VectorXd along = coordinates_of(image, orbit.period) / speed;
+  along.tail(all / 2) /= scale * scale; // the image's velocities are forces: their coordinates are over it once more
+  J.row(n).head(n) = (Q.transpose() * along).transpose();
   VectorXd rhs = VectorXd::Zero(n + 1);
-  rhs.head(n) = -coordinates_of(orbit.defect, orbit.period);
+  rhs.head(n) = -Q.transpose() * coordinates_of(orbit.defect, orbit.period);
   J.row(n) /= std::max(J.row(n).norm(), 1e-300);
   if (!J.allFinite() || !rhs.allFinite()) return {zeros_like(orbit.rate), std::nan("")}; // Eigen would never end
   const VectorXd step = J.completeOrthogonalDecomposition().solve(rhs);
-  Correction correction{state_at(step.head(n), orbit), step(n) / rate_norm};
+  Correction correction{state_at(Q * step.head(n), orbit), step(n) / rate_norm};
   const double length = std::max(energy_norm(flow, correction.state), std::abs(correction.period) * speed);
   const double factor = std::min(1., clamp * orbit.fluctuation / length);
   check(VecScale(correction.state, factor));

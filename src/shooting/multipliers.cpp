@@ -52,27 +52,42 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   Multipliers& multipliers = result.multipliers;
   multipliers.method = MultiplierMethod::whole;
   const Orbit& orbit = monodromy.orbit;
+  const Eigen::MatrixXd Q = coordinates_with_mass(monodromy.flow);
+  bool finite = true;
   const auto find_pairs = [&]
   {
     multipliers.periods += 2 * dofs;
-    return solve_dense_unsymmetric(
-        whole_matrix(orbit, [&](std::span<const Owned<Vec>> states) { multiply(monodromy, states); }));
+    const Eigen::MatrixXd whole =
+        whole_matrix(orbit, [&](std::span<const Owned<Vec>> states) { multiply(monodromy, states); });
+    finite = finite && whole.allFinite();
+    return finite ? solve_dense_unsymmetric(Q.transpose() * whole * Q) : std::vector<DenseEigenpair>();
   };
   const auto pairs_on = [&](const TimeGrid& grid)
   {
     monodromy.flow.record_period(orbit.period, orbit.state, grid);
     return find_pairs();
   };
-  std::vector<DenseEigenpair> pairs = monodromy.exact() ? pairs_on({}) : find_pairs();
+  std::vector<DenseEigenpair> pairs = monodromy.exact() ? pairs_on({}) : find_pairs(), moved, finer;
+  if (monodromy.exact())
+  {
+    moved = pairs_on({0.5, 1});
+    finer = pairs_on({0, 2});
+    monodromy.flow.record_period(orbit.period, orbit.state, {});
+  }
+  if (!finite)
+  {
+    multipliers.stability = Stability::undecided;
+    multipliers.would_decide = "the tangent of this period is not finite: other steps a period would decide";
+    return result;
+  }
   const std::vector<Complex> values = values_of(pairs);
   GridErrors grid{std::vector<double>(values.size(), 0.), std::vector<double>(values.size(), 0.)};
   if (monodromy.exact())
   {
-    add_changes(values, values_of(pairs_on({0.5, 1})), 1, grid);
-    add_changes(values, values_of(pairs_on({0, 2})), 4. / 3, grid);
-    monodromy.flow.record_period(orbit.period, orbit.state, {});
+    add_changes(values, values_of(moved), 1, grid);
+    add_changes(values, values_of(finer), 4. / 3, grid);
   }
-  const std::size_t shift = find_shift(pairs, coordinates_of(orbit.rate, orbit.period));
+  const std::size_t shift = find_shift(pairs, Q.transpose() * coordinates_of(orbit.rate, orbit.period));
   multipliers.trivial_error = std::abs(values[shift] - 1.);
   for (std::size_t i = 0; i < values.size(); ++i)
   {
@@ -87,7 +102,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   if (pairs.empty()) return result;
   decide(multipliers, {true, ""}, multipliers.values.size());
   result.fastest =
-      fastest_motion(monodromy.flow, pairs.front(), [&](const Eigen::VectorXd& y) { return state_at(y, orbit); });
+      fastest_motion(monodromy.flow, pairs.front(), [&](const Eigen::VectorXd& y) { return state_at(Q * y, orbit); });
   return result;
 }
 

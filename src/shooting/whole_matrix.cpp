@@ -1,5 +1,7 @@
 #include "whole_matrix.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
 
 namespace squeal
@@ -37,6 +39,18 @@ Owned<Vec> state_at(const Eigen::VectorXd& coordinates, const Orbit& orbit)
       add_entry(i < dofs ? displacement(state) : velocity(state), i % dofs,
                 coordinates(i) * (i < dofs ? 1 : two_pi / orbit.period));
   return state;
+}
+
+Eigen::MatrixXd coordinates_with_mass(const Flow& flow)
+{
+  constexpr double rounding = 1e-14; // of the largest mass
+  const auto [masses, directions] = solve_dense_symmetric(dense_copy(flow.M));
+  const Eigen::Index n = masses.size(), with_mass = (masses.array() > rounding * masses.maxCoeff()).count();
+  if (with_mass == n) return Eigen::MatrixXd::Identity(2 * n, 2 * n);
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(2 * n, n + with_mass);
+  result.topLeftCorner(n, n).setIdentity();
+  result.bottomRightCorner(n, with_mass) = directions.rightCols(with_mass);
+  return result;
 }
 
 Eigen::MatrixXd whole_matrix(const Orbit& orbit, const std::function<void(std::span<const Owned<Vec>>)>& multiply)

@@ -79,6 +79,18 @@ def test_massless_feet_and_strong_growth_lead_to_a_cycle(converged, tmp_path, st
     assert cycle["outcome"] == "converged" and cycle["periods_integrated"] <= 60
 
 
+@pytest.mark.parametrize("stiffness", [0.3, 1.0, 3.0])
+def test_velocities_without_mass_have_no_multipliers(converged, tmp_path, stiffness):
+    """At theta = 1/2 the step keeps them with factors of 1 in modulus, at 0.55 it damps them away. What the structure itself
+    has agrees within the bars and 0.01, as that theta also damps 0.05 (omega h)^2/h of the motion."""
+    scene = drum_brake(tmp_path, stiffness)
+    multipliers = [converged(scene, "--set", f"cycle.theta={theta}", ranks=1).report["cycle"]["multipliers"]
+                   for theta in (0.5, 0.55)]
+    largest = [math.hypot(one["values"][0]["real"], one["values"][0]["imaginary"]) for one in multipliers]
+    assert [one["stability"] for one in multipliers] == ["stable", "stable"] and max(largest) < 0.6
+    assert abs(largest[0] - largest[1]) < sum(one["values"][0]["error"] for one in multipliers) + 0.01
+
+
 def test_the_cycle_starts_from_a_mode_a_transient_or_a_file(converged, squeal, tmp_path):
     base = [INPUTS / "oscillator" / "scene.toml", "--set", "cycle.steps_per_period=100", "--set", "cycle.tolerance=1e-8"]
     state = tmp_path / "end.state"

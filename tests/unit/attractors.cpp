@@ -3,6 +3,7 @@
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/base/constants.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <doctest/doctest.h>
 
@@ -29,6 +30,18 @@ ReachedMotion motion(ReachedKind kind, double energy, double frequency, std::siz
 }
 
 } // namespace
+
+TEST_CASE("means over a motion's own period do not beat, over the mode's they do")
+{
+  constexpr double own = 60.7; // samples
+  const std::vector<double> energies = series(6400, [](int i) { return 1 + 0.8 * std::cos(2 * two_pi * i / own); });
+  const auto spread = [](const std::vector<double>& means)
+  { return *std::max_element(means.begin(), means.end()) - *std::min_element(means.begin(), means.end()); };
+  const std::vector<double> means = means_over(energies, own);
+  CHECK(means.size() == 105);
+  CHECK(spread(means) < 5e-3); // of second order in the samples, held between two by the first of them
+  CHECK(spread(means_over(energies, 64)) > 0.05);
+}
 
 TEST_CASE("a decay towards a constant is unsettled while its trend shows, and steady after")
 {

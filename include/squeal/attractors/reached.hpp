@@ -36,8 +36,15 @@ struct ReachedMotion
   std::vector<std::size_t> starts; // numbers of the starts that lead to it
 };
 
-/// What one motion has settled on, from the energies of its periods and the upward zero crossings [s] of a coordinate.
-/// `rest`: an energy below it is that of a motion at rest.
+/// Means of successive windows of so many samples, a broken number: over the mode's period a cycle of another one
+/// beats.
+std::vector<double> means_over(const std::vector<double>& samples, double length);
+
+/// [Hz] Of upward zero crossings [s], from their second half, with a bar; zero where they are too few.
+MeanValue frequency_of(const std::vector<double>& crossings);
+
+/// What one motion has settled on, from the mean energies of its periods and the upward zero crossings [s] of a
+/// coordinate. `rest`: an energy below it is that of a motion at rest.
 ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<double>& crossings, double rest);
 
 /// Whether energies and frequencies agree within their bars, or within a percent and a thousandth.
