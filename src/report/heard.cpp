@@ -185,8 +185,10 @@ std::string heard(const Report& report, const Scene& scene)
     return format("passes by a cycle at %.5g Hz", 1 / report.cycle.orbit.period) +
            beside_mode(report, 1 / report.cycle.orbit.period) + stability_text(report.cycle.multipliers) +
            "; what it leads to was not found";
-  return linear_text(report) + "; what is heard was not found: the search for a cycle ended with " +
-         std::string(word(outcome.kind));
+  const std::string end = report.ended_by.empty()
+                              ? "the search for a cycle ended with " + std::string(word(outcome.kind))
+                              : "the run was ended " + report.ended_by;
+  return linear_text(report) + "; what is heard was not found: " + end;
 }
 
 } // namespace squeal
