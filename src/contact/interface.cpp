@@ -1,5 +1,6 @@
 #include "squeal/contact/interface.hpp"
 
+#include "squeal/base/integers.hpp"
 #include "squeal/solid/binary.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 
@@ -58,6 +59,19 @@ std::string where(const Interface& interface, int pair)
   if (interface.geometry.empty()) return text;
   const Vec3& at = interface.geometry[static_cast<std::size_t>(pair)].position;
   return text + " at (" + std::to_string(at[0]) + ", " + std::to_string(at[1]) + ", " + std::to_string(at[2]) + ")";
+}
+
+/// A vector as y = B x has it. On the layout that B already has: MatCreateVecs makes another one, and the ranks agree
+/// on it, twice, which a step would pay at each of its products.
+Owned<Vec> vector_of_rows(Mat B)
+{
+  PetscLayout rows = nullptr;
+  check(MatGetLayouts(B, &rows, nullptr));
+  Owned<Vec> result;
+  check(VecCreate(comm_of(B), result.put()));
+  check(VecSetLayout(result, rows));
+  check(VecSetType(result, VECSTANDARD));
+  return result;
 }
 
 /// Whether none of the files of contact pairs is there.
@@ -198,10 +212,41 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
 
 std::vector<double> relative(const Interface& interface, Vec x)
 {
-  Owned<Vec> rows;
-  check(MatCreateVecs(interface.B, nullptr, rows.put()));
-  check(MatMult(interface.B, x, rows));
-  return all_entries(rows);
+  return std::move(relative(interface, std::span(&x, 1)).front());
+}
+
+std::vector<std::vector<double>> relative(const Interface& interface, std::span<const Vec> x)
+{
+  const Owned<Vec> rows = vector_of_rows(interface.B);
+  const RowLayout layout = row_layout(interface.B);
+  PetscInt first = 0, last = 0;
+  check(VecGetOwnershipRange(rows, &first, &last));
+  std::vector<double> own; // entries of one vector after the other
+  for (const Vec vector : x)
+  {
+    check(MatMult(interface.B, vector, rows));
+    const PetscScalar* entries = nullptr;
+    check(VecGetArrayRead(rows, &entries));
+    own.insert(own.end(), entries, entries + (last - first));
+    check(VecRestoreArrayRead(rows, &entries));
+  }
+  std::vector<double> whole(static_cast<std::size_t>(layout.total()) * x.size());
+  const int vectors = to_int(x.size());
+  (void)to_int(whole.size());
+  RowLayout sent = layout;
+  for (int& number : sent.counts) number *= vectors;
+  for (int& number : sent.starts) number *= vectors;
+  MPI_Allgatherv(own.data(), to_int(own.size()), MPI_DOUBLE, whole.data(), sent.counts.data(), sent.starts.data(),
+                 MPI_DOUBLE, comm_of(interface.B));
+  std::vector<std::vector<double>> result(x.size());
+  auto from = whole.cbegin();
+  for (const int count : layout.counts)
+    for (std::vector<double>& entries : result)
+    {
+      entries.insert(entries.end(), from, from + count);
+      from += count;
+    }
+  return result;
 }
 
 std::vector<double> contact_velocity(const Interface& interface, Vec v)
@@ -222,8 +267,7 @@ std::vector<ContactStatus> contact_status(const Interface& interface, const std:
 
 void add_reactions(const Interface& interface, const std::vector<double>& r, Vec y)
 {
-  Owned<Vec> rows;
-  check(MatCreateVecs(interface.B, nullptr, rows.put()));
+  const Owned<Vec> rows = vector_of_rows(interface.B);
   set_all_entries(rows, r);
   check(MatMultTransposeAdd(interface.B, rows, y, y));
 }

@@ -15,21 +15,24 @@ namespace squeal
 namespace
 {
 
+/// B ut and B v of a trajectory.
+struct StartOfStep
+{
+  const std::vector<double>&position, &velocity;
+};
+
 /// From B v_free of a trajectory: normal rows become gap rates (g0 + B_n ut)/h + B_n v_free, of pairs with a compliance
-/// those of section 4.16, tangential ones sliding velocities. Collective; both are on rank 0.
-std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t trajectory, std::vector<double> b)
+/// those of section 4.16, tangential ones sliding velocities. ut is in v_theta. Collective; both are on rank 0.
+std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t trajectory, const StartOfStep& start,
+                                          std::vector<double> b)
 {
   const auto& [step, interface, factors, works, states, reports] = batch;
-  const State& state = states[trajectory];
   const StepWork& work = works[trajectory];
-  check(VecWAXPY(work.v_theta, step.h * (1 - step.theta), state.v, state.u)); // ut, for a moment
-  const std::vector<double> position = relative(interface, work.v_theta);
-  const std::vector<double> rates = interface.compliance.empty() ? std::vector<double>{} : relative(interface, state.v);
   double rounding = 0;
   if (step.law == ContactLaw::velocity) check(VecNorm(work.v_theta, NORM_INFINITY, &rounding));
   if (b.empty()) return b;
   const PairView velocity(b, interface.directions);
-  const PairView moved(position, interface.directions);
+  const PairView moved(start.position, interface.directions);
   const TangentView drive(interface.drive, interface.directions);
   // A gap at rounding is closed: against the displacements it was rounded from, or a free step's own motion.
   for (std::size_t i = 0; i < velocity.pairs(); ++i)
@@ -41,7 +44,7 @@ std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t tr
     if (const double c = compliance_of(interface, i); c > 0)
     {
       const CompliantGap law = compliant_gap(c, step.theta, step.h);
-      const double rate = PairView(rates, interface.directions).normal(i);
+      const double rate = PairView(start.velocity, interface.directions).normal(i);
       velocity.normal(i) += law.by_gap * (gap - step.h * (1 - step.theta) * rate) + law.by_rate * rate;
     }
     else if (step.law == ContactLaw::displacement)
@@ -69,15 +72,22 @@ std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector
   const FrictionLaw law_before = scaled(interface.friction, factors.friction_before);
   std::vector<double> drive = interface.drive;
   for (double& velocity : drive) velocity *= factors.drive_start;
+  std::vector<Vec> start;
+  for (std::size_t k = 0; k < states.size(); ++k)
+  {
+    check(VecWAXPY(works[k].v_theta, step.h * (1 - step.theta), states[k].v, states[k].u)); // ut, for a moment
+    start.insert(start.end(), {works[k].v_theta, states[k].v});
+  }
+  const std::vector<std::vector<double>> motion = relative(interface, start);
   std::vector<StepProblem> problems(states.size());
   for (std::size_t k = 0; k < states.size(); ++k)
   {
+    const std::vector<double>&position = motion[2 * k], &velocity = motion[2 * k + 1];
     const auto first = Bv_free.begin() + static_cast<std::ptrdiff_t>(k) * size;
-    problems[k].free = free_contact_velocity(batch, k, {first, first + size});
-    const std::vector<double> velocity = relative(interface, states[k].v);
+    problems[k].free = free_contact_velocity(batch, k, {position, velocity}, {first, first + size});
     problems[k].past =
         past_sliding(PairView(velocity, interface.directions), TangentView<const double>(drive, interface.directions),
-                     status_with(interface, law_before, factors.drive_start, states[k].reactions, states[k].v), weight);
+                     status_with(interface, law_before, factors.drive_start, states[k].reactions, velocity), weight);
   }
   return problems;
 }
@@ -208,13 +218,11 @@ FrictionLaw scaled(FrictionLaw law, double factor)
 }
 
 std::vector<ContactStatus> status_with(const Interface& interface, const FrictionLaw& law, double drive,
-                                       const std::vector<double>& reactions, Vec v)
+                                       const std::vector<double>& reactions, std::vector<double> velocity)
 {
-  std::vector<double> velocity;
   if (law.decay_speed > 0)
   {
-    velocity = relative(interface, v);
-    const PairView w(velocity, interface.directions);
+    const PairView<double> w(velocity, interface.directions);
     const TangentView v_d(interface.drive, interface.directions);
     for (std::size_t i = 0; i < w.pairs(); ++i)
       for (std::size_t k = 0; k < v_d.of(i).size(); ++k) w.tangential(i)[k] -= drive * v_d.of(i)[k];

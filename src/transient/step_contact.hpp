@@ -19,9 +19,10 @@ struct StepBatch
 /// The law with its coefficients times a factor.
 FrictionLaw scaled(FrictionLaw law, double factor);
 
-/// Statuses of a step's end, from its reactions, its velocities v, its law and its factor on the drive. Collective.
+/// Statuses of a step's end, from its reactions, its law, its factor on the drive and `velocity`, B v, which a law
+/// without a decay speed does not look at.
 std::vector<ContactStatus> status_with(const Interface& interface, const FrictionLaw& law, double drive,
-                                       const std::vector<double>& reactions, Vec v);
+                                       const std::vector<double>& reactions, std::vector<double> velocity);
 
 /// Reactions at the end of the step, into the states of every rank, and what the reports say of contact. `Bv_free`: B v
 /// of the steps without reactions, one trajectory after the other, on rank 0. Overwrites v_theta. Collective.

@@ -114,12 +114,16 @@ MatrixXd contact_of_start(const ThetaStep& step, const Interface& interface, con
 {
   const double past = (1 - step.theta) / step.theta;
   MatrixXd db = MatrixXd::Zero(static_cast<Index>(interface.size()), static_cast<Index>(columns.size()));
+  std::vector<Vec> start;
   for (std::size_t k = 0; k < columns.size(); ++k)
   {
     check(VecWAXPY(work.scratch[k], step.h * (1 - step.theta), columns[k].v, columns[k].u)); // of ut
-    const std::vector<double> position = relative(interface, work.scratch[k]),
-                              velocity = relative(interface, columns[k].v);
-    const PairView moved(position, interface.directions), s(velocity, interface.directions);
+    start.insert(start.end(), {work.scratch[k], columns[k].v});
+  }
+  const std::vector<std::vector<double>> motion = relative(interface, start);
+  for (std::size_t k = 0; k < columns.size(); ++k)
+  {
+    const PairView moved(motion[2 * k], interface.directions), s(motion[2 * k + 1], interface.directions);
     auto column = db.col(static_cast<Index>(k));
     const PairView<double> change(column, interface.directions);
     for (std::size_t pair = 0; pair < change.pairs(); ++pair)

@@ -377,7 +377,10 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
   for (std::size_t k = 0; k < states.size(); ++k)
   {
     StepWork& work = works[k];
-    for (const ContactStatus status : status_with(interface, law, factors.drive_end, states[k].reactions, work.v_next))
+    std::vector<double> velocity;
+    if (law.decay_speed > 0) velocity = relative(interface, work.v_next);
+    for (const ContactStatus status :
+         status_with(interface, law, factors.drive_end, states[k].reactions, std::move(velocity)))
       ++(status == ContactStatus::open    ? reports[k].open
          : status == ContactStatus::stick ? reports[k].stick
                                           : reports[k].slip);

@@ -91,8 +91,11 @@ TEST_CASE("a pad that lifts opens every gap, one that rides with its disc none")
   const Interface& interface = joined.interface;
   REQUIRE(interface.pairs == 9);
   REQUIRE(interface.directions == 2);
-  const auto lifted = relative(interface, sample_pad(joined.structure, rigid_motion({0, 0, 2}, {})));
-  const auto ridden = relative(interface, sample(joined.structure, rigid_motion({1, 2, 3}, {0.4, 0.5, 0.6})));
+  const auto lifting = sample_pad(joined.structure, rigid_motion({0, 0, 2}, {}));
+  const auto riding = sample(joined.structure, rigid_motion({1, 2, 3}, {0.4, 0.5, 0.6}));
+  const auto lifted = relative(interface, lifting), ridden = relative(interface, riding);
+  const std::array<Vec, 2> both = {riding, lifting};
+  CHECK(relative(interface, both) == std::vector{ridden, lifted}); // in one message
   for (std::size_t i = 0; i < interface.size(); ++i)
   {
     CHECK(lifted[i] == doctest::Approx(i % 3 == 0 ? 2 : 0).epsilon(round_off));

@@ -50,6 +50,9 @@ void check_interface(const Interface& interface, const std::string& source, MPI_
 /// B x, whole on every rank. Collective.
 std::vector<double> relative(const Interface& interface, Vec x);
 
+/// The same of several vectors, in one message: latency counts on small models. Collective.
+std::vector<std::vector<double>> relative(const Interface& interface, std::span<const Vec> x);
+
 /// y += B^T r. Collective; r the same on every rank.
 void add_reactions(const Interface& interface, const std::vector<double>& r, Vec y);
 
