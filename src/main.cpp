@@ -341,6 +341,13 @@ std::string problem_of_surroundings()
   return problem_of_limits();
 }
 
+/// Without a launcher Open MPI would start a daemon beside this process, for processes that it may start: a third of
+/// the time that a start takes. It takes settings of its own from the environment alone, before MPI is up.
+void stay_alone()
+{
+  if (launched_rank().empty()) setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
+}
+
 } // namespace
 
 int main(int argc, char** argv)
@@ -356,6 +363,7 @@ int main(int argc, char** argv)
   argc = static_cast<int>(words.size());
   words.push_back(nullptr);
   argv = words.data();
+  stay_alone();
   Session session(argc, argv, nullptr);
   note_ranks();
   const int rank = rank_of(PETSC_COMM_WORLD);

@@ -1,4 +1,4 @@
-"""Runs the squeal program as a user does: mpirun, a scene file, its output folder."""
+"""Runs the squeal program as a user does: by itself or by mpirun, a scene file, its output folder."""
 
 import contextlib
 import fcntl
@@ -76,7 +76,9 @@ class Run:
     """One finished run: exit code, what it printed, and report.json when there is one."""
 
     def __init__(self, arguments, ranks, folder):
-        command = [os.environ.get("MPIEXEC", "mpirun"), "-n", str(ranks), os.environ["SQUEAL"]]
+        # one process needs no launcher, whose start takes as long as all that squeal does in a small run
+        launcher = [os.environ.get("MPIEXEC", "mpirun"), "-n", str(ranks)] if ranks > 1 else []
+        command = [*launcher, os.environ["SQUEAL"]]
         self.output = Path(folder)
         # The caller's arguments come last, so that its own --output wins.
         command += ["--output", str(folder), *map(str, arguments)]
