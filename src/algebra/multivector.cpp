@@ -43,6 +43,19 @@ void set_column(MultiVector& X, Index j, Vec x)
   check(VecRestoreArrayRead(x, &values));
 }
 
+/// A X of so few columns that to make matrices of them, which sends a dozen messages, takes longer than to read A
+/// again.
+void multiply_few(Mat A, const MultiVector& X, MultiVector& Y)
+{
+  const Owned<Vec> x = vector_of_columns(A), y = vector_of_rows(A);
+  for (Index j = 0; j < X.columns(); ++j)
+  {
+    copy_column(X, j, x);
+    check(MatMult(A, x, y));
+    set_column(Y, j, y);
+  }
+}
+
 /// Drops the columns with a norm of `least` or below; returns the norms of the others.
 VectorXd drop_columns(MultiVector& X, double least)
 {
@@ -119,6 +132,11 @@ MultiVector product(Mat A, const MultiVector& X)
   PetscInt rows = 0;
   check(MatGetLocalSize(A, &rows, nullptr));
   MultiVector Y{X.comm, MatrixXd(rows, X.columns())};
+  if (X.columns() <= 2)
+  {
+    multiply_few(A, X, Y);
+    return Y;
+  }
   constexpr Index at_once = 256; // columns: PETSc's product is a copy
   for (Index first = 0; first < X.columns(); first += at_once)
   {

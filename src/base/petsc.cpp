@@ -46,6 +46,15 @@ RowLayout row_layout(const PetscInt* ranges, MPI_Comm comm)
   return layout;
 }
 
+Owned<Vec> vector_on(PetscLayout layout, MPI_Comm comm)
+{
+  Owned<Vec> result;
+  check(VecCreate(comm, result.put()));
+  check(VecSetLayout(result, layout));
+  check(VecSetType(result, VECSTANDARD));
+  return result;
+}
+
 } // namespace
 
 Session::Session(int& argc, char**& argv, const char* help)
@@ -90,6 +99,20 @@ Owned<Vec> zeros_like(Vec pattern)
   check(VecDuplicate(pattern, result.put()));
   check(VecSet(result, 0));
   return result;
+}
+
+Owned<Vec> vector_of_columns(Mat A)
+{
+  PetscLayout columns = nullptr;
+  check(MatGetLayouts(A, nullptr, &columns));
+  return vector_on(columns, comm_of(A));
+}
+
+Owned<Vec> vector_of_rows(Mat A)
+{
+  PetscLayout rows = nullptr;
+  check(MatGetLayouts(A, &rows, nullptr));
+  return vector_on(rows, comm_of(A));
 }
 
 Owned<Mat> transpose_of(Mat A)

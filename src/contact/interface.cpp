@@ -61,19 +61,6 @@ std::string where(const Interface& interface, int pair)
   return text + " at (" + std::to_string(at[0]) + ", " + std::to_string(at[1]) + ", " + std::to_string(at[2]) + ")";
 }
 
-/// A vector as y = B x has it. On the layout that B already has: MatCreateVecs makes another one, and the ranks agree
-/// on it, twice, which a step would pay at each of its products.
-Owned<Vec> vector_of_rows(Mat B)
-{
-  PetscLayout rows = nullptr;
-  check(MatGetLayouts(B, &rows, nullptr));
-  Owned<Vec> result;
-  check(VecCreate(comm_of(B), result.put()));
-  check(VecSetLayout(result, rows));
-  check(VecSetType(result, VECSTANDARD));
-  return result;
-}
-
 /// Whether none of the files of contact pairs is there.
 bool has_no_pairs(const std::filesystem::path& folder, MPI_Comm comm)
 {

@@ -70,6 +70,11 @@ private:
 /// Returns a vector of the same layout with zero entries.
 Owned<Vec> zeros_like(Vec pattern);
 
+/// Return a vector for x, or for y, of y = A x. On the layouts that A has, so that no message is sent: the ranks would
+/// agree on those of MatCreateVecs by two messages.
+Owned<Vec> vector_of_columns(Mat A);
+Owned<Vec> vector_of_rows(Mat A);
+
 /// A'. Collective.
 Owned<Mat> transpose_of(Mat A);
 
