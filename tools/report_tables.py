@@ -8,6 +8,7 @@ ROWS = 12  # of a table that stand open; the rest is folded away
 WORDS = 40  # letters of a cell that stay on one line
 NUMBERS = 6  # of the scene that are shown for a mode: those that move its growth most
 MODES = 3  # unstable modes whose numbers stand open
+FEEDS = {"contact_powers": "", "falling_friction_powers": "falling friction of ", "turning_friction_powers": "turning friction of "}
 CHANGES = {"mass": ("mass", "kg"), "damping": ("dashpot", "N s/m"), "stiffness": ("spring", "N/m")}  # of a [[change]]
 
 
@@ -144,12 +145,14 @@ def sensitivity(report):
     names = [f"{c['stator']} on {c['rotor']}" for c in report.get("equilibrium", {}).get("contacts", [])]
     powers = range(len(found[0]["contact_powers"]))
     names = names if len(names) == len(powers) else [f"contact {k}" for k in powers]
-    rows = [[number(mode["frequency_hz"], 7), number(mode["growth_rate"]), *(number(p) for p in mode["contact_powers"]), number(mode["damping_power"])]
+    feeds = [key for key in FEEDS if any(power for mode in found for power in mode[key])] or ["contact_powers"]
+    rows = [[number(mode["frequency_hz"], 7), number(mode["growth_rate"]), *(number(p) for key in feeds for p in mode[key]), number(mode["damping_power"])]
             for mode in found]
-    head = ["unstable mode [Hz]", "growth rate [1/s]", *(f"fed in by {text(name)} [1/s]" for name in names), "taken by damping [1/s]"]
+    head = ["unstable mode [Hz]", "growth rate [1/s]", *(f"fed in by {FEEDS[key]}{text(name)} [1/s]" for key in feeds for name in names),
+            "taken by damping [1/s]"]
     parts = ["<h3>Why modes are unstable</h3>", table(head, rows, "modes that grow more slowly"),
-             paragraph("Powers are over the mean energy of the mode. Damping contains what the law and the direction of friction "
-                       "add to the damping matrix; where that feeds the mode, what damping takes may be negative.")]
+             paragraph("Powers are over the mean energy of the mode; what is fed in less what is taken is twice the growth rate. "
+                       "A negative feed takes, as friction that turns with the motion does.")]
     of_modes = [f"<h4>Mode at {mode['frequency_hz']:.7g} Hz, {mode['growth_rate']:+.5g} 1/s</h4>" + derivatives(mode) + shares(mode)
                 for mode in found]
     parts += of_modes[:MODES]

@@ -50,6 +50,8 @@ Json mode_entry(const ModeCauses& causes, const Scene& scene)
                                {"growth_rate_by_damping", causes.probes[i].damping.real()},
                                {"growth_rate_by_stiffness", causes.probes[i].stiffness.real()}});
   entry["contact_powers"] = causes.contact_powers;
+  entry["falling_friction_powers"] = causes.falling_friction_powers;
+  entry["turning_friction_powers"] = causes.turning_friction_powers;
   entry["damping_power"] = causes.damping_power;
   entry["power_defect"] = causes.defect;
   entry["changes"] = Json::array();
@@ -77,6 +79,25 @@ std::vector<NumberDerivative> strongest(const ModeCauses& causes)
   return list;
 }
 
+std::string sum_text(const std::vector<double>& powers)
+{
+  std::string text;
+  for (const double power : powers) text += format("%s%.5g", text.empty() ? "" : " + ", power);
+  return text;
+}
+
+/// What friction puts in beside the reactions, if anything.
+std::string friction_text(const ModeCauses& causes)
+{
+  const auto any = [](double power) { return power != 0; };
+  std::string text;
+  if (std::ranges::any_of(causes.falling_friction_powers, any))
+    text += ", friction that falls with speed " + sum_text(causes.falling_friction_powers);
+  if (std::ranges::any_of(causes.turning_friction_powers, any))
+    text += ", friction that turns " + sum_text(causes.turning_friction_powers);
+  return text;
+}
+
 } // namespace
 
 void add_sensitivity(const Sensitivity& sensitivity, const Scene& scene, Json& entry)
@@ -93,10 +114,9 @@ std::vector<std::string> sensitivity_lines(const Sensitivity& sensitivity, const
   for (std::size_t m = 0; m < std::min(modes_shown, sensitivity.modes.size()); ++m)
   {
     const ModeCauses& causes = sensitivity.modes[m];
-    std::string powers;
-    for (const double power : causes.contact_powers) powers += format("%s%.5g", powers.empty() ? "" : " + ", power);
-    lines.push_back(format("%.7g Hz, growth %.6g 1/s: contacts put in %s 1/s of the energy, damping takes %.5g 1/s",
-                           in_hz(causes.lambda.imag()), causes.lambda.real(), powers.c_str(), causes.damping_power));
+    lines.push_back(format("%.7g Hz, growth %.6g 1/s: contacts put in %s 1/s of the energy%s, damping takes %.5g 1/s",
+                           in_hz(causes.lambda.imag()), causes.lambda.real(), sum_text(causes.contact_powers).c_str(),
+                           friction_text(causes).c_str(), causes.damping_power));
     const std::vector<NumberDerivative> list = strongest(causes);
     for (std::size_t i = 0; i < std::min(numbers_shown, list.size()); ++i)
       lines.push_back(format("  1 %% of %-28s moves the growth by %+.4g 1/s, the frequency by %+.4g Hz",

@@ -78,7 +78,9 @@ AtHeldVectors at_held_vectors(const SlidingEquilibrium& sliding, const HeldVecto
   if (structure.K_loss.get()) C_right.entries -= loss_right.entries / structure.loss_omega;
   const MatrixXd M = inner_products(vectors.left, M_right), C = inner_products(vectors.left, C_right),
                  K = inner_products(vectors.left, K_right), L = inner_products(vectors.left, loss_right);
-  const MatrixXd m = inner_products(vectors.right, M_right), c = inner_products(vectors.right, C_right),
+  MultiVector own_C_right = product(structure.C, vectors.right);
+  if (structure.K_loss.get()) own_C_right.entries -= loss_right.entries / structure.loss_omega;
+  const MatrixXd m = inner_products(vectors.right, M_right), c = inner_products(vectors.right, own_C_right),
                  k = inner_products(vectors.right, K_right), l = inner_products(vectors.right, loss_right);
   AtHeldVectors held;
   for (std::size_t j = 0; j < count; ++j)

@@ -32,7 +32,7 @@ struct AtHeldVectors
 {
   std::vector<std::complex<double>> residual; // left'(Q right - R' reactions) + sides'(B_n right + c reactions)
   std::vector<EigenvalueSlope> slopes;        // of left' Q right
-  // right^H A right, C with that of the friction direction, K with the springs of the pairs, and that of loss factors
+  // right^H A right of M, C without friction and losses, K with the springs of the pairs, and the K of loss factors
   std::vector<double> mass, damping, stiffness, loss;
 };
 

@@ -16,7 +16,41 @@ using Complex = std::complex<double>;
 
 constexpr double relative_step = 1e-4; // of central differences: most numbers enter M, C and K linearly
 
-/// Powers of the pairs and of damping: their difference is twice the growth rate.
+/// phi^H C_f phi of one pair: by the law, and by the direction of friction.
+struct PairDamping
+{
+  double of_speed = 0, of_direction = 0;
+};
+
+std::vector<PairDamping> pair_dampings(const SlidingEquilibrium& sliding, const HeldVectors& vectors, std::size_t mode)
+{
+  const auto& [structure, interface, equilibrium] = sliding;
+  const TangentView drive(interface.drive, interface.directions);
+  const std::vector<double> re = relative(interface, column(vectors.right, mode, structure.load)),
+                            im = relative(interface, column(vectors.right, mode + vectors.count(), structure.load));
+  const PairView real(re, interface.directions), imaginary(im, interface.directions),
+      reactions(equilibrium.reactions, interface.directions);
+  std::vector<PairDamping> result(equilibrium.closed.size());
+  for (std::size_t i = 0; i < result.size(); ++i)
+  {
+    if (!equilibrium.closed[i] || reactions.normal(i) <= 0) continue;
+    const SlidingFriction friction = sliding_friction(interface.friction, reactions.normal(i), drive.of(i));
+    const auto product_with = [&](const auto& damping)
+    {
+      double sum = 0;
+      for (const auto& motion : {real.tangential(i), imaginary.tangential(i)})
+        for (std::size_t k = 0; k < motion.size(); ++k)
+          for (std::size_t l = 0; l < motion.size(); ++l) sum += motion[k] * damping[k][l] * motion[l];
+      return sum;
+    };
+    result[i].of_speed = product_with(friction.damping_of_speed);
+    if (interface.friction.direction_damping)
+      result[i].of_direction = product_with(friction.damping) - result[i].of_speed;
+  }
+  return result;
+}
+
+/// Powers of the pairs, of their friction and of damping: their sum is twice the growth rate.
 void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, const AtHeldVectors& held,
                  Sensitivity& result)
 {
@@ -28,16 +62,24 @@ void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, 
     const double energy = std::norm(lambda) * held.mass[j] + held.stiffness[j];
     const std::vector<Complex> motion =
         pair_motions(interface, vectors.right, j, vectors.count(), sliding.structure.load).friction;
+    const std::vector<PairDamping> dampings = pair_dampings(sliding, vectors, j);
     double sum = 0;
+    const auto put_in = [&](std::vector<double>& powers, std::size_t contact, double power)
+    {
+      powers.resize(std::max(powers.size(), contact + 1));
+      powers[contact] += power;
+      sum += power;
+    };
     for (std::size_t i = 0; i < motion.size(); ++i)
     {
       const double power = 2 * std::real(std::conj(lambda * motion[i]) * vectors.reactions[j][i]) / energy;
       const std::size_t contact =
           interface.geometry.empty() ? 0 : static_cast<std::size_t>(interface.geometry[i].contact);
       causes.pair_powers.push_back(power);
-      causes.contact_powers.resize(std::max(causes.contact_powers.size(), contact + 1));
-      causes.contact_powers[contact] += power;
-      sum += power;
+      put_in(causes.contact_powers, contact, power);
+      const double scale = -2 * std::norm(lambda) / energy;
+      put_in(causes.falling_friction_powers, contact, scale * dampings[i].of_speed);
+      put_in(causes.turning_friction_powers, contact, scale * dampings[i].of_direction);
     }
     const double loss = std::real(std::conj(lambda) * loss_factor_of(vectors.loss[j], lambda)) * held.loss[j];
     causes.damping_power = 2 * (std::norm(lambda) * held.damping[j] + loss) / energy;

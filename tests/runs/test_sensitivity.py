@@ -118,10 +118,36 @@ def pin(tmp_path_factory):
     return run
 
 
-@pytest.mark.parametrize("scene", ["compliant pads", "lossy pin", "spinning disc"])
+FEEDS = "contact_powers", "falling_friction_powers", "turning_friction_powers"
+
+
+def power_defect(mode):
+    """Over |lambda|, by which the terms are rounded."""
+    return (sum(sum(mode[key]) for key in FEEDS) - mode["damping_power"] - 2 * mode["growth_rate"]) / (2 * np.pi * mode["frequency_hz"])
+
+
+@pytest.mark.parametrize("scene", ["compliant pads", "lossy pin", "spinning disc", "falling friction"])
 def test_powers_sum_beyond_rigid_pairs_and_symmetric_matrices(scene, scene_of, converged):
     for mode in converged(*scene_of(scene), *sensitivity_of("friction.coefficient"), ranks=1).report["sensitivity"]["modes"]:
-        assert abs(sum(mode["contact_powers"]) - mode["damping_power"] - 2 * mode["growth_rate"]) <= 1e-10 * 2 * np.pi * mode["frequency_hz"]
+        assert abs(power_defect(mode)) <= 1e-10
+        assert mode["damping_power"] > 0 and max(mode["turning_friction_powers"]) <= 0
+        falls = scene == "falling friction"
+        assert all(power > 0 if falls else power == 0 for power in mode["falling_friction_powers"])
+
+
+def test_falling_friction_feeds_a_mass_on_a_belt(tmp_path, converged):
+    """By its slope alone: 2 sigma m = -mu' N - c."""
+    mass, load, slope, damping = 2.0, 300.0, -0.3 / 0.8 * np.exp(-1.5 / 0.8), 4.0
+    points = [{"name": "belt", "at": [0, 0, 0], "free": "none"}, {"name": "block", "at": [0, 0, 0], "mass": mass, "free": "x z"}]
+    scene = write_scene(tmp_path, point=points, spring=[{"from": "block", "direction": "x", "stiffness": 4e5, "damping": damping}],
+                        force=[{"on": "block", "vector": [0, 0, -load]}],
+                        contact=[{"rotor": "belt", "stator": "block", "normal": [0, 0, 1], "tangents": [[1, 0, 0]], "velocity": [1.5, 0, 0]}],
+                        friction={"coefficient": 0.2, "static_coefficient": 0.5, "decay_speed": 0.8}, modes={"band": 500})
+    [mode] = converged(scene, *sensitivity_of("friction.coefficient"), ranks=1).report["sensitivity"]["modes"]
+    assert mode["falling_friction_powers"] == pytest.approx([-slope * load / mass], rel=1e-9)
+    assert mode["damping_power"] == pytest.approx(damping / mass, rel=1e-9)
+    assert mode["contact_powers"] == mode["turning_friction_powers"] == pytest.approx([0], abs=1e-9)
+    assert abs(power_defect(mode)) <= 1e-10
 
 
 def test_powers_sum_to_twice_the_growth_rate(pin):
@@ -130,7 +156,7 @@ def test_powers_sum_to_twice_the_growth_rate(pin):
     for mode in modes:
         # beside |lambda|, by which the terms are rounded
         size = 2 * np.pi * mode["frequency_hz"]
-        assert abs(sum(mode["contact_powers"]) - mode["damping_power"] - 2 * mode["growth_rate"]) <= 1e-10 * size
+        assert abs(power_defect(mode)) <= 1e-10
         assert mode["power_defect"] == pytest.approx(0, abs=1e-10 * size)
     with h5py.File(pin.output / "fields.h5") as fields:
         for number, mode in enumerate(modes, 1):

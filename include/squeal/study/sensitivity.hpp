@@ -31,17 +31,20 @@ struct ChangeEffect
   std::complex<double> predicted, computed;
 };
 
-/// Powers are over the mean energy (|lambda|^2 phi^H M phi + phi^H K phi)/4 of the motion [1/s].
+/// Powers are over the mean energy (|lambda|^2 phi^H M phi + phi^H K phi)/4 of the motion [1/s]. Those of contacts are
+/// put in, and sums over the scene's contacts; a matrix scene has one.
 struct ModeCauses
 {
   std::complex<double> lambda;
   double backward_error = 0; // the larger one of the right and of the left vector
   std::vector<NumberDerivative> numbers;
   std::vector<ProbeDerivative> probes;
-  std::vector<double> pair_powers;    // that the contact forces of each pair put in
-  std::vector<double> contact_powers; // their sums over the scene's contacts; one of a matrix scene
-  double damping_power = 0;           // that C and the damping of the friction direction take
-  double defect = 0;                  // sum of contact_powers - damping_power - 2 Re(lambda)
+  std::vector<double> pair_powers;             // by reactions that change, of each pair
+  std::vector<double> contact_powers;          // the same of each contact
+  std::vector<double> falling_friction_powers; // by the law: negative where friction rises with the speed
+  std::vector<double> turning_friction_powers; // by the direction of friction, which damps: not positive
+  double damping_power = 0;                    // that C and loss factors take
+  double defect = 0;                           // all that is put in - damping_power - 2 Re(lambda)
   std::vector<ChangeEffect> changes;
 };
 
