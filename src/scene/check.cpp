@@ -44,6 +44,7 @@ public:
         fail(&tie.master, "[[tie]] slave and master are both \"" + tie.slave + "\"; name two surfaces");
     for (const Probe& probe : scene_.probes) check_probe(probe);
     check_friction();
+    check_damping();
     check_loss();
     check_transient();
     check_cycle();
@@ -240,6 +241,21 @@ private:
     if ((f.static_coefficient > 0) != (f.decay_speed > 0))
       fail(f.decay_speed > 0 ? static_cast<const void*>(&f.decay_speed) : &f.static_coefficient,
            "[friction] static_coefficient and decay_speed go together: give both, or coefficient alone");
+  }
+
+  /// Rayleigh damping is of parts and of given matrices: masses of points and bodies and springs carry none.
+  void check_damping() const
+  {
+    const RayleighDamping& damping = scene_.damping;
+    if (!scene_.parts.empty() || scene_.matrices || !scene_.superelements.empty()) return;
+    const auto refuse = [&](const void* member, const char* key)
+    {
+      fail(member, "[damping] " + std::string(key) +
+                       " has no effect: it is of [[part]]s, and the scene has none; give each [[spring]] its damping");
+    };
+    if (!damping.measured.empty()) refuse(&damping.measured, "measured");
+    if (damping.alpha != 0) refuse(&damping.alpha, "alpha");
+    if (damping.beta != 0) refuse(&damping.beta, "beta");
   }
 
   void check_loss() const

@@ -7,6 +7,7 @@ from conftest import INPUTS
 from scipy.optimize import nnls
 
 OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"]
+MATRICES = [INPUTS / "oscillator" / "matrices.toml", *OSCILLATOR[1:]]
 PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
        "--set", "modes.method=full", "--set", "response.from=500", "--set", "response.to=12000", "--set", "response.count=150"]
 
@@ -74,7 +75,7 @@ def test_the_poles_are_the_modes(converged):
     (["damping.measured=[[100, 0.01], [200, 0.01]]", "damping.beta=1e-3"], "excludes 'measured'"),
 ])
 def test_bad_input_is_one_message(squeal, words, message):
-    run = squeal(*OSCILLATOR, *[word for pair in words for word in ("--set", pair)], ranks=1)
+    run = squeal(*MATRICES, *[word for pair in words for word in ("--set", pair)], ranks=1)
     assert run.code == 1 and len(run.messages) == 1 and message in run.messages[0], run.errors
 
 
@@ -84,7 +85,16 @@ def resolved(run):
     return [float(text.split(f"{key} = ")[1].split()[0]) for key in ("alpha", "beta")]
 
 
-# The oscillator's frequencies are near 0.17 Hz; its points have no mass or stiffness of a part, so that only the scene counts.
+@pytest.mark.parametrize("word, message", [("damping.alpha=0.1", "[damping] alpha"), ("damping.beta=1e-3", "[damping] beta"),
+                                           ("damping.measured=[[0.1, 0.01], [0.4, 0.008]]", "[damping] measured")])
+def test_damping_of_parts_is_refused_without_parts(squeal, word, message):
+    """Masses of points and springs carry none: it was silently without effect."""
+    run = squeal(*OSCILLATOR, "--set", word, "--dry-run", ranks=1)
+    assert run.code == 1 and len(run.messages) == 1, run.errors
+    assert f"--set {word}: {message} has no effect" in run.messages[0] and "give each [[spring]] its damping" in run.messages[0]
+
+
+# The oscillator's frequencies are near 0.17 Hz.
 @pytest.mark.parametrize("measured", [
     [[0.1, 0.01], [0.4, 0.008]],              # met by both
     [[0.1, 0.002], [0.2, 0.004], [0.4, 0.008]],  # beta alone: in a line
@@ -93,7 +103,7 @@ def resolved(run):
     [[0.1, 0.01], [0.2, 0.03], [0.4, 0.005]],    # no fit: a warning
 ])
 def test_measured_ratios_are_fitted(converged, measured, tmp_path):
-    run = converged(*OSCILLATOR, "--set", f"damping.measured={measured}", ranks=1)
+    run = converged(*MATRICES, "--set", f"damping.measured={measured}", ranks=1)
     omega, ratio = 2 * np.pi * np.array(measured).T[0], np.array(measured).T[1]
     rows = np.column_stack([1 / (2 * omega), omega / 2]) / ratio[:, None]
     wanted, _ = nnls(rows, np.ones(len(ratio)))

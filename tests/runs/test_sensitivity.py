@@ -30,7 +30,7 @@ def two_pads(folder, compliance=0, **friction):
                        contact=[{"rotor": "disc", "stator": "top", "normal": [0, 0, 1], "velocity": [0.3, 2, 0],
                                  "compliance": compliance},
                                 {"rotor": "disc", "stator": "bottom", "normal": [0, 0, -1], "velocity": [-0.5, 1.7, 0]}],
-                       friction={"coefficient": 0.5, **friction}, damping={"alpha": 2.0}, modes={"band": 5000})
+                       friction={"coefficient": 0.5, **friction}, modes={"band": 5000})
 
 
 @pytest.fixture
@@ -211,7 +211,7 @@ def test_a_stable_scene_has_nothing_to_explain(converged):
 @pytest.mark.parametrize("lines, words", [
     ("[sensitivity]\nnumbers = ['friction.coefficent']", "not in the scene"),
     ("[sensitivity]\nnumbers = ['friction.decay_speed']", "is 0, and nothing beside that is a scene"),
-    ("[sensitivity]\nnumbers = ['point.0.mass', 'damping.beta', 'point.0.mass']", 'names "point.0.mass" twice'),
+    ("[sensitivity]\nnumbers = ['point.0.mass', 'spring.0.damping', 'point.0.mass']", 'names "point.0.mass" twice'),
     ("[[change]]\nprobe = 'pad_y'\nmass = 1", "give that table too"),
     ("[sensitivity]\n[[change]]\nprobe = 'pad_z'\nmass = 1", "is not defined"),
     ("[sensitivity]\n[[change]]\nprobe = 'pad_y'", "neither mass, damping nor stiffness"),
