@@ -77,6 +77,10 @@ def ordered_rows(table, choice):
     return rows[np.argsort(table["value"][rows, 0], kind="stable")]
 
 
+def hertz(frequency):
+    return f"{frequency:.0f}" if frequency >= 1000 else f"{frequency:.3g}"
+
+
 def look_of_mode(place):
     """Colour and mark, different for 64 modes."""
     return COLOURS[place % len(COLOURS)], MARKS[place // len(COLOURS) % len(MARKS)]
@@ -110,8 +114,7 @@ def draw_column(axes, table, rows, sweep, size, direction):
         if np.isnan(frequency).all():
             continue
         colour, mark = look_of_mode(place)
-        hertz = f"{strongest['frequency_hz']:.0f}" if size == 1000 else f"{strongest['frequency_hz']:.3g}"
-        label = f"mode {track}, {hertz} Hz where it grows most"
+        label = f"mode {track}, {hertz(strongest['frequency_hz'])} Hz where it grows most"
         x, along, rising = with_thresholds(number, frequency, growth, thresholds_of(sweep, direction, track))
         for ax, line, points in ((above, along / size, frequency / size), (below, rising, growth)):
             ax.plot(x, line, "-", color=colour, lw=1.4)
@@ -224,14 +227,11 @@ def draw_levels(ax, points, thresholds, limit):
     ax.pcolormesh(ends, edges, np.array(level), rasterized=True, **style)
 
 
-def lines_of_thresholds(sweep, share=0.02):
-    """Thresholds of like frequencies, by rising frequency: a mode has another number at each value of the second number."""
-    groups = []
+def lines_of_thresholds(sweep):
+    """Thresholds of each mode, by rising frequency."""
+    groups = {}
     for threshold in sorted(sweep["thresholds"], key=lambda t: t["frequency_hz"]):
-        if groups and threshold["frequency_hz"] <= (1 + share) * groups[-1][-1]["frequency_hz"]:
-            groups[-1].append(threshold)
-        else:
-            groups.append([threshold])
+        groups.setdefault(threshold["track"], []).append(threshold)
     return groups
 
 
@@ -252,13 +252,13 @@ def draw_map(results, sweep):
         failed = [p for p in points if p["outcome"] != "converged"]
         if failed:
             failures["point that failed"], = ax.plot(*zip(*(p["values"] for p in failed)), "x", ms=6, mew=1.6, color="black")
-        for place, group in enumerate(lines_of_thresholds(sweep)):
+        for place, (track, group) in enumerate(lines_of_thresholds(sweep).items()):
             at = [t["values"] for t in group if t["direction"] == direction]
-            if at:
+            if at:  # of different sizes, since thresholds of two modes may coincide
                 mark, shade = MARKS[1 + place % (len(MARKS) - 1)], SHADES[place // (len(MARKS) - 1) % len(SHADES)]  # a dot is a point
                 mean = np.mean([t["frequency_hz"] for t in group])
-                ax.plot(*zip(*at), ls="", marker=mark, ms=8, mew=1.2, mec="white", color=shade,
-                        label=f"threshold at {mean:.4g} Hz")
+                ax.plot(*zip(*at), ls="", marker=mark, ms=9 - 1.5 * (place % 3), mew=1.2, mec="white", color=shade,
+                        label=f"threshold of mode {track}, {hertz(mean)} Hz")
         ax.use_sticky_edges = False  # points at the edge are seen whole
         ax.margins(0.03)
         ax.set_xlabel(labels_of(sweep)[0])

@@ -75,7 +75,7 @@ std::vector<SweepLine> share_of(const std::vector<SweepLine>& lines, int group, 
   const std::size_t total = points_of(lines);
   const auto begin_of = [&](int g) { return total * static_cast<std::size_t>(g) / static_cast<std::size_t>(groups); };
   const std::size_t begin = begin_of(group), end = begin_of(group + 1);
-  std::vector<SweepLine> share;
+  std::vector<SweepLine> share, starts;
   bool begins_line = false;
   for (std::size_t first = 0; const SweepLine& line : lines)
   {
@@ -88,10 +88,14 @@ std::vector<SweepLine> share_of(const std::vector<SweepLine>& lines, int group, 
       piece.points = {at(from - first - (piece.known ? 1 : 0)), at(to - first)};
       begins_line = begins_line || (line.ordered && !piece.known);
     }
+    if (first < begin)
+    {
+      std::erase_if(starts, [&](const SweepLine& start) { return start.reversed == line.reversed; });
+      starts.push_back({{line.points.front()}, line.reversed, true, true});
+    }
     first = last;
   }
-  if (group > 0 && begins_line)
-    share.insert(share.begin(), {{lines.front().points.front()}, lines.front().reversed, true, true});
+  if (begins_line) share.insert(share.begin(), starts.begin(), starts.end());
   return share;
 }
 

@@ -19,7 +19,8 @@ std::vector<SweepLine> lines_of(const SweepSettings& settings);
 std::size_t points_of(const std::vector<SweepLine>& lines);
 
 /// So many points, one after the other, as evenly spread over groups of ranks as it goes. What begins within a line
-/// begins with the point before; where a line begins in it, the first point of all comes first.
+/// begins with the point before; where a line begins in it, the first points of the last lines before in either
+/// direction of rotation come first.
 std::vector<SweepLine> share_of(const std::vector<SweepLine>& lines, int group, int groups);
 
 } // namespace squeal

@@ -63,20 +63,26 @@ public:
 
   void add(const Sweep& part, const std::vector<SweepLine>& share)
   {
-    TrackNames of_first; // by the first point of all
+    std::array<TrackNames, 2> of_starts; // of lines, in either direction of rotation
     auto point = part.points.begin();
     for (const SweepLine& line : share)
     {
       const auto begin = point;
       for (std::size_t visited = 0; point != part.points.end() && visited < line.points.size(); ++point)
         visited += point->inserted ? 0 : 1;
-      TrackNames names = of_first;
+      TrackNames known;
       if (line.known && begin != point)
-        if (const SweepPoint* const there = same_point(whole_.points, *begin)) names = names_by(*begin, *there);
+        if (const SweepPoint* const there = same_point(whole_.points, *begin)) known = names_by(*begin, *there);
+      TrackNames& of_start = of_starts[line.reversed];
       if (line.known && line.points.size() == 1)
-        of_first = names;
+        of_start = known;
+      else if (line.known)
+        take(part, line, {begin + 1, point}, known);
       else
-        take(part, line, {begin + (line.known ? 1 : 0), point}, names);
+      {
+        if (of_start.empty()) of_start = of_starts[!line.reversed];
+        take(part, line, {begin, point}, of_start);
+      }
     }
     whole_.lost += part.lost;
     whole_.least_mac = std::min(whole_.least_mac, part.least_mac);

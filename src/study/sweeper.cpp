@@ -51,6 +51,7 @@ public:
       train(lines.front());
       if (lines.size() > 1) train(lines.back());
     }
+    lines_ = lines;
     for (const SweepLine& line : lines) run_line(line);
     sweep_.basis = static_cast<int>(model_.shapes());
     sweep_.passes = model_.passes();
@@ -100,7 +101,7 @@ private:
       if (!line.ordered)
         record(*now, {});
       else if (!before)
-        begin(*now);
+        begin(*now, line);
       else
         advance(*before, *now, 0);
       before = std::move(now);
@@ -142,49 +143,108 @@ private:
   /// The modes at a point; nothing if it fails, which is recorded.
   std::optional<Followed> evaluate(Followed point)
   {
+    if (find_modes_of(point)) return point;
+    record(point, {});
+    return std::nullopt;
+  }
+
+  /// Returns false if the point fails.
+  bool find_modes_of(Followed& point)
+  {
     const Equilibrium& at = model_.equilibrium_at({point.values, point.reversed});
     point.closed = static_cast<int>(std::ranges::count(at.closed, 1));
     point.modes.outcome = at.outcome;
     if (at.outcome.kind == OutcomeKind::converged && problem_.settings.stages >= SweepStages::modes)
       point.modes = model_.modes_at({point.values, point.reversed}, tolerance_);
-    if (point.modes.outcome.kind == OutcomeKind::converged) return point;
+    if (point.modes.outcome.kind == OutcomeKind::converged) return true;
     point.modes.pairs.clear(); // of which some may be no modes
-    record(point, {});
-    return std::nullopt;
+    return false;
   }
 
-  /// The first point of a line. Its modes have the tracks of the first point of all where those are clear.
-  void begin(Followed& now)
+  /// The first point of a line. Its modes have the tracks of that of the line before in this direction of rotation, or
+  /// else in the other one.
+  void begin(Followed& now, const SweepLine& line)
   {
-    const std::size_t count = now.modes.pairs.size();
-    now.tracks.assign(count, -1);
-    if (!first_ && kept_ > 0)
-      for (const SweepPoint& point : sweep_.points)
-        if (point.outcome.kind == OutcomeKind::converged)
-        {
-          first_ = restored(point);
-          break;
-        }
-    if (first_)
-      for (std::size_t i = 0; const Match& match : matches_with_first(now))
-      {
-        const int track = first_->tracks[i++];
-        if (match.to >= 0) now.tracks[static_cast<std::size_t>(match.to)] = track;
-      }
+    now.tracks.assign(now.modes.pairs.size(), -1);
+    if (!begins(line)) return begin_anew(now); // the group that the point is of knows its tracks
+    for (const bool reversed : {false, true})
+      if (std::optional<Followed>& start = starts_[reversed]; !start && kept_ > 0) start = restored_start(reversed);
+    const std::optional<Followed>&own = starts_[now.reversed], &other = starts_[!now.reversed];
+    if (own)
+      carry_over(*own, now, 0);
+    else if (other)
+      take_over(*other, now, matches_turned(*other, now));
+    begin_anew(now);
+    starts_[now.reversed] = now;
+  }
+
+  /// Gives modes without a track one of their own.
+  void begin_anew(Followed& now)
+  {
     for (int& track : now.tracks)
       if (track < 0) track = sweep_.tracks++;
     record(now, {});
-    if (!first_) first_ = now;
   }
 
-  /// Between the first point of all and that of a line. The basis of the other direction of rotation is another one.
-  std::vector<Match> matches_with_first(const Followed& now) const
+  /// Whether the first point of this line is that of a line of the sweep.
+  static bool begins(const SweepLine& line) { return !line.known || line.points.size() == 1; }
+
+  /// The first point of the last line with points, as it was recorded.
+  std::optional<Followed> restored_start(bool reversed)
   {
-    if (first_->reversed == now.reversed) return follow(forms_between(first_->modes, now.modes), clear_mac);
+    const SweepPoint* start = nullptr;
+    for (const SweepLine& line : lines_)
+    {
+      if (line.reversed != reversed || !begins(line)) continue;
+      const auto found =
+          std::ranges::find_if(sweep_.points,
+                               [&](const SweepPoint& point)
+                               {
+                                 return point.reversed == reversed && point.outcome.kind == OutcomeKind::converged &&
+                                        std::equal(point.values.begin() + 1, point.values.end(),
+                                                   line.points.front().begin() + 1, line.points.front().end());
+                               });
+      if (found != sweep_.points.end()) start = &*found;
+    }
+    return start ? restored(*start) : std::nullopt;
+  }
+
+  static void take_over(const Followed& before, Followed& now, const std::vector<Match>& matches)
+  {
+    for (std::size_t i = 0; i < matches.size(); ++i)
+      if (matches[i].to >= 0) now.tracks[static_cast<std::size_t>(matches[i].to)] = before.tracks[i];
+  }
+
+  /// Follows the modes from line to line, along the second number, with points between where they are unclear. These
+  /// lie on no line and are not recorded.
+  void carry_over(const Followed& before, Followed& now, int depth)
+  {
+    const ModeForms between_both = forms(before, now);
+    std::vector<Match> matches = follow(between_both, clear_mac);
+    if (depth < problem_.options.depth && before.values != now.values && !all_clear(before, matches))
+    {
+      Followed between{now.values, now.reversed, true};
+      for (std::size_t k = 0; k < between.values.size(); ++k)
+        between.values[k] = (before.values[k] + now.values[k]) / 2;
+      if (find_modes_of(between))
+      {
+        between.tracks.assign(between.modes.pairs.size(), -1);
+        carry_over(before, between, depth + 1);
+        carry_over(between, now, depth + 1);
+        return;
+      }
+    }
+    if (!all_clear(before, matches)) matches = follow(between_both, least_clear(before, now));
+    take_over(before, now, matches);
+  }
+
+  /// Between the first points of lines of both directions of rotation, whose bases are two.
+  std::vector<Match> matches_turned(const Followed& before, const Followed& now) const
+  {
     const Eigen::Index shapes = model_.shared_shapes();
     std::vector<Match> matches =
-        follow(overlaps_between(leading_part(first_->modes, shapes), leading_part(now.modes, shapes)), clear_overlap);
-    match_coincident(matches, first_->modes.pairs, now.modes.pairs);
+        follow(overlaps_between(leading_part(before.modes, shapes), leading_part(now.modes, shapes)), clear_overlap);
+    match_coincident(matches, before.modes.pairs, now.modes.pairs);
     return matches;
   }
 
@@ -295,8 +355,9 @@ private:
   std::size_t kept_; // points of the scene that were done before a restart
   double tolerance_ = exact_tolerance;
   Progress* progress_ = nullptr;
-  std::optional<Followed> first_{}; // of all lines
-  std::size_t done_ = 0;            // points
+  std::vector<SweepLine> lines_{};
+  std::array<std::optional<Followed>, 2> starts_{}; // of the last line in either direction of rotation
+  std::size_t done_ = 0;                            // points
 };
 
 } // namespace

@@ -190,6 +190,21 @@ def test_two_numbers(converged):
     assert thresholds[0.02] == pytest.approx(HOPF, abs=1e-5) and abs(thresholds[0.05] - HOPF) > 1e-4
 
 
+@pytest.mark.parametrize("key, ends", [("point.pad.mass", (0.2, 5.0)), ("point.disc.mass", (0.1, 10.0))])
+@pytest.mark.parametrize("directions", ["one", "both"])
+def test_modes_keep_their_numbers_over_the_plane(key, ends, directions, converged):
+    """Between the first lines and the last their shapes change too much for a look at both: modes are followed from line to line."""
+    run = converged(*OSCILLATOR, *sweep_of(f"['friction.coefficient','{key}']", f"[0.1,{ends[0]}]", f"[0.2,{ends[1]}]", points="[2,4]",
+                                           directions=directions), ranks=1)
+    points = {}
+    for row in rows_of(run.output):
+        if row["inserted"] == "0":
+            points.setdefault((row["friction.coefficient"], row[key], row["direction"]), []).append(row["track"])
+    assert len(points) == (8 if directions == "one" else 16)
+    assert all(sorted(tracks) == ["0", "1"] for tracks in points.values()), points
+    assert len(run.report["sweep"]["points"]) == len(points)  # those in between are on no line
+
+
 def test_random_points_repeat_with_their_seed(converged):
     ask = [*OSCILLATOR, *sweep_of(samples=6)]
     first, again = (rows_of(converged(*ask, ranks=1).output) for _ in range(2))
@@ -225,6 +240,7 @@ def names(rows):
 
 @pytest.mark.parametrize("sweep", [
     sweep_of(TWO, "[0.1,0.02]", "[0.3,0.05]", points="[5,4]", directions="both"),
+    sweep_of("['friction.coefficient','point.pad.mass']", "[0.1,0.4]", "[0.3,3.0]", points="[3,4]", directions="both"),
     sweep_of(TWO, "[0.1,0.02]", "[0.3,0.05]", samples=11),
     ["--set", "sweep.key=friction.coefficient", "--set", "sweep.values=[0.1,0.2,0.3]"],
 ])
