@@ -122,15 +122,19 @@ Sensitivity run_sensitivity(const Chain& chain)
   if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
   if (chain.model.structure.H.get())
     return not_run<Sensitivity>(OutcomeKind::refused, "the structure has a circulatory part");
-  const auto model_at = [&](const SceneNumber& number)
-  { return model_with(chain.model, scene, from_zero(scene, number), comm_of(chain.model.structure.load)); };
+  const auto model_at = [&](std::span<const SceneNumber> numbers)
+  {
+    std::vector<SceneNumber> all;
+    for (const SceneNumber& number : numbers) std::ranges::copy(from_zero(scene, number), std::back_inserter(all));
+    return model_with(chain.model, scene, all, comm_of(chain.model.structure.load));
+  };
   std::vector<int> probes;
   for (const Change& change : scene.changes)
     probes.push_back(
         static_cast<int>(std::ranges::find(scene.probes, change.probe, &Probe::name) - scene.probes.begin()));
-  return find_sensitivity({chain.sliding(), *chain.linearised, chain.report.modes, sensitive_numbers(scene), model_at,
-                           chain.model.probes, scene.changes, probes, scene.modes, chain.options.modes,
-                           chain.options.equilibrium});
+  return find_sensitivity({chain.sliding(), *chain.linearised, chain.report.modes, sensitive_numbers(scene),
+                           components_of(scene), contact_names(scene), model_at, chain.model.probes, scene.changes,
+                           probes, scene.modes, chain.options.modes, chain.options.equilibrium});
 }
 
 Sweep run_scene_sweep(const Chain& chain)

@@ -3,7 +3,7 @@
 import numpy as np
 from plot_basis import heading, plt, those_with
 from plot_sweep import COLOURS
-from squeal import Missing
+from squeal import Missing, number_label
 
 
 def robustness_of(results):
@@ -60,7 +60,7 @@ def draw_drivers(axes, robustness):
     axes.axvline(0, color="0.2", lw=0.8)
     axes.set_xlim(-1, 1)
     axes.set_xticks([-1, -0.5, 0, 0.5, 1])
-    axes.set_yticks(range(len(numbers)), [number["key"] for number in numbers])
+    axes.set_yticks(range(len(numbers)), [number_label(number["key"], number["name"]) for number in numbers])
     axes.invert_yaxis()
     axes.set_xlabel("rank correlation with growth")
 

@@ -3,7 +3,7 @@
 import numpy as np
 from plot_basis import (RED, SLIP, colour, frequency_unit, heading, label_column, label_of, length_unit, mode_words, plt,
                         those_with)
-from squeal import Missing
+from squeal import Missing, number_label
 
 LABELS = 12  # at most so many modes have one
 
@@ -209,7 +209,7 @@ def draw_branch(runs):
             below.plot(event["parameter"], 0, EVENT_MARKS["Hopf"], color="black", ms=10, zorder=5)
     if any(event["kind"] == "Hopf" for event in branch["events"]):
         below.plot([], [], EVENT_MARKS["Hopf"], color="black", ms=10, ls="none", label="Hopf")
-    below.set(ylabel="growth rate [1/s]", xlabel=branch["key"])
+    below.set(ylabel="growth rate [1/s]", xlabel=number_label(branch["key"], branch["name"]))
     for style, stability in (("-", "stable"), ("--", "unstable"), (":", "undecided")):
         if any(point["stability"] == stability for point in points):
             above.plot([], [], style, color="0.3", label=stability)

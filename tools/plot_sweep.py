@@ -4,7 +4,7 @@ sought, and a map of stability for two numbers."""
 import numpy as np
 from matplotlib.lines import Line2D
 from plot_basis import frequency_unit, heading, label_row, legend_below, plt, those_with
-from squeal import Missing
+from squeal import Missing, number_label
 
 COLOURS = ["#c0272d", "#1b6ca8", "#d95f02", "#2e8b57", "#7b3fa0", "#b5893a", "#008b8b", "#d6409f"]
 MARKS = "os^Dvp*X"
@@ -57,8 +57,8 @@ def sweep_of(results):
 
 
 def labels_of(sweep):
-    """The swept numbers with their units."""
-    return [key if unit == "-" else f"{key} [{unit}]" for key, unit in zip(sweep["keys"], sweep["units"])]
+    """The swept numbers with their names and units."""
+    return [number_label(*number) for number in zip(sweep["keys"], sweep["names"], sweep["units"])]
 
 
 def strongest_tracks(sweep):
@@ -188,7 +188,7 @@ def draw_chart(results, sweep, table):
         mark_thresholds(axes[:, column], sweep, direction)
     # A mode keeps its colour: one label each.
     legend = {label: handle for ax in axes[0] for handle, label in zip(*ax.get_legend_handles_labels())} | legend
-    figure.suptitle(heading([results], "modes against " + sweep["keys"][0]))
+    figure.suptitle(heading([results], "modes against " + number_label(sweep["keys"][0], sweep["names"][0])))
     legend_below(figure, legend)
     return figure
 
@@ -236,7 +236,7 @@ def lines_of_thresholds(sweep):
 
 
 def draw_map(results, sweep):
-    """Largest growth rate over the plane of two numbers; points as dots, thresholds of like frequencies have one mark."""
+    """Largest growth rate over the plane of two numbers; points as dots, thresholds of a mode have one mark."""
     found = [p for p in sweep["points"] if "growth_rate" in p]
     directions = [d for d in (1, -1) if any(p["direction"] == d for p in found)]
     figure, axes = plt.subplots(1, len(directions), figsize=(3.4 + 3.6 * len(directions), 5.2), sharey=True, squeeze=False)

@@ -3,6 +3,7 @@
 import html
 
 import numpy as np
+from squeal import number_label
 
 ROWS = 12  # of a table that stand open; the rest is folded away
 WORDS = 40  # letters of a cell that stay on one line
@@ -96,22 +97,22 @@ def strongest(derivatives):
 def derivatives(mode):
     shown, weaker = strongest(mode["derivatives"])
     by = lambda d, name: number(0.01 * d["value"] * d[name], 3) if d["value"] else "–"
-    rows = [[text(d["key"]), number(float(d["value"])), by(d, "growth_rate_by"), by(d, "frequency_hz_by"), number(d["growth_rate_by"], 4)]
+    rows = [[text(number_label(d["key"], d["name"])), number(float(d["value"])), by(d, "growth_rate_by"), by(d, "frequency_hz_by"), number(d["growth_rate_by"], 4)]
             for d in shown]
     words = [f"{weaker} that move it less are in report.json"] if weaker else []
-    unknown = [d["key"] for d in mode["derivatives"] if not d["known"]]
+    unknown = [number_label(d["key"], d["name"]) for d in mode["derivatives"] if not d["known"]]
     words += [f"without a derivative, since pairs open or close there: {', '.join(unknown)}"] if unknown else []
     head = ["number of the scene", "value", "1 % more moves the growth by [1/s]", "and the frequency by [Hz]", "derivative of the growth [1/s per unit]"]
     return (table(head, rows) if rows else "") + (paragraph("; ".join(words) + ".") if words else "")
 
 
 def shares(mode):
-    """Where the energies of a mode are: shares of densities and masses, moduli and stiffnesses, from 1 %."""
-    found = [d for d in mode["derivatives"] if d["known"] and max(d["kinetic_share"], d["strain_share"]) >= 0.01]
-    found.sort(key=lambda d: -max(d["kinetic_share"], d["strain_share"]))
-    rows = [[text(d["key"]), *(number(100 * d[name], 3) if abs(d[name]) >= 5e-4 else "" for name in ("kinetic_share", "strain_share"))]
-            for d in found]
-    return table(["share of the energies that is due to", "kinetic [%]", "strain [%]"], rows) if rows else ""
+    """Where the energies of a mode are: what holds at least 1 % of one."""
+    found = [s for s in mode["shares"] if max(s["kinetic"], s["strain"]) >= 0.01]
+    found.sort(key=lambda s: -max(s["kinetic"], s["strain"]))
+    rows = [[text(f"{s['table'].replace('_', ' ')} {s['name']}"), *(number(100 * s[name], 3) if abs(s[name]) >= 5e-4 else "" for name in ("kinetic", "strain"))]
+            for s in found]
+    return table(["energy is held by", "kinetic [%]", "strain [%]"], rows) if rows else ""
 
 
 def what_is_added(change):
@@ -174,7 +175,7 @@ def sweep(report):
     found = report.get("sweep", {})
     if not found.get("points"):
         return ""
-    keys = ", ".join(key if unit == "-" else f"{key} [{unit}]" for key, unit in zip(found["keys"], found["units"]))
+    keys = ", ".join(map(number_label, found["keys"], found["names"], found["units"]))
     both = found["directions"] == "both"
     at = lambda entry: [values_of(entry), *([rotation(entry)] if both else [])]
     where = [text(keys), *(["rotation"] if both else [])]
@@ -183,7 +184,7 @@ def sweep(report):
     if found["followed_modes"]:
         words += (f"; {found['followed_modes']} modes followed with a MAC of at least {min(found['least_mac'], found['least_mac_across']):.2f}, "
                   f"{found['lost_modes']} lost on the way")
-    parts = [f"<h3>Sweep of {text(' and '.join(found['keys']))}</h3>", paragraph(words + ".")]
+    parts = [f"<h3>Sweep of {text(' and '.join(map(number_label, found['keys'], found['names'])))}</h3>", paragraph(words + ".")]
     failed = [[*at(point), text(point["outcome"]), text(point.get("reason", ""))] for point in found["points"] if point["outcome"] != "converged"]
     if failed:
         parts.append("<h4>Points that failed</h4>" + table([*where, "outcome", "why"], failed))
@@ -236,7 +237,7 @@ def robustness(report):
     checks = len(found["checks"])
     words = (f"{found['samples']} random samples. {checks} of them were computed in full: growth rates are off by {found['growth_error']:.1e} "
              f"of the eigenvalue at most, {found['wrong_verdicts']} of {checks} have another number of unstable modes.")
-    drivers = [[text(n["key"]), text(n["distribution"]), f"{n['rank_correlation']:+.2f}"]
+    drivers = [[text(number_label(n["key"], n["name"])), text(n["distribution"]), f"{n['rank_correlation']:+.2f}"]
                for n in sorted(found["numbers"], key=lambda n: -abs(n["rank_correlation"]))]
     return ("<h3>Random numbers</h3>" + paragraph(words) + table(head, rows, "rarer modes")
             + table(["random number", "distribution", "rank correlation with growth"], drivers, "weaker ones"))

@@ -107,6 +107,11 @@ def toml(value):
     return str(value)
 
 
+def number_label(key, name="", unit="-"):
+    """A number of a scene as a reader knows it: its key, the name of what the key calls by its place, its unit."""
+    return key + (f" ({name})" if name else "") + (f" [{unit}]" if unit != "-" else "")
+
+
 def read_report(folder):
     """report.json of a results folder; an error where it cannot be read, or other files are of another run."""
     folder = Path(folder)
@@ -251,8 +256,12 @@ class Results:
                          for entry in sweep.get("thresholds", [])])
 
     def derivatives(self):
-        """A row a number of the scene for each unstable mode: mode, key, value, growth_rate_by, frequency_hz_by, shares."""
+        """A row a number of the scene for each unstable mode: mode, key, value, growth_rate_by, frequency_hz_by, name."""
         return self._of_sensitive_modes("derivatives")
+
+    def energy_shares(self):
+        """A row a part, body, spring or compliant contact for each unstable mode: mode, table, name, kinetic and strain."""
+        return self._of_sensitive_modes("shares")
 
     def changes(self):
         """A row a [[change]] for each unstable mode: mode, probe, what is added, predicted and computed growth rate."""

@@ -120,6 +120,7 @@ void add_branch(const BrakeBranch& branch, const Scene& scene, Json& entry)
 {
   const BranchSettings& settings = *scene.branch;
   entry["key"] = settings.key;
+  entry["name"] = name_of_number(scene, settings.key);
   entry["from"] = settings.from;
   entry["to"] = settings.to;
   entry["periods_integrated"] = branch.branch.periods;

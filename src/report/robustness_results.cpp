@@ -86,6 +86,7 @@ void add_robustness(const Robustness& robustness, const Scene& scene, Json& entr
   entry["numbers"] = Json::array();
   for (std::size_t i = 0; i < robustness.correlation.size(); ++i)
     entry["numbers"].push_back({{"key", scene.uncertain[i].key},
+                                {"name", name_of_number(scene, scene.uncertain[i].key)},
                                 {"distribution", word(scene.uncertain[i].distribution)},
                                 {"rank_correlation", robustness.correlation[i]}});
   entry["checks"] = Json::array();
@@ -147,8 +148,8 @@ std::vector<std::string> robustness_lines(const Robustness& robustness, const Sc
         text_of(mode.unstable, confidence) +
         format(", growth %.4g 1/s in the middle", part_of(mode.growth_rates, 0.5)));
   for (std::size_t i = 0; i < robustness.correlation.size(); ++i)
-    lines.push_back(
-        format("rank correlation of growth with %s: %+.2f", scene.uncertain[i].key.c_str(), robustness.correlation[i]));
+    lines.push_back(format("rank correlation of growth with %s: %+.2f",
+                           label_of_number(scene, scene.uncertain[i].key).c_str(), robustness.correlation[i]));
   return lines;
 }
 

@@ -25,15 +25,14 @@ Json change_entry(std::complex<double> lambda)
   return {{"growth_rate", lambda.real()}, {"frequency_hz", in_hz(lambda.imag())}};
 }
 
-Json number_entry(const NumberDerivative& derivative)
+Json number_entry(const NumberDerivative& derivative, const Scene& scene)
 {
-  Json entry = {{"key", derivative.number.key}, {"value", derivative.number.value}};
+  const auto& [key, value] = derivative.number;
+  Json entry = {{"key", key}, {"name", name_of_number(scene, key)}, {"value", value}};
   entry["known"] = derivative.known;
   if (!derivative.known) return entry;
   entry["growth_rate_by"] = derivative.lambda.real();
   entry["frequency_hz_by"] = in_hz(derivative.lambda.imag());
-  entry["kinetic_share"] = derivative.kinetic;
-  entry["strain_share"] = derivative.strain;
   return entry;
 }
 
@@ -42,13 +41,18 @@ Json mode_entry(const ModeCauses& causes, const Scene& scene)
   Json entry = change_entry(causes.lambda);
   entry["backward_error"] = causes.backward_error;
   entry["derivatives"] = Json::array();
-  for (const NumberDerivative& derivative : causes.numbers) entry["derivatives"].push_back(number_entry(derivative));
+  for (const NumberDerivative& derivative : causes.numbers)
+    entry["derivatives"].push_back(number_entry(derivative, scene));
   entry["probes"] = Json::array();
   for (std::size_t i = 0; i < causes.probes.size(); ++i)
     entry["probes"].push_back({{"name", scene.probes[i].name},
                                {"growth_rate_by_mass", causes.probes[i].mass.real()},
                                {"growth_rate_by_damping", causes.probes[i].damping.real()},
                                {"growth_rate_by_stiffness", causes.probes[i].stiffness.real()}});
+  entry["shares"] = Json::array();
+  for (const EnergyShare& share : causes.shares)
+    entry["shares"].push_back(
+        {{"table", share.table}, {"name", share.name}, {"kinetic", share.kinetic}, {"strain", share.strain}});
   entry["contact_powers"] = causes.contact_powers;
   entry["falling_friction_powers"] = causes.falling_friction_powers;
   entry["turning_friction_powers"] = causes.turning_friction_powers;
@@ -77,6 +81,21 @@ std::vector<NumberDerivative> strongest(const ModeCauses& causes)
   const auto effect = [](const NumberDerivative& d) { return std::abs(d.number.value * d.lambda.real()); };
   std::stable_sort(list.begin(), list.end(), [&](const auto& a, const auto& b) { return effect(a) > effect(b); });
   return list;
+}
+
+/// What holds most of an energy.
+std::string shares_text(std::vector<EnergyShare> shares, double EnergyShare::*energy)
+{
+  constexpr std::size_t shown = 4;
+  constexpr double least = 0.005;
+  std::erase_if(shares, [&](const EnergyShare& share) { return share.*energy < least; });
+  std::ranges::stable_sort(shares, std::greater(), energy);
+  if (shares.size() > shown) shares.resize(shown);
+  std::string text;
+  for (const EnergyShare& share : shares)
+    text += format("%s%s %.0f %%", text.empty() ? "" : ", ", (share.name.empty() ? share.table : share.name).c_str(),
+                   100 * share.*energy);
+  return text;
 }
 
 std::string sum_text(const std::vector<double>& powers)
@@ -117,10 +136,13 @@ std::vector<std::string> sensitivity_lines(const Sensitivity& sensitivity, const
     lines.push_back(format("%.7g Hz, growth %.6g 1/s: contacts put in %s 1/s of the energy%s, damping takes %.5g 1/s",
                            in_hz(causes.lambda.imag()), causes.lambda.real(), sum_text(causes.contact_powers).c_str(),
                            friction_text(causes).c_str(), causes.damping_power));
+    lines.push_back("  kinetic energy: " + shares_text(causes.shares, &EnergyShare::kinetic) +
+                    "; strain energy: " + shares_text(causes.shares, &EnergyShare::strain));
     const std::vector<NumberDerivative> list = strongest(causes);
     for (std::size_t i = 0; i < std::min(numbers_shown, list.size()); ++i)
       lines.push_back(format("  1 %% of %-28s moves the growth by %+.4g 1/s, the frequency by %+.4g Hz",
-                             list[i].number.key.c_str(), 0.01 * list[i].number.value * list[i].lambda.real(),
+                             label_of_number(scene, list[i].number.key).c_str(),
+                             0.01 * list[i].number.value * list[i].lambda.real(),
                              0.01 * list[i].number.value * in_hz(list[i].lambda.imag())));
     for (std::size_t i = 0; i < causes.changes.size(); ++i)
       lines.push_back(format("  change at %s: growth %.6g 1/s predicted", scene.changes[i].probe.c_str(),

@@ -90,7 +90,11 @@ void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
 {
   const SweepSettings& settings = *scene.sweep;
   entry["keys"] = settings.key;
-  for (const std::string& key : settings.key) entry["units"].push_back(unit_of_number(key));
+  for (const std::string& key : settings.key)
+  {
+    entry["names"].push_back(name_of_number(scene, key));
+    entry["units"].push_back(unit_of_number(key));
+  }
   entry["stages"] = word(settings.stages);
   entry["directions"] = word(settings.directions);
   entry["followed_modes"] = sweep.tracks;
@@ -186,7 +190,7 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
 {
   constexpr std::size_t shown = 12;
   std::string keys;
-  for (const std::string& key : scene.sweep->key) keys += (keys.empty() ? "" : " and ") + key;
+  for (const std::string& key : scene.sweep->key) keys += (keys.empty() ? "" : " and ") + label_of_number(scene, key);
   std::vector<std::string> lines = {format("%zu points of %s", sweep.points.size(), keys.c_str())};
   if (scene.sweep->stages == SweepStages::equilibrium) return lines;
   lines.back() += format("; backward error %.1e at most, on a basis of %d shapes after %d corrections",

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
-#include <sstream>
 
 namespace squeal
 {
@@ -186,9 +185,7 @@ private:
 
 std::string unit_of_number(const std::string& key)
 {
-  std::vector<std::string> words;
-  std::istringstream text(key);
-  for (std::string word; std::getline(text, word, '.');) words.push_back(word);
+  const std::vector<std::string> words = words_of_key(key);
   Scene scene;
   Rotation rotation;
   Orthotropy orthotropy;
@@ -205,6 +202,71 @@ std::string unit_of_number(const std::string& key)
     keys = below == nested.end() ? SceneKeys() : below->second;
   }
   return "-";
+}
+
+namespace
+{
+
+std::string name_of(const Part& part)
+{
+  return part.name;
+}
+std::string name_of(const Point& point)
+{
+  return point.name;
+}
+std::string name_of(const RigidBody& body)
+{
+  return body.name;
+}
+std::string name_of(const Spring& spring)
+{
+  return spring.from + " to " + spring.to;
+}
+std::string name_of(const Force& force)
+{
+  return "on " + force.on;
+}
+std::string name_of(const Pressure& pressure)
+{
+  return "on " + pressure.on;
+}
+std::string name_of(const Contact& contact)
+{
+  return contact.stator + " on " + contact.rotor;
+}
+
+/// The name of the entry at a place; nothing where the selector is a name.
+template <class List> std::string name_at(const List& list, const std::string& selector)
+{
+  for (std::size_t i = 0; i < list.size(); ++i)
+    if (name_of(list[i]) == selector) return "";
+  for (std::size_t i = 0; i < list.size(); ++i)
+    if (std::to_string(i) == selector) return name_of(list[i]);
+  return "";
+}
+
+} // namespace
+
+std::string name_of_number(const Scene& scene, const std::string& key)
+{
+  const std::vector<std::string> words = words_of_key(key);
+  if (words.size() < 2) return "";
+  const std::string &table = words[0], &selector = words[1];
+  if (table == "part") return name_at(scene.parts, selector);
+  if (table == "point") return name_at(scene.points, selector);
+  if (table == "rigid_body") return name_at(scene.rigid_bodies, selector);
+  if (table == "spring") return name_at(scene.springs, selector);
+  if (table == "force") return name_at(scene.forces, selector);
+  if (table == "pressure") return name_at(scene.pressures, selector);
+  if (table == "contact") return name_at(scene.contacts, selector);
+  return "";
+}
+
+std::string label_of_number(const Scene& scene, const std::string& key)
+{
+  const std::string name = name_of_number(scene, key);
+  return name.empty() ? key : key + " (" + name + ")";
 }
 
 Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)
@@ -258,31 +320,26 @@ std::string key_of(const char* list, std::size_t place, const char* key)
   return std::string(list) + "." + std::to_string(place) + "." + key;
 }
 
-/// Whether two entries of a list have a name that reads as a place: then places would not name them.
-template <class List> bool names_are_places(const List& list)
+/// The same of an entry with a name.
+std::string key_of(const char* list, const std::string& name, const char* key)
 {
-  return std::ranges::any_of(list, [](const auto& entry)
-                             { return entry.name.find_first_not_of("0123456789") == std::string::npos; });
+  const bool plain = std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
+  return std::string(list) + "." + (plain ? name : toml_string(name)) + "." + key;
 }
 
 void add_named(const Scene& scene, std::vector<SceneNumber>& numbers)
 {
-  if (!names_are_places(scene.parts))
-    for (std::size_t i = 0; i < scene.parts.size(); ++i)
-    {
-      const Part& part = scene.parts[i];
-      numbers.push_back({key_of("part", i, "young"), part.material.young});
-      numbers.push_back({key_of("part", i, "density"), part.material.density});
-      numbers.push_back({key_of("part", i, "loss_factor"), part.loss_factor});
-      if (part.damping) numbers.push_back({key_of("part", i, "alpha"), part.damping->alpha});
-      if (part.damping) numbers.push_back({key_of("part", i, "beta"), part.damping->beta});
-    }
-  if (!names_are_places(scene.points))
-    for (std::size_t i = 0; i < scene.points.size(); ++i)
-      numbers.push_back({key_of("point", i, "mass"), scene.points[i].mass});
-  if (!names_are_places(scene.rigid_bodies))
-    for (std::size_t i = 0; i < scene.rigid_bodies.size(); ++i)
-      numbers.push_back({key_of("rigid_body", i, "mass"), scene.rigid_bodies[i].mass});
+  for (const Part& part : scene.parts)
+  {
+    numbers.push_back({key_of("part", part.name, "young"), part.material.young});
+    numbers.push_back({key_of("part", part.name, "density"), part.material.density});
+    numbers.push_back({key_of("part", part.name, "loss_factor"), part.loss_factor});
+    if (part.damping) numbers.push_back({key_of("part", part.name, "alpha"), part.damping->alpha});
+    if (part.damping) numbers.push_back({key_of("part", part.name, "beta"), part.damping->beta});
+  }
+  for (const Point& point : scene.points) numbers.push_back({key_of("point", point.name, "mass"), point.mass});
+  for (const RigidBody& body : scene.rigid_bodies)
+    numbers.push_back({key_of("rigid_body", body.name, "mass"), body.mass});
 }
 
 } // namespace
@@ -307,6 +364,67 @@ std::vector<SceneNumber> sensitive_numbers(const Scene& scene)
       numbers.push_back({key_of("contact", i, "rotation.rate"), scene.contacts[i].rotation->rate});
   std::erase_if(numbers, [](const SceneNumber& number) { return number.value == 0; });
   return numbers;
+}
+
+namespace
+{
+
+/// A component with numbers that are not zero, if there are any.
+void add_component(std::vector<SceneComponent>& components, SceneComponent component)
+{
+  std::erase_if(component.doubled, [](const SceneNumber& number) { return number.value == 0; });
+  for (SceneNumber& number : component.doubled) number.value *= 2;
+  if (!component.doubled.empty()) components.push_back(std::move(component));
+}
+
+/// Numbers of a list within a table.
+template <class Values> void add_list(std::vector<SceneNumber>& numbers, const std::string& key, const Values& values)
+{
+  for (std::size_t k = 0; k < values.size(); ++k) numbers.push_back({key + "." + std::to_string(k), values[k]});
+}
+
+SceneComponent component_of(const Part& part)
+{
+  SceneComponent component{"part", part.name, {{key_of("part", part.name, "density"), part.material.density}}};
+  component.doubled.push_back({key_of("part", part.name, "young"), part.material.young});
+  if (const auto& orthotropy = part.material.orthotropy)
+  {
+    add_list(component.doubled, key_of("part", part.name, "orthotropic.young"), orthotropy->young);
+    add_list(component.doubled, key_of("part", part.name, "orthotropic.shear"), orthotropy->shear);
+  }
+  return component;
+}
+
+} // namespace
+
+std::vector<SceneComponent> components_of(const Scene& scene)
+{
+  std::vector<SceneComponent> components;
+  for (const Part& part : scene.parts) add_component(components, component_of(part));
+  for (const Point& point : scene.points)
+    add_component(components, {"point", point.name, {{key_of("point", point.name, "mass"), point.mass}}});
+  for (const RigidBody& body : scene.rigid_bodies)
+  {
+    SceneComponent component{"rigid_body", body.name, {{key_of("rigid_body", body.name, "mass"), body.mass}}};
+    add_list(component.doubled, key_of("rigid_body", body.name, "inertia"), body.inertia);
+    add_component(components, std::move(component));
+  }
+  for (std::size_t i = 0; i < scene.springs.size(); ++i)
+    add_component(
+        components,
+        {"spring", name_of(scene.springs[i]), {{key_of("spring", i, "stiffness"), scene.springs[i].stiffness}}});
+  std::string rest;
+  for (const Superelement& element : scene.superelements) rest += (rest.empty() ? "" : " and ") + element.name;
+  if (!rest.empty()) components.push_back({"superelement", rest});
+  if (scene.matrices) components.push_back({"matrices", ""});
+  return components;
+}
+
+std::vector<std::string> contact_names(const Scene& scene)
+{
+  std::vector<std::string> names;
+  for (const Contact& contact : scene.contacts) names.push_back(name_of(contact));
+  return names;
 }
 
 std::vector<SceneNumber> from_zero(const Scene& scene, const SceneNumber& number)

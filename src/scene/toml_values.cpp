@@ -144,10 +144,15 @@ void refuse_deep_key(std::string_view line, const std::string& place)
     throw Error(place + ": a key of more than " + std::to_string(deepest) + " parts: leave it out");
 }
 
+std::vector<std::string> words_of_key(const std::string& key)
+{
+  return names_of(parse_override(key + "=0"));
+}
+
 toml::node* find_value(toml::table& root, const std::string& key)
 {
   toml::node* node = &root;
-  for (const std::string& name : names_of(parse_override(key + "=0")))
+  for (const std::string& name : words_of_key(key))
   {
     std::vector<std::string> known;
     if (node && node->is_table())

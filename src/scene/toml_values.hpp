@@ -35,6 +35,9 @@ void refuse_deep_key(std::string_view line, const std::string& place);
 /// Applies "table.key=value" to the tables of a scene.
 void apply_override(toml::table& root, const std::string& text);
 
+/// The words of a key between its dots; a word in quotes may hold dots.
+std::vector<std::string> words_of_key(const std::string& key);
+
 /// Returns the value that an override of this key would replace; null if there is none.
 toml::node* find_value(toml::table& root, const std::string& key);
 

@@ -68,6 +68,14 @@ MultiVector product_or_zero(Mat A, const MultiVector& X)
 
 } // namespace
 
+std::vector<double> quadratic_forms(Mat A, const HeldVectors& vectors)
+{
+  const MatrixXd products = inner_products(vectors.right, product(A, vectors.right));
+  std::vector<double> result;
+  for (std::size_t j = 0; j < vectors.count(); ++j) result.push_back(hermitian(products, j, vectors.count()));
+  return result;
+}
+
 AtHeldVectors at_held_vectors(const SlidingEquilibrium& sliding, const HeldVectors& vectors)
 {
   const auto& [structure, interface, equilibrium] = sliding;

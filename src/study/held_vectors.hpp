@@ -43,6 +43,9 @@ Owned<Vec> column(const MultiVector& X, std::size_t j, Vec pattern);
 PairMotions pair_motions(const Interface& interface, const MultiVector& X, std::size_t mode, std::size_t count,
                          Vec pattern);
 
+/// right^H A right of each mode, A symmetric.
+std::vector<double> quadratic_forms(Mat A, const HeldVectors& vectors);
+
 AtHeldVectors at_held_vectors(const SlidingEquilibrium& sliding, const HeldVectors& vectors);
 
 /// The unstable modes with their left vectors. Sets the modes of the result, and its outcome where one was not found:

@@ -16,6 +16,12 @@ using Complex = std::complex<double>;
 
 constexpr double relative_step = 1e-4; // of central differences: most numbers enter M, C and K linearly
 
+/// The contact of the scene that a pair belongs to.
+std::size_t contact_of(const Interface& interface, std::size_t pair)
+{
+  return interface.geometry.empty() ? 0 : static_cast<std::size_t>(interface.geometry[pair].contact);
+}
+
 /// phi^H C_f phi of one pair: by the law, and by the direction of friction.
 struct PairDamping
 {
@@ -73,8 +79,7 @@ void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, 
     for (std::size_t i = 0; i < motion.size(); ++i)
     {
       const double power = 2 * std::real(std::conj(lambda * motion[i]) * vectors.reactions[j][i]) / energy;
-      const std::size_t contact =
-          interface.geometry.empty() ? 0 : static_cast<std::size_t>(interface.geometry[i].contact);
+      const std::size_t contact = contact_of(interface, i);
       causes.pair_powers.push_back(power);
       put_in(causes.contact_powers, contact, power);
       const double scale = -2 * std::norm(lambda) / energy;
@@ -84,6 +89,53 @@ void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, 
     const double loss = std::real(std::conj(lambda) * loss_factor_of(vectors.loss[j], lambda)) * held.loss[j];
     causes.damping_power = 2 * (std::norm(lambda) * held.damping[j] + loss) / energy;
     causes.defect = sum - causes.damping_power - 2 * lambda.real();
+  }
+}
+
+/// The strain energy of the closed pairs with a compliance, over that of the mode, of each contact.
+std::vector<double> strain_of_contacts(const SensitivityProblem& problem, const HeldVectors& vectors,
+                                       const AtHeldVectors& held, std::size_t mode)
+{
+  const auto& [structure, interface, equilibrium] = problem.sliding;
+  const std::vector<Complex> normal =
+      pair_motions(interface, vectors.right, mode, vectors.count(), structure.load).normal;
+  std::vector<double> strain(problem.contacts.size());
+  for (std::size_t i = 0; i < normal.size(); ++i)
+    if (const double compliance = compliance_of(interface, i); compliance > 0 && equilibrium.closed[i])
+    {
+      const std::size_t contact = contact_of(interface, i);
+      strain.resize(std::max(strain.size(), contact + 1));
+      strain[contact] += std::norm(normal[i]) / compliance / held.stiffness[mode];
+    }
+  return strain;
+}
+
+/// What each component holds of the energies: what doubling its mass and stiffness adds.
+void find_shares(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held,
+                 Sensitivity& result)
+{
+  const std::vector<double> stiffness = quadratic_forms(problem.sliding.structure.K, vectors);
+  for (const SceneComponent& component : problem.components)
+  {
+    if (component.doubled.empty()) continue;
+    const BrakeModel doubled = problem.model_with(component.doubled);
+    const std::vector<double> M = quadratic_forms(doubled.structure.M, vectors),
+                              K = quadratic_forms(doubled.structure.K, vectors);
+    for (std::size_t j = 0; j < vectors.count(); ++j)
+      result.modes[j].shares.push_back({component.table, component.name, (M[j] - held.mass[j]) / held.mass[j],
+                                        (K[j] - stiffness[j]) / held.stiffness[j]});
+  }
+  for (std::size_t j = 0; j < vectors.count(); ++j)
+  {
+    std::vector<EnergyShare>& shares = result.modes[j].shares;
+    const std::vector<double> strain = strain_of_contacts(problem, vectors, held, j);
+    for (std::size_t i = 0; i < strain.size(); ++i)
+      if (strain[i] > 0)
+        shares.push_back({"contact", i < problem.contacts.size() ? problem.contacts[i] : "", 0, strain[i]});
+    EnergyShare rest{"", "", 1, 1};
+    for (const EnergyShare& share : shares) rest.kinetic -= share.kinetic, rest.strain -= share.strain;
+    for (const SceneComponent& component : problem.components)
+      if (component.doubled.empty()) shares.push_back({component.table, component.name, rest.kinetic, rest.strain});
   }
 }
 
@@ -145,7 +197,7 @@ private:
   /// The held vectors with another value; nothing where other pairs are closed.
   std::optional<AtHeldVectors> hold_at(const std::string& key, double value)
   {
-    const BrakeModel model = problem_.model_with({key, value});
+    const BrakeModel model = problem_.model_with(std::array{SceneNumber{key, value}});
     const std::optional<Equilibrium> other = equilibria_.at(model);
     const Equilibrium& equilibrium = other ? *other : problem_.sliding.equilibrium;
     if (equilibrium.outcome.kind != OutcomeKind::converged || equilibrium.closed != problem_.sliding.equilibrium.closed)
@@ -172,17 +224,9 @@ private:
     for (std::size_t j = 0; j < result.size(); ++j)
     {
       Complex residual = 0;
-      double mass = 0, stiffness = 0;
-      for (const auto& [weight, model] : models)
-      {
-        residual += weight * model.residual[j];
-        mass += weight * model.mass[j];
-        stiffness += weight * model.stiffness[j];
-      }
+      for (const auto& [weight, model] : models) residual += weight * model.residual[j];
       result[j].known = true;
       result[j].lambda = eigenvalue_change(held_.slopes[j], residual / step);
-      result[j].kinetic = number.value * mass / step / held_.mass[j];
-      result[j].strain = number.value * stiffness / step / held_.stiffness[j];
     }
     return result;
   }
@@ -365,6 +409,7 @@ Sensitivity find_sensitivity(const SensitivityProblem& problem)
   if (vectors.count() == 0) return result;
   const AtHeldVectors held = at_held_vectors(problem.sliding, vectors);
   find_powers(problem.sliding, vectors, held, result);
+  find_shares(problem, vectors, held, result);
   find_number_derivatives(problem, vectors, held, result);
   find_probe_derivatives(problem, vectors, held, result);
   find_change_effects(problem, result);

@@ -88,6 +88,8 @@ def test_tables_of_a_study(tmp_path):
     at = thresholds[thresholds["spring.0.damping"] == 0.02].iloc[0]
     assert at["friction.coefficient"] == pytest.approx(0.17649288, abs=2 * at["error"])  # exact
     assert set(results.derivatives()["key"]) == {"friction.coefficient"} and len(results.changes()) == 1
+    shares = results.energy_shares()
+    assert shares[["kinetic", "strain"]].sum().tolist() == pytest.approx([1, 1], abs=1e-9)
     assert len(results.samples()) == 20 and results.squeal_probabilities()["probability"][0] > 0.9
     assert results.probes("cycle") == {}
 

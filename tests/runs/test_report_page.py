@@ -115,7 +115,8 @@ def test_the_page_has_what_studies_of_a_number_found(studies):
     assert f"{100 * any_mode['probability']:.3g} ({100 * any_mode['lower']:.3g} to {100 * any_mode['upper']:.3g})" in text
     (mode,) = found["sensitivity"]["modes"]
     for derivative in mode["derivatives"]:
-        assert f"{derivative['key']} {derivative['value']:.5g} {0.01 * derivative['value'] * derivative['growth_rate_by']:.3g}" in text
+        assert f"{squeal.number_label(derivative['key'], derivative['name'])} {derivative['value']:.5g} {0.01 * derivative['value'] * derivative['growth_rate_by']:.3g}" in text
+    assert all(f"{share['table']} {share['name']}" in text for share in mode["shares"] if max(share["kinetic"], share["strain"]) >= 0.01)
     assert f"{mode['contact_powers'][0]:.5g} {mode['damping_power']:.5g}" in text
     for change, what in zip(mode["changes"], ("mass of 0.002 kg at pad_x", "spring of 0.003 N/m at pad_x")):
         assert f"{what} {mode['growth_rate']:.6g} {change['predicted']['growth_rate']:.6g} {change['computed']['growth_rate']:.6g}" in text

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 from conftest import INPUTS
-from models import write_scene
+from models import write_coexistence, write_scene
 
 OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"]
 # Two directions, so that friction turns and the equilibrium enters; two unstable modes.
@@ -13,7 +13,8 @@ PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.division
 
 LOSSY = [*PIN, "--set", "part.pin.loss_factor=0.01", "--set", "part.disc.loss_factor=1e-6", "--set", "damping.loss_frequency=5000"]
 SPINNING = [*PIN, "--set", "part.disc.rotation={axis='z',rate=300}"]
-SCENES = {"oscillator": OSCILLATOR, "pin": PIN, "lossy pin": LOSSY, "spinning disc": SPINNING}
+HEAVY = [*PIN, "--set", "rigid_body.holder.inertia=[1e-4,2e-4,3e-4,0,0,0]"]
+SCENES = {"oscillator": OSCILLATOR, "pin": PIN, "heavy holder": HEAVY, "lossy pin": LOSSY, "spinning disc": SPINNING}
 
 
 def two_pads(folder, compliance=0, **friction):
@@ -163,15 +164,32 @@ def test_powers_sum_to_twice_the_growth_rate(pin):
             assert fields[f"modes/{number}/pair_power"][()].sum() == pytest.approx(sum(mode["contact_powers"]), rel=1e-12)
 
 
-def test_shares_sum_to_one(pin):
-    for mode in pin.report["sensitivity"]["modes"]:
-        share = {d["key"]: d for d in mode["derivatives"]}
-        kinetic = [share[key]["kinetic_share"] for key in ("part.pin.density", "part.disc.density", "rigid_body.holder.mass")]
-        strain = [share[key]["strain_share"] for key in ("part.pin.young", "part.disc.young", "spring.0.stiffness")]
-        assert sum(kinetic) == pytest.approx(1, abs=1e-9) and min(kinetic) > -1e-9
-        assert sum(strain) == pytest.approx(1, abs=1e-9) and min(strain) > -1e-9
-        # friction changes neither matrix
-        assert abs(share["friction.coefficient"]["kinetic_share"]) < 1e-9
+@pytest.mark.parametrize("scene, held", [
+    ("pin", {"part disc", "part pin", "rigid_body holder", "spring holder to ground"}),
+    ("heavy holder", {"part disc", "part pin", "rigid_body holder", "spring holder to ground"}),
+    ("compliant pads", {"point disc", "point top", "point bottom", "point caliper", "contact top on disc", "spring top to caliper"}),
+    ("lossy pin", {"part disc", "part pin"}),
+    ("spinning disc", {"part disc", "part pin"}),
+])
+def test_shares_sum_to_one(scene, held, scene_of, converged):
+    modes = converged(*scene_of(scene), *sensitivity_of("friction.coefficient"), ranks=1).report["sensitivity"]["modes"]
+    assert modes
+    for mode in modes:
+        found = {f"{share['table']} {share['name']}".strip(): share for share in mode["shares"]}
+        assert held <= set(found)
+        for energy in ("kinetic", "strain"):
+            shares = [share[energy] for share in mode["shares"]]
+            assert sum(shares) == pytest.approx(1, abs=1e-9)
+            assert scene == "spinning disc" or min(shares) > -1e-9  # a spin takes from the stiffness
+        if scene == "compliant pads":
+            assert found["contact top on disc"]["strain"] > 1e-5 and found["contact top on disc"]["kinetic"] == 0
+
+
+def test_matrices_hold_all_energy(tmp_path, converged):
+    scene = write_coexistence(tmp_path, {"coefficient": 0.55}, {"enabled": False})
+    for mode in converged(scene, *sensitivity_of("friction.coefficient"), ranks=1).report["sensitivity"]["modes"]:
+        [share] = mode["shares"]
+        assert share == {"table": "matrices", "name": "", "kinetic": 1, "strain": 1}
 
 
 def test_changes_move_the_growth_as_predicted(tmp_path, squeal):
@@ -191,6 +209,23 @@ def test_changes_move_the_growth_as_predicted(tmp_path, squeal):
                     "--set", "spring.0.stiffness=1.002", "--set", "force.0.vector=[0,-1,0]", ranks=1).report
     wanted = single["modes"]["modes"][0]["growth_rate"]
     assert mode["changes"][1]["computed"]["growth_rate"] == pytest.approx(wanted, rel=1e-9)
+
+
+def test_numbers_are_called_by_name(tmp_path, converged):
+    report = converged(*PIN, "--set", "sensitivity.numbers=[]", ranks=1).report
+    names = {d["key"]: d["name"] for d in report["sensitivity"]["modes"][0]["derivatives"]}
+    assert names == {"friction.coefficient": "", "damping.beta": "", "part.disc.young": "", "part.disc.density": "", "part.pin.young": "",
+                     "part.pin.density": "", "rigid_body.holder.mass": "", "spring.0.stiffness": "holder to ground",
+                     "contact.0.rotation.rate": "pin_face on disc_face"}
+    text = two_pads(tmp_path).read_text().replace('"top"', '"the top.1"')
+    (tmp_path / "scene.toml").write_text(text + "\n[sensitivity]\n[sweep]\nkey = [\"point.'the top.1'.mass\", 'force.0.vector.2']\n"
+                                         "from = [0.3, -950]\nto = [0.4, -900]\npoints = 2\n")
+    run = converged(tmp_path / "scene.toml", ranks=1)
+    numbers = {d["key"]: d for d in run.report["sensitivity"]["modes"][0]["derivatives"]}
+    assert numbers["point.'the top.1'.mass"]["value"] == 0.4 and numbers["point.'the top.1'.mass"]["known"]
+    sweep = run.report["sweep"]
+    assert sweep["names"] == ["", "on caliper"] and sweep["units"] == ["kg", "N"]
+    assert "force.0.vector.2 (on caliper)" in run.printed
 
 
 def test_ranks_agree(pin, squeal):

@@ -20,12 +20,32 @@ inline constexpr const char* friction_coefficient_key = "friction.coefficient";
 /// Returns the scene with other values of numbers that it has. Throws Error if that is no scene.
 Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers);
 
+/// What has mass or stiffness of its own: a part, point, rigid body or spring. With the numbers `doubled` it has twice
+/// of both. Without any it is what the others leave: given matrices, or superelements.
+struct SceneComponent
+{
+  std::string table, name;
+  std::vector<SceneNumber> doubled{};
+};
+
+std::vector<SceneComponent> components_of(const Scene& scene);
+
+/// Names of the contacts: "pad on disc".
+std::vector<std::string> contact_names(const Scene& scene);
+
 /// A number that is zero in the scene, with what it needs to be another one: a first loss factor has to have a
 /// frequency of its equivalent in time, on which modes do not depend.
 std::vector<SceneNumber> from_zero(const Scene& scene, const SceneNumber& number);
 
 /// The unit of a number of a scene, "-" where it has none.
 std::string unit_of_number(const std::string& key);
+
+/// What a number's key calls by its place alone, "part.0.young" or "contact.1.gap": the name of that part, or
+/// "pad on disc". Empty where the key says it itself.
+std::string name_of_number(const Scene& scene, const std::string& key);
+
+/// The key with that name, if it has one: "contact.1.gap (pad on disc)".
+std::string label_of_number(const Scene& scene, const std::string& key);
 
 /// The numbers with respect to which eigenvalues are derived, with the scene's values. They are those that it names,
 /// else friction and what is not zero of parts, points, bodies, springs, damping and rates of rotation.

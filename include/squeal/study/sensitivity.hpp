@@ -13,9 +13,8 @@ namespace squeal
 struct NumberDerivative
 {
   SceneNumber number;
-  bool known = false;             // the closed pairs are the same on both sides
-  std::complex<double> lambda{};  // d lambda / d number [1/s per unit of the number]
-  double kinetic = 0, strain = 0; // d ln / d ln number of phi^H M phi and phi^H K phi: shares of a part
+  bool known = false;            // the closed pairs are the same on both sides
+  std::complex<double> lambda{}; // d lambda / d number [1/s per unit of the number]
 };
 
 /// By what is added at a probe along its direction.
@@ -31,6 +30,13 @@ struct ChangeEffect
   std::complex<double> predicted, computed;
 };
 
+/// What a table of the scene holds of the energies of a mode.
+struct EnergyShare
+{
+  std::string table, name; // as SceneComponent; "contact": of pairs with a compliance
+  double kinetic = 0, strain = 0;
+};
+
 /// Powers are over the mean energy (|lambda|^2 phi^H M phi + phi^H K phi)/4 of the motion [1/s]. Those of contacts are
 /// put in, and sums over the scene's contacts; a matrix scene has one.
 struct ModeCauses
@@ -39,6 +45,7 @@ struct ModeCauses
   double backward_error = 0; // the larger one of the right and of the left vector
   std::vector<NumberDerivative> numbers;
   std::vector<ProbeDerivative> probes;
+  std::vector<EnergyShare> shares;             // their sums are one
   std::vector<double> pair_powers;             // by reactions that change, of each pair
   std::vector<double> contact_powers;          // the same of each contact
   std::vector<double> falling_friction_powers; // by the law: negative where friction rises with the speed
@@ -62,8 +69,10 @@ struct SensitivityProblem
   const LinearisedSliding& linearised;
   const Modes& modes;
   std::vector<SceneNumber> numbers;
-  std::function<BrakeModel(const SceneNumber&)> model_with; // the scene with another value
-  Mat probes = nullptr;                                     // a row a probe
+  std::vector<SceneComponent> components;
+  std::vector<std::string> contacts;                                    // names
+  std::function<BrakeModel(std::span<const SceneNumber>)> model_with{}; // the scene with other values
+  Mat probes = nullptr;                                                 // a row a probe
   const std::vector<Change>& changes;
   std::vector<int> probes_of_changes; // their rows
   const ModesSettings& modes_settings;
