@@ -32,7 +32,7 @@ def draw_probabilities(axes, robustness):
                   color="0.55" if place == 0 else COLOURS[(place - 1) % len(COLOURS)])
     axes.set_yticks(range(len(entries)), [name for name, _ in entries])
     axes.invert_yaxis()
-    axes.set_xlim(0, max(1e-3, min(100, 110 * max(entry["upper"] for _, entry in entries))))
+    axes.set_xlim(0, max(1e-3, min(103, 110 * max(entry["upper"] for _, entry in entries))))
     axes.set_xlabel(f"probability of instability [%], {100 * robustness['confidence']:.3g} % interval")
 
 
@@ -48,7 +48,8 @@ def draw_growth(axes, table):
     axes.axvline(0, color="0.2", lw=0.8)
     axes.set_xlabel("largest growth rate over omega [%]")
     axes.set_ylabel("samples")
-    axes.legend(fontsize=8)
+    axes.set_ylim(top=1.25 * axes.get_ylim()[1])  # the legend hides no bar
+    axes.legend(fontsize=8, ncols=2, loc="upper center")
 
 
 def draw_drivers(axes, robustness):
@@ -60,7 +61,7 @@ def draw_drivers(axes, robustness):
     axes.axvline(0, color="0.2", lw=0.8)
     axes.set_xlim(-1, 1)
     axes.set_xticks([-1, -0.5, 0, 0.5, 1])
-    axes.set_yticks(range(len(numbers)), [number_label(number["key"], number["name"]) for number in numbers])
+    axes.set_yticks(range(len(numbers)), [number_label(number["key"], number["name"]).replace(" (", "\n(") for number in numbers])
     axes.invert_yaxis()
     axes.set_xlabel("rank correlation with growth")
 
@@ -70,6 +71,8 @@ def draw_robustness(runs):
     table = {name: results.series("robustness", name) for name in ("known", "growth_rate", "frequency", "unstable_modes")}
     rows = max(len(robustness["numbers"]), 1 + min(8, len(robustness["modes"])))
     figure, axes = plt.subplots(1, 3, figsize=(13.5, 2.4 + 0.35 * rows))
+    for ax in axes:
+        ax.set_axisbelow(True)  # the grid
     draw_probabilities(axes[0], robustness)
     draw_growth(axes[1], table)
     draw_drivers(axes[2], robustness)
