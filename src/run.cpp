@@ -142,8 +142,10 @@ Sweep run_scene_sweep(const Chain& chain)
   const Scene& scene = chain.scene;
   if (!scene.sweep) return not_run<Sweep>(OutcomeKind::off, "the scene has no [sweep]");
   if (chain.model.structure.H.get() && scene.sweep->directions == SweepDirections::both)
-    return not_run<Sweep>(OutcomeKind::refused, "the structure has a circulatory part, which the other direction of "
-                                                "rotation would change: sweep one direction");
+    return not_run<Sweep>(OutcomeKind::refused, "what the circulatory part of given matrices becomes in the other "
+                                                "direction of rotation is not known, as another code's friction is "
+                                                "in the symmetric part of K as well: sweep one direction, and the "
+                                                "other one with matrices of its own");
   const auto model_at = [&](std::span<const double> values, MPI_Comm comm)
   {
     std::vector<SceneNumber> numbers;
