@@ -49,15 +49,15 @@ def test_brake_transient(brakes):
 
 
 def test_brake_cycle(brakes):
-    """1e-9 of the period, 1e-8 of the energy: though the cycle is sought to 1e-3 only, its iterates depend on the ranks
-    by rounding alone."""
+    """1e-7 of the period, 1e-6 of the energy, far below the 1e-3 to which the cycle is sought: beside rounding the iterates
+    depend on the ranks by the errors of the modes' shapes in the preconditioner, 1e-4 within a cluster of pins."""
     first = brakes[0]["cycle"]
     for run in brakes:
         cycle = run["cycle"]
         assert cycle["outcome"] == "converged" and cycle["residual_full"] < 1e-3
         assert cycle["periods_integrated"] == first["periods_integrated"]
-        assert cycle["period"] == pytest.approx(first["period"], rel=1e-9)
-        assert cycle["mean_energy"] == pytest.approx(first["mean_energy"], rel=1e-8)
+        assert cycle["period"] == pytest.approx(first["period"], rel=1e-7)
+        assert cycle["mean_energy"] == pytest.approx(first["mean_energy"], rel=1e-6)
 
 
 def test_brake_carries_its_clamp_force(brakes):
