@@ -11,7 +11,7 @@ namespace
 
 constexpr double smallest_refactored = 0.02; // a correction over the period: shooting makes smaller ones
 
-/// The recurrence nearest to the start lies where the defect is orthogonal to the flow. [s], from the period's end.
+/// The recurrence nearest to the start is where the defect is orthogonal to the flow. [s], from the period's end.
 double nearest_recurrence(const OrbitProblem& problem, const Orbit& orbit)
 {
   const double speed = energy_norm(problem.flow, orbit.rate);

@@ -84,7 +84,7 @@ void check_columns(std::istream& stream, const std::filesystem::path& file, cons
       if (j <= previous || j >= columns)
         throw Error(file.string() + ": row " + std::to_string(row) + " has column " + std::to_string(j) + " after " +
                     std::to_string(previous) + " of " + std::to_string(columns) +
-                    "; columns must ascend and lie within the matrix");
+                    "; columns must ascend and be those of the matrix");
       previous = j;
     }
   }
