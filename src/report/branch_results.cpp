@@ -1,7 +1,5 @@
 #include "branch_results.hpp"
 
-#include "derived.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -201,8 +199,7 @@ void write_branch(Hdf5File& file, const BrakeBranch& branch, const Scene& scene)
   write("open_steps", "steps of pairs", points, [](Cycle p) { return p.measures.open_steps; });
   write("stick_steps", "steps of pairs", points, [](Cycle p) { return p.measures.stick_steps; });
   for (std::size_t i = 0; i < scene.probes.size() && !points.empty(); ++i)
-    write("probes/" + without_slash(scene.probes[i].name), "m", points,
-          [i](Cycle p) { return p.measures.peak_to_peak[i]; });
+    write("probes/" + scene.probes[i].name, "m", points, [i](Cycle p) { return p.measures.peak_to_peak[i]; });
   std::vector<EquilibriumStability> known = branch.equilibria;
   std::erase_if(known, [](const EquilibriumStability& equilibrium) { return !equilibrium.known; });
   using Equilibria = const EquilibriumStability&;

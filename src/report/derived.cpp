@@ -60,10 +60,4 @@ double chatter(const History& history)
   return sum > 0 ? std::sqrt(squares * static_cast<double>(force.size() - 2)) / 4 / sum : 0;
 }
 
-std::string without_slash(std::string name)
-{
-  std::replace(name.begin(), name.end(), '/', '_');
-  return name;
-}
-
 } // namespace squeal

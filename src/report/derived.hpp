@@ -29,7 +29,4 @@ StepBias cycle_bias(const Report& report);
 /// The part of the normal force that alternates from step to step: rms of its second difference / 4, over its mean.
 double chatter(const History& history);
 
-/// A name for HDF5, which reads a slash as a group.
-std::string without_slash(std::string name);
-
 } // namespace squeal

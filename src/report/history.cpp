@@ -1,7 +1,6 @@
 #include "squeal/report/history.hpp"
 
 #include "branch_results.hpp"
-#include "derived.hpp"
 #include "files.hpp"
 #include "response_results.hpp"
 #include "robustness_results.hpp"
@@ -31,8 +30,7 @@ void write_group(Hdf5File& file, const std::string& group, const History& histor
   write("stick", history.stick, "pairs");
   write("slip", history.slip, "pairs");
   const std::size_t probes = std::min(scene.probes.size(), history.probes.size());
-  for (std::size_t i = 0; i < probes; ++i)
-    write("probes/" + without_slash(scene.probes[i].name), history.probes[i], "m");
+  for (std::size_t i = 0; i < probes; ++i) write("probes/" + scene.probes[i].name, history.probes[i], "m");
 }
 
 /// The spectrum of a settled motion, and its lines, strongest first. `unit`: of the amplitudes.

@@ -1,8 +1,5 @@
 #include "response_results.hpp"
 
-#include "derived.hpp"
-
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 namespace squeal
@@ -65,8 +62,7 @@ void write_response(Hdf5File& file, const Response& response, const Scene& scene
       std::vector<double> flat;
       for (const std::complex<double>& value : response.receptance[i][j])
         flat.insert(flat.end(), {value.real(), value.imag()});
-      file.write("response/receptance/" + without_slash(name_of(response, i, scene)) + "/" +
-                     without_slash(scene.probes[j].name),
+      file.write("response/receptance/" + name_of(response, i, scene) + "/" + scene.probes[j].name,
                  {flat.size() / 2, 2}, flat, "m/N");
     }
 }

@@ -106,12 +106,12 @@ History history_of(std::size_t steps)
   return history;
 }
 
-/// Every stage ran.
 FieldNodes nodes_of(const Model& model)
 {
   return {model.mesh, model.dofs, model.structure, model.interface};
 }
 
+/// Every stage ran.
 Report full_report(const Model& model)
 {
   Report report;
@@ -150,7 +150,7 @@ Scene scene_of_test()
 {
   Scene scene;
   scene.title = "one of each";
-  scene.probes.push_back({"tip/x", "tip", {}, {1, 0, 0}});
+  scene.probes.push_back({"tip x", "tip", {}, {1, 0, 0}});
   return scene;
 }
 
@@ -226,7 +226,7 @@ TEST_CASE("history: one entry a step, statuses as step by pair")
   const hid_t file = H5Fopen((folder.path / "history.h5").c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   std::vector<hsize_t> shape;
   CHECK(read_set(file, "transient/energy", shape).size() == 11);
-  CHECK(read_set(file, "cycle/probes/tip_x", shape) == std::vector<double>(5, 0.25));
+  CHECK(read_set(file, "cycle/probes/tip x", shape) == std::vector<double>(5, 0.25));
   CHECK(read_set(file, "cycle/status", shape) == std::vector<double>{0, 2, 1, 2});
   CHECK(shape == std::vector<hsize_t>{2, 2});
   H5Fclose(file);
@@ -245,7 +245,7 @@ TEST_CASE("report.json has the documented keys; what is not a number is null; a 
   CHECK(json["estimate"]["outcome"] == "no balance");
   CHECK(json["estimate"]["amplitude"].is_null()); // never a number that is not a root
   CHECK(json["transient"]["growth_rate_fit"].is_null());
-  CHECK(json["cycle"]["peak_to_peak"]["tip/x"] == 1e-6);
+  CHECK(json["cycle"]["peak_to_peak"]["tip x"] == 1e-6);
   CHECK(json["timings"]["modes"] == 1.5);
   CHECK(json["processor_seconds"]["modes"] == 1.25);
   const std::vector<std::pair<std::string, std::vector<std::string>>> documented = {
