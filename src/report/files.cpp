@@ -111,4 +111,11 @@ void Hdf5File::write(const std::string& name, const std::vector<hsize_t>& shape,
   write_data(name, shape, H5T_NATIVE_UCHAR, data.size(), data.data(), unit);
 }
 
+std::string csv_text(const std::string& text)
+{
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
 } // namespace squeal

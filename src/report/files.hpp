@@ -1,5 +1,5 @@
 #pragma once
-/// HDF5 files of results, each written whole or not at all.
+/// HDF5 files of results, each written whole or not at all, and cells of CSV files.
 #include <filesystem>
 #include <hdf5.h>
 #include <string>
@@ -37,5 +37,8 @@ private:
   std::filesystem::path place_;
   hid_t id_ = -1;
 };
+
+/// A text in quotation marks, as a cell of a CSV file.
+std::string csv_text(const std::string& text);
 
 } // namespace squeal

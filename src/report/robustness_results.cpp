@@ -121,7 +121,7 @@ void write_robustness(Hdf5File& file, const Robustness& robustness)
 std::string robustness_csv(const Robustness& robustness, const Scene& scene)
 {
   std::string text;
-  for (const UncertainNumber& number : scene.uncertain) text += "\"" + number.key + "\",";
+  for (const UncertainNumber& number : scene.uncertain) text += csv_text(number.key) + ",";
   text += "known,closed_pairs,unstable_modes,growth_rate,frequency_hz,mode\n";
   for (const RobustSample& sample : robustness.samples)
   {

@@ -79,13 +79,6 @@ std::string text_of(const std::vector<double>& values)
   return text;
 }
 
-std::string csv_text(const std::string& text)
-{
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
-
 void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
 {
   const SweepSettings& settings = *scene.sweep;

@@ -22,7 +22,4 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene);
 /// Values as "0.3, 1e-6".
 std::string text_of(const std::vector<double>& values);
 
-/// A text in quotation marks.
-std::string csv_text(const std::string& text);
-
 } // namespace squeal
