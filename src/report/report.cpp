@@ -103,28 +103,20 @@ void write_request(const Scene& scene, const std::string& run, const std::filesy
 void write_results(const Report& report, const Scene& scene, const FieldNodes& nodes,
                    const std::filesystem::path& output, MPI_Comm comm)
 {
-  on_rank_zero(comm, [&] { write_history(report, scene, output / word(ResultFile::history)); });
-  if (has_run(report.sweep.outcome))
-    on_rank_zero(
-        comm,
-        [&] { write_whole_file(output / word(ResultFile::sweep), sweep_csv(report.sweep, scene), Flush::by_system); });
-  if (has_motions(report.sweep))
-    on_rank_zero(comm,
-                 [&] {
-                   write_whole_file(output / word(ResultFile::sweep_motions), motions_csv(report.sweep, scene),
-                                    Flush::by_system);
-                 });
-  if (has_run(report.robustness.outcome))
-    on_rank_zero(comm,
-                 [&]
-                 {
-                   write_whole_file(output / word(ResultFile::robustness), robustness_csv(report.robustness, scene),
-                                    Flush::by_system);
-                 });
+  const auto write = [&](ResultFile file, const std::string& text)
+  { write_whole_file(output / word(file), text, Flush::by_system); };
+  on_rank_zero(comm,
+               [&]
+               {
+                 write_history(report, scene, output / word(ResultFile::history));
+                 if (has_run(report.sweep.outcome)) write(ResultFile::sweep, sweep_csv(report.sweep, scene));
+                 if (has_motions(report.sweep)) write(ResultFile::sweep_motions, motions_csv(report.sweep, scene));
+                 if (has_run(report.robustness.outcome))
+                   write(ResultFile::robustness, robustness_csv(report.robustness, scene));
+               });
   write_fields(report, scene, nodes, output, comm);
   // Last: where there is a report, the rest is there too.
-  on_rank_zero(comm, [&]
-               { write_whole_file(output / word(ResultFile::report), report_json(report, scene), Flush::by_system); });
+  on_rank_zero(comm, [&] { write(ResultFile::report, report_json(report, scene)); });
 }
 
 } // namespace squeal
