@@ -265,11 +265,11 @@ std::string xdmf_text(const Layout& layout, const std::string& run)
 }
 
 /// Collective. One nodal vector field into the file of rank 0.
-void write_displacement(std::optional<Hdf5File>& file, const Gather& gather, Vec u, const std::string& data,
-                        MPI_Comm comm)
+void write_nodal(std::optional<Hdf5File>& file, const Gather& gather, Vec u, const std::string& data,
+                 const std::string& unit, MPI_Comm comm)
 {
-  const std::vector<double> displacement = gather.nodal(u);
-  on_rank_zero(comm, [&] { file->write(data, {displacement.size() / 3, 3}, displacement, "m"); });
+  const std::vector<double> nodal = gather.nodal(u);
+  on_rank_zero(comm, [&] { file->write(data, {nodal.size() / 3, 3}, nodal, unit); });
 }
 
 void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Modes& modes, Layout& layout, MPI_Comm comm)
@@ -282,8 +282,8 @@ void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Mode
     const std::string data = "modes/" + std::to_string(++number) + "/";
     std::ostringstream name;
     name << (grows ? "unstable mode " : "mode ") << number << ", " << std::lround(mode.frequency_hz()) << " Hz, ";
-    write_displacement(file, gather, mode.real, data + "real", comm);
-    write_displacement(file, gather, mode.imaginary, data + "imaginary", comm);
+    write_nodal(file, gather, mode.real, data + "real", "m", comm);
+    write_nodal(file, gather, mode.imaginary, data + "imaginary", "m", comm);
     layout.still.push_back({name.str() + "real part", data + "real", Center::node, 3});
     layout.still.push_back({name.str() + "imaginary part", data + "imaginary", Center::node, 3});
   }
@@ -299,8 +299,7 @@ void write_motion_shapes(std::optional<Hdf5File>& file, const Gather& gather, co
   {
     copy_column(shapes.V, i, shape);
     const std::string number = std::to_string(i + 1), data = "settled/shape_" + number;
-    const std::vector<double> nodal = gather.nodal(shape);
-    on_rank_zero(comm, [&] { file->write(data, {nodal.size() / 3, 3}, nodal, "kg^-1/2"); });
+    write_nodal(file, gather, shape, data, "kg^-1/2", comm);
     if (i < shown_shapes)
       layout.still.push_back({"shape " + number + " of the settled motion [kg^-1/2]", data, Center::node, 3});
   }
@@ -331,7 +330,7 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
   const Gather gather(nodes);
   if (report.equilibrium.u.get())
   {
-    write_displacement(file, gather, report.equilibrium.u, "equilibrium/displacement", comm);
+    write_nodal(file, gather, report.equilibrium.u, "equilibrium/displacement", "m", comm);
     layout.still.push_back({"displacement at equilibrium [m]", "equilibrium/displacement", Center::node, 3});
     on_rank_zero(comm, [&] { write_contact(*file, report.equilibrium, nodes, layout); });
   }
@@ -348,7 +347,7 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
   const auto& samples = report.cycle.measured.displacements;
   for (std::size_t i = 0; i < samples.size(); ++i)
   {
-    write_displacement(file, gather, samples[i], cycle_data(i), comm);
+    write_nodal(file, gather, samples[i], cycle_data(i), "m", comm);
     layout.time.push_back(sample_time(report.cycle, i));
   }
   on_rank_zero(comm,
