@@ -32,13 +32,11 @@ const char* count_remedy(const Modes& modes)
 {
   if (modes.count.found > modes.count.expected)
     return "so none is known to be missing, but the count does not show it: friction or damping moves pairs across the "
-           "end "
-           "of the band; another modes.band may confirm it";
+           "end of the band; another modes.band may confirm it";
   if (modes.method == ModesMethod::projection)
     return "so an unstable one may be missing: raise modes.real_modes, or take modes.method = \"full\"";
   return "so one is overdamped or an unstable one is missing: with friction.direction_damping = false fewer are "
-         "overdamped, "
-         "and -modes_solver slices and toar seek them in different ways";
+         "overdamped, and -modes_solver slices and toar seek them in different ways";
 }
 
 Sentences of_modes(const Report& report)
