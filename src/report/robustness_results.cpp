@@ -1,7 +1,6 @@
 #include "robustness_results.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace squeal

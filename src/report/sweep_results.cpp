@@ -4,7 +4,6 @@
 #include "sweep_motion_results.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <numeric>
 
 namespace squeal
 {

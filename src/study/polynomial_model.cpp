@@ -5,7 +5,6 @@
 #include "squeal/scene/numbers.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace squeal
 {

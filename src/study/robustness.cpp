@@ -20,7 +20,6 @@ namespace
 
 using Complex = std::complex<double>;
 using Eigen::Index;
-using Eigen::MatrixXcd;
 using Eigen::VectorXcd;
 
 constexpr double least_share = 0.1; // of a reference mode in an unstable one, below which it is none of them

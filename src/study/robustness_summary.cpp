@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>
-#include <cmath>
 #include <numeric>
 
 namespace squeal

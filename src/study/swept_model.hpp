@@ -2,7 +2,6 @@
 /// The model at the points of a sweep, with what they share: its matrices, the compliance of its pairs and the basis of
 /// its modes.
 #include "following.hpp"
-#include "lines.hpp"
 
 #include <map>
 #include <optional>
