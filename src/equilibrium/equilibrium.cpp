@@ -324,6 +324,12 @@ OptionList options_of(EquilibriumOptions& options)
   };
 }
 
+EquilibriumOptions checked_if_asked(EquilibriumOptions options)
+{
+  options.check_max_iterations = std::max<PetscInt>(options.check_max_iterations, 0);
+  return options;
+}
+
 struct PairCompliance::Parts
 {
   std::vector<double> axes; // of each pair, as TangentView reads them

@@ -176,10 +176,8 @@ class Sampler
 public:
   explicit Sampler(const RobustnessProblem& problem)
       : problem_(problem), model_(problem), omega_(0.1 * two_pi * problem.modes.band),
-        equilibrium_options_(problem.equilibrium_options)
+        equilibrium_options_(checked_if_asked(problem.equilibrium_options))
   {
-    // the independent fixed point is a check of single runs
-    if (equilibrium_options_.check_max_iterations < 0) equilibrium_options_.check_max_iterations = 0;
     const PairShapes pairs = make_pair_shapes(model_.reference(), omega_);
     reduced_.emplace(model_, trained_shapes(pairs), pairs);
     if (const auto at = matrices_at(values_at(problem.numbers, std::vector<double>(problem.numbers.size(), 0.5))))
@@ -295,7 +293,8 @@ private:
 std::optional<std::vector<Complex>> full_modes(const RobustnessProblem& problem, const std::vector<double>& values)
 {
   const BrakeModel model = problem.model_at(values);
-  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, problem.equilibrium_options);
+  const Equilibrium equilibrium =
+      find_equilibrium(model.structure, model.interface, checked_if_asked(problem.equilibrium_options));
   if (equilibrium.outcome.kind != OutcomeKind::converged) return std::nullopt;
   const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
   ModesSettings settings = problem.modes;

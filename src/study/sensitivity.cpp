@@ -152,9 +152,8 @@ class NearbyEquilibria
 {
 public:
   explicit NearbyEquilibria(const SensitivityProblem& problem)
-      : problem_(problem), options_(problem.equilibrium_options)
+      : problem_(problem), options_(checked_if_asked(problem.equilibrium_options))
   {
-    if (options_.check_max_iterations < 0) options_.check_max_iterations = 0;
   }
 
   /// Nothing where it is the equilibrium of the problem itself.

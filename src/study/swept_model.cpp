@@ -28,10 +28,8 @@ std::vector<double> without_friction(std::vector<double> values, const SweepSett
 } // namespace
 
 SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm)
-    : problem_(problem), comm_(comm), equilibrium_options_(problem.equilibrium_options)
+    : problem_(problem), comm_(comm), equilibrium_options_(checked_if_asked(problem.equilibrium_options))
 {
-  // the independent fixed point is a check of single runs
-  if (equilibrium_options_.check_max_iterations < 0) equilibrium_options_.check_max_iterations = 0;
 }
 
 void SweptModel::go_to(const SweptPlace& place)

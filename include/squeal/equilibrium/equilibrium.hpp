@@ -65,6 +65,9 @@ struct EquilibriumOptions
 
 OptionList options_of(EquilibriumOptions& options);
 
+/// For studies of many equilibria: the fixed point, which checks single runs, runs only where it is asked for.
+EquilibriumOptions checked_if_asked(EquilibriumOptions options);
+
 /// The stiffness factored and the compliance D of the pairs, on their normals and the axes they slide along. Neither
 /// load nor friction changes them, nor a drive along the same axes.
 class PairCompliance
