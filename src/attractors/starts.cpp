@@ -1,10 +1,10 @@
 #include "starts.hpp"
 
 #include "squeal/base/constants.hpp"
+#include "squeal/base/random.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 namespace squeal
 {
@@ -13,12 +13,6 @@ namespace
 {
 
 constexpr std::size_t random_modes = 6; // the least stable ones
-
-/// A number in [0, 1) that is the same on every machine: std::uniform_real_distribution is not.
-double uniform(std::mt19937_64& generator)
-{
-  return static_cast<double>(generator() >> 11) * 0x1p-53;
-}
 
 State at_rest(const Equilibrium& equilibrium)
 {

@@ -1,7 +1,8 @@
 #include "lines.hpp"
 
+#include "squeal/base/random.hpp"
+
 #include <algorithm>
-#include <random>
 
 namespace squeal
 {
@@ -21,7 +22,7 @@ std::vector<double> grid_of(const SweepSettings& settings, std::size_t number)
   return values;
 }
 
-/// Evenly distributed in the ranges, the same on every machine.
+/// Evenly distributed in the ranges.
 std::vector<std::vector<double>> random_points(const SweepSettings& settings)
 {
   std::mt19937_64 generator(static_cast<std::uint64_t>(settings.seed));
@@ -30,10 +31,7 @@ std::vector<std::vector<double>> random_points(const SweepSettings& settings)
   {
     std::vector<double>& values = points.emplace_back();
     for (std::size_t k = 0; k < settings.key.size(); ++k)
-    {
-      const double part = static_cast<double>(generator() >> 11) * 0x1p-53; // in [0, 1)
-      values.push_back(settings.from[k] + part * (settings.to[k] - settings.from[k]));
-    }
+      values.push_back(settings.from[k] + uniform(generator) * (settings.to[k] - settings.from[k]));
   }
   return points;
 }

@@ -4,13 +4,13 @@
 #include "robustness_summary.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
+#include "squeal/base/random.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/modes/dense_losses.hpp"
 #include "swept_model.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 namespace squeal
 {
@@ -52,7 +52,7 @@ std::vector<double> values_at(const std::vector<UncertainNumber>& numbers, const
   return values;
 }
 
-/// The same on every machine. Collective: it ends where the run is asked to.
+/// The samples. Collective: it ends where the run is asked to.
 std::vector<std::vector<double>> random_values(const RobustnessProblem& problem, MPI_Comm comm)
 {
   constexpr int between = 1 << 14; // samples, a few milliseconds
@@ -62,8 +62,7 @@ std::vector<std::vector<double>> random_values(const RobustnessProblem& problem,
   {
     if (k % between == 0) end_if_asked(comm);
     std::vector<double> parts;
-    for (std::size_t i = 0; i < problem.numbers.size(); ++i)
-      parts.push_back(static_cast<double>(generator() >> 11) * 0x1p-53); // in [0, 1)
+    for (std::size_t i = 0; i < problem.numbers.size(); ++i) parts.push_back(uniform(generator));
     samples.push_back(values_at(problem.numbers, parts));
   }
   return samples;
