@@ -268,9 +268,14 @@ OptionList options_of(ModesOptions& options)
   };
 }
 
+double instability_of(std::complex<double> lambda)
+{
+  return lambda.real() - 1e-8 * std::abs(lambda);
+}
+
 bool is_unstable(std::complex<double> lambda)
 {
-  return lambda.real() > 1e-8 * std::abs(lambda);
+  return instability_of(lambda) > 0;
 }
 
 Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised, const ModesSettings& settings,

@@ -401,6 +401,11 @@ MatrixXcd real_times(const MatrixXd& A, const MatrixXcd& x)
   return result;
 }
 
+bool in_band(const TwoSidedPair& pair, double band)
+{
+  return std::abs(pair.lambda) < two_pi * band;
+}
+
 ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>& closed)
 {
   ModesBasis modes{make_basis(problem.structure, problem.interface, sketched)};

@@ -101,4 +101,7 @@ PointModes find_point_modes(ModesBasis& basis, const PointProblem& problem);
 /// Modes are followed a little beyond the band, so that none is lost at its end.
 inline constexpr double followed_band = 1.05;
 
+/// Whether |lambda| is below the end of a band [Hz].
+bool in_band(const TwoSidedPair& pair, double band);
+
 } // namespace squeal

@@ -81,17 +81,12 @@ std::vector<std::vector<double>> training_values(const RobustnessProblem& proble
   return points;
 }
 
-bool in_band(Complex lambda, double band)
-{
-  return lambda.imag() >= 0 && std::abs(lambda) < two_pi * band;
-}
-
 /// The modes in the band with both vectors.
 std::vector<TwoSidedPair> two_sided_modes(const ReducedMatrices& at, double band)
 {
   std::vector<TwoSidedPair> pairs = solve_two_sided_shared(MPI_COMM_SELF, at.M, at.C, at.K);
   const auto keep_below = [&](double end)
-  { std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !in_band(pair.lambda, end); }); };
+  { std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !in_band(pair, end); }); };
   if (at.K_loss.size() > 0)
   {
     keep_below(followed_band * band);
@@ -203,14 +198,14 @@ public:
   std::vector<TwoSidedPair> pairs_of(const ReducedMatrices& at) const
   {
     const auto norm = [](const Eigen::MatrixXd& A) { return A.cwiseAbs().colwise().sum().maxCoeff(); };
-    const double floor = 1e-12 * norm(at.K) / norm(at.M), band = problem_.modes.band; // as in section 3.4
+    const double floor = vibration_floor({norm(at.M), 0, norm(at.K)}), band = problem_.modes.band;
     std::vector<TwoSidedPair> pairs;
     if (at.K_loss.size() > 0)
       pairs = two_sided_modes(at, band);
     else
-      for (const Complex lambda : dense_quadratic_eigenvalues(at.M, at.C, at.K))
-        if (in_band(lambda, band)) pairs.push_back({lambda, {}, {}});
-    std::erase_if(pairs, [&](const TwoSidedPair& pair) { return std::norm(pair.lambda) < floor; });
+      for (const Complex lambda : dense_quadratic_eigenvalues(at.M, at.C, at.K)) pairs.push_back({lambda, {}, {}});
+    std::erase_if(pairs,
+                  [&](const TwoSidedPair& pair) { return std::norm(pair.lambda) < floor || !in_band(pair, band); });
     return pairs;
   }
 

@@ -1,7 +1,6 @@
 #include "thresholds.hpp"
 
 #include "squeal/algebra/root.hpp"
-#include "squeal/base/constants.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,11 +18,9 @@ using Places = std::vector<std::size_t>;
 /// Points of one step, at most. Three thresholds of up to 4 log2(1e5) points each (algebra/root.hpp) are fewer.
 constexpr int most_points = 200;
 
-/// Positive where the mode counts as unstable.
 double instability(const Followed& point, std::size_t place)
 {
-  const std::complex<double> lambda = point.modes.pairs[place].lambda;
-  return lambda.real() - 1e-8 * std::abs(lambda);
+  return instability_of(point.modes.pairs[place].lambda);
 }
 
 /// The unstable modes among these come first, by falling growth.
@@ -249,11 +246,6 @@ private:
 };
 
 } // namespace
-
-bool in_band(const TwoSidedPair& pair, double band)
-{
-  return std::abs(pair.lambda) < two_pi * band;
-}
 
 std::vector<Threshold> find_thresholds(const ThresholdSearch& search, const Followed& before, Followed& now,
                                        const std::vector<Match>& matches)

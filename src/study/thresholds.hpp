@@ -8,8 +8,6 @@
 namespace squeal
 {
 
-bool in_band(const TwoSidedPair& pair, double band);
-
 /// What a search between two points needs.
 struct ThresholdSearch
 {

@@ -132,8 +132,9 @@ struct ModesOptions
 
 OptionList options_of(ModesOptions& options);
 
-/// Real part large enough to call a mode unstable, here and everywhere: rounding shows up to 1e-8 |lambda| on a mode
-/// without damping.
+/// Real part less 1e-8 |lambda|, which is what rounding shows on a mode without damping: positive where a mode counts
+/// as unstable, here and everywhere.
+double instability_of(std::complex<double> lambda);
 bool is_unstable(std::complex<double> lambda);
 
 /// Frictionless undamped modes in the structure's dofs with frequency below `band` [Hz], as many as there are.
