@@ -65,13 +65,6 @@ MatrixXcd form(const ExpandedModes& lefts, const ExpandedModes& rights, const Mu
   return result + bilinear(lefts.left, C_right);
 }
 
-/// A ratio of 1 is perfect; one above it is as far off as its inverse.
-double folded(double ratio)
-{
-  if (!std::isfinite(ratio)) return 0;
-  return ratio > 1 ? 1 / ratio : ratio;
-}
-
 MatrixXd all_macs(const ModeForms& forms)
 {
   MatrixXd macs(forms.there.rows(), forms.there.cols());
@@ -194,6 +187,12 @@ void add_neighbour(Cluster& cluster, const MatrixXd& macs, const std::vector<Mat
 }
 
 } // namespace
+
+double folded(double ratio)
+{
+  if (!std::isfinite(ratio)) return 0;
+  return ratio > 1 ? 1 / ratio : ratio;
+}
 
 ModeForms forms_between(const PointModes& from, const PointModes& to)
 {

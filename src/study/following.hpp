@@ -35,6 +35,9 @@ inline constexpr double clear_mac_across = 0.6;
 /// divisions at mu = 0.05 modes share at least 0.33 with themselves, and less than 0.05 with others [6ea0b68].
 inline constexpr double clear_overlap = 0.25;
 
+/// How near a ratio is to 1: one above 1 is as far off as its inverse. Of a ratio of the form b it is the MAC.
+double folded(double ratio);
+
 /// The form b of section 10.3 between the modes of two points, with the matrices of one of them.
 struct ModeForms
 {

@@ -122,13 +122,11 @@ public:
     int result = unmatched;
     for (std::size_t i = 0; i < pairs_.size(); ++i)
     {
-      const double share = std::abs(form(at, pairs_[i], pair) * form(at, pair, pairs_[i]) / (own_[i] * own));
-      const double folded = share > 1 ? 1 / share : share;
+      const double mac = folded(std::abs(form(at, pairs_[i], pair) * form(at, pair, pairs_[i]) / (own_[i] * own)));
       // Where only one of two shapes moves with the pairs, T may show them alike. To be one mode, its stiffness over
       // its mass would have to have changed by so much.
-      const double ratio = std::norm(pairs_[i].lambda) / std::norm(pair.lambda),
-                   alike = folded * std::min(ratio, 1 / ratio);
-      if (!(alike > most)) continue;
+      const double alike = mac * folded(std::norm(pairs_[i].lambda) / std::norm(pair.lambda));
+      if (alike <= most) continue;
       most = alike;
       result = static_cast<int>(i);
     }

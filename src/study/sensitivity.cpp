@@ -382,9 +382,8 @@ void find_change_effects(const SensitivityProblem& problem, Sensitivity& result)
       ChangeEffect effect;
       effect.predicted =
           causes.lambda + change.mass * by.mass + change.damping * by.damping + change.stiffness * by.stiffness;
-      const auto farther = [&](const ComplexMode& a, const ComplexMode& b)
-      { return std::abs(a.lambda - effect.predicted) < std::abs(b.lambda - effect.predicted); };
-      const auto nearest = std::min_element(modes.modes.begin(), modes.modes.end(), farther);
+      const auto nearest = std::ranges::min_element(
+          modes.modes, {}, [&](const ComplexMode& mode) { return std::abs(mode.lambda - effect.predicted); });
       effect.found = modes.outcome.kind == OutcomeKind::converged && nearest != modes.modes.end();
       if (effect.found)
         effect.computed = nearest->lambda;
