@@ -355,7 +355,7 @@ bool complete(ModesBasis& modes, const PointProblem& problem)
   PetscInt size = 0, first = 0;
   check(MatGetSize(problem.sliding.structure.K, &size, nullptr));
   check(MatGetOwnershipRange(problem.sliding.structure.K, &first, nullptr));
-  if (size > problem.whole) return false;
+  if (size > problem.dense_limit) return false;
   MultiVector all{modes.basis.T.comm, MatrixXd::Zero(modes.basis.T.entries.rows(), size)};
   all.entries.middleCols(first, all.entries.rows()).setIdentity();
   modes.whole = true;
@@ -408,7 +408,7 @@ bool in_band(const TwoSidedPair& pair, double band)
 
 ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>& closed)
 {
-  ModesBasis modes{make_basis(problem.structure, problem.interface, sketched)};
+  ModesBasis modes{{make_basis(problem.structure, problem.interface, sketched)}};
   rebase(modes, problem, closed);
   return modes;
 }
@@ -417,9 +417,7 @@ void turn_round(ModesBasis& modes)
 {
   if (!modes.turned)
     modes.turned = GrownBasis{leading_part(modes.basis, modes.shared), std::vector<char>(modes.attached.size(), 0)};
-  std::swap(modes.basis, modes.turned->basis);
-  std::swap(modes.attached, modes.turned->attached);
-  std::swap(modes.whole, modes.turned->whole);
+  std::swap<GrownBasis>(modes, *modes.turned);
 }
 
 void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed)

@@ -15,23 +15,21 @@ namespace squeal
 struct GrownBasis
 {
   SlidingBasis basis;
-  std::vector<char> attached{}; // pairs beyond the closed ones whose static shapes the basis holds
+  std::vector<char> attached{}; // pairs beyond those closed at every point whose static shapes the basis holds
   bool whole = false;           // undamped modes in and near the band were not enough to solve on
 };
 
-/// Modes of the frictionless structure in and beyond the band, corrected wherever a point needs it.
-struct ModesBasis
+/// Modes of the frictionless structure in and beyond the band, corrected wherever a point needs it: those of the
+/// direction of rotation that is at hand, with what both directions have in common.
+struct ModesBasis : GrownBasis
 {
-  SlidingBasis basis;
-  ClosedContact contact{};      // of the pairs that are closed and rigid at every point: without friction
-  std::vector<char> closed{};   // those pairs
-  std::vector<char> attached{}; // other pairs whose static shapes the basis holds
-  Owned<Mat> M_z{}, K_z{};      // with the springs of pairs that have a compliance where the basis was made
+  ClosedContact contact{};    // of the pairs that are closed and rigid at every point: without friction
+  std::vector<char> closed{}; // those pairs
+  Owned<Mat> M_z{}, K_z{};    // with the springs of pairs that have a compliance where the basis was made
   Owned<Mat> Z_transposed{};
   ShiftInvert pencil{};               // of K_z, M_z just below zero
   QuadraticNorms norms{};             // of M_z, C_z and K_z
   int passes = 0;                     // corrections so far
-  bool whole = false;                 // undamped modes in and near the band were not enough to solve on
   Eigen::Index shared = 0;            // shapes that come first in both directions
   std::optional<GrownBasis> turned{}; // of the other direction, once it is needed
 };
@@ -61,10 +59,10 @@ void turn_round(ModesBasis& modes);
 struct PointProblem
 {
   const SlidingEquilibrium& sliding;
-  double band = 0;      // [Hz]
-  double tolerance = 0; // on the backward error of right and left vectors
-  PetscInt passes = 0;  // corrections of the basis, at most
-  PetscInt whole = 0;   // up to this size a problem that these leave inexact is solved on all degrees of freedom
+  double band = 0;          // [Hz]
+  double tolerance = 0;     // on the backward error of right and left vectors
+  PetscInt passes = 0;      // corrections of the basis, at most
+  PetscInt dense_limit = 0; // up to this size a problem that these leave inexact is solved on all degrees of freedom
 };
 
 /// Vectors are coefficients of the basis; those of earlier points lack the shapes that came later.
