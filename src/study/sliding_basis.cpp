@@ -16,32 +16,28 @@ namespace
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// The local rows that hold entries of B.
-std::vector<Index> columns_with_entries(Mat B)
+/// The local rows of the degrees of freedom at which some row of B has an entry, ascending.
+std::vector<Index> dofs_with_entries(Mat B)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRangeColumn(B, &first, &last));
-  Owned<Mat> squares;
-  Owned<Vec> ones, sums;
-  check(MatDuplicate(B, MAT_COPY_VALUES, squares.put()));
-  for_each_row(B,
-               [&](PetscInt row, std::span<const PetscInt> columns, std::span<const PetscScalar>)
-               {
-                 const std::vector<PetscScalar> marks(columns.size(), 1);
-                 check(MatSetValues(squares, 1, &row, static_cast<PetscInt>(columns.size()), columns.data(),
-                                    marks.data(), INSERT_VALUES));
-               });
-  check(MatAssemblyBegin(squares, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(squares, MAT_FINAL_ASSEMBLY));
-  check(MatCreateVecs(B, sums.put(), ones.put()));
-  check(VecSet(ones, 1));
-  check(MatMultTranspose(squares, ones, sums));
+  const Owned<Vec> marks = vector_of_columns(B);
+  check(VecSet(marks, 0));
+  for_each_row(
+      B,
+      [&](PetscInt, std::span<const PetscInt> columns, std::span<const PetscScalar>)
+      {
+        const std::vector<PetscScalar> ones(columns.size(), 1);
+        check(VecSetValues(marks, static_cast<PetscInt>(columns.size()), columns.data(), ones.data(), INSERT_VALUES));
+      });
+  check(VecAssemblyBegin(marks));
+  check(VecAssemblyEnd(marks));
+  PetscInt size = 0;
   const PetscScalar* values = nullptr;
   std::vector<Index> rows;
-  check(VecGetArrayRead(sums, &values));
-  for (PetscInt i = 0; i < last - first; ++i)
+  check(VecGetLocalSize(marks, &size));
+  check(VecGetArrayRead(marks, &values));
+  for (PetscInt i = 0; i < size; ++i)
     if (values[i] > 0) rows.push_back(i);
-  check(VecRestoreArrayRead(sums, &values));
+  check(VecRestoreArrayRead(marks, &values));
   return rows;
 }
 
@@ -113,14 +109,13 @@ Owned<IS> set_of(MPI_Comm comm, const std::vector<PetscInt>& places)
 }
 
 /// The pivots of this rank.
-Owned<IS> pivot_set(Mat A, const ClosedContact& contact)
+Owned<IS> pivot_set(const ClosedContact& contact)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(A, &first, &last));
+  PetscInt first = 0;
+  check(MatGetOwnershipRange(contact.Z, &first, nullptr));
   std::vector<PetscInt> own;
-  for (const PetscInt pivot : contact.pivots)
-    if (pivot >= first && pivot < last) own.push_back(pivot);
-  return set_of(comm_of(A), own);
+  for (const Index pivot : local_pivots(contact)) own.push_back(first + static_cast<PetscInt>(pivot));
+  return set_of(comm_of(contact.Z), own);
 }
 
 Owned<Mat> part_of(Mat A, IS rows, IS columns)
@@ -146,7 +141,7 @@ MultiVector change_by_lift(const SlidingBasis& basis, const ClosedContact& conta
     rows.push_back(dof);
     columns.push_back(first + static_cast<PetscInt>(dof) - static_cast<PetscInt>(below));
   }
-  MultiVector change = product(part_of(lift, pivot_set(lift, contact), set_of(comm_of(lift), columns)),
+  MultiVector change = product(part_of(lift, pivot_set(contact), set_of(comm_of(lift), columns)),
                                {basis.T.comm, basis.T.entries(rows, Eigen::all)});
   change.entries -= basis.T.entries(pivots, Eigen::all);
   return change;
@@ -184,10 +179,10 @@ void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact, Mat B)
   lift.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) -
               shared_sum(at_pivots.transpose() * at_pivots, basis.T.comm); // shapes are orthonormal
   lift.independent = independent_part(lift.kept);
+  const Owned<IS> pivots = pivot_set(contact);
   for (BasisImage* image : images_of(basis))
   {
     const MatrixXd rows = image->contact_rows.entries(lift.in_contact, Eigen::all);
-    const Owned<IS> pivots = pivot_set(image->matrix, contact);
     image->lifted_rows = product(part_of(image->matrix, pivots, pivots), lift.change);
     image->lifted_rows.entries += rows;
     image->lifted_products =
@@ -250,8 +245,7 @@ MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& cont
                  places.push_back(row - first);
                });
   const Owned<IS> taken = set_of(comm_of(B), rows);
-  const Owned<Mat> D_taken = part_of(D.matrix, taken, taken),
-                   at_pivots = part_of(B, taken, pivot_set(basis.K.matrix, contact));
+  const Owned<Mat> D_taken = part_of(D.matrix, taken, taken), at_pivots = part_of(B, taken, pivot_set(contact));
   double entries = 0;
   check(MatNorm(at_pivots, NORM_FROBENIUS, &entries));
   const MultiVector sliding{basis.T.comm, basis.by_Z.of_B.entries(places, Eigen::all)};
@@ -291,7 +285,7 @@ Owned<Mat> copy_of(Mat A)
 SlidingBasis make_basis(const Structure& structure, const Interface& interface, Index sketched)
 {
   SlidingBasis basis{random_multivector(structure.K, static_cast<PetscInt>(sketched)), sketched,
-                     columns_with_entries(interface.B)};
+                     dofs_with_entries(interface.B)};
   set_structure(basis, structure);
   return basis;
 }
