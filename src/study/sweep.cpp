@@ -14,8 +14,17 @@ namespace squeal
 namespace
 {
 
+/// Where a point is, for messages.
+std::string place_of(const SweepPoint& point, const std::vector<std::string>& keys)
+{
+  std::string text;
+  for (std::size_t k = 0; k < keys.size(); ++k)
+    text += (k == 0 ? "" : ", ") + format("%s = %g", keys[k].c_str(), point.values[k]);
+  return text + (point.reversed ? ", rotation reversed" : "");
+}
+
 /// Sets what follows from the points.
-void assess(Sweep& sweep, const std::string& key, std::size_t total)
+void assess(Sweep& sweep, const std::vector<std::string>& keys, std::size_t total)
 {
   sweep.outcome.iterations = static_cast<int>(sweep.points.size());
   const auto note = [&](const auto& outcome_of, const char* what, std::size_t of)
@@ -24,7 +33,7 @@ void assess(Sweep& sweep, const std::string& key, std::size_t total)
     std::string first;
     for (const SweepPoint& point : sweep.points)
       if (const Outcome* outcome = outcome_of(point); outcome && !succeeded(*outcome) && ++failed == 1)
-        first = format("%s = %g: ", key.c_str(), point.values[0]) + outcome->reason;
+        first = place_of(point, keys) + ": " + outcome->reason;
     if (failed == 0) return;
     sweep.outcome.kind = OutcomeKind::not_converged;
     sweep.outcome.reason += (sweep.outcome.reason.empty() ? "" : "; ") +
@@ -87,7 +96,7 @@ Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm)
     return groups > 1 ? run_in_groups(problem, lines, groups, comm) : visit(problem, {comm, false, "sweep"}, lines);
   };
   Sweep sweep = problem.settings.stages == SweepStages::cycle ? with_motions(linear, problem, comm) : linear();
-  assess(sweep, problem.settings.key[0], total);
+  assess(sweep, problem.settings.key, total);
   return sweep;
 }
 

@@ -261,7 +261,8 @@ def test_points_that_fail_are_passed_over(squeal):
                  "sweep.values=[0.1, 0.3, 50]", ranks=1)
     assert run.code == 2
     sweep = run.report["sweep"]
-    assert sweep["outcome"] == "not converged" and "1 of 3 points failed" in sweep["reason"]
+    assert sweep["outcome"] == "not converged"
+    assert "1 of 3 points failed, the first at friction.coefficient = 50: " in sweep["reason"]
     assert [p["outcome"] == "converged" for p in sweep["points"] if not p["inserted"]] == [True, True, False]
     assert sweep["points"][-1]["reason"]
 
