@@ -16,18 +16,24 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-/// x'A y of each mode, without conjugation, from the products of all parts.
+/// x'A y of a mode, without conjugation, from the products of all parts.
 Complex bilinear(const MatrixXd& products, std::size_t mode, std::size_t count)
 {
   const auto re = static_cast<Index>(mode), im = static_cast<Index>(mode + count);
   return {products(re, re) - products(im, im), products(re, im) + products(im, re)};
 }
 
-/// x^H A x of each mode, A symmetric.
+/// x^H A x of a mode, A symmetric.
 double hermitian(const MatrixXd& products, std::size_t mode, std::size_t count)
 {
   const auto re = static_cast<Index>(mode), im = static_cast<Index>(mode + count);
   return products(re, re) + products(im, im);
+}
+
+/// A X; zero without a matrix.
+MultiVector product_or_zero(Mat A, const MultiVector& X)
+{
+  return A ? product(A, X) : MultiVector{X.comm, MatrixXd::Zero(X.entries.rows(), X.columns())};
 }
 
 } // namespace
@@ -56,17 +62,6 @@ PairMotions pair_motions(const Interface& interface, const MultiVector& X, std::
   }
   return result;
 }
-
-namespace
-{
-
-/// A matrix of a structure that may lack it, as products with vectors.
-MultiVector product_or_zero(Mat A, const MultiVector& X)
-{
-  return A ? product(A, X) : MultiVector{X.comm, MatrixXd::Zero(X.entries.rows(), X.columns())};
-}
-
-} // namespace
 
 std::vector<double> quadratic_forms(Mat A, const HeldVectors& vectors)
 {

@@ -143,9 +143,9 @@ PolynomialModel::PolynomialModel(const RobustnessProblem& problem) : problem_(pr
   for (std::size_t i = 0; i < places.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
     {
+      // the squares cancel, so that the product alone is left
       const BrakeModel both = at({{places[i], 1}, {places[j], 1}});
       terms_.push_back(sum_of({{1, &both}, {-1, &above[i]}, {-1, &above[j]}, {1, &reference_}}, reference_));
-      // both - above_i - above_j + centre holds the product alone: the squares cancel
       terms_.back().factors = {places[j], places[i]};
     }
   std::vector<double> corner = centre_;

@@ -109,7 +109,7 @@ void find_correlations(Robustness& result, std::size_t numbers)
   for (const RobustSample& sample : result.samples)
   {
     if (!sample.known || sample.frequency_hz == 0) continue;
-    growth.push_back(sample.growth_rate / sample.frequency_hz);
+    growth.push_back(sample.growth_rate / sample.frequency_hz); // which orders samples as that over |lambda| does
     for (std::size_t i = 0; i < numbers; ++i) values[i].push_back(sample.values[i]);
   }
   for (const std::vector<double>& of_number : values) result.correlation.push_back(rank_correlation(of_number, growth));

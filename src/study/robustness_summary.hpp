@@ -22,7 +22,7 @@ void share(std::vector<RobustCheck>& checks, MPI_Comm comm);
 /// Gives every rank all unstable modes, by samples.
 void share(std::vector<UnstableMode>& modes, MPI_Comm comm);
 
-/// Of so many numbers with the growth of the samples.
+/// Of so many numbers with the growth rates over |lambda| of the samples whose mode oscillates.
 void find_correlations(Robustness& result, std::size_t numbers);
 
 /// Probabilities of the unstable modes that are one of the reference's, and of any.

@@ -17,7 +17,7 @@ struct SharedPoints
 /// each, if each gets enough points. Collective.
 int groups_of(PetscInt wanted, const SharedPoints& shared, MPI_Comm comm);
 
-/// The first rank of a group, and of the rank behind the last group.
+/// The first rank of a group; behind the last group, the number of ranks.
 int first_rank(int group, int groups, int ranks);
 
 /// Does the work of this rank's group. What any group throws ends all of them after their work; so does a request to

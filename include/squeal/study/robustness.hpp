@@ -18,14 +18,14 @@ struct Probability
 /// The probability of an event that `count` of the samples show. Arithmetic of one rank.
 Probability probability_of(int count, int samples, double confidence);
 
-/// Of all samples. growth_rate and frequency_hz are of the mode that grows most or decays least.
+/// Of all samples. growth_rate, frequency_hz and mode are of the mode with the greatest growth rate over |lambda|.
 struct RobustSample
 {
   std::vector<double> values; // of the random numbers
   bool known = false;         // there is an equilibrium
   int closed = 0;             // pairs
   int unstable = 0;           // modes in the band
-  double growth_rate = 0;     // [1/s]
+  double growth_rate = 0;     // [1/s] 0 without a mode in the band
   double frequency_hz = 0;
   int mode = -1; // which mode of the reference it is, if it is unstable
 };
