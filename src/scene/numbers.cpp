@@ -1,4 +1,4 @@
-/// Numbers of a scene that a branch follows or a sweep varies, found in the scene's own text and replaced there.
+/// Numbers of a scene, found in the scene's own text and replaced there, and checks of the tables that name them.
 #include "squeal/scene/numbers.hpp"
 
 #include "scene_keys.hpp"
@@ -33,6 +33,19 @@ std::string text_of_number(double value)
 toml::table document_of(const Scene& scene)
 {
   return toml::parse(resolved_scene(scene), std::string_view("scene"));
+}
+
+/// Does a check; the text of an Error of it then begins with `prefix`.
+template <class Check> void prefixed(const std::string& prefix, Check check)
+{
+  try
+  {
+    check();
+  }
+  catch (const Error& error)
+  {
+    throw Error(prefix + error.what());
+  }
 }
 
 /// Finds the keys of a table, and how many words of a number's key come before one of them.
@@ -89,14 +102,7 @@ double number_at(const Scene& scene, const std::string& key, NumberTable table)
 
 void need_scene(const Scene& scene, const SceneNumber& number, const std::string& place, const std::string& label)
 {
-  try
-  {
-    (void)scene_with(scene, std::span(&number, 1));
-  }
-  catch (const Error& error)
-  {
-    throw Error(place + ": " + label + error.what());
-  }
+  prefixed(place + ": " + label, [&] { (void)scene_with(scene, std::span(&number, 1)); });
 }
 
 namespace
@@ -117,14 +123,8 @@ public:
     if (numbers > 2) fail(&sweep_.key, "names " + std::to_string(numbers) + " numbers: give one or two");
     if (numbers == 2 && sweep_.key[0] == sweep_.key[1])
       fail(&sweep_.key, "names \"" + sweep_.key[0] + "\" twice: give two different numbers");
-    for (const std::string& key : sweep_.key) try
-      {
-        (void)number_at(scene_, key, NumberTable::sweep);
-      }
-      catch (const Error& error)
-      {
-        throw Error(places_.at(&sweep_.key) + ": " + error.what());
-      }
+    for (const std::string& key : sweep_.key)
+      prefixed(places_.at(&sweep_.key) + ": ", [&] { (void)number_at(scene_, key, NumberTable::sweep); });
     check_form();
     for (std::size_t i = 0; i < numbers; ++i)
       for (const auto* list : {&sweep_.from, &sweep_.to})
@@ -286,14 +286,7 @@ void resolve_branch(Scene& scene, const Places& places)
   if (!scene.branch) return;
   BranchSettings& branch = *scene.branch;
   const auto fail = [&](const void* member, const std::string& text) { throw Error(places.at(member) + ": " + text); };
-  try
-  {
-    branch.own = number_at(scene, branch.key, NumberTable::branch);
-  }
-  catch (const Error& error)
-  {
-    fail(&branch.key, error.what());
-  }
+  prefixed(places.at(&branch.key) + ": ", [&] { branch.own = number_at(scene, branch.key, NumberTable::branch); });
   if (branch.from == branch.to)
     fail(&branch.to, "[branch] from and to are both " + text_of_number(branch.to) + ": give a range");
   if (branch.own < std::min(branch.from, branch.to) || branch.own > std::max(branch.from, branch.to))
@@ -447,16 +440,12 @@ void check_numbers(const Scene& scene)
     const std::string& key = numbers[i].key;
     if (std::ranges::count(std::span(numbers).first(i), key, &SceneNumber::key) > 0)
       throw Error("[sensitivity] numbers names \"" + key + "\" twice: take one of them out");
-    if (numbers[i].value == 0) try
-      {
-        constexpr double little = 1e-9; // beside any number of use
-        (void)scene_with(scene, from_zero(scene, {key, little}));
-      }
-      catch (const Error& error)
-      {
-        throw Error("[sensitivity] " + key + " is 0, and nothing beside that is a scene: leave it out, or give it a " +
-                    "value. " + error.what());
-      }
+    constexpr double little = 1e-9; // beside any number of use
+    if (numbers[i].value == 0)
+      prefixed("[sensitivity] " + key + " is 0, and nothing beside that is a scene: leave it out, or give it a value. ",
+               [&] {
+                 (void)scene_with(scene, from_zero(scene, {key, little}));
+               });
   }
 }
 
@@ -464,14 +453,7 @@ void check_numbers(const Scene& scene)
 
 void check_sensitivity(const Scene& scene, const Places& places)
 {
-  if (scene.sensitivity) try
-    {
-      check_numbers(scene);
-    }
-    catch (const Error& error)
-    {
-      throw Error(places.at(&scene.sensitivity->numbers) + ": " + error.what());
-    }
+  if (scene.sensitivity) prefixed(places.at(&scene.sensitivity->numbers) + ": ", [&] { check_numbers(scene); });
   std::vector<std::string> probes;
   for (const Probe& probe : scene.probes) probes.push_back(probe.name);
   for (const Change& change : scene.changes)
