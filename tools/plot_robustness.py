@@ -5,6 +5,8 @@ from plot_basis import heading, plt, those_with
 from plot_sweep import COLOURS
 from squeal import Missing, number_label
 
+SHOWN = 8  # modes, those that are unstable most often
+
 
 def robustness_of(results):
     robustness = results.stage("robustness")
@@ -23,8 +25,8 @@ def name_of(mode, modes):
 
 
 def draw_probabilities(axes, robustness):
-    """A bar for any mode and one for each mode, with its interval."""
-    entries = [("any mode", robustness["any"])] + [(name_of(mode, robustness["modes"]), mode) for mode in robustness["modes"][:8]]
+    """A bar for any mode and one for each of the first modes, with its interval."""
+    entries = [("any mode", robustness["any"])] + [(name_of(mode, robustness["modes"]), mode) for mode in robustness["modes"][:SHOWN]]
     for place, (_, entry) in enumerate(entries):
         middle = 100 * entry["probability"]
         error = [[middle - 100 * entry["lower"]], [100 * entry["upper"] - middle]]
@@ -37,7 +39,7 @@ def draw_probabilities(axes, robustness):
 
 
 def draw_growth(axes, table):
-    """Histogram of growth over omega of the mode that grows most; unstable samples in red."""
+    """Histogram of growth over omega of the mode where it is largest; unstable samples in red."""
     chosen = (table["known"] == 1) & (table["frequency"] > 0)
     ratio = 100 * table["growth_rate"][chosen] / (2 * np.pi * table["frequency"][chosen])
     width = max(np.ptp(ratio) / 40, 1e-12)
@@ -69,7 +71,7 @@ def draw_drivers(axes, robustness):
 def draw_robustness(runs):
     (results, robustness), *_ = those_with(runs, robustness_of)
     table = {name: results.series("robustness", name) for name in ("known", "growth_rate", "frequency", "unstable_modes")}
-    rows = max(len(robustness["numbers"]), 1 + min(8, len(robustness["modes"])))
+    rows = max(len(robustness["numbers"]), 1 + min(SHOWN, len(robustness["modes"])))
     figure, axes = plt.subplots(1, 3, figsize=(13.5, 2.4 + 0.35 * rows))
     for ax in axes:
         ax.set_axisbelow(True)  # the grid

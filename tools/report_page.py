@@ -17,6 +17,7 @@ from squeal import Missing
 
 STAGES = ("equilibrium", "modes", "estimate", "response", "transient", "coarse", "cycle", "settled", "attractors", "branch",
           "sensitivity", "sweep", "robustness")
+FAILED = ("not converged", "no equilibrium", "refused", "collapsed to equilibrium", "not periodic", "unstable cycle", "interrupted")
 
 
 def data(content, kind):
@@ -114,16 +115,17 @@ def answers(runs):
         heard = run.report.get("heard") or f"the run ended with exit code {run.exit_code}"
         cards = "".join(f"<div><dt>{text(name)}</dt><dd>{text(value)}</dd></div>" for name, value in facts(run).items())
         return f'<p class="heard">{text(heard[0].upper() + heard[1:])}.</p><dl class="cards">{cards}</dl>'
-    names = list(dict.fromkeys(name for run in runs for name in facts(run)))
-    rows = [[f"<b>{text(run.folder.name)}</b>", text(run.report.get("heard", "")), *(text(facts(run).get(name, "–")) for name in names)]
-            for run in runs]
+    found = [facts(run) for run in runs]
+    names = list(dict.fromkeys(name for entry in found for name in entry))
+    rows = [[f"<b>{text(run.folder.name)}</b>", text(run.report.get("heard", "")), *(text(entry.get(name, "–")) for name in names)]
+            for run, entry in zip(runs, found)]
     return table(["run", "heard", *map(text, names)], rows)
 
 
 def warnings(run):
     found = [(stage, words) for stage in ("model", *STAGES) for words in run.report.get(stage, {}).get("warnings", [])]
     failed = [(stage, run.report[stage].get("reason") or run.report[stage]["outcome"]) for stage in STAGES
-              if run.report.get(stage, {}).get("outcome") in ("not converged", "no equilibrium", "refused", "not periodic", "interrupted")]
+              if run.report.get(stage, {}).get("outcome") in FAILED]
     items = "".join(f"<li><b>{stage}</b>: {text(words)}</li>" for stage, words in failed + found)
     return f'<section class="warnings"><h2>Warnings</h2><ul>{items}</ul></section>' if items else ""
 
