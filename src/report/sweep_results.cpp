@@ -181,6 +181,7 @@ std::string sweep_csv(const Sweep& sweep, const Scene& scene)
 std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
 {
   constexpr std::size_t shown = 12;
+  if (sweep.points.empty()) return {};
   std::string keys;
   for (const std::string& key : scene.sweep->key) keys += (keys.empty() ? "" : " and ") + label_of_number(scene, key);
   std::vector<std::string> lines = {format("%zu points of %s", sweep.points.size(), keys.c_str())};
