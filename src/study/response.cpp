@@ -165,8 +165,8 @@ MultiVector corrections(const HarmonicBasis& basis, const std::vector<double>& o
   const Index driven = found.driven;
   const Eigen::RowVectorXd of_driven = found.defects.topRows(driven).colwise().maxCoeff(),
                            of_read = found.defects.bottomRows(found.defects.rows() - driven).colwise().maxCoeff();
-  std::array<MultiVector, 2> residuals = {basis.V, basis.V};
-  for (MultiVector& part : residuals) part.entries.resize(Eigen::NoChange, 0);
+  const MultiVector none{basis.V.comm, MatrixXd(basis.V.entries.rows(), 0)};
+  std::array<MultiVector, 2> residuals = {none, none};
   std::map<Index, std::array<MatrixXcd, 2>> solved; // by frequency
   for (Index force = 0; force < found.defects.rows(); ++force)
   {
