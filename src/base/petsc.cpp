@@ -130,6 +130,13 @@ Owned<Vec> copy_of(Vec source)
   return result;
 }
 
+Owned<Mat> copy_of(Mat source)
+{
+  Owned<Mat> result;
+  check(MatDuplicate(source, MAT_COPY_VALUES, result.put()));
+  return result;
+}
+
 std::vector<double> all_entries(Vec x)
 {
   const RowLayout layout = row_layout(x);

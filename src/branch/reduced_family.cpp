@@ -249,9 +249,8 @@ void ReducedFamily::check_shapes_fit(const Interface& other) const
 {
   constexpr double rounding = 1e-12; // of directions found anew
   const Interface& own = problem_.sliding.interface;
-  Owned<Mat> moved;
+  const Owned<Mat> moved = copy_of(own.B);
   double change = 0, whole = 0;
-  check(MatDuplicate(own.B, MAT_COPY_VALUES, moved.put()));
   check(MatAXPY(moved, -1, other.B, DIFFERENT_NONZERO_PATTERN));
   check(MatNorm(moved, NORM_FROBENIUS, &change));
   check(MatNorm(own.B, NORM_FROBENIUS, &whole));

@@ -65,8 +65,7 @@ void find_loose(Mat A, Vec D, const FactorOptions& options, Factored& result)
   check(VecSet(uniform, 1));
   for (bool failed = true; failed && part < 100; part *= 10)
   {
-    Owned<Mat> shifted;
-    check(MatDuplicate(A, MAT_COPY_VALUES, shifted.put()));
+    const Owned<Mat> shifted = copy_of(A);
     check(MatShift(shifted, largest > 0 ? part * largest : 1));
     const Factor factor(shifted, nullptr, options);
     failed = factor.failed();

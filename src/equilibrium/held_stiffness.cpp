@@ -42,7 +42,7 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
   {
     first.factor = Factor(); // two of them side by side would be the most that a run ever holds
     held.kappa = typical_stiffness(structure.K);
-    check(MatDuplicate(structure.K, MAT_COPY_VALUES, held.augmented.put()));
+    held.augmented = copy_of(structure.K);
     check(MatAXPY(held.augmented, held.kappa, normal_springs(interface), DIFFERENT_NONZERO_PATTERN));
     check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
     Factored second = factor_positive(held.augmented, interface, options);

@@ -324,8 +324,7 @@ std::vector<std::complex<double>> normal_reactions(const ReactionOperator& react
 
 Owned<Mat> sum_of(Mat A, Mat B)
 {
-  Owned<Mat> result;
-  check(MatDuplicate(B, MAT_COPY_VALUES, result.put()));
+  Owned<Mat> result = copy_of(B);
   check(MatAXPY(result, 1, A, DIFFERENT_NONZERO_PATTERN));
   return result;
 }
@@ -334,8 +333,7 @@ Owned<Mat> sliding_damping(const SlidingEquilibrium& sliding)
 {
   const auto& [structure, interface, equilibrium] = sliding;
   const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
-  Owned<Mat> result;
-  check(MatDuplicate(structure.C, MAT_COPY_VALUES, result.put()));
+  Owned<Mat> result = copy_of(structure.C);
   if (const Owned<Mat> Cf = friction_damping(interface, equilibrium.closed, equilibrium.reactions, part); Cf.get())
     check(MatAXPY(result, 1, Cf, UNKNOWN_NONZERO_PATTERN));
   if (structure.G.get()) result = sum_of(result, structure.G);

@@ -27,8 +27,7 @@ void normalise(Eigenpair& pair)
 
 Owned<Mat> scaled(Mat A, double factor)
 {
-  Owned<Mat> result;
-  check(MatDuplicate(A, MAT_COPY_VALUES, result.put()));
+  Owned<Mat> result = copy_of(A);
   check(MatScale(result, factor));
   return result;
 }
@@ -131,8 +130,7 @@ QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSe
 
 Owned<Mat> without_loss(Mat C, const Structure& structure)
 {
-  Owned<Mat> result;
-  check(MatDuplicate(C, MAT_COPY_VALUES, result.put()));
+  Owned<Mat> result = copy_of(C);
   check(MatAXPY(result, -1 / structure.loss_omega, structure.K_loss, UNKNOWN_NONZERO_PATTERN));
   return result;
 }

@@ -97,8 +97,7 @@ struct ShiftedPencil
 /// definite, by MUMPS.
 ShiftedPencil shifted_below_zero(Mat K, Mat M, double shift, const ModesOptions& options)
 {
-  Owned<Mat> A;
-  check(MatDuplicate(K, MAT_COPY_VALUES, A.put()));
+  const Owned<Mat> A = copy_of(K);
   check(MatAXPY(A, -shift, M, UNKNOWN_NONZERO_PATTERN));
   const auto factor = std::make_shared<const Factor>(A, nullptr, options.factor);
   if (!factor->failed()) return {K, M, shift, [factor](Vec b, Vec x) { solve(*factor, b, x); }};

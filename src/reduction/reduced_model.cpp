@@ -65,8 +65,8 @@ Owned<Mat> only_rows(Mat A, const std::vector<PetscInt>& rows)
 /// Of shapes X = Z y.
 LeftPart left_part(const ClosedContact& contact, Mat B, const MultiVector& X)
 {
-  Owned<Mat> difference, of_motions, on_pairs;
-  check(MatDuplicate(contact.Y, MAT_COPY_VALUES, difference.put()));
+  const Owned<Mat> difference = copy_of(contact.Y);
+  Owned<Mat> of_motions, on_pairs;
   check(MatAXPY(difference, -1, contact.Z, DIFFERENT_NONZERO_PATTERN));
   check(MatMatMult(difference, kept_rows(contact), MAT_INITIAL_MATRIX, PETSC_DEFAULT, of_motions.put()));
   check(MatMatMult(B, of_motions, MAT_INITIAL_MATRIX, PETSC_DEFAULT, on_pairs.put()));

@@ -82,8 +82,7 @@ bool is_there(const std::filesystem::path& file, MPI_Comm comm)
 /// Returns A with the pattern of `pattern`, whose entries are zero.
 Owned<Mat> with_pattern(Mat pattern, Mat A)
 {
-  Owned<Mat> result;
-  check(MatDuplicate(pattern, MAT_COPY_VALUES, result.put()));
+  Owned<Mat> result = copy_of(pattern);
   check(MatAXPY(result, 1, A, SUBSET_NONZERO_PATTERN));
   mark_symmetric(result);
   return result;
@@ -198,8 +197,7 @@ void mark_symmetric(Mat A)
 
 void share_pattern(Structure& structure)
 {
-  Owned<Mat> pattern;
-  check(MatDuplicate(structure.M, MAT_COPY_VALUES, pattern.put()));
+  Owned<Mat> pattern = copy_of(structure.M);
   check(MatAXPY(pattern, 1, structure.C, DIFFERENT_NONZERO_PATTERN));
   check(MatAXPY(pattern, 1, structure.K, DIFFERENT_NONZERO_PATTERN));
   check(MatShift(pattern, 1)); // adds the diagonal entries that are missing

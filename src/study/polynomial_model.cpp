@@ -1,6 +1,5 @@
 #include "polynomial_model.hpp"
 
-#include "sliding_basis.hpp"
 #include "squeal/modes/quadratic.hpp"
 #include "squeal/scene/numbers.hpp"
 

@@ -1,6 +1,5 @@
 #include "reduced_sliding.hpp"
 
-#include "sliding_basis.hpp"
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"

@@ -275,13 +275,6 @@ bool equal(Mat A, Mat B)
   return same == PETSC_TRUE;
 }
 
-Owned<Mat> copy_of(Mat A)
-{
-  Owned<Mat> result;
-  check(MatDuplicate(A, MAT_COPY_VALUES, result.put()));
-  return result;
-}
-
 SlidingBasis make_basis(const Structure& structure, const Interface& interface, Index sketched)
 {
   SlidingBasis basis{random_multivector(structure.K, static_cast<PetscInt>(sketched)), sketched,

@@ -91,6 +91,4 @@ MultiVector with_zero_pivots(const MultiVector& kept, const ClosedContact& conta
 /// Whether two matrices have one layout and equal entries. Collective.
 bool equal(Mat A, Mat B);
 
-Owned<Mat> copy_of(Mat A);
-
 } // namespace squeal

@@ -229,8 +229,7 @@ OptionList options_of(StepOptions& options)
 
 Owned<Mat> step_matrix(const Structure& structure, double h, double theta)
 {
-  Owned<Mat> A;
-  check(MatDuplicate(structure.M, MAT_COPY_VALUES, A.put()));
+  Owned<Mat> A = copy_of(structure.M);
   check(MatAXPY(A, h * theta, structure.C, SAME_NONZERO_PATTERN));
   check(MatAXPY(A, h * h * theta * theta, structure.K, SAME_NONZERO_PATTERN));
   check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));

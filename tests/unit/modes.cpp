@@ -101,8 +101,7 @@ TEST_CASE("the equations of the structure hold with the reactions of each mode, 
   const SmallModel model = crowded_model(12, 3);
   const Equilibrium equilibrium = all_closed(model);
   const Modes modes = test::modes_of(model, equilibrium, settings_of(ModesMethod::full), {});
-  Owned<Mat> C;
-  check(MatDuplicate(model.structure.C, MAT_COPY_VALUES, C.put()));
+  const Owned<Mat> C = copy_of(model.structure.C);
   check(MatAXPY(C, 1,
                 friction_damping(model.interface, equilibrium.closed, equilibrium.reactions, FrictionDamping::whole),
                 UNKNOWN_NONZERO_PATTERN));

@@ -78,8 +78,9 @@ Owned<Vec> vector_of_rows(Mat A);
 /// A'. Collective.
 Owned<Mat> transpose_of(Mat A);
 
-/// Returns a vector of the same layout and entries.
+/// Return a vector, and a matrix, of the same layout and entries.
 Owned<Vec> copy_of(Vec source);
+Owned<Mat> copy_of(Mat source);
 
 /// Returns all entries of a small distributed vector on every rank. Collective.
 std::vector<double> all_entries(Vec x);
