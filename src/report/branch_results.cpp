@@ -1,5 +1,7 @@
 #include "branch_results.hpp"
 
+#include "derived.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -215,7 +217,7 @@ std::vector<std::string> branch_lines(const BrakeBranch& branch, const Scene& sc
   if (followed.points.empty()) return {};
   std::vector<std::string> lines = {
       format("%zu cycles along %s from %.6g to %.6g; %ld periods and %ld columns of the tangent",
-             followed.points.size(), scene.branch->key.c_str(), followed.points.front().parameter,
+             followed.points.size(), number_text(scene, scene.branch->key).c_str(), followed.points.front().parameter,
              followed.points.back().parameter, followed.periods, followed.columns),
       format("%12s %14s %14s %18s", "parameter", "frequency", "energy", "largest multiplier"),
       format("%12s %14s %14s %18s", "", "[Hz]", "[J]", "[-]")};

@@ -47,6 +47,12 @@ StepBias cycle_bias(const Report& report)
   return bias_of(report, discrete_eigenvalue(report.modes.modes.front().lambda, report.cycle.theta, h));
 }
 
+std::string number_text(const Scene& scene, const std::string& key)
+{
+  const std::string unit = unit_of_number(key);
+  return label_of_number(scene, key) + (unit == "-" ? "" : " [" + unit + "]");
+}
+
 double chatter(const History& history)
 {
   const std::vector<double>& force = history.normal_force;

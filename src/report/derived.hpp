@@ -1,5 +1,5 @@
 #pragma once
-/// What the report derives from results: sums of forces, the step's own error, chatter.
+/// What the report derives from results and the scene: sums of forces, the step's own error, chatter, names.
 #include "squeal/report/report.hpp"
 
 #include <limits>
@@ -25,6 +25,9 @@ struct StepBias
 
 StepBias transient_bias(const Report& report);
 StepBias cycle_bias(const Report& report);
+
+/// A number of the scene with its name and unit, where it has them: "contact.1.gap (pad on disc) [m]".
+std::string number_text(const Scene& scene, const std::string& key);
 
 /// The part of the normal force that alternates from step to step: rms of its second difference / 4, over its mean.
 double chatter(const History& history);

@@ -1,5 +1,6 @@
 #include "sweep_results.hpp"
 
+#include "derived.hpp"
 #include "squeal/scene/numbers.hpp"
 #include "sweep_motion_results.hpp"
 
@@ -183,7 +184,7 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
   constexpr std::size_t shown = 12;
   if (sweep.points.empty()) return {};
   std::string keys;
-  for (const std::string& key : scene.sweep->key) keys += (keys.empty() ? "" : " and ") + label_of_number(scene, key);
+  for (const std::string& key : scene.sweep->key) keys += (keys.empty() ? "" : " and ") + number_text(scene, key);
   std::vector<std::string> lines = {format("%zu points of %s", sweep.points.size(), keys.c_str())};
   if (scene.sweep->stages == SweepStages::equilibrium) return lines;
   lines.back() += format("; backward error %.1e at most, on a basis of %d shapes after %d corrections",

@@ -131,6 +131,7 @@ def test_a_number_that_no_reduced_model_holds_is_followed_on_the_full_one(conver
     branch = run.report["branch"]
     assert branch["model"] == "full" and "contact.0.gap moves the contact itself" in branch["not_reduced"]
     assert "followed on the full model: contact.0.gap" in run.printed
+    assert "cycles along contact.0.gap (pin_face on disc_face) [m] from" in run.printed
 
 
 def test_a_branch_ends_where_its_cycle_does(squeal, tmp_path):
