@@ -24,6 +24,30 @@ using Eigen::VectorXcd;
 
 constexpr double least_share = 0.1; // of a reference mode in an unstable one, below which it is none of them
 
+/// The text of the Error of some work; empty where there is none.
+template <class Work> std::string error_of(Work work)
+{
+  try
+  {
+    work();
+  }
+  catch (const LibraryError&)
+  {
+    throw;
+  }
+  catch (const Error& error)
+  {
+    return error.what();
+  }
+  return {};
+}
+
+/// Error: a stage of a sample did not converge, and why.
+void need(const Outcome& outcome)
+{
+  if (outcome.kind != OutcomeKind::converged) throw Error(word(outcome.kind) + (": " + outcome.reason));
+}
+
 /// Points that fill the unit cube evenly: the centre, then Halton's sequence.
 std::vector<std::vector<double>> even_points(std::size_t dimensions, PetscInt count)
 {
@@ -172,12 +196,13 @@ public:
   {
     const PairShapes pairs = make_pair_shapes(model_.reference(), omega_);
     reduced_.emplace(model_, trained_shapes(pairs), pairs);
-    if (const auto at = matrices_at(values_at(problem.numbers, std::vector<double>(problem.numbers.size(), 0.5))))
-      reference_ = Reference(*at, problem.modes.band);
+    const std::vector<double> medians = values_at(problem.numbers, std::vector<double>(problem.numbers.size(), 0.5));
+    // without it, modes are like none of the reference
+    (void)error_of([&] { reference_ = Reference(matrices_at(medians), problem.modes.band); });
   }
 
-  /// The reduced matrices at a point; nothing without an equilibrium.
-  std::optional<ReducedMatrices> matrices_at(const std::vector<double>& values)
+  /// The reduced matrices at a point. Error: there is no equilibrium, or friction jams a closed pair.
+  ReducedMatrices matrices_at(const std::vector<double>& values)
   {
     const BrakeModel& model = model_.at(values);
     const auto& [structure, interface] = model;
@@ -187,7 +212,7 @@ public:
       compliance_.emplace(structure, interface, equilibrium_options_);
     }
     Equilibrium equilibrium = find_equilibrium(structure, interface, *compliance_, closed_, equilibrium_options_);
-    if (equilibrium.outcome.kind != OutcomeKind::converged) return std::nullopt;
+    need(equilibrium.outcome);
     closed_ = equilibrium.closed;
     return reduced_->at(model_.coefficients(values), interface, equilibrium);
   }
@@ -214,28 +239,29 @@ public:
     return modes;
   }
 
-  /// Sets what is found at the values of a sample; its unstable modes join the list.
+  /// Sets what is found at the values of a sample; its unstable modes join the list. Error: as of matrices_at.
   void evaluate(int place, RobustSample& sample, std::vector<UnstableMode>& unstable)
   {
-    const std::optional<ReducedMatrices> at = matrices_at(sample.values);
-    if (!at) return;
-    sample.known = true;
-    sample.closed = static_cast<int>(std::ranges::count(closed_, 1));
+    const ReducedMatrices at = matrices_at(sample.values);
+    RobustSample found{sample.values, true, static_cast<int>(std::ranges::count(closed_, 1))};
+    std::vector<UnstableMode> modes;
     Complex worst;
-    for (const TwoSidedPair& pair : pairs_of(*at))
+    for (const TwoSidedPair& pair : pairs_of(at))
     {
       const Complex lambda = pair.lambda;
       const bool first = worst == 0. || lambda.real() / std::abs(lambda) > worst.real() / std::abs(worst);
       if (first) worst = lambda;
       if (!is_unstable(lambda)) continue;
-      ++sample.unstable;
       const bool known = pair.right.size() > 0;
-      const int mode = reference_.nearest(*at, known ? pair : two_sided_pair(at->M, at->C, at->K, lambda));
-      if (first) sample.mode = mode;
-      unstable.push_back({place, mode, lambda});
+      const int mode = reference_.nearest(at, known ? pair : two_sided_pair(at.M, at.C, at.K, lambda));
+      if (first) found.mode = mode;
+      modes.push_back({place, mode, lambda});
     }
-    sample.growth_rate = worst.real();
-    sample.frequency_hz = frequency_hz_of(worst);
+    found.unstable = static_cast<int>(modes.size());
+    found.growth_rate = worst.real();
+    found.frequency_hz = frequency_hz_of(worst);
+    sample = std::move(found);
+    unstable.insert(unstable.end(), modes.begin(), modes.end());
   }
 
   const Reference& reference() const { return reference_; }
@@ -281,18 +307,18 @@ private:
   Reference reference_{};
 };
 
-/// The modes of the full problem in the band; nothing where they were not found.
-std::optional<std::vector<Complex>> full_modes(const RobustnessProblem& problem, const std::vector<double>& values)
+/// The modes of the full problem in the band. Error: they were not found.
+std::vector<Complex> full_modes(const RobustnessProblem& problem, const std::vector<double>& values)
 {
   const BrakeModel model = problem.model_at(values);
   const Equilibrium equilibrium =
       find_equilibrium(model.structure, model.interface, checked_if_asked(problem.equilibrium_options));
-  if (equilibrium.outcome.kind != OutcomeKind::converged) return std::nullopt;
+  need(equilibrium.outcome);
   const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
   ModesSettings settings = problem.modes;
   settings.method = ModesMethod::full;
   const Modes modes = find_modes(sliding, linearise(sliding), settings, problem.modes_options);
-  if (modes.outcome.kind != OutcomeKind::converged) return std::nullopt;
+  need(modes.outcome);
   std::vector<Complex> lambda;
   for (const ComplexMode& mode : modes.modes) lambda.push_back(mode.lambda);
   return lambda;
@@ -324,33 +350,22 @@ void compare(const std::vector<Complex>& reduced, const std::vector<Complex>& fu
   check.unstable = static_cast<int>(std::ranges::count_if(full, is_unstable));
 }
 
-/// Runs the work of a sample; what is wrong with it leaves it unknown.
-template <class Work> void attempt(Work work)
-{
-  try
-  {
-    work();
-  }
-  catch (const LibraryError&)
-  {
-    throw;
-  }
-  catch (const Error&)
-  {
-  }
-}
-
-/// Calls work(k) for this rank's share of so many pieces of work, between requests to end.
-template <class Work> void for_own(int count, MPI_Comm comm, Progress& progress, Work work)
+/// Calls work(k) for this rank's share of so many samples, between requests to end. Returns the first that failed, on
+/// every rank. Collective.
+template <class Work> SampleFailure for_own(int count, MPI_Comm comm, Progress& progress, Work work)
 {
   constexpr int between = 16;
+  SampleFailure first;
   const int ranks = ranks_of(comm), rank = rank_of(comm);
   for (int step = 0; step * ranks < count; ++step)
   {
     if (step % between == 0) end_if_asked(comm);
-    if (const int k = step * ranks + rank; k < count) attempt([&] { work(k); });
+    if (const int k = step * ranks + rank; k < count)
+      if (const std::string error = error_of([&] { work(k); }); !error.empty() && first.reason.empty())
+        first = {k, error};
     progress.update(std::min(count, (step + 1) * ranks), "");
   }
+  return first_of_ranks(first, comm);
 }
 
 } // namespace
@@ -382,23 +397,24 @@ Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
   for (std::vector<double>& values : random_values(problem, comm)) result.samples.push_back({std::move(values)});
   for (int k = 0; k < problem.settings.checks; ++k) result.checks.push_back({k});
   std::vector<UnstableMode> unstable;
+  SampleFailure failed;
   {
     Progress progress(comm, "robustness", problem.settings.samples);
-    for_own(problem.settings.samples, comm, progress,
-            [&](int k) { sampler->evaluate(k, result.samples[static_cast<std::size_t>(k)], unstable); });
+    failed = for_own(problem.settings.samples, comm, progress,
+                     [&](int k) { sampler->evaluate(k, result.samples[static_cast<std::size_t>(k)], unstable); });
   }
   {
     Progress progress(comm, "robustness: checks", problem.settings.checks);
-    for_own(problem.settings.checks, comm, progress,
-            [&](int k)
-            {
-              RobustCheck& check = result.checks[static_cast<std::size_t>(k)];
-              const auto& values = result.samples[static_cast<std::size_t>(k)].values;
-              const auto reduced = sampler->matrices_at(values);
-              const auto full = full_modes(problem, values);
-              check.known = reduced && full;
-              if (check.known) compare(sampler->modes_of(*reduced), *full, check);
-            });
+    const SampleFailure check_failed =
+        for_own(problem.settings.checks, comm, progress,
+                [&](int k)
+                {
+                  RobustCheck& check = result.checks[static_cast<std::size_t>(k)];
+                  const auto& values = result.samples[static_cast<std::size_t>(k)].values;
+                  compare(sampler->modes_of(sampler->matrices_at(values)), full_modes(problem, values), check);
+                  check.known = true;
+                });
+    if (failed.reason.empty()) failed = check_failed;
   }
   share(result.samples, comm);
   share(result.checks, comm);
@@ -408,7 +424,7 @@ Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
   result.trained = sampler->trained();
   result.basis = static_cast<int>(sampler->shapes());
   result.model_error = sampler->error();
-  assess(result);
+  assess(result, failed);
   return result;
 }
 

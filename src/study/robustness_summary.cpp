@@ -1,9 +1,11 @@
 #include "robustness_summary.hpp"
 
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>
+#include <limits>
 #include <numeric>
 
 namespace squeal
@@ -144,7 +146,19 @@ void find_probabilities(Robustness& result, const std::vector<UnstableMode>& uns
   std::ranges::stable_sort(result.modes, std::greater{}, [](const RobustMode& mode) { return mode.unstable.count; });
 }
 
-void assess(Robustness& result)
+SampleFailure first_of_ranks(SampleFailure own, MPI_Comm comm)
+{
+  struct
+  {
+    int sample, rank;
+  } first{own.reason.empty() ? std::numeric_limits<int>::max() : own.sample, rank_of(comm)};
+  MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_2INT, MPI_MINLOC, comm);
+  own.sample = first.sample;
+  broadcast(own.reason, comm, first.rank);
+  return own;
+}
+
+void assess(Robustness& result, const SampleFailure& first)
 {
   const auto unknown = std::ranges::count(result.samples, false, &RobustSample::known);
   const auto failed = std::ranges::count(result.checks, false, &RobustCheck::known);
@@ -154,8 +168,9 @@ void assess(Robustness& result)
   result.outcome.kind = unknown + failed > 0 ? OutcomeKind::not_converged : OutcomeKind::converged;
   if (unknown + failed > 0)
     result.outcome.reason =
-        format("%ld of %zu samples have no equilibrium, %ld of %zu checks have no modes", static_cast<long>(unknown),
-               result.samples.size(), static_cast<long>(failed), result.checks.size());
+        format("%ld of %zu samples and %ld of %zu checks failed, the first at sample %d: ", static_cast<long>(unknown),
+               result.samples.size(), static_cast<long>(failed), result.checks.size(), first.sample) +
+        first.reason;
 }
 
 } // namespace squeal

@@ -29,7 +29,17 @@ void find_correlations(Robustness& result, std::size_t numbers);
 void find_probabilities(Robustness& result, const std::vector<UnstableMode>& unstable,
                         const std::vector<std::complex<double>>& reference, double confidence);
 
-/// Sets the outcome.
-void assess(Robustness& result);
+/// A sample that could not be computed, and why; no reason: there is none.
+struct SampleFailure
+{
+  int sample = 0;
+  std::string reason{};
+};
+
+/// The first one of those of all ranks, on every rank. Collective.
+SampleFailure first_of_ranks(SampleFailure own, MPI_Comm comm);
+
+/// Sets the outcome, with the first failure.
+void assess(Robustness& result, const SampleFailure& first);
 
 } // namespace squeal

@@ -186,6 +186,17 @@ def test_numbers_that_move_the_contact_are_refused(squeal):
     assert robustness["outcome"] == "refused" and "rows of contact" in robustness["reason"]
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_the_first_sample_that_fails_says_why(ranks, squeal):
+    """Turned round, friction presses the pad on: beyond D_nn/D_nt = 2.87/0.185 = 15.5 there is no equilibrium."""
+    run = squeal(*OSCILLATOR, "--set", "contact.0.velocity=[-0.6,0,0]",
+                 *random("{key='friction.coefficient', distribution='uniform', from=0.1, to=20}", samples=40, checks=0), ranks=ranks)
+    failed = [number for number, row in enumerate(rows_of(run)) if row["known"] == "0"]
+    assert failed == [number for number, row in enumerate(rows_of(run)) if float(row["friction.coefficient"]) > 15.5]
+    words = f"{len(failed)} of 40 samples and 0 of 0 checks failed, the first at sample {failed[0]}: no equilibrium: "
+    assert run.code == 2 and run.report["robustness"]["reason"].startswith(words)
+
+
 def test_picture(friction, tmp_path):
     subprocess.run([sys.executable, ROOT / "tools" / "plot", friction.output, "--only", "robustness", "--output", tmp_path],
                    check=True)

@@ -49,7 +49,7 @@ struct RobustCheck
   double growth_error = 0, frequency_error = 0;
 };
 
-/// outcome: "converged", "not converged" (a check failed, or samples without an equilibrium: how many), "refused" (the
+/// outcome: "converged", "not converged" (samples or checks failed: how many, the first reason), "refused" (the
 /// matrices are no polynomial of the numbers), "off". residual: the largest growth error. iterations: number of
 /// samples.
 struct Robustness
