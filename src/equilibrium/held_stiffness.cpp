@@ -1,5 +1,10 @@
 #include "held_stiffness.hpp"
 
+#include "squeal/base/integers.hpp"
+
+#include <algorithm>
+#include <Eigen/Eigenvalues>
+#include <map>
 #include <numeric>
 
 namespace squeal
@@ -7,6 +12,11 @@ namespace squeal
 
 namespace
 {
+
+std::size_t at(PetscInt i)
+{
+  return static_cast<std::size_t>(i);
+}
 
 /// B_n' B_n
 Owned<Mat> normal_springs(const Interface& interface)
@@ -30,48 +40,121 @@ double typical_stiffness(Mat K)
   return largest > 0 ? largest : 1;
 }
 
+/// Of each degree of freedom the least one of its body, that is of those that K connects it to. Collective.
+std::vector<PetscInt> bodies_of(Mat K)
+{
+  PetscInt size = 0;
+  check(MatGetSize(K, &size, nullptr));
+  std::vector<PetscInt> body(static_cast<std::size_t>(size));
+  std::iota(body.begin(), body.end(), PetscInt{0});
+  const auto least = [&](PetscInt i)
+  {
+    for (; body[at(i)] != i; i = body[at(i)]) body[at(i)] = body[at(body[at(i)])];
+    return i;
+  };
+  const auto join = [&](PetscInt i, PetscInt j)
+  { body[at(std::max(least(i), least(j)))] = std::min(least(i), least(j)); };
+  for_each_row(K,
+               [&](PetscInt row, std::span<const PetscInt> columns, std::span<const double>)
+               {
+                 for (const PetscInt column : columns) join(row, column);
+               });
+  for (int changed = 1; changed != 0;) // until what this rank joined agrees with the others
+  {
+    for (PetscInt i = 0; i < size; ++i) body[at(i)] = least(i);
+    const std::vector<PetscInt> own = body;
+    MPI_Allreduce(own.data(), body.data(), to_int(own.size()), MPIU_INT, MPI_MIN, comm_of(K));
+    changed = body != own;
+    for (PetscInt i = 0; i < size; ++i) join(i, own[at(i)]);
+    MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, comm_of(K));
+  }
+  return body;
+}
+
+/// The least x'K x/x' diag(K) x of translations x of a body as a whole: a bound of the least of all motions, which
+/// tells without a factor that only contact holds a brake's pad. 1 on a matrix scene. Collective.
+double resistance_to_translations(const Structure& structure)
+{
+  const std::vector<PetscInt>& nodal_dof = structure.names.nodal_dof;
+  if (nodal_dof.empty()) return 1;
+  const std::vector<PetscInt> body = bodies_of(structure.K);
+  std::map<PetscInt, std::size_t> place;
+  for (std::size_t i = 0; i < body.size(); ++i)
+    if (body[i] == static_cast<PetscInt>(i)) place.emplace(body[i], place.size());
+  std::vector<Eigen::Matrix3d> K(place.size(), Eigen::Matrix3d::Zero()), D = K;
+  const auto direction = [&](PetscInt dof) { return nodal_dof[at(dof)] % 6; }; // three and more are rotations
+  for_each_row(structure.K,
+               [&](PetscInt row, std::span<const PetscInt> columns, std::span<const double> values)
+               {
+                 const PetscInt i = direction(row);
+                 const std::size_t k = place[body[at(row)]];
+                 for (std::size_t c = 0; i < 3 && c < columns.size(); ++c)
+                 {
+                   if (const PetscInt j = direction(columns[c]); j < 3) K[k](i, j) += values[c];
+                   if (columns[c] == row) D[k](i, i) += values[c];
+                 }
+               });
+  const auto add_ranks = [&](std::vector<Eigen::Matrix3d>& sums)
+  {
+    MPI_Allreduce(MPI_IN_PLACE, sums.front().data(), to_int(9 * sums.size()), MPI_DOUBLE, MPI_SUM,
+                  comm_of(structure.K));
+  };
+  add_ranks(K);
+  add_ranks(D);
+  double least = 1;
+  for (std::size_t k = 0; k < K.size(); ++k)
+  {
+    for (Eigen::Index i = 0; i < 3; ++i)
+      if (D[k](i, i) == 0) K[k](i, i) = D[k](i, i) = 1; // the body does not move that way
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> pencil(K[k], D[k], Eigen::EigenvaluesOnly);
+    least = std::min(least, pencil.eigenvalues().minCoeff());
+  }
+  return least;
+}
+
 } // namespace
 
 Held hold(const Structure& structure, const Interface& interface, const FactorOptions& options)
 {
   // Springs this soft beside the rest lose the digits of the reactions, which contact would hold.
   constexpr double soft = 1e-10;
-  Factored first = factor_positive(structure.K, interface, options);
+  const double bound = interface.pairs > 0 ? resistance_to_translations(structure) : 1;
+  Factored own;
+  own.resistance = bound;
+  const bool by_contact = bound < soft;
+  if (!by_contact) own = factor_positive(structure.K, interface, options);
   Held held;
-  if (interface.pairs > 0 && (first.loose || first.resistance < soft))
+  if (by_contact || (interface.pairs > 0 && (own.loose || own.resistance < soft)))
   {
-    first.factor = Factor(); // two of them side by side would be the most that a run ever holds
+    own.factor = Factor(); // two of them side by side would be the most that a run ever holds
     held.kappa = typical_stiffness(structure.K);
     held.augmented = copy_of(structure.K);
     check(MatAXPY(held.augmented, held.kappa, normal_springs(interface), DIFFERENT_NONZERO_PATTERN));
     check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
-    Factored second = factor_positive(held.augmented, interface, options);
-    if (!second.loose && (first.loose || second.resistance > 10 * first.resistance))
+    Factored with_contact = factor_positive(held.augmented, interface, options);
+    if (!with_contact.loose && (own.loose || with_contact.resistance > 10 * own.resistance))
     {
-      held.factor = std::move(second.factor);
+      held.factor = std::move(with_contact.factor);
       return held;
     }
     held = {};
-    if (first.loose)
+    with_contact.factor = Factor();
+    if (!own.loose) own = factor_positive(structure.K, interface, options);
+    if (own.loose && with_contact.loose)
     {
-      first.loose = second.loose;
-      first.indefinite = second.indefinite;
-    }
-    else
-    {
-      second.factor = Factor();
-      first = factor_positive(structure.K, interface, options);
+      own.loose = with_contact.loose;
+      own.indefinite = with_contact.indefinite;
     }
   }
-  if (first.loose && first.indefinite)
+  if (own.loose && own.indefinite)
     throw Error("equilibrium: the stiffness is not positive definite: a motion that is largest at " +
-                describe(structure.names, *first.loose) +
+                describe(structure.names, *own.loose) +
                 " is driven on, not back, and the structure diverges (buckles) from any rest; look for a stiffness of "
                 "the wrong sign, or a load beyond the critical one");
-  if (first.loose)
+  if (own.loose)
     throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
-                describe(structure.names, *first.loose) + "; give it a support or a spring");
-  held.factor = std::move(first.factor);
+                describe(structure.names, *own.loose) + "; give it a support or a spring");
+  held.factor = std::move(own.factor);
   return held;
 }
 
