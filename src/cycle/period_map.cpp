@@ -20,13 +20,14 @@ void set_step(PeriodMap& map, double h)
   map.step = make_theta_step(map.sliding.structure, map.sliding.interface, h, map.theta, map.options);
 }
 
-/// The kept step where the line from N h to T neglects less than a thousandth of what the last period moved its start
+/// The kept step where the line from N h to T neglects less than 3 % of what the last period moved its start
 /// by; else T/N.
 double step_for(const PeriodMap& map, double period)
 {
   const double own = period / map.steps, missing = period - map.steps * map.kept.h;
   if (!map.keeps_step || map.kept.h == 0 || map.kept.curvature == 0) return own;
-  return map.kept.curvature * missing * missing / 2 <= 1e-3 * map.kept.moved ? map.kept.h : own;
+  constexpr double part = 0.03; // a period of shooting lowers the residual by more than that of itself
+  return map.kept.curvature * missing * missing / 2 <= part * map.kept.moved ? map.kept.h : own;
 }
 
 } // namespace
