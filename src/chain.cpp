@@ -88,6 +88,18 @@ CycleProblem cycle_problem(const Chain& chain)
           given_start(chain),       chain.carried ? chain.carried->period : 0};
 }
 
+SettledBySteps by_steps(const SettledMotion& settled)
+{
+  const std::vector<MeanValue>& exponents = settled.examined.exponents;
+  return {settled.examined.verdict.kind, settled.fluctuating_energy,
+          exponents.empty() ? MeanValue{} : exponents.front()};
+}
+
+bool alike(const MeanValue& a, const MeanValue& b)
+{
+  return std::abs(a.value - b.value) <= a.error + b.error;
+}
+
 /// Whether the search for a cycle ended without one that attracts, on a free motion that goes on.
 bool motion_goes_on(const LimitCycle& cycle)
 {
@@ -275,39 +287,40 @@ SettledMotion run_settled(const Chain& chain)
   return find_settled_motion(cycle_problem(chain), cycle, chain.options.settled);
 }
 
-bool goes_on_with_finer_steps(Chain& chain)
+bool steps_may_decide(const Chain& chain)
 {
-  constexpr int finer = 4, finest = 1024;
   const Scene& scene = chain.scene;
-  SettledMotion& settled = chain.report.settled;
+  const SettledMotion& settled = chain.report.settled;
   const bool open = scene.fidelity == CycleModel::automatic && scene.cycle.steps_per_period == 0;
   PetscInt dofs = 0;
   check(VecGetSize(chain.model.structure.load, &dofs));
   if (!open || chain.coarse || !has_run(settled.outcome) || dofs > small_model) return false;
-  MotionVerdict& verdict = settled.examined.verdict;
-  const auto& exponents = settled.examined.exponents;
-  const SettledBySteps now{verdict.kind, settled.fluctuating_energy,
-                           exponents.empty() ? MeanValue{} : exponents.front()};
-  const std::optional<SettledBySteps> before = std::exchange(chain.by_fewer_steps, now);
-  const auto alike = [](const MeanValue& a, const MeanValue& b)
-  { return std::abs(a.value - b.value) <= a.error + b.error; };
-  if (before && before->kind == now.kind && alike(before->energy, now.energy) && alike(before->exponent, now.exponent))
-    return false;
-  const bool wanders = now.kind == MotionKind::irregular || now.kind == MotionKind::undecided;
-  if (!before && !wanders && !depends_on_steps(settled)) return false;
-  if (finer * settled.steps_per_period > finest)
-  {
-    if (verdict.kind == MotionKind::undecided) return false;
-    verdict.between = std::string(word(verdict.kind)) + " and what finer steps than " +
-                      std::to_string(settled.steps_per_period) + " a period would show";
-    verdict.would_decide = "steps that change neither the energy nor the largest exponent (cycle.steps_per_period)";
-    verdict.kind = MotionKind::undecided;
-    settled.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
-    return false;
-  }
+  const SettledBySteps now = by_steps(settled);
+  if (const std::optional<SettledBySteps>& before = chain.by_fewer_steps)
+    return before->kind != now.kind || !alike(before->energy, now.energy) || !alike(before->exponent, now.exponent);
+  return now.kind == MotionKind::irregular || now.kind == MotionKind::undecided || depends_on_steps(settled);
+}
+
+bool take_finer_steps(Chain& chain)
+{
+  constexpr int finer = 4, finest = 1024;
+  const SettledMotion& settled = chain.report.settled;
+  if (finer * settled.steps_per_period > finest) return false;
+  chain.by_fewer_steps = by_steps(settled);
   chain.begin_steps = finer * settled.steps_per_period;
   chain.carried.reset(); // of what the motion had settled on
   return true;
+}
+
+void leave_to_finer_steps(SettledMotion& settled)
+{
+  MotionVerdict& verdict = settled.examined.verdict;
+  if (verdict.kind == MotionKind::undecided) return;
+  verdict.between = std::string(word(verdict.kind)) + " and what finer steps than " +
+                    std::to_string(settled.steps_per_period) + " a period would show";
+  verdict.would_decide = "steps that change neither the energy nor the largest exponent (cycle.steps_per_period)";
+  verdict.kind = MotionKind::undecided;
+  settled.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
 }
 
 void take_cycle_as_answer(Report& report, FittedCycle found)
@@ -327,19 +340,21 @@ Attractors run_attractors(const Chain& chain)
   if (!settings.enabled || settings.starts == 0)
     return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
   const std::vector<ComplexMode>& modes = chain.report.modes.modes;
-  UnstableModes started = chain.unstable();
-  Estimate of_stable;
-  if (chain.report.modes.unstable_count == 0 && !modes.empty() && chain.model.interface.pairs > 0)
+  const bool stable = !modes.empty() && chain.report.modes.unstable_count == 0 && chain.model.interface.pairs > 0;
+  const auto attractors = [&](const UnstableModes& started) {
+    return find_attractors({chain.sliding(), modes, started, settings, chain.options.step}, chain.options.attractors);
+  };
+  if (!stable)
   {
-    // a motion may go on beside a stable equilibrium: from the mode that decays slowest, and random sums of modes
-    of_stable = estimate_amplitude(chain.sliding(), *chain.linearised, modes.front(), chain.options.estimate);
-    started = {std::span(modes).first(1), std::span(&of_stable, 1)};
+    const std::string reason = no_unstable_mode(chain.report);
+    return reason.empty() ? attractors(chain.unstable()) : not_run<Attractors>(OutcomeKind::skipped, reason);
   }
-  else if (const std::string reason = no_unstable_mode(chain.report); !reason.empty())
-    return not_run<Attractors>(OutcomeKind::skipped, reason);
-  if (!std::isfinite(started.estimates.front().start_amplitude) && chain.report.modes.unstable_count == 0)
+  // a motion may go on beside a stable equilibrium: from the mode that decays slowest, and random sums of modes
+  const Estimate estimate =
+      estimate_amplitude(chain.sliding(), *chain.linearised, modes.front(), chain.options.estimate);
+  if (!std::isfinite(estimate.start_amplitude))
     return not_run<Attractors>(OutcomeKind::skipped, "no amplitude is known at which contact opens or slip reverses");
-  return find_attractors({chain.sliding(), modes, started, settings, chain.options.step}, chain.options.attractors);
+  return attractors({std::span(modes).first(1), std::span(&estimate, 1)});
 }
 
 } // namespace squeal

@@ -279,18 +279,13 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
     report.coarse = stage(report, Stage::coarse, comm, [&] { return run_coarse(chain); });
   else
     report.coarse = not_run<CoarseStart>(OutcomeKind::off, "the scene has no cycle.start = \"coarse\"");
-  do
-  {
-    FittedCycle fitted = stage(report, Stage::cycle, comm, [&] { return run_cycle(chain); });
-    report.cycle = std::move(fitted.cycle);
-    report.fidelity = std::move(fitted.fidelity);
-    if (has_run(report.cycle.outcome)) save();
-    if (checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
-    report.settled = stage(report, Stage::settled, comm, [&] { return run_settled(chain); });
-    if (settles_on_another_cycle(report))
-      take_cycle_as_answer(report, stage(report, Stage::cycle, comm, [&] { return run_cycle_from_settled(chain); }));
-  } while (goes_on_with_finer_steps(chain));
-  take_as_answer(report.settled, report.cycle.outcome);
+  seek_motion(chain,
+              [&](Stage which, const auto& work)
+              {
+                if (which == Stage::settled && has_run(report.cycle.outcome)) save();
+                if (which == Stage::settled && checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
+                return stage(report, which, comm, work);
+              });
   if (has_run(report.settled.outcome)) save();
   report.attractors = stage(report, Stage::attractors, comm, [&] { return run_attractors(chain); });
   if (has_run(report.attractors.outcome)) save();

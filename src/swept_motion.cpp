@@ -47,15 +47,7 @@ void run_stages(Chain& chain)
   }
   if (chain.scene.cycle.start.kind == CycleStartKind::file)
     chain.cycle_file = read_state(chain.scene.cycle.start.file, structure);
-  do
-  {
-    FittedCycle fitted = run_cycle(chain);
-    report.cycle = std::move(fitted.cycle);
-    report.fidelity = std::move(fitted.fidelity);
-    report.settled = run_settled(chain);
-    if (settles_on_another_cycle(report)) take_cycle_as_answer(report, run_cycle_from_settled(chain));
-  } while (goes_on_with_finer_steps(chain));
-  take_as_answer(report.settled, report.cycle.outcome);
+  seek_motion(chain, [](Stage, const auto& work) { return work(); });
 }
 
 /// What is kept of a cycle that was found.

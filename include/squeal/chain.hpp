@@ -91,17 +91,43 @@ bool settles_on_another_cycle(const Report& report);
 /// The cycle from the end of the settled motion.
 FittedCycle run_cycle_from_settled(Chain& chain);
 
-/// Whether the cycle is to be sought once more, at four times the steps a period: where "auto" chooses them for a small
-/// model, until a motion that settled on no cycle does as it did at the steps before. The grid of time alone can make a
-/// motion of impacts wander; it then diverges by the step, not by the period. Notes the motion and the steps. A motion
-/// that the finest steps still change becomes undecided. Not collective.
-bool goes_on_with_finer_steps(Chain& chain);
+/// Whether more steps a period may change what the motion settled on: where "auto" chooses them for a small model,
+/// until a motion that settled on no cycle does as it did at the steps before. The grid of time alone can make a motion
+/// of impacts wander; it then diverges by the step, not by the period. Not collective.
+bool steps_may_decide(const Chain& chain);
+
+/// Notes what the motion settled on, and lets the next search begin at four times the steps a period; false where these
+/// would be too many. Not collective.
+bool take_finer_steps(Chain& chain);
+
+/// A motion that the finest steps still change is undecided.
+void leave_to_finer_steps(SettledMotion& settled);
 
 /// Where it has converged, it answers in the settled motion's stead. Not collective.
 void take_cycle_as_answer(Report& report, FittedCycle found);
 
 /// What the motion settles on where no cycle attracts.
 SettledMotion run_settled(const Chain& chain);
+
+/// Seeks the cycle, and where none attracts the motion that is settled on. `run_stage(which, work)` returns what the
+/// stage's work does, or a result that says why it was left out. Collective.
+template <class RunStage> void seek_motion(Chain& chain, const RunStage& run_stage)
+{
+  Report& report = chain.report;
+  for (bool goes_on = true; goes_on;)
+  {
+    FittedCycle fitted = run_stage(Stage::cycle, [&] { return run_cycle(chain); });
+    report.cycle = std::move(fitted.cycle);
+    report.fidelity = std::move(fitted.fidelity);
+    report.settled = run_stage(Stage::settled, [&] { return run_settled(chain); });
+    if (settles_on_another_cycle(report))
+      take_cycle_as_answer(report, run_stage(Stage::cycle, [&] { return run_cycle_from_settled(chain); }));
+    if (!steps_may_decide(chain)) break;
+    goes_on = take_finer_steps(chain);
+    if (!goes_on) leave_to_finer_steps(report.settled);
+  }
+  take_as_answer(report.settled, report.cycle.outcome);
+}
 
 /// The motions that the scene's starts lead to.
 Attractors run_attractors(const Chain& chain);

@@ -55,10 +55,10 @@ std::string stability_text(const Multipliers& multipliers)
     return multipliers.stability == Stability::undecided ? ", whether it lasts is undecided"
                                                          : ", whether it lasts was not examined";
   const double modulus = std::abs(multipliers.values.front()), error = multipliers.errors.front();
-  std::string largest = format(" (largest multiplier %.4f +- %.0e", modulus, error);
-  const double bound = largest_upper_bound(multipliers);
-  if (modulus + error >= 1 && bound < 1) largest += format(", at most %.6f", bound);
-  largest += ")";
+  const double bound = largest_upper_bound(multipliers); // closer than the error, which is of both sides
+  const std::string largest = modulus + error >= 1 && bound < 1
+                                  ? format(" (largest multiplier %.4f, at most %.6f)", modulus, bound)
+                                  : format(" (largest multiplier %.4f +- %.0e)", modulus, error);
   switch (multipliers.stability)
   {
   case Stability::stable:
@@ -70,9 +70,10 @@ std::string stability_text(const Multipliers& multipliers)
   }
 }
 
-/// As many digits as the error leaves, at least two.
+/// As many digits as the error leaves, at least two; where it leaves none, the bound.
 std::string energy_text(const MeanValue& energy)
 {
+  if (energy.error >= energy.value) return format(", mean energy at most %.2g J", energy.value + energy.error);
   const double ratio = energy.value / std::max(energy.error, 1e-5 * energy.value);
   const int digits = std::clamp(static_cast<int>(std::ceil(std::log10(std::max(ratio, 1.)))) + 1, 2, 6);
   return format(", mean energy %.*g +- %.0e J", digits, energy.value, energy.error);

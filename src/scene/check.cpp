@@ -247,12 +247,13 @@ private:
   void check_damping() const
   {
     const RayleighDamping& damping = scene_.damping;
-    if (!scene_.parts.empty() || scene_.matrices || !scene_.superelements.empty()) return;
+    const bool needed = std::ranges::any_of(scene_.parts, [](const Part& part) { return !part.damping; });
+    if (needed || scene_.matrices || !scene_.superelements.empty()) return;
+    const std::string why = scene_.parts.empty()
+                                ? "it is of [[part]]s, and the scene has none; give each [[spring]] its damping"
+                                : "every [[part]] has an alpha or beta of its own; take one of them out";
     const auto refuse = [&](const void* member, const char* key)
-    {
-      fail(member, "[damping] " + std::string(key) +
-                       " has no effect: it is of [[part]]s, and the scene has none; give each [[spring]] its damping");
-    };
+    { fail(member, "[damping] " + std::string(key) + " has no effect: " + why); };
     if (!damping.measured.empty()) refuse(&damping.measured, "measured");
     if (damping.alpha != 0) refuse(&damping.alpha, "alpha");
     if (damping.beta != 0) refuse(&damping.beta, "beta");
@@ -321,6 +322,10 @@ private:
     const bool sought = c.enabled || (scene_.sweep && scene_.sweep->stages == SweepStages::cycle);
     if (c.start.kind == CycleStartKind::transient && sought && !scene_.transient.enabled)
       fail(&c.start, "[cycle] start = 'transient' needs the [transient] that it starts from the end of");
+    constexpr double of_rounding = 1e-14; // what the steps of a period leave of the fluctuation
+    if (c.tolerance > 0 && c.tolerance < of_rounding)
+      fail(&c.tolerance,
+           format("[cycle] tolerance = %g is below what rounding leaves: give %g or more", c.tolerance, of_rounding));
     if (!(c.tolerance < 1)) fail(&c.tolerance, "[cycle] tolerance is a part of the fluctuation: give less than 1");
     constexpr int fewest = 8; // show three harmonics
     if (c.steps_per_period > 0 && c.steps_per_period < fewest)

@@ -236,11 +236,23 @@ std::string name_of(const Contact& contact)
   return contact.stator + " on " + contact.rotor;
 }
 
+/// Calls `visit(table, list)` for every table of the scene of which there may be several.
+template <class Visit> void for_each_list(const Scene& scene, Visit visit)
+{
+  visit("part", scene.parts);
+  visit("point", scene.points);
+  visit("rigid_body", scene.rigid_bodies);
+  visit("spring", scene.springs);
+  visit("force", scene.forces);
+  visit("pressure", scene.pressures);
+  visit("contact", scene.contacts);
+}
+
 /// The name of the entry at a place; nothing where the selector is a name.
 template <class List> std::string name_at(const List& list, const std::string& selector)
 {
-  for (std::size_t i = 0; i < list.size(); ++i)
-    if (name_of(list[i]) == selector) return "";
+  for (const auto& entry : list)
+    if (name_of(entry) == selector) return "";
   for (std::size_t i = 0; i < list.size(); ++i)
     if (std::to_string(i) == selector) return name_of(list[i]);
   return "";
@@ -251,16 +263,14 @@ template <class List> std::string name_at(const List& list, const std::string& s
 std::string name_of_number(const Scene& scene, const std::string& key)
 {
   const std::vector<std::string> words = words_of_key(key);
-  if (words.size() < 2) return "";
-  const std::string &table = words[0], &selector = words[1];
-  if (table == "part") return name_at(scene.parts, selector);
-  if (table == "point") return name_at(scene.points, selector);
-  if (table == "rigid_body") return name_at(scene.rigid_bodies, selector);
-  if (table == "spring") return name_at(scene.springs, selector);
-  if (table == "force") return name_at(scene.forces, selector);
-  if (table == "pressure") return name_at(scene.pressures, selector);
-  if (table == "contact") return name_at(scene.contacts, selector);
-  return "";
+  std::string name;
+  if (words.size() < 2) return name;
+  for_each_list(scene,
+                [&](const char* table, const auto& list)
+                {
+                  if (words[0] == table) name = name_at(list, words[1]);
+                });
+  return name;
 }
 
 std::string label_of_number(const Scene& scene, const std::string& key)
