@@ -172,7 +172,8 @@ void integrate_periods(PeriodMap& map, double period, std::span<const Vec> start
   }
 }
 
-/// Moves a state on by part of a step: Hermite's interpolation between the ends of the step.
+} // namespace
+
 void move_by_part(const PeriodMap& map, double part, State& state)
 {
   State next = copy_of(state);
@@ -185,8 +186,6 @@ void move_by_part(const PeriodMap& map, double part, State& state)
   check(VecAXPBY(state.v, s, 1 - s, next.v));
   state.reactions = next.reactions;
 }
-
-} // namespace
 
 void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& grid)
 {

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <utility>
 
 namespace squeal
@@ -158,8 +159,23 @@ std::string shoot_extrapolated(FullShooting& shooting, Orbit& last, double beyon
 /// line from the one before it. Returns why there is none, or nothing.
 using AppendCycle = std::function<std::string(std::vector<CycleAtSteps>& cycles, int steps, double beyond)>;
 
-/// From the cycle at few steps a period to twice as many and on. Returns why the accuracy was not reached, or nothing.
-std::string refine(Fidelity& fidelity, const CycleAtSteps& coarse, const AppendCycle& append)
+/// The last cycle on a grid of time that begins half a step later; nothing where none is found.
+using MoveGrid = std::function<std::optional<CycleAtSteps>()>;
+
+/// Raises the errors to what the place of contact's events in their steps changes. Returns the larger change.
+double raise_step_errors(Fidelity& fidelity, const CycleAtSteps& cycle, const CycleAtSteps& moved)
+{
+  const double of_period = std::abs(moved.period / cycle.period - 1),
+               of_energy = std::abs(moved.energy / cycle.energy - 1);
+  fidelity.step_frequency_error = std::max(fidelity.step_frequency_error, of_period);
+  fidelity.step_energy_error = std::max(fidelity.step_energy_error, of_energy);
+  return std::max(of_period, of_energy);
+}
+
+/// From the cycle at few steps a period to twice as many and on. Where the cycles agree, so must the last one on a
+/// moved grid, if there is one: those of several numbers of steps may agree by chance. Returns why the accuracy was not
+/// reached, or nothing.
+std::string refine(Fidelity& fidelity, const CycleAtSteps& coarse, const AppendCycle& append, const MoveGrid& move)
 {
   std::vector<CycleAtSteps> cycles{coarse};
   if (const std::string problem = append(cycles, 2 * coarse.steps, 0); !problem.empty()) return problem;
@@ -167,12 +183,16 @@ std::string refine(Fidelity& fidelity, const CycleAtSteps& coarse, const AppendC
   {
     const int before = cycles[cycles.size() - 2].steps, now = cycles.back().steps;
     estimate_step_errors(fidelity, cycles);
+    double of_grid = 0;
+    if (move && largest_step_error(fidelity) <= fidelity.accuracy / 2)
+      if (const auto moved = move()) of_grid = raise_step_errors(fidelity, cycles.back(), *moved);
     if (largest_step_error(fidelity) <= fidelity.accuracy / 2) return {};
     if (tries == 5) return "the accuracy needs more than " + std::to_string(now) + " steps a period";
     const StepError of_period = step_error(cycles, &CycleAtSteps::period, 2),
                     of_energy = step_error(cycles, &CycleAtSteps::energy, 2);
     const double needed =
-        std::max(of_period.steps_for(fidelity.accuracy / 3), of_energy.steps_for(fidelity.accuracy / 3));
+        std::max({of_period.steps_for(fidelity.accuracy / 3), of_energy.steps_for(fidelity.accuracy / 3),
+                  now * of_grid / (fidelity.accuracy / 3)}); // events have errors of first order
     const int steps = 4 * static_cast<int>(std::ceil(std::clamp(needed, 1.5 * now, 4. * now) / 4));
     const double order = of_energy.order(now),
                  beyond = error_fraction(before, now, now, order) - error_fraction(before, now, steps, order);
@@ -204,6 +224,42 @@ void leave(LimitCycle& cycle, int finer, const std::string& reason)
   cycle.multipliers = {};
 }
 
+/// Newton's start at a state beside a cycle, and options that end it soon: it takes three to six periods.
+struct StartBesideCycle
+{
+  ShootingStart start;
+  CycleOptions options;
+};
+
+StartBesideCycle start_beside_cycle(const CycleCorrection& correction, Vec u, Vec v, double period)
+{
+  StartBesideCycle beside{{correction.problem.sliding.equilibrium.u, u, v, period}, correction.options};
+  beside.start.is_cycle = true;
+  beside.options.shooting.free_periods = 0;
+  beside.options.shooting.max_periods = 20;
+  return beside;
+}
+
+/// The cycle of a small model on a grid that begins half a step later. What is found joins `convergence`.
+std::optional<CycleAtSteps> find_on_moved_grid(const CycleCorrection& correction, LimitCycle& cycle)
+{
+  const CycleProblem& problem = correction.problem;
+  CycleSettings settings = problem.settings;
+  settings.steps_per_period = cycle.steps_per_period;
+  PeriodMap map{problem.sliding, problem.step, cycle.steps_per_period, cycle.theta};
+  set_period(map, cycle.orbit.period);
+  const Vec state = cycle.orbit.state;
+  State later{copy_of(displacement(state)), copy_of(velocity(state)), 0, problem.sliding.equilibrium.reactions};
+  move_by_part(map, 0.5, later);
+  StartBesideCycle beside = start_beside_cycle(correction, later.u, later.v, cycle.orbit.period);
+  beside.options.shooting.multipliers = 0;
+  LimitCycle moved =
+      find_cycle_from(with_settings(problem, settings), beside.options, beside.start, correction.preconditioner, 0);
+  cycle.convergence = joined(std::move(cycle.convergence), moved.convergence);
+  if (moved.outcome.kind != OutcomeKind::converged) return {};
+  return CycleAtSteps{cycle.steps_per_period, moved.orbit.period, moved.measured.mean_fluctuating_energy};
+}
+
 /// The cycle of a small model at so many steps a period, with its verdict, from the cycle at hand. Where that begins at
 /// an event of contact Newton may fail: then from the scene's start, as if the scene gave the steps. The cycle at hand
 /// stays where none is found. Returns why the refinement ends there, or nothing.
@@ -213,14 +269,10 @@ std::string find_anew(const CycleCorrection& correction, int steps, LimitCycle& 
   CycleSettings settings = problem.settings;
   settings.steps_per_period = steps;
   const Vec state = cycle.orbit.state;
-  ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), cycle.orbit.period};
-  start.is_cycle = true;
-  start.other_unstable = other_unstable_states(problem);
+  StartBesideCycle beside = start_beside_cycle(correction, displacement(state), velocity(state), cycle.orbit.period);
+  beside.start.other_unstable = other_unstable_states(problem);
   const CycleProblem finer = with_settings(problem, settings);
-  CycleOptions at_once = correction.options;
-  at_once.shooting.free_periods = 0;
-  at_once.shooting.max_periods = 20; // Newton takes three to six
-  LimitCycle next = find_cycle_from(finer, at_once, start, correction.preconditioner, 0);
+  LimitCycle next = find_cycle_from(finer, beside.options, beside.start, correction.preconditioner, 0);
   if (next.outcome.kind != OutcomeKind::converged)
   {
     Convergence before = std::move(next.convergence);
@@ -255,7 +307,9 @@ void refine_small(const CycleCorrection& correction, LimitCycle& cycle)
     if (problem.empty()) cycles.push_back(at_hand());
     return problem;
   };
-  if (const std::string problem = refine(fidelity, at_hand(), append); !problem.empty()) fidelity.reason = problem;
+  const auto move = [&] { return find_on_moved_grid(correction, cycle); };
+  if (const std::string problem = refine(fidelity, at_hand(), append, move); !problem.empty())
+    fidelity.reason = problem;
   if (cycle.outcome.kind == OutcomeKind::converged) estimate_model_errors(correction, cycle);
   fidelity.full_periods = cycle.convergence.periods;
 }
@@ -314,8 +368,8 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
     if (problem_met.empty()) cycles.push_back(shooting.cycle());
     return problem_met;
   };
-  const std::string problem_met =
-      refine(fidelity, {cycle.steps_per_period, cycle.orbit.period, cycle.measured.mean_fluctuating_energy}, append);
+  const std::string problem_met = refine(
+      fidelity, {cycle.steps_per_period, cycle.orbit.period, cycle.measured.mean_fluctuating_energy}, append, {});
   if (!problem_met.empty()) fidelity.reason = problem_met;
   note_model_errors(fidelity, shooting.multisecant);
   cycle.convergence = std::move(log.convergence);

@@ -201,6 +201,10 @@ CASES = {
                                       ["part]] lower", "loss_frequency", "give the squeal's frequency"]),
     "loss frequency without a factor": (block_scene("[modes]", "[damping]\nloss_frequency = 100\n[modes]"),
                                         ["loss_frequency", "loss_factor"]),
+    "damping that no part takes": (
+        block_scene("[modes]", "[damping]\nbeta = 1e-6\n[modes]",
+                    arguments=[word for part in ("lower", "upper") for word in ("--set", f"part.{part}.beta=1e-6")]),
+        ["[damping] beta has no effect", "every [[part]]"]),
     "gyroscopic part that is not skew": (matrix_scene(with_entries("G", 1, 1)), ["G.petsc", "not skew", "C.petsc"]),
     "circulatory part with pairs": (matrix_scene(with_entries("H", 1, -1)), ["H.petsc", "take B, gap, drive and F out"]),
     "circulatory part with a load": (matrix_scene(without_pairs), ["H.petsc", "take B, gap, drive and F out"]),

@@ -71,6 +71,7 @@ OPTIONS = {
     "a probe without a name": (["--set", "probe.0.name=."], ["probe", "name"]),
     "a number whose square is infinite": (["--set", "force.0.vector=[0,0,1e300]"], ["force", "1e100"]),
     "a number that is too large": (["--set", "modes.band=1e300"], ["band", "1e100"]),
+    "a tolerance that no motion meets": (["--set", "cycle.tolerance=1e-30"], ["tolerance = 1e-30", "1e-14 or more"]),
     "a tolerance that any motion meets": (["--set", "cycle.tolerance=2"], ["tolerance", "less than 1"]),
     "an accuracy that any cycle has": (["--set", "accuracy=1"], ["accuracy", "less than 1"]),
     "steps that show no harmonic": (["--set", "cycle.steps_per_period=4"], ["steps_per_period", "at least 8"]),

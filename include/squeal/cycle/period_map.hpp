@@ -53,6 +53,9 @@ inline constexpr int enough_steps = 128; // a period: with as many at most, what
 /// Makes A and W those of h = T/N, unless they are already.
 void set_period(PeriodMap& map, double period);
 
+/// Moves a state on by part of a step: Hermite's interpolation between the ends of the step.
+void move_by_part(const PeriodMap& map, double part, State& state);
+
 /// Records the contact of each step of a period.
 void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& grid);
 
