@@ -127,7 +127,8 @@ UNDER_WAY = {  # where a library or another process is at work: ranks, scene and
                                  "distribution='uniform', from=0.4, to=0.6}]"], "robustness …"),
     # each rank follows it by itself, so that none may wait for another
     "branch on a reduced model": (2, [*WITH_VERDICT, "--set", "cycle.steps_per_period=32", "--set", "transient.enabled=false", "--set",
-                                      "branch={key='friction.coefficient', from=0.29, to=0.32, points=600}"], "branch   "),
+                                      "fidelity=reduced", "--set", "branch={key='friction.coefficient', from=0.29, to=0.32, points=600}"],
+                                  "branch   "),
 }
 
 
