@@ -282,8 +282,11 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   seek_motion(chain,
               [&](Stage which, const auto& work)
               {
-                if (which == Stage::settled && has_run(report.cycle.outcome)) save();
-                if (which == Stage::settled && checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
+                if (which == Stage::settled) // the cycle is in the report
+                {
+                  if (has_run(report.cycle.outcome)) save();
+                  if (checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
+                }
                 return stage(report, which, comm, work);
               });
   if (has_run(report.settled.outcome)) save();

@@ -1,5 +1,6 @@
 #include "held_stiffness.hpp"
 
+#include "squeal/base/disjoint_sets.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
@@ -41,31 +42,22 @@ double typical_stiffness(Mat K)
 }
 
 /// Of each degree of freedom the least one of its body, that is of those that K connects it to. Collective.
-std::vector<PetscInt> bodies_of(Mat K)
+std::vector<int> bodies_of(Mat K)
 {
-  PetscInt size = 0;
-  check(MatGetSize(K, &size, nullptr));
-  std::vector<PetscInt> body(static_cast<std::size_t>(size));
-  std::iota(body.begin(), body.end(), PetscInt{0});
-  const auto least = [&](PetscInt i)
-  {
-    for (; body[at(i)] != i; i = body[at(i)]) body[at(i)] = body[at(body[at(i)])];
-    return i;
-  };
-  const auto join = [&](PetscInt i, PetscInt j)
-  { body[at(std::max(least(i), least(j)))] = std::min(least(i), least(j)); };
+  DisjointSets sets(static_cast<std::size_t>(row_layout(K).total()));
   for_each_row(K,
                [&](PetscInt row, std::span<const PetscInt> columns, std::span<const double>)
                {
-                 for (const PetscInt column : columns) join(row, column);
+                 for (const PetscInt column : columns) sets.join(to_int(row), to_int(column));
                });
+  std::vector<int> body(static_cast<std::size_t>(sets.size()));
   for (int changed = 1; changed != 0;) // until what this rank joined agrees with the others
   {
-    for (PetscInt i = 0; i < size; ++i) body[at(i)] = least(i);
-    const std::vector<PetscInt> own = body;
-    MPI_Allreduce(own.data(), body.data(), to_int(own.size()), MPIU_INT, MPI_MIN, comm_of(K));
+    for (int i = 0; i < sets.size(); ++i) body[at(i)] = sets.least(i);
+    const std::vector<int> own = body;
+    MPI_Allreduce(own.data(), body.data(), sets.size(), MPI_INT, MPI_MIN, comm_of(K));
+    for (int i = 0; i < sets.size(); ++i) sets.join(i, body[at(i)]);
     changed = body != own;
-    for (PetscInt i = 0; i < size; ++i) join(i, own[at(i)]);
     MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, comm_of(K));
   }
   return body;
@@ -77,10 +69,9 @@ double resistance_to_translations(const Structure& structure)
 {
   const std::vector<PetscInt>& nodal_dof = structure.names.nodal_dof;
   if (nodal_dof.empty()) return 1;
-  const std::vector<PetscInt> body = bodies_of(structure.K);
-  std::map<PetscInt, std::size_t> place;
-  for (std::size_t i = 0; i < body.size(); ++i)
-    if (body[i] == static_cast<PetscInt>(i)) place.emplace(body[i], place.size());
+  const std::vector<int> body = bodies_of(structure.K);
+  std::map<int, std::size_t> place;
+  for (const int least : body) place.emplace(least, place.size());
   std::vector<Eigen::Matrix3d> K(place.size(), Eigen::Matrix3d::Zero()), D = K;
   const auto direction = [&](PetscInt dof) { return nodal_dof[at(dof)] % 6; }; // three and more are rotations
   for_each_row(structure.K,
@@ -118,10 +109,9 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
 {
   // Springs this soft beside the rest lose the digits of the reactions, which contact would hold.
   constexpr double soft = 1e-10;
-  const double bound = interface.pairs > 0 ? resistance_to_translations(structure) : 1;
-  Factored own;
-  own.resistance = bound;
-  const bool by_contact = bound < soft;
+  Factored own; // of K
+  own.resistance = interface.pairs > 0 ? resistance_to_translations(structure) : 1;
+  const bool by_contact = own.resistance < soft;
   if (!by_contact) own = factor_positive(structure.K, interface, options);
   Held held;
   if (by_contact || (interface.pairs > 0 && (own.loose || own.resistance < soft)))

@@ -5,6 +5,7 @@
 /// its nodal degrees of freedom.
 #include "squeal/mesh/partition.hpp"
 
+#include "squeal/base/disjoint_sets.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/shapes.hpp"
 
@@ -24,24 +25,14 @@ struct Vertices
   int count = 0;
 };
 
-/// Merges the two heaviest nodes of each pair, and of pairs that share one, into one vertex by union-find.
+/// Merges the two heaviest nodes of each pair, and of pairs that share one, into one vertex.
 Vertices merge_pairs(std::size_t nodes, const std::vector<ContactPair>& pairs)
 {
-  std::vector<int> parent(nodes);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int node)
-  {
-    while (parent[node] != node) node = parent[node] = parent[parent[node]];
-    return node;
-  };
-  for (const ContactPair& pair : pairs)
-  {
-    const int a = root(pair.rotor_node), b = root(pair.stator_node);
-    parent[std::max(a, b)] = std::min(a, b);
-  }
+  DisjointSets sets(nodes);
+  for (const ContactPair& pair : pairs) sets.join(pair.rotor_node, pair.stator_node);
   Vertices vertices{std::vector<int>(nodes), 0};
-  for (int i = 0; i < static_cast<int>(nodes); ++i) // a root has the smallest number of its set
-    vertices.of_node[i] = root(i) == i ? vertices.count++ : vertices.of_node[root(i)];
+  for (int i = 0; i < sets.size(); ++i)
+    vertices.of_node[i] = sets.least(i) == i ? vertices.count++ : vertices.of_node[sets.least(i)];
   return vertices;
 }
 

@@ -236,18 +236,6 @@ std::string name_of(const Contact& contact)
   return contact.stator + " on " + contact.rotor;
 }
 
-/// Calls `visit(table, list)` for every table of the scene of which there may be several.
-template <class Visit> void for_each_list(const Scene& scene, Visit visit)
-{
-  visit("part", scene.parts);
-  visit("point", scene.points);
-  visit("rigid_body", scene.rigid_bodies);
-  visit("spring", scene.springs);
-  visit("force", scene.forces);
-  visit("pressure", scene.pressures);
-  visit("contact", scene.contacts);
-}
-
 /// The name of the entry at a place; nothing where the selector is a name.
 template <class List> std::string name_at(const List& list, const std::string& selector)
 {
@@ -265,11 +253,12 @@ std::string name_of_number(const Scene& scene, const std::string& key)
   const std::vector<std::string> words = words_of_key(key);
   std::string name;
   if (words.size() < 2) return name;
-  for_each_list(scene,
-                [&](const char* table, const auto& list)
-                {
-                  if (words[0] == table) name = name_at(list, words[1]);
-                });
+  for_each_table(scene,
+                 [&](const std::string& table, const auto& entries, const char*)
+                 {
+                   if constexpr (requires { name_of(entries.front()); })
+                     if (words[0] == table) name = name_at(entries, words[1]);
+                 });
   return name;
 }
 

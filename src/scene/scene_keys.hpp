@@ -91,7 +91,7 @@ SceneKeys keys_of(Probe& probe);
 
 /// Calls visit(key, member, meaning) for each table of a scene file, in the order in which they are written.
 /// A vector is a list of tables [[key]], an optional is a table that may be missing, all else a table with defaults.
-template <class Visit> void for_each_table(Scene& scene, Visit visit)
+template <class AnyScene, class Visit> void for_each_table(AnyScene& scene, Visit visit)
 {
   visit("mesh", scene.mesh, "a mesh and how to read it");
   visit("matrices", scene.matrices, "matrices of another code instead of a mesh");

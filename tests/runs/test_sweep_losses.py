@@ -26,9 +26,12 @@ def set_to(key, value):
     (LOSSY, "part.pin.loss_factor", [0.0, 0.2, 0.6], [2]),
     (LOSSY, "friction.coefficient", [0.1, 0.4], [1]),
     (SOFT, "contact.0.compliance", [0.0, 2e-13, 1e-12], [2]),
+    (SOFT, "friction.coefficient", [0.1, 0.4], [1]),
     ([*SPINNING, "--set", "friction.coefficient=0.1"], "part.disc.rotation.rate", [0.0, 200.0, 500.0], [2]),
+    (SPINNING, "friction.coefficient", [0.3, 0.4], [1]),
     (ALL, "friction.coefficient", [0.3, 0.4], [1, 2]),
-], ids=["loss factor", "friction with losses", "compliance", "rate", "friction with all"])
+], ids=["loss factor", "friction with losses", "compliance", "friction with compliance", "rate", "friction with spin",
+        "friction with all"])
 def test_points_are_single_runs(scene, key, values, ranks, converged):
     """Values of what spins have no threshold between them, whose search would take nine tenths of the time."""
     sweeps = [converged(*scene, "--set", f"sweep.key={key}", "--set", f"sweep.values={values}", ranks=n) for n in ranks]
@@ -128,8 +131,10 @@ UP_TO_20_KHZ = ["--set", "modes.band=20000"] # without spin the mode that fricti
 
 @pytest.mark.parametrize("scene, numbers", [
     ([*LOSSY, *UP_TO_20_KHZ], [LOSSES, FRICTION, "{key='part.pin.young', deviation=2e8}"]),
+    ([*SOFT, *UP_TO_20_KHZ], [COMPLIANCE, FRICTION]),
+    (SPINNING, [RATE, FRICTION]),
     (ALL, [LOSSES, COMPLIANCE, RATE, FRICTION]),
-], ids=["losses", "all"])
+], ids=["losses", "compliance", "spin", "all"])
 def test_random_numbers_are_single_runs(scene, numbers, converged):
     """Growth within 1e-3 of |lambda|, as it is asked for; the losses move it by up to a hundredth."""
     run = converged(*scene, *random(*numbers, samples=8, checks=4), "-robustness_training", "6", ranks=1)
