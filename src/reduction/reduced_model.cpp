@@ -228,13 +228,13 @@ void set_matrices(ReducedModel& model, const SlidingEquilibrium& sliding, const 
 namespace
 {
 
-/// E = Z'(K + omega^2 M)Z, factored.
-Factor energy_factor(Mat K, Mat M, double omega, Mat Z, const FactorOptions& options)
+/// E = Z'(K + omega^2 M)Z, bordered by P.
+Factor energy_factor(Mat K, Mat M, double omega, Mat Z, Mat P, const FactorOptions& options)
 {
   const Owned<Mat> E = project_symmetric(K, Z);
   check(MatAXPY(E, omega * omega, project_symmetric(M, Z), UNKNOWN_NONZERO_PATTERN));
   check(MatSetOption(E, MAT_SYMMETRIC, PETSC_TRUE));
-  Factor factor(E, nullptr, options);
+  Factor factor(E, P, options);
   if (factor.failed()) throw Error("reduced model: K + omega^2 M is not positive definite with the active pairs open");
   return factor;
 }
@@ -286,12 +286,13 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   MultiVector X;
   {
     const ModeColumns of_modes = mode_columns(modes, reduction, contact);
-    const Factor factor = energy_factor(K, structure.M, omega, contact.Z, reduction.factor);
+    const Owned<Mat> P = force_rows(forces, BZ);
+    const Factor factor = energy_factor(K, structure.M, omega, contact.Z, P, reduction.factor);
     const MultiVector& shapes = of_modes.columns;
     const MatrixXd energy =
         symmetric_inner_products(shapes, K) + omega * omega * symmetric_inner_products(shapes, structure.M);
-    X = make_basis(model, {factor, contact.Z, BZ, forces}, of_modes, energy, whole_product(B, shapes), structure.M,
-                   limits_of(reduction, structure, shapes.columns()));
+    X = make_basis(model, {factor, contact.Z, P}, of_modes, energy, forces.transpose() * whole_product(B, shapes),
+                   structure.M, limits_of(reduction, structure, shapes.columns()));
   }
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
   const LeftPart left = left_part(contact, B, X);

@@ -1,7 +1,10 @@
 #include "reduction_basis.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/integers.hpp"
+#include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -81,21 +84,19 @@ Extension extend(Orthonormal& basis, Index count, double threshold, Index at_mos
   return {kept, left_out, sizes.segment(sizes.size() - fresh_ones, left_out).sum() / static_cast<double>(count)};
 }
 
-/// Solves for the attachments of the columns of `forces` and shows them to `visit`, some at a time, in the coordinates
-/// that Z keeps.
-template <class Forces, class Visit>
-void solve_attachments(const Attachments& attachments, const Forces& forces, Visit visit)
+/// Solves for combinations of the attachments and shows them to `visit`, some at a time, in the coordinates that Z
+/// keeps.
+template <class Visit> void solve_attachments(const Attachments& attachments, const MatrixXd& combinations, Visit visit)
 {
   Owned<Vec> pattern, on_rows;
-  check(MatCreateVecs(attachments.BZ, pattern.put(), on_rows.put()));
+  check(MatCreateVecs(attachments.P, pattern.put(), on_rows.put()));
   PetscInt first_row = 0;
   check(VecGetOwnershipRange(on_rows, &first_row, nullptr));
   constexpr Index at_once = 64;
-  for (Index first = 0; first < forces.cols(); first += at_once)
+  for (Index first = 0; first < combinations.cols(); first += at_once)
   {
-    const MatrixXd some = forces.middleCols(first, std::min(at_once, forces.cols() - first));
     std::vector<Owned<Vec>> force, shape;
-    for (const auto column : some.colwise())
+    for (const auto column : combinations.middleCols(first, std::min(at_once, combinations.cols() - first)).colwise())
     {
       PetscInt own = 0;
       PetscScalar* entries = nullptr;
@@ -105,30 +106,23 @@ void solve_attachments(const Attachments& attachments, const Forces& forces, Vis
       check(VecRestoreArrayWrite(on_rows, &entries));
       force.push_back(zeros_like(pattern));
       shape.push_back(zeros_like(pattern));
-      check(MatMultTranspose(attachments.BZ, on_rows, force.back()));
+      check(MatMultTranspose(attachments.P, on_rows, force.back()));
     }
-    (void)attachments.factor.forward(std::vector<Vec>(force.begin(), force.end()));
-    attachments.factor.backward({}, std::vector<Vec>(shape.begin(), shape.end()));
+    const std::vector<double> no_forces(attachments.factor.forward(std::vector<Vec>(force.begin(), force.end())).size(),
+                                        0.);
+    attachments.factor.backward(no_forces, std::vector<Vec>(shape.begin(), shape.end()));
     visit(first, columns_of(std::vector<Vec>(shape.begin(), shape.end())));
   }
 }
 
-/// X'E X of modes and attachments X = [modes, E^-1 F], from that of the modes and F'X of the modes.
+/// X'E X of modes and attachments X = [modes, E^-1 P'], from that of the modes and P X of the modes.
 MatrixXd energies(const Attachments& attachments, const MatrixXd& energy_of_modes, const MatrixXd& of_modes)
 {
-  const Index modes = of_modes.cols(), count = attachments.forces.cols();
+  const Index modes = of_modes.cols(), count = of_modes.rows();
+  std::vector<double> condensed = attachments.factor.condensed(1);
+  broadcast(condensed, comm_of(attachments.P));
   MatrixXd result(modes + count, modes + count);
-  result.topLeftCorner(modes, modes) = energy_of_modes;
-  result.bottomLeftCorner(count, modes) = attachments.forces.transpose() * of_modes;
-  result.topRightCorner(modes, count) = result.bottomLeftCorner(count, modes).transpose();
-  MatrixXd among(count, count);
-  solve_attachments(attachments, attachments.forces,
-                    [&](Index first, const MultiVector& shapes)
-                    {
-                      among.middleCols(first, shapes.columns()) =
-                          attachments.forces.transpose() * whole_product(attachments.BZ, shapes);
-                    });
-  result.bottomRightCorner(count, count) = (among + among.transpose()) / 2;
+  result << energy_of_modes, of_modes.transpose(), of_modes, MatrixXd::Map(condensed.data(), count, count);
   return result;
 }
 
@@ -208,6 +202,24 @@ Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std
   return forces;
 }
 
+Owned<Mat> force_rows(const Eigen::SparseMatrix<double>& forces, Mat BZ)
+{
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(BZ, &first, &last));
+  std::vector<SparseRow> own;
+  for (Index force = 0; force < forces.cols(); ++force)
+  {
+    SparseRow row;
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(forces, force); entry; ++entry)
+      row[to_int(entry.row())] = entry.value();
+    if (const PetscInt place = row.begin()->first; place >= first && place < last) own.push_back(std::move(row));
+  }
+  const Owned<Mat> transposed = matrix_of_rows(own, last - first, comm_of(BZ));
+  Owned<Mat> P;
+  check(MatMatMult(transposed, BZ, MAT_INITIAL_MATRIX, PETSC_DEFAULT, P.put()));
+  return P;
+}
+
 MatrixXd by_falling_period(const MatrixXd& mass, double omega, Index& slow)
 {
   const SymmetricEigenpairs spectrum = solve_dense_symmetric((mass + mass.transpose()) / 2);
@@ -220,7 +232,7 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
                        const MatrixXd& energy_of_modes, const MatrixXd& of_modes, Mat M, const AttachmentLimits& limits)
 {
   constexpr double new_shape = 1e-3; // part of further shapes that must be new
-  const Index modal = modes.columns.columns(), count = attachments.forces.cols();
+  const Index modal = modes.columns.columns(), count = of_modes.rows();
   const MatrixXd energy = energies(attachments, energy_of_modes, of_modes);
   Orthonormal basis{energy, MatrixXd(energy.rows(), 0)};
   extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
@@ -239,12 +251,11 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
   model.left_out = static_cast<int>(attached.left_out);
   model.lost_compliance = attached.lost;
 
-  // The basis is solved for, not combined from attachments: they would have to be held, those left out as well.
-  const auto [of_shapes, of_forces] =
-      std::pair{basis.T.topRows(modal), basis.T.bottomRightCorner(count, attached.taken)};
+  // The basis is solved for, not combined from attachments: these would have to be held, those left out as well.
+  const auto of_shapes = basis.T.topRows(modal);
   MultiVector X{modes.columns.comm, MatrixXd(modes.columns.entries.rows(), basis.T.cols())};
   X.entries.leftCols(of_modes_alone).noalias() = modes.columns.entries * of_shapes.leftCols(of_modes_alone);
-  solve_attachments(attachments, MatrixXd(attachments.forces * of_forces),
+  solve_attachments(attachments, basis.T.bottomRightCorner(count, attached.taken),
                     [&](Index first, const MultiVector& shapes)
                     {
                       const Index at = of_modes_alone + first, some = shapes.columns();

@@ -29,12 +29,14 @@ ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction&
 /// the active pairs' rows of B.
 Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std::vector<int>& active);
 
-/// What makes the shapes Z E^-1 (B Z)' f of forces f on the active pairs' rows.
+/// P = F'B Z of the forces F, columns on the active pairs' rows.
+Owned<Mat> force_rows(const Eigen::SparseMatrix<double>& forces, Mat BZ);
+
+/// What makes the shapes Z E^-1 P', a column each force.
 struct Attachments
 {
-  const Factor& factor; // of E = K_z + w^2 M_z
-  Mat Z = nullptr, BZ = nullptr;
-  const Eigen::SparseMatrix<double>& forces; // one column each
+  const Factor& factor; // of E = K_z + w^2 M_z, bordered by P
+  Mat Z = nullptr, P = nullptr;
 };
 
 /// The part of the attachments that a basis takes.
@@ -46,9 +48,9 @@ struct AttachmentLimits
 };
 
 /// The basis: the modes, the attachments next to them, all by falling period, as motions. `energy_of_modes`: X'E X of
-/// the modes X; `of_modes`: B X. Sets the model's counts, what it leaves out, `slow` and `apart`. No attachment is
-/// stored before it is known what the basis holds of it: they are solved for twice, for their energies and for the
-/// basis. Error: more compliance would be lost than may be.
+/// the modes X; `of_modes`: F'B X. Sets the model's counts, what it leaves out, `slow` and `apart`. Energies of
+/// attachments are the condensed operator P E^-1 P', so that only those which the basis takes are solved for. Error:
+/// more compliance would be lost than may be.
 MultiVector make_basis(ReducedModel& model, const Attachments& attachments, const ModeColumns& modes,
                        const Eigen::MatrixXd& energy_of_modes, const Eigen::MatrixXd& of_modes, Mat M,
                        const AttachmentLimits& limits);
