@@ -12,6 +12,7 @@ void multiply(const Monodromy& monodromy, std::span<const Owned<Vec>> states)
   if (monodromy.exact())
   {
     monodromy.flow.apply_tangent(std::vector<Vec>(states.begin(), states.end()));
+    if (monodromy.multiplied) monodromy.multiplied(states.size());
     return;
   }
   const Owned<Vec> moved = zeros_like(orbit.state);
