@@ -333,6 +333,7 @@ SlowMotions ReducedFamily::slow_motions(double period, Vec start)
   ReducedMap& map = at_->map;
   const ReducedState state = reduced_state(start);
   const auto moved = record_contacts(map, period, moved_on(map, period / map.steps / 2, state));
+  other_grid_.reset();
   recorded_ = record_contacts(map, period, state);
   const ReducedSpectrum spectrum = large_multipliers(map, period, recorded_, deciding_values, PETSC_COMM_SELF);
   SlowMotions slow;
@@ -403,14 +404,21 @@ FlowFamily ReducedFamily::flows()
   };
   family.flow.record_period = [this](double period, Vec start, const TimeGrid& grid)
   {
-    const double step = period / at_->map.steps;
+    const int steps = grid.finer * at_->map.steps + grid.more;
+    other_grid_.reset();
+    if (steps != at_->map.steps)
+    {
+      other_grid_.emplace(at_->map);
+      other_grid_->steps = steps;
+    }
+    ReducedMap& map = other_grid_ ? *other_grid_ : at_->map;
     const ReducedState state = reduced_state(start);
     recorded_ =
-        record_contacts(at_->map, period, grid.shift > 0 ? moved_on(at_->map, grid.shift * step, state) : state);
+        record_contacts(map, period, grid.shift > 0 ? moved_on(map, grid.shift * period / steps, state) : state);
   };
   family.flow.apply_tangent = [this](std::span<const Vec> states)
   {
-    ReducedMap& map = at_->map;
+    ReducedMap& map = other_grid_ ? *other_grid_ : at_->map;
     copy_columns(apply_tangent(map, map.h * map.steps, recorded_, columns_of_states(states), PETSC_COMM_SELF), states);
   };
   family.flow.slow_motions = [this](double period, Vec start) { return slow_motions(period, start); };

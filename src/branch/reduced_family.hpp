@@ -85,7 +85,8 @@ private:
   double interpolation_error_ = 0;
   std::unique_ptr<At> at_;
   std::vector<RecordedContact> recorded_;
-  MonodromyCorrection correction_; // of the flows
+  std::optional<ReducedMap> other_grid_; // of the recorded steps, where it is not the map's own
+  MonodromyCorrection correction_;       // of the flows
   MonodromyCorrection lifted_correction_;
 };
 

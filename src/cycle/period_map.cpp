@@ -190,9 +190,9 @@ void move_by_part(const PeriodMap& map, double part, State& state)
 void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& grid)
 {
   integrate_replayed(map);
-  const int steps = grid.finer * map.steps;
+  const int steps = grid.finer * map.steps + grid.more;
   set_step(map, period / steps);
-  if (grid.shift == 0 && grid.finer == 1 && is_recorded(map, start)) return;
+  if (grid.shift == 0 && steps == map.steps && is_recorded(map, start)) return;
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
   if (grid.shift > 0) move_by_part(map, grid.shift, state);
   map.recorded_start = {};

@@ -2,6 +2,7 @@
 
 #include "arnoldi_multipliers.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/progress.hpp"
 #include "whole_matrix.hpp"
 
 #include <algorithm>
@@ -14,6 +15,7 @@ namespace
 {
 
 using Complex = std::complex<double>;
+using Eigen::Index;
 
 /// The sum of a change of amplitude and the other unstable motions, each of energy norm 1.
 Owned<Vec> motions_that_may_grow(const OrbitProblem& problem, const Orbit& orbit,
@@ -44,8 +46,50 @@ void add_changes(const std::vector<Complex>& values, const std::vector<Complex>&
   }
 }
 
+/// The multipliers of these places along eight periods on a grid of 8 N + 1 steps, by projection on the vectors of all
+/// of them; then what each is a period: the root that is nearest to the value.
+std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Eigen::MatrixXd& Q,
+                                         const std::vector<DenseEigenpair>& pairs, const std::vector<Index>& places)
+{
+  constexpr int periods = 8;
+  const Orbit& orbit = monodromy.orbit;
+  Eigen::MatrixXd V(Q.cols(), Q.cols()), image(Q.cols(), static_cast<Index>(places.size()));
+  for (Index i = 0; i < V.cols(); ++i)
+  {
+    const DenseEigenpair& pair = pairs[static_cast<std::size_t>(i)];
+    V.col(i) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.y.imag()) : Eigen::VectorXd(pair.y.real());
+  }
+  std::vector<Owned<Vec>> states;
+  for (const Index place : places) states.push_back(state_at(Q * V.col(place), orbit));
+  monodromy.flow.record_period(periods * orbit.period, orbit.state, {0, periods, 1});
+  multiply(monodromy, states);
+  for (Index k = 0; k < image.cols(); ++k)
+    image.col(k) = Q.transpose() * coordinates_of(states[static_cast<std::size_t>(k)], orbit.period);
+  const Eigen::MatrixXd projected = V.partialPivLu().solve(image)(places, Eigen::all);
+  if (!projected.allFinite()) return {};
+
+  std::vector<Complex> values, powers;
+  for (const Index place : places) values.push_back(pairs[static_cast<std::size_t>(place)].lambda);
+  for (const Complex value : values) powers.push_back(std::pow(value, periods));
+  const std::vector<Complex> found = values_of(solve_dense_unsymmetric(projected));
+  const std::vector<std::size_t> partners = nearest_places(powers, found);
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    const Complex first = std::pow(found[partners[i]], 1. / periods), value = values[i];
+    for (int k = 0; k < periods; ++k)
+    {
+      const Complex root = first * std::polar(1., two_pi * k / periods);
+      if (k == 0 || std::abs(root - value) < std::abs(values[i] - value)) values[i] = root;
+    }
+  }
+  return values;
+}
+
 /// All multipliers. Bars: the change of each when the grid of time moves by half a step, and 4/3 of the change on one
-/// of twice as many steps, which is the error of a step of order 2.
+/// of twice as many steps, which is the error of a step of order 2. A contact that hits a mass moves it within a step
+/// by what the grid allows, and a tangent along a grid that fits the period sees but one place of the impact in the
+/// step. So the bars hold as well what changes along eight periods of 8 N + 1 steps, which see eight places, and by
+/// how much the multiplier of the shift in time misses 1 on either grid.
 FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
 {
   FloquetAnalysis result;
@@ -89,18 +133,42 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   }
   const std::size_t shift = find_shift(pairs, Q.transpose() * coordinates_of(orbit.rate, orbit.period));
   multipliers.trivial_error = std::abs(values[shift] - 1.);
+  double largest_trivial_error = multipliers.trivial_error;
+  if (monodromy.exact())
+  {
+    constexpr double decays = 0.7; // a period: such a motion decides nothing
+    std::vector<Index> places;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (std::abs(values[i]) > decays || i == shift) places.push_back(static_cast<Index>(i));
+    const std::vector<Complex> others = along_eight_periods(monodromy, Q, pairs, places);
+    multipliers.periods += static_cast<long>(8 * places.size());
+    monodromy.flow.record_period(orbit.period, orbit.state, {});
+    for (std::size_t k = 0; k < others.size(); ++k)
+    {
+      const auto i = static_cast<std::size_t>(places[k]);
+      grid.errors[i] = std::max(grid.errors[i], std::abs(others[k] - values[i]));
+      grid.rises[i] = std::max(grid.rises[i], std::abs(others[k]) - std::abs(values[i]));
+      if (i == shift) largest_trivial_error = std::max(largest_trivial_error, std::abs(others[k] - 1.));
+    }
+  }
   for (std::size_t i = 0; i < values.size(); ++i)
   {
     if (i == shift) continue;
     constexpr double rounding = 1e-9;
-    const double of_differences = monodromy.exact() ? rounding : multipliers.trivial_error;
+    const double least = std::max(rounding, largest_trivial_error);
     multipliers.values.push_back(values[i]);
-    multipliers.errors.push_back(std::max(grid.errors[i], of_differences));
-    multipliers.upper.push_back(std::abs(values[i]) + std::max(grid.rises[i], of_differences));
+    multipliers.errors.push_back(std::max(grid.errors[i], least));
+    multipliers.upper.push_back(std::abs(values[i]) + std::max(grid.rises[i], least));
   }
   pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
   if (pairs.empty()) return result;
   decide(multipliers, {true, ""}, multipliers.values.size());
+  if (multipliers.stability == Stability::undecided && largest_trivial_error > 0.5 * multipliers.errors.front())
+    multipliers.would_decide =
+        format("the multiplier of a shift in time, which is 1, misses it by %.1e along a grid of time: contact that "
+               "hits masses "
+               "within steps; a motion beside it (-cycle_watched_periods), or contact with a compliance, would decide",
+               largest_trivial_error);
   result.fastest =
       fastest_motion(monodromy.flow, pairs.front(), [&](const Eigen::VectorXd& y) { return state_at(Q * y, orbit); });
   return result;
@@ -133,6 +201,16 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
   Monodromy monodromy{problem.flow, orbit, options.difference * orbit.fluctuation};
   const MultiplierMethod method = chosen_method(options, problem.flow, dofs);
   if (method == MultiplierMethod::whole) return from_whole_matrix(monodromy, dofs);
+  std::optional<Progress> progress;
+  if (dofs > large_model)
+  {
+    constexpr double columns_often = 100; // that a verdict takes
+    progress.emplace(comm_of(orbit.state), "multipliers", columns_often);
+    progress->update(0, "a reduced model on the cycle's contact");
+    monodromy.multiplied = [&, done = 0.](std::size_t columns) mutable {
+      progress->update(done += static_cast<double>(columns), format("%.0f products with the period's tangent", done));
+    };
+  }
   std::string refusal;
   if (method == MultiplierMethod::oblique && problem.flow.slow_motions)
     if (auto found = multipliers_by_projection(monodromy, options.multipliers, refusal)) return std::move(*found);

@@ -24,12 +24,12 @@ OptionList options_of(ShootingOptions& options)
       {"-cycle_max_periods", &options.max_periods, Range::not_negative,
        "periods that one search integrates at most; another number of steps a period is another search"},
       {"-cycle_free_periods", &options.free_periods, Range::not_negative,
-       "integrated freely at most, while shooting finds no cycle that attracts"},
+       "periods integrated freely at most, while shooting finds no cycle that attracts"},
       {"-cycle_multipliers", &options.multipliers, Range::any,
        "columns that the search for Floquet multipliers may take, 0: none; below 0: as many as it needs, within "
        "limits"},
       {"-cycle_watched_periods", &options.watched_periods, Range::not_negative,
-       "integrated from beside the cycle found, to see a small motion grow or decay"},
+       "periods integrated from beside the cycle found, to see a small motion grow or decay"},
       {"-cycle_multiplier_method", choice_of(options.multiplier_method), Range::any,
        "of the Floquet multipliers: auto, whole, oblique or arnoldi"},
   };

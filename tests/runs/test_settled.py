@@ -191,3 +191,18 @@ def test_a_grid_too_coarse_for_a_light_foot_is_no_irregular_motion(squeal, tmp_p
     assert cycle["mean_fluctuating_energy"] == pytest.approx(11.89, rel=1e-2)
     largest = cycle["multipliers"]["values"][0]
     assert abs(math.hypot(largest["real"], largest["imaginary"]) - 0.677) < largest["error"] + 1e-3
+
+
+def test_bars_of_multipliers_hold_what_impacts_within_a_step_change(squeal, tmp_path):
+    """A rigid pad whose two corners hit. Along 668, 1000 and 2500 steps a period its largest multiplier is 0.987, along 1501,
+    2000, 4001, 6000 and 8000 it is 0.956. Where the grid of time does not fit the period, motions decay by 0.955 to 0.961 a
+    period (20000.4, 80000.4 and 80000.7 steps)."""
+    write_matrices(tmp_path / "m", [[0, 1, -1, -1, 1], [1, 0, 0.55321627, 0, -0.2], [0, 1, 1, -1, -1], [1, 0, 0.55321627, 0, -0.2]],
+                   [0, 0], [0.32756219, 0.32756219], [0, -1, 0, 0, 0], M=np.diag([1, 1, 0.4810073, 0.44105631, 0.49414496]),
+                   C=np.diag([0.00846301, 0.00846301, 0.00407077, 0.00373267, 0.00418196]),
+                   K=[[0.98784625, 0.06515682, 0.21394039, 0, 0], [0.06515682, 1.31761424, -0.16422969, 0, 0],
+                      [0.21394039, -0.16422969, 0.7785392, 0, 0], [0, 0, 0, 2.43607547, 0], [0, 0, 0, 0, 1.80893223]])
+    scene = write_scene(tmp_path, matrices={"folder": "m"}, modes={"band": 1e6}, friction={"coefficient": 0.43902544}, cycle={})
+    cycle = squeal(scene, ranks=1).report["cycle"]
+    largest = cycle["multipliers"]["values"][0]
+    assert abs(abs(complex(largest["real"], largest["imaginary"])) - 0.958) <= largest["error"]
