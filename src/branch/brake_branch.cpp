@@ -33,6 +33,13 @@ Outcome outcome_of(const BrakeBranchProblem& problem, const BrakeBranch& found)
     return outcome;
   }
   for (const BranchPoint& point : branch.points) outcome.residual = std::max(outcome.residual, point.residual);
+  const auto beside_jumps = std::ranges::count_if(branch.points, [&](const BranchPoint& point)
+                                                  { return point.residual > problem.tolerance; });
+  if (beside_jumps > 0)
+    outcome.reason =
+        format("at %ld of %zu points the period's map jumps, where contact changes in a step: residuals up "
+               "to %.1e; other steps a period move the jumps",
+               static_cast<long>(beside_jumps), branch.points.size(), outcome.residual);
   const auto note = [&](BranchEnding ending, const BranchPoint& end)
   {
     if (natural(ending)) return;
@@ -69,24 +76,26 @@ struct Place
 };
 
 /// The branch's points, and between a stable and another one the fold that parts them: up to there cycles are stable.
+/// Undecided points are left out: they end no range, as an event would.
 std::vector<Place> places_along(const Branch& branch)
 {
   std::vector<Place> places;
-  for (const BranchPoint& point : branch.points)
+  const auto is_stable = [](const BranchPoint& point) { return point.multipliers.stability == Stability::stable; };
+  for (std::size_t i = 0; i < branch.points.size(); ++i)
   {
-    const Place place{point.parameter, point.multipliers.stability == Stability::stable};
-    if (!places.empty() && places.back().stable != place.stable)
+    const BranchPoint& point = branch.points[i];
+    if (i > 0 && is_stable(point) != is_stable(branch.points[i - 1]))
     {
-      const double from = places.back().parameter, length = std::abs(place.parameter - from);
+      const double from = branch.points[i - 1].parameter, length = std::abs(point.parameter - from);
       for (const BranchEvent& event : branch.events)
         if (event.kind == BranchEventKind::fold && std::abs(event.parameter - from) <= length + event.error &&
-            std::abs(event.parameter - place.parameter) <= length + event.error)
+            std::abs(event.parameter - point.parameter) <= length + event.error)
         {
           places.push_back({event.parameter, true});
           break;
         }
     }
-    places.push_back(place);
+    if (point.multipliers.stability != Stability::undecided) places.push_back({point.parameter, is_stable(point)});
   }
   return places;
 }
@@ -310,7 +319,7 @@ BrakeBranch find_branch(const BrakeBranchProblem& problem)
 {
   const BranchSettings& settings = problem.settings;
   const ContinuationSettings continuation{std::min(settings.from, settings.to), std::max(settings.from, settings.to),
-                                          settings.points, problem.tolerance};
+                                          settings.points, problem.tolerance, problem.steps_per_period};
   BrakeFamily family(problem);
   BrakeBranch found;
   found.equilibria = equilibria_along(family, problem);

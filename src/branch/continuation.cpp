@@ -191,7 +191,9 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Branch
   BranchSide side{{}, {}, known_beyond(start.multipliers)};
   side.orbits.push_back(copy_of(start));
   refer_to(corrector, side.orbits.back().corrected);
-  Walk walk{std::move(tangent), 1. / points, 2e-3 / points, 6. / points};
+  // a range may be far wider than what the branch's kinks are to be passed by
+  const double narrow = std::abs(start.corrected.parameter) / corrector.scales.parameter;
+  Walk walk{std::move(tangent), 1. / points, 2e-3 / points * (narrow > 0 ? std::min(1., narrow) : 1), 6. / points};
   const bool upwards = walk.tangent.parameter > 0;
   if (!inside(corrector.settings,
               start.corrected.parameter + std::copysign(1e-9 * corrector.scales.parameter, walk.tangent.parameter)))

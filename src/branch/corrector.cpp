@@ -12,6 +12,15 @@ namespace
 constexpr int most_iterations = 12, most_columns = 120;
 constexpr double good_reduction = 0.3; // of the residual by a step: a worse one calls for a new Jacobian
 
+// The map of a period jumps where an event of contact meets the grid of time: an orbit there closes on neither side,
+// and exact steps go to and fro between both. The same orbit begun a part of a step later has the event elsewhere.
+constexpr int fruitless_steps = 2, most_moves = 3;
+constexpr double moved_by = 0.3; // of a step of the grid: three moves try four places of the event in it
+
+// Where none of them helps, the better side of the jump is taken, up to so many times the tolerance. Its residual says
+// what it is worth.
+constexpr double beside_jump = 10;
+
 Owned<Vec> preconditioned(const BranchCorrector& corrector, double period, Vec b)
 {
   Owned<Vec> y = zeros_like(b);
@@ -217,7 +226,7 @@ void form_jacobian(BranchCorrector& corrector, const Orbit& orbit)
 bool makes_progress(const BranchCorrector& corrector, const Orbit& orbit, double first_residual)
 {
   return std::isfinite(orbit.residual) && orbit.residual < 10 * std::max(first_residual, 1e-3) &&
-         orbit.fluctuation < 4 * corrector.scales.fluctuation;
+         orbit.fluctuation < 4 * corrector.scales.fluctuation && orbit.fluctuation > corrector.scales.fluctuation / 20;
 }
 
 } // namespace
@@ -270,8 +279,21 @@ std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const BranchVe
   Orbit orbit = evaluate_at(z);
   const double first_residual = orbit.residual;
   bool renew = corrector.secants.empty();
+  int fruitless = 0, moves = 0;
+  std::optional<CorrectedOrbit> best; // beside a jump
   for (int iteration = 0; iteration <= most_iterations; ++iteration)
   {
+    if (fruitless > 0 && !(best && best->orbit.residual <= orbit.residual))
+      best = CorrectedOrbit{copy_of(orbit), z.parameter, iteration};
+    if (fruitless == fruitless_steps && moves == most_moves) break;
+    if (fruitless == fruitless_steps && corrector.settings.steps > 0)
+    {
+      check(VecAXPY(z.state, moved_by * z.period / corrector.settings.steps, orbit.rate));
+      orbit = evaluate_at(z);
+      iteration = fruitless = 0;
+      renew = true;
+      ++moves;
+    }
     if (!makes_progress(corrector, orbit, first_residual)) return {};
     record_full(corrector.log, ShootingStage::multisecant, orbit);
     if (orbit.residual <= problem.tolerance) return CorrectedOrbit{std::move(orbit), z.parameter, iteration};
@@ -288,12 +310,15 @@ std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const BranchVe
     add(1, step, z);
     if (!admissible_period(problem, z.period)) return {};
     Orbit next = evaluate_at(z);
-    renew = next.residual > good_reduction * orbit.residual;
+    const bool poor = next.residual > good_reduction * orbit.residual;
+    fruitless = poor && renew ? fruitless + 1 : 0;
+    renew = poor;
     Owned<Vec> change = preconditioned(corrector, next.period, next.defect);
     check(VecAXPY(change, -1, defect));
     keep(corrector, {std::move(step), std::move(change)});
     orbit = std::move(next);
   }
+  if (best && best->orbit.residual <= beside_jump * problem.tolerance) return best;
   return {};
 }
 

@@ -195,3 +195,21 @@ def test_falling_friction_is_followed_round_its_fold_to_the_hopf_point(converged
     assert both == {"from": hopf["parameter"], "to": fold["parameter"]}
     last = branch["points"][-1]
     assert last["parameter"] == pytest.approx(hopf["parameter"], rel=1e-4)  # 1e-2 of its way from the fold
+
+
+def test_a_branch_is_followed_where_the_map_of_a_period_jumps(converged, tmp_path):
+    """Friction of two directions turns in steps of the grid of time, and some orbits close on neither side of the jump. Cycles
+    of single runs at 0.45, 0.5, 0.65 and 0.7 have mean energies of 0.86981, 0.88573, 0.92224 and 0.93295 J; half of the bar is
+    the cubic between points, half the jumps' residuals of up to 1e-4."""
+    write_matrices(tmp_path / "m", [[0, 1, 0, -1], [1, 0, 0, 0], [0, 0, 1, 0]], [0], [0.30302196, -0.80665068], [0, -1, 0, 0],
+                   M=np.diag([0.64946477, 0.40263725, 0.76986867, 0.96158865]),
+                   C=np.diag([0.00187686, 0.00116356, 0.00222481, 0.00277885]),
+                   K=[[0.8271456, 0.01018081, -0.03251772, 0.12373557], [0.01018081, 1.13737841, 0.04752635, 0.13725626],
+                      [-0.03251772, 0.04752635, 0.97594384, -0.01520235], [0.12373557, 0.13725626, -0.01520235, 0.54711067]])
+    scene = write_scene(tmp_path, matrices={"folder": "m"}, modes={"band": 1e6}, friction={"coefficient": 0.60578577},
+                        cycle={"steps_per_period": 200}, fidelity="full")
+    branch = converged(scene, *branch_of("friction.coefficient", 0.424, 0.9086), ranks=1).report["branch"]
+    points = branch["points"]
+    assert all(point["residual"] <= 1e-4 and point["stability"] == "stable" for point in points)
+    energies = np.interp([0.45, 0.5, 0.65, 0.7], *zip(*((p["parameter"], p["mean_energy"]) for p in points)))
+    assert energies == pytest.approx([0.86981, 0.88573, 0.92224, 0.93295], rel=1e-3)

@@ -123,6 +123,7 @@ struct ContinuationSettings
   double least = 0, greatest = 0; // of the parameter
   int points = 30;                // that would span the range if the parameter alone changed
   double tolerance = 0;           // on the full-space residual
+  int steps = 0;                  // of the flow's grid of time a period; 0: it has none
 };
 
 /// The orbit of this value that closes near `start`, without its multipliers; none where none does. Collective. Error:
