@@ -100,10 +100,13 @@ bool alike(const MeanValue& a, const MeanValue& b)
   return std::abs(a.value - b.value) <= a.error + b.error;
 }
 
-/// Whether the search for a cycle ended without one that attracts, on a free motion that goes on.
-bool motion_goes_on(const LimitCycle& cycle)
+/// Whether the search for a cycle ended without one that attracts, on a free motion that goes on: beside an equilibrium
+/// that is unstable it grows again from however little is left.
+bool motion_goes_on(const Report& report)
 {
-  return cycle.outcome.kind != OutcomeKind::collapsed_to_equilibrium && cycle.free.state.get();
+  const LimitCycle& cycle = report.cycle;
+  return cycle.free.state.get() &&
+         (cycle.outcome.kind != OutcomeKind::collapsed_to_equilibrium || report.modes.unstable_count > 0);
 }
 
 } // namespace
@@ -283,7 +286,8 @@ SettledMotion run_settled(const Chain& chain)
   const LimitCycle& cycle = chain.report.cycle;
   if (!has_run(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::off, "no cycle was sought");
   if (succeeded(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::skipped, "the cycle is the answer");
-  if (!motion_goes_on(cycle)) return not_run<SettledMotion>(OutcomeKind::skipped, "there is no motion to go on from");
+  if (!motion_goes_on(chain.report))
+    return not_run<SettledMotion>(OutcomeKind::skipped, "there is no motion to go on from");
   return find_settled_motion(cycle_problem(chain), cycle, chain.options.settled);
 }
 

@@ -54,11 +54,20 @@ std::string stability_text(const Multipliers& multipliers)
   if (multipliers.values.empty())
     return multipliers.stability == Stability::undecided ? ", whether it lasts is undecided"
                                                          : ", whether it lasts was not examined";
-  const double modulus = std::abs(multipliers.values.front()), error = multipliers.errors.front();
+  std::size_t place = 0; // of the largest, or of the one that leaves it undecided
+  if (multipliers.stability == Stability::undecided)
+    for (std::size_t i = 1; i < multipliers.values.size(); ++i)
+      if (multipliers.upper_bound(place) < multipliers.upper_bound(i)) place = i;
+  const double modulus = std::abs(multipliers.values[place]), error = multipliers.errors[place];
   const double bound = largest_upper_bound(multipliers); // closer than the error, which is of both sides
+  const bool decided = multipliers.stability == Stability::stable || multipliers.stability == Stability::unstable;
+  const std::string which = place == 0 ? "largest" : "a";
   const std::string largest = modulus + error >= 1 && bound < 1
                                   ? format(" (largest multiplier %.4f, at most %.6f)", modulus, bound)
-                                  : format(" (largest multiplier %.4f +- %.0e)", modulus, error);
+                              : decided && modulus - error <= 1 && bound >= 1 && !multipliers.seen.empty()
+                                  ? format(" (a motion beside it seen to grow %.4f +- %.0e times a period)",
+                                           multipliers.seen.back().growth, multipliers.seen.back().error)
+                                  : format(" (%s multiplier %.4f +- %.0e)", which.c_str(), modulus, error);
   switch (multipliers.stability)
   {
   case Stability::stable:
@@ -113,24 +122,31 @@ std::string settled_text(const Report& report, const Scene& scene)
                 100 * report.settled.step_error / report.settled.fluctuating_energy.value);
 }
 
-/// How many of the scene's other starts lead to the cycle; empty: all that have settled.
+/// How many of the scene's other starts lead to the cycle, and where most of the others lead; empty: all that have
+/// settled lead to it.
 std::string starts_text(const Report& report)
 {
   const Attractors& attractors = report.attractors;
   const LimitCycle& cycle = report.cycle;
   if (!has_run(attractors.outcome) || attractors.motions.empty()) return {};
-  const ReachedMotion found{
-      ReachedKind::steady, {cycle.measured.mean_fluctuating_energy, 0}, {1 / cycle.orbit.period, 0}, {}};
   std::size_t all = 0, here = 0;
+  const ReachedMotion* other = nullptr; // they come by falling number of starts
   for (const ReachedMotion& motion : attractors.motions)
   {
-    const bool same = agree(motion, found);
+    const bool same = is_cycle(motion, cycle.measured.mean_fluctuating_energy, 1 / cycle.orbit.period);
     if (motion.kind == ReachedKind::unsettled && !same) continue; // it may still come there
     all += motion.starts.size();
-    if (same && motion.kind != ReachedKind::varying) here += motion.starts.size();
+    if (same && motion.kind != ReachedKind::varying)
+      here += motion.starts.size();
+    else if (!other)
+      other = &motion;
   }
   if (here == all) return {};
-  return format(", which %zu of %zu other starts lead%s to", here, all, here == 1 ? "s" : "");
+  const std::string elsewhere = other->kind == ReachedKind::rest ? "rest"
+                                                                 : format("%.5g Hz, mean energy %.3g J",
+                                                                          other->frequency.value, other->energy.value);
+  return format(", which %zu of %zu other starts lead%s to (%zu to %s)", here, all, here == 1 ? "s" : "",
+                other->starts.size(), elsewhere.c_str());
 }
 
 std::string cycle_text(const Report& report, const Scene& scene)

@@ -50,6 +50,10 @@ ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<
 /// Whether energies and frequencies agree within their bars, or within a percent and a thousandth.
 bool agree(const ReachedMotion& a, const ReachedMotion& b);
 
+/// Whether the motion is the cycle of this energy [J] and frequency [Hz]: a coordinate crosses zero a whole number of
+/// times a period.
+bool is_cycle(const ReachedMotion& motion, double energy, double frequency);
+
 /// Joins motions of one kind that agree. Those that most starts lead to come first.
 std::vector<ReachedMotion> joined(std::vector<ReachedMotion> motions);
 
