@@ -53,6 +53,14 @@ bool inside(const ContinuationSettings& settings, double parameter)
   return parameter >= settings.least && parameter <= settings.greatest;
 }
 
+/// Takes out of a change what only begins the orbit later.
+void remove_shift(const BranchCorrector& corrector, const Orbit& orbit, BranchVector& change)
+{
+  const Flow& flow = corrector.family.flow;
+  const double along = energy_product(flow, orbit.rate, change.state) / energy_product(flow, orbit.rate, orbit.rate);
+  check(VecAXPY(change.state, -along, orbit.rate));
+}
+
 /// The orbit a step on, on the bound where the step would pass it; none if it was not found.
 std::optional<CorrectedOrbit> step_on(BranchCorrector& corrector, const CorrectedOrbit& from, const Walk& walk,
                                       double length)
@@ -71,6 +79,7 @@ std::optional<CorrectedOrbit> step_on(BranchCorrector& corrector, const Correcte
   if (!next) return next;
   BranchVector error = vector_of(*next);
   add(-1, predicted, error);
+  remove_shift(corrector, next->orbit, error);
   // far from the prediction another branch may have been met
   if (std::sqrt(scaled_product(corrector, error, error)) > 0.5 * length || !inside(settings, next->parameter))
     return {};
@@ -82,6 +91,7 @@ BranchVector direction_between(const BranchCorrector& corrector, const Corrected
 {
   BranchVector direction = vector_of(to);
   add(-1, vector_of(from), direction);
+  remove_shift(corrector, to.orbit, direction);
   scale(1 / std::sqrt(scaled_product(corrector, direction, direction)), direction);
   return direction;
 }
@@ -191,9 +201,9 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Branch
   BranchSide side{{}, {}, known_beyond(start.multipliers)};
   side.orbits.push_back(copy_of(start));
   refer_to(corrector, side.orbits.back().corrected);
-  // a range may be far wider than what the branch's kinks are to be passed by
-  const double narrow = std::abs(start.corrected.parameter) / corrector.scales.parameter;
-  Walk walk{std::move(tangent), 1. / points, 2e-3 / points * (narrow > 0 ? std::min(1., narrow) : 1), 6. / points};
+  // The smallest step must resolve a change of contact also where the range is far wider than the value at the start.
+  const double of_range = std::clamp(std::abs(start.corrected.parameter) / corrector.scales.parameter, 1e-3, 1.);
+  Walk walk{std::move(tangent), 1. / points, 2e-3 / points * of_range, 6. / points};
   const bool upwards = walk.tangent.parameter > 0;
   if (!inside(corrector.settings,
               start.corrected.parameter + std::copysign(1e-9 * corrector.scales.parameter, walk.tangent.parameter)))

@@ -13,12 +13,13 @@ constexpr int most_iterations = 12, most_columns = 120;
 constexpr double good_reduction = 0.3; // of the residual by a step: a worse one calls for a new Jacobian
 
 // The map of a period jumps where an event of contact meets the grid of time: an orbit there closes on neither side,
-// and exact steps go to and fro between both. The same orbit begun a part of a step later has the event elsewhere.
-constexpr int fruitless_steps = 2, most_moves = 3;
+// and exact steps alternate between both. The same orbit begun a part of a step later has the event elsewhere.
+constexpr double no_reduction = 0.9; // of the residual by an exact step; those of a jump leave 0.95 and more
+constexpr int steps_without_reduction = 2, most_moves = 3;
 constexpr double moved_by = 0.3; // of a step of the grid: three moves try four places of the event in it
 
-// Where none of them helps, the better side of the jump is taken, up to so many times the tolerance. Its residual says
-// what it is worth.
+// Where none of them helps, the better side of the jump is taken, up to so many times the tolerance: its residual is
+// reported.
 constexpr double beside_jump = 10;
 
 Owned<Vec> preconditioned(const BranchCorrector& corrector, double period, Vec b)
@@ -279,24 +280,26 @@ std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const BranchVe
   Orbit orbit = evaluate_at(z);
   const double first_residual = orbit.residual;
   bool renew = corrector.secants.empty();
-  int fruitless = 0, moves = 0;
+  int without_reduction = 0, moves = 0, corrections = 0;
   std::optional<CorrectedOrbit> best; // beside a jump
   for (int iteration = 0; iteration <= most_iterations; ++iteration)
   {
-    if (fruitless > 0 && !(best && best->orbit.residual <= orbit.residual))
-      best = CorrectedOrbit{copy_of(orbit), z.parameter, iteration};
-    if (fruitless == fruitless_steps && moves == most_moves) break;
-    if (fruitless == fruitless_steps && corrector.settings.steps > 0)
+    if (!makes_progress(corrector, orbit, first_residual)) break;
+    record_full(corrector.log, ShootingStage::multisecant, orbit);
+    if (orbit.residual <= problem.tolerance) return CorrectedOrbit{std::move(orbit), z.parameter, corrections};
+    if (without_reduction > 0 && !(best && best->orbit.residual <= orbit.residual))
+      best = CorrectedOrbit{copy_of(orbit), z.parameter, corrections};
+    if (without_reduction == steps_without_reduction && corrector.settings.steps > 0)
     {
+      if (moves == most_moves) break;
       check(VecAXPY(z.state, moved_by * z.period / corrector.settings.steps, orbit.rate));
       orbit = evaluate_at(z);
-      iteration = fruitless = 0;
+      iteration = without_reduction = 0;
       renew = true;
       ++moves;
+      if (!makes_progress(corrector, orbit, first_residual)) break;
+      if (orbit.residual <= problem.tolerance) return CorrectedOrbit{std::move(orbit), z.parameter, corrections};
     }
-    if (!makes_progress(corrector, orbit, first_residual)) return {};
-    record_full(corrector.log, ShootingStage::multisecant, orbit);
-    if (orbit.residual <= problem.tolerance) return CorrectedOrbit{std::move(orbit), z.parameter, iteration};
     if (renew) form_jacobian(corrector, orbit);
     const BranchBorder border = border_at(corrector, orbit, normal);
     Owned<Vec> defect = preconditioned(corrector, orbit.period, orbit.defect);
@@ -306,19 +309,21 @@ std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const BranchVe
     BranchVector step = renew ? step_by_columns(corrector, orbit, border, std::move(wanted), 0.03)
                               : step_by_secants(corrector, border, std::move(wanted));
     const double length = std::sqrt(scaled_product(corrector, step, step));
-    if (length > corrector.options.clamp) scale(corrector.options.clamp / length, step);
+    const bool clamped = length > corrector.options.clamp;
+    if (clamped) scale(corrector.options.clamp / length, step);
     add(1, step, z);
-    if (!admissible_period(problem, z.period)) return {};
+    ++corrections;
+    if (!admissible_period(problem, z.period)) break;
     Orbit next = evaluate_at(z);
-    const bool poor = next.residual > good_reduction * orbit.residual;
-    fruitless = poor && renew ? fruitless + 1 : 0;
-    renew = poor;
+    const bool exact = renew && !clamped;
+    without_reduction = exact && next.residual > no_reduction * orbit.residual ? without_reduction + 1 : 0;
+    renew = next.residual > good_reduction * orbit.residual;
     Owned<Vec> change = preconditioned(corrector, next.period, next.defect);
     check(VecAXPY(change, -1, defect));
     keep(corrector, {std::move(step), std::move(change)});
     orbit = std::move(next);
   }
-  if (best && best->orbit.residual <= beside_jump * problem.tolerance) return best;
+  if (moves == most_moves && best && best->orbit.residual <= beside_jump * problem.tolerance) return best;
   return {};
 }
 

@@ -297,6 +297,7 @@ ReducedBrake ReducedFamily::interpolated(double parameter) const
 void ReducedFamily::set_parameter(double parameter)
 {
   if (at_ && at_->parameter == parameter) return;
+  other_grid_.reset(); // of the model that goes
   at_ = std::make_unique<At>(parameter, interpolated(parameter), problem_.steps_per_period, problem_.cycle.theta);
   at_->map.contact.tolerance = problem_.step.contact.tolerance;
   at_->flow = flow_of(at_->map, energy_);
@@ -404,7 +405,7 @@ FlowFamily ReducedFamily::flows()
   };
   family.flow.record_period = [this](double period, Vec start, const TimeGrid& grid)
   {
-    const int steps = grid.finer * at_->map.steps + grid.more;
+    const int steps = grid.steps(at_->map.steps);
     other_grid_.reset();
     if (steps != at_->map.steps)
     {

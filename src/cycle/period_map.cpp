@@ -190,7 +190,7 @@ void move_by_part(const PeriodMap& map, double part, State& state)
 void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& grid)
 {
   integrate_replayed(map);
-  const int steps = grid.finer * map.steps + grid.more;
+  const int steps = grid.steps(map.steps);
   set_step(map, period / steps);
   if (grid.shift == 0 && steps == map.steps && is_recorded(map, start)) return;
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};

@@ -62,12 +62,12 @@ std::string stability_text(const Multipliers& multipliers)
   const double bound = largest_upper_bound(multipliers); // closer than the error, which is of both sides
   const bool decided = multipliers.stability == Stability::stable || multipliers.stability == Stability::unstable;
   const std::string which = place == 0 ? "largest" : "a";
-  const std::string largest = modulus + error >= 1 && bound < 1
-                                  ? format(" (largest multiplier %.4f, at most %.6f)", modulus, bound)
-                              : decided && modulus - error <= 1 && bound >= 1 && !multipliers.seen.empty()
-                                  ? format(" (a motion beside it seen to grow %.4f +- %.0e times a period)",
-                                           multipliers.seen.back().growth, multipliers.seen.back().error)
-                                  : format(" (%s multiplier %.4f +- %.0e)", which.c_str(), modulus, error);
+  const std::string largest =
+      modulus + error >= 1 && bound < 1 ? format(" (largest multiplier %.4f, at most %.6f)", modulus, bound)
+      : decided && modulus - error <= 1 && bound >= 1 && !multipliers.seen.empty()
+          ? format(" (the distance of a motion beside it changes by %.4f +- %.0e times a period)",
+                   multipliers.seen.back().growth, multipliers.seen.back().error)
+          : format(" (%s multiplier %.4f +- %.0e)", which.c_str(), modulus, error);
   switch (multipliers.stability)
   {
   case Stability::stable:

@@ -12,7 +12,7 @@ void multiply(const Monodromy& monodromy, std::span<const Owned<Vec>> states)
   if (monodromy.exact())
   {
     monodromy.flow.apply_tangent(std::vector<Vec>(states.begin(), states.end()));
-    if (monodromy.multiplied) monodromy.multiplied(states.size());
+    if (monodromy.after_product) monodromy.after_product(states.size());
     return;
   }
   const Owned<Vec> moved = zeros_like(orbit.state);
@@ -24,6 +24,7 @@ void multiply(const Monodromy& monodromy, std::span<const Owned<Vec>> states)
     check(VecAXPY(state, -1, orbit.state));
     check(VecAXPY(state, -1, orbit.defect));
     check(VecScale(state, 1 / step));
+    if (monodromy.after_product) monodromy.after_product(1);
   }
 }
 

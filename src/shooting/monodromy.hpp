@@ -13,7 +13,7 @@ struct Monodromy
   const Orbit& orbit;
   double step = 0;    // of difference quotients, in the energy norm
   Owned<Vec> phase{}; // energy image of the unit flow, divided by |d|; null: nothing is taken out
-  std::function<void(std::size_t columns)> multiplied{}; // told of products; empty: nobody is
+  std::function<void(std::size_t columns)> after_product{}; // called after each product; may be empty
 
   bool exact() const { return static_cast<bool>(flow.apply_tangent); }
 };

@@ -87,9 +87,9 @@ std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Eigen
 
 /// All multipliers. Bars: the change of each when the grid of time moves by half a step, and 4/3 of the change on one
 /// of twice as many steps, which is the error of a step of order 2. A contact that hits a mass moves it within a step
-/// by what the grid allows, and a tangent along a grid that fits the period sees but one place of the impact in the
-/// step. So the bars hold as well what changes along eight periods of 8 N + 1 steps, which see eight places, and by
-/// how much the multiplier of the shift in time misses 1 on either grid.
+/// by what the grid allows, and a grid with a whole number of steps a period places each impact at one point of its
+/// step. So the bars hold as well what changes along eight periods in 8 N + 1 steps, which place it at eight points,
+/// and by how much the multiplier of the shift in time misses 1 on either grid.
 FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
 {
   FloquetAnalysis result;
@@ -118,12 +118,13 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
     finer = pairs_on({0, 2});
     monodromy.flow.record_period(orbit.period, orbit.state, {});
   }
-  if (!finite)
+  const auto of_tangent_that_is_not_finite = [&]
   {
     multipliers.stability = Stability::undecided;
     multipliers.would_decide = "the tangent of this period is not finite: other steps a period would decide";
-    return result;
-  }
+    return std::move(result);
+  };
+  if (!finite) return of_tangent_that_is_not_finite();
   const std::vector<Complex> values = values_of(pairs);
   GridErrors grid{std::vector<double>(values.size(), 0.), std::vector<double>(values.size(), 0.)};
   if (monodromy.exact())
@@ -134,7 +135,9 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   const std::size_t shift = find_shift(pairs, Q.transpose() * coordinates_of(orbit.rate, orbit.period));
   multipliers.trivial_error = std::abs(values[shift] - 1.);
   double largest_trivial_error = multipliers.trivial_error;
-  if (monodromy.exact())
+  // over eight periods the orbit's own error must not lead away from it
+  const bool stays = std::pow(std::max(1., std::abs(values.front())), 8) * orbit.residual < 1e-2;
+  if (monodromy.exact() && stays)
   {
     constexpr double decays = 0.7; // a period: such a motion decides nothing
     std::vector<Index> places;
@@ -143,6 +146,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
     const std::vector<Complex> others = along_eight_periods(monodromy, Q, pairs, places);
     multipliers.periods += static_cast<long>(8 * places.size());
     monodromy.flow.record_period(orbit.period, orbit.state, {});
+    if (others.empty()) return of_tangent_that_is_not_finite();
     for (std::size_t k = 0; k < others.size(); ++k)
     {
       const auto i = static_cast<std::size_t>(places[k]);
@@ -163,12 +167,16 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
   if (pairs.empty()) return result;
   decide(multipliers, {true, ""}, multipliers.values.size());
-  if (multipliers.stability == Stability::undecided && largest_trivial_error > 0.5 * multipliers.errors.front())
-    multipliers.would_decide =
-        format("the multiplier of a shift in time, which is 1, misses it by %.1e along a grid of time: contact that "
-               "hits masses "
-               "within steps; a motion beside it (-cycle_watched_periods), or contact with a compliance, would decide",
-               largest_trivial_error);
+  std::size_t deciding = 0;
+  for (std::size_t i = 1; i < multipliers.values.size(); ++i)
+    if (multipliers.upper_bound(deciding) < multipliers.upper_bound(i)) deciding = i;
+  if (monodromy.exact() && multipliers.stability == Stability::undecided &&
+      largest_trivial_error > 0.5 * multipliers.errors[deciding])
+    multipliers.would_decide = format(
+        "the multiplier of a shift in time, which is 1, misses it by %.1e along a grid of time, as where contact "
+        "hits masses within steps: contact with a compliance would decide, or -cycle_watched_periods where the "
+        "largest value alone reaches across 1",
+        largest_trivial_error);
   result.fastest =
       fastest_motion(monodromy.flow, pairs.front(), [&](const Eigen::VectorXd& y) { return state_at(Q * y, orbit); });
   return result;
@@ -204,11 +212,13 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
   std::optional<Progress> progress;
   if (dofs > large_model)
   {
-    constexpr double columns_often = 100; // that a verdict takes
-    progress.emplace(comm_of(orbit.state), "multipliers", columns_often);
+    constexpr double expected_columns = 100;
+    progress.emplace(comm_of(orbit.state), "multipliers", expected_columns);
     progress->update(0, "a reduced model on the cycle's contact");
-    monodromy.multiplied = [&, done = 0.](std::size_t columns) mutable {
-      progress->update(done += static_cast<double>(columns), format("%.0f products with the period's tangent", done));
+    monodromy.after_product = [&, done = 0.](std::size_t columns) mutable
+    {
+      done += static_cast<double>(columns);
+      progress->update(done, format("%.0f products with the period's tangent", done));
     };
   }
   std::string refusal;

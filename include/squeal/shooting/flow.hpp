@@ -36,6 +36,8 @@ struct TimeGrid
   double shift = 0; // the part of a step by which it is moved
   int finer = 1;    // times as many steps as the flow takes
   int more = 0;     // steps beyond that
+
+  int steps(int of_flow) const { return finer * of_flow + more; }
 };
 
 /// The period map Phi_T: the state a time T after a start.

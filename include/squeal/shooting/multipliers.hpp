@@ -6,8 +6,8 @@
 /// tangent; a flow without one is left to difference quotients. The shift in time, whose multiplier is 1, is the value
 /// near 1 whose vector is closest to d.
 ///
-/// Each multiplier has an error bar of its own. The distance of the shift's own multiplier from 1 says nothing about
-/// the others.
+/// Each multiplier has an error bar of its own. In a whole matrix none is smaller than the distance of the shift's own
+/// multiplier from 1; a projection's bars do not hold that.
 ///
 /// Caveat: a projection may lack a motion that grows. What is done about that makes it unlikely.
 #include "squeal/shooting/options.hpp"
