@@ -65,7 +65,8 @@ std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Eigen
   multiply(monodromy, states);
   for (Index k = 0; k < image.cols(); ++k)
     image.col(k) = Q.transpose() * coordinates_of(states[static_cast<std::size_t>(k)], orbit.period);
-  const Eigen::MatrixXd projected = V.partialPivLu().solve(image)(places, Eigen::all);
+  // vectors of motions that contact takes away may be parallel: they have no part in the others' rows
+  const Eigen::MatrixXd projected = V.completeOrthogonalDecomposition().solve(image)(places, Eigen::all);
   if (!projected.allFinite()) return {};
 
   std::vector<Complex> values, powers;
