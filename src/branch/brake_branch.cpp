@@ -75,27 +75,32 @@ struct Place
   bool stable = false;
 };
 
-/// The branch's points, and between a stable and another one the fold that parts them: up to there cycles are stable.
-/// Undecided points are left out: they end no range, as an event would.
+/// The branch's decided points, and between a stable and an unstable one the fold that parts them: up to there cycles
+/// are stable. Undecided points end no range, as an event would.
 std::vector<Place> places_along(const Branch& branch)
 {
   std::vector<Place> places;
-  const auto is_stable = [](const BranchPoint& point) { return point.multipliers.stability == Stability::stable; };
-  for (std::size_t i = 0; i < branch.points.size(); ++i)
+  double least = HUGE_VAL, greatest = -HUGE_VAL; // from the last decided point on
+  for (const BranchPoint& point : branch.points)
   {
-    const BranchPoint& point = branch.points[i];
-    if (i > 0 && is_stable(point) != is_stable(branch.points[i - 1]))
+    least = std::min(least, point.parameter);
+    greatest = std::max(greatest, point.parameter);
+    if (point.multipliers.stability == Stability::undecided) continue;
+    const bool stable = point.multipliers.stability == Stability::stable;
+    if (!places.empty() && places.back().stable != stable)
     {
-      const double from = branch.points[i - 1].parameter, length = std::abs(point.parameter - from);
-      for (const BranchEvent& event : branch.events)
-        if (event.kind == BranchEventKind::fold && std::abs(event.parameter - from) <= length + event.error &&
-            std::abs(event.parameter - point.parameter) <= length + event.error)
-        {
-          places.push_back({event.parameter, true});
-          break;
-        }
+      const double length = greatest - least;
+      const auto fold = std::ranges::find_if(branch.events,
+                                             [&](const BranchEvent& event)
+                                             {
+                                               return event.kind == BranchEventKind::fold &&
+                                                      event.parameter >= least - length - event.error &&
+                                                      event.parameter <= greatest + length + event.error;
+                                             });
+      if (fold != branch.events.end()) places.push_back({fold->parameter, true});
     }
-    if (point.multipliers.stability != Stability::undecided) places.push_back({point.parameter, is_stable(point)});
+    places.push_back({point.parameter, stable});
+    least = greatest = point.parameter;
   }
   return places;
 }

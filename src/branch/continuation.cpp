@@ -309,6 +309,28 @@ std::optional<BranchPoint> close_orbit(const FlowFamily& family, const Continuat
   return point_of(examined);
 }
 
+namespace
+{
+
+/// Drops neighbouring folds that are no further apart than the residual, as a part of the range, leaves a parameter
+/// unknown: a branch of hardly any amplitude turns by that much.
+void drop_folds_of_residuals(const ContinuationSettings& settings, std::vector<BranchEvent>& events)
+{
+  const double unknown = settings.tolerance * (settings.greatest - settings.least);
+  for (std::size_t i = 0; i + 1 < events.size();)
+  {
+    const BranchEvent &event = events[i], &next = events[i + 1];
+    if (event.kind == BranchEventKind::fold && next.kind == BranchEventKind::fold &&
+        std::abs(event.parameter - next.parameter) <= unknown)
+      events.erase(events.begin() + static_cast<std::ptrdiff_t>(i),
+                   events.begin() + static_cast<std::ptrdiff_t>(i) + 2);
+    else
+      ++i;
+  }
+}
+
+} // namespace
+
 Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settings, const ShootingOptions& options,
                     const Orbit& start, double parameter)
 {
@@ -327,6 +349,7 @@ Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settin
   corrector.secants.clear();
   BranchSide forward = follow(corrector, examined, std::move(tangent));
   Branch branch = joined(std::move(backward), std::move(forward));
+  drop_folds_of_residuals(settings, branch.events);
   branch.periods = log.convergence.periods;
   branch.columns = corrector.columns;
   return branch;

@@ -134,17 +134,17 @@ def test_a_number_that_no_reduced_model_holds_is_followed_on_the_full_one(conver
     assert "cycles along contact.0.gap (pin_face on disc_face) [m] from" in run.printed
 
 
-def test_a_branch_ends_where_its_cycle_does(squeal, tmp_path):
-    """Below mu = 0.45 no cycle is left, and the multiplier is 0.97 there: it ends at an event of contact. The branch does not
-    go back along itself at other phases, which it did once; the equilibrium is stable up to 0.5."""
+def test_a_branch_passes_jumps_of_the_map_to_its_fold_and_hopf_point(converged, tmp_path):
+    """Single runs downwards, each from the state of the one before, hold a stable cycle at mu = 0.444 and fall to rest at 0.443;
+    the equilibrium is stable up to 0.49977. At 0.45 the map of a period jumps, where the branch ended once."""
     scene = write_coexistence(tmp_path, {"coefficient": 0.55}, cycle={"tolerance": 1e-7})
-    run = squeal(scene, *branch_of("friction.coefficient", 0.36, 0.6), "--set", "branch.points=12", ranks=1)
+    run = converged(scene, *branch_of("friction.coefficient", 0.36, 0.6), "--set", "branch.points=12", ranks=1)
     branch = run.report["branch"]
-    assert run.code == 2 and branch["ends"] == {"backward": "step too small", "forward": "bound"}
-    parameters = [point["parameter"] for point in branch["points"]]
-    assert parameters == sorted(parameters) and 0.445 < parameters[0] < 0.455
-    assert all(point["stability"] == "stable" for point in branch["points"])
-    assert branch["coexistence"] == [{"from": pytest.approx(parameters[0]), "to": pytest.approx(0.5, abs=5e-3)}]
+    fold, = [event["parameter"] for event in branch["events"] if event["kind"] == "fold"]
+    hopf, = [event["parameter"] for event in branch["events"] if event["kind"] == "Hopf"]
+    assert 0.443 < fold < 0.444 and hopf == pytest.approx(0.499772, abs=1e-5)
+    assert branch["points"][0]["parameter"] == pytest.approx(hopf, abs=1e-4)
+    assert branch["coexistence"] == [{"from": pytest.approx(fold), "to": pytest.approx(hopf)}]
 
 
 @pytest.mark.parametrize("key, start, end, words", [
