@@ -294,11 +294,11 @@ std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const BranchVe
       if (moves == most_moves) break;
       check(VecAXPY(z.state, moved_by * z.period / corrector.settings.steps, orbit.rate));
       orbit = evaluate_at(z);
-      iteration = without_reduction = 0;
+      without_reduction = 0;
       renew = true;
       ++moves;
-      if (!makes_progress(corrector, orbit, first_residual)) break;
-      if (orbit.residual <= problem.tolerance) return CorrectedOrbit{std::move(orbit), z.parameter, corrections};
+      iteration = -1; // as many again
+      continue;
     }
     if (renew) form_jacobian(corrector, orbit);
     const BranchBorder border = border_at(corrector, orbit, normal);

@@ -53,12 +53,8 @@ std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Eigen
 {
   constexpr int periods = 8;
   const Orbit& orbit = monodromy.orbit;
-  Eigen::MatrixXd V(Q.cols(), Q.cols()), image(Q.cols(), static_cast<Index>(places.size()));
-  for (Index i = 0; i < V.cols(); ++i)
-  {
-    const DenseEigenpair& pair = pairs[static_cast<std::size_t>(i)];
-    V.col(i) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.y.imag()) : Eigen::VectorXd(pair.y.real());
-  }
+  const Eigen::MatrixXd V = real_columns(pairs, Q.cols());
+  Eigen::MatrixXd image(Q.cols(), static_cast<Index>(places.size()));
   std::vector<Owned<Vec>> states;
   for (const Index place : places) states.push_back(state_at(Q * V.col(place), orbit));
   monodromy.flow.record_period(periods * orbit.period, orbit.state, {0, periods, 1});

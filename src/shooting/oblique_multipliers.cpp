@@ -182,18 +182,6 @@ StateBlock corrections(const Monodromy& monodromy, const SlowMotions& slow, cons
   return block_of(states);
 }
 
-/// Real columns that span the pairs' vectors.
-MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Index size)
-{
-  MatrixXd result(size, static_cast<Index>(pairs.size()));
-  for (Index i = 0; i < result.cols(); ++i)
-  {
-    const DenseEigenpair& pair = pairs[static_cast<std::size_t>(i)];
-    result.col(i) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.y.imag()) : Eigen::VectorXd(pair.y.real());
-  }
-  return result;
-}
-
 /// The wanted pairs and the shift in time, complex pairs whole.
 std::vector<DenseEigenpair> with_shift(const Passes& passes)
 {

@@ -1,5 +1,5 @@
 /// The row of a free degree of freedom of `to`, component c of a node at x: sum_k N_k(xi) u_kc over the nodes k of the
-/// element of `from` in which x lies. Constraints of `from` enter by u = T q, those of `to` hold since they are never
+/// element of `from` that contains x. Constraints of `from` enter by u = T q, those of `to` hold since they are never
 /// interpolated.
 ///
 /// Caveat: bending between the nodes of a shell is linear, and what incompatible modes add inside a brick is left out.
@@ -18,7 +18,7 @@ namespace
 {
 
 constexpr double farthest = 1;   // half widths outside of the coarse part: chords of a quarter circle leave 0.6
-constexpr double inwards = 0.05; // of the way to the element's middle: sides that touch are told apart
+constexpr double inwards = 0.05; // of the way to the element's middle: two sides in contact are distinguished
 
 /// The first element of each node; -1 for a node of its own.
 std::vector<int> first_elements(const Mesh& mesh)
