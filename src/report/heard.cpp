@@ -54,10 +54,8 @@ std::string stability_text(const Multipliers& multipliers)
   if (multipliers.values.empty())
     return multipliers.stability == Stability::undecided ? ", whether it lasts is undecided"
                                                          : ", whether it lasts was not examined";
-  std::size_t place = 0; // of the largest, or of the one that leaves it undecided
-  if (multipliers.stability == Stability::undecided)
-    for (std::size_t i = 1; i < multipliers.values.size(); ++i)
-      if (multipliers.upper_bound(place) < multipliers.upper_bound(i)) place = i;
+  // of the largest, or of the one that leaves it undecided
+  const std::size_t place = multipliers.stability == Stability::undecided ? deciding_place(multipliers) : 0;
   const double modulus = std::abs(multipliers.values[place]), error = multipliers.errors[place];
   const double bound = largest_upper_bound(multipliers); // closer than the error, which is of both sides
   const bool decided = multipliers.stability == Stability::stable || multipliers.stability == Stability::unstable;

@@ -164,11 +164,8 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
   if (pairs.empty()) return result;
   decide(multipliers, {true, ""}, multipliers.values.size());
-  std::size_t deciding = 0;
-  for (std::size_t i = 1; i < multipliers.values.size(); ++i)
-    if (multipliers.upper_bound(deciding) < multipliers.upper_bound(i)) deciding = i;
   if (monodromy.exact() && multipliers.stability == Stability::undecided &&
-      largest_trivial_error > 0.5 * multipliers.errors[deciding])
+      largest_trivial_error > 0.5 * multipliers.errors[deciding_place(multipliers)])
     multipliers.would_decide = format(
         "the multiplier of a shift in time, which is 1, misses it by %.1e along a grid of time, as where contact "
         "hits masses within steps: contact with a compliance would decide, or -cycle_watched_periods where the "
@@ -191,11 +188,18 @@ MultiplierMethod chosen_method(const ShootingOptions& options, const Flow& flow,
 
 } // namespace
 
+std::size_t deciding_place(const Multipliers& multipliers)
+{
+  std::size_t place = 0;
+  for (std::size_t i = 1; i < multipliers.values.size(); ++i)
+    if (multipliers.upper_bound(place) < multipliers.upper_bound(i)) place = i;
+  return place;
+}
+
 double largest_upper_bound(const Multipliers& multipliers)
 {
-  double largest = multipliers.values.empty() ? std::numeric_limits<double>::quiet_NaN() : 0;
-  for (std::size_t i = 0; i < multipliers.values.size(); ++i) largest = std::max(largest, multipliers.upper_bound(i));
-  return largest;
+  if (multipliers.values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  return multipliers.upper_bound(deciding_place(multipliers));
 }
 
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,

@@ -79,6 +79,9 @@ struct Multipliers
   double upper_bound(std::size_t i) const { return upper.empty() ? std::abs(values[i]) + errors[i] : upper[i]; }
 };
 
+/// The place of the value whose upper bound is largest: it decides. 0 where none was examined.
+std::size_t deciding_place(const Multipliers& multipliers);
+
 /// Of the moduli of all; NaN where none was examined. An orbit is stable where it is below 1, though the bar of a value
 /// that the grid of time lowers may reach across.
 double largest_upper_bound(const Multipliers& multipliers);
