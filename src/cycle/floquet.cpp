@@ -3,6 +3,7 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/free_memory.hpp"
+#include "squeal/cycle/reduced_flow.hpp"
 #include "squeal/cycle/reduced_spectrum.hpp"
 
 #include <algorithm>
@@ -80,6 +81,15 @@ struct RecordedPeriods
   std::array<std::vector<StepRecord>, count> records; // that of other steps may be empty
 };
 
+/// The records without what a tangent of the full model needs beyond contact.
+std::vector<StepRecord> contact_of(const std::vector<StepRecord>& records)
+{
+  std::vector<StepRecord> contact;
+  for (const StepRecord& record : records)
+    contact.push_back({record.wanted, record.reactions, record.contact_velocity, record.opposes_theta, {}, {}, {}});
+  return contact;
+}
+
 /// Leaves the map with its own period recorded.
 RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, Vec start)
 {
@@ -94,9 +104,7 @@ RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, V
   record_period(map, period, start, {0.5});
   result.records[RecordedPeriods::moved] = std::move(map.records);
   record_period(map, period, start, {});
-  for (const StepRecord& record : map.records)
-    result.records[RecordedPeriods::own].push_back(
-        {record.wanted, record.reactions, record.contact_velocity, record.opposes_theta, {}, {}, {}});
+  result.records[RecordedPeriods::own] = contact_of(map.records);
   return result;
 }
 
@@ -227,9 +235,12 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
                            static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces));
   if (!missing.empty()) return nullptr;
   constexpr double highest = 0.25; // of the modes: what they change says what those beyond them may
-  return std::make_shared<const ReducedModel>(
+  auto model = std::make_shared<ReducedModel>(
       reduce(problem.sliding, problem.modes, roles,
              {static_cast<int>(problem.modes.size()), 1e-5, taken, follow, &beyond, problem.step.factor, highest}));
+  // more pairs may be closed than the shapes can tell apart (section 7.2)
+  for (std::size_t i = 0; i < model->of_left_out.size(); ++i) model->compliance[i] += model->of_left_out[i];
+  return model;
 }
 
 /// What the grid of time changes the modulus of each value of the spectrum by. A step of order 2 on grids of n and 2 n
@@ -351,6 +362,24 @@ void add_slow_motions(const CycleProblem& problem, const ReducedOptions& options
 {
   flow.slow_motions = [&problem, &options, &map, other_steps](double period, Vec start)
   { return slow_motions_of(problem, options, map, other_steps, period, start); };
+}
+
+Preconditioner recorded_preconditioner(const CycleProblem& problem, const ReducedOptions& options, const PeriodMap& map,
+                                       double period, Vec rate)
+{
+  const auto& [structure, interface, equilibrium] = problem.sliding;
+  RecordedPeriods periods;
+  periods.records[RecordedPeriods::own] = contact_of(map.records);
+  std::string missing;
+  const auto model = model_for(problem, options, periods, missing);
+  if (!model) return {};
+  ReducedMap reduced{*model, map.steps, map.theta};
+  const auto contacts = recorded_contacts(*model, interface.directions, periods.records[RecordedPeriods::own]);
+  const MatrixXd columns = monodromy(reduced, period, contacts, comm_of(structure.load));
+  const auto correction = std::make_shared<const MonodromyCorrection>(
+      monodromy_correction(*model, columns, coordinates(*model, structure, displacement(rate), velocity(rate))));
+  return [model, correction, apply = preconditioner_of(*correction, *model, structure)](double T, Vec x, Vec y)
+  { apply(T, x, y); };
 }
 
 int steps_to_compare(const Structure& structure, int steps)

@@ -11,6 +11,11 @@ namespace squeal
 void add_slow_motions(const CycleProblem& problem, const ReducedOptions& options, PeriodMap& map, int other_steps,
                       Flow& flow);
 
+/// The preconditioner of the reduced model (section 7.6) on the contact of the period that the map recorded last;
+/// `rate` is its dPhi/dT. Empty where there is no memory for that model. Borrows the problem.
+Preconditioner recorded_preconditioner(const CycleProblem& problem, const ReducedOptions& options, const PeriodMap& map,
+                                       double period, Vec rate);
+
 /// The number of steps a period that tells the error of another: twice as many of a large model with few, else 0.
 int steps_to_compare(const Structure& structure, int steps);
 

@@ -39,10 +39,9 @@ void add_remedies(const PeriodMap& map, Outcome& outcome)
                       " steps left the contact unconverged (-transient_contact_max_it)";
 }
 
-} // namespace
-
-LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
-                           const Preconditioner& preconditioner, int free_periods)
+/// Shoots from the start with the preconditioner that `make` returns for the map and its flow; it may move the start.
+template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, const CycleOptions& options,
+                                                const ShootingStart& start, Make make, int free_periods)
 {
   const CycleSettings& settings = problem.settings;
   PeriodMap map{problem.sliding, problem.step, settings.steps_per_period, settings.theta};
@@ -50,6 +49,7 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   map.keeps_step = is_large(problem.sliding.structure);
   Flow flow = flow_of(map);
   add_slow_motions(problem, options.reduced, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
+  const Preconditioner preconditioner = make(map, flow);
   ShootingResult found = shoot(flow, preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
                    settings.steps_per_period,
@@ -68,6 +68,15 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
   add_remedies(map, cycle.outcome);
   return cycle;
+}
+
+} // namespace
+
+LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
+                           const Preconditioner& preconditioner, int free_periods)
+{
+  return shoot_at_cycle(
+      problem, options, start, [&](PeriodMap&, Flow&) { return preconditioner; }, free_periods);
 }
 
 CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
@@ -92,6 +101,51 @@ std::vector<Owned<Vec>> other_unstable_states(const CycleProblem& problem)
   for (const State& motion : other_unstable_motions(problem)) states.push_back(state_of(motion.u, motion.v));
   return states;
 }
+
+namespace
+{
+
+/// From a start next to the cycle: one period carries it on, and the contact of that gives the preconditioner. The
+/// shapes of that make room for those of the multipliers; a search that goes on beyond them takes the estimated one.
+LimitCycle find_cycle_near(const CycleProblem& problem, const CycleOptions& options, ShootingStart& start)
+{
+  Owned<Vec> end;
+  Preconditioner at_hand;
+  const auto carry_on = [&](PeriodMap& map, Flow& flow)
+  {
+    const Owned<Vec> state = state_of(start.u, start.v), rate = zeros_like(state);
+    end = zeros_like(state);
+    flow.integrate(start.period, state, end, rate);
+    flow.record_period(start.period, state, {}); // where it was taken from the log of an earlier run
+    start.u = displacement(end);
+    start.v = velocity(end);
+    try
+    {
+      at_hand = recorded_preconditioner(problem, options.reduced, map, start.period, rate);
+    }
+    catch (const Error&) // on every rank alike: there is no such model of this structure
+    {
+    }
+    flow.slow_motions = [&at_hand, find = flow.slow_motions](double period, Vec x)
+    {
+      at_hand = {};
+      return find(period, x);
+    };
+    return [&](double period, Vec x, Vec y)
+    {
+      if (!at_hand) at_hand = estimated_preconditioner(problem, options.band_factor);
+      if (at_hand)
+        at_hand(period, x, y);
+      else
+        check(VecAXPBY(y, -1, 0, x)); // P = -1
+    };
+  };
+  LimitCycle cycle = shoot_at_cycle(problem, options, start, carry_on, 0);
+  ++cycle.convergence.periods;
+  return cycle;
+}
+
+} // namespace
 
 std::optional<State> cycle_start(const CycleProblem& problem)
 {
@@ -139,6 +193,8 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
                       first_event,
                       is_cycle};
   start.other_unstable = other_unstable_states(problem);
+  if (is_cycle && problem.settings.start.kind == CycleStartKind::coarse)
+    return find_cycle_near(problem, options, start);
   return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),
                          is_cycle ? 0 : problem.settings.free_periods);
 }

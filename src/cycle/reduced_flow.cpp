@@ -121,13 +121,17 @@ Flow flow_of(ReducedMap& map, const EnergyMatrices& energy)
 
 MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm)
 {
-  const ReducedModel& model = map.model;
+  const ReducedState flow = end_of_period(map, period, state).rate;
+  return monodromy_correction(map.model, monodromy(map, period, record_contacts(map, period, state), comm), flow);
+}
+
+MonodromyCorrection monodromy_correction(const ReducedModel& model, const MatrixXd& columns, const ReducedState& f)
+{
   const Eigen::Index n = model.size(), slow = model.slow;
-  const ReducedState f = end_of_period(map, period, state).rate;
   const VectorXd flow = stacked(f), image = stacked({model.K_z * f.q, model.M_z * f.v});
   // dPhi S S' - f f^+ = U V', and (U V' - I)^-1 + I = -U (I - V'U)^-1 V'
   MatrixXd U(2 * n, 2 * slow + 1), V = MatrixXd::Zero(2 * slow + 1, 2 * n);
-  U << monodromy(map, period, record_contacts(map, period, state), comm), -flow;
+  U << columns, -flow;
   V.topLeftCorner(slow, slow).diagonal().setOnes();
   V.block(slow, n, slow, slow).diagonal().setOnes();
   V.bottomRows(1) = image.transpose() / flow.dot(image);

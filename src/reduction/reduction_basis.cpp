@@ -18,6 +18,7 @@ namespace
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 /// A column of the modes.
 struct ModeShape
@@ -250,6 +251,13 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
   model.attachments = static_cast<int>(attached.taken);
   model.left_out = static_cast<int>(attached.left_out);
   model.lost_compliance = attached.lost;
+  if (attached.left_out > 0)
+  {
+    const VectorXd own = energy.diagonal().tail(count),
+                   held = (basis.T.transpose() * energy.rightCols(count)).colwise().squaredNorm();
+    const VectorXd missing = (own - held).cwiseMax(0);
+    model.of_left_out.assign(missing.begin(), missing.end());
+  }
 
   // The basis is solved for, not combined from attachments: these would have to be held, those left out as well.
   const auto of_shapes = basis.T.topRows(modal);

@@ -50,6 +50,15 @@ SmallModel pressed_masses()
   return model;
 }
 
+/// The pairs' normal rows.
+Eigen::VectorXd normal_rows(const Eigen::VectorXd& of_rows)
+{
+  const PairRows<Eigen::Index> rows(1);
+  Eigen::VectorXd normal(pairs);
+  for (Eigen::Index i = 0; i < normal.size(); ++i) normal(i) = of_rows(rows.normal(i));
+  return normal;
+}
+
 /// Of each row of the pairs: how far a unit force moves it.
 Eigen::VectorXd own_compliance(const ReducedModel& model)
 {
@@ -89,6 +98,10 @@ TEST_CASE("what the leading attachments leave out is what their model lacks of t
     CHECK(some.lost_compliance == approx(lost, 1e-9)); // 1 less a mean near 1: rounding over the smallest part lost
     CHECK(some.lost_compliance < before);
     before = some.lost_compliance;
+    // what the shapes and those left out have of a pair's own compliance is all of it
+    const Eigen::VectorXd normal =
+        normal_rows(own_compliance(some)) + Eigen::VectorXd::Map(some.of_left_out.data(), pairs);
+    CHECK((normal - normal_rows(exact)).cwiseAbs().maxCoeff() <= 1e-9 * exact.maxCoeff());
   }
   const ReducedModel fitting = reduced(0); // a small model fits any memory
   CHECK(fitting.left_out == 0);

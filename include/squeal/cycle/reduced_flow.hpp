@@ -39,6 +39,10 @@ struct MonodromyCorrection
 /// Collective: each rank does its share of the columns.
 MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm);
 
+/// From the columns of a monodromy matrix along the slow coordinates of q and of v, and the flow.
+MonodromyCorrection monodromy_correction(const ReducedModel& model, const Eigen::MatrixXd& columns,
+                                         const ReducedState& flow);
+
 /// P^-1 x = -x + D x on the reduced model. Borrows D.
 Preconditioner preconditioner_of(const MonodromyCorrection& correction);
 
