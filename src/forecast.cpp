@@ -237,7 +237,7 @@ double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, bool in_factor, 
                        number * vectors_of_shooting * sizes.dofs;
   const auto shapes = [&](double pairs) { return memory_of_reduction(sizes.dofs, pairs + vectors_of_modes_kept); };
   const double start = fidelity == CycleModel::full ? 0 : std::min(shapes(sizes.pairs), memory_for_shapes(free));
-  const double multipliers = shapes(std::min<double>(sizes.pairs, attachments_of_multipliers));
+  const double multipliers = shapes(std::min<double>(sizes.pairs, attachments_on_recorded_contact));
   return least + start + multipliers <= free ? least + start + multipliers : least + start;
 }
 

@@ -202,22 +202,23 @@ int eliminated_pairs(const CycleProblem& problem, const RecordedPeriods& periods
   return static_cast<int>(std::count(roles.sliding.begin(), roles.sliding.end(), 1));
 }
 
-/// Why a model of so many shapes is not made; empty: there is room for it.
-std::string lack_of_memory(const Structure& structure, Index shapes)
+/// Why a model of so many shapes is not made; empty: it takes no more than `part` of the free memory.
+std::string lack_of_memory(const Structure& structure, Index shapes, double part)
 {
   PetscInt dofs = 0;
   check(VecGetSize(structure.load, &dofs));
   const double needed = memory_of_reduction(dofs, static_cast<double>(shapes)),
                free = free_memory(comm_of(structure.load));
-  if (needed <= free) return {};
+  if (needed <= part * free) return {};
   return format("a reduced model of %ld shapes takes %.3g GB, and %.3g GB are free: a larger machine would decide, or "
                 "-reduced_attachments for the leading shapes alone",
                 static_cast<long>(shapes), 1e-9 * needed, 1e-9 * free);
 }
 
-/// The reduced model for the recorded periods; null where it does not fit the memory, with the reason.
+/// The reduced model for the recorded periods; null where it does not fit this part of the free memory, with the
+/// reason.
 std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const ReducedOptions& options,
-                                              const RecordedPeriods& periods, std::string& missing)
+                                              const RecordedPeriods& periods, double part, std::string& missing)
 {
   const Interface& interface = problem.sliding.interface;
   const std::vector<PairHistory> pairs = histories(interface, periods.records);
@@ -229,10 +230,10 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   const std::size_t rows = PairRows<std::size_t>(interface.directions).rows_of(roles.active.size());
   const bool follow = slide && rows > 150; // friction, the normal force
   const RealModes beyond = modes_beyond_band(problem);
-  const PetscInt taken = options.attachments > 0 ? options.attachments : attachments_of_multipliers;
+  const PetscInt taken = options.attachments > 0 ? options.attachments : attachments_on_recorded_contact;
   const std::size_t forces = std::min(follow ? roles.active.size() : rows, static_cast<std::size_t>(taken));
   missing = lack_of_memory(problem.sliding.structure,
-                           static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces));
+                           static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces), part);
   if (!missing.empty()) return nullptr;
   constexpr double highest = 0.25; // of the modes: what they change says what those beyond them may
   auto model = std::make_shared<ReducedModel>(
@@ -322,7 +323,7 @@ SlowMotions slow_motions_of(const CycleProblem& problem, const ReducedOptions& o
   const RecordedPeriods periods = record_periods(map, other_steps, period, start);
   SlowMotions slow;
   slow.periods = other_steps > 0 ? 3 : 2;
-  const auto model = model_for(problem, options, periods, slow.missing);
+  const auto model = model_for(problem, options, periods, 1, slow.missing);
   if (!model) return slow;
   const auto contacts = [&](int which)
   {
@@ -371,7 +372,7 @@ Preconditioner recorded_preconditioner(const CycleProblem& problem, const Reduce
   RecordedPeriods periods;
   periods.records[RecordedPeriods::own] = contact_of(map.records);
   std::string missing;
-  const auto model = model_for(problem, options, periods, missing);
+  const auto model = model_for(problem, options, periods, memory_for_shapes(1), missing); // it is kept while shooting
   if (!model) return {};
   ReducedMap reduced{*model, map.steps, map.theta};
   const auto contacts = recorded_contacts(*model, interface.directions, periods.records[RecordedPeriods::own]);

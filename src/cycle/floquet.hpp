@@ -12,7 +12,8 @@ void add_slow_motions(const CycleProblem& problem, const ReducedOptions& options
                       Flow& flow);
 
 /// The preconditioner of the reduced model (section 7.6) on the contact of the period that the map recorded last;
-/// `rate` is its dPhi/dT. Empty where there is no memory for that model. Borrows the problem.
+/// `rate` is its dPhi/dT. Empty where that model would take more than half of the free memory. Borrows the problem.
+/// Error: as of reduce.
 Preconditioner recorded_preconditioner(const CycleProblem& problem, const ReducedOptions& options, const PeriodMap& map,
                                        double period, Vec rate);
 

@@ -49,7 +49,7 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
   map.keeps_step = is_large(problem.sliding.structure);
   Flow flow = flow_of(map);
   add_slow_motions(problem, options.reduced, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
-  const Preconditioner preconditioner = make(map, flow);
+  const Preconditioner& preconditioner = make(map, flow);
   ShootingResult found = shoot(flow, preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
                    settings.steps_per_period,
@@ -76,7 +76,8 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
                            const Preconditioner& preconditioner, int free_periods)
 {
   return shoot_at_cycle(
-      problem, options, start, [&](PeriodMap&, Flow&) { return preconditioner; }, free_periods);
+      problem, options, start, [&](PeriodMap&, Flow&) -> const Preconditioner& { return preconditioner; },
+      free_periods);
 }
 
 CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
@@ -107,11 +108,11 @@ namespace
 
 /// From a start next to the cycle: one period carries it on, and the contact of that gives the preconditioner. The
 /// shapes of that make room for those of the multipliers; a search that goes on beyond them takes the estimated one.
-LimitCycle find_cycle_near(const CycleProblem& problem, const CycleOptions& options, ShootingStart& start)
+LimitCycle find_cycle_near(const CycleProblem& problem, const CycleOptions& options, ShootingStart start)
 {
   Owned<Vec> end;
   Preconditioner at_hand;
-  const auto carry_on = [&](PeriodMap& map, Flow& flow)
+  const auto prepare = [&](PeriodMap& map, Flow& flow)
   {
     const Owned<Vec> state = state_of(start.u, start.v), rate = zeros_like(state);
     end = zeros_like(state);
@@ -123,6 +124,10 @@ LimitCycle find_cycle_near(const CycleProblem& problem, const CycleOptions& opti
     {
       at_hand = recorded_preconditioner(problem, options.reduced, map, start.period, rate);
     }
+    catch (const LibraryError&) // perhaps on this rank alone
+    {
+      throw;
+    }
     catch (const Error&) // on every rank alike: there is no such model of this structure
     {
     }
@@ -131,16 +136,17 @@ LimitCycle find_cycle_near(const CycleProblem& problem, const CycleOptions& opti
       at_hand = {};
       return find(period, x);
     };
-    return [&](double period, Vec x, Vec y)
-    {
-      if (!at_hand) at_hand = estimated_preconditioner(problem, options.band_factor);
-      if (at_hand)
-        at_hand(period, x, y);
-      else
-        check(VecAXPBY(y, -1, 0, x)); // P = -1
-    };
+    return Preconditioner(
+        [&](double period, Vec x, Vec y)
+        {
+          if (!at_hand) at_hand = estimated_preconditioner(problem, options.band_factor);
+          if (at_hand)
+            at_hand(period, x, y);
+          else
+            check(VecAXPBY(y, -1, 0, x)); // P = -1
+        });
   };
-  LimitCycle cycle = shoot_at_cycle(problem, options, start, carry_on, 0);
+  LimitCycle cycle = shoot_at_cycle(problem, options, start, prepare, 0);
   ++cycle.convergence.periods;
   return cycle;
 }
@@ -194,7 +200,7 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
                       is_cycle};
   start.other_unstable = other_unstable_states(problem);
   if (is_cycle && problem.settings.start.kind == CycleStartKind::coarse)
-    return find_cycle_near(problem, options, start);
+    return find_cycle_near(problem, options, std::move(start));
   return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),
                          is_cycle ? 0 : problem.settings.free_periods);
 }

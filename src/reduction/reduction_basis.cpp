@@ -255,7 +255,8 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
   {
     const VectorXd own = energy.diagonal().tail(count),
                    held = (basis.T.transpose() * energy.rightCols(count)).colwise().squaredNorm();
-    const VectorXd missing = (own - held).cwiseMax(0);
+    constexpr double rounding = 1e-9; // of differences of energies; a pair that the shapes hold whole stays rigid
+    const VectorXd missing = ((own - held).array() > rounding * own.array()).select(own - held, 0);
     model.of_left_out.assign(missing.begin(), missing.end());
   }
 

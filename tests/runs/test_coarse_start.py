@@ -26,7 +26,8 @@ def test_the_cycle_is_that_of_the_default_start(converged):
         assert coarser["residual"] <= 1e-3 and coarser["mean_fluctuating_energy"] > 0 and coarser["periods"] > 10
         assert coarser["frequency_hz"] == pytest.approx(report["cycle"]["frequency_hz"], rel=0.1)
         assert report["cycle"]["residual_full"] <= TOLERANCE
-        assert report["cycle"]["periods_integrated"] <= default["periods_integrated"] - 10  # no free periods
+        # no free periods, and the contact of the first one for a preconditioner: 25, by the estimated one 35, from the estimate 49
+        assert report["cycle"]["periods_integrated"] <= default["periods_integrated"] - 20
         # cycles of 60 steps differ by where among the steps their events fall: 2.4e-5 and 1.3e-3 seen; the step's own
         # error of the period is 1e-3
         assert report["cycle"]["period"] == pytest.approx(default["period"], rel=1e-4)
