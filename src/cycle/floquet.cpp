@@ -240,7 +240,8 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
       reduce(problem.sliding, problem.modes, roles,
              {static_cast<int>(problem.modes.size()), 1e-5, taken, follow, &beyond, problem.step.factor, highest}));
   // more pairs may be closed than the shapes can tell apart (section 7.2)
-  for (std::size_t i = 0; i < model->of_left_out.size(); ++i) model->compliance[i] += model->of_left_out[i];
+  for (Index i = 0; i < model->of_left_out.size(); ++i)
+    model->compliance[static_cast<std::size_t>(i)] += model->of_left_out(i);
   return model;
 }
 

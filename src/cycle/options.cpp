@@ -17,8 +17,7 @@ OptionList options_of(CycleOptions& options)
        "an attachment shape is dropped when less than this part of it is new"},
       {"-reduced_attachments", &reduced.attachments, Range::not_negative,
        "attachment shapes at most, the leading ones; 0: 300 on recorded contact, else all, or as many as half of the "
-       "free "
-       "memory holds"},
+       "free memory holds"},
       {"-reduced_band_factor", &reduced.band_factor, Range::any,
        "frictionless modes above the band reach this many times the mode's frequency; 0: none; negative: 4.5, and 3 "
        "beyond 10 000 degrees of freedom at fewer than 128 steps a period"},

@@ -310,13 +310,7 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
                 "fidelity = \"full\"");
   model.shapes = std::move(X);
   model.active = active;
-  if (!reduction.sliding && !model.of_left_out.empty())
-  {
-    const PairView<const double> of_rows(model.of_left_out, interface.directions);
-    std::vector<double> normal;
-    for (std::size_t i = 0; i < active.size(); ++i) normal.push_back(of_rows.normal(i));
-    model.of_left_out = std::move(normal);
-  }
+  if (!reduction.sliding) model.of_left_out = normal_rows(model.of_left_out, interface.directions);
   set_active_pairs(model, interface, equilibrium, reduction.sliding);
   model.force = -model.H * VectorXd::Map(model.reactions.data(), model.H.cols());
   return model;

@@ -256,8 +256,7 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
     const VectorXd own = energy.diagonal().tail(count),
                    held = (basis.T.transpose() * energy.rightCols(count)).colwise().squaredNorm();
     constexpr double rounding = 1e-9; // of differences of energies; a pair that the shapes hold whole stays rigid
-    const VectorXd missing = ((own - held).array() > rounding * own.array()).select(own - held, 0);
-    model.of_left_out.assign(missing.begin(), missing.end());
+    model.of_left_out = ((own - held).array() > rounding * own.array()).select(own - held, 0);
   }
 
   // The basis is solved for, not combined from attachments: these would have to be held, those left out as well.

@@ -39,7 +39,7 @@ int probed_node(const Probe& probe, const Mesh& mesh)
       *std::min_element(nodes.begin(), nodes.end(), [&](int a, int b) { return distance(a) < distance(b); });
   // A position outside may be meant, to name an end; one beyond 100 lengths of the mesh is a slip, of units say.
   if (const double size = diagonal(mesh.nodes); size > 0 && distance(nearest) > 100 * size)
-    throw Error(user + format(": 'at' lies %g m from the nearest node of the group, where the whole mesh measures %g m",
+    throw Error(user + format(": 'at' is %g m from the nearest node of the group, where the whole mesh measures %g m",
                               distance(nearest), size));
   return nearest;
 }

@@ -99,8 +99,7 @@ TEST_CASE("what the leading attachments leave out is what their model lacks of t
     CHECK(some.lost_compliance < before);
     before = some.lost_compliance;
     // what the shapes and those left out have of a pair's own compliance is all of it
-    const Eigen::VectorXd normal =
-        normal_rows(own_compliance(some)) + Eigen::VectorXd::Map(some.of_left_out.data(), pairs);
+    const Eigen::VectorXd normal = normal_rows(own_compliance(some)) + some.of_left_out;
     CHECK((normal - normal_rows(exact)).cwiseAbs().maxCoeff() <= 1e-9 * exact.maxCoeff());
   }
   const ReducedModel fitting = reduced(0); // a small model fits any memory
