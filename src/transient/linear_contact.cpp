@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <Eigen/LU>
+#include <optional>
+#include <vector>
 
 namespace squeal
 {
@@ -12,6 +15,97 @@ namespace
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+using PairMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 2, 2>; // of tangential directions
+
+struct Slip // of a pair
+{
+  Index first = 0, normal = 0; // its first tangential row of W, and its normal one's place among the first unknowns
+  PairMatrix turn;             // [-] columns: e, and the direction across it
+  double mu = 0;               // [-]
+  double by_coefficient = 0;   // [N] r_n dmu/d(coefficient)
+};
+
+/// The closed pairs.
+struct Unknowns
+{
+  std::vector<Index> leading; // the first unknowns: rows of W
+  std::vector<Slip> slips;
+  Index first_turned = 0; // of the directions of `turn`: the first one that has an entry of y
+  VectorXd S;             // [N s/m] the diagonal of S, by entries of y: pair by pair
+
+  Index turned_of_pair() const { return slips.empty() ? 0 : slips.front().turn.cols() - first_turned; }
+};
+
+Unknowns unknowns_of(int directions, const FrictionLaw& law, const StepRecord& record,
+                     std::span<const ContactStatus> statuses)
+{
+  const PairRows<Index> rows(directions);
+  const PairView reactions(record.reactions, directions), velocity(record.contact_velocity, directions);
+  Unknowns result;
+  result.first_turned = law.decay_speed == 0 ? 1 : 0; // constant mu: dw_t along e does not matter
+  std::vector<double> S;
+  for (std::size_t pair = 0; pair < statuses.size(); ++pair)
+  {
+    if (statuses[pair] == ContactStatus::open) continue;
+    const auto own = static_cast<Index>(pair);
+    result.leading.push_back(rows.normal(own));
+    if (statuses[pair] == ContactStatus::stick)
+    {
+      for (Index k = 0; k < directions; ++k) result.leading.push_back(rows.tangential(own) + k);
+      continue;
+    }
+    const VectorXd w = VectorXd::Map(velocity.tangential(pair).data(), directions);
+    const double speed = std::max(w.norm(), 1e-300), reaction = reactions.normal(pair);
+    const FrictionCoefficient mu = friction_coefficient(law, speed);
+    const VectorXd e = w / speed;
+    PairMatrix turn = e;
+    if (directions == 2) turn = (PairMatrix(2, 2) << e(0), -e(1), e(1), e(0)).finished();
+    result.slips.push_back({rows.tangential(own), static_cast<Index>(result.leading.size()) - 1, turn, mu.value,
+                            reaction * share_of_coefficient(law, speed)});
+    if (result.first_turned == 0) S.push_back(mu.derivative * reaction);
+    if (directions == 2) S.push_back(mu.value * reaction / speed);
+  }
+  result.S = VectorXd::Map(S.data(), static_cast<Index>(S.size()));
+  return result;
+}
+
+/// Rows of the first unknowns and of y, of columns with all rows of W.
+MatrixXd rows_of(const Unknowns& unknowns, const Eigen::Ref<const MatrixXd>& columns)
+{
+  const auto leading = static_cast<Index>(unknowns.leading.size());
+  const Index turned = unknowns.turned_of_pair();
+  MatrixXd result(leading + unknowns.S.size(), columns.cols());
+  for (Index k = 0; k < columns.cols(); ++k)
+  {
+    for (Index i = 0; i < leading; ++i) result(i, k) = columns(unknowns.leading[static_cast<std::size_t>(i)], k);
+    Index at = leading;
+    for (const Slip& slip : unknowns.slips)
+    {
+      const auto tangential = columns.col(k).segment(slip.first, slip.turn.rows());
+      for (Index d = 0; d < turned; ++d) result(at++, k) = slip.turn.col(unknowns.first_turned + d).dot(tangential);
+    }
+  }
+  return result;
+}
+
+/// (dw_n and dw_t of stick; dw_t where y is) by (the first unknowns; y), b apart.
+MatrixXd condense(const Unknowns& unknowns, const Eigen::Map<const MatrixXd>& W)
+{
+  const auto leading = static_cast<Index>(unknowns.leading.size());
+  const Index size = leading + unknowns.S.size();
+  MatrixXd result(size, size);
+  for (Index j = 0; j < leading; ++j)
+    result.col(j) = rows_of(unknowns, W.col(unknowns.leading[static_cast<std::size_t>(j)]));
+  Index at = leading;
+  for (const Slip& slip : unknowns.slips)
+  {
+    const MatrixXd turned = rows_of(unknowns, W.middleCols(slip.first, slip.turn.rows()) * slip.turn);
+    result.col(slip.normal) -= slip.mu * turned.col(0);
+    for (Index d = unknowns.first_turned; d < turned.cols(); ++d) result.col(at++) = turned.col(d);
+  }
+  return result;
+}
 
 /// Pairs that stick may have more rows than the structure has motions. Their reactions are then not unique but their
 /// velocities are; this much more of a diagonal entry makes the system regular.
@@ -24,114 +118,77 @@ void regularise(MatrixXd& A, Index rows)
       A(i, i) *= 1 + 1e-10;
 }
 
-} // namespace
-
-LinearContact::LinearContact(std::span<const double> W, int directions, const FrictionLaw& law,
-                             const StepRecord& record, std::span<const ContactStatus> statuses)
-    : size_(static_cast<Index>(record.reactions.size())), directions_(directions)
+/// The first unknowns and y with `b` in rows of `A`, which condense() gave and regularise() made regular; nothing where
+/// the fixed point does not contract.
+std::optional<MatrixXd> by_fixed_point(const MatrixXd& A, const VectorXd& S, const MatrixXd& b)
 {
-  const PairRows<Index> rows(directions);
-  const PairView reactions(record.reactions, directions), velocity(record.contact_velocity, directions);
-  std::vector<Index> following;
-  for (std::size_t pair = 0; pair < statuses.size(); ++pair)
-  {
-    if (statuses[pair] == ContactStatus::open) continue;
-    const bool slips = statuses[pair] == ContactStatus::slip;
-    if (slips)
-    {
-      const VectorXd s = VectorXd::Map(velocity.tangential(pair).data(), directions_);
-      const double speed = std::max(s.norm(), 1e-300), reaction = reactions.normal(pair);
-      const FrictionCoefficient mu = friction_coefficient(law, speed);
-      const VectorXd e = s / speed;
-      const MatrixXd along = e * e.transpose();
-      slips_.push_back({static_cast<Index>(rows_.size()), static_cast<Index>(following.size()), e, mu.value,
-                        mu.value * reaction / speed * (MatrixXd::Identity(directions_, directions_) - along) +
-                            mu.derivative * reaction * along,
-                        reaction * share_of_coefficient(law, speed)});
-    }
-    const auto own = static_cast<Index>(pair);
-    rows_.push_back(rows.normal(own));
-    for (Index k = 0; k < directions_; ++k) (slips ? following : rows_).push_back(rows.tangential(own) + k);
-  }
-  leading_ = static_cast<Index>(rows_.size());
-  for (Slip& slip : slips_) slip.first += leading_;
-  rows_.insert(rows_.end(), following.begin(), following.end());
-  W_ = MatrixXd::Map(W.data(), size_, size_)(rows_, rows_);
-}
-
-MatrixXd LinearContact::by_whole_system(const MatrixXd& db, const VectorXd& dmu)
-{
-  if (!whole_lu_)
-  {
-    MatrixXd A = W_;
-    for (const Slip& slip : slips_)
-    {
-      A.middleRows(slip.first, directions_) = (slip.S * W_.middleRows(slip.first, directions_)).eval();
-      A.block(slip.first, slip.first, directions_, directions_).diagonal().array() += 1;
-      A.block(slip.first, slip.normal, directions_, 1) += slip.mu * slip.e;
-    }
-    regularise(A, leading_);
-    whole_lu_.emplace(A);
-  }
-  MatrixXd right = -db;
-  for (const Slip& slip : slips_)
-    right.middleRows(slip.first, directions_) =
-        (slip.S * right.middleRows(slip.first, directions_) - slip.by_coefficient * slip.e * dmu.transpose()).eval();
-  return whole_lu_->solve(right);
-}
-
-bool LinearContact::by_fixed_point(const MatrixXd& db, const VectorXd& dmu, MatrixXd& dr)
-{
-  const Index following = W_.rows() - leading_, columns = db.cols();
-  if (!leading_lu_)
-  {
-    MatrixXd A = W_.topLeftCorner(leading_, leading_);
-    for (const Slip& slip : slips_)
-      A.col(slip.normal) -= slip.mu * W_.block(0, slip.first, leading_, directions_) * slip.e;
-    regularise(A, leading_);
-    leading_lu_.emplace(A);
-  }
-  MatrixXd turned = MatrixXd::Zero(following, columns); // S dw_t
-  const bool alone = std::all_of(slips_.begin(), slips_.end(), [](const Slip& slip) { return slip.S.isZero(0); });
+  const Index turned = S.size(), leading = A.rows() - turned;
+  const Eigen::PartialPivLU<MatrixXd> lu(A.topLeftCorner(leading, leading));
+  const VectorXd own = A.diagonal().tail(turned);
+  MatrixXd x = MatrixXd::Zero(b.rows(), b.cols());
   double last = HUGE_VAL;
   for (int pass = 0; pass < 30; ++pass)
   {
-    dr.resize(W_.rows(), columns);
-    dr.bottomRows(following) = -turned;
-    for (const Slip& slip : slips_)
-      dr.middleRows(slip.first, directions_) -= slip.by_coefficient * slip.e * dmu.transpose();
-    MatrixXd right = -db.topRows(leading_);
-    right.noalias() -= W_.topRightCorner(leading_, following) * dr.bottomRows(following);
-    dr.topRows(leading_) = leading_lu_->solve(right);
-    for (const Slip& slip : slips_) dr.middleRows(slip.first, directions_) -= slip.mu * slip.e * dr.row(slip.normal);
-    if (alone) return true;
-    MatrixXd dw = db.bottomRows(following);
-    dw.noalias() += W_.bottomRows(following) * dr;
-    double change = 0;
-    for (const Slip& slip : slips_)
-    {
-      const Index at = slip.first - leading_;
-      const MatrixXd own = slip.S * W_.block(slip.first, slip.first, directions_, directions_);
-      const MatrixXd next = (MatrixXd::Identity(directions_, directions_) + own).inverse() *
-                            (slip.S * dw.middleRows(at, directions_) + own * turned.middleRows(at, directions_));
-      change = std::max(change, (next - turned.middleRows(at, directions_)).cwiseAbs().maxCoeff());
-      turned.middleRows(at, directions_) = next;
-    }
-    if (change <= 1e-10 * dr.cwiseAbs().maxCoeff()) return true;
-    if (pass > 2 && change > 0.5 * last) return false;
+    MatrixXd right = -b.topRows(leading);
+    if (pass > 0) right.noalias() -= A.topRightCorner(leading, turned) * x.bottomRows(turned);
+    x.topRows(leading) = lu.solve(right);
+    if (turned == 0) return x;
+    MatrixXd dw = b.bottomRows(turned);
+    dw.noalias() += A.bottomRows(turned) * x;
+    const MatrixXd y = ((own.array() * S.array()).matrix().asDiagonal() * x.bottomRows(turned) - S.asDiagonal() * dw)
+                           .array()
+                           .colwise() /
+                       (1 + S.array() * own.array());
+    const double change = (y - x.bottomRows(turned)).cwiseAbs().maxCoeff();
+    x.bottomRows(turned) = y;
+    if (change <= 1e-10 * x.cwiseAbs().maxCoeff()) return x;
+    if (pass > 2 && change > 0.5 * last) return std::nullopt;
     last = change;
   }
-  return false;
+  return std::nullopt;
 }
 
-MatrixXd LinearContact::response(const MatrixXd& db, const VectorXd& dmu)
+/// The same by the factors of all rows.
+MatrixXd by_whole_system(MatrixXd A, const VectorXd& S, const MatrixXd& b)
 {
-  MatrixXd result = MatrixXd::Zero(size_, db.cols());
-  if (rows_.empty()) return result;
-  const MatrixXd own = db(rows_, Eigen::all);
-  MatrixXd dr;
-  if (whole_lu_ || !by_fixed_point(own, dmu, dr)) dr = by_whole_system(own, dmu);
-  result(rows_, Eigen::all) = dr;
+  const Index turned = S.size();
+  MatrixXd right = -b;
+  A.bottomRows(turned) = (S.asDiagonal() * A.bottomRows(turned)).eval();
+  A.diagonal().tail(turned).array() += 1;
+  right.bottomRows(turned) = (S.asDiagonal() * right.bottomRows(turned)).eval();
+  return A.partialPivLu().solve(right);
+}
+
+} // namespace
+
+MatrixXd linear_contact_response(std::span<const double> W, int directions, const FrictionLaw& law,
+                                 const StepRecord& record, std::span<const ContactStatus> statuses, const MatrixXd& db,
+                                 const VectorXd& dmu)
+{
+  MatrixXd result = MatrixXd::Zero(db.rows(), db.cols());
+  const Unknowns unknowns = unknowns_of(directions, law, record, statuses);
+  if (unknowns.leading.empty()) return result;
+  const Eigen::Map<const MatrixXd> whole(W.data(), db.rows(), db.rows());
+  const auto leading = static_cast<Index>(unknowns.leading.size());
+  MatrixXd A = condense(unknowns, whole), b = rows_of(unknowns, db);
+  if (!dmu.isZero(0))
+  {
+    VectorXd friction = VectorXd::Zero(db.rows());
+    for (const Slip& slip : unknowns.slips)
+      friction.segment(slip.first, slip.turn.rows()) = slip.by_coefficient * slip.turn.col(0);
+    b -= rows_of(unknowns, whole * friction) * dmu.transpose();
+  }
+  regularise(A, leading);
+  std::optional<MatrixXd> x = by_fixed_point(A, unknowns.S, b);
+  if (!x) x = by_whole_system(std::move(A), unknowns.S, b);
+  for (Index i = 0; i < leading; ++i) result.row(unknowns.leading[static_cast<std::size_t>(i)]) = x->row(i);
+  Index at = leading;
+  for (const Slip& slip : unknowns.slips)
+  {
+    auto own = result.middleRows(slip.first, slip.turn.rows());
+    own -= slip.turn.col(0) * (slip.mu * x->row(slip.normal) + slip.by_coefficient * dmu.transpose());
+    for (Index d = unknowns.first_turned; d < slip.turn.cols(); ++d) own += slip.turn.col(d) * x->row(at++);
+  }
   return result;
 }
 

@@ -162,10 +162,9 @@ MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> column
                                  VectorXd dmu(db.cols());
                                  for (Index k = 0; k < dmu.size(); ++k)
                                    dmu(k) = columns[static_cast<std::size_t>(k)].friction;
-                                 LinearContact contact(
+                                 dr = linear_contact_response(
                                      W, interface.directions, law_of_step(step, interface.friction), record,
-                                     contact_status(interface, record.reactions, record.contact_velocity));
-                                 dr = contact.response(db, dmu);
+                                     contact_status(interface, record.reactions, record.contact_velocity), db, dmu);
                                });
   MPI_Bcast(dr.data(), to_int(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));
   return dr;
