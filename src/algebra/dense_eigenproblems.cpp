@@ -329,6 +329,17 @@ std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)
   return all;
 }
 
+Eigen::MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Eigen::Index size)
+{
+  Eigen::MatrixXd result(size, static_cast<Eigen::Index>(pairs.size()));
+  for (Eigen::Index i = 0; i < result.cols(); ++i)
+  {
+    const DenseEigenpair& pair = pairs[static_cast<std::size_t>(i)];
+    result.col(i) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.y.imag()) : Eigen::VectorXd(pair.y.real());
+  }
+  return result;
+}
+
 std::vector<std::complex<double>> values_of(const std::vector<DenseEigenpair>& pairs)
 {
   std::vector<std::complex<double>> values;

@@ -140,10 +140,7 @@ LimitCycle find_cycle_near(const CycleProblem& problem, const CycleOptions& opti
         [&](double period, Vec x, Vec y)
         {
           if (!at_hand) at_hand = estimated_preconditioner(problem, options.band_factor);
-          if (at_hand)
-            at_hand(period, x, y);
-          else
-            check(VecAXPBY(y, -1, 0, x)); // P = -1
+          apply(at_hand, period, x, y);
         });
   };
   LimitCycle cycle = shoot_at_cycle(problem, options, start, prepare, 0);

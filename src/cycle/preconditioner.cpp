@@ -57,7 +57,7 @@ MatrixXd on_shapes(const MultiVector& shapes, const MatrixXd& friction, const Cl
 }
 
 /// The columns Re and Im of (y, lambda y) of every pair; the real vector alone of a real one.
-MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Eigen::Index size)
+MatrixXd state_columns(const std::vector<DenseEigenpair>& pairs, Eigen::Index size)
 {
   MatrixXd result(2 * size, 2 * size);
   Eigen::Index column = 0;
@@ -109,7 +109,7 @@ SlidingModes make_sliding_modes(const std::vector<DenseEigenpair>& sliding, Mult
                                 const CycleSettings& settings)
 {
   const Eigen::Index size = shapes.columns();
-  SlidingModes modes{std::move(shapes), {}, 0, real_columns(sliding, size), {}, settings.steps_per_period,
+  SlidingModes modes{std::move(shapes), {}, 0, state_columns(sliding, size), {}, settings.steps_per_period,
                      settings.theta};
   for (const DenseEigenpair& pair : sliding)
   {

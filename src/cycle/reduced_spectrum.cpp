@@ -17,25 +17,6 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// Real eigenvectors or real and imaginary parts, one column a value; of A or of its transpose.
-struct Eigencolumns
-{
-  std::vector<Complex> values;
-  MatrixXd columns;
-};
-
-Eigencolumns eigencolumns(const MatrixXd& A)
-{
-  Eigencolumns result{{}, MatrixXd(A.rows(), A.rows())};
-  for (const DenseEigenpair& pair : solve_dense_unsymmetric(A))
-  {
-    const auto at = static_cast<Index>(result.values.size());
-    result.values.push_back(pair.lambda);
-    result.columns.col(at) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.y.imag()) : Eigen::VectorXd(pair.y.real());
-  }
-  return result;
-}
-
 /// How many of the values are wanted, complex pairs whole.
 std::size_t number_of(const std::vector<Complex>& values, const LargeValues& wanted)
 {
@@ -90,14 +71,17 @@ ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<cons
                [&]
                {
                  const MatrixXd square = slow_rows(columns, size, slow);
-                 const Eigencolumns of = eigencolumns(square), adjoint = eigencolumns(square.transpose());
-                 const std::size_t count = number_of(of.values, wanted);
-                 result.values.assign(of.values.begin(), of.values.begin() + static_cast<std::ptrdiff_t>(count));
-                 right = of.columns.leftCols(static_cast<Index>(count));
+                 const std::vector<DenseEigenpair> pairs = solve_dense_unsymmetric(square),
+                                                   adjoint = solve_dense_unsymmetric(square.transpose());
+                 result.values = values_of(pairs);
+                 const std::size_t count = number_of(result.values, wanted);
+                 result.values.resize(count);
+                 right = real_columns(pairs, square.rows()).leftCols(static_cast<Index>(count));
+                 const MatrixXd left_columns = real_columns(adjoint, square.rows());
                  left.resize(right.rows(), right.cols());
-                 const std::vector<std::size_t> places = nearest_places(result.values, adjoint.values);
+                 const std::vector<std::size_t> places = nearest_places(result.values, values_of(adjoint));
                  for (std::size_t i = 0; i < count; ++i)
-                   left.col(static_cast<Index>(i)) = adjoint.columns.col(static_cast<Index>(places[i]));
+                   left.col(static_cast<Index>(i)) = left_columns.col(static_cast<Index>(places[i]));
                });
   broadcast_values(result.values, comm);
   broadcast(right, comm);
@@ -148,7 +132,8 @@ std::vector<Complex> multipliers_along(const ReducedSpectrum& spectrum, ReducedM
                [&]
                {
                  const Eigen::ColPivHouseholderQR<MatrixXd> gram(spectrum.left.transpose() * spectrum.right);
-                 const std::vector<Complex> found = eigencolumns(gram.solve(spectrum.left.transpose() * image)).values;
+                 const std::vector<Complex> found =
+                     values_of(solve_dense_unsymmetric(gram.solve(spectrum.left.transpose() * image)));
                  for (const std::size_t place : nearest_places(spectrum.values, found)) values.push_back(found[place]);
                });
   broadcast_values(values, comm);

@@ -3,14 +3,6 @@
 namespace squeal
 {
 
-void apply(const Preconditioner& preconditioner, double period, Vec x, Vec y)
-{
-  if (preconditioner)
-    preconditioner(period, x, y);
-  else
-    check(VecAXPBY(y, -1, 0, x));
-}
-
 Border border_at(const OrbitProblem& problem, const Orbit& orbit)
 {
   Border border{zeros_like(orbit.rate), zeros_like(orbit.rate), energy_norm(problem.flow, orbit.rate), 0};

@@ -8,9 +8,6 @@
 namespace squeal
 {
 
-/// y = P^-1 x; P = -I without a preconditioner.
-void apply(const Preconditioner& preconditioner, double period, Vec x, Vec y);
-
 struct Border
 {
   Owned<Vec> phase, column;    // energy image of f; P^-1 d

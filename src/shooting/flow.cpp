@@ -18,6 +18,14 @@ Vec part(Vec state, PetscInt index)
 
 } // namespace
 
+void apply(const Preconditioner& preconditioner, double period, Vec x, Vec y)
+{
+  if (preconditioner)
+    preconditioner(period, x, y);
+  else
+    check(VecAXPBY(y, -1, 0, x));
+}
+
 Owned<Vec> state_of(Vec u, Vec v)
 {
   const Owned<Vec> own_u = copy_of(u), own_v = copy_of(v);

@@ -52,17 +52,6 @@ FastestMotion fastest_motion(const Flow& flow, const DenseEigenpair& pair,
   return motion;
 }
 
-Eigen::MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Eigen::Index size)
-{
-  Eigen::MatrixXd result(size, static_cast<Eigen::Index>(pairs.size()));
-  for (Eigen::Index i = 0; i < result.cols(); ++i)
-  {
-    const DenseEigenpair& pair = pairs[static_cast<std::size_t>(i)];
-    result.col(i) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.y.imag()) : Eigen::VectorXd(pair.y.real());
-  }
-  return result;
-}
-
 std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::VectorXd& flow)
 {
   std::size_t place = 0;

@@ -25,9 +25,6 @@ void multiply(const Monodromy& monodromy, std::span<const Owned<Vec>> states);
 FastestMotion fastest_motion(const Flow& flow, const DenseEigenpair& pair,
                              const std::function<Owned<Vec>(const Eigen::VectorXd&)>& state);
 
-/// Real columns that span the pairs' vectors, which have `size` entries.
-Eigen::MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Eigen::Index size);
-
 /// The place of the shift in time among the pairs: near 1, with the vector that is closest to the flow.
 std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::VectorXd& flow);
 

@@ -79,6 +79,10 @@ std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Ei
 /// All eigenpairs of A, the largest modulus first, of a complex pair first the one with Im(lambda) > 0.
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const Eigen::MatrixXd& A);
 
+/// Real columns that span the pairs' vectors, which have `size` entries, one column a pair: the real part where
+/// Im(lambda) >= 0, the imaginary part of the other one.
+Eigen::MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Eigen::Index size);
+
 std::vector<std::complex<double>> values_of(const std::vector<DenseEigenpair>& pairs);
 
 /// For each reference the place of a value of its own. No two references come nearer to their values, by the sum of

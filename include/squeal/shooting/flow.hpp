@@ -59,6 +59,8 @@ struct Flow
 /// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; x and y are states. Empty: P = -I.
 using Preconditioner = std::function<void(double period, Vec x, Vec y)>;
 
+void apply(const Preconditioner& preconditioner, double period, Vec x, Vec y);
+
 /// A state made of copies of u and v.
 Owned<Vec> state_of(Vec u, Vec v);
 
