@@ -15,98 +15,106 @@ namespace
 
 using Two = double __attribute__((vector_size(16)));
 using Four = double __attribute__((vector_size(32)));
-using Eight = double __attribute__((vector_size(64)));
+using Eight = double __attribute__((vector_size(64))); // for AVX-512: without it GCC keeps arrays of these in memory
 
 /// y += A x for the upper triangles of symmetric matrices. With two parts an Entry belongs to one matrix, and a row of
-/// x holds v and then u of all trajectories. With one part an Entry holds those of both, and a row of x is (v, u).
-template <std::size_t parts, class Entry, class Vector>
+/// x holds v and then u of all trajectories, each in so many Vectors. With one part and an Entry of two numbers a row
+/// of x is (v, u).
+template <std::size_t parts, class Entry, class Vector, std::size_t vectors>
 SQUEAL_INLINE void add_product(const PairedRows& matrices, const double* x, double* y)
 {
-  constexpr std::size_t width = sizeof(Vector) / sizeof(double), stride = parts * width;
+  constexpr std::size_t width = sizeof(Vector) / sizeof(double), stride = parts * vectors * width;
   const PetscInt* const columns = matrices.columns.data();
   const std::array<double, 2>* const values = matrices.values.data();
   Entry entry;
-  Vector own[parts], sums[parts], other;
+  Vector own[parts * vectors], sums[parts * vectors], other;
   for (std::size_t i = 0; i + 1 < matrices.starts.size(); ++i)
   {
     const auto first = static_cast<std::size_t>(matrices.starts[i]),
                end = static_cast<std::size_t>(matrices.starts[i + 1]);
-    for (std::size_t part = 0; part < parts; ++part)
+    for (std::size_t n = 0; n < parts * vectors; ++n)
     {
-      std::memcpy(&own[part], x + i * stride + part * width, sizeof other);
-      std::memcpy(&sums[part], y + i * stride + part * width, sizeof other);
-      std::memcpy(&entry, &values[first][part], sizeof entry); // on the diagonal
-      sums[part] += entry * own[part];
+      std::memcpy(&own[n], x + i * stride + n * width, sizeof other);
+      std::memcpy(&sums[n], y + i * stride + n * width, sizeof other);
+      std::memcpy(&entry, &values[first][n / vectors], sizeof entry); // on the diagonal
+      sums[n] += entry * own[n];
     }
     for (std::size_t k = first + 1; k < end; ++k)
-      for (std::size_t part = 0; part < parts; ++part)
+      for (std::size_t n = 0; n < parts * vectors; ++n)
       {
-        const std::size_t j = static_cast<std::size_t>(columns[k]) * stride + part * width;
-        std::memcpy(&entry, &values[k][part], sizeof entry);
+        const std::size_t j = static_cast<std::size_t>(columns[k]) * stride + n * width;
+        std::memcpy(&entry, &values[k][n / vectors], sizeof entry);
         std::memcpy(&other, x + j, sizeof other);
-        sums[part] += entry * other;
+        sums[n] += entry * other;
         std::memcpy(&other, y + j, sizeof other);
-        other += entry * own[part];
+        other += entry * own[n];
         std::memcpy(y + j, &other, sizeof other);
       }
-    for (std::size_t part = 0; part < parts; ++part)
-      std::memcpy(y + i * stride + part * width, &sums[part], sizeof other);
+    for (std::size_t n = 0; n < parts * vectors; ++n) std::memcpy(y + i * stride + n * width, &sums[n], sizeof other);
   }
 }
 
 /// One trajectory. Without fused products K u of a body that moves without strain is zero to the last bit.
 void add_both(const PairedRows& matrices, const double* x, double* y)
 {
-  add_product<1, Two, Two>(matrices, x, y);
+  add_product<1, Two, Two, 1>(matrices, x, y);
 }
 
 /// 4 or 8 trajectories.
 SQUEAL_SIMD void add_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
 {
-  count == 4 ? add_product<2, double, Four>(matrices, x, y) : add_product<2, double, Eight>(matrices, x, y);
+  count == 4          ? add_product<2, double, Four, 1>(matrices, x, y)
+  : SQUEAL_HAS_AVX512 ? add_product<2, double, Eight, 1>(matrices, x, y)
+                      : add_product<2, double, Four, 2>(matrices, x, y);
 }
 
 /// M alone, 4 or 8 trajectories.
 SQUEAL_SIMD void add_mass_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
 {
-  count == 4 ? add_product<1, double, Four>(matrices, x, y) : add_product<1, double, Eight>(matrices, x, y);
+  count == 4          ? add_product<1, double, Four, 1>(matrices, x, y)
+  : SQUEAL_HAS_AVX512 ? add_product<1, double, Eight, 1>(matrices, x, y)
+                      : add_product<1, double, Four, 2>(matrices, x, y);
 }
 
 /// y += A x for columns of other ranks; Entry, Vector and the rows of x as above.
-template <std::size_t parts, class Entry, class Vector>
+template <std::size_t parts, class Entry, class Vector, std::size_t vectors>
 SQUEAL_INLINE void add_foreign(const PairedRows& matrices, const double* x, double* y)
 {
-  constexpr std::size_t width = sizeof(Vector) / sizeof(double), stride = parts * width;
+  constexpr std::size_t width = sizeof(Vector) / sizeof(double), stride = parts * vectors * width;
   Entry entry;
   Vector sum, other;
   for (std::size_t i = 0; i + 1 < matrices.starts.size(); ++i)
-    for (std::size_t part = 0; part < parts && matrices.starts[i] < matrices.starts[i + 1]; ++part)
+    for (std::size_t n = 0; n < parts * vectors && matrices.starts[i] < matrices.starts[i + 1]; ++n)
     {
-      std::memcpy(&sum, y + i * stride + part * width, sizeof sum);
+      std::memcpy(&sum, y + i * stride + n * width, sizeof sum);
       for (auto k = static_cast<std::size_t>(matrices.starts[i]); k < static_cast<std::size_t>(matrices.starts[i + 1]);
            ++k)
       {
-        std::memcpy(&entry, &matrices.values[k][part], sizeof entry);
-        std::memcpy(&other, x + static_cast<std::size_t>(matrices.columns[k]) * stride + part * width, sizeof other);
+        std::memcpy(&entry, &matrices.values[k][n / vectors], sizeof entry);
+        std::memcpy(&other, x + static_cast<std::size_t>(matrices.columns[k]) * stride + n * width, sizeof other);
         sum += entry * other;
       }
-      std::memcpy(y + i * stride + part * width, &sum, sizeof sum);
+      std::memcpy(y + i * stride + n * width, &sum, sizeof sum);
     }
 }
 
 void add_foreign_both(const PairedRows& matrices, const double* x, double* y)
 {
-  add_foreign<1, Two, Two>(matrices, x, y);
+  add_foreign<1, Two, Two, 1>(matrices, x, y);
 }
 
 SQUEAL_SIMD void add_foreign_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
 {
-  count == 4 ? add_foreign<2, double, Four>(matrices, x, y) : add_foreign<2, double, Eight>(matrices, x, y);
+  count == 4          ? add_foreign<2, double, Four, 1>(matrices, x, y)
+  : SQUEAL_HAS_AVX512 ? add_foreign<2, double, Eight, 1>(matrices, x, y)
+                      : add_foreign<2, double, Four, 2>(matrices, x, y);
 }
 
 SQUEAL_SIMD void add_foreign_mass_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
 {
-  count == 4 ? add_foreign<1, double, Four>(matrices, x, y) : add_foreign<1, double, Eight>(matrices, x, y);
+  count == 4          ? add_foreign<1, double, Four, 1>(matrices, x, y)
+  : SQUEAL_HAS_AVX512 ? add_foreign<1, double, Eight, 1>(matrices, x, y)
+                      : add_foreign<1, double, Four, 2>(matrices, x, y);
 }
 
 bool is_sparse(Mat A)

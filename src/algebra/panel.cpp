@@ -14,7 +14,7 @@ namespace
 {
 
 using Four = double __attribute__((vector_size(32)));
-using Eight = double __attribute__((vector_size(64)));
+using Eight = double __attribute__((vector_size(64))); // for AVX-512: without it GCC keeps arrays of these in memory
 
 template <class Vector> SQUEAL_INLINE void get(const double* from, Vector& to)
 {
@@ -85,19 +85,23 @@ SQUEAL_INLINE void subtract_strip(const double* L, std::size_t rows, const doubl
 template <std::size_t width>
 SQUEAL_INLINE void subtract_transposed_strip(const double* L, std::size_t rows, const double* x, double* y)
 {
-  Eight sums[width] = {}, some_L, some_x;
+  constexpr std::size_t half = tile / 2;
+  Four sums[width] = {}, some_L, upper_x, lower_x;
   for (std::size_t i = 0; i < rows; i += tile, L += tile * width)
   {
-    get(x + i, some_x);
+    get(x + i, upper_x);
+    get(x + i + half, lower_x);
     for (std::size_t k = 0; k < width; ++k)
     {
       __builtin_prefetch(L + tile * k + prefetch_distance);
       get(L + tile * k, some_L);
-      sums[k] += some_L * some_x;
+      sums[k] += some_L * upper_x;
+      get(L + tile * k + half, some_L);
+      sums[k] += some_L * lower_x;
     }
   }
   for (std::size_t k = 0; k < width; ++k)
-    for (std::size_t row = 0; row < tile; ++row) y[k] -= sums[k][row];
+    for (std::size_t row = 0; row < half; ++row) y[k] -= sums[k][row];
 }
 
 /// The place of row i in a strip.
@@ -141,6 +145,17 @@ subtract_transposed_strip(const double* L, std::size_t rows, std::size_t lanes, 
 
 /// The right-hand sides in a Vector; of a single right-hand side, the vector registers hold rows.
 template <class Vector> constexpr std::size_t taken = sizeof(Vector) / sizeof(double);
+
+/// Calls work(std::type_identity<Vector>) with what holds right-hand sides: 1, 4 or a multiple of 8 of them.
+template <class Work> SQUEAL_INLINE void with_vector(std::size_t lanes, const Work& work)
+{
+  if (lanes == 1)
+    work(std::type_identity<double>{});
+  else if (lanes % taken<Eight> == 0 && SQUEAL_HAS_AVX512)
+    work(std::type_identity<Eight>{});
+  else
+    work(std::type_identity<Four>{});
+}
 
 /// work(strip, its first column, its width) for each strip of a panel; the width is a constant of its type.
 template <class Work> SQUEAL_INLINE void for_each_strip(const Panel& L, Work work)
@@ -257,9 +272,10 @@ SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j,
   for (std::size_t k = 0; k < tile; ++k)
     for (std::size_t i = j; i < j + tile; ++i)
       y[j + k] += first[std::min(k, i - j) * size + j + std::max(k, i - j)] * x[i];
-  Eight sums[tile] = {}, some_W, some_x, some_y;
+  constexpr std::size_t some = taken<Four>;
+  Four sums[tile] = {}, some_W, some_x, some_y;
   std::size_t i = j + tile;
-  for (; i + tile <= size; i += tile)
+  for (; i + some <= size; i += some)
   {
     get(x + i, some_x);
     get(y + i, some_y);
@@ -273,7 +289,7 @@ SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j,
   }
   for (std::size_t k = 0; k < tile; ++k)
   {
-    for (std::size_t part = 0; part < tile; ++part) y[j + k] += sums[k][part];
+    for (std::size_t part = 0; part < some; ++part) y[j + k] += sums[k][part];
     for (std::size_t row = i; row < size; ++row)
     {
       y[row] += first[k * size + row] * x[j + k];
@@ -310,7 +326,8 @@ SQUEAL_INLINE void multiply(const double* W, std::size_t size, std::size_t lanes
 
 SQUEAL_SIMD void dense_product(const double* W, std::size_t size, std::size_t lanes, const double* x, double* y)
 {
-  lanes == 4 ? multiply<Four>(W, size, lanes, x, y) : multiply<Eight>(W, size, lanes, x, y);
+  with_vector(lanes, [&](auto vector) SQUEAL_INLINE_LAMBDA
+              { multiply<typename decltype(vector)::type>(W, size, lanes, x, y); });
 }
 
 SQUEAL_SIMD void add_symmetric_product(const double* W, std::size_t size, std::size_t columns, const double* x,
@@ -380,30 +397,26 @@ double* pack_triangle(const double* from, std::size_t height, std::size_t column
 
 SQUEAL_SIMD void subtract_product(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
-  lanes == 1   ? product<double>(L, lanes, x, y)
-  : lanes == 4 ? product<Four>(L, lanes, x, y)
-               : product<Eight>(L, lanes, x, y);
+  with_vector(lanes,
+              [&](auto vector) SQUEAL_INLINE_LAMBDA { product<typename decltype(vector)::type>(L, lanes, x, y); });
 }
 
 SQUEAL_SIMD void subtract_transposed(const Panel& L, std::size_t lanes, const double* x, double* y)
 {
-  lanes == 1   ? transposed<double>(L, lanes, x, y)
-  : lanes == 4 ? transposed<Four>(L, lanes, x, y)
-               : transposed<Eight>(L, lanes, x, y);
+  with_vector(lanes,
+              [&](auto vector) SQUEAL_INLINE_LAMBDA { transposed<typename decltype(vector)::type>(L, lanes, x, y); });
 }
 
 SQUEAL_SIMD void solve_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x)
 {
-  lanes == 1   ? solve<double>(L, columns, lanes, x)
-  : lanes == 4 ? solve<Four>(L, columns, lanes, x)
-               : solve<Eight>(L, columns, lanes, x);
+  with_vector(lanes,
+              [&](auto vector) SQUEAL_INLINE_LAMBDA { solve<typename decltype(vector)::type>(L, columns, lanes, x); });
 }
 
 SQUEAL_SIMD void solve_transposed_triangle(const double* L, std::size_t columns, std::size_t lanes, double* x)
 {
-  lanes == 1   ? solve_transposed<double>(L, columns, lanes, x)
-  : lanes == 4 ? solve_transposed<Four>(L, columns, lanes, x)
-               : solve_transposed<Eight>(L, columns, lanes, x);
+  with_vector(lanes, [&](auto vector) SQUEAL_INLINE_LAMBDA
+              { solve_transposed<typename decltype(vector)::type>(L, columns, lanes, x); });
 }
 
 } // namespace squeal
