@@ -127,6 +127,10 @@ void find_on_model(const CycleProblem& problem, const CycleOptions& options, Ste
     {
       fidelity.reason = find_by_reduced_model(search, steps, result.cycle);
     }
+    catch (const LibraryError&) // perhaps on this rank alone
+    {
+      throw;
+    }
     catch (const Error& error) // on every rank alike: the reduced model is the same on all
     {
       if (fidelity.asked == CycleModel::reduced) throw;

@@ -34,7 +34,7 @@ struct Unknowns
   Index first_turned = 0; // of the directions of `turn`: the first one that has an entry of y
   VectorXd S;             // [N s/m] the diagonal of S, by entries of y: pair by pair
 
-  Index turned_of_pair() const { return slips.empty() ? 0 : slips.front().turn.cols() - first_turned; }
+  Index size() const { return static_cast<Index>(leading.size()) + S.size(); }
 };
 
 Unknowns unknowns_of(int directions, const FrictionLaw& law, const StepRecord& record,
@@ -70,22 +70,23 @@ Unknowns unknowns_of(int directions, const FrictionLaw& law, const StepRecord& r
   return result;
 }
 
-/// Rows of the first unknowns and of y, of columns with all rows of W.
-MatrixXd rows_of(const Unknowns& unknowns, const Eigen::Ref<const MatrixXd>& columns)
+/// Rows of the first unknowns and of y, of a column with all rows of W.
+void put_rows(const Unknowns& unknowns, const double* column, double* result)
 {
-  const auto leading = static_cast<Index>(unknowns.leading.size());
-  const Index turned = unknowns.turned_of_pair();
-  MatrixXd result(leading + unknowns.S.size(), columns.cols());
-  for (Index k = 0; k < columns.cols(); ++k)
-  {
-    for (Index i = 0; i < leading; ++i) result(i, k) = columns(unknowns.leading[static_cast<std::size_t>(i)], k);
-    Index at = leading;
-    for (const Slip& slip : unknowns.slips)
+  for (const Index row : unknowns.leading) *result++ = column[row];
+  for (const Slip& slip : unknowns.slips)
+    for (Index d = unknowns.first_turned; d < slip.turn.cols(); ++d)
     {
-      const auto tangential = columns.col(k).segment(slip.first, slip.turn.rows());
-      for (Index d = 0; d < turned; ++d) result(at++, k) = slip.turn.col(unknowns.first_turned + d).dot(tangential);
+      double along = 0;
+      for (Index k = 0; k < slip.turn.rows(); ++k) along += slip.turn(k, d) * column[slip.first + k];
+      *result++ = along;
     }
-  }
+}
+
+MatrixXd rows_of(const Unknowns& unknowns, const MatrixXd& columns)
+{
+  MatrixXd result(unknowns.size(), columns.cols());
+  for (Index k = 0; k < columns.cols(); ++k) put_rows(unknowns, columns.col(k).data(), result.col(k).data());
   return result;
 }
 
@@ -93,16 +94,22 @@ MatrixXd rows_of(const Unknowns& unknowns, const Eigen::Ref<const MatrixXd>& col
 MatrixXd condense(const Unknowns& unknowns, const Eigen::Map<const MatrixXd>& W)
 {
   const auto leading = static_cast<Index>(unknowns.leading.size());
-  const Index size = leading + unknowns.S.size();
-  MatrixXd result(size, size);
+  MatrixXd result(unknowns.size(), unknowns.size());
   for (Index j = 0; j < leading; ++j)
-    result.col(j) = rows_of(unknowns, W.col(unknowns.leading[static_cast<std::size_t>(j)]));
+    put_rows(unknowns, W.col(unknowns.leading[static_cast<std::size_t>(j)]).data(), result.col(j).data());
+  MatrixXd tangential(unknowns.size(), unknowns.slips.empty() ? 0 : unknowns.slips.front().turn.rows());
   Index at = leading;
   for (const Slip& slip : unknowns.slips)
   {
-    const MatrixXd turned = rows_of(unknowns, W.middleCols(slip.first, slip.turn.rows()) * slip.turn);
-    result.col(slip.normal) -= slip.mu * turned.col(0);
-    for (Index d = unknowns.first_turned; d < turned.cols(); ++d) result.col(at++) = turned.col(d);
+    for (Index k = 0; k < tangential.cols(); ++k)
+      put_rows(unknowns, W.col(slip.first + k).data(), tangential.col(k).data());
+    for (Index k = 0; k < tangential.cols(); ++k)
+      result.col(slip.normal) -= slip.mu * slip.turn(k, 0) * tangential.col(k);
+    for (Index d = unknowns.first_turned; d < slip.turn.cols(); ++d, ++at)
+    {
+      result.col(at) = slip.turn(0, d) * tangential.col(0);
+      for (Index k = 1; k < tangential.cols(); ++k) result.col(at) += slip.turn(k, d) * tangential.col(k);
+    }
   }
   return result;
 }
