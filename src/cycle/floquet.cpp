@@ -242,6 +242,7 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   // more pairs may be closed than the shapes can tell apart (section 7.2)
   for (Index i = 0; i < model->of_left_out.size(); ++i)
     model->compliance[static_cast<std::size_t>(i)] += model->of_left_out(i);
+  if (is_large(problem.sliding.structure)) return_freed_memory(); // of the factor that gave the attachments
   return model;
 }
 

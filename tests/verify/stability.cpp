@@ -1,4 +1,3 @@
-// ranks: 1 2 3
 // Published and exact eigenvalues of sliding systems.
 #include "../support/flutter_chain.hpp"
 #include "../support/linearised.hpp"
