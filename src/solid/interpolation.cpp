@@ -9,6 +9,7 @@
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
 
+#include <array>
 #include <memory>
 
 namespace squeal
@@ -17,8 +18,10 @@ namespace squeal
 namespace
 {
 
-constexpr double farthest = 1;   // half widths outside of the coarse part: chords of a quarter circle leave 0.6
-constexpr double inwards = 0.05; // of the way to the element's middle: two sides in contact are distinguished
+constexpr double farthest = 1; // half widths outside of the coarse part: chords of a quarter circle leave 0.6
+/// Of the way to the element's middle: two sides in contact are distinguished. Where coarse elements are smaller than
+/// the node's own, the first way may end in one that is not next to the node.
+constexpr std::array inwards = {0.05, 0.01, 0.002};
 
 /// The first element of each node; -1 for a node of its own.
 std::vector<int> first_elements(const Mesh& mesh)
@@ -66,8 +69,7 @@ public:
     const Vec3& at = to_.nodes[node];
     auto& locator = locators_[static_cast<std::size_t>(element.part)];
     if (!locator) locator = std::make_unique<ElementLocator>(from_, element.part);
-    const Location inside = locator->find(at + inwards * (middle_of(to_, element) - at));
-    const Location found = inside.element < 0 ? inside : located(from_, inside.element, at);
+    const Location found = nearest(*locator, at, middle_of(to_, element) - at);
     if (!(found.excess <= farthest))
       throw Error(node_text(node, at) + " lies outside of part '" +
                   scene_.parts[static_cast<std::size_t>(element.part)].name +
@@ -80,6 +82,22 @@ public:
   }
 
 private:
+  /// Of the coarse elements on the way inwards the one that the node leaves least.
+  Location nearest(const ElementLocator& locator, const Vec3& at, const Vec3& to_middle) const
+  {
+    constexpr double none = 1e-9; // rounding of the excess
+    Location best = locator.find(at + inwards.front() * to_middle);
+    if (best.element >= 0) best = located(from_, best.element, at);
+    for (std::size_t i = 1; i < inwards.size() && !(best.excess <= none); ++i)
+    {
+      const Location inside = locator.find(at + inwards[i] * to_middle);
+      if (inside.element < 0) continue;
+      const Location found = located(from_, inside.element, at);
+      if (best.element < 0 || found.excess < best.excess) best = found;
+    }
+    return best;
+  }
+
   const Mesh& from_;
   const Mesh& to_;
   const Scene& scene_;
