@@ -36,3 +36,13 @@ def test_the_frequencies_of_a_clamped_disc_converge_with_its_mesh(tmp_path):
                    "modes.band=3500", "--set", "modes.method=full", "--set", "estimate.enabled=false")
     for i in range(1, 9):
         assert 1.4 < found[f"frequency {i} [Hz]"][0] < 2.6
+
+
+def test_the_stages_of_the_brake_are_benched():
+    """A row a stage, by the clock and by the processor; what they take is no test."""
+    done = subprocess.run([sys.executable, ROOT / "tools" / "bench", "brake", "4000", "--ranks", "1"], capture_output=True,
+                          text=True, timeout=300, env=os.environ)
+    assert done.returncode == 0, done.stderr
+    rows = dict(re.findall(r"^\| ([^|]+?) \| ([0-9.e-]+) \|", done.stdout, re.M))
+    stages = {"model", "equilibrium", "modes", "estimate", "factor and W", "a step"}
+    assert set(rows) == stages | {f"{stage}, processor" for stage in stages} | {"memory [GB]"}

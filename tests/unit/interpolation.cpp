@@ -96,8 +96,8 @@ TEST_CASE("linear fields are carried exactly, each side of a contact by its own"
 {
   // fields are of order 10; Newton ends below 1e-13 of an element
   CHECK(error_of({2, 3, 2}, {3, 4, 5}, 1) < 1e-11);
-  CHECK(error_of({1, 2, 1}, {5, 3, 2}, 0) < 1e-11); // both blocks in one part
-  CHECK(error_of({3, 2, 2}, {3, 2, 2}, 1) < 1e-11); // the same mesh
+  CHECK(error_of({1, 2, 1}, {5, 3, 2}, 0) < 1e-11);   // both blocks in one part
+  CHECK(error_of({3, 2, 2}, {3, 2, 2}, 1) < 1e-11);   // the same mesh
   CHECK(error_of({100, 2, 3}, {1, 1, 2}, 0) < 1e-11); // the nodes' own elements are the larger ones
 }
 
