@@ -86,14 +86,13 @@ private:
   Location nearest(const ElementLocator& locator, const Vec3& at, const Vec3& to_middle) const
   {
     constexpr double none = 1e-9; // rounding of the excess
-    Location best = locator.find(at + inwards.front() * to_middle);
-    if (best.element >= 0) best = located(from_, best.element, at);
-    for (std::size_t i = 1; i < inwards.size() && !(best.excess <= none); ++i)
+    Location best;
+    for (std::size_t i = 0; i < inwards.size() && !(best.excess <= none); ++i)
     {
       const Location inside = locator.find(at + inwards[i] * to_middle);
       if (inside.element < 0) continue;
       const Location found = located(from_, inside.element, at);
-      if (best.element < 0 || found.excess < best.excess) best = found;
+      if (found.excess < best.excess) best = found;
     }
     return best;
   }

@@ -85,7 +85,7 @@ Turned turned_from_circle(const Mesh& mesh, const OuterFace& face, const Rotatio
   return turned;
 }
 
-/// Throws Error unless each outer face lies along the circles about the axis, and the middle of all of them on it. A
+/// Throws Error unless each outer face is tangential to circles about the axis, and the middle of all of them on it. A
 /// face with its corners on a surface of revolution has the normal of a point within it. At its centre it is turned by
 /// less than half of the angle that it spans, a right-angled triangle by a sixth, a quadrilateral hardly.
 void check_revolution(const Mesh& mesh, const Part& part, int index)
