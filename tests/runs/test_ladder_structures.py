@@ -14,11 +14,14 @@ OFF = {"enabled": False}
 
 
 def static(converged, folder, ranks, mesh, **tables):
-    """Displacements that the probes read under the loads."""
+    """Displacements that the probes read under the loads.
+
+    The forces balance to the rounding of K u: of the slenderest beams |K| |u| is 1e8 |F|, of which epsilon is 2e-8.
+    """
     mesh.write(folder / "body.msh")
     scene = write_scene(folder, title="static", mesh={"file": "body.msh"}, modes=OFF, estimate=OFF, **tables)
     equilibrium = converged(scene, ranks=ranks).report["equilibrium"]
-    assert equilibrium["force_residual"] < 1e-9
+    assert equilibrium["force_residual"] < 2e-8
     return equilibrium["probes"]
 
 
