@@ -135,25 +135,31 @@ void project(const Monodromy& monodromy, const SlowMotions& slow, const std::vec
   }
 }
 
-/// Whether some value is above 1 by more than its bar.
-bool repels(const Passes& passes)
+/// Whether some value is above 1 by more than its margin.
+bool is_above(const Passes& passes, const std::vector<double>& margins)
 {
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
-    if (i != passes.shift && std::abs(passes.pairs[i].lambda) - passes.bars[i] > 1) return true;
+    if (i != passes.shift && std::abs(passes.pairs[i].lambda) - margins[i] > 1) return true;
   return false;
 }
 
-/// The pairs that decide: the largest, and those whose bars reach across 1 unless another one is above it for sure.
+bool repels(const Passes& passes)
+{
+  return is_above(passes, passes.bars);
+}
+
+/// The pairs that decide: the largest, and those whose bars reach across 1 unless another one is above it by more than
+/// the grid of time may change. That one may decide alone, once it has settled.
 std::vector<std::size_t> deciding_pairs(const Passes& passes)
 {
-  const bool decided = repels(passes);
+  const bool may_decide = is_above(passes, passes.grid);
   double largest = 0;
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
     if (i != passes.shift) largest = std::max(largest, std::abs(passes.pairs[i].lambda));
   std::vector<std::size_t> deciding;
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
     if (i != passes.shift &&
-        ((!decided && reaches_across(passes, i)) || std::abs(passes.pairs[i].lambda) > largest - 1e-9))
+        ((!may_decide && reaches_across(passes, i)) || std::abs(passes.pairs[i].lambda) > largest - 1e-9))
       deciding.push_back(i);
   return deciding;
 }
