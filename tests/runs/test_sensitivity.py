@@ -87,6 +87,15 @@ def test_derivatives_are_central_differences(scene, keys, scene_of, converged):
         assert abs(found - wanted) <= 1e-6 * max(abs(wanted), 1e-2 * abs(own)), (d["key"], found, wanted)
 
 
+def test_weak_nonlinear_numbers_move_modes_as_they_must(converged):
+    """Friction that turns with the motion damps by load over speed, and with all pairs closed nothing else knows of either: what
+    both do cancels. At 20 000 rad/s they move an eigenvalue by 4e-6 of itself per unit of theirs, so that rounding leaves 3e-7."""
+    run = converged(*PIN, "--set", "contact.0.rotation.rate=20000", *sensitivity_of("contact.0.rotation.rate", "force.0.vector.2"), ranks=1)
+    by = [d["value"] * complex(d["growth_rate_by"], 2 * np.pi * d["frequency_hz_by"])
+          for d in run.report["sensitivity"]["modes"][0]["derivatives"]]
+    assert abs(by[0]) > 1e-2 and abs(by[0] + by[1]) <= 1e-6 * abs(by[0]), by
+
+
 @pytest.mark.parametrize("scene, key, step, needs", [
     ("pin", "part.pin.loss_factor", 1e-5, ["damping.loss_frequency=5000"]),
     ("pin", "spring.0.damping", 300.0, []),
