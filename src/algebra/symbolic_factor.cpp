@@ -3,6 +3,7 @@
 #include "splitmix.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/base/run_control.hpp"
 
 #include <algorithm>
 #include <metis.h>
@@ -79,8 +80,12 @@ std::vector<idx_t> nested_dissection(Graph& graph, std::vector<idx_t>& weights)
   METIS_SetDefaultOptions(options.data());
   options[METIS_OPTION_COMPRESS] = 0; // nodes_of has compressed the graph
   idx_t size = graph.nodes();
-  if (METIS_NodeND(&size, graph.offsets.data(), graph.neighbours.data(), weights.data(), options.data(), order.data(),
-                   position.data()) != METIS_OK)
+  const auto dissect = [&]
+  {
+    return METIS_NodeND(&size, graph.offsets.data(), graph.neighbours.data(), weights.data(), options.data(),
+                        order.data(), position.data());
+  };
+  if (without_losing_signals(dissect) != METIS_OK)
     throw LibraryError("METIS found no elimination order");
   return position;
 }

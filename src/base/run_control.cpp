@@ -6,6 +6,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <metis.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 #include <utility>
@@ -53,6 +54,7 @@ struct Control
   bool checkpoint_due = false;
   std::vector<pid_t> peers; // ranks of this machine
   int together = 0;         // number of ranks that work together; 0: all
+  bool undisturbed = false; // nothing is asked
 };
 
 Control& control()
@@ -175,6 +177,7 @@ void end_run_control()
 Request request(MPI_Comm comm)
 {
   Control& own = control();
+  if (own.undisturbed) return Request::none;
   int ranks = 1, all = own.together;
   MPI_Comm_size(comm, &ranks);
   if (all == 0) MPI_Comm_size(MPI_COMM_WORLD, &all);
@@ -194,12 +197,31 @@ WorkOfPart::~WorkOfPart()
   control().together = 0;
 }
 
+Undisturbed::Undisturbed()
+{
+  control().undisturbed = true;
+}
+
+Undisturbed::~Undisturbed()
+{
+  control().undisturbed = false;
+}
+
 Request request_of_part(MPI_Comm part)
 {
   agree_on_requests(part);
   const Control& own = control();
   if (own.ended_by != 0) return Request::end;
   return own.checkpoint_due ? Request::checkpoint : Request::none;
+}
+
+int without_losing_signals(const std::function<int()>& metis)
+{
+  const int first = metis();
+  if (first == METIS_OK) return first;
+  const int second = metis();
+  if (second == METIS_OK) signal_received = SIGTERM;
+  return second;
 }
 
 void join_parts(MPI_Comm comm)

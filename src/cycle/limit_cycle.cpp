@@ -3,8 +3,11 @@
 #include "floquet.hpp"
 #include "preconditioner.hpp"
 
+#include "squeal/base/run_control.hpp"
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace squeal
 {
@@ -60,8 +63,11 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
                    std::move(found.multipliers),
                    {},
                    {},
-                   {}};
+                   {},
+                   found.cut_short};
   cycle.free = std::move(found.free);
+  std::optional<Undisturbed> last_period;
+  if (found.cut_short) last_period.emplace();
   cycle.measured =
       measure_period(map, {problem.probes, options.samples}, cycle.orbit.period, cycle.orbit.state, nullptr);
   ++cycle.convergence.periods;

@@ -7,6 +7,7 @@
 
 #include "squeal/base/disjoint_sets.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>
@@ -79,10 +80,14 @@ std::vector<int> partition_graph(Graph graph, int ranks)
   METIS_SetDefaultOptions(options);
   options[METIS_OPTION_SEED] = 1; // the same partition on every run
   std::vector<idx_t> part(graph.weights.size());
-  const int code =
-      METIS_PartGraphKway(&vertices, &constraints, graph.offsets.data(), graph.neighbours.data(), graph.weights.data(),
-                          nullptr, nullptr, &parts, nullptr, nullptr, options, &cut, part.data());
-  if (code != METIS_OK) throw Error("METIS could not partition the mesh into " + std::to_string(ranks) + " parts");
+  const auto divide = [&]
+  {
+    return METIS_PartGraphKway(&vertices, &constraints, graph.offsets.data(), graph.neighbours.data(),
+                               graph.weights.data(), nullptr, nullptr, &parts, nullptr, nullptr, options, &cut,
+                               part.data());
+  };
+  if (without_losing_signals(divide) != METIS_OK)
+    throw Error("METIS could not partition the mesh into " + std::to_string(ranks) + " parts");
   std::vector<int> rank(part.begin(), part.end());
   for (int r = 0; r < ranks; ++r)
     if (std::find(rank.begin(), rank.end(), r) == rank.end()) // METIS may leave a rank empty on a small graph

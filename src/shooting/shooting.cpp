@@ -4,6 +4,7 @@
 #include "free_periods.hpp"
 #include "newton_krylov.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/shooting/full_space.hpp"
 #include "subspace_newton.hpp"
 
@@ -74,6 +75,7 @@ struct Attempt
   FloquetAnalysis floquet{}; // of a converged orbit
   double first_return = 0;   // return residual where it started
   Beside beside = Beside::not_seen;
+  bool cut_short = false; // the run was asked to end in the search for multipliers
 
   bool converged() const { return found.ending == StageEnding::converged; }
   bool repels() const
@@ -149,8 +151,18 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
     attempt.beside = known->beside;
     return attempt;
   }
-  attempt.floquet = find_multipliers(problem, options, attempt.found.orbit, start.other_unstable);
-  hold_against_motion(search, attempt);
+  try
+  {
+    attempt.floquet = find_multipliers(problem, options, attempt.found.orbit, start.other_unstable);
+    hold_against_motion(search, attempt);
+  }
+  catch (const Interrupted&) // on all ranks alike: the orbit stays
+  {
+    attempt.cut_short = true;
+    attempt.floquet = {};
+    attempt.floquet.multipliers.stability = Stability::undecided;
+    attempt.floquet.multipliers.would_decide = "the run was ended while its multipliers were sought";
+  }
   return attempt;
 }
 
@@ -279,7 +291,7 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   ShootingResult result;
   result.outcome = outcome_of(log.convergence, ending, found.found.orbit.residual);
   std::vector<SeenGrowth> seen;
-  if (options.watched_periods > 0 && found.converged())
+  if (options.watched_periods > 0 && found.converged() && !found.cut_short)
     seen = growths_beside(problem, log, found.found.orbit, found.floquet, options.watched_periods);
   result.multipliers = std::move(found.floquet.multipliers);
   decide_by_growth(seen, result.multipliers);
@@ -296,6 +308,7 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   result.orbit = std::move(found.found.orbit);
   if (goes_on) result.free = std::move(free);
   result.convergence = std::move(log.convergence);
+  result.cut_short = found.cut_short;
   return result;
 }
 

@@ -26,22 +26,28 @@ std::string place_of(const SweepPoint& point, const std::vector<std::string>& ke
 /// Sets what follows from the points.
 void assess(Sweep& sweep, const std::vector<std::string>& keys, std::size_t total)
 {
-  sweep.outcome.iterations = static_cast<int>(sweep.points.size());
+  Outcome& outcome = sweep.outcome;
+  outcome.iterations = static_cast<int>(sweep.points.size());
+  const bool complete = outcome.kind != OutcomeKind::interrupted;
+  const auto motions =
+      std::ranges::count_if(sweep.points, [](const SweepPoint& point) { return point.motion.has_value(); });
+  if (!complete)
+    outcome.reason = format("the run was ended %s after %td of %zu points", who_asked_to_end().c_str(),
+                            std::ranges::count(sweep.points, false, &SweepPoint::inserted), total) +
+                     (motions > 0 ? format(" and %td motions", motions) : "");
   const auto note = [&](const auto& outcome_of, const char* what, std::size_t of)
   {
     int failed = 0;
     std::string first;
     for (const SweepPoint& point : sweep.points)
-      if (const Outcome* outcome = outcome_of(point); outcome && !succeeded(*outcome) && ++failed == 1)
-        first = place_of(point, keys) + ": " + outcome->reason;
+      if (const Outcome* at = outcome_of(point); at && !succeeded(*at) && ++failed == 1)
+        first = place_of(point, keys) + ": " + at->reason;
     if (failed == 0) return;
-    sweep.outcome.kind = OutcomeKind::not_converged;
-    sweep.outcome.reason += (sweep.outcome.reason.empty() ? "" : "; ") +
-                            format("%d of %zu %s failed, the first at ", failed, of, what) + first;
+    if (complete) outcome.kind = OutcomeKind::not_converged;
+    outcome.reason +=
+        (outcome.reason.empty() ? "" : "; ") + format("%d of %zu %s failed, the first at ", failed, of, what) + first;
   };
   note([](const SweepPoint& point) { return &point.outcome; }, "points", total);
-  const auto motions =
-      std::ranges::count_if(sweep.points, [](const SweepPoint& point) { return point.motion.has_value(); });
   note([](const SweepPoint& point) { return point.motion ? &point.motion->outcome : nullptr; }, "motions",
        static_cast<std::size_t>(motions));
 }
@@ -62,12 +68,14 @@ Sweep run_in_groups(const SweepProblem& problem, const std::vector<SweepLine>& l
           own = visit(problem, {group.comm(), true, checkpoint}, shares[static_cast<std::size_t>(group.number())]);
         });
   }
-  catch (const Interrupted&)
+  catch (const Interrupted&) // on all ranks, of groups that were done, too
   {
-    if (!own.points.empty()) keep_sweep(own, checkpoint, group.comm());
-    throw;
+    if (own.outcome.kind != OutcomeKind::interrupted) keep_sweep(own, checkpoint, group.comm());
+    own.outcome.kind = OutcomeKind::interrupted;
   }
-  return joined(shared(own, group, groups, comm), shares);
+  Sweep whole = joined(shared(own, group, groups, comm), shares);
+  whole.outcome.kind = own.outcome.kind; // the same on all ranks
+  return whole;
 }
 
 } // namespace

@@ -76,7 +76,7 @@ public:
       TrackNames& of_start = of_starts[line.reversed];
       if (line.known && line.points.size() == 1)
         of_start = known;
-      else if (line.known)
+      else if (line.known && begin != point) // else the group was asked to end before
         take(part, line, {begin + 1, point}, known);
       else
       {

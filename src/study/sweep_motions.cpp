@@ -55,7 +55,8 @@ SweptMotion motion_at(const SweepProblem& problem, const SweptPlace& place, cons
   return motion;
 }
 
-/// The motions of some of the places, each kept for a restart as soon as it is known.
+/// The motions of some of the places, each kept for a restart as soon as it is known. Interrupted: the run was asked to
+/// end; those that are known stay.
 void seek_motions(Sweep& sweep, const std::vector<std::size_t>& places, const SweepProblem& problem, MPI_Comm comm)
 {
   Progress progress(comm, "motions", static_cast<double>(places.size()));
@@ -93,20 +94,29 @@ void seek_in_groups(Sweep& sweep, const std::vector<std::size_t>& places, const 
                     MPI_Comm comm)
 {
   const RankGroup group(comm, groups);
-  work_in_parts(comm,
-                [&]
-                {
-                  const WorkOfPart part(group.comm());
-                  seek_motions(sweep, share_of(places, group.number(), groups), problem, group.comm());
-                });
+  bool ended = false;
+  try
+  {
+    work_in_parts(comm,
+                  [&]
+                  {
+                    const WorkOfPart part(group.comm());
+                    seek_motions(sweep, share_of(places, group.number(), groups), problem, group.comm());
+                  });
+  }
+  catch (const Interrupted&) // on all ranks
+  {
+    ended = true;
+  }
   for (int g = 0; g < groups; ++g)
     for (const std::size_t place : share_of(places, g, groups))
     {
       std::optional<SweptMotion>& motion = sweep.points[place].motion;
-      std::string bytes = g == group.number() ? packed(*motion).bytes() : std::string();
+      std::string bytes = g == group.number() && motion ? packed(*motion).bytes() : std::string();
       broadcast(bytes, comm, first_rank(g, groups, ranks_of(comm)));
-      motion = motion_from(*Checkpoint::from(bytes));
+      if (!bytes.empty()) motion = motion_from(*Checkpoint::from(bytes));
     }
+  if (ended) throw Interrupted{};
 }
 
 } // namespace
@@ -117,15 +127,23 @@ Sweep with_motions(const std::function<Sweep()>& linear, const SweepProblem& pro
   if (sweep.points.empty())
   {
     sweep = linear();
+    if (sweep.outcome.kind == OutcomeKind::interrupted) return sweep;
     keep_sweep(sweep, name_of_modes, comm);
   }
   if (rank_of(comm) == 0) keep_period_log(); // of the stages before
   const std::vector<std::size_t> places = places_of_motions(sweep);
   const int groups = groups_of(problem.options.groups, {places.size(), 1}, comm);
-  if (groups > 1)
-    seek_in_groups(sweep, places, problem, groups, comm);
-  else
-    seek_motions(sweep, places, problem, comm);
+  try
+  {
+    if (groups > 1)
+      seek_in_groups(sweep, places, problem, groups, comm);
+    else
+      seek_motions(sweep, places, problem, comm);
+  }
+  catch (const Interrupted&)
+  {
+    sweep.outcome.kind = OutcomeKind::interrupted;
+  }
   return sweep;
 }
 

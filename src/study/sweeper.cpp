@@ -33,9 +33,28 @@ public:
   {
   }
 
-  /// Visits these lines.
+  /// Visits these lines. Where the run is asked to end, the points done stay.
   Sweep run(const std::vector<SweepLine>& lines)
   {
+    try
+    {
+      visit_all(lines);
+    }
+    catch (const Interrupted&) // on all ranks of this share alike
+    {
+      sweep_.points.resize(complete_.points);
+      sweep_.thresholds.resize(complete_.thresholds);
+      sweep_.outcome.kind = OutcomeKind::interrupted;
+    }
+    sweep_.basis = static_cast<int>(model_.shapes());
+    sweep_.passes = model_.passes();
+    return std::move(sweep_);
+  }
+
+private:
+  void visit_all(const std::vector<SweepLine>& lines)
+  {
+    note_complete();
     Progress progress(place_.comm, "sweep", static_cast<double>(points_of(lines)));
     progress_ = &progress;
     for (const SweepLine& line : lines)
@@ -53,12 +72,11 @@ public:
     }
     lines_ = lines;
     for (const SweepLine& line : lines) run_line(line);
-    sweep_.basis = static_cast<int>(model_.shapes());
-    sweep_.passes = model_.passes();
-    return std::move(sweep_);
   }
 
-private:
+  /// What is recorded is not of a step between points that is under way.
+  void note_complete() { complete_ = {sweep_.points.size(), sweep_.thresholds.size()}; }
+
   Request asked() const { return place_.of_part ? request_of_part(place_.comm) : request(place_.comm); }
 
   void end_if_asked_here() const
@@ -90,6 +108,7 @@ private:
         if (++done_ == kept_ && line.ordered) before = restored_end(line);
         continue;
       }
+      note_complete();
       if (const Request now = asked(); now != Request::none)
       {
         keep_sweep(sweep_, place_.checkpoint, place_.comm);
@@ -358,6 +377,10 @@ private:
   std::vector<SweepLine> lines_{};
   std::array<std::optional<Followed>, 2> starts_{}; // of the last line in either direction of rotation
   std::size_t done_ = 0;                            // points
+  struct
+  {
+    std::size_t points = 0, thresholds = 0;
+  } complete_{}; // recorded
 };
 
 } // namespace

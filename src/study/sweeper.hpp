@@ -17,8 +17,8 @@ struct SharePlace
   std::string checkpoint;
 };
 
-/// Visits all points of these lines, after those that the checkpoint holds. Collective. Interrupted: the run was asked
-/// to end; the points done are in the checkpoint.
+/// Visits all points of these lines, after those that the checkpoint holds. Collective. outcome: "interrupted" where
+/// the run was asked to end, else "converged"; the points done are in the checkpoint, too.
 Sweep visit(const SweepProblem& problem, const SharePlace& place, const std::vector<SweepLine>& lines);
 
 } // namespace squeal

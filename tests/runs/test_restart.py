@@ -146,6 +146,23 @@ def test_a_signal_is_no_error_of_what_is_under_way(tmp_path, where):
     assert "ended by SIGUSR1" in log.read_text().splitlines()[-1]
 
 
+def test_a_run_that_ends_in_its_verdict_keeps_the_cycle(squeal, tmp_path):
+    """The verdict is the last third of the cycle's stage: of ends within it one at least meets it. The restart decides."""
+    whole = squeal(*WITH_VERDICT, ranks=1).report
+    end = sum(whole["timings"].values())
+    for part in np.linspace(0.05, 0.6, 12):
+        ask = [*WITH_VERDICT, "--output", tmp_path / f"ended{part:.2f}"]
+        ended = squeal(*ask, "--time-limit", f"{end - part * whole['timings']['cycle']:.2f}", ranks=1)
+        cycle = json.loads((tmp_path / f"ended{part:.2f}" / "report.json").read_text())["cycle"]
+        if ended.code == 3 and cycle["outcome"] == "converged":
+            break
+    assert cycle["multipliers"]["stability"] == "undecided" and "the run was ended" in cycle["multipliers"]["would_decide"]
+    assert cycle["frequency_hz"] == whole["cycle"]["frequency_hz"]
+    again = squeal(*ask, "--restart", ranks=1)
+    restarted = json.loads((tmp_path / f"ended{part:.2f}" / "report.json").read_text())
+    assert again.code == 0 and restarted["cycle"]["multipliers"]["values"] == whole["cycle"]["multipliers"]["values"]
+
+
 def test_the_wrapper_passes_signals_on(tmp_path):
     """mpirun itself kills its ranks soon after a TERM; launch of tools/environment makes it a USR1."""
     output = tmp_path / "results"

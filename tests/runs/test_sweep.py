@@ -408,6 +408,10 @@ def test_an_interrupted_sweep_goes_on_where_it_was(ranks, start, end, points, sq
     seconds = whole.report["timings"]
     limit = sum(seconds.values()) - 0.5 * seconds["sweep"]
     first = squeal(*ask, "--time-limit", f"{limit:.2f}", ranks=ranks)
+    if first.code == 3:  # what is done is in the results
+        ended = json.loads((tmp_path / "in_two" / "report.json").read_text())["sweep"]
+        assert ended["outcome"] == "interrupted" and f"of {points} points" in ended["reason"]
+        assert {float(row["friction.coefficient"]) for row in rows_of(tmp_path / "in_two")} == {p["values"][0] for p in ended["points"]}
     again = squeal(*ask, "--restart", ranks=ranks) if first.code == 3 else first
     assert whole.code == again.code == 0, again.errors
     one, two = whole.report["sweep"], json.loads((tmp_path / "in_two" / "report.json").read_text())["sweep"]

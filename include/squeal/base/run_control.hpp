@@ -1,6 +1,7 @@
 #pragma once
 /// Requests that reach a run from outside while it computes: to end in order, by a signal or the time limit, and to
 /// make a checkpoint. One process is one run, as for signals: its control is the process's own.
+#include <functional>
 #include <mpi.h>
 #include <string>
 
@@ -57,9 +58,23 @@ public:
   ~WorkOfPart();
 };
 
+/// While one lives, request() asks for nothing: for short work without which what is known would be lost. By all ranks.
+class Undisturbed
+{
+public:
+  Undisturbed();
+  Undisturbed(const Undisturbed&) = delete;
+  Undisturbed& operator=(const Undisturbed&) = delete;
+  ~Undisturbed();
+};
+
 /// The same of a part of the ranks that works by itself, by what these know and their first one's clock. Collective
 /// among them, at any time; join_parts comes after.
 Request request_of_part(MPI_Comm part);
+
+/// Calls a function of METIS, and once more where it failed: METIS takes a SIGTERM during the call for an error of its
+/// own. Where it does not fail again, that request is noted. Returns METIS's code. Not collective.
+int without_losing_signals(const std::function<int()>& metis);
 
 /// After parts of the ranks have worked by themselves: throws Interrupted if any of them was asked to end. Collective
 /// of all ranks.

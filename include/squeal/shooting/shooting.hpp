@@ -41,6 +41,7 @@ struct ShootingResult
   Orbit free;  // the end of the free motion, evaluated over one more period; null where it is not finite
   Convergence convergence;
   Multipliers multipliers;
+  bool cut_short = false; // the run was asked to end in the search for multipliers
 };
 
 /// An orbit that repels is no answer; with other unstable modes the motion need not be periodic at all. Not collective.
