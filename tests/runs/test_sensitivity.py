@@ -3,18 +3,37 @@
 import h5py
 import numpy as np
 import pytest
-from conftest import INPUTS
+from conftest import INPUTS, Run
 from models import write_coexistence, write_scene
 
 OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"]
-# Two directions, so that friction turns and the equilibrium enters; two unstable modes.
-PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
-       "--set", "modes.method=full", "--set", "modes.band=20000", "--set", "friction.coefficient=0.5"]
+# Two directions, so that friction turns and the equilibrium enters; two unstable modes. One element across the pin.
+PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=1", "--set", "cycle.enabled=false",
+       "--set", "modes.method=full", "--set", "modes.band=25000", "--set", "friction.coefficient=0.5"]
 
 LOSSY = [*PIN, "--set", "part.pin.loss_factor=0.01", "--set", "part.disc.loss_factor=1e-6", "--set", "damping.loss_frequency=5000"]
 SPINNING = [*PIN, "--set", "part.disc.rotation={axis='z',rate=300}"]
 HEAVY = [*PIN, "--set", "rigid_body.holder.inertia=[1e-4,2e-4,3e-4,0,0,0]"]
 SCENES = {"oscillator": OSCILLATOR, "pin": PIN, "heavy holder": HEAVY, "lossy pin": LOSSY, "spinning disc": SPINNING}
+# Numbers whose derivatives are held against differences: of a size, and zero or next to it in the scene.
+SIZED = {
+    "oscillator": ["friction.coefficient", "spring.0.stiffness", "spring.0.damping", "point.pad.mass", "point.disc.mass"],
+    "pin": ["friction.coefficient", "part.pin.young", "part.disc.young", "part.pin.density", "damping.beta",
+            "rigid_body.holder.mass", "spring.0.stiffness", "contact.0.rotation.rate", "part.pin.poisson"],
+    "falling friction": ["friction.coefficient", "friction.static_coefficient", "friction.decay_speed", "contact.0.velocity.1",
+                         "contact.1.velocity.0", "force.0.vector.2"],
+    "compliant pads": ["friction.coefficient", "contact.0.compliance", "spring.3.stiffness", "force.0.vector.2"],
+    "lossy pin": ["part.pin.loss_factor", "part.pin.young", "friction.coefficient"],
+    "spinning disc": ["part.disc.rotation.rate", "part.disc.density"],
+}
+ZEROS = [
+    ("pin", "part.pin.loss_factor", 1e-5, ["damping.loss_frequency=5000"]),
+    ("pin", "spring.0.damping", 300.0, []),
+    ("lossy pin", "part.disc.loss_factor", 1e-4, []), # 1e-6: a ten-thousandth of it would drown in rounding
+    ("falling friction", "contact.0.compliance", 1e-10, []),
+    ("falling friction", "contact.0.normal.0", 1e-3, []),
+    ("falling friction", "contact.0.gap", 1e-7, []),
+]
 
 
 def two_pads(folder, compliance=0, **friction):
@@ -34,18 +53,6 @@ def two_pads(folder, compliance=0, **friction):
                        friction={"coefficient": 0.5, **friction}, modes={"band": 5000})
 
 
-@pytest.fixture
-def scene_of(tmp_path):
-    """Arguments by the name of a scene: of an input, or of two pads."""
-    def find(name):
-        if name == "compliant pads":
-            return [two_pads(tmp_path, compliance=2e-9)]
-        if name == "falling friction":
-            return [two_pads(tmp_path, static_coefficient=0.6, decay_speed=1.5)]
-        return SCENES[name]
-    return find
-
-
 def sensitivity_of(*numbers):
     return ["--set", "sensitivity.numbers=[" + ",".join(f"'{number}'" for number in numbers) + "]"]
 
@@ -62,29 +69,46 @@ def overridden(key, value):
     return f"{key}={value!r}"
 
 
-@pytest.mark.parametrize("scene, keys", [
-    ("oscillator", ["friction.coefficient", "spring.0.stiffness", "spring.0.damping", "point.pad.mass", "point.disc.mass"]),
-    ("pin", ["friction.coefficient", "part.pin.young", "part.disc.young", "part.pin.density", "damping.beta",
-           "rigid_body.holder.mass", "spring.0.stiffness", "contact.0.rotation.rate", "part.pin.poisson"]),
-    ("falling friction", ["friction.coefficient", "friction.static_coefficient", "friction.decay_speed", "contact.0.velocity.1",
-                          "contact.1.velocity.0", "force.0.vector.2"]),
-    ("compliant pads", ["friction.coefficient", "contact.0.compliance", "spring.3.stiffness", "force.0.vector.2"]),
-    ("lossy pin", ["part.pin.loss_factor", "part.pin.young", "friction.coefficient"]),
-    ("spinning disc", ["part.disc.rotation.rate", "part.disc.density"]),
-])
-def test_derivatives_are_central_differences(scene, keys, scene_of, converged):
-    scene = scene_of(scene)
-    entry = converged(*scene, *sensitivity_of(*keys), ranks=1).report["sensitivity"]
-    mode = entry["modes"][0]
-    own = complex(mode["growth_rate"], 2 * np.pi * mode["frequency_hz"])
-    assert [d["key"] for d in mode["derivatives"]] == keys
-    for d in mode["derivatives"]:
+@pytest.fixture(scope="module")
+def explained(tmp_path_factory):
+    """Arguments of a scene by its name, and its run with the derivatives by all of its numbers, once."""
+    found = {}
+
+    def explain(name):
+        if name not in found:
+            folder = tmp_path_factory.mktemp("scene")
+            arguments = {"compliant pads": lambda: [two_pads(folder, compliance=2e-9)],
+                         "falling friction": lambda: [two_pads(folder, static_coefficient=0.6, decay_speed=1.5)],
+                         }.get(name, lambda: SCENES[name])()
+            keys = SIZED.get(name, ["friction.coefficient"]) + [key for scene, key, *_ in ZEROS if scene == name]
+            run = Run([*arguments, *sensitivity_of(*keys)], 1, tmp_path_factory.mktemp("explained"))
+            assert run.code == 0, run.printed[-2000:] + run.errors[-2000:]
+            for mode in run.report["sensitivity"]["modes"]:
+                assert [d["key"] for d in mode["derivatives"]] == keys
+            found[name] = arguments, run
+        return found[name]
+
+    return explain
+
+
+def first_mode(run):
+    """Of the sensitivities: its eigenvalue and its derivatives by key."""
+    mode = run.report["sensitivity"]["modes"][0]
+    return complex(mode["growth_rate"], 2 * np.pi * mode["frequency_hz"]), {d["key"]: d for d in mode["derivatives"]}
+
+
+@pytest.mark.parametrize("scene", SIZED)
+def test_derivatives_are_central_differences(scene, explained, converged):
+    arguments, run = explained(scene)
+    own, derivatives = first_mode(run)
+    for key in SIZED[scene]:
+        d = derivatives[key]
         found = d["value"] * complex(d["growth_rate_by"], 2 * np.pi * d["frequency_hz_by"])
         step = 1e-4  # its square is below the tolerance, and rounding over it
-        sides = [lambda_of(converged(*scene, "--set", overridden(d["key"], d["value"] * (1 + sign * step)), ranks=1).report, own)
+        sides = [lambda_of(converged(*arguments, "--set", overridden(key, d["value"] * (1 + sign * step)), ranks=1).report, own)
                  for sign in (1, -1)]
         wanted = (sides[0] - sides[1]) / (2 * step)
-        assert abs(found - wanted) <= 1e-6 * max(abs(wanted), 1e-2 * abs(own)), (d["key"], found, wanted)
+        assert abs(found - wanted) <= 1e-6 * max(abs(wanted), 1e-2 * abs(own)), (key, found, wanted)
 
 
 def test_weak_nonlinear_numbers_move_modes_as_they_must(converged):
@@ -96,36 +120,19 @@ def test_weak_nonlinear_numbers_move_modes_as_they_must(converged):
     assert abs(by[0]) > 1e-2 and abs(by[0] + by[1]) <= 1e-6 * abs(by[0]), by
 
 
-@pytest.mark.parametrize("scene, key, step, needs", [
-    ("pin", "part.pin.loss_factor", 1e-5, ["damping.loss_frequency=5000"]),
-    ("pin", "spring.0.damping", 300.0, []),
-    ("lossy pin", "part.disc.loss_factor", 1e-4, []), # 1e-6: a ten-thousandth of it would drown in rounding
-    ("falling friction", "contact.0.compliance", 1e-10, []),
-    ("falling friction", "contact.0.normal.0", 1e-3, []),
-    ("falling friction", "contact.0.gap", 1e-7, []),
-])
-def test_derivatives_at_zero_are_one_sided_differences(scene, key, step, needs, scene_of, converged):
-    scene = scene_of(scene)
-    mode = converged(*scene, *sensitivity_of(key), ranks=1).report["sensitivity"]["modes"][0]
-    own = complex(mode["growth_rate"], 2 * np.pi * mode["frequency_hz"])
-    [d] = mode["derivatives"]
+@pytest.mark.parametrize("scene, key, step, needs", ZEROS)
+def test_derivatives_at_zero_are_one_sided_differences(scene, key, step, needs, explained, converged):
+    arguments, run = explained(scene)
+    own, derivatives = first_mode(run)
+    d = derivatives[key]
     assert d["known"]
     found = complex(d["growth_rate_by"], 2 * np.pi * d["frequency_hz_by"])
     needed = [word for need in needs for word in ("--set", need)]
-    sides = [lambda_of(converged(*scene, *(needed if i else []), "--set", overridden(key, d["value"] + i * step), ranks=1).report, own)
-             for i in range(5)]
-    wanted = np.dot([-25, 48, -36, 16, -3], sides) / (12 * step) # of fourth order
+    sides = [lambda_of(run.report, own)]
+    sides += [lambda_of(converged(*arguments, *needed, "--set", overridden(key, d["value"] + i * step), ranks=1).report, own)
+              for i in range(1, 4)]
+    wanted = np.dot([-11, 18, -9, 2], sides) / (6 * step) # of third order: off by up to 3e-7
     assert abs(found - wanted) <= 1e-6 * abs(wanted), (key, found, wanted)
-
-
-@pytest.fixture(scope="module")
-def pin(tmp_path_factory):
-    from conftest import Run
-    changes = ["--set", "sensitivity.numbers=['friction.coefficient','part.pin.young','part.disc.young','part.pin.density',"
-               "'part.disc.density','rigid_body.holder.mass','spring.0.stiffness']"]
-    run = Run([*PIN, *changes], 1, tmp_path_factory.mktemp("pin"))
-    assert run.code == 0, run.printed[-2000:] + run.errors[-2000:]
-    return run
 
 
 FEEDS = "contact_powers", "falling_friction_powers", "turning_friction_powers"
@@ -137,8 +144,8 @@ def power_defect(mode):
 
 
 @pytest.mark.parametrize("scene", ["compliant pads", "lossy pin", "spinning disc", "falling friction"])
-def test_powers_sum_beyond_rigid_pairs_and_symmetric_matrices(scene, scene_of, converged):
-    for mode in converged(*scene_of(scene), *sensitivity_of("friction.coefficient"), ranks=1).report["sensitivity"]["modes"]:
+def test_powers_sum_beyond_rigid_pairs_and_symmetric_matrices(scene, explained):
+    for mode in explained(scene)[1].report["sensitivity"]["modes"]:
         assert abs(power_defect(mode)) <= 1e-10
         assert mode["damping_power"] > 0 and max(mode["turning_friction_powers"]) <= 0
         falls = scene == "falling friction"
@@ -160,7 +167,8 @@ def test_falling_friction_feeds_a_mass_on_a_belt(tmp_path, converged):
     assert abs(power_defect(mode)) <= 1e-10
 
 
-def test_powers_sum_to_twice_the_growth_rate(pin):
+def test_powers_sum_to_twice_the_growth_rate(explained):
+    pin = explained("pin")[1]
     modes = pin.report["sensitivity"]["modes"]
     assert len(modes) == pin.report["modes"]["unstable_count"] >= 1
     for mode in modes:
@@ -180,8 +188,8 @@ def test_powers_sum_to_twice_the_growth_rate(pin):
     ("lossy pin", {"part disc", "part pin"}),
     ("spinning disc", {"part disc", "part pin"}),
 ])
-def test_shares_sum_to_one(scene, held, scene_of, converged):
-    modes = converged(*scene_of(scene), *sensitivity_of("friction.coefficient"), ranks=1).report["sensitivity"]["modes"]
+def test_shares_sum_to_one(scene, held, explained):
+    modes = explained(scene)[1].report["sensitivity"]["modes"]
     assert modes
     for mode in modes:
         found = {f"{share['table']} {share['name']}".strip(): share for share in mode["shares"]}
@@ -240,10 +248,10 @@ def test_numbers_are_called_by_name(tmp_path, converged):
     assert "force.0.vector.2 (on caliper)" in run.printed
 
 
-def test_ranks_agree(pin, squeal):
+def test_ranks_agree(explained, squeal):
     run = squeal(*PIN, *sensitivity_of("friction.coefficient", "part.pin.young"), ranks=2)
     assert run.code == 0
-    for one, other in zip(pin.report["sensitivity"]["modes"], run.report["sensitivity"]["modes"], strict=True):
+    for one, other in zip(explained("pin")[1].report["sensitivity"]["modes"], run.report["sensitivity"]["modes"], strict=True):
         for a, b in zip(one["derivatives"][:2], other["derivatives"], strict=True):
             size = 2 * np.pi * one["frequency_hz"]
             assert a["value"] * (a["growth_rate_by"] - b["growth_rate_by"]) == pytest.approx(0, abs=1e-8 * size)
