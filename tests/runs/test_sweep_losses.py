@@ -9,13 +9,16 @@ from test_robustness import rows_of as samples_of
 from test_sensitivity import overridden, two_pads
 from test_sweep import lambdas, modes_at, rows_of, same_modes, sweep_of
 
-PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
+PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=1", "--set", "cycle.enabled=false",
        "--set", "modes.method=full", "--set", "modes.band=10000", "--set", "estimate.enabled=false"]
-LOSSY = [*PIN, "--set", "part.pin.loss_factor=0.1", "--set", "part.disc.loss_factor=0.002", "--set",
-         "damping.loss_frequency=5000"]
-SOFT = [*PIN, "--set", "contact.0.compliance=5e-13"]
-SPINNING = [*PIN, "--set", "part.disc.rotation={axis='z',rate=300}"]
-ALL = [*LOSSY, "--set", "contact.0.compliance=5e-13", "--set", "part.disc.rotation={axis='z',rate=300}"]
+LOSSES_OF_PARTS = ["--set", "part.pin.loss_factor=0.1", "--set", "part.disc.loss_factor=0.002", "--set",
+                   "damping.loss_frequency=5000"]
+COMPLIANT = ["--set", "contact.0.compliance=5e-13"]
+LOSSY = [*PIN, *LOSSES_OF_PARTS]
+SOFT = [*PIN, *COMPLIANT]
+# Spin needs more shapes for a mode: of the small mesh up to all that there are.
+SPINNING = [*PIN, "--set", "mesh.parameters.divisions=2", "--set", "modes.band=5000", "--set", "part.disc.rotation={axis='z',rate=300}"]
+ALL = [*SPINNING, *LOSSES_OF_PARTS, *COMPLIANT]
 
 
 def set_to(key, value):
@@ -38,6 +41,7 @@ def test_points_are_single_runs(scene, key, values, ranks, converged):
     singles = [lambdas(converged(*scene, *set_to(key, value), ranks=1).report) for value in values]
     for sweep in sweeps:
         assert sweep.report["sweep"]["lost_modes"] == 0
+        assert sweep.report["sweep"]["basis_shapes"] < 0.6 * sweep.report["model"]["dofs"]  # nor is the problem solved whole
         for value, single in zip(values, singles):
             # backward errors of both vectors are below 1e-10; lambda is off by their product, times at most 1e9 here
             same_modes(modes_at(rows_of(sweep.output), value, key=key), single, 1e-9)
@@ -78,8 +82,8 @@ def test_single_runs_change_at_the_thresholds(key, values, tmp_path, converged):
 
 
 def test_a_single_run_changes_at_the_loss_factor_that_stabilises(converged):
-    """Friction makes a mode at 17 974 Hz unstable; losses of the pin take it away."""
-    ask = [*LOSSY, "--set", "modes.band=20000", "--set", "friction.coefficient=0.3"]
+    """Friction makes a mode at 6752 Hz unstable; losses of the pin take it away."""
+    ask = [*LOSSY, "--set", "friction.coefficient=0.3"]
     run = converged(*ask, *sweep_of("part.pin.loss_factor", 0.0, 0.1, points=2), ranks=1)
     (threshold,) = run.report["sweep"]["thresholds"]
     eta = threshold["values"][0]
@@ -126,12 +130,9 @@ RATE = "{key='part.disc.rotation.rate', deviation=50}"
 FRICTION = "{key='friction.coefficient', distribution='uniform', from=0.3, to=0.5}"
 
 
-UP_TO_20_KHZ = ["--set", "modes.band=20000"] # without spin the mode that friction makes unstable is at 18 kHz
-
-
 @pytest.mark.parametrize("scene, numbers", [
-    ([*LOSSY, *UP_TO_20_KHZ], [LOSSES, FRICTION, "{key='part.pin.young', deviation=2e8}"]),
-    ([*SOFT, *UP_TO_20_KHZ], [COMPLIANCE, FRICTION]),
+    (LOSSY, [LOSSES, FRICTION, "{key='part.pin.young', deviation=2e8}"]),
+    (SOFT, [COMPLIANCE, FRICTION]),
     (SPINNING, [RATE, FRICTION]),
     (ALL, [LOSSES, COMPLIANCE, RATE, FRICTION]),
 ], ids=["losses", "compliance", "spin", "all"])
