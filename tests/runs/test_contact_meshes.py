@@ -55,7 +55,8 @@ def body(mesh, name, x, z, width, height, kind):
 
 
 def line_contact(converged, folder, per_radius, kind, ratio):
-    """Errors of radius (from the second moment, a^2/4) and peak pressure; spacing of nodes a/per_radius on the slave."""
+    """Errors of radius (from the second moment, a^2/4) and peak pressure; spacing of nodes a/per_radius on the slave.
+    The coarse mesh is on two ranks, the finer ones on one."""
     radius, a, young, poisson, width = 1.0, 0.02, 1e9, 0.3, 0.01
     stiffness = young / (2 * (1 - poisson**2))
     load = np.pi * a**2 * stiffness / (4 * radius)  # a metre of length
@@ -74,7 +75,7 @@ def line_contact(converged, folder, per_radius, kind, ratio):
                         contact=[{"rotor": "plane:face", "stator": "cylinder:face", "normal": "z", "reach": 1e-3}],
                         pressure=[{"on": "cylinder:end", "value": load / 2 / end}],
                         support=[{"on": "plane:end", "fixed": "z"}, {"on": "x=0", "fixed": "x"}, {"on": "sides", "fixed": "y"}])
-    run = converged(scene)
+    run = converged(scene, ranks=2 if per_radius == 6 else 1)
     with h5py.File(run.output / "fields.h5") as fields:
         x, force = fields["pairs/position"][:, 0], fields["pairs/reaction"][:, 0]
         pressure = fields["pairs/pressure"][:]
