@@ -57,7 +57,8 @@ def pin(tmp_path_factory):
 
 
 def test_points_are_single_runs(pin, converged):
-    """The basis, made once and corrected by residuals, gives what the full problem gives at each friction; it is no whole space."""
+    """The basis, made once and corrected by residuals, gives what the full problem gives at each friction, and is
+    no whole space."""
     assert pin.report["sweep"]["basis_shapes"] < 0.6 * pin.report["model"]["dofs"]
     rows = rows_of(pin.output)
     for mu in (0.05, 0.15, 0.35):

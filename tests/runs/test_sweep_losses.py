@@ -17,7 +17,8 @@ COMPLIANT = ["--set", "contact.0.compliance=5e-13"]
 LOSSY = [*PIN, *LOSSES_OF_PARTS]
 SOFT = [*PIN, *COMPLIANT]
 # Spin needs more shapes for a mode: of the small mesh up to all that there are.
-SPINNING = [*PIN, "--set", "mesh.parameters.divisions=2", "--set", "modes.band=5000", "--set", "part.disc.rotation={axis='z',rate=300}"]
+SPINNING = [*PIN, "--set", "mesh.parameters.divisions=2", "--set", "modes.band=5000", "--set",
+            "part.disc.rotation={axis='z',rate=300}"]
 ALL = [*SPINNING, *LOSSES_OF_PARTS, *COMPLIANT]
 
 
@@ -41,7 +42,7 @@ def test_points_are_single_runs(scene, key, values, ranks, converged):
     singles = [lambdas(converged(*scene, *set_to(key, value), ranks=1).report) for value in values]
     for sweep in sweeps:
         assert sweep.report["sweep"]["lost_modes"] == 0
-        assert sweep.report["sweep"]["basis_shapes"] < 0.6 * sweep.report["model"]["dofs"]  # nor is the problem solved whole
+        assert sweep.report["sweep"]["basis_shapes"] < 0.6 * sweep.report["model"]["dofs"]  # it is no whole space
         for value, single in zip(values, singles):
             # backward errors of both vectors are below 1e-10; lambda is off by their product, times at most 1e9 here
             same_modes(modes_at(rows_of(sweep.output), value, key=key), single, 1e-9)
