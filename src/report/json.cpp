@@ -184,7 +184,8 @@ Json cycle_entry(const Report& report, const Scene& scene)
   const std::size_t probes = std::min(scene.probes.size(), cycle.measured.peak_to_peak.size());
   for (std::size_t i = 0; i < probes; ++i) swings[scene.probes[i].name] = cycle.measured.peak_to_peak[i];
   entry["peak_to_peak"] = swings;
-  if (cycle.multipliers.stability != Stability::not_examined) entry["multipliers"] = multiplier_entry(cycle.multipliers);
+  if (cycle.multipliers.stability != Stability::not_examined)
+    entry["multipliers"] = multiplier_entry(cycle.multipliers);
   entry["newton"] = newton_list(cycle.convergence.records);
   return entry;
 }
