@@ -174,7 +174,7 @@ std::string beside_rest(const Report& report)
 /// Without a cycle.
 std::string linear_text(const Report& report)
 {
-  if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "nothing is known: there is no equilibrium";
+  if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "nothing is known: no equilibrium was found";
   if (!has_run(report.modes.outcome)) return "nothing is known: the modes were not computed";
   if (report.modes.unstable_count == 0)
     return report.modes.outcome.kind == OutcomeKind::converged

@@ -105,6 +105,15 @@ std::string sum_text(const std::vector<double>& powers)
   return text;
 }
 
+/// What is added.
+std::string change_text(const Change& change)
+{
+  std::string text;
+  for (const auto& [value, unit] : {std::pair{change.mass, "kg"}, {change.damping, "N s/m"}, {change.stiffness, "N/m"}})
+    if (value != 0) text += format("%s%g %s", text.empty() ? "" : " and ", value, unit);
+  return text;
+}
+
 /// What friction puts in beside the reactions, if anything.
 std::string friction_text(const ModeCauses& causes)
 {
@@ -145,8 +154,8 @@ std::vector<std::string> sensitivity_lines(const Sensitivity& sensitivity, const
                              0.01 * list[i].number.value * list[i].lambda.real(),
                              0.01 * list[i].number.value * in_hz(list[i].lambda.imag())));
     for (std::size_t i = 0; i < causes.changes.size(); ++i)
-      lines.push_back(format("  change at %s: growth %.6g 1/s predicted", scene.changes[i].probe.c_str(),
-                             causes.changes[i].predicted.real()) +
+      lines.push_back(format("  %s at %s: growth %.6g 1/s predicted", change_text(scene.changes[i]).c_str(),
+                             scene.changes[i].probe.c_str(), causes.changes[i].predicted.real()) +
                       (causes.changes[i].found ? format(", %.6g 1/s computed", causes.changes[i].computed.real())
                                                : std::string(", not found")));
   }

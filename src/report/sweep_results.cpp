@@ -70,6 +70,21 @@ Json point_entry(const SweepPoint& point)
   return entry;
 }
 
+/// Of points whose modes are not followed.
+std::string unstable_points_text(const Sweep& sweep)
+{
+  const SweepPoint* most = nullptr;
+  for (const SweepPoint& point : sweep.points)
+    if (point.unstable > 0 && (!most || most->modes.front().lambda.real() < point.modes.front().lambda.real()))
+      most = &point;
+  const auto count = std::ranges::count_if(sweep.points, [](const SweepPoint& point) { return point.unstable > 0; });
+  std::string text = format("unstable at %td of %zu points", count, sweep.points.size());
+  if (!most) return text;
+  const std::complex<double> lambda = most->modes.front().lambda;
+  return text + format(", most at %s%s: %.7g Hz, growth %.6g 1/s", text_of(most->values).c_str(),
+                       most->reversed ? " reversed" : "", frequency_hz_of(lambda), lambda.real());
+}
+
 } // namespace
 
 std::string text_of(const std::vector<double>& values)
@@ -191,10 +206,14 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
                          sweep.outcome.residual, sweep.basis, sweep.passes);
   if (sweep.groups > 1) lines.back() += format(", by %d groups of ranks", sweep.groups);
   if (sweep.tracks > 0)
+  {
     lines.push_back(
         format("%d modes followed, MAC %.3f at least, %d lost on the way", sweep.tracks, sweep.least_mac, sweep.lost));
-  if (sweep.least_mac_across < 1)
-    lines.back() += format("; MAC %.3f at least where pairs open or close", sweep.least_mac_across);
+    if (sweep.least_mac_across < 1)
+      lines.back() += format("; MAC %.3f at least where pairs open or close", sweep.least_mac_across);
+  }
+  else
+    lines.push_back(unstable_points_text(sweep));
   const std::vector<Track> unstable = unstable_tracks(sweep);
   for (std::size_t i = 0; i < std::min(shown, unstable.size()); ++i)
   {

@@ -402,9 +402,12 @@ std::vector<SceneComponent> components_of(const Scene& scene)
     add_component(components, std::move(component));
   }
   for (std::size_t i = 0; i < scene.springs.size(); ++i)
-    add_component(
-        components,
-        {"spring", name_of(scene.springs[i]), {{key_of("spring", i, "stiffness"), scene.springs[i].stiffness}}});
+  {
+    std::string name = name_of(scene.springs[i]);
+    const auto same = [&](const Spring& spring) { return name_of(spring) == name; };
+    if (std::ranges::count_if(scene.springs, same) > 1) name = format("spring.%zu (%s)", i, name.c_str());
+    add_component(components, {"spring", name, {{key_of("spring", i, "stiffness"), scene.springs[i].stiffness}}});
+  }
   std::string rest;
   for (const Superelement& element : scene.superelements) rest += (rest.empty() ? "" : " and ") + element.name;
   if (!rest.empty()) components.push_back({"superelement", rest});

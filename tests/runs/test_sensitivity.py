@@ -217,6 +217,9 @@ def test_changes_move_the_growth_as_predicted(tmp_path, squeal):
     run = squeal(scene, "--set", "transient.enabled=false", "--set", "cycle.enabled=false", ranks=1)
     assert run.code == 0, run.errors
     mode = run.report["sensitivity"]["modes"][0]
+    assert "0.002 kg and 0.001 N s/m at pad_y: growth" in run.printed
+    springs = [share["name"] for share in mode["shares"] if share["table"] == "spring"]
+    assert "spring.1 (pad to ground)" in springs and len(set(springs)) == len(springs)
     for change in mode["changes"]:
         moved = change["computed"]["growth_rate"] - mode["growth_rate"]
         assert abs(moved) > 1e-6

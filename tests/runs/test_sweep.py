@@ -251,6 +251,9 @@ def test_groups_share_few_points_two_numbers_and_random_ones(sweep, squeal):
     one, two = squeal(*OSCILLATOR, *sweep, ranks=1), squeal(*OSCILLATOR, *sweep, "-sweep_groups", "9", ranks=2)
     assert one.code == two.code == 0
     assert two.report["sweep"]["groups"] == 2
+    points = one.report["sweep"]["points"]
+    if not one.report["sweep"]["followed_modes"]:  # of random points the table counts those that are unstable
+        assert f"unstable at {sum(p['unstable_modes'] > 0 for p in points)} of {len(points)} points" in one.printed
     for a, b in zip(one.report["sweep"]["points"], two.report["sweep"]["points"], strict=True):
         assert a["values"] == b["values"] and a["direction"] == b["direction"]
         assert a["growth_rate"] == pytest.approx(b["growth_rate"], abs=1e-9)  # of an eigenvalue of some 10 1/s
@@ -268,6 +271,15 @@ def test_points_that_fail_are_passed_over(squeal):
     assert "1 of 3 points failed, the first at friction.coefficient = 50: " in sweep["reason"]
     assert [p["outcome"] == "converged" for p in sweep["points"] if not p["inserted"]] == [True, True, False]
     assert sweep["points"][-1]["reason"]
+
+
+def test_a_point_put_in_between_is_none_of_the_scene(converged):
+    """At 20 friction holds one pair; a little below, none and all in turn: the modes are followed without that point."""
+    sweep = converged(*NINE_PAIRS, "--set", "modes.band=7000", "--set", "sweep.key=friction.coefficient",
+                      "--set", "sweep.values=[3, 20]", ranks=1).report["sweep"]
+    inside = [p["outcome"] for p in sweep["points"] if p["inserted"]]
+    assert inside.count("converged") == len(inside) - 1
+    assert f"1 of {len(inside)} points put in between failed, the first at friction.coefficient = " in sweep["reason"]
 
 
 def test_equilibrium_alone(converged):
