@@ -3,6 +3,7 @@ sought, and a map of stability for two numbers."""
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.tri import LinearTriInterpolator, Triangulation
 from plot_basis import frequency_unit, heading, label_row, legend_below, plt, those_with
 from squeal import Missing, number_label
 
@@ -206,6 +207,19 @@ def level_between(points, thresholds, fine):
     return np.interp(fine, *zip(*x), left=np.nan, right=np.nan)
 
 
+def level_within(values, growth, count=400):
+    """Largest growth rate on a fine grid, in planes between random points; unknown outside of them. On a grid, since the
+    shaded triangles of a picture overlap where they are thin, and show colours that stand for no value."""
+    low, size = values.min(axis=0), np.ptp(values, axis=0)
+    parts = np.linspace(0, 1, count)
+    x, y = low[0] + parts * size[0], low[1] + parts * size[1]
+    unit = (values - low) / np.where(size > 0, size, 1)  # numbers of different units make no long triangles
+    if np.linalg.matrix_rank(unit - unit[0]) < 2:  # no triangle joins them
+        return x, y, np.full((count, count), np.nan)
+    level = LinearTriInterpolator(Triangulation(*unit.T), growth)(*np.meshgrid(parts, parts))
+    return x, y, np.maximum(level.filled(np.nan), 0)
+
+
 def draw_levels(ax, points, thresholds, limit):
     """Colours of the largest growth rate. Where the second number has a few values, each has a band, since modes are
     followed along the first number alone; random points are joined by triangles."""
@@ -214,9 +228,9 @@ def draw_levels(ax, points, thresholds, limit):
     seconds = np.unique(values[:, 1])
     if len(seconds) > len(points) / 2:
         found = [p for p in points if "growth_rate" in p]
-        values = np.array([p["values"] for p in found])
-        if np.linalg.matrix_rank(values - values[0]) == 2:  # else no triangle joins them
-            ax.tripcolor(*values.T, np.clip([p["growth_rate"] for p in found], 0, limit), shading="gouraud", **style)
+        x, y, level = level_within(np.array([p["values"] for p in found]), np.array([p["growth_rate"] for p in found]))
+        if np.isfinite(level).any():
+            ax.pcolormesh(x, y, level, shading="nearest", rasterized=True, **style)
         return
     fine = np.linspace(values[:, 0].min(), values[:, 0].max(), 600)
     middles = (seconds[1:] + seconds[:-1]) / 2

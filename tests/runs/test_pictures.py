@@ -217,6 +217,18 @@ def test_a_map_grows_from_its_thresholds_and_knows_nothing_of_points_that_failed
     assert level == pytest.approx([0, 0, 5, 15, np.nan], nan_ok=True)
 
 
+def test_a_map_of_random_points_shows_the_planes_between_them():
+    """Thin triangles and numbers of units far apart included: the growth rate of a plane is met everywhere, and 0 below it."""
+    import plot_sweep
+
+    values = np.random.default_rng(5).uniform((0.1, 2e9), (0.8, 4e9), (12, 2))
+    plane = lambda x, y: 10 * x - 4e-9 * y + 8
+    x, y, level = plot_sweep.level_within(values, plane(*values.T))
+    known = np.isfinite(level)
+    assert 0.5 < known.mean() < 1 and level[known] == pytest.approx(np.maximum(plane(*np.meshgrid(x, y)), 0)[known], abs=1e-9)
+    assert np.isnan(plot_sweep.level_within(values[:2], np.ones(2))[2]).all()  # no triangle
+
+
 def test_modes_of_a_sweep_look_different():
     import plot_sweep
 
