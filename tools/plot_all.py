@@ -9,7 +9,7 @@ import plot_shape
 import plot_spectra
 import plot_stability
 import plot_sweep
-from plot_basis import plt
+from plot_basis import ABSENT, plt
 from squeal import Missing
 
 # Name: what draws it, whether it is of one run only, and what it shows.
@@ -41,20 +41,25 @@ FIGURES = {
     "robustness": (plot_robustness.draw_robustness, True, "How likely modes are unstable where numbers are random, with the "
                    "intervals; growth of the samples; which numbers drive it."),
 }
+ONE_RUN = "it shows one run; give one results folder"
 ANIMATION = "One period, over and over: the whole, and what moves most, exaggerated."
 
 
 def figures(runs, only=(), spectrogram="probe"):
-    """Name and figure, or the Missing that says why there is none, one after the other; each is closed by the next."""
+    """Name, figure, or the Missing that says why there is none, and the runs that the figure lacks, one after the other; each
+    figure is closed by the next."""
     for name, (draw, alone, _) in FIGURES.items():
-        if (alone and len(runs) > 1) or (only and name not in only):
+        if only and name not in only:
             continue
+        ABSENT.clear()
         try:
+            if alone and len(runs) > 1:
+                raise Missing(ONE_RUN)
             figure = draw(runs, spectrogram) if name == "spectrogram" else draw(runs)
         except Missing as reason:
-            yield name, reason
+            yield name, reason, []
             continue
-        yield name, figure
+        yield name, figure, list(ABSENT)
         plt.close(figure)
 
 
@@ -62,7 +67,7 @@ def draw_all(runs, folder, a):
     """Files of all pictures; a: the arguments of tools/plot."""
     prefix = "compare_" if len(runs) > 1 else ""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, figure in figures(runs, a.only or (), a.spectrogram):
+    for name, figure, absent in figures(runs, a.only or (), a.spectrogram):
         files = [folder / f"{prefix}{name}.{ending}" for ending in a.format]
         for file in files:
             if isinstance(figure, Missing):
@@ -72,11 +77,15 @@ def draw_all(runs, folder, a):
             print(f"plot: {file}")
         if isinstance(figure, Missing):
             print(f"plot: {prefix}{name} left out: {figure}")
-    if len(runs) == 1 and (not a.only or "animation" in a.only):
-        file = folder / "animation.gif"
+        for reason in absent:
+            print(f"plot: {prefix}{name} lacks {reason}")
+    if not a.only or "animation" in a.only:
+        file = folder / f"{prefix}animation.gif"
         try:
+            if len(runs) > 1:
+                raise Missing(ONE_RUN)
             plot_shape.animate(runs[0], file)
             print(f"plot: {file}")
         except Missing as reason:
             file.unlink(missing_ok=True)
-            print(f"plot: animation left out: {reason}")
+            print(f"plot: {prefix}animation left out: {reason}")

@@ -12,6 +12,7 @@ OPEN, STICK, SLIP = "#c9c9c9", ORANGE, BLUE  # of the contact states 0, 1 and 2
 STATES = {"open": OPEN, "stick": STICK, "slip": SLIP}
 REST, SQUEAL = "#dfe4ea", ("#f6c65b", "#e8662c", "#a3102a")  # colours of no amplitude, and of more and more
 plt = common.pyplot(dpi=130)
+ABSENT = []  # the runs that a picture which is being drawn lacks, with the reason
 
 
 def frequency_unit(largest):
@@ -58,7 +59,7 @@ def colour(place):
 
 
 def those_with(runs, take):
-    """(run, take(run)) of the runs that have it; Missing where none has."""
+    """(run, take(run)) of the runs that have it, the others go to ABSENT; Missing where none has."""
     found, reasons = [], []
     for run in runs:
         try:
@@ -67,6 +68,7 @@ def those_with(runs, take):
             reasons.append(f"{run.folder.name}: {reason}" if len(runs) > 1 else str(reason))
     if not found:
         raise Missing("; ".join(reasons))
+    ABSENT.extend(reasons)
     return found
 
 

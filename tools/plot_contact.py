@@ -59,7 +59,8 @@ def draw_pressure(runs):
     found = those_with(runs, lambda run: (patches_of(run), run.field("pairs/pressure")))
     count = max(len(patches) for _, (patches, _) in found)
     size, unit = unit_of(np.concatenate([pressure for _, (_, pressure) in found]), "Pa")
-    figure, panels = plt.subplots(len(found), count, figsize=(1 + 4.4 * count, 0.7 + 3.8 * len(found)), squeeze=False)
+    figure, panels = plt.subplots(len(found), count, figsize=(1 + 4.4 * count, 0.7 + 3.8 * len(found)), squeeze=False,
+                                  layout="compressed")  # no wide margins beside maps of equal scales
     for row, (run, (patches, pressure)) in zip(panels, found):
         for axes in row[len(patches) :]:
             axes.remove()

@@ -33,9 +33,11 @@ def picture(content, kind, name, caption):
 
 
 def pictures(runs):
-    """All pictures of these runs, and why the others are left out."""
+    """All pictures of these runs, why the others are left out, and which runs they lack."""
     found, left_out = [], []
-    for name, figure in figures(runs):
+    names = [name for name, (_, alone, _) in FIGURES.items() if len(runs) == 1 or not alone]  # each run has its own, too
+    for name, figure, absent in figures(runs, names):
+        left_out += [f"{name} lacks {reason}" for reason in absent]
         if isinstance(figure, Missing):
             left_out.append(f"{name}: {figure}")
             continue

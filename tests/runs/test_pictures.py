@@ -1,5 +1,6 @@
 """tools/plot: its measures on motions known in closed form, its maps and labels, its formats, several runs at once."""
 
+import shutil
 import subprocess
 import sys
 
@@ -139,9 +140,14 @@ def test_formats_and_dots(pins, tmp_path):
 
 
 def test_several_runs_are_compared(pins, tmp_path):
-    printed = plot(*pins, "--output", tmp_path, "--only", "modes", "estimate", "spectrum", "cycle", "powers", "pressure",
-                   "liftoff", "newton")
-    names = {file.name for file in tmp_path.iterdir()}
+    """What the third lacks, and what shows one run, is said."""
+    (tmp_path / "bare").mkdir()
+    shutil.copy(pins[0] / "report.json", tmp_path / "bare")
+    printed = plot(*pins, tmp_path / "bare", "--output", tmp_path / "out", "--only", "modes", "estimate", "spectrum", "cycle", "powers",
+                   "pressure", "liftoff", "newton", "sweep", "animation")
+    assert "compare_pressure lacks bare: there is no fields.h5" in printed
+    assert all(f"compare_{name} left out: it shows one run" in printed for name in ("sweep", "animation"))
+    names = {file.name for file in (tmp_path / "out").iterdir()}
     assert names == {f"compare_{name}.png" for name in ("modes", "estimate", "spectrum", "cycle", "powers", "pressure", "liftoff",
                                                         "newton")}, printed
 
