@@ -10,6 +10,7 @@ from conftest import INPUTS, ROOT
 
 sys.path.insert(0, str(ROOT / "tools"))
 import plot_basis  # noqa: E402
+import plot_response  # noqa: E402
 import plot_spectra  # noqa: E402
 import surface  # noqa: E402
 from matplotlib.text import Text  # noqa: E402
@@ -117,6 +118,23 @@ def test_elements_that_touch_share_no_outer_face():
     shifted = list(range(4, 8)) + list(range(8, 12))
     solid, _ = surface.faces(np.array([9, *range(8), 9, *shifted, 1, 1, 3]))  # two cubes and a point
     assert len(solid) == 10
+
+
+class Driven:
+    """A run whose ten probes are each driven."""
+    title, report = "ten probes", {}
+
+    def responses(self):
+        return np.arange(1.0, 9), {(f"p{i}", f"p{j}"): np.ones(8) * (1 + 1j) for i in range(10) for j in range(10)}
+
+
+def test_the_legend_of_responses_covers_no_curve_and_what_is_left_out_is_named():
+    figure = plot_response.draw_response([Driven()])
+    figure.canvas.draw()
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [f"p{k}" for k in range(8)]
+    assert all(axes.get_legend() is None and axes.get_tightbbox().y0 >= legend.get_window_extent().y1 for axes in figure.axes)
+    assert figure._suptitle.get_text().endswith("not drawn: driven at p3, p4, p5, p6, p7, p8, p9, read at p8, p9")
 
 
 @pytest.fixture(scope="module")
