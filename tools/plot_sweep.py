@@ -1,7 +1,8 @@
-"""Pictures of a sweep: frequency and growth of the followed modes against the number, with the motions where they were
-sought, and a map of stability for two numbers."""
+"""Pictures of a sweep: frequency and growth of the followed modes against the number, and a map of stability for two
+numbers; with the motions where they were sought."""
 
 import numpy as np
+from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 from plot_basis import frequency_unit, heading, label_row, legend_below, plt, those_with
@@ -19,9 +20,9 @@ def tables_of(results):
 
 
 def motions_of(sweep, direction):
-    """Values and motions of one direction of rotation, by rising first number."""
+    """Values and motions of one direction of rotation, by rising numbers."""
     points = [p for p in sweep["points"] if "motion" in p and p["direction"] == direction]
-    return sorted(((p["values"][0], p["motion"]) for p in points), key=lambda pair: pair[0])
+    return sorted(((p["values"], p["motion"]) for p in points), key=lambda pair: pair[0])
 
 
 def look_of(motion):
@@ -31,13 +32,13 @@ def look_of(motion):
     if motion["stability"] == "stable":
         return "o", "black", "cycle, attracts"
     if motion["stability"] == "unstable":
-        return "o", "none", "cycle, repels"
+        return "v", "none", "cycle, repels"
     return "s", "0.6", "motion, undecided"
 
 
 def draw_motions(above, energy, motions, size):
     """Frequencies among the modes' and mean energies, with the error of settled motions."""
-    for value, motion in motions:
+    for (value,), motion in motions:
         if motion["frequency_hz"] is None:
             continue
         mark, filling, label = look_of(motion)
@@ -45,6 +46,10 @@ def draw_motions(above, energy, motions, size):
         above.plot([value], [motion["frequency_hz"] / size], label=label, **style)
         energy.errorbar([value], [motion["mean_fluctuating_energy"]], yerr=motion["energy_error"] or 0, capsize=2, lw=0.8,
                         **style)
+
+
+def over_a_decade(values):
+    return max(values) > 10 * min(values) > 0
 
 
 def sweep_of(results):
@@ -178,8 +183,7 @@ def draw_chart(results, sweep, table):
     axes[1, 0].set_ylabel("growth rate [1/s]")
     if rows_of_axes == 3:
         axes[2, 0].set_ylabel("mean energy of the motion [J]")
-        energies = [m["mean_fluctuating_energy"] for pairs in motions.values() for _, m in pairs if m["frequency_hz"]]
-        if max(energies) > 10 * min(energies) > 0:
+        if over_a_decade([m["mean_fluctuating_energy"] for pairs in motions.values() for _, m in pairs if m["frequency_hz"]]):
             axes[2, 0].set_yscale("log")
     coloured = list(strongest_tracks(sweep))
     limit_growth(axes[1, 0], table["growth_rate"][:, coloured] if coloured else table["growth_rate"])
@@ -249,11 +253,36 @@ def lines_of_thresholds(sweep):
     return groups
 
 
+def draw_heard(figure, rows, sweep, directions):
+    """Maps of what is heard where modes grow: its frequency, below it its mean energy, in colour."""
+    motions = {direction: motions_of(sweep, direction) for direction in directions}
+    heard = [motion for pairs in motions.values() for _, motion in pairs if motion["frequency_hz"]]
+    size, unit = frequency_unit(max(motion["frequency_hz"] for motion in heard))
+    for axes, key, size, label in ((rows[0], "frequency_hz", size, f"frequency of the motion [{unit}]"),
+                                   (rows[1], "mean_fluctuating_energy", 1, "mean energy of the motion [J]")):
+        values = [motion[key] / size for motion in heard]
+        norm = (LogNorm if over_a_decade(values) else plt.Normalize)(min(values), max(values))
+        for ax, direction in zip(axes, directions):
+            ax.grid(False)
+            ax.plot(*zip(*(p["values"] for p in sweep["points"] if p["direction"] == direction)), ".", ms=3, color="0.75", zorder=0)
+            for at, motion in motions[direction]:
+                if motion["frequency_hz"]:
+                    mark, _, words = look_of(motion)
+                    ax.scatter(*at, c=[motion[key] / size], marker=mark, s=60, norm=norm, cmap="viridis", edgecolors="black",
+                               linewidths=0.8, label=words)
+                else:
+                    ax.plot(*at, "x", ms=6, color="0.4", label=f"no motion found: {motion['outcome']}")
+        figure.colorbar(plt.cm.ScalarMappable(norm, "viridis"), ax=axes, label=label)
+
+
 def draw_map(results, sweep):
-    """Largest growth rate over the plane of two numbers; points as dots, thresholds of a mode have one mark."""
+    """Largest growth rate over the plane of two numbers; points as dots, thresholds of a mode have one mark. Below it the
+    motions where they were sought."""
     found = [p for p in sweep["points"] if "growth_rate" in p]
     directions = [d for d in (1, -1) if any(p["direction"] == d for p in found)]
-    figure, axes = plt.subplots(1, len(directions), figsize=(3.4 + 3.6 * len(directions), 5.2), sharey=True, squeeze=False)
+    with_motions = any(p["motion"]["frequency_hz"] for p in found if "motion" in p)
+    figure, axes = plt.subplots(3 if with_motions else 1, len(directions), sharex=True, sharey=True, squeeze=False,
+                                figsize=(3.4 + 3.6 * len(directions), 11 if with_motions else 5.2))
     limit = max(max(p["growth_rate"] for p in found), 1e-12)
     failures = {}
     for ax, direction in zip(axes[0], directions):
@@ -275,14 +304,18 @@ def draw_map(results, sweep):
                         label=f"threshold of mode {track}, {hertz(mean)} Hz")
         ax.use_sticky_edges = False  # points at the edge are seen whole
         ax.margins(0.03)
-        ax.set_xlabel(labels_of(sweep)[0])
         if len(directions) > 1:
             ax.set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
-    axes[0, 0].set_ylabel(labels_of(sweep)[1])
-    shades = plt.cm.ScalarMappable(plt.Normalize(0, limit), "YlOrRd")
-    figure.colorbar(shades, ax=axes, label="largest growth rate [1/s]")
-    figure.suptitle(heading([results], "stability"))
-    legend_below(figure, {label: handle for ax in axes[0] for handle, label in zip(*ax.get_legend_handles_labels())} | failures)
+    figure.colorbar(plt.cm.ScalarMappable(plt.Normalize(0, limit), "YlOrRd"), ax=axes[0], label="largest growth rate [1/s]")
+    if with_motions:
+        draw_heard(figure, axes[1:], sweep, directions)
+    for ax in axes[-1]:
+        ax.set_xlabel(labels_of(sweep)[0])
+    for ax in axes[:, 0]:
+        ax.set_ylabel(labels_of(sweep)[1])
+    sought = any("motion" in p for p in found)
+    figure.suptitle(heading([results], "stability" + (" and motions" if with_motions else "; no motion was found" if sought else "")))
+    legend_below(figure, {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels())} | failures)
     return figure
 
 

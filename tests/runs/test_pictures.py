@@ -253,6 +253,23 @@ def test_a_map_of_random_points_shows_the_planes_between_them():
     assert np.isnan(plot_sweep.level_within(values[:2], np.ones(2))[2]).all()  # no triangle
 
 
+def test_a_map_of_two_numbers_shows_the_motions_too():
+    """Each motion by its mark in a map of frequencies and one of energies; where none was found a cross says so."""
+    import plot_sweep
+
+    found = {"outcome": "converged", "stability": "stable", "frequency_hz": 1500.0, "mean_fluctuating_energy": 2e-6}
+    motions = [found, found | {"stability": "unstable", "mean_fluctuating_energy": 5e-5}, found | {"outcome": "settled"},
+               {"outcome": "not converged", "frequency_hz": None}]
+    points = [{"values": [k, k % 2], "direction": 1, "outcome": "converged", "unstable_modes": 1, "growth_rate": 9.0, "motion": motion}
+              for k, motion in enumerate(motions)]
+    sweep = {"points": points, "thresholds": [], "keys": ["a", "b"], "names": ["", ""], "units": ["-", "m"]}
+    figure = plot_sweep.draw_map(Driven(), sweep)
+    assert [len(axes.collections) for axes in figure.axes[1:3]] == [3, 3]
+    labels = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"cycle, attracts", "cycle, repels", "settled motion, no cycle attracts", "no motion found: not converged"} <= labels
+    assert [axes.get_ylabel() for axes in figure.axes[-2:]] == ["frequency of the motion [kHz]", "mean energy of the motion [J]"]
+
+
 def test_modes_of_a_sweep_look_different():
     import plot_sweep
 
