@@ -29,6 +29,11 @@ def data_sets(file):
     return [(int(lines[0]), lines[1:]) for block in blocks if (lines := block.strip("\n").splitlines()) and lines[0].strip()]
 
 
+def end_of(line, first=31):
+    """Name, node and direction of a response in the sixth line of a data set 58; those of the reference begin at 56."""
+    return line[first:first + 10].strip(), int(line[first + 10:first + 20]), int(line[first + 20:first + 24])
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     return squeal.run(INPUTS / "pin_on_disc", {"mesh.parameters.divisions": 2, "cycle.enabled": False, "transient.periods": 2},
@@ -49,6 +54,12 @@ def test_the_file_holds_nodes_modes_and_motions(run):
     assert np.allclose(positions, run.nodes, atol=1e-5 * np.ptp(run.nodes, axis=0).max())
     assert sum(number == 55 for number, _ in sets) == len(run.mode_numbers()) > 10
     assert sum(number == 58 for number, _ in sets) == len(run.probes("transient")) > 0
+    ends = [end_of(lines[5]) for number, lines in sets if number == 58]
+    assert [(name, direction) for name, _, direction in ends] == [("holder", 3), ("pin", 2)]
+    for (name, node, direction), at in zip(ends, ([0.09, 0, 0.025], [0.09, 0, 0])):
+        assert run.nodes[node - 1] == pytest.approx(at, abs=1e-9)
+        moved = run.field("equilibrium/displacement")[node - 1, direction - 1]  # not that of the disc at the same place
+        assert moved == pytest.approx(run.report["equilibrium"]["probes"][name], rel=1e-12)
 
 
 def test_modes_read_back_are_the_same(run):
@@ -71,9 +82,9 @@ def test_a_file_without_modes_is_refused(run, tmp_path):
 
 @pytest.fixture(scope="module")
 def responses(tmp_path_factory):
-    """Responses of the oscillator, and their file."""
+    """Responses of the oscillator, and their file. Its probes share ten letters, the point, but no direction."""
     values = {"transient.enabled": False, "cycle.enabled": False, "response.from": 0.02, "response.to": 0.6, "response.count": 59,
-              "friction.coefficient": 0.1}
+              "friction.coefficient": 0.1, "probe.0.name": "long_probe_x", "probe.1.name": "long_probe_y"}
     run = squeal.run(INPUTS / "oscillator", values, output=tmp_path_factory.mktemp("responses") / "run")
     assert uff(run.folder).returncode == 0
     return run
@@ -84,7 +95,10 @@ def test_responses_are_written_by_their_columns(responses):
     frequency, table = responses.responses()
     sets = [lines for number, lines in data_sets(responses.folder / "squeal.uff") if number == 58]
     assert len(sets) == len(table) == 4
-    for lines, h in zip(sets, table.values()):
+    directions = {"long_probe_x": 1, "long_probe_y": 2}
+    for lines, ((driven, read), h) in zip(sets, table.items()):
+        assert end_of(lines[5]) == ("long_probe", 1, directions[read])
+        assert end_of(lines[5], 56) == ("long_probe", 1, directions[driven])
         assert int(lines[5][:5]) == 4
         kind, count, _ = (int(lines[6][10 * k:10 * k + 10]) for k in range(3))
         assert (kind, count) == (6, len(frequency))
@@ -116,11 +130,15 @@ def test_responses_read_back_are_the_same(responses, tmp_path):
     assert float(row[3]) == 1 and float(row[4]) == pytest.approx(20 * np.log10(2), abs=1e-3)
 
 
-def test_responses_of_other_probes_are_refused(responses, tmp_path):
+def test_responses_of_other_or_of_several_probes_are_refused(responses, tmp_path):
     text = (responses.folder / "squeal.uff").read_text()
-    (tmp_path / "other.uff").write_text(text.replace("pad_x", "other"))
-    done = uff(responses.folder, "--measured", tmp_path / "other.uff")
-    assert done.returncode == 1 and "other" in done.stderr and "Traceback" not in done.stderr
+    (tmp_path / "other.uff").write_text(text.replace(" long_probe ", " other      "))
+    (tmp_path / "alike.uff").write_text(re.sub(r"(long_probe +)1   [12]", r"\g<1>9   0", text))
+    for name, message in (("other", "other (node 1, direction 1) driven at other (node 1, direction 1), fits none of"),
+                          ("alike", "fits 4 of the run's responses between long_probe_x (node 1, direction 1), long_probe_y")):
+        done = uff(responses.folder, "--measured", tmp_path / f"{name}.uff")
+        assert done.returncode == 1 and f"{name}.uff: dataset 3" in done.stderr and message in done.stderr, done.stderr
+        assert done.stderr.count("\n") == 1 and not done.stdout
 
 
 @pytest.mark.parametrize("word", ["nan", "1.2x3"])
@@ -140,3 +158,8 @@ def test_what_is_no_file_of_datasets_is_refused(responses, tmp_path):
         done = uff(responses.folder, *words)
         assert done.returncode == 1 and message in done.stderr and done.stderr.count("\n") == 1, done.stderr
     assert uff(responses.folder, "--output", tmp_path / "new" / "x.uff").returncode == 0
+
+
+def test_help_needs_no_package(monkeypatch, tmp_path):
+    monkeypatch.setenv("SQUEAL_PYTHON", str(tmp_path))
+    assert uff("--help").returncode == 0
