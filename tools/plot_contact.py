@@ -38,7 +38,7 @@ def name_of(run, number):
 
 def draw_map(axes, patches, values, **style):
     plane, cells, owners = patches
-    collection = PolyCollection(cells, array=values[owners], edgecolors="face", linewidths=0.3, **style)
+    collection = PolyCollection(cells, array=values[owners], edgecolors="face", linewidths=0.8, **style)  # broad enough: no seams
     axes.add_collection(collection)
     low, high = cells.min(axis=(0, 1)), cells.max(axis=(0, 1))
     margin = 0.04 * (high - low).max()

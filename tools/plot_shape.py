@@ -102,6 +102,18 @@ def mode_pictures(run, number, height, views):
     return pictures
 
 
+def is_local(run, number):
+    """Whether what moves in a mode is small beside the whole, which would hide it."""
+    size = amplitude(run.shape(number))
+    diagonal = lambda nodes: np.linalg.norm(np.ptp(nodes, axis=0))
+    return diagonal(run.nodes[size > 0.25 * size.max()]) < 0.5 * diagonal(run.nodes)
+
+
+def colour_bar(figure, axes):
+    bar = matplotlib.cm.ScalarMappable(cmap=squeal_colours())
+    figure.colorbar(bar, ax=axes, shrink=0.8, label="amplitude over its largest")
+
+
 def show(axes, picture, title):
     axes.imshow(picture)
     axes.grid(False)
@@ -141,8 +153,7 @@ def draw_shape(runs):
         prefix = f"{one.folder.name}: " if len(runs) > 1 else "squealing mode, "
         show(axes[0], whole, f"{prefix}{words_of(one, number)}")
         show(axes[1], near, "what moves most, exaggerated")
-        bar = matplotlib.cm.ScalarMappable(cmap=squeal_colours())
-        figure.colorbar(bar, ax=axes[1], shrink=0.8, label="amplitude over its largest")
+        colour_bar(figure, axes[1])
     if has_cycle:
         above = figure.add_subplot(grid[0, 2])
         draw_period(above, figure.add_subplot(grid[1, 2], sharex=above), run)
@@ -159,9 +170,11 @@ def draw_shapes(runs):
     figure, grid = plt.subplots(rows, columns, figsize=(4.6 * columns, 3.9 * rows), squeeze=False)
     for axes, (run, number) in zip(grid.flat, found):
         prefix = f"{run.folder.name}: " if len(runs) > 1 else ""
-        show(axes, mode_pictures(run, number, 600, (False,))[0], prefix + words_of(run, number))
+        near = is_local(run, number)
+        show(axes, mode_pictures(run, number, 600, (near,))[0], prefix + words_of(run, number) + ("\nwhat moves most" if near else ""))
     for axes in list(grid.flat)[len(found) :]:
         axes.remove()
+    colour_bar(figure, list(grid.flat)[: len(found)])
     figure.suptitle(heading(runs, "unstable modes, exaggerated"))
     return figure
 

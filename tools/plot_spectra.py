@@ -90,13 +90,14 @@ def draw_spectrum(runs):
     for k, (run, name, frequency, amplitude, is_lines) in enumerate(lines):
         shown = (frequency <= 1.02 * last) & (frequency > 0)
         level = decibel(amplitude[shown])
+        words = label_of(run, runs, name) + ("" if (level > top - FLOOR).any() else ", beyond the axes")
         if is_lines:  # probes side by side at each harmonic
             beside = frequency[shown] / size + (k - (len(lines) - 1) / 2) * 0.09 / max(len(lines) - 1, 1) * frequency[0] / size * 2
             axes.vlines(beside, top - FLOOR, np.maximum(level, top - FLOOR), color=colour(k), lw=1.6, alpha=0.7)
             seen = level > top - FLOOR
-            axes.plot(beside[seen], level[seen], "o", ms=4, color=colour(k), label=label_of(run, runs, name))
+            axes.plot(beside[seen], level[seen], "o", ms=4, color=colour(k), label=words)
         else:
-            axes.plot(frequency[shown] / size, level, color=colour(k), lw=1, label=label_of(run, runs, name))
+            axes.plot(frequency[shown] / size, level, color=colour(k), lw=1, label=words)
     axes.set(xlabel=f"frequency [{unit}]", ylabel="level of velocity [dB re 1 nm/s]", ylim=(top - FLOOR, top + 5),
              title=heading(runs, found[0][1][0] if len(found) == 1 else "spectra of the probes' velocities"))
     axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)

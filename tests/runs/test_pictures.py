@@ -217,6 +217,26 @@ def test_a_cycle_keeps_its_harmonics_on_the_axis():
     assert plot_spectra.last_shown([(frequency, 1e-3 * (4840 / frequency) ** 9)]) == 4840 * 3  # the fourth is 108 dB below
 
 
+def test_the_legend_of_a_spectrum_tells_which_lines_are_beyond_its_axes(monkeypatch):
+    frequency = np.arange(1.0, 100)
+    lines = {"pin": (frequency, 1e-3 / frequency, False), "still": (frequency, 1e-9 / frequency, False)}
+    monkeypatch.setattr(plot_spectra, "spectra_of", lambda run: ("words", lines))
+    legend = plot_spectra.draw_spectrum([Driven()]).axes[0].get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["pin", "still, beyond the axes"]
+
+
+def test_a_mode_of_a_small_part_is_drawn_from_near():
+    import plot_shape
+
+    class Shaped:
+        nodes = np.arange(30.0).reshape(10, 3)
+
+        def shape(self, number):
+            return (np.arange(10) < number)[:, None] * np.ones(3) * 1j
+
+    assert plot_shape.is_local(Shaped(), 3) and not plot_shape.is_local(Shaped(), 8)
+
+
 @pytest.mark.parametrize("scale, low, high", [(0.011, -1e5, 3), (4.4, -5e3, 2e3), (1e-9, -1e4, 0.5), (1e-12, -3, -1)])
 def test_ticks_of_a_logarithm_away_from_zero_keep_apart(scale, low, high):
     from plot_stability import symlog_ticks
