@@ -106,6 +106,15 @@ def test_responses_are_written_by_their_columns(responses):
         assert numbers[0::2] + 1j * numbers[1::2] == pytest.approx(h, rel=1e-10)
 
 
+def test_a_probe_of_matrices_has_the_number_of_dofs_txt(tmp_path):
+    """No file places it, so that there is no data set 15."""
+    values = {"modes.enabled": False, "cycle.enabled": False, "response.from": 1000, "response.to": 2000, "response.count": 2}
+    run = squeal.run(INPUTS / "strip_calculix", values, output=tmp_path / "run")
+    assert uff(run.folder).returncode == 0
+    ((number, lines),) = [(number, lines) for number, lines in data_sets(run.folder / "squeal.uff") if number != 164]
+    assert number == 58 and end_of(lines[5]) == end_of(lines[5], 56) == ("lining", 138, 3)
+
+
 def table_of(text):
     return [line.split() for line in text.splitlines()[1:]]
 
