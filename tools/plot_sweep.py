@@ -53,12 +53,10 @@ def over_a_decade(values):
 
 
 def sweep_of(results):
-    """Of two numbers, what a map shows stands at the points; of one, modes must be followed."""
+    """What was found at the points of a sweep of modes."""
     sweep = results.stage("sweep")
     if not any("growth_rate" in point for point in sweep["points"]):
         raise Missing("the sweep has no modes")
-    if len(sweep["keys"]) == 1 and sweep["followed_modes"] == 0:
-        raise Missing("modes are not followed through random points of one number")
     return sweep
 
 
@@ -163,17 +161,38 @@ def limit_growth(axes, growth):
     axes.set_ylim(low - margin, max(high, 0) + margin)
 
 
-def draw_chart(results, sweep, table):
-    """The lock-in chart. Of two numbers, the first value of the second one."""
-    directions = [d for d in (1, -1) if (table["direction"] == d).any()]
-    size, unit = frequency_unit(np.nanmax(table["frequency"]))
+def by_stability(points):
+    """Label, style and points of those that are stable and those that are not."""
+    known = [p for p in points if "growth_rate" in p]
+    return (("stable", {"mfc": "white", "mec": "0.5"}, [p for p in known if not p["unstable_modes"]]),
+            ("unstable", {"color": "0.2"}, [p for p in known if p["unstable_modes"]]))
+
+
+def draw_samples(axes, sweep, size, direction):
+    """Random points of one direction of rotation, through which no mode is followed: the least stable mode."""
+    above, below = axes
+    for label, style, points in by_stability(p for p in sweep["points"] if p["direction"] == direction):
+        x = [p["values"][0] for p in points]
+        above.plot(x, [p["frequency_hz"] / size for p in points], "o", ms=4, label=f"least stable mode, {label}", **style)
+        below.plot(x, [p["growth_rate"] for p in points], "o", ms=4, **style)
+    below.axhline(0, color="0.3", lw=0.8)
+
+
+def draw_chart(results, sweep):
+    """The lock-in chart; of random points the least stable mode alone."""
+    found = [p for p in sweep["points"] if "growth_rate" in p]
+    directions = [d for d in (1, -1) if any(p["direction"] == d for p in sweep["points"])]
+    table = tables_of(results) if sweep["followed_modes"] else None
+    size, unit = frequency_unit(np.nanmax(table["frequency"]) if table else max(p["frequency_hz"] for p in found))
     motions = {direction: motions_of(sweep, direction) for direction in directions}
     rows_of_axes = 3 if any(motion["frequency_hz"] for pairs in motions.values() for _, motion in pairs) else 2
     figure, axes = plt.subplots(rows_of_axes, len(directions), figsize=(4.2 + 3.6 * len(directions), 3.5 * rows_of_axes),
                                 sharex=True, sharey="row", squeeze=False)
     for column, direction in enumerate(directions):
-        rows = ordered_rows(table, table["direction"] == direction)
-        draw_column(axes[:2, column], table, rows, sweep, size, direction)
+        if table:
+            draw_column(axes[:2, column], table, ordered_rows(table, table["direction"] == direction), sweep, size, direction)
+        else:
+            draw_samples(axes[:2, column], sweep, size, direction)
         if rows_of_axes == 3:
             draw_motions(axes[0, column], axes[2, column], motions[direction], size)
         axes[-1, column].set_xlabel(labels_of(sweep)[0])
@@ -186,7 +205,8 @@ def draw_chart(results, sweep, table):
         if over_a_decade([m["mean_fluctuating_energy"] for pairs in motions.values() for _, m in pairs if m["frequency_hz"]]):
             axes[2, 0].set_yscale("log")
     coloured = list(strongest_tracks(sweep))
-    limit_growth(axes[1, 0], table["growth_rate"][:, coloured] if coloured else table["growth_rate"])
+    growth = table["growth_rate"] if table else np.array([p["growth_rate"] for p in found])
+    limit_growth(axes[1, 0], growth[:, coloured] if coloured else growth)
     legend = {}
     for column, direction in enumerate(directions):
         legend |= mark_failed(axes[1, column], sweep, direction)
@@ -289,8 +309,7 @@ def draw_map(results, sweep):
         points = [p for p in sweep["points"] if p["direction"] == direction]
         ax.grid(False)
         draw_levels(ax, points, thresholds_of(sweep, direction), limit)
-        for label, style, chosen in (("stable", {"mfc": "white", "mec": "0.5"}, [p for p in points if "growth_rate" in p and not p["unstable_modes"]]),
-                                     ("unstable", {"color": "0.2"}, [p for p in points if p["unstable_modes"]])):
+        for label, style, chosen in by_stability(points):
             ax.plot([p["values"][0] for p in chosen], [p["values"][1] for p in chosen], "o", ms=3, label=label, **style)
         failed = [p for p in points if p["outcome"] != "converged"]
         if failed:
@@ -323,4 +342,4 @@ def draw_sweep(runs):
     (results, sweep), *_ = those_with(runs, sweep_of)
     if len(sweep["keys"]) == 2:
         return draw_map(results, sweep)
-    return draw_chart(results, sweep, tables_of(results))
+    return draw_chart(results, sweep)

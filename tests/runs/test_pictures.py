@@ -290,6 +290,18 @@ def test_a_map_of_two_numbers_shows_the_motions_too():
     assert [axes.get_ylabel() for axes in figure.axes[-2:]] == ["frequency of the motion [kHz]", "mean energy of the motion [J]"]
 
 
+def test_random_points_of_one_number_are_drawn():
+    import plot_sweep
+
+    points = [{"values": [x], "direction": 1, "outcome": "converged", "unstable_modes": int(x > 0), "growth_rate": x, "frequency_hz": 9.0}
+              for x in (-1.0, 2.0, 1.0)] + [{"values": [0.0], "direction": -1, "outcome": "no equilibrium", "unstable_modes": 0}]
+    sweep = {"points": points, "thresholds": [], "keys": ["a"], "names": [""], "units": ["-"], "followed_modes": 0, "unstable_tracks": []}
+    figure = plot_sweep.draw_chart(Driven(), sweep)
+    assert [line.get_ydata().tolist() for line in figure.axes[2].lines[:2]] == [[-1], [2, 1]]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["least stable mode, stable", "least stable mode, unstable",
+                                                                            "point that failed: no equilibrium"]
+
+
 def test_modes_of_a_sweep_look_different():
     import plot_sweep
 
