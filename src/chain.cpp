@@ -329,7 +329,9 @@ void leave_to_finer_steps(SettledMotion& settled)
 
 void take_cycle_as_answer(Report& report, FittedCycle found)
 {
-  if (found.cycle.outcome.kind != OutcomeKind::converged) return;
+  if (found.cycle.cut_short) // whether it attracts is not known: the settled motion is
+    report.cycle.cut_short = true;
+  if (found.cycle.cut_short || found.cycle.outcome.kind != OutcomeKind::converged) return;
   report.cycle = std::move(found.cycle);
   report.fidelity = std::move(found.fidelity);
   report.settled = not_run<SettledMotion>(OutcomeKind::skipped, "it is the cycle, which is the answer");

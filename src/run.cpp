@@ -64,7 +64,7 @@ template <class Result> bool was_cut_short(Result& result)
 
 bool was_cut_short(FittedCycle& fitted)
 {
-  return fitted.fidelity.cut_short;
+  return fitted.cycle.cut_short;
 }
 
 /// Runs one stage of the chain. Where the run is asked to end, the stage is left out or ends, and the later ones are

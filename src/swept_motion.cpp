@@ -48,7 +48,7 @@ void run_stages(Chain& chain)
   if (chain.scene.cycle.start.kind == CycleStartKind::file)
     chain.cycle_file = read_state(chain.scene.cycle.start.file, structure);
   seek_motion(chain, [](Stage, const auto& work) { return work(); });
-  if (report.fidelity.cut_short) throw Interrupted{};
+  if (report.cycle.cut_short) throw Interrupted{};
 }
 
 /// What is kept of a cycle that was found.

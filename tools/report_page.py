@@ -97,7 +97,7 @@ def study_facts(report):
         found["what moves that mode most"] = f"{shown[0]['key']}: {effect:+.3g} 1/s for 1 %"
     sweep = report.get("sweep", {})
     if sweep.get("points"):
-        failed = sum(p["outcome"] != "converged" for p in sweep["points"])
+        failed = sum(p["outcome"] != "converged" and not p["inserted"] for p in sweep["points"])
         name = f"sweep of {' and '.join(sweep['keys'])}"
         found[name] = f"unstable at {sum(p['unstable_modes'] > 0 for p in sweep['points'])} of {len(sweep['points'])} points"
         found[name] += f", {failed} failed" if failed else ""

@@ -85,7 +85,7 @@ std::vector<idx_t> nested_dissection(Graph& graph, std::vector<idx_t>& weights)
     return METIS_NodeND(&size, graph.offsets.data(), graph.neighbours.data(), weights.data(), options.data(),
                         order.data(), position.data());
   };
-  if (without_losing_signals(dissect) != METIS_OK) throw LibraryError("METIS found no elimination order");
+  if (without_losing_signals(METIS_OK, dissect) != METIS_OK) throw LibraryError("METIS found no elimination order");
   return position;
 }
 

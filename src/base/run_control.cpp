@@ -6,7 +6,6 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <metis.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 #include <utility>
@@ -215,13 +214,13 @@ Request request_of_part(MPI_Comm part)
   return own.checkpoint_due ? Request::checkpoint : Request::none;
 }
 
-int without_losing_signals(const std::function<int()>& metis)
+int without_losing_signals(int success, const std::function<int()>& metis)
 {
-  const int first = metis();
-  if (first == METIS_OK) return first;
-  const int second = metis();
-  if (second == METIS_OK) signal_received = SIGTERM;
-  return second;
+  constexpr int most = 4; // signals in a row
+  int code = metis();
+  for (int again = 0; code != success && again < most; ++again)
+    if (code = metis(); code == success) note_signal(SIGTERM);
+  return code;
 }
 
 void join_parts(MPI_Comm comm)

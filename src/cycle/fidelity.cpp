@@ -43,7 +43,7 @@ void refine_or_cut_short(const CycleCorrection& correction, LimitCycle& cycle)
   }
   catch (const Interrupted&) // on all ranks alike
   {
-    correction.fidelity.cut_short = true;
+    cycle.cut_short = true;
     correction.fidelity.reason = format("the run was ended at %d steps a period", cycle.steps_per_period);
   }
 }
@@ -67,7 +67,6 @@ std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& red
   }
   cycle = find_cycle_from(problem, search.options, start, preconditioner, 0);
   search.fidelity.full_periods = cycle.convergence.periods;
-  search.fidelity.cut_short = cycle.cut_short;
   if (cycle.cut_short) return {};
   if (cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium || cycle.outcome.kind == OutcomeKind::not_periodic)
     return "the full model's shooting from the reduced model's cycle left it";
@@ -92,8 +91,7 @@ std::string find_by_reduced_model(ReducedSearch& search, StepChoice steps, Limit
   const std::string reason = correct_on_full_model(search, reduced, steps, cycle);
   search.fidelity.full_seconds += MPI_Wtime() - clock;
   const bool converged = search.fidelity.asked == CycleModel::reduced || cycle.outcome.kind == OutcomeKind::converged;
-  if (converged && steps == StepChoice::given && !search.fidelity.cut_short)
-    estimate_reduced_step_errors(search, reduced);
+  if (converged && steps == StepChoice::given && !cycle.cut_short) estimate_reduced_step_errors(search, reduced);
   return reason;
 }
 
@@ -107,8 +105,7 @@ void find_by_full_model(const CycleProblem& problem, const CycleOptions& options
   found.convergence.periods += fidelity.full_periods; // of a search that stalled
   result.cycle = std::move(found);
   fidelity.full_periods = result.cycle.convergence.periods;
-  fidelity.cut_short = result.cycle.cut_short;
-  if (steps == StepChoice::by_accuracy && !fidelity.cut_short)
+  if (steps == StepChoice::by_accuracy && !result.cycle.cut_short)
   {
     const Preconditioner preconditioner = estimated_preconditioner(problem, options.band_factor);
     refine_or_cut_short({problem, options, preconditioner, fidelity}, result.cycle);

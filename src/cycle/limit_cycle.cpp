@@ -66,8 +66,7 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
                    {},
                    found.cut_short};
   cycle.free = std::move(found.free);
-  std::optional<Undisturbed> last_period;
-  if (found.cut_short) last_period.emplace();
+  const Undisturbed last_period;
   cycle.measured =
       measure_period(map, {problem.probes, options.samples}, cycle.orbit.period, cycle.orbit.state, nullptr);
   ++cycle.convergence.periods;

@@ -3,6 +3,7 @@
 #include "floquet.hpp"
 
 #include "squeal/base/constants.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/cycle/period_log.hpp"
 #include "squeal/shooting/multisecant.hpp"
 
@@ -279,6 +280,7 @@ std::string find_anew(const CycleCorrection& correction, int steps, LimitCycle& 
     next = find_cycle_from_start(finer, correction.options);
     next.convergence = joined(std::move(before), next.convergence);
   }
+  if (next.cut_short) throw Interrupted{}; // the cycle at hand has a verdict
   next.convergence = joined(std::move(cycle.convergence), next.convergence);
   const OutcomeKind kind = next.outcome.kind;
   if (kind != OutcomeKind::converged && kind != OutcomeKind::unstable_cycle)

@@ -86,7 +86,7 @@ std::vector<int> partition_graph(Graph graph, int ranks)
                                graph.weights.data(), nullptr, nullptr, &parts, nullptr, nullptr, options, &cut,
                                part.data());
   };
-  if (without_losing_signals(divide) != METIS_OK)
+  if (without_losing_signals(METIS_OK, divide) != METIS_OK)
     throw Error("METIS could not partition the mesh into " + std::to_string(ranks) + " parts");
   std::vector<int> rank(part.begin(), part.end());
   for (int r = 0; r < ranks; ++r)

@@ -147,6 +147,8 @@ Json newton_list(const std::vector<NewtonRecord>& records)
 
 Json multiplier_entry(const Multipliers& multipliers)
 {
+  if (multipliers.values.empty()) // the run was asked to end before
+    return {{"stability", word(multipliers.stability)}, {"would_decide", multipliers.would_decide}};
   Json entry = {{"stability", word(multipliers.stability)},        {"method", word(multipliers.method)},
                 {"trivial_error", multipliers.trivial_error},      {"periods_integrated", multipliers.periods},
                 {"upper_bound", largest_upper_bound(multipliers)}, {"values", multiplier_list(multipliers)}};

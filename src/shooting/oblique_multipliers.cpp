@@ -149,10 +149,10 @@ bool repels(const Passes& passes)
 }
 
 /// The pairs that decide: the largest, and those whose bars reach across 1 unless another one is above it by more than
-/// the grid of time may change. That one may decide alone, once it has settled.
-std::vector<std::size_t> deciding_pairs(const Passes& passes)
+/// the grid of time may change. That one may decide `alone`, once it has settled.
+std::vector<std::size_t> deciding_pairs(const Passes& passes, bool alone)
 {
-  const bool may_decide = is_above(passes, passes.grid);
+  const bool may_decide = alone ? is_above(passes, passes.grid) : repels(passes);
   double largest = 0;
   for (std::size_t i = 0; i < passes.pairs.size(); ++i)
     if (i != passes.shift) largest = std::max(largest, std::abs(passes.pairs[i].lambda));
@@ -246,8 +246,12 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
   for (int pass = 1;; ++pass)
   {
     project(monodromy, slow, refined, passes);
-    refined = deciding_pairs(passes);
-    if (pass > 1 || !first) std::erase_if(refined, is_settled);
+    for (const bool alone : {true, false})
+    {
+      refined = deciding_pairs(passes, alone);
+      if (pass > 1 || !first) std::erase_if(refined, is_settled);
+      if (!refined.empty()) break;
+    }
     if (refined.empty() || pass == (dofs > large_model ? passes_of_large_model : passes_at_most)) break;
     if (extend(monodromy, corrections(monodromy, slow, refined, passes), passes) == 0) break;
   }

@@ -151,17 +151,18 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
     attempt.beside = known->beside;
     return attempt;
   }
+  const char* sought = "its multipliers were sought";
   try
   {
     attempt.floquet = find_multipliers(problem, options, attempt.found.orbit, start.other_unstable);
+    sought = "a motion beside it was watched";
     hold_against_motion(search, attempt);
   }
   catch (const Interrupted&) // on all ranks alike: the orbit stays
   {
     attempt.cut_short = true;
-    attempt.floquet = {};
     attempt.floquet.multipliers.stability = Stability::undecided;
-    attempt.floquet.multipliers.would_decide = "the run was ended while its multipliers were sought";
+    attempt.floquet.multipliers.would_decide = std::string("the run was ended while ") + sought;
   }
   return attempt;
 }
@@ -291,8 +292,14 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   ShootingResult result;
   result.outcome = outcome_of(log.convergence, ending, found.found.orbit.residual);
   std::vector<SeenGrowth> seen;
-  if (options.watched_periods > 0 && found.converged() && !found.cut_short)
-    seen = growths_beside(problem, log, found.found.orbit, found.floquet, options.watched_periods);
+  if (options.watched_periods > 0 && found.converged() && !found.cut_short) try
+    {
+      seen = growths_beside(problem, log, found.found.orbit, found.floquet, options.watched_periods);
+    }
+    catch (const Interrupted&) // on all ranks alike: the verdict stands
+    {
+      found.cut_short = true;
+    }
   result.multipliers = std::move(found.floquet.multipliers);
   decide_by_growth(seen, result.multipliers);
   result.multipliers.seen = std::move(seen);

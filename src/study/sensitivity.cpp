@@ -246,30 +246,31 @@ private:
   }
 
   /// Of some modes by a central difference of fourth order, whose steps of a hundredth leave 1e-8 of a number's
-  /// inverse, say; of a thousandth where other pairs are closed there, or the values make no scene. Where the number
-  /// enters linearly, steps to one side of any length have less rounding: theirs are taken where both agree within that
-  /// of the first.
+  /// inverse, say; of a thousandth where other pairs are closed there, or the values make no scene. Steps to one side
+  /// are longer and have less rounding: they are taken where they agree with the central difference within its
+  /// rounding, as where the number enters linearly, or where there is none.
   void take_long_steps(const SceneNumber& number, const std::vector<std::size_t>& modes,
                        std::vector<NumberDerivative>& result)
   {
     constexpr double rounding = 1e-14;
+    const auto one_sided = by_one_side(number);
     for (const double part : {1e-2, 1e-3})
     {
       const double step = part * number.value;
       const auto at = [&](int steps) { return try_at(number.key, number.value + steps * step); };
       const auto below = at(-1), above = at(1), far_below = at(-2), far_above = at(2);
       if (!below || !above || !far_below || !far_above) continue;
-      const auto both =
+      const auto central =
           quotients(number, step, {{2. / 3, *above}, {-2. / 3, *below}, {-1. / 12, *far_above}, {1. / 12, *far_below}});
-      const auto one = by_one_side(number);
       for (const std::size_t j : modes)
       {
-        const double difference = std::abs(one[j].lambda - both[j].lambda);
-        const bool agree = one[j].known && difference <= rounding * std::abs(vectors_.lambda[j] / step);
-        result[j] = agree ? one[j] : both[j];
+        const double difference = std::abs(one_sided[j].lambda - central[j].lambda);
+        const bool agree = one_sided[j].known && difference <= rounding * std::abs(vectors_.lambda[j] / step);
+        result[j] = agree ? one_sided[j] : central[j];
       }
       return;
     }
+    for (const std::size_t j : modes) result[j] = one_sided[j];
   }
 
   /// The same; nothing, too, where the value makes no scene.

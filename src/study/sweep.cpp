@@ -35,7 +35,7 @@ void assess(Sweep& sweep, const std::vector<std::string>& keys, std::size_t tota
     outcome.reason = format("the run was ended %s after %td of %zu points", who_asked_to_end().c_str(),
                             std::ranges::count(sweep.points, false, &SweepPoint::inserted), total) +
                      (motions > 0 ? format(" and %td motions", motions) : "");
-  const auto note = [&](const auto& outcome_of, const std::string& what, OutcomeKind kind)
+  const auto note = [&](const auto& outcome_of, const std::string& what, bool fails)
   {
     int failed = 0;
     std::string first;
@@ -43,19 +43,17 @@ void assess(Sweep& sweep, const std::vector<std::string>& keys, std::size_t tota
       if (const Outcome* at = outcome_of(point); at && !succeeded(*at) && ++failed == 1)
         first = place_of(point, keys) + ": " + at->reason;
     if (failed == 0) return;
-    if (complete && kind != OutcomeKind::converged) outcome.kind = kind;
+    if (complete && fails) outcome.kind = OutcomeKind::not_converged;
     outcome.reason +=
         (outcome.reason.empty() ? "" : "; ") + format("%d %s failed, the first at ", failed, what.c_str()) + first;
   };
   const auto at_point = [](bool inserted)
   { return [=](const SweepPoint& point) { return point.inserted == inserted ? &point.outcome : nullptr; }; };
-  note(at_point(false), format("of %zu points", total), OutcomeKind::not_converged);
+  note(at_point(false), format("of %zu points", total), true);
   note([](const SweepPoint& point) { return point.motion ? &point.motion->outcome : nullptr; },
-       format("of %td motions", motions), OutcomeKind::not_converged);
-  // modes are followed from the last one that did not
-  note(at_point(true),
-       format("of %td points put in between", std::ranges::count(sweep.points, true, &SweepPoint::inserted)),
-       OutcomeKind::converged);
+       format("of %td motions", motions), true);
+  const auto inserted = std::ranges::count(sweep.points, true, &SweepPoint::inserted);
+  note(at_point(true), format("of %td points put in between", inserted), false); // modes are followed without it
 }
 
 /// Each group's share of the points, visited at the same time. What a group throws ends all of them after their work.

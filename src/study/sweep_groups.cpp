@@ -64,6 +64,11 @@ public:
   void add(const Sweep& part, const std::vector<SweepLine>& share)
   {
     std::array<TrackNames, 2> of_starts; // of lines, in either direction of rotation
+    const auto has = [&](const SweepPoint& wanted)
+    {
+      return std::ranges::any_of(whole_.points, [&](const SweepPoint& point)
+                                 { return point.values == wanted.values && point.reversed == wanted.reversed; });
+    };
     auto point = part.points.begin();
     for (const SweepLine& line : share)
     {
@@ -76,7 +81,7 @@ public:
       TrackNames& of_start = of_starts[line.reversed];
       if (line.known && line.points.size() == 1)
         of_start = known;
-      else if (line.known && begin != point) // else the group was asked to end before
+      else if (line.known && begin != point && has(*begin)) // it lacks where a group was asked to end
         take(part, line, {begin + 1, point}, known);
       else
       {

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace squeal
 {
@@ -42,8 +43,8 @@ public:
     }
     catch (const Interrupted&) // on all ranks of this share alike
     {
-      sweep_.points.resize(complete_.points);
-      sweep_.thresholds.resize(complete_.thresholds);
+      go_back();
+      if (!sweep_.points.empty()) keep_sweep(sweep_, place_.checkpoint, place_.comm);
       sweep_.outcome.kind = OutcomeKind::interrupted;
     }
     sweep_.basis = static_cast<int>(model_.shapes());
@@ -75,7 +76,20 @@ private:
   }
 
   /// What is recorded is not of a step between points that is under way.
-  void note_complete() { complete_ = {sweep_.points.size(), sweep_.thresholds.size()}; }
+  void note_complete()
+  {
+    complete_ = {sweep_.points.size(), sweep_.thresholds.size(), sweep_.tracks,
+                 sweep_.lost,          sweep_.least_mac,         sweep_.least_mac_across};
+  }
+
+  /// To what was recorded before that step.
+  void go_back()
+  {
+    sweep_.points.resize(complete_.points);
+    sweep_.thresholds.resize(complete_.thresholds);
+    std::tie(sweep_.tracks, sweep_.lost) = std::tie(complete_.tracks, complete_.lost);
+    std::tie(sweep_.least_mac, sweep_.least_mac_across) = std::tie(complete_.least_mac, complete_.least_mac_across);
+  }
 
   Request asked() const { return place_.of_part ? request_of_part(place_.comm) : request(place_.comm); }
 
@@ -111,8 +125,8 @@ private:
       note_complete();
       if (const Request now = asked(); now != Request::none)
       {
-        keep_sweep(sweep_, place_.checkpoint, place_.comm);
         if (now == Request::end) throw Interrupted();
+        keep_sweep(sweep_, place_.checkpoint, place_.comm);
       }
       std::optional<Followed> now = evaluate({values, line.reversed});
       progress_->update(static_cast<double>(++done_), "");
@@ -170,6 +184,7 @@ private:
   /// Returns false if the point fails.
   bool find_modes_of(Followed& point)
   {
+    end_if_asked_here();
     const Equilibrium& at = model_.equilibrium_at({point.values, point.reversed});
     point.closed = static_cast<int>(std::ranges::count(at.closed, 1));
     point.modes.outcome = at.outcome;
@@ -380,6 +395,8 @@ private:
   struct
   {
     std::size_t points = 0, thresholds = 0;
+    int tracks = 0, lost = 0;
+    double least_mac = 1, least_mac_across = 1;
   } complete_{}; // recorded
 };
 

@@ -147,21 +147,32 @@ def test_a_signal_is_no_error_of_what_is_under_way(tmp_path, where):
     assert "ended by SIGUSR1" in log.read_text().splitlines()[-1]
 
 
-def test_a_run_that_ends_in_its_verdict_keeps_the_cycle(squeal, tmp_path):
-    """The verdict is the last third of the cycle's stage: of ends within it one at least meets it. The restart decides."""
-    whole = squeal(*WITH_VERDICT, ranks=1).report
+@pytest.mark.parametrize("ranks", [2])
+def test_a_run_that_ends_in_its_verdict_keeps_the_cycle(ranks, squeal, tmp_path):
+    """Where it ends is sought by halves: later where no cycle was found yet, sooner where its verdict was. The restart decides, to
+    what 1, 2 and 3 ranks agree within."""
+    whole = squeal(*WITH_VERDICT, ranks=ranks).report
     end = sum(whole["timings"].values())
-    for part in np.linspace(0.05, 0.6, 12):
-        ask = [*WITH_VERDICT, "--output", tmp_path / f"ended{part:.2f}"]
-        ended = squeal(*ask, "--time-limit", f"{end - part * whole['timings']['cycle']:.2f}", ranks=1)
-        cycle = json.loads((tmp_path / f"ended{part:.2f}" / "report.json").read_text())["cycle"]
-        if ended.code == 3 and cycle["outcome"] == "converged":
+    soonest, latest = end - whole["timings"]["cycle"], 1.5 * end
+    for number in range(12):
+        ask = [*WITH_VERDICT, "--output", tmp_path / f"ended{number}"]
+        limit = (soonest + latest) / 2
+        ended = squeal(*ask, "--time-limit", f"{limit:.3f}", ranks=ranks)
+        cycle = json.loads((tmp_path / f"ended{number}" / "report.json").read_text())["cycle"]
+        if cycle["outcome"] != "converged":
+            soonest = limit
+        elif ended.code == 0 or cycle["multipliers"]["stability"] != "undecided":
+            latest = limit
+        else:
             break
-    assert cycle["multipliers"]["stability"] == "undecided" and "the run was ended" in cycle["multipliers"]["would_decide"]
-    assert cycle["frequency_hz"] == whole["cycle"]["frequency_hz"]
-    again = squeal(*ask, "--restart", ranks=1)
-    restarted = json.loads((tmp_path / f"ended{part:.2f}" / "report.json").read_text())
-    assert again.code == 0 and restarted["cycle"]["multipliers"]["values"] == whole["cycle"]["multipliers"]["values"]
+    else:
+        pytest.fail(f"no end between {soonest} and {latest} s met the verdict")
+    assert ended.code == 3 and "the run was ended" in cycle["multipliers"]["would_decide"]
+    assert cycle["frequency_hz"] == pytest.approx(whole["cycle"]["frequency_hz"], rel=1e-7)
+    again = squeal(*ask, "--restart", ranks=ranks)
+    restarted = json.loads((tmp_path / f"ended{number}" / "report.json").read_text())["cycle"]["multipliers"]
+    assert again.code == 0 and restarted["stability"] == whole["cycle"]["multipliers"]["stability"] == "stable"
+    assert restarted["upper_bound"] == pytest.approx(whole["cycle"]["multipliers"]["upper_bound"], abs=1e-6)
 
 
 def test_the_wrapper_passes_signals_on(tmp_path):

@@ -424,10 +424,14 @@ def test_an_interrupted_sweep_goes_on_where_it_was(ranks, divisions, start, end,
     seconds = whole.report["timings"]
     limit = sum(seconds.values()) - 0.5 * seconds["sweep"]
     first = squeal(*ask, "--time-limit", f"{limit:.2f}", ranks=ranks)
-    if first.code == 3:  # what is done is in the results
+    if first.code == 3:  # what is done is in the results; a slower run may have ended before the sweep
         ended = json.loads((tmp_path / "in_two" / "report.json").read_text())["sweep"]
-        assert ended["outcome"] == "interrupted" and f"of {points} points" in ended["reason"]
-        assert {float(row["friction.coefficient"]) for row in rows_of(tmp_path / "in_two")} == {p["values"][0] for p in ended["points"]}
+        if ended["outcome"] == "interrupted":
+            at = [p["values"][0] for p in ended["points"]]
+            assert f"of {points} points" in ended["reason"]
+            assert set(at) <= {p["values"][0] for p in whole.report["sweep"]["points"]}
+            assert [p["inserted"] for p in ended["points"]].count(False) < points
+            assert {float(row["friction.coefficient"]) for row in rows_of(tmp_path / "in_two")} == set(at)
     again = squeal(*ask, "--restart", ranks=ranks) if first.code == 3 else first
     assert whole.code == again.code == 0, again.errors
     one, two = whole.report["sweep"], json.loads((tmp_path / "in_two" / "report.json").read_text())["sweep"]

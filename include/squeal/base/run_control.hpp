@@ -58,23 +58,9 @@ public:
   ~WorkOfPart();
 };
 
-/// While one lives, request() asks for nothing: for short work without which what is known would be lost. By all ranks.
-class Undisturbed
-{
-public:
-  Undisturbed();
-  Undisturbed(const Undisturbed&) = delete;
-  Undisturbed& operator=(const Undisturbed&) = delete;
-  ~Undisturbed();
-};
-
 /// The same of a part of the ranks that works by itself, by what these know and their first one's clock. Collective
 /// among them, at any time; join_parts comes after.
 Request request_of_part(MPI_Comm part);
-
-/// Calls a function of METIS, and once more where it failed: METIS takes a SIGTERM during the call for an error of its
-/// own. Where it does not fail again, that request is noted. Returns METIS's code. Not collective.
-int without_losing_signals(const std::function<int()>& metis);
 
 /// After parts of the ranks have worked by themselves: throws Interrupted if any of them was asked to end. Collective
 /// of all ranks.
@@ -98,5 +84,19 @@ void checkpoint_made();
 
 /// "by SIGTERM" or "by the time limit"; empty while nobody asked. The same on all ranks once request() has said so.
 std::string who_asked_to_end();
+
+/// While one lives, request() asks for nothing: for short work without which what is known would be lost. By all ranks.
+class Undisturbed
+{
+public:
+  Undisturbed();
+  Undisturbed(const Undisturbed&) = delete;
+  Undisturbed& operator=(const Undisturbed&) = delete;
+  ~Undisturbed();
+};
+
+/// Calls a function of METIS, and again where it failed: METIS takes a SIGTERM during the call for an error of its own.
+/// Where it does not fail again, that request is noted. Returns its code. Not collective.
+int without_losing_signals(int success, const std::function<int()>& metis);
 
 } // namespace squeal

@@ -33,10 +33,7 @@ struct Fidelity
 {
   CycleModel asked = CycleModel::full, used = CycleModel::full; // used: full or reduced
   std::string reason;                                           // in a sentence
-  /// The run was asked to end in the search for multipliers, or while finer steps were tried: the cycle is that of the
-  /// last ones.
-  bool cut_short = false;
-  double accuracy = 0; // asked for
+  double accuracy = 0;                                          // asked for
   int size = 0, modes = 0, attachment_shapes = 0;
   int left_out_shapes = 0;                     // attachments beyond the cap
   double lost_compliance = 0;                  // mean part of the active pairs' own compliance that is theirs

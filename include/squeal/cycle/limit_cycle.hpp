@@ -28,7 +28,7 @@ struct LimitCycle
   MeasuredPeriod measured; // from the orbit's state
   Orbit free;              // the end of the free motion that the search went on from; null where there was none
   StepCosts costs;         // of the last theta step made
-  bool cut_short = false;  // the run was asked to end in the search for multipliers
+  bool cut_short = false;  // the run was asked to end in the search for multipliers, or for finer steps
 };
 
 /// The brake about its sliding equilibrium, and what is asked of its cycle.
