@@ -37,7 +37,7 @@ FIGURES = {
                "integrated."),
     "branch": (plot_stability.draw_branch, True, "The limit cycle along a number of the scene."),
     "sweep": (plot_sweep.draw_sweep, True, "Frequency and growth of the followed modes against a number of the scene; of two "
-              "numbers a map of stability. Dotted lines are thresholds, crosses points that failed."),
+              "numbers maps of stability and of what is heard. Dotted lines are thresholds, crosses points that failed."),
     "robustness": (plot_robustness.draw_robustness, True, "How likely modes are unstable where numbers are random, with the "
                    "intervals; growth of the samples; which numbers drive it."),
 }
