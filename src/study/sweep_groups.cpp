@@ -36,14 +36,17 @@ TrackNames names_by(const SweepPoint& here, const SweepPoint& there)
   return names;
 }
 
+bool at_one_place(const SweepPoint& a, const SweepPoint& b)
+{
+  return a.values == b.values && a.reversed == b.reversed;
+}
+
 /// The last of the points that is this one and has modes; null: there is none.
 const SweepPoint* same_point(const std::vector<SweepPoint>& points, const SweepPoint& wanted)
 {
   const auto found = std::find_if(points.rbegin(), points.rend(),
-                                  [&](const SweepPoint& point)
-                                  {
-                                    return point.values == wanted.values && point.reversed == wanted.reversed &&
-                                           point.outcome.kind == OutcomeKind::converged;
+                                  [&](const SweepPoint& point) {
+                                    return at_one_place(point, wanted) && point.outcome.kind == OutcomeKind::converged;
                                   });
   return found == points.rend() ? nullptr : &*found;
 }
@@ -64,10 +67,8 @@ public:
   void add(const Sweep& part, const std::vector<SweepLine>& share)
   {
     std::array<TrackNames, 2> of_starts; // of lines, in either direction of rotation
-    const auto has = [&](const SweepPoint& wanted)
-    {
-      return std::ranges::any_of(whole_.points, [&](const SweepPoint& point)
-                                 { return point.values == wanted.values && point.reversed == wanted.reversed; });
+    const auto has = [&](const SweepPoint& wanted) {
+      return std::ranges::any_of(whole_.points, [&](const SweepPoint& point) { return at_one_place(point, wanted); });
     };
     auto point = part.points.begin();
     for (const SweepLine& line : share)

@@ -250,7 +250,7 @@ private:
   }
 
   /// Follows the modes from line to line, along the second number, with points between where they are unclear. These
-  /// lie on no line and are not recorded.
+  /// belong to no line and are not recorded.
   void carry_over(const Followed& before, Followed& now, int depth)
   {
     const ModeForms between_both = forms(before, now);
