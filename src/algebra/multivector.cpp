@@ -1,5 +1,6 @@
 #include "squeal/algebra/multivector.hpp"
 
+#include "sparse_product.hpp"
 #include "splitmix.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/base/integers.hpp"
@@ -25,16 +26,6 @@ void add_up(MatrixXd& parts, MPI_Comm comm)
   MPI_Bcast(parts.data(), size, MPI_DOUBLE, 0, comm);
 }
 
-/// A PETSc matrix that borrows the entries of `count` columns.
-Owned<Mat> as_matrix(const MultiVector& X, Index first, Index count)
-{
-  Owned<Mat> A;
-  double* const entries = const_cast<double*>(X.entries.data()) + first * X.entries.rows();
-  check(MatCreateDense(X.comm, static_cast<PetscInt>(X.entries.rows()), PETSC_DECIDE, PETSC_DETERMINE,
-                       static_cast<PetscInt>(count), entries, A.put()));
-  return A;
-}
-
 void set_column(MultiVector& X, Index j, Vec x)
 {
   const PetscScalar* values = nullptr;
@@ -43,8 +34,8 @@ void set_column(MultiVector& X, Index j, Vec x)
   check(VecRestoreArrayRead(x, &values));
 }
 
-/// A X of so few columns that to make matrices of them, which sends a dozen messages, takes longer than to read A
-/// again.
+/// A X by one column after the other: of a dense A, or of so few columns that to exchange them together, which takes a
+/// dozen messages to prepare, costs more than to read A again.
 void multiply_few(Mat A, const MultiVector& X, MultiVector& Y)
 {
   const Owned<Vec> x = vector_of_columns(A), y = vector_of_rows(A);
@@ -132,23 +123,12 @@ MultiVector product(Mat A, const MultiVector& X)
   PetscInt rows = 0;
   check(MatGetLocalSize(A, &rows, nullptr));
   MultiVector Y{X.comm, MatrixXd(rows, X.columns())};
-  if (X.columns() <= 2)
+  if (X.columns() <= 2 || !is_sparse(A))
   {
     multiply_few(A, X, Y);
     return Y;
   }
-  constexpr Index at_once = 256; // columns: PETSc's product is a copy
-  for (Index first = 0; first < X.columns(); first += at_once)
-  {
-    const Index count = std::min(at_once, X.columns() - first);
-    const Owned<Mat> from = as_matrix(X, first, count);
-    Owned<Mat> to;
-    check(MatMatMult(A, from, MAT_INITIAL_MATRIX, PETSC_DEFAULT, to.put()));
-    const PetscScalar* values = nullptr;
-    check(MatDenseGetArrayRead(to, &values));
-    Y.entries.middleCols(first, count) = MatrixXd::Map(values, rows, count);
-    check(MatDenseRestoreArrayRead(to, &values));
-  }
+  Y.entries = sparse_product(A, X.entries);
   return Y;
 }
 

@@ -1,5 +1,6 @@
 #include "squeal/algebra/paired_matrices.hpp"
 
+#include "sparse_product.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/algebra/simd.hpp"
 
@@ -115,13 +116,6 @@ SQUEAL_SIMD void add_foreign_mass_products(const PairedRows& matrices, std::size
   count == 4          ? add_foreign<1, double, Four, 1>(matrices, x, y)
   : SQUEAL_HAS_AVX512 ? add_foreign<1, double, Eight, 1>(matrices, x, y)
                       : add_foreign<1, double, Four, 2>(matrices, x, y);
-}
-
-bool is_sparse(Mat A)
-{
-  PetscBool sparse = PETSC_FALSE;
-  check(PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(A), &sparse, MATSEQAIJ, MATMPIAIJ, ""));
-  return sparse;
 }
 
 /// Columns of other ranks in this rank's rows, ascending.

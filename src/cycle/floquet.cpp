@@ -1,5 +1,6 @@
 #include "floquet.hpp"
 
+#include "preconditioner.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/free_memory.hpp"
@@ -190,8 +191,7 @@ RealModes modes_beyond_band(const CycleProblem& problem)
   constexpr double near = 2, far = 3; // times the followed mode's frequency
   const double frequency = problem.unstable.modes.front().frequency_hz();
   if (highest_frequency(problem.modes) > near * frequency) return {};
-  return find_real_modes_between(problem.linearised, highest_frequency(problem.modes), far * frequency,
-                                 problem.modes_options);
+  return real_modes_beyond(problem, far * frequency);
 }
 
 /// The number of pairs that slide throughout.

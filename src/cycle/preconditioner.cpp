@@ -138,7 +138,6 @@ MultiVector shapes_below(const CycleProblem& problem, double band)
   // Friction and damping turn most modes by less than this part of them: what is left of those is nearly real. Two that
   // have locked in share a complex shape, and both its parts stay.
   constexpr double least = 1e-2;
-  constexpr double far = 0.9; // the band's end is no sharp bound of what matters
   const Mat M = problem.sliding.structure.M;
   MultiVector shapes = empty_multivector(M);
   for (const ComplexMode& mode : problem.modes)
@@ -148,11 +147,9 @@ MultiVector shapes_below(const CycleProblem& problem, double band)
       parts.entries /= std::sqrt(inner_products(parts, product(M, parts)).trace());
       append(shapes, parts);
     }
-  if (const double end = highest_frequency(problem.modes); end < far * band)
-  {
-    const RealModes beyond = find_real_modes_between(problem.linearised, end, band, problem.modes_options);
+  const RealModes beyond = real_modes_beyond(problem, band);
+  if (!beyond.shapes.empty())
     append(shapes, columns_of(std::vector<Vec>(beyond.shapes.begin(), beyond.shapes.end()))); // |x|_M = 1
-  }
   if (shapes.columns() == 0) return shapes;
   const auto [sizes, directions] = solve_dense_symmetric(inner_products(shapes, product(M, shapes)));
   const Eigen::Index kept = (sizes.array() > least * least * sizes.maxCoeff()).count();
@@ -160,6 +157,14 @@ MultiVector shapes_below(const CycleProblem& problem, double band)
 }
 
 } // namespace
+
+RealModes real_modes_beyond(const CycleProblem& problem, double highest)
+{
+  constexpr double far = 0.9;
+  const double end = highest_frequency(problem.modes);
+  if (end >= far * highest) return {};
+  return find_real_modes_between(problem.linearised, end, highest, problem.modes_options);
+}
 
 Preconditioner estimated_preconditioner(const CycleProblem& problem, double band_factor)
 {

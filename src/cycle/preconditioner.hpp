@@ -19,4 +19,8 @@ namespace squeal
 /// band ends far below that; none for a factor of 0. Borrows the structure's M.
 Preconditioner estimated_preconditioner(const CycleProblem& problem, double band_factor);
 
+/// Real modes beyond the complex ones, up to a frequency [Hz]. None where the complex ones reach to within a tenth of
+/// it: the end of a band is no sharp bound of what matters, and to seek in so short a band costs two factors.
+RealModes real_modes_beyond(const CycleProblem& problem, double highest);
+
 } // namespace squeal

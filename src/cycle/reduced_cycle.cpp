@@ -1,6 +1,7 @@
 #include "reduced_cycle.hpp"
 
 #include "floquet.hpp"
+#include "preconditioner.hpp"
 #include "squeal/base/integers.hpp"
 #include "step_refinement.hpp"
 
@@ -259,8 +260,7 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
   double amplitude = equivalent_amplitude(problem, *start);
   const Owned<Vec> estimated = fluctuation_of(problem, *start);
   Owned<Vec> motion = copy_of(estimated.get());
-  search.real = find_real_modes_between(problem.linearised, highest_frequency(problem.modes), highest_joining(search),
-                                        problem.modes_options);
+  search.real = real_modes_beyond(problem, highest_joining(search));
   FreeMotion free{{}, 1 / mode.frequency_hz(), 0};
   double unit = 0; // [J] energy at amplitude 1
   const auto on_model = [&](Vec x)

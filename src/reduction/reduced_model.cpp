@@ -2,10 +2,12 @@
 
 #include "reduction_basis.hpp"
 #include "squeal/base/free_memory.hpp"
+#include "squeal/solid/rayleigh.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 namespace squeal
 {
@@ -101,13 +103,20 @@ void project(ReducedModel& model, const Structure& structure, const Shapes& shap
   MultiVector followed{X.comm, MatrixXd(left.entries.entries.rows(), X.columns())};
   const auto keep = [&](Index first, const MultiVector& image)
   { followed.entries.middleCols(first, image.columns()) = image.entries(shapes.left.rows, Eigen::all); };
-  for (const auto& [matrix, unsymmetric, symmetric] :
-       {std::tuple{structure.M.get(), &model.M, &model.M_z}, std::tuple{structure.C.get(), &model.C, &model.C_z},
-        std::tuple{structure.K.get(), &model.K, &model.K_z}})
+  const auto set = [&](Mat matrix, MatrixXd& unsymmetric, MatrixXd& symmetric)
   {
-    *symmetric = symmetric_inner_products(X, matrix, keep);
-    *unsymmetric = *symmetric + inner_products(left.entries, followed);
+    symmetric = symmetric_inner_products(X, matrix, keep);
+    unsymmetric = symmetric + inner_products(left.entries, followed);
+  };
+  set(structure.M, model.M, model.M_z);
+  set(structure.K, model.K, model.K_z);
+  if (const std::optional<Rayleigh> damping = rayleigh_part(structure.M, structure.C, structure.K))
+  {
+    model.C_z = damping->of_mass * model.M_z + damping->of_stiffness * model.K_z;
+    model.C = damping->of_mass * model.M + damping->of_stiffness * model.K;
   }
+  else
+    set(structure.C, model.C, model.C_z);
   if (!structure.G.get()) return;
   MatrixXd skew = symmetric_inner_products(X, structure.G, keep); // below the diagonal
   skew.triangularView<Eigen::StrictlyUpper>() = -skew.transpose();

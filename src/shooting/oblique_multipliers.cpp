@@ -49,22 +49,28 @@ bool reaches_across(const Passes& passes, std::size_t i)
   return i != passes.shift && size - passes.bars[i] <= 1 && size + passes.rises[i] >= 1;
 }
 
-/// Takes in a block and its image, and tests by its energy image. Returns the number of columns that are new.
+/// Takes in what is new of a block, and tests by its energy image.
+StateBlock take_in(const Flow& flow, StateBlock block, Projector& space)
+{
+  for (int pass = 0; pass < 2; ++pass) // the second removes what rounding left
+    subtract(block, space.V, inner_products(energy_images(flow, space.V), block));
+  block = orthonormal(flow, std::move(block), 1e-8);
+  if (block.columns() == 0) return block;
+  append(space.V, block);
+  append(space.W, energy_images(flow, block));
+  return block;
+}
+
+/// Takes in a block and its image. Returns the number of columns that are new.
 Index extend(const Monodromy& monodromy, StateBlock block, Passes& passes)
 {
-  const Flow& flow = monodromy.flow;
-  StateBlock& Q = passes.space.V;
-  for (int pass = 0; pass < 2; ++pass) // the second removes what rounding left
-    subtract(block, Q, inner_products(energy_images(flow, Q), block));
-  block = orthonormal(flow, std::move(block), 1e-8);
-  if (block.columns() == 0) return 0;
-  append(Q, block);
-  append(passes.space.W, energy_images(flow, block));
-  append(passes.image, image_of(monodromy, block));
+  block = take_in(monodromy.flow, std::move(block), passes.space);
+  if (block.columns() > 0) append(passes.image, image_of(monodromy, block));
   return block.columns();
 }
 
-/// Q and W of the reduced model's vectors and of the flow. Returns why they do not serve, or nothing.
+/// Q and W of the reduced model's vectors and of the flow, and all images at once: each passage through the period
+/// costs its contact anew. Returns why the vectors do not serve, or nothing.
 std::string begin_passes(const Monodromy& monodromy, const SlowMotions& slow, Passes& passes)
 {
   const Flow& flow = monodromy.flow;
@@ -75,9 +81,9 @@ std::string begin_passes(const Monodromy& monodromy, const SlowMotions& slow, Pa
   passes.grid_rises = slow.rises;
   if (const double condition = fit(space); !(condition <= largest_condition))
     return format("right and left vectors of the reduced model do not fit together: condition %.0e", condition);
-  passes.image = image_of(monodromy, space.V);
   const Owned<Vec> rate = copy_of(monodromy.orbit.rate.get());
-  extend(monodromy, block_of(std::span(&rate, 1)), passes);
+  take_in(flow, block_of(std::span(&rate, 1)), space);
+  passes.image = image_of(monodromy, space.V);
   return {};
 }
 
