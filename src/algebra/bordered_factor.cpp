@@ -89,7 +89,8 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   on_rank_zero(comm,
                [&]
                {
-                 plan.symbolic = analyse(ranks_of(comm) > 1 ? pattern : plan.entries, rows_of(A), rows_of(B));
+                 plan.symbolic =
+                     options.known->analyse(ranks_of(comm) > 1 ? pattern : plan.entries, rows_of(A), rows_of(B));
                  plan.memory = cholesky_memory(plan.symbolic);
                });
   MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);
@@ -321,6 +322,11 @@ double Factor::entries() const
   double entries = with_factor<double>(*parts_, [](const auto& factor) { return factor.entries(); });
   MPI_Bcast(&entries, 1, MPI_DOUBLE, 0, parts_->comm);
   return entries;
+}
+
+std::shared_ptr<KnownAnalyses> no_analyses()
+{
+  return std::make_shared<KnownAnalyses>();
 }
 
 OptionList options_of(FactorOptions& options)

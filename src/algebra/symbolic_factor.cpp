@@ -313,4 +313,38 @@ SymbolicFactor analyse(const Triplets& lower, int dofs, int border)
   return result;
 }
 
+namespace
+{
+
+/// 128 bits of the entries' places and of the sizes.
+std::array<std::uint64_t, 2> hash_of(const Triplets& lower, int dofs, int border)
+{
+  const auto both = [](int a, int b)
+  { return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint64_t>(static_cast<unsigned>(b)); };
+  std::array<std::uint64_t, 2> hash{splitmix64(both(dofs, border)), lower.row.size()};
+  for (std::size_t k = 0; k < lower.row.size(); ++k)
+  {
+    const std::uint64_t place = both(lower.row[k], lower.column[k]);
+    hash[0] = splitmix64(hash[0] ^ place);
+    hash[1] = splitmix64(hash[1] + 3 * place);
+  }
+  return hash;
+}
+
+} // namespace
+
+SymbolicFactor KnownAnalyses::analyse(const Triplets& lower, int dofs, int border)
+{
+  constexpr std::size_t most = 3; // a model's own matrix, that of its steps, and that of a reduced model
+  const std::array<std::uint64_t, 2> pattern = hash_of(lower, dofs, border);
+  const auto found =
+      std::find_if(known_.begin(), known_.end(), [&](const Known& known) { return known.pattern == pattern; });
+  if (found == known_.end())
+    known_.push_front({pattern, squeal::analyse(lower, dofs, border)});
+  else
+    std::rotate(known_.begin(), found, found + 1);
+  if (known_.size() > most) known_.pop_back();
+  return known_.front().symbolic;
+}
+
 } // namespace squeal

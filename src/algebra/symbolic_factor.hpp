@@ -6,7 +6,10 @@
 /// ones are joined with their parent, at the price of some zeros (relaxed amalgamation; Ashcraft and Grimes 1989).
 #include "triplets.hpp"
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <vector>
 
 namespace squeal
@@ -43,5 +46,21 @@ struct SymbolicFactor
 
 /// `lower`: the lower triangle of A and, from row dofs + 1 on, the border.
 SymbolicFactor analyse(const Triplets& lower, int dofs, int border);
+
+/// The analyses of the last patterns. METIS takes as long as the factor itself where that is small.
+class KnownAnalyses
+{
+public:
+  /// As above; entries in another order count as another pattern.
+  SymbolicFactor analyse(const Triplets& lower, int dofs, int border);
+
+private:
+  struct Known
+  {
+    std::array<std::uint64_t, 2> pattern; // its hash: two of 128 bits are not alike by chance
+    SymbolicFactor symbolic;
+  };
+  std::deque<Known> known_; // the last one first
+};
 
 } // namespace squeal

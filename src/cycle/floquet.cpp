@@ -11,6 +11,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <utility>
 
 namespace squeal
 {
@@ -91,7 +92,7 @@ std::vector<StepRecord> contact_of(const std::vector<StepRecord>& records)
   return contact;
 }
 
-/// Leaves the map with its own period recorded.
+/// Leaves the map with its own period recorded, which the shooting may have done already.
 RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, Vec start)
 {
   RecordedPeriods result;
@@ -102,10 +103,12 @@ RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, V
     record_period(other, period, start, {});
     result.records[RecordedPeriods::other] = std::move(other.records);
   }
-  record_period(map, period, start, {0.5});
-  result.records[RecordedPeriods::moved] = std::move(map.records);
   record_period(map, period, start, {});
   result.records[RecordedPeriods::own] = contact_of(map.records);
+  std::vector<StepRecord> own = std::exchange(map.records, {});
+  record_period(map, period, start, {0.5});
+  result.records[RecordedPeriods::moved] = std::exchange(map.records, std::move(own));
+  map.recorded_start = copy_of(start); // with the same step
   return result;
 }
 

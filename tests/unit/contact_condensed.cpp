@@ -294,6 +294,28 @@ TEST_CASE("a factor is used again and again: later right-hand sides see nothing 
     }
 }
 
+TEST_CASE("factors with the same options are those of their own matrix, be its pattern known from another one or new")
+{
+  const std::size_t n = 600; // sparse enough not to be taken dense
+  const std::vector<double> load(n, 1.);
+  test::Rows chain = chain_stiffness(n), stiffer = chain, wider = chain;
+  for (std::size_t i = 0; i < n; ++i) stiffer[i][i] += 1 + 0.01 * static_cast<double>(i % 5);
+  for (std::size_t i = 0; i + 2 < n; ++i) wider[i][i + 2] = wider[i + 2][i] = 1e-4;
+  const FactorOptions options{.kind = FactorKind::supernodal};
+  for (const test::Rows* K : {&chain, &stiffer, &wider, &chain, &stiffer})
+  {
+    const auto structure = test::make_structure(*K, *K, *K, load);
+    const auto x = zeros_like(structure.load), residual = copy_of(structure.load);
+    solve(Factor(structure.K, nullptr, options), structure.load, x);
+    check(VecScale(residual, -1));
+    check(MatMultAdd(structure.K, x, residual, residual));
+    double left = 0, size = 0;
+    check(VecNorm(residual, NORM_INFINITY, &left));
+    check(VecNorm(x, NORM_INFINITY, &size));
+    CHECK(left < 1e-14 * size); // rounding: rows of five numbers of size 1
+  }
+}
+
 TEST_CASE("a sparse factor says of a matrix with one negative eigenvalue that it failed")
 {
   auto K = lattice_stiffness(4, 2);

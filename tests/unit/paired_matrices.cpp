@@ -1,5 +1,6 @@
 // ranks: 1 2 3
 #include "squeal/algebra/paired_matrices.hpp"
+#include "squeal/algebra/multivector.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>
@@ -73,4 +74,29 @@ TEST_CASE("matrices of different patterns side by side give the products of each
       CHECK(difference(K, u[k], Ku[k]) < 1e-13);
     }
   }
+}
+
+TEST_CASE("a sparse matrix, wide or of few rows, gives the same products of many columns and of one")
+{
+  const Owned<Mat> A = striped(41, 3);
+  Owned<IS> few;
+  Owned<Mat> rows;
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(A, &first, &last));
+  check(ISCreateStride(PETSC_COMM_WORLD, first == 0 ? 2 : 0, 0, 1, few.put())); // all on one rank
+  Owned<IS> all;
+  check(ISCreateStride(PETSC_COMM_WORLD, last - first, first, 1, all.put()));
+  check(MatCreateSubMatrix(A, few, all, MAT_INITIAL_MATRIX, rows.put()));
+  for (Mat matrix : {A.get(), rows.get()})
+    for (const PetscInt count : {3, 16, 17, 40})
+    {
+      const MultiVector X = random_multivector(A, count), Y = product(matrix, X);
+      const Owned<Vec> x = vector_of_columns(matrix), y = vector_of_rows(matrix);
+      for (PetscInt j = 0; j < count; ++j)
+      {
+        copy_column(X, j, x);
+        copy_column(Y, j, y);
+        CHECK(difference(matrix, x, y) < 1e-13); // rounding of sums of 20 numbers of size 1
+      }
+    }
 }

@@ -34,11 +34,17 @@ inline Words words_of(FactorKind)
   return factor_kind_words;
 }
 
+/// The orders of elimination of the last patterns, on rank 0.
+class KnownAnalyses;
+
+std::shared_ptr<KnownAnalyses> no_analyses();
+
 /// Of every stage that factors a symmetric positive definite matrix.
 struct FactorOptions
 {
   FactorKind kind = FactorKind::automatic;
   double limit = 4; // [GB] of a rank's share in a supernodal factor; beyond it several ranks take MUMPS
+  std::shared_ptr<KnownAnalyses> known = no_analyses(); // one for all copies: matrices of a pattern are analysed once
 };
 
 OptionList options_of(FactorOptions& options);
