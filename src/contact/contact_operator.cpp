@@ -75,7 +75,7 @@ void ContactOperator::multiply(std::span<const std::span<const double>> x, std::
   std::vector<double> from(n * lanes), to(n * lanes);
   for (std::size_t k = 0; k < x.size(); ++k)
     for (std::size_t i = 0; i < n; ++i) from[i * lanes + k] = x[k][i];
-  dense_product(values_.data(), n, lanes, from.data(), to.data());
+  dense_product(values_.data(), n, n, lanes, from.data(), to.data());
   for (std::size_t k = 0; k < y.size(); ++k)
     for (std::size_t i = 0; i < n; ++i) y[k][i] = to[i * lanes + k];
 }

@@ -408,12 +408,22 @@ LimitCycle measure_reduced_cycle(const CycleCorrection& correction, const Shooti
   record_full(log, ShootingStage::full_period, cycle.orbit);
   estimate_model_errors(correction, cycle);
   cycle.outcome = {OutcomeKind::converged, "", 0, cycle.orbit.residual};
-  cycle.multipliers = examine(problem, correction.options, flow.map, cycle.orbit).multipliers;
+  try
+  {
+    cycle.multipliers = examine(problem, correction.options, flow.map, cycle.orbit).multipliers;
+  }
+  catch (const Interrupted&) // on all ranks alike: the cycle stays
+  {
+    cycle.cut_short = true;
+    cycle.multipliers.stability = Stability::undecided;
+    cycle.multipliers.would_decide = "the run was ended while its multipliers were sought";
+  }
   refuse_repelling(cycle.multipliers, problem.unstable.modes.size() - 1, cycle.outcome);
   cycle.steps_per_period = flow.map.steps;
   cycle.theta = flow.map.theta;
   cycle.convergence = std::move(log.convergence);
   correction.fidelity.full_periods = cycle.convergence.periods;
+  const Undisturbed last_period;
   cycle.measured = std::move(last_measured(flow));
   cycle.costs = {flow.map.step.factor_seconds, flow.map.step.condensed_seconds};
   return cycle;

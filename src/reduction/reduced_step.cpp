@@ -2,6 +2,7 @@
 #include "squeal/reduction/reduced_step.hpp"
 #include "reduced_contact.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/algebra/panel.hpp"
 #include "squeal/contact/sliding_direction.hpp"
 
 namespace squeal
@@ -65,7 +66,8 @@ void prepare(ReducedMap& map, double period)
   map.W = model.G * map.from_reactions;
   const std::vector<Eigen::Index> normal = normal_rows(model);
   for (std::size_t i = 0; i < normal.size(); ++i) map.W(normal[i], normal[i]) += gap_law(map, i).by_reaction;
-  map.G_n = model.G(normal, Eigen::all);
+  map.G.resize(static_cast<std::size_t>(model.G.size()));
+  MatrixXd::Map(map.G.data(), n, rows) = model.G.transpose();
   map.W_single = map.W.cast<float>();
   map.W_n = map.W_single(normal, Eigen::all);
   map.own = own_blocks(map.W, model);
@@ -74,20 +76,39 @@ void prepare(ReducedMap& map, double period)
 namespace
 {
 
+/// What the pairs see of a step's start.
+struct PairMotion
+{
+  VectorXd free, before, position; // G v_free, G v, G q
+};
+
+/// By one reading of G.
+PairMotion motion_of_pairs(const ReducedMap& map, const ReducedState& state, const VectorXd& v_free)
+{
+  constexpr int lanes = 4; // one of them idle
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, lanes, Eigen::RowMajor>;
+  const Eigen::Index n = map.model.size();
+  Rows x(n, lanes), y(map.model.G.rows(), lanes);
+  x << v_free, state.v, state.q, VectorXd::Zero(n);
+  dense_product(map.G.data(), static_cast<std::size_t>(y.rows()), static_cast<std::size_t>(n), lanes, x.data(),
+                y.data());
+  return {y.col(0), y.col(1), y.col(2)};
+}
+
 /// b of w = W r + b without past sliding: normal rows are gap rates (g0 + G_n q~)/h + G_n v_free, q~ = q + h (1-theta)
-/// v, tangential ones sliding velocities. `rates`: G v_free and G v.
-VectorXd free_contact_velocity(const ReducedMap& map, const ReducedState& state, const MatrixXd& rates)
+/// v, tangential ones sliding velocities.
+VectorXd free_contact_velocity(const ReducedMap& map, const PairMotion& motion)
 {
   const ReducedModel& model = map.model;
-  const VectorXd position = map.G_n * state.q, before = rates.col(1);
-  VectorXd b = rates.col(0);
+  VectorXd b = motion.free;
   const PairView<double> velocity(b, model.directions);
+  const PairView before(motion.before, model.directions), position(motion.position, model.directions);
   const TangentView drive(model.drive, model.directions);
   for (std::size_t i = 0; i < model.gap.size(); ++i)
   {
-    const double gap = model.gap[i] + position(static_cast<Eigen::Index>(i));
+    const double gap = model.gap[i] + position.normal(i);
     const CompliantGap law = gap_law(map, i);
-    velocity.normal(i) += law.by_gap * gap + law.by_rate * PairView(before, model.directions).normal(i);
+    velocity.normal(i) += law.by_gap * gap + law.by_rate * before.normal(i);
     for (std::size_t k = 0; k < drive.of(i).size(); ++k) velocity.tangential(i)[k] -= drive.of(i)[k];
   }
   return b;
@@ -107,10 +128,9 @@ VectorXd contact_velocity(const ReducedModel& model, VectorXd velocity)
 bool find_reactions(const ReducedMap& map, const ReducedState& state, const VectorXd& v_free, ReducedContact& contact)
 {
   const ReducedModel& model = map.model;
-  MatrixXd both(model.size(), 2);
-  both << v_free, state.v;
-  const MatrixXd rates = model.G * both;
-  const VectorXd free = free_contact_velocity(map, state, rates), velocity = rates.col(1);
+  const PairMotion motion = motion_of_pairs(map, state, v_free);
+  const VectorXd free = free_contact_velocity(map, motion);
+  const VectorXd& velocity = motion.before;
   const auto reactions = [&] { return PairView<const double>(contact.r, model.directions); };
   const VectorXd sliding = contact_velocity(model, velocity);
   contact.past =

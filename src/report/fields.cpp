@@ -7,6 +7,7 @@
 #include "files.hpp"
 #include "squeal/base/whole_file.hpp"
 #include "squeal/report/result_files.hpp"
+#include "squeal/solid/probes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -326,6 +327,9 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
                {
                  write_mesh(file.emplace(place, report.run), nodes.mesh, layout);
                  write_pairs(*file, report.equilibrium, nodes.interface);
+                 if (!scene.probes.empty())
+                   file->write("probes/node", {scene.probes.size()}, probed_nodes(scene.probes, nodes.mesh),
+                               "index in mesh/nodes");
                });
   const Gather gather(nodes);
   if (report.equilibrium.u.get())

@@ -25,7 +25,6 @@ double diagonal(const std::vector<Vec3>& nodes)
   return norm(high - low);
 }
 
-/// Returns the node of a probe: of its point or group, the one nearest to its position.
 int probed_node(const Probe& probe, const Mesh& mesh)
 {
   const std::string user = "probe " + probe.name;
@@ -46,15 +45,23 @@ int probed_node(const Probe& probe, const Mesh& mesh)
 
 } // namespace
 
+std::vector<int> probed_nodes(const std::vector<Probe>& probes, const Mesh& mesh)
+{
+  std::vector<int> nodes;
+  for (const Probe& probe : probes) nodes.push_back(probed_node(probe, mesh));
+  return nodes;
+}
+
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const DofMap& dofs, MPI_Comm comm)
 {
   std::vector<SparseRow> rows;
+  const std::vector<int> nodes = probed_nodes(probes, mesh);
   const auto [first, last] = local_range(static_cast<PetscInt>(probes.size()), comm);
   for (PetscInt i = 0; i < static_cast<PetscInt>(probes.size()); ++i) // all on every rank, so that all throw errors
   {
     const Probe& probe = probes[static_cast<std::size_t>(i)];
     SparseRow row;
-    add_displacement(dofs, probed_node(probe, mesh), probe.direction, row);
+    add_displacement(dofs, nodes[static_cast<std::size_t>(i)], probe.direction, row);
     if (std::all_of(row.begin(), row.end(), [](const auto& entry) { return entry.second == 0; }))
       throw Error("probe " + probe.name + ": the motion of " + probe.on +
                   " in its direction is held, so it would read 0");

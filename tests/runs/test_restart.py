@@ -147,15 +147,16 @@ def test_a_signal_is_no_error_of_what_is_under_way(tmp_path, where):
     assert "ended by SIGUSR1" in log.read_text().splitlines()[-1]
 
 
-@pytest.mark.parametrize("ranks", [2])
-def test_a_run_that_ends_in_its_verdict_keeps_the_cycle(ranks, squeal, tmp_path):
+@pytest.mark.parametrize("ranks, fidelity", [(1, "reduced"), (2, "auto")])
+def test_a_run_that_ends_in_its_verdict_keeps_the_cycle(ranks, fidelity, squeal, tmp_path):
     """Where it ends is sought by halves: later where no cycle was found yet, sooner where its verdict was. The restart decides, to
     what 1, 2 and 3 ranks agree within."""
-    whole = squeal(*WITH_VERDICT, ranks=ranks).report
+    asked = [*WITH_VERDICT, "--set", f"fidelity={fidelity}"]
+    whole = squeal(*asked, ranks=ranks).report
     end = sum(whole["timings"].values())
     soonest, latest = end - whole["timings"]["cycle"], 1.5 * end
     for number in range(12):
-        ask = [*WITH_VERDICT, "--output", tmp_path / f"ended{number}"]
+        ask = [*asked, "--output", tmp_path / f"ended{number}"]
         limit = (soonest + latest) / 2
         ended = squeal(*ask, "--time-limit", f"{limit:.3f}", ranks=ranks)
         cycle = json.loads((tmp_path / f"ended{number}" / "report.json").read_text())["cycle"]

@@ -35,7 +35,7 @@ struct ReducedMap
   Eigen::MatrixXd from_reactions{};  // h A^-1 H
   Eigen::MatrixXd W{};               // G h A^-1 H
   Eigen::MatrixXf W_single{}, W_n{}; // the same for changes; its normal rows
-  Eigen::MatrixXd G_n{};             // normal rows of G
+  std::vector<double> G{};           // the model's, by rows
   std::vector<PairBlock> own{};      // the symmetric part of each pair's own block of W
   Eigen::VectorXd reactions{};       // [N] every period's warm start
   ContactSettings contact{};
