@@ -63,6 +63,7 @@ ProgramOptions read_program_options(MPI_Comm comm)
 {
   ProgramOptions options;
   on_every_rank(comm, [&] { read_options(options_of(options)); });
+  options.factor.known = no_analyses();
   options.equilibrium.factor = options.modes.factor = options.step.factor = options.factor;
   options.modes.pencil = options.pencil;
   return options;

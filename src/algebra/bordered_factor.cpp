@@ -89,8 +89,9 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   on_rank_zero(comm,
                [&]
                {
-                 plan.symbolic =
-                     options.known->analyse(ranks_of(comm) > 1 ? pattern : plan.entries, rows_of(A), rows_of(B));
+                 const Triplets& all = ranks_of(comm) > 1 ? pattern : plan.entries;
+                 plan.symbolic = options.known ? options.known->analyse(all, rows_of(A), rows_of(B))
+                                               : analyse(all, rows_of(A), rows_of(B));
                  plan.memory = cholesky_memory(plan.symbolic);
                });
   MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);

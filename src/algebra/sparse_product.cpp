@@ -70,7 +70,7 @@ SQUEAL_SIMD void add_product(const CompressedRows& A, const double* x, double* y
 /// The part of A on this rank's columns, and that on other ranks' with the exchange of their rows.
 struct SplitMatrix
 {
-  Mat own = nullptr, foreign = nullptr; // foreign: null on one rank
+  Mat own = nullptr, foreign = nullptr; // foreign: null of SEQAIJ
   PetscInt received = 0;
   Owned<PetscSF> exchange{};
 };

@@ -335,7 +335,7 @@ std::array<std::uint64_t, 2> hash_of(const Triplets& lower, int dofs, int border
 
 SymbolicFactor KnownAnalyses::analyse(const Triplets& lower, int dofs, int border)
 {
-  constexpr std::size_t most = 3; // a model's own matrix, that of its steps, and that of a reduced model
+  constexpr std::size_t most = 6; // a model with a motion has five: K and A with and without border, one reduced
   const std::array<std::uint64_t, 2> pattern = hash_of(lower, dofs, border);
   const auto found =
       std::find_if(known_.begin(), known_.end(), [&](const Known& known) { return known.pattern == pattern; });

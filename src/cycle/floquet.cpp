@@ -108,7 +108,8 @@ RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, V
   std::vector<StepRecord> own = std::exchange(map.records, {});
   record_period(map, period, start, {0.5});
   result.records[RecordedPeriods::moved] = std::exchange(map.records, std::move(own));
-  map.recorded_start = copy_of(start); // with the same step
+  map.recorded_start = copy_of(start);
+  map.recorded_step = map.step.h;
   return result;
 }
 

@@ -197,6 +197,9 @@ void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& gri
   if (grid.shift > 0) move_by_part(map, grid.shift, state);
   map.recorded_start = {};
   map.records = record_steps(map.step, map.sliding.structure, map.sliding.interface, state, steps, Recorded::contact);
+  if (grid.shift > 0 || steps != map.steps) return;
+  map.recorded_start = copy_of(start);
+  map.recorded_step = map.step.h;
 }
 
 namespace

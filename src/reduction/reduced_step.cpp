@@ -66,8 +66,7 @@ void prepare(ReducedMap& map, double period)
   map.W = model.G * map.from_reactions;
   const std::vector<Eigen::Index> normal = normal_rows(model);
   for (std::size_t i = 0; i < normal.size(); ++i) map.W(normal[i], normal[i]) += gap_law(map, i).by_reaction;
-  map.G.resize(static_cast<std::size_t>(model.G.size()));
-  MatrixXd::Map(map.G.data(), n, rows) = model.G.transpose();
+  map.G = model.G;
   map.W_single = map.W.cast<float>();
   map.W_n = map.W_single(normal, Eigen::all);
   map.own = own_blocks(map.W, model);
@@ -88,7 +87,7 @@ PairMotion motion_of_pairs(const ReducedMap& map, const ReducedState& state, con
   constexpr int lanes = 4; // one of them idle
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, lanes, Eigen::RowMajor>;
   const Eigen::Index n = map.model.size();
-  Rows x(n, lanes), y(map.model.G.rows(), lanes);
+  Rows x(n, lanes), y(map.G.rows(), lanes);
   x << v_free, state.v, state.q, VectorXd::Zero(n);
   dense_product(map.G.data(), static_cast<std::size_t>(y.rows()), static_cast<std::size_t>(n), lanes, x.data(),
                 y.data());

@@ -49,7 +49,7 @@ bool reaches_across(const Passes& passes, std::size_t i)
   return i != passes.shift && size - passes.bars[i] <= 1 && size + passes.rises[i] >= 1;
 }
 
-/// Takes in what is new of a block, and tests by its energy image.
+/// Takes in what is new of a block, which it returns, and tests by its energy image.
 StateBlock take_in(const Flow& flow, StateBlock block, Projector& space)
 {
   for (int pass = 0; pass < 2; ++pass) // the second removes what rounding left

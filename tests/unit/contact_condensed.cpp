@@ -294,26 +294,39 @@ TEST_CASE("a factor is used again and again: later right-hand sides see nothing 
     }
 }
 
-TEST_CASE("factors with the same options are those of their own matrix, be its pattern known from another one or new")
+TEST_CASE("factors with the same options are those of their own matrix and border, their pattern known already or new")
 {
   const std::size_t n = 600; // sparse enough not to be taken dense
-  const std::vector<double> load(n, 1.);
-  test::Rows chain = chain_stiffness(n), stiffer = chain, wider = chain;
-  for (std::size_t i = 0; i < n; ++i) stiffer[i][i] += 1 + 0.01 * static_cast<double>(i % 5);
-  for (std::size_t i = 0; i + 2 < n; ++i) wider[i][i + 2] = wider[i + 2][i] = 1e-4;
-  const FactorOptions options{.kind = FactorKind::supernodal};
-  for (const test::Rows* K : {&chain, &stiffer, &wider, &chain, &stiffer})
+  const FactorOptions options{.kind = FactorKind::supernodal, .known = no_analyses()};
+  const auto entries_with = [&](std::size_t reach, double shift, std::size_t row)
   {
-    const auto structure = test::make_structure(*K, *K, *K, load);
+    test::Rows K = chain_stiffness(n), B = test::zeros(1, n);
+    for (std::size_t i = 0; i < n; ++i) K[i][i] += shift;
+    for (std::size_t i = 0; reach > 1 && i + reach < n; ++i) K[i][i + reach] = K[i + reach][i] = 1e-4;
+    B[0][row] = 1;
+    const auto structure = test::make_structure(K, K, K, std::vector<double>(n, 1.));
+    const auto interface = test::make_interface(B, 0, {0}, {}, 0, structure.K);
+    const Factor factor(structure.K, interface.B, options);
     const auto x = zeros_like(structure.load), residual = copy_of(structure.load);
-    solve(Factor(structure.K, nullptr, options), structure.load, x);
+    solve(factor, structure.load, x);
     check(VecScale(residual, -1));
     check(MatMultAdd(structure.K, x, residual, residual));
     double left = 0, size = 0;
     check(VecNorm(residual, NORM_INFINITY, &left));
     check(VecNorm(x, NORM_INFINITY, &size));
     CHECK(left < 1e-14 * size); // rounding: rows of five numbers of size 1
-  }
+    return factor.entries();
+  };
+  std::vector<double> first;
+  for (int round = 0; round < 2; ++round)
+    for (std::size_t reach = 1; reach <= 8; ++reach) // more patterns than are kept
+    {
+      const double one = entries_with(reach, 0, 3), again = entries_with(reach, 1, 3);
+      CHECK(again == one);
+      CHECK(entries_with(reach, 0, 400) > 0);
+      if (round == 0) first.push_back(one);
+      CHECK(one == first[reach - 1]);
+    }
 }
 
 TEST_CASE("a sparse factor says of a matrix with one negative eigenvalue that it failed")

@@ -37,6 +37,7 @@ inline Words words_of(FactorKind)
 /// The orders of elimination of the last patterns, on rank 0.
 class KnownAnalyses;
 
+/// One that knows none yet.
 std::shared_ptr<KnownAnalyses> no_analyses();
 
 /// Of every stage that factors a symmetric positive definite matrix.
@@ -44,7 +45,7 @@ struct FactorOptions
 {
   FactorKind kind = FactorKind::automatic;
   double limit = 4; // [GB] of a rank's share in a supernodal factor; beyond it several ranks take MUMPS
-  std::shared_ptr<KnownAnalyses> known = no_analyses(); // one for all copies: matrices of a pattern are analysed once
+  std::shared_ptr<KnownAnalyses> known{}; // one for all copies; null: every matrix is analysed anew
 };
 
 OptionList options_of(FactorOptions& options);

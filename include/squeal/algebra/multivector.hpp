@@ -1,6 +1,6 @@
 #pragma once
-/// Distributed vectors side by side: a sparse matrix is read once for all of them, and products among them are dense
-/// matrix products. Every function is collective; small matrices are whole on every rank.
+/// Distributed vectors side by side: a sparse matrix is read once for every sixteen of them, and products among them
+/// are dense matrix products. Every function is collective; small matrices are whole on every rank.
 #include "squeal/base/petsc.hpp"
 
 #include <Eigen/Core>
@@ -40,7 +40,7 @@ MultiVector product(Mat A, const MultiVector& X);
 /// A X of a matrix of few rows, whole on every rank.
 Eigen::MatrixXd whole_product(Mat A, const MultiVector& X);
 
-/// y_k = A x_k for all k at one reading of A.
+/// y_k = A x_k for all k.
 void product(Mat A, std::span<const Vec> x, std::span<const Vec> y);
 
 /// X a

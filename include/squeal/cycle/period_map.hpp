@@ -41,7 +41,7 @@ struct PeriodMap
   std::vector<double> reactions{};   // warm start: at the end of the last period integrated with its rate
   long unconverged = 0;              // steps whose contact did not converge
   std::vector<StepRecord> records{}; // of the period recorded last, with the step at hand
-  Owned<Vec> recorded_start{};       // of that period, if it was one that the flow integrated with its rate
+  Owned<Vec> recorded_start{};       // of that period, if its steps are the flow's own
   double recorded_step = 0;          // [s]
   ReplayedPeriod replayed{};         // the last one integrated with its rate, if it is still to be recorded
   bool keeps_step = false;           // where factors cost more than what the line to T neglects

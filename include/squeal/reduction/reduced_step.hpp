@@ -29,15 +29,15 @@ struct ReducedMap
   const ReducedModel& model;
   int steps = 0;
   double theta = 0.5;
-  double h = 0;                      // [s] of the matrices below
-  Eigen::MatrixXd from_state{};      // v_free = from_state (v, q) + from_load
-  Eigen::VectorXd from_load{};       // h A^-1 f
-  Eigen::MatrixXd from_reactions{};  // h A^-1 H
-  Eigen::MatrixXd W{};               // G h A^-1 H
-  Eigen::MatrixXf W_single{}, W_n{}; // the same for changes; its normal rows
-  std::vector<double> G{};           // the model's, by rows
-  std::vector<PairBlock> own{};      // the symmetric part of each pair's own block of W
-  Eigen::VectorXd reactions{};       // [N] every period's warm start
+  double h = 0;                                       // [s] of the matrices below
+  Eigen::MatrixXd from_state{};                       // v_free = from_state (v, q) + from_load
+  Eigen::VectorXd from_load{};                        // h A^-1 f
+  Eigen::MatrixXd from_reactions{};                   // h A^-1 H
+  Eigen::MatrixXd W{};                                // G h A^-1 H
+  Eigen::MatrixXf W_single{}, W_n{};                  // the same for changes; its normal rows
+  Eigen::Matrix<double, -1, -1, Eigen::RowMajor> G{}; // the model's, stored by rows
+  std::vector<PairBlock> own{};                       // the symmetric part of each pair's own block of W
+  Eigen::VectorXd reactions{};                        // [N] every period's warm start
   ContactSettings contact{};
   long unconverged = 0;
 };
