@@ -20,7 +20,9 @@ def test_an_installation_runs_and_plots_from_another_folder(tmp_path):
     done = subprocess.run([shared / "tools" / "run", "scene"], cwd=work, env=environment | {"RANKS": "1"},
                           capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-    ended = subprocess.run([shared / "tools" / "run", "scene", "--output", "ended", "-cycle_max_periods", "2"], cwd=work,
+    ended = subprocess.run([shared / "tools" / "run", "scene", "--output", "ended", "--set",
+                            "transient.enabled=false", "--set", "cycle.free_periods=2", "-cycle_max_periods", "3", "-settled_periods",
+                            "4"], cwd=work,
                            env=environment | {"RANKS": "1"}, capture_output=True, text=True, timeout=500)
     assert ended.returncode == 2 and "exit code 2: a stage did not reach its result" in ended.stderr
     assert "abort" not in ended.stdout + ended.stderr
