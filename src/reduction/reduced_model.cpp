@@ -105,7 +105,10 @@ void project(ReducedModel& model, const Structure& structure, const Shapes& shap
   { followed.entries.middleCols(first, image.columns()) = image.entries(shapes.left.rows, Eigen::all); };
   const auto set = [&](Mat matrix, MatrixXd& unsymmetric, MatrixXd& symmetric)
   {
-    symmetric = symmetric_inner_products(X, matrix, keep);
+    if (symmetric.size() > 0) // of the basis
+      followed = product(only_rows(matrix, left.rows), X);
+    else
+      symmetric = symmetric_inner_products(X, matrix, keep);
     unsymmetric = symmetric + inner_products(left.entries, followed);
   };
   set(structure.M, model.M, model.M_z);

@@ -271,7 +271,8 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
                       X.entries.middleCols(at, some).noalias() +=
                           modes.columns.entries * of_shapes.middleCols(at, some);
                     });
-  const MatrixXd turn = by_falling_period(symmetric_inner_products(X, M), model.omega, model.slow);
+  const MatrixXd mass = symmetric_inner_products(X, M), turn = by_falling_period(mass, model.omega, model.slow);
+  model.M_z = turn.transpose() * mass * turn;
   model.apart = turn.middleRows(before, last).transpose();
   combine(X, turn);
   return X;

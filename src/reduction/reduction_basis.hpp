@@ -48,8 +48,8 @@ struct AttachmentLimits
 };
 
 /// The basis: the modes, the attachments next to them, all by falling period, as motions. `energy_of_modes`: X'E X of
-/// the modes X; `of_modes`: F'B X. Sets the model's counts, what it leaves out (its compliance by forces), `slow` and
-/// `apart`. Energies of attachments are the condensed operator P E^-1 P', so that only those which the basis takes
+/// the modes X; `of_modes`: F'B X. Sets the model's counts, what it leaves out (its compliance by forces), M_z, `slow`
+/// and `apart`. Energies of attachments are the condensed operator P E^-1 P', so that only those which the basis takes
 /// are solved for. Error: more compliance would be lost than may be.
 MultiVector make_basis(ReducedModel& model, const Attachments& attachments, const ModeColumns& modes,
                        const Eigen::MatrixXd& energy_of_modes, const Eigen::MatrixXd& of_modes, Mat M,
