@@ -36,7 +36,7 @@ Root find_root(const std::function<std::optional<double>(double)>& function, Bra
   {
   }
   const double x = value_a == value_b ? (a + b) / 2 : (a * value_b - b * value_a) / (value_b - value_a);
-  return {x, value_a == 0 || value_b == 0 ? 0 : std::abs(b - a)};
+  return {x, value_a == 0 || value_b == 0 ? 0 : std::abs(b - a), {a, b, value_a, value_b}};
 }
 
 } // namespace squeal

@@ -442,11 +442,13 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   {
     equilibrium.outcome = failure(search.solution, interface);
     equilibrium.reactions.assign(interface.size(), 0.);
+    equilibrium.gaps.assign(pairs, 0.);
     check(VecSet(equilibrium.u, 0));
     return equilibrium;
   }
   settle(held, structure, interface, search, equilibrium, comm);
   equilibrium.reactions = pair_forces(interface, search.solution.reaction, interface.gap, 0);
+  equilibrium.gaps = search.solution.gap;
   check_solution(structure, interface, search, options, equilibrium);
   equilibrium.outcome.iterations = search.solution.iterations;
   return equilibrium;

@@ -10,7 +10,9 @@
 #include "thresholds.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <deque>
 #include <tuple>
 
 namespace squeal
@@ -173,11 +175,14 @@ private:
     return again;
   }
 
-  /// The modes at a point; nothing if it fails, which is recorded.
+  /// The modes at a point; nothing if it fails, which is recorded once: a step may be divided there for several
+  /// reasons.
   std::optional<Followed> evaluate(Followed point)
   {
     if (find_modes_of(point)) return point;
-    record(point, {});
+    const auto here = [&](const SweepPoint& known)
+    { return known.values == point.values && known.reversed == point.reversed; };
+    if (std::ranges::none_of(sweep_.points, here)) record(point, {});
     return std::nullopt;
   }
 
@@ -294,12 +299,15 @@ private:
     return same ? clear_mac : clear_mac_across;
   }
 
-  /// Follows the modes to a point, with points between where they are unclear, and seeks the thresholds on the way.
+  /// Follows the modes to a point, with points between where they are unclear, and on both sides of each place where
+  /// pairs open or close. Seeks the thresholds on the way.
   void advance(Followed& before, Followed& now, int depth)
   {
+    const bool divisible = std::abs(now.values[0] - before.values[0]) > tolerance_between(before, now);
+    if (divisible && divided_at_contact_change(before, now, depth)) return;
     const ModeForms between_both = forms(before, now);
     std::vector<Match> matches = follow(between_both, clear_mac);
-    if (depth < problem_.options.depth && !all_clear(before, matches))
+    if (divisible && depth < problem_.options.depth && !all_clear(before, matches))
     {
       std::vector<double> middle = now.values;
       middle[0] = (before.values[0] + now.values[0]) / 2;
@@ -315,6 +323,35 @@ private:
     record(now, matches_at(now, matches));
   }
 
+  /// Modes jump where pairs open or close: a mode may be unstable up to there alone, and neither end shows it.
+  bool divided_at_contact_change(Followed& before, Followed& now, int depth)
+  {
+    std::deque<Followed> points; // which stay where they are
+    Followed* last = &before;
+    for (const double place :
+         model_.contact_change({before.values, before.reversed}, {now.values, now.reversed},
+                               tolerance_between(before, now) / 2)) // that of a smaller end is smaller
+    {
+      std::vector<double> values = now.values;
+      values[0] = place;
+      if (values == before.values || values == now.values) continue;
+      std::optional<Followed> point = evaluate({values, now.reversed, true});
+      if (!point) continue;
+      points.push_back(std::move(*point));
+      advance(*last, points.back(), depth);
+      last = &points.back();
+    }
+    if (points.empty()) return false;
+    advance(*last, now, depth);
+    return true;
+  }
+
+  /// To which thresholds are found between two points: of the first number.
+  static double tolerance_between(const Followed& before, const Followed& now)
+  {
+    return threshold_tolerance * std::max(std::abs(before.values[0]), std::abs(now.values[0]));
+  }
+
   /// Whether every mode in the band is found again. Those near its end may leave.
   bool all_clear(const Followed& before, const std::vector<Match>& matches) const
   {
@@ -327,7 +364,6 @@ private:
   /// that tracks go by them; where one of those is unclear, by both ends.
   void take_tracks(const Followed& before, Followed& now, const std::vector<Match>& matches)
   {
-    const double size = std::max(std::abs(before.values[0]), std::abs(now.values[0]));
     const auto point_at = [&](double value)
     {
       std::vector<double> values = now.values;
@@ -336,8 +372,9 @@ private:
     };
     const auto match = [&](const Followed& from, const Followed& to)
     { return follow(forms(from, to), least_clear(from, to)); };
-    for (Threshold& threshold : find_thresholds(
-             {point_at, match, problem_.modes.band, threshold_tolerance * size, sweep_.tracks}, before, now, matches))
+    for (Threshold& threshold :
+         find_thresholds({point_at, match, problem_.modes.band, tolerance_between(before, now), sweep_.tracks}, before,
+                         now, matches))
       sweep_.thresholds.push_back(std::move(threshold));
     const auto has = [&](int track) { return std::ranges::find(now.tracks, track) != now.tracks.end(); };
     for (std::size_t i = 0; i < matches.size(); ++i)

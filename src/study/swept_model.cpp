@@ -1,15 +1,20 @@
 #include "swept_model.hpp"
 
+#include "squeal/algebra/root.hpp"
+#include "squeal/contact/pairs.hpp"
 #include "squeal/scene/numbers.hpp"
 #include "squeal/study/reversed.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace squeal
 {
 
 namespace
 {
+
+constexpr double smallest = std::numeric_limits<double>::min();
 
 /// Place of the friction coefficient among the swept numbers; -1: it is none of them.
 int friction_place(const SweepSettings& settings)
@@ -164,6 +169,34 @@ void SweptModel::train_at(const SweptPlace& place, double tolerance)
 bool SweptModel::same_pairs_closed(const SweptPlace& a, const SweptPlace& b)
 {
   return equilibrium_at(a).closed == equilibrium_at(b).closed && rigid_at(a) == rigid_at(b);
+}
+
+std::vector<double> SweptModel::contact_change(const SweptPlace& a, const SweptPlace& b, double tolerance)
+{
+  const Equilibrium &at_a = equilibrium_at(a), &at_b = equilibrium_at(b);
+  if (at_a.closed.size() != at_b.closed.size()) return {};
+  const auto change = std::ranges::mismatch(at_a.closed, at_b.closed);
+  if (change.in1 == at_a.closed.end()) return {};
+  const auto pair = static_cast<std::size_t>(change.in1 - at_a.closed.begin());
+  // The reaction of the pair, and less its gap, each over its value at its end: continuous, and zero at the change
+  // alone
+  const auto reaction = [&](const Equilibrium& at) { return PairView(at.reactions, at.directions).normal(pair); };
+  const bool opens = at_a.closed[pair];
+  const double largest_reaction = reaction(opens ? at_a : at_b), largest_gap = (opens ? at_b : at_a).gaps[pair];
+  std::optional<double> failed;
+  const auto contact = [&](double value) -> std::optional<double>
+  {
+    SweptPlace place = b;
+    place.values[0] = value;
+    const Equilibrium& at = equilibrium_at(place);
+    if (at.outcome.kind != OutcomeKind::converged) failed = value;
+    if (failed) return std::nullopt;
+    const double part = at.closed[pair] ? reaction(at) / largest_reaction : at.gaps[pair] / largest_gap;
+    return at.closed[pair] ? std::max(part, smallest) : -std::max(part, smallest); // a zero would be of neither side
+  };
+  const Root root = find_root(contact, {a.values[0], b.values[0], opens ? 1. : -1., opens ? -1. : 1.}, tolerance);
+  if (failed) return {*failed};
+  return {root.bracket.a, root.bracket.b};
 }
 
 ModeForms SweptModel::forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to,

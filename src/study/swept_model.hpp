@@ -31,6 +31,11 @@ public:
   /// Whether the same pairs are closed at two points, and the same of them rigid.
   bool same_pairs_closed(const SweptPlace& a, const SweptPlace& b);
 
+  /// On the way from a to b, along the first number: both ends of a stretch no longer than `tolerance` in which a pair
+  /// opens or closes that is closed at one of the two alone; empty: there is none. Where an equilibrium on the way
+  /// fails, its place alone.
+  std::vector<double> contact_change(const SweptPlace& a, const SweptPlace& b, double tolerance);
+
   /// Between the modes of two points of a line, the second one being that of the modes found last.
   ModeForms forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to, const PointModes& second);
 

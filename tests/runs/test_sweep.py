@@ -124,6 +124,26 @@ def test_pairs_that_open_leave_no_mode_of_rounding(converged):
     same_modes(modes_at(rows_of(run.output), 0.6, -1), lambdas(single), 1e-9)
 
 
+def test_modes_unstable_up_to_a_change_of_contact_alone_are_found(converged):
+    """On the way from a softer to a stiffer pin a mode becomes unstable, and stable again where one of nine pairs opens:
+    the points on both sides of these two thresholds have the same mode unstable, none."""
+    key = "part.pin.young"
+    small = [*NINE_PAIRS, "--set", "modes.band=11000"]
+    run = converged(*small, *sweep_of(key=key, start=1.7e10, end=1.88e10, points=2, directions="both"), ranks=1)
+    sweep = run.report["sweep"]
+    assert [p["unstable_modes"] for p in sweep["points"] if not p["inserted"]] == [0] * 4
+    for direction in (1, -1):
+        found = [t for t in sweep["thresholds"] if t["direction"] == direction]
+        assert [t["change"] for t in found] == [1, -1]
+        closed = {p["closed"] for p in sweep["points"] if p["direction"] == direction}
+        assert closed == {8, 9}
+    for threshold in found:
+        young = threshold["values"][0]
+        before, behind = (converged(*small, "--set", f"{key}={young * factor}", ranks=1).report["modes"]["unstable_count"]
+                          for factor in (1 - 1e-4, 1 + 1e-4))
+        assert behind - before == threshold["change"]
+
+
 def test_what_misses_its_tolerance_fails_or_is_solved_whole(squeal, converged):
     ask = [*NINE_PAIRS, "--set", "modes.band=8000", "--set", "sweep.key=friction.coefficient", "--set", "sweep.values=[0.05,0.3]",
            "-sweep_passes", "0"]
@@ -274,12 +294,14 @@ def test_points_that_fail_are_passed_over(squeal):
 
 
 def test_a_point_put_in_between_is_none_of_the_scene(converged):
-    """At 20 friction holds one pair; a little below, none and all in turn: the modes are followed without that point."""
+    """At 19 friction holds three pairs; a little below, the sets of closed pairs repeat without end: the modes are followed
+    without such points, and each is said once."""
     sweep = converged(*NINE_PAIRS, "--set", "modes.band=7000", "--set", "sweep.key=friction.coefficient",
-                      "--set", "sweep.values=[3, 20]", ranks=1).report["sweep"]
-    inside = [p["outcome"] for p in sweep["points"] if p["inserted"]]
-    assert inside.count("converged") == len(inside) - 1
-    assert f"1 of {len(inside)} points put in between failed, the first at friction.coefficient = " in sweep["reason"]
+                      "--set", "sweep.values=[1.5, 19]", ranks=1).report["sweep"]
+    inside = [p for p in sweep["points"] if p["inserted"]]
+    failed = [p["values"][0] for p in inside if p["outcome"] != "converged"]
+    assert 0 < len(failed) == len(set(failed)) and all(18 < mu < 19 for mu in failed)
+    assert f"{len(failed)} of {len(inside)} points put in between failed, the first at friction.coefficient = " in sweep["reason"]
 
 
 def test_equilibrium_alone(converged):

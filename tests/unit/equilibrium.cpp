@@ -115,6 +115,8 @@ TEST_CASE("pads that partly lift off: every law of the equilibrium, the fixed po
       const double r_n = result.reactions[3 * p], gap = model.interface.gap[p] + motion[3 * p];
       CHECK(r_n >= 0);
       CHECK(gap > -1e-20 * load);
+      CHECK(result.gaps[p] >= 0);
+      CHECK(std::abs(result.gaps[p] - gap) < 1e-20 * load);
       CHECK((result.closed[p] != 0) == (r_n > 0));
       CHECK((r_n == 0 || std::abs(gap) < 1e-20 * load)); // gaps of open pairs are 1e-7 load
       CHECK(result.reactions[3 * p + 1] == 0.3 * r_n * e[2 * p]);

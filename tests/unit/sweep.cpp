@@ -31,6 +31,10 @@ TEST_CASE("a zero is enclosed to the tolerance, whatever the function's shape")
       const Root root = find_root(counted, {a, b, curve(a), curve(b)}, 1e-6);
       CHECK(root.error <= 1e-6);
       CHECK(std::abs(root.x - 0.3) <= root.error);
+      const auto& [at_a, at_b, value_a, value_b] = root.bracket; // on the sides that a and b were on
+      CHECK((at_a - 0.3) * (a - 0.3) >= 0);
+      CHECK((at_b - 0.3) * (b - 0.3) >= 0);
+      CHECK((curve(at_a) == value_a && curve(at_b) == value_b));
       // four values halve the bracket at least: 22 halvings of a length of 3
       CHECK(calls <= 4 * 22);
     }

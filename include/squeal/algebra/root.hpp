@@ -13,10 +13,12 @@ struct Bracket
   double value_a = 0, value_b = 0;
 };
 
-/// `error`: the length of the last bracket, which holds the zero.
+/// `bracket`: the last one, which holds the zero, a and b on the sides that they were given on. `error`: its length, or
+/// 0 where an end is the zero itself.
 struct Root
 {
   double x = 0, error = 0;
+  Bracket bracket{};
 };
 
 /// TOMS 748 (Alefeld, Potra and Shi 1995) until the bracket is no longer than `tolerance`. Where the function has no

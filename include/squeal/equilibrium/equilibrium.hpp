@@ -46,6 +46,7 @@ struct Equilibrium
   std::vector<double> reactions;  // [N] a contact vector
   int directions = 2;             // tangential entries of a pair in it
   std::vector<char> closed;       // per pair
+  std::vector<double> gaps;       // [m] per pair, g + c r_n: zero where closed
   double force_residual = 0;      // |K u - F - B'r| / |F|
   double check_residual = 0;      // the natural map with the fixed point's rho = 1/lambda_max(D_nn)
   int check_iterations = 0;       // of an independent run of the fixed point; 0: not run
