@@ -19,13 +19,22 @@ def unwound(h):
     return np.where(np.append(np.abs(np.diff(phase)) > 180, False), np.nan, phase)
 
 
+def least_known(run, table):
+    """The receptance at each frequency up to which one may be rounding. The reported residual force, over a unit force, holds the
+    rounding of the solution; it moves a probe by that part of the largest receptance. What DEPTH hides says nothing either."""
+    return max(run.report["response"]["residual"], 10 ** (-DEPTH / 20)) * np.max([np.abs(h) for h in table.values()], axis=0)
+
+
 def draw_column(above, below, lines, unit):
-    """lines: colour, frequency and receptance."""
-    for shade, frequency, h in lines:
-        above.plot(frequency, level(h), lw=1.2, color=shade)
-        below.plot(frequency, unwound(h), lw=1.2, color=shade)
-    top = max(level(h).max() for _, _, h in lines)
-    above.set_ylim(max(min(level(h).min() for _, _, h in lines), top - DEPTH) - 5, top + 5)
+    """lines: of each probe its colour, frequency, receptance and where that is known. Returns the probes beyond the axes."""
+    for shade, frequency, h, known in lines.values():
+        if not known.all():
+            above.plot(frequency, level(h), lw=1.2, ls=":", color=shade)
+        for axes, values in ((above, level(h)), (below, unwound(h))):
+            axes.plot(frequency, np.where(known, values, np.nan), lw=1.2, color=shade)
+    top = max(level(h).max() for _, _, h, _ in lines.values())
+    bottom = max(min(level(h[known]).min(initial=top) for _, _, h, known in lines.values()), top - DEPTH) - 5
+    above.set_ylim(bottom, top + 5)
     above.set_ylabel("displacement over force [dB re 1 m/N]")
     below.set_ylim(-190, 190)
     below.set_yticks([-180, -90, 0, 90, 180])
@@ -33,28 +42,34 @@ def draw_column(above, below, lines, unit):
     below.set_xlabel(f"frequency [{unit}]")
     for axes in (above, below):
         axes.grid(alpha=0.3)
+    return [name for name, (_, _, h, _) in lines.items() if level(h).max() < bottom]
 
 
 def draw_response(runs):
-    found = those_with(runs, lambda run: run.responses())
-    every = list(dict.fromkeys(i for _, (_, table) in found for i, _ in table))
+    found = [(run, *of, least_known(run, of[1])) for run, of in those_with(runs, lambda run: run.responses())]
+    every = list(dict.fromkeys(i for _, _, table, _ in found for i, _ in table))
     driven = every[:MOST_COLUMNS]
-    read = list(dict.fromkeys(label_of(run, runs, j) for run, (_, table) in found for i, j in table if i in driven))
+    read = list(dict.fromkeys(label_of(run, runs, j) for run, _, table, _ in found for i, j in table if i in driven))
     left_out = [f"{word} {', '.join(names)}" for word, names in (("driven at", every[MOST_COLUMNS:]), ("read at", read[MOST_LINES:]))
                 if names]
     shades = {label: colour(place) for place, label in enumerate(read[:MOST_LINES])}
-    size, unit = frequency_unit(max(frequency[-1] for _, (frequency, _) in found))
+    size, unit = frequency_unit(max(frequency[-1] for _, frequency, _, _ in found))
     figure, axes = plt.subplots(2, len(driven), figsize=(max(8, 5.4 * len(driven)), 6.8), squeeze=False, sharex=True,
                                 height_ratios=[2.4, 1], layout="constrained")
+    unknown = False
     for column, name in enumerate(driven):
-        lines = [(shades[label_of(run, runs, j)], frequency / size, h) for run, (frequency, table) in found
-                 for (i, j), h in table.items() if i == name and label_of(run, runs, j) in shades]
-        axes[0, column].set_title(f"driven at {name}", fontsize=10)
-        if lines:  # the runs of the first lines may not be driven here
-            draw_column(*axes[:, column], lines, unit)
-    unstable = any(run.report.get("modes", {}).get("unstable_count", 0) for run, _ in found)
-    figure.suptitle(heading([run for run, _ in found], "frequency responses about sliding" +
+        lines = {label: (shades[label], frequency / size, h, np.abs(h) > least) for run, frequency, table, least in found
+                 for (i, j), h in table.items() if i == name and (label := label_of(run, runs, j)) in shades}
+        # the runs of the first lines may not be driven here
+        beyond = draw_column(*axes[:, column], lines, unit) if lines else []
+        axes[0, column].set_title(f"driven at {name}" + (f"; beyond the axes: {', '.join(beyond)}" if beyond else ""), fontsize=10)
+        unknown |= any(not known.all() for _, _, _, known in lines.values())
+    unstable = any(run.report.get("modes", {}).get("unstable_count", 0) for run, *_ in found)
+    figure.suptitle(heading([run for run, *_ in found], "frequency responses about sliding" +
                             (", formal: a mode is unstable" if unstable else "") +
                             (f"; not drawn: {', '.join(left_out)}" if left_out else "")))
-    legend_below(figure, {label: Line2D([], [], color=shade, lw=1.2) for label, shade in shades.items()})  # covers no curve
+    legend = {label: Line2D([], [], color=shade, lw=1.2) for label, shade in shades.items()}
+    if unknown:
+        legend["within the residual's reach: no phase"] = Line2D([], [], color="0.4", lw=1.2, ls=":")
+    legend_below(figure, legend)  # covers no curve
     return figure

@@ -122,7 +122,7 @@ def test_elements_that_touch_share_no_outer_face():
 
 class Driven:
     """A run whose ten probes are each driven."""
-    title, report = "ten probes", {}
+    title, report = "ten probes", {"response": {"residual": 1e-6}}
 
     def responses(self):
         return np.arange(1.0, 9), {(f"p{i}", f"p{j}"): np.ones(8) * (1 + 1j) for i in range(10) for j in range(10)}
@@ -135,6 +135,25 @@ def test_the_legend_of_responses_covers_no_curve_and_what_is_left_out_is_named()
     assert [text.get_text() for text in legend.get_texts()] == [f"p{k}" for k in range(8)]
     assert all(axes.get_legend() is None and axes.get_tightbbox().y0 >= legend.get_window_extent().y1 for axes in figure.axes)
     assert figure._suptitle.get_text().endswith("not drawn: driven at p3, p4, p5, p6, p7, p8, p9, read at p8, p9")
+
+
+class Symmetric(Driven):
+    """A run whose transfers between two probes are rounding: all of one, and of the other at half of the frequencies."""
+
+    def responses(self):
+        h = 1e-7 * np.exp(1j * np.arange(8))
+        part = h * np.where(np.arange(8) < 4, 1e-3, 1e-9)
+        return np.arange(1.0, 9), {("a", "a"): h, ("a", "b"): 1e-9 * h, ("a", "c"): part}
+
+
+def test_a_response_that_is_rounding_has_no_phase():
+    """Nothing below the residual's part of the largest response at the frequency; the title names a curve that is nowhere."""
+    figure = plot_response.draw_response([Symmetric()])
+    above, below = figure.axes
+    assert above.get_title() == "driven at a; beyond the axes: b"
+    assert [np.isfinite(line.get_ydata()).sum() for line in below.lines] == [7, 0, 3]  # a turn is a gap
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["a", "b", "c", "within the residual's reach: no phase"]
+    assert above.get_ylim()[0] == pytest.approx(-205)  # 5 dB below what is known
 
 
 @pytest.fixture(scope="module")
