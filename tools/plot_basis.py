@@ -78,11 +78,17 @@ def cycle_words(run):
     return {"converged": "limit cycle", "unstable cycle": "limit cycle that repels"}.get(outcome, f"period kept, cycle {outcome}")
 
 
-def strongest(probes):
-    """Name and values of the probe that swings most."""
+def swing(values, steps):
+    """Peak to peak of each whole period of so many steps, their mean: what drifts from one to the next is no swing."""
+    steps = min(steps, len(values))
+    return np.ptp(values[: len(values) // steps * steps].reshape(-1, steps), axis=1).mean()
+
+
+def strongest(probes, steps=None):
+    """Name and values of the probe that swings most within periods of so many steps, or within one that is all of them."""
     if not probes:
         raise Missing("the scene has no probes")
-    return max(probes.items(), key=lambda item: np.ptp(item[1]))
+    return max(probes.items(), key=lambda item: swing(item[1], steps or len(item[1])))
 
 
 def start_of(run, runs):

@@ -35,12 +35,17 @@ def strongest_line(frequency, amplitude):
     return frequency[np.argmax(np.where(frequency > 0, np.abs(amplitude), 0))]
 
 
+def loudest(lines):
+    """Frequencies and amplitudes of the probe with the largest velocity. lines: those of all probes."""
+    return max(lines, key=lambda line: np.abs(line[1]).max())
+
+
 def last_shown(lines):
     """Where the axis of frequencies ends [Hz]: with what is within FLOOR of the largest, but no further than five times the
     strongest line, or 20 kHz where that is heard beside it. lines: frequencies, amplitudes of velocity."""
     top = max(decibel(amplitude).max() for _, amplitude in lines)
     last = max(frequency[decibel(amplitude) > top - FLOOR].max(initial=0) for frequency, amplitude in lines)
-    strongest = strongest_line(*max(lines, key=lambda line: np.abs(line[1]).max()))
+    strongest = strongest_line(*loudest(lines))
     return min(last, max(5 * strongest, min(AUDIBLE, 25 * strongest)))
 
 
@@ -132,13 +137,14 @@ def spectrogram_of(run, of):
     step = (time[-1] - time[0]) / (len(time) - 1)
     # Of the motion, not of the mode that grows most: another one may win.
     probes = run.probes(name)
-    period = 1 / strongest_line(*windowed(strongest(probes)[1], step)) if probes else run.followed_period()
+    spectra = [windowed(values, step) for values in probes.values()]
+    period = 1 / strongest_line(*loudest(spectra)) if probes else run.followed_period()
     if of == "energy":
         values, words = run.series(name, "energy"), "mechanical energy (quadratic: not the motion's own spectrum)"
     else:
         if of != "probe" and of not in probes:
             raise Missing(f"there is no probe {of}: {', '.join(probes) or 'the scene has none'}")
-        probe, values = strongest(probes) if of == "probe" else (of, probes[of])
+        probe, values = strongest(probes, round(period / step)) if of == "probe" else (of, probes[of])
         values, words = np.gradient(values, step), f"velocity of {probe}"
     return *framed(values, step, period), period, words
 

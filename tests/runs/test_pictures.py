@@ -49,6 +49,30 @@ def test_a_windowed_spectrum_and_a_spectrogram_find_the_line():
     assert frequency[power.argmax(axis=1)] == pytest.approx(f, rel=0.03)  # ten periods resolve a tenth; padded four times
 
 
+class Drifting:
+    """A run that settles: its holder drifts, and its pin swings at 4 kHz."""
+    title, report, step = "drift", {}, 1e-5
+
+    def stage(self, name):
+        if name != "settled":
+            raise plot_spectra.Missing(name)
+
+    def series(self, _, name):
+        return self.step * np.arange(4000)
+
+    def probes(self, _):
+        time = self.series("settled", "time")
+        return {"holder": 3e-4 * np.sin(2 * np.pi * 25 * time), "pin": 1e-4 * np.sin(2 * np.pi * 4000 * time)}
+
+
+def test_a_spectrogram_is_of_the_probe_that_swings_most_within_a_period():
+    """Not of one that drifts further over all of them; a probe that is asked for is shown."""
+    *_, period, words = plot_spectra.spectrogram_of(Drifting(), "probe")
+    assert period == pytest.approx(1 / 4000) and words == "velocity of pin"
+    assert plot_spectra.draw_spectrogram([Drifting()], "probe").axes[0].get_title() == "drift: spectrogram, velocity of pin"
+    assert plot_spectra.spectrogram_of(Drifting(), "holder")[-1] == "velocity of holder"
+
+
 class Shifted:
     """A run whose probe's first harmonic is largest at a step of 64."""
 
