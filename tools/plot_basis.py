@@ -72,10 +72,24 @@ def those_with(runs, take):
     return found
 
 
-def cycle_words(run):
-    """What the period that was kept is of."""
-    outcome = run.stage("cycle")["outcome"]
-    return {"converged": "limit cycle", "unstable cycle": "limit cycle that repels"}.get(outcome, f"period kept, cycle {outcome}")
+def search_outcome(run):
+    """How the search for the period that was kept ended. Where the settled motion is the answer, the reason begins with it."""
+    cycle = run.stage("cycle")
+    return cycle["reason"].partition(":")[0] if cycle["outcome"] == "settled" else cycle["outcome"]
+
+
+def is_closed(run):
+    return search_outcome(run) in ("converged", "unstable cycle")
+
+
+def cycle_words(*runs):
+    """What the periods that were kept are of."""
+    if len(runs) > 1:
+        return "limit cycles" if all(map(is_closed, runs)) else "periods kept, not all closed"
+    outcome = search_outcome(runs[0])
+    words = {"converged": "limit cycle", "unstable cycle": "limit cycle that repels"}
+    beside = " (not the settled motion)" if runs[0].stage("cycle")["outcome"] == "settled" else ""
+    return words.get(outcome, f"last period of the search, {outcome}") + beside
 
 
 def swing(values, steps):

@@ -2,8 +2,8 @@
 
 import matplotlib
 import numpy as np
-from plot_basis import (RED, SLIP, STICK, colour, cycle_words, heading, label_of, length_unit, plt, portrait, start_of,
-                        state_colours, state_legend, those_with, unit_of)
+from plot_basis import (RED, SLIP, STICK, colour, cycle_words, heading, is_closed, label_of, length_unit, plt, portrait,
+                        start_of, state_colours, state_legend, those_with, unit_of)
 from squeal import Missing
 
 
@@ -62,10 +62,6 @@ def draw_status(axes, run):
     state_legend(axes, loc="lower center", bbox_to_anchor=(0.5, 1))
 
 
-def is_closed(run):
-    return run.stage("cycle")["outcome"] in ("converged", "unstable cycle")
-
-
 def draw_cycle(runs):
     found = those_with(runs, cycle_of)
     shown = list(dict.fromkeys(name for _, (_, probes) in found for name in probes))[:5]
@@ -96,9 +92,8 @@ def draw_cycle(runs):
         flat[0].legend(fontsize=8)
     for axes in flat[panels:]:
         axes.remove()
-    run, (cycle, _) = found[0]
-    figure.suptitle(heading(runs, f"{cycle_words(run)}, {cycle['frequency_hz']:.7g} Hz" if len(found) == 1 else
-                            "limit cycles" if all(is_closed(run) for run, _ in found) else "periods kept, not all closed"))
+    frequency = f", {found[0][1][0]['frequency_hz']:.7g} Hz" if len(found) == 1 else ""
+    figure.suptitle(heading(runs, cycle_words(*(run for run, _ in found)) + frequency))
     return figure
 
 
@@ -130,7 +125,8 @@ def draw_powers(runs):
                    label=label_of(run, runs, f"sum, mean {total.mean() / size:+.1g} {unit}"))
         below.plot(phase, powers["fluctuating_energy"] / e_size, color=shade, lw=1.6, label=label_of(run, runs))
     above.axhline(0, color="0.5", lw=0.8)
-    above.set(ylabel=f"power on the structure [{unit}]", title=heading(runs, f"powers round the {cycle_words(found[0][0])}"))
+    words = cycle_words(*(run for run, _ in found)).replace(" (", "\n(")
+    above.set(ylabel=f"power on the structure [{unit}]", title=heading(runs, f"powers round the {words}"))
     above.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
     below.set(xlabel="time over period [-]", ylabel=f"energy of the motion\nabout equilibrium [{e_unit}]", xlim=(0, 1))
     return figure
@@ -186,7 +182,7 @@ def draw_lift_off(runs):
                       label=label_of(run, runs, "sticking"))
         words = "number of pairs" if area == len(run.series("cycle", "status").T) else f"area of {1e4 * area:.4g} cm²"
         axes.set(xlabel="time over period [-]", ylabel=f"part of the contact's {words} [%]", xlim=(0, 1),
-                 title=f"one period of the {cycle_words(run)}")
+                 title=cycle_words(*(run for run, _ in cycles)).replace(" (", "\n("))
         axes.legend(fontsize=8)
     for k, (run, (time, least, most)) in enumerate(transients):
         axes = panels[0, -1]

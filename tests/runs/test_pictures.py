@@ -114,6 +114,41 @@ def test_labels_of_many_modes_do_not_overlap():
     assert all(below.y1 <= above.y0 for below, above in zip(boxes, boxes[1:]))
 
 
+class Ended:
+    """A run whose cycle ended so."""
+    title = "ended"
+
+    def __init__(self, outcome, reason=""):
+        self.report = {"cycle": {"outcome": outcome, "reason": reason, "period": 1}, "model": {"pairs": 2}}
+
+    def stage(self, name):
+        if name not in self.report:
+            raise plot_spectra.Missing(name)
+        return self.report[name]
+
+    def series(self, _, name):
+        return {"status": np.zeros((4, 2)), "time": np.arange(4) / 4}[name]
+
+    def probes(self, _):
+        return {}
+
+    def field(self, name):
+        raise plot_spectra.Missing(name)
+
+
+@pytest.mark.parametrize("run, title, closed", [
+    (Ended("converged"), "limit cycle", True), (Ended("unstable cycle"), "limit cycle that repels", True),
+    (Ended("settled", "unstable cycle: it repels"), "limit cycle that repels\n(not the settled motion)", True),
+    (Ended("settled", "not periodic: a slow drift"), "last period of the search, not periodic\n(not the settled motion)", False),
+    (Ended("not converged"), "last period of the search, not converged", False)])
+def test_the_period_that_was_kept_is_called_what_it_is(run, title, closed):
+    """Where the settled motion is the answer, the picture shows what the search for a cycle left."""
+    import plot_motion
+
+    assert plot_motion.draw_lift_off([run]).axes[0].get_title() == title
+    assert plot_basis.is_closed(run) == closed
+
+
 # One element of each kind, its nodes in VTK's order: corners of the unit cube, wedge and tetrahedron, then middles.
 CUBE = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)], float)
 WEDGE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)], float)
