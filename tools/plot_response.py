@@ -26,14 +26,14 @@ def least_known(run, table):
 
 
 def draw_column(above, below, lines, unit):
-    """lines: of each probe its colour, frequency, receptance and where that is known. Returns the probes beyond the axes."""
-    for shade, frequency, h, known in lines.values():
+    """lines: of each probe its name, colour, frequency, receptance and where that is known. Returns the probes beyond the axes."""
+    for _, shade, frequency, h, known in lines:
         if not known.all():
             above.plot(frequency, level(h), lw=1.2, ls=":", color=shade)
         for axes, values in ((above, level(h)), (below, unwound(h))):
             axes.plot(frequency, np.where(known, values, np.nan), lw=1.2, color=shade)
-    top = max(level(h).max() for _, _, h, _ in lines.values())
-    bottom = max(min(level(h[known]).min(initial=top) for _, _, h, known in lines.values()), top - DEPTH) - 5
+    top = max(level(h).max() for *_, h, _ in lines)
+    bottom = max(min(level(h[known]).min(initial=top) for *_, h, known in lines), top - DEPTH) - 5
     above.set_ylim(bottom, top + 5)
     above.set_ylabel("displacement over force [dB re 1 m/N]")
     below.set_ylim(-190, 190)
@@ -42,7 +42,7 @@ def draw_column(above, below, lines, unit):
     below.set_xlabel(f"frequency [{unit}]")
     for axes in (above, below):
         axes.grid(alpha=0.3)
-    return [name for name, (_, _, h, _) in lines.items() if level(h).max() < bottom]
+    return [name for name, _, _, h, _ in lines if level(h).max() < bottom]
 
 
 def draw_response(runs):
@@ -58,12 +58,12 @@ def draw_response(runs):
                                 height_ratios=[2.4, 1], layout="constrained")
     unknown = False
     for column, name in enumerate(driven):
-        lines = {label: (shades[label], frequency / size, h, np.abs(h) > least) for run, frequency, table, least in found
-                 for (i, j), h in table.items() if i == name and (label := label_of(run, runs, j)) in shades}
+        lines = [(label, shades[label], frequency / size, h, np.abs(h) > least) for run, frequency, table, least in found
+                 for (i, j), h in table.items() if i == name and (label := label_of(run, runs, j)) in shades]
         # the runs of the first lines may not be driven here
         beyond = draw_column(*axes[:, column], lines, unit) if lines else []
         axes[0, column].set_title(f"driven at {name}" + (f"; beyond the axes: {', '.join(beyond)}" if beyond else ""), fontsize=10)
-        unknown |= any(not known.all() for _, _, _, known in lines.values())
+        unknown |= any(not known.all() for *_, known in lines)
     unstable = any(run.report.get("modes", {}).get("unstable_count", 0) for run, *_ in found)
     figure.suptitle(heading([run for run, *_ in found], "frequency responses about sliding" +
                             (", formal: a mode is unstable" if unstable else "") +

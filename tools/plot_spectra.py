@@ -138,7 +138,10 @@ def spectrogram_of(run, of):
     # Of the motion, not of the mode that grows most: another one may win.
     probes = run.probes(name)
     spectra = [windowed(values, step) for values in probes.values()]
-    period = 1 / strongest_line(*loudest(spectra)) if probes else run.followed_period()
+    line = strongest_line(*loudest(spectra)) if probes else 1 / run.followed_period()
+    if not line > 0:
+        raise Missing("no probe moves")
+    period = 1 / line
     if of == "energy":
         values, words = run.series(name, "energy"), "mechanical energy (quadratic: not the motion's own spectrum)"
     else:

@@ -138,7 +138,10 @@ private:
       else if (!before)
         begin(*now, line);
       else
-        advance(*before, *now, 0);
+      {
+        Division division = division_between(*before, *now);
+        advance(*before, *now, 0, division);
+      }
       before = std::move(now);
     }
   }
@@ -175,14 +178,14 @@ private:
     return again;
   }
 
-  /// The modes at a point; nothing if it fails, which is recorded once: a step may be divided there for several
-  /// reasons.
+  /// The modes at a point; nothing if it fails, which is recorded: a point between others once, though a step may be
+  /// divided there for several reasons.
   std::optional<Followed> evaluate(Followed point)
   {
     if (find_modes_of(point)) return point;
-    const auto here = [&](const SweepPoint& known)
-    { return known.values == point.values && known.reversed == point.reversed; };
-    if (std::ranges::none_of(sweep_.points, here)) record(point, {});
+    const auto recorded = [&](const SweepPoint& known)
+    { return known.inserted && known.values == point.values && known.reversed == point.reversed; };
+    if (!point.inserted || std::ranges::none_of(sweep_.points, recorded)) record(point, {});
     return std::nullopt;
   }
 
@@ -299,57 +302,79 @@ private:
     return same ? clear_mac : clear_mac_across;
   }
 
+  /// How finely a step between two points of a line is divided.
+  struct Division
+  {
+    double tolerance = 0;    // of the first number: what is found between two points is found to it
+    std::ptrdiff_t left = 0; // changes of contact to be sought
+  };
+
+  /// Each pair changes once on the way, or a few do more often; more say that equilibria jump.
+  Division division_between(const Followed& before, const Followed& now)
+  {
+    const double size = std::max(std::abs(before.values[0]), std::abs(now.values[0]));
+    const Equilibrium& at = model_.equilibrium_at({now.values, now.reversed});
+    const bool modes = problem_.settings.stages >= SweepStages::modes; // which alone jump
+    return {threshold_tolerance * size, modes ? std::ssize(at.closed) : 0};
+  }
+
   /// Follows the modes to a point, with points between where they are unclear, and on both sides of each place where
   /// pairs open or close. Seeks the thresholds on the way.
-  void advance(Followed& before, Followed& now, int depth)
+  void advance(Followed& before, Followed& now, int depth, Division& division)
   {
-    const bool divisible = std::abs(now.values[0] - before.values[0]) > tolerance_between(before, now);
-    if (divisible && divided_at_contact_change(before, now, depth)) return;
+    const bool divisible = std::abs(now.values[0] - before.values[0]) > division.tolerance;
+    if (divisible && divided_at_contact_change(before, now, depth, division)) return;
     const ModeForms between_both = forms(before, now);
     std::vector<Match> matches = follow(between_both, clear_mac);
     if (divisible && depth < problem_.options.depth && !all_clear(before, matches))
     {
-      std::vector<double> middle = now.values;
-      middle[0] = (before.values[0] + now.values[0]) / 2;
-      if (std::optional<Followed> between = evaluate({middle, now.reversed, true}))
+      const double middle = (before.values[0] + now.values[0]) / 2;
+      if (std::optional<Followed> between = evaluate(between_points(now, middle)))
       {
-        advance(before, *between, depth + 1);
-        advance(*between, now, depth + 1);
+        advance(before, *between, depth + 1, division);
+        advance(*between, now, depth + 1, division);
         return;
       }
     }
     if (!all_clear(before, matches)) matches = follow(between_both, least_clear(before, now));
-    take_tracks(before, now, matches);
+    take_tracks(before, now, matches, division.tolerance);
     record(now, matches_at(now, matches));
   }
 
   /// Modes jump where pairs open or close: a mode may be unstable up to there alone, and neither end shows it.
-  bool divided_at_contact_change(Followed& before, Followed& now, int depth)
+  bool divided_at_contact_change(Followed& before, Followed& now, int depth, Division& division)
   {
-    std::deque<Followed> points; // which stay where they are
-    Followed* last = &before;
-    for (const double place :
-         model_.contact_change({before.values, before.reversed}, {now.values, now.reversed},
-                               tolerance_between(before, now) / 2)) // that of a smaller end is smaller
+    if (division.left-- <= 0) return false;
+    const std::optional<ContactChange> change = model_.contact_change(
+        {before.values, before.reversed}, {now.values, now.reversed}, division.tolerance, [&] { end_if_asked_here(); });
+    if (!change) return false;
+    if (change->failed) evaluate(between_points(now, *change->failed));
+    if (change->failed) return false;
+    std::deque<Followed> sides; // which stay where they are
+    for (const double value : {change->before, change->behind})
     {
-      std::vector<double> values = now.values;
-      values[0] = place;
-      if (values == before.values || values == now.values) continue;
-      std::optional<Followed> point = evaluate({values, now.reversed, true});
-      if (!point) continue;
-      points.push_back(std::move(*point));
-      advance(*last, points.back(), depth);
-      last = &points.back();
+      if (value == before.values[0] || value == now.values[0]) continue;
+      std::optional<Followed> side = evaluate(between_points(now, value));
+      if (!side) return false;
+      sides.push_back(std::move(*side));
     }
-    if (points.empty()) return false;
-    advance(*last, now, depth);
+    if (sides.empty()) return false;
+    Followed* last = &before;
+    for (Followed& side : sides)
+    {
+      advance(*last, side, depth, division);
+      last = &side;
+    }
+    advance(*last, now, depth, division);
     return true;
   }
 
-  /// To which thresholds are found between two points: of the first number.
-  static double tolerance_between(const Followed& before, const Followed& now)
+  /// A point of the same line that is none of the scene.
+  static Followed between_points(const Followed& of_line, double value)
   {
-    return threshold_tolerance * std::max(std::abs(before.values[0]), std::abs(now.values[0]));
+    Followed point{of_line.values, of_line.reversed, true};
+    point.values[0] = value;
+    return point;
   }
 
   /// Whether every mode in the band is found again. Those near its end may leave.
@@ -362,19 +387,13 @@ private:
 
   /// Seeks the thresholds on the way. The modes found meanwhile are nearer to each other than those of both ends, so
   /// that tracks go by them; where one of those is unclear, by both ends.
-  void take_tracks(const Followed& before, Followed& now, const std::vector<Match>& matches)
+  void take_tracks(const Followed& before, Followed& now, const std::vector<Match>& matches, double tolerance)
   {
-    const auto point_at = [&](double value)
-    {
-      std::vector<double> values = now.values;
-      values[0] = value;
-      return evaluate({values, now.reversed, true});
-    };
+    const auto point_at = [&](double value) { return evaluate(between_points(now, value)); };
     const auto match = [&](const Followed& from, const Followed& to)
     { return follow(forms(from, to), least_clear(from, to)); };
     for (Threshold& threshold :
-         find_thresholds({point_at, match, problem_.modes.band, tolerance_between(before, now), sweep_.tracks}, before,
-                         now, matches))
+         find_thresholds({point_at, match, problem_.modes.band, tolerance, sweep_.tracks}, before, now, matches))
       sweep_.thresholds.push_back(std::move(threshold));
     const auto has = [&](int track) { return std::ranges::find(now.tracks, track) != now.tracks.end(); };
     for (std::size_t i = 0; i < matches.size(); ++i)

@@ -14,8 +14,6 @@ namespace squeal
 namespace
 {
 
-constexpr double smallest = std::numeric_limits<double>::min();
-
 /// Place of the friction coefficient among the swept numbers; -1: it is none of them.
 int friction_place(const SweepSettings& settings)
 {
@@ -171,32 +169,42 @@ bool SweptModel::same_pairs_closed(const SweptPlace& a, const SweptPlace& b)
   return equilibrium_at(a).closed == equilibrium_at(b).closed && rigid_at(a) == rigid_at(b);
 }
 
-std::vector<double> SweptModel::contact_change(const SweptPlace& a, const SweptPlace& b, double tolerance)
+std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, const SweptPlace& to, double tolerance,
+                                                        const std::function<void()>& end_if_asked)
 {
-  const Equilibrium &at_a = equilibrium_at(a), &at_b = equilibrium_at(b);
-  if (at_a.closed.size() != at_b.closed.size()) return {};
-  const auto change = std::ranges::mismatch(at_a.closed, at_b.closed);
-  if (change.in1 == at_a.closed.end()) return {};
-  const auto pair = static_cast<std::size_t>(change.in1 - at_a.closed.begin());
+  const Equilibrium &first = equilibrium_at(from), &last = equilibrium_at(to);
+  const std::size_t pairs = first.closed.size();
+  const auto changing = std::ranges::mismatch(first.closed, last.closed);
+  if (last.closed.size() != pairs || changing.in1 == first.closed.end()) return std::nullopt;
+  const auto pair = static_cast<std::size_t>(changing.in1 - first.closed.begin());
+
   // The reaction of the pair, and less its gap, each over its value at its end: continuous, and zero at the change
   // alone
   const auto reaction = [&](const Equilibrium& at) { return PairView(at.reactions, at.directions).normal(pair); };
-  const bool opens = at_a.closed[pair];
-  const double largest_reaction = reaction(opens ? at_a : at_b), largest_gap = (opens ? at_b : at_a).gaps[pair];
+  const bool opens = first.closed[pair];
+  const auto scale = [](double at_end) { return at_end > 0 ? at_end : 1; };
+  const double of_reaction = scale(reaction(opens ? first : last)), of_gap = scale((opens ? last : first).gaps[pair]);
+  constexpr double least = std::numeric_limits<double>::min(); // a zero would be of neither side
+  closed_ = first.closed; // what is expected next: not what was visited before, which a restart does not
   std::optional<double> failed;
+  std::vector<SweptPlace> visited;
   const auto contact = [&](double value) -> std::optional<double>
   {
-    SweptPlace place = b;
+    end_if_asked();
+    SweptPlace place = to;
     place.values[0] = value;
+    visited.push_back(place);
     const Equilibrium& at = equilibrium_at(place);
-    if (at.outcome.kind != OutcomeKind::converged) failed = value;
+    if (at.outcome.kind != OutcomeKind::converged || at.closed.size() != pairs) failed = value;
     if (failed) return std::nullopt;
-    const double part = at.closed[pair] ? reaction(at) / largest_reaction : at.gaps[pair] / largest_gap;
-    return at.closed[pair] ? std::max(part, smallest) : -std::max(part, smallest); // a zero would be of neither side
+    return at.closed[pair] ? std::max(reaction(at) / of_reaction, least) : -std::max(at.gaps[pair] / of_gap, least);
   };
-  const Root root = find_root(contact, {a.values[0], b.values[0], opens ? 1. : -1., opens ? -1. : 1.}, tolerance);
-  if (failed) return {*failed};
-  return {root.bracket.a, root.bracket.b};
+  const Bracket ends{from.values[0], to.values[0], opens ? 1. : -1., opens ? -1. : 1.};
+  const Bracket found = find_root(contact, ends, tolerance).bracket;
+  for (const SweptPlace& place : visited)
+    if (place.values[0] != found.a && place.values[0] != found.b) equilibria_.erase(place);
+  if (failed) return ContactChange{0, 0, failed};
+  return ContactChange{found.a, found.b};
 }
 
 ModeForms SweptModel::forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to,

@@ -9,6 +9,13 @@
 namespace squeal
 {
 
+/// Where a pair opens or closes on the way from one point to another.
+struct ContactChange
+{
+  double before = 0, behind = 0;  // values of the first number on either side of it
+  std::optional<double> failed{}; // where an equilibrium failed in the search, which has no other result then
+};
+
 class SweptModel
 {
 public:
@@ -31,12 +38,13 @@ public:
   /// Whether the same pairs are closed at two points, and the same of them rigid.
   bool same_pairs_closed(const SweptPlace& a, const SweptPlace& b);
 
-  /// On the way from a to b, along the first number: both ends of a stretch no longer than `tolerance` in which a pair
-  /// opens or closes that is closed at one of the two alone; empty: there is none. Where an equilibrium on the way
-  /// fails, its place alone.
-  std::vector<double> contact_change(const SweptPlace& a, const SweptPlace& b, double tolerance);
+  /// The first change of contact that is found on the way between two points of a line: of a pair that is closed at one
+  /// of them alone, to `tolerance` of the first number; nothing: there is none. Calls `end_if_asked` at each
+  /// equilibrium.
+  std::optional<ContactChange> contact_change(const SweptPlace& from, const SweptPlace& to, double tolerance,
+                                              const std::function<void()>& end_if_asked);
 
-  /// Between the modes of two points of a line, the second one being that of the modes found last.
+  /// Between the modes of two points of a line.
   ModeForms forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to, const PointModes& second);
 
   /// The number of shapes that the bases of both directions of rotation have in common.

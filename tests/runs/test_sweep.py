@@ -125,23 +125,31 @@ def test_pairs_that_open_leave_no_mode_of_rounding(converged):
 
 
 def test_modes_unstable_up_to_a_change_of_contact_alone_are_found(converged):
-    """On the way from a softer to a stiffer pin a mode becomes unstable, and stable again where one of nine pairs opens:
-    the points on both sides of these two thresholds have the same mode unstable, none."""
+    """As the pin stiffens a mode becomes unstable, and stable again where one of nine pairs opens. Neither end of the step shows
+    it. The pin is its own mirror image, so that both directions have the same thresholds."""
     key = "part.pin.young"
     small = [*NINE_PAIRS, "--set", "modes.band=11000"]
-    run = converged(*small, *sweep_of(key=key, start=1.7e10, end=1.88e10, points=2, directions="both"), ranks=1)
-    sweep = run.report["sweep"]
+    sweep = converged(*small, *sweep_of(key=key, start=1.7e10, end=1.88e10, points=2, directions="both"), ranks=1).report["sweep"]
     assert [p["unstable_modes"] for p in sweep["points"] if not p["inserted"]] == [0] * 4
-    for direction in (1, -1):
-        found = [t for t in sweep["thresholds"] if t["direction"] == direction]
-        assert [t["change"] for t in found] == [1, -1]
-        closed = {p["closed"] for p in sweep["points"] if p["direction"] == direction}
-        assert closed == {8, 9}
-    for threshold in found:
-        young = threshold["values"][0]
-        before, behind = (converged(*small, "--set", f"{key}={young * factor}", ranks=1).report["modes"]["unstable_count"]
+    found, reversed_ = ([t for t in sweep["thresholds"] if t["direction"] == direction] for direction in (1, -1))
+    assert [t["change"] for t in found] == [t["change"] for t in reversed_] == [1, -1]
+    for one, other in zip(found, reversed_):
+        assert other["values"][0] == pytest.approx(one["values"][0], rel=2e-5)
+        before, behind = (converged(*small, "--set", f"{key}={one['values'][0] * factor}", ranks=1).report["modes"]["unstable_count"]
                           for factor in (1 - 1e-4, 1 + 1e-4))
-        assert behind - before == threshold["change"]
+        assert behind - before == one["change"]
+    for direction in (1, -1):
+        assert {p["closed"] for p in sweep["points"] if p["direction"] == direction} == {8, 9}
+
+
+@pytest.mark.parametrize("values", ["[-1, 1]", "[-1, 0, 1]"])
+def test_contact_that_opens_at_zero_is_found(values, converged):
+    """The oscillator's pad is held by its load alone: it opens where that is zero, to 1e-5 of the step's larger end."""
+    sweep = converged(*OSCILLATOR, "--set", "sweep.key=force.0.vector.1", "--set", f"sweep.values={values}", ranks=1).report["sweep"]
+    places = [(p["values"][0], p["closed"]) for p in sweep["points"]]
+    assert len(places) <= 4 and {closed for _, closed in places} == {0, 1}
+    assert max(force for force, closed in places if closed) == pytest.approx(0, abs=1e-5)
+    assert min(force for force, closed in places if not closed) == pytest.approx(0, abs=1e-5)
 
 
 def test_what_misses_its_tolerance_fails_or_is_solved_whole(squeal, converged):
@@ -294,19 +302,20 @@ def test_points_that_fail_are_passed_over(squeal):
 
 
 def test_a_point_put_in_between_is_none_of_the_scene(converged):
-    """At 19 friction holds three pairs; a little below, the sets of closed pairs repeat without end: the modes are followed
-    without such points, and each is said once."""
-    sweep = converged(*NINE_PAIRS, "--set", "modes.band=7000", "--set", "sweep.key=friction.coefficient",
-                      "--set", "sweep.values=[1.5, 19]", ranks=1).report["sweep"]
-    inside = [p for p in sweep["points"] if p["inserted"]]
-    failed = [p["values"][0] for p in inside if p["outcome"] != "converged"]
-    assert 0 < len(failed) == len(set(failed)) and all(18 < mu < 19 for mu in failed)
-    assert f"{len(failed)} of {len(inside)} points put in between failed, the first at friction.coefficient = " in sweep["reason"]
+    """Either rotation opens another one of nine pairs; halfway between nothing slides, and friction has no direction. Modes are
+    followed without that point, which is said once though the step is divided there for several reasons."""
+    sweep = converged(*NINE_PAIRS, "--set", "modes.band=7000", "--set", "friction.coefficient=0.5",
+                      *sweep_of(key="contact.0.rotation.rate", start=-20, end=20, points=2), ranks=1).report["sweep"]
+    assert [(p["values"][0], p["outcome"]) for p in sweep["points"] if p["inserted"]] == [(0, "no equilibrium")]
+    assert "1 of 1 points put in between failed, the first at contact.0.rotation.rate = 0" in sweep["reason"]
 
 
 def test_equilibrium_alone(converged):
     sweep = converged(*PIN, *sweep_of(points=3, stages="equilibrium"), ranks=1).report["sweep"]
     assert [p["closed"] > 0 for p in sweep["points"]] == [True] * 3 and "growth_rate" not in sweep["points"][0]
+    opening = converged(*OSCILLATOR, "--set", "sweep.key=force.0.vector.1", "--set", "sweep.values=[-1, 1]", "--set",
+                        "sweep.stages=equilibrium", ranks=1).report["sweep"]
+    assert [p["closed"] for p in opening["points"]] == [1, 0]  # none is put in between for modes
 
 
 CYCLES = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "sweep.stages=cycle"]

@@ -56,7 +56,7 @@ struct SweepPoint
 {
   std::vector<double> values; // of the swept numbers
   bool reversed = false;      // direction of rotation
-  bool inserted = false;      // between points of the scene, where modes were unclear
+  bool inserted = false;      // between points of the scene: modes were unclear, or pairs open or close
   Outcome outcome;
   int closed = 0;                      // pairs
   int unstable = 0;                    // modes in the band
