@@ -15,7 +15,7 @@ from squeal import Missing
 # Name: what draws it, whether it is of one run only, and what it shows.
 FIGURES = {
     "shape": (plot_shape.draw_shape, False, "The mode that grows fastest, deformed and coloured by how much each place moves; "
-              "beside it one period of the limit cycle."),
+              "beside it one period of the limit cycle, if one was found."),
     "shapes": (plot_shape.draw_shapes, True, "The unstable modes, the fastest growing first."),
     "modes": (plot_stability.draw_modes, False, "Every mode of the sliding brake. Those above zero grow and may squeal."),
     "estimate": (plot_stability.draw_estimate, False, "Power of friction and of damping against amplitude: where they are equal "

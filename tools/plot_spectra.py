@@ -1,7 +1,9 @@
 """Spectra of the probes' velocities, and spectrograms of one of them or of the energy."""
 
+import contextlib
+
 import numpy as np
-from plot_basis import colour, frequency_unit, heading, label_of, plt, strongest, those_with
+from plot_basis import colour, cycle_words, frequency_unit, heading, label_of, plt, strongest, those_with
 from squeal import Missing
 
 REFERENCE = 1e-9  # [m/s], of velocity levels by ISO 1683
@@ -60,27 +62,30 @@ def record_of(run, name):
     return probes, (time[-1] - time[0]) / (len(time) - 1)
 
 
+def spectrum_of_cycle(run):
+    cycle, probes = run.periodic(), run.probes("cycle")
+    if not probes:
+        raise Missing("the scene has no probes")
+    run.series("cycle", "time")
+    return (f"{cycle_words(run)}, harmonics of {cycle['frequency_hz']:.6g} Hz",
+            {name: (*harmonics(values, cycle["period"]), True) for name, values in probes.items()})
+
+
+def spectrum_of_record(run, name):
+    run.stage(name)
+    probes, step = record_of(run, name)
+    half = len(next(iter(probes.values()))) // 2
+    words = "settled motion" if name == "settled" else "second half of the transient"
+    return words, {probe: (*windowed(values[-half:], step), False) for probe, values in probes.items()}
+
+
 def spectra_of(run):
-    """What is drawn of a run: a title, and of each probe its frequencies, amplitudes and whether these are lines."""
-    try:
-        cycle = run.periodic()
-        probes = run.probes("cycle")
-        if not probes:
-            raise Missing("the scene has no probes")
-        run.series("cycle", "time")
-        return (f"limit cycle, harmonics of {cycle['frequency_hz']:.6g} Hz",
-                {name: (*harmonics(values, cycle["period"]), True) for name, values in probes.items()})
-    except Missing:
-        pass
-    for name in ("settled", "transient"):
-        try:
-            run.stage(name)
-            probes, step = record_of(run, name)
-        except Missing:
-            continue
-        half = len(next(iter(probes.values()))) // 2
-        words = "settled motion" if name == "settled" else "second half of the transient"
-        return words, {probe: (*windowed(values[-half:], step), False) for probe, values in probes.items()}
+    """What is drawn of a run: a title, and of each probe its frequencies, amplitudes and whether these are lines. Where no cycle
+    attracts, the settled motion is what is heard."""
+    for find in (lambda: spectrum_of_record(run, "settled"), lambda: spectrum_of_cycle(run),
+                 lambda: spectrum_of_record(run, "transient")):
+        with contextlib.suppress(Missing):
+            return find()
     raise Missing("the run has no motion with probes in time")
 
 
@@ -96,8 +101,8 @@ def draw_spectrum(runs):
         shown = (frequency <= 1.02 * last) & (frequency > 0)
         level = decibel(amplitude[shown])
         words = label_of(run, runs, name) + ("" if (level > top - FLOOR).any() else ", beyond the axes")
-        if is_lines:  # probes side by side at each harmonic
-            beside = frequency[shown] / size + (k - (len(lines) - 1) / 2) * 0.09 / max(len(lines) - 1, 1) * frequency[0] / size * 2
+        if is_lines:  # probes side by side at each harmonic, by what their marks are wide
+            beside = (frequency[shown] + (k - (len(lines) - 1) / 2) * 0.01 * last) / size
             axes.vlines(beside, top - FLOOR, np.maximum(level, top - FLOOR), color=colour(k), lw=1.6, alpha=0.7)
             seen = level > top - FLOOR
             axes.plot(beside[seen], level[seen], "o", ms=4, color=colour(k), label=words)

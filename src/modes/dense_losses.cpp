@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <Eigen/LU>
-#include <Eigen/QR>
+#include <Eigen/SVD>
 
 namespace squeal
 {
@@ -156,70 +156,71 @@ std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<Complex>& ei
 namespace
 {
 
-/// Inverse iteration from the pair's vectors, with lambda by the two-sided Rayleigh quotient.
+/// Newton's method from the pair's right vector, then inverse iteration for the left one of the same lambda, which is
+/// that of the two-sided Rayleigh quotient in the end. Beside lock-in inverse iteration of both sides at once may lead
+/// them to two modes, which share nothing: the quotient is of any size then.
 void refine(const LossyMatrices& problem, TwoSidedPair& pair)
 {
-  constexpr int steps = 10;
-  constexpr double last = 1e-12;   // change of lambda: vectors are off by it
   constexpr double beside = 1e-13; // of lambda, so that no pivot vanishes
-  for (int step = 0; step < steps; ++step)
+  DenseEigenpair right{pair.lambda, pair.right};
+  if (solve_lossy(problem, pair.loss, right))
   {
-    const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, loss_factors(pair.loss, pair.lambda * (1 + beside))));
-    for (int iteration = 0; iteration < 2; ++iteration)
-    {
-      pair.right = factor.solve(pair.right).normalized();
-      pair.left = factor.transpose().solve(pair.left).normalized();
-    }
-    const ComplexFactors factors = loss_factors(pair.loss, pair.lambda);
-    std::array<Complex, 4> products{};
-    Complex residual = 0;
-    for (std::size_t k = 0; k < 4; ++k)
-    {
-      products[k] = pair.left.transpose() * (problem[k] * pair.right);
-      residual += factors[k] * products[k];
-    }
-    const Complex change =
-        eigenvalue_change(slope_of(pair.loss, pair.lambda, products[0], products[1], products[3]), residual);
-    pair.lambda += change;
-    if (!(std::abs(change) > last * std::abs(pair.lambda))) return;
+    pair.lambda = right.lambda;
+    pair.right = right.y;
   }
+  const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, loss_factors(pair.loss, pair.lambda * (1 + beside))));
+  for (int iteration = 0; iteration < 2; ++iteration)
+  {
+    pair.right = factor.solve(pair.right).normalized();
+    pair.left = factor.transpose().solve(pair.left).normalized();
+  }
+  const ComplexFactors factors = loss_factors(pair.loss, pair.lambda);
+  std::array<Complex, 4> products{};
+  Complex residual = 0;
+  for (std::size_t k = 0; k < 4; ++k)
+  {
+    products[k] = pair.left.transpose() * (problem[k] * pair.right);
+    residual += factors[k] * products[k];
+  }
+  pair.lambda += eigenvalue_change(slope_of(pair.loss, pair.lambda, products[0], products[1], products[3]), residual);
 }
 
-/// An orthonormal basis of the real and imaginary parts of vectors of one side, of which some may be parallel. What the
-/// last columns add is the least.
-MatrixXd span_of(const std::vector<TwoSidedPair>& pairs, const std::vector<std::size_t>& places,
-                 VectorXcd TwoSidedPair::*side)
+/// Real and imaginary parts of vectors of one side.
+MatrixXd parts_of(const std::vector<TwoSidedPair>& pairs, const std::vector<std::size_t>& places,
+                  VectorXcd TwoSidedPair::*side)
 {
-  constexpr double independent = 1e-6; // of a start
   MatrixXd parts((pairs[places.front()].*side).size(), 2 * static_cast<Index>(places.size()));
   for (Index column = 0; const std::size_t place : places)
   {
     parts.col(column++) = (pairs[place].*side).real();
     parts.col(column++) = (pairs[place].*side).imag();
   }
-  Eigen::ColPivHouseholderQR<MatrixXd> qr(parts);
-  qr.setThreshold(independent);
-  return qr.householderQ() * MatrixXd::Identity(parts.rows(), qr.rank());
+  return parts;
 }
 
-/// The problem on the span of a few pairs.
+/// The problem on the span of a few pairs, M being 1. It is tested by the left vectors: those of the matrices may have
+/// any other basis.
 struct OnSpan
 {
-  MatrixXd V; // of right vectors
+  MatrixXd V;           // of right vectors
+  MatrixXd coordinates; // of x: times M x
   LossyMatrices problem;
 };
 
-/// It is tested by the left vectors: those of the matrices may have any other basis. M becomes 1.
+/// Directions of both sides go together by the singular vectors of M between them. What either side has by itself, as
+/// where real and imaginary parts are nearly parallel, would leave M singular.
 OnSpan on_span(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pairs,
                const std::vector<std::size_t>& places)
 {
-  MatrixXd V = span_of(pairs, places, &TwoSidedPair::right), W = span_of(pairs, places, &TwoSidedPair::left);
-  const Index size = std::min(V.cols(), W.cols());
-  V = V.leftCols(size).eval();
-  OnSpan result{V, {}};
-  for (std::size_t k = 0; k < 4; ++k) result.problem[k] = W.leftCols(size).transpose() * (problem[k] * V);
-  const Eigen::PartialPivLU<MatrixXd> mass(result.problem[0]);
-  for (MatrixXd& A : result.problem) A = mass.solve(A).eval();
+  constexpr double independent = 1e-6; // of a start
+  const MatrixXd R = parts_of(pairs, places, &TwoSidedPair::right), L = parts_of(pairs, places, &TwoSidedPair::left);
+  Eigen::BDCSVD<MatrixXd> svd(L.transpose() * problem[0] * R, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  svd.setThreshold(independent);
+  const Index rank = svd.rank();
+  OnSpan result{R * svd.matrixV().leftCols(rank), {}, {}};
+  result.coordinates =
+      svd.singularValues().head(rank).cwiseInverse().asDiagonal() * (L * svd.matrixU().leftCols(rank)).transpose();
+  for (std::size_t k = 0; k < 4; ++k) result.problem[k] = result.coordinates * problem[k] * result.V;
   return result;
 }
 
@@ -247,13 +248,13 @@ void add_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
   std::vector<std::size_t> solved;
   for (const NeighbouringPairs& group : neighbouring_pairs(eigenvalues))
   {
-    const auto [V, small] = on_span(problem, without, group.places);
+    const auto [V, coordinates, small] = on_span(problem, without, group.places);
     for (std::size_t k = group.first; k < group.end; ++k)
     {
       TwoSidedPair& pair = pairs[group.places[k]];
-      pair.right = (V.transpose() * pair.right).normalized();
+      pair.right = (coordinates * (problem[0] * pair.right)).normalized();
       follow_losses(small, pair);
-      pair.right = V * pair.right;
+      pair.right = (V * pair.right).normalized();
       refine(problem, pair);
       solved.push_back(group.places[k]);
     }

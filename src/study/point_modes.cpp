@@ -358,7 +358,7 @@ bool complete(ModesBasis& modes, const PointProblem& problem)
   if (size > problem.dense_limit) return false;
   MultiVector all{modes.basis.T.comm, MatrixXd::Zero(modes.basis.T.entries.rows(), size)};
   all.entries.middleCols(first, all.entries.rows()).setIdentity();
-  modes.whole = true;
+  modes.whole_up_to = 1;
   return extend(modes.basis, std::move(all)) > 0;
 }
 
@@ -474,7 +474,8 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   if (at_start) modes.shared = modes.basis.shapes();
   const double end = two_pi * followed_band * problem.band;
   const Window window{vibration_floor(modes.norms), end * end};
-  Extent extent = modes.whole || modes.basis.shapes() <= small_basis ? Extent::whole : Extent::near_band;
+  Extent extent =
+      problem.tolerance <= modes.whole_up_to || modes.basis.shapes() <= small_basis ? Extent::whole : Extent::near_band;
   double before = HUGE_VAL, first = 0;
   for (PetscInt pass = 0;; ++pass)
   {
@@ -486,7 +487,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
     {
       SolvedPairs whole = solve_projected(modes, on_basis, window, Extent::whole);
       const double of_whole = largest_excess(whole, problem);
-      modes.whole = of_whole < slow * now; // the undamped modes leave out more than the basis does
+      if (of_whole < slow * now) modes.whole_up_to = problem.tolerance; // the undamped modes leave out more than T does
       extent = Extent::whole;
       solved = std::move(whole);
       now = of_whole;

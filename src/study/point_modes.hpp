@@ -16,7 +16,7 @@ struct GrownBasis
 {
   SlidingBasis basis;
   std::vector<char> attached{}; // pairs beyond those closed at every point whose static shapes the basis holds
-  bool whole = false;           // undamped modes in and near the band were not enough to solve on
+  double whole_up_to = 0;       // tolerances for which undamped modes in and near the band were not enough to solve on
 };
 
 /// Modes of the frictionless structure in and beyond the band, corrected wherever a point needs it: those of the
