@@ -214,7 +214,7 @@ OnSpan on_span(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pa
 {
   constexpr double independent = 1e-6; // of a start
   const MatrixXd R = parts_of(pairs, places, &TwoSidedPair::right), L = parts_of(pairs, places, &TwoSidedPair::left);
-  Eigen::BDCSVD<MatrixXd> svd(L.transpose() * problem[0] * R, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  Eigen::JacobiSVD<MatrixXd> svd(L.transpose() * problem[0] * R, Eigen::ComputeThinU | Eigen::ComputeThinV);
   svd.setThreshold(independent);
   const Index rank = svd.rank();
   OnSpan result{R * svd.matrixV().leftCols(rank), {}, {}};

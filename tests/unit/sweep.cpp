@@ -75,6 +75,39 @@ TEST_CASE("pairs take losses at their own frequency, with both vectors, whatever
   }
 }
 
+TEST_CASE("modes keep themselves as they take losses, however near to lock-in and however little damped without")
+{
+  std::mt19937 generator(3);
+  std::uniform_real_distribution<double> random(-1, 1);
+  const int n = 60; // more than neighbours hold, so that their span is not the whole space
+  const auto matrix = [&] { return MatrixXd::NullaryExpr(n, n, [&] { return random(generator); }).eval(); };
+  const MatrixXd M = MatrixXd::Identity(n, n), damping = matrix(), coupling = matrix();
+  MatrixXd part = matrix().leftCols(10);
+  for (const double distance : {1e-1, 1e-3, -1e-3, -1e-1})
+    for (const double damped : {1e-2, 1e-4, 1e-6, 1e-8})
+    {
+      MatrixXd K = Eigen::VectorXd::LinSpaced(n, 10, 600).asDiagonal();
+      K.bottomRightCorner(30, 30) *= 1e4;
+      K.block(20, 20, 2, 2) << 210, 5, -5, 220 + 10 * distance; // the two meet at distance 0
+      K += damped * coupling;
+      const LossyMatrices problem{M, damped * damping, K, 1e-2 * K + 0.1 * part * part.transpose()};
+      const std::vector<TwoSidedPair> without = solve_two_sided_shared(PETSC_COMM_WORLD, M, problem[1], K);
+      std::vector<TwoSidedPair> pairs = without;
+      add_losses_shared(PETSC_COMM_WORLD, problem, pairs);
+      for (std::size_t i = 0; i < pairs.size(); ++i)
+      {
+        const auto& [lambda, right, left, loss] = pairs[i];
+        INFO("distance ", distance, " damped ", damped, " lambda ", without[i].lambda.real(), " ",
+             without[i].lambda.imag());
+        const MatrixXcd Q = sum(problem, loss_factors(loss, lambda));
+        const double size = std::norm(lambda) + std::abs(lambda) * damped + K.norm();
+        CHECK((Q * right).norm() < 1e-11 * size);
+        CHECK((left.transpose() * Q).norm() < 1e-11 * size);
+        for (std::size_t j = 0; j < i; ++j) CHECK(std::abs(lambda - pairs[j].lambda) > 1e-6 * std::abs(lambda));
+      }
+    }
+}
+
 TEST_CASE("one loss factor everywhere gives the closed form of its viscous equivalent")
 {
   const MatrixXd one = MatrixXd::Identity(1, 1);
