@@ -479,6 +479,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   double before = HUGE_VAL, first = 0;
   for (PetscInt pass = 0;; ++pass)
   {
+    problem.end_if_asked();
     const ProjectedSliding on_basis = project(modes.basis, point.contact, interface.B, point.damping, point.stiffness);
     SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
     if (extent == Extent::near_band) refine_few(modes, on_basis, problem, solved);

@@ -8,6 +8,8 @@
 #include "squeal/modes/quadratic.hpp"
 #include "squeal/study/sweep.hpp"
 
+#include <functional>
+
 namespace squeal
 {
 
@@ -63,6 +65,7 @@ struct PointProblem
   double tolerance = 0;     // on the backward error of right and left vectors
   PetscInt passes = 0;      // corrections of the basis, at most
   PetscInt dense_limit = 0; // up to this size a problem that these leave inexact is solved on all degrees of freedom
+  const std::function<void()>& end_if_asked; // called before each solution
 };
 
 /// Vectors are coefficients of the basis; those of earlier points lack the shapes that came later.

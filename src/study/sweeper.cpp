@@ -30,7 +30,7 @@ class Sweeper
 {
 public:
   Sweeper(const SweepProblem& problem, SharePlace place)
-      : problem_(problem), model_(problem, place.comm), place_(std::move(place)),
+      : problem_(problem), model_(problem, place.comm, [this] { end_if_asked_here(); }), place_(std::move(place)),
         sweep_(kept_sweep(place_.checkpoint, place_.comm)),
         kept_(static_cast<std::size_t>(std::ranges::count(sweep_.points, false, &SweepPoint::inserted)))
   {
@@ -353,8 +353,8 @@ private:
   bool divided_at_contact_change(Followed& before, Followed& now, int depth, Division& division)
   {
     if (division.left-- <= 0) return false;
-    const std::optional<ContactChange> change = model_.contact_change(
-        {before.values, before.reversed}, {now.values, now.reversed}, division.tolerance, [&] { end_if_asked_here(); });
+    const std::optional<ContactChange> change =
+        model_.contact_change({before.values, before.reversed}, {now.values, now.reversed}, division.tolerance);
     if (!change) return false;
     if (change->failed) evaluate(between_points(now, *change->failed));
     if (change->failed) return false;

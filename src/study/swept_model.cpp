@@ -30,8 +30,9 @@ std::vector<double> without_friction(std::vector<double> values, const SweepSett
 
 } // namespace
 
-SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm)
-    : problem_(problem), comm_(comm), equilibrium_options_(checked_if_asked(problem.equilibrium_options))
+SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked)
+    : problem_(problem), comm_(comm), end_if_asked_(std::move(end_if_asked)),
+      equilibrium_options_(checked_if_asked(problem.equilibrium_options))
 {
 }
 
@@ -145,7 +146,8 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
                                        problem_.modes.band,
                                        tolerance,
                                        problem_.options.passes,
-                                       problem_.modes_options.dense_limit});
+                                       problem_.modes_options.dense_limit,
+                                       end_if_asked_});
   }
   catch (const LibraryError&)
   {
@@ -169,8 +171,7 @@ bool SweptModel::same_pairs_closed(const SweptPlace& a, const SweptPlace& b)
   return equilibrium_at(a).closed == equilibrium_at(b).closed && rigid_at(a) == rigid_at(b);
 }
 
-std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, const SweptPlace& to, double tolerance,
-                                                        const std::function<void()>& end_if_asked)
+std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, const SweptPlace& to, double tolerance)
 {
   const Equilibrium &first = equilibrium_at(from), &last = equilibrium_at(to);
   const std::size_t pairs = first.closed.size();
@@ -190,7 +191,7 @@ std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, 
   std::vector<SweptPlace> visited;
   const auto contact = [&](double value) -> std::optional<double>
   {
-    end_if_asked();
+    end_if_asked_();
     SweptPlace place = to;
     place.values[0] = value;
     visited.push_back(place);

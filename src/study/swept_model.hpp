@@ -3,6 +3,7 @@
 /// its modes.
 #include "following.hpp"
 
+#include <functional>
 #include <map>
 #include <optional>
 
@@ -19,7 +20,9 @@ struct ContactChange
 class SweptModel
 {
 public:
-  SweptModel(const SweepProblem& problem, MPI_Comm comm);
+  /// Calls `end_if_asked` between parts of long work: equilibria of a search, corrections of the basis.
+  SweptModel(
+      const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked = [] {});
 
   /// Finds the equilibrium of a point. The pairs that are closed at all points prepared are those of the basis.
   void prepare(const SweptPlace& place);
@@ -39,10 +42,8 @@ public:
   bool same_pairs_closed(const SweptPlace& a, const SweptPlace& b);
 
   /// The first change of contact that is found on the way between two points of a line: of a pair that is closed at one
-  /// of them alone, to `tolerance` of the first number; nothing: there is none. Calls `end_if_asked` at each
-  /// equilibrium.
-  std::optional<ContactChange> contact_change(const SweptPlace& from, const SweptPlace& to, double tolerance,
-                                              const std::function<void()>& end_if_asked);
+  /// of them alone, to `tolerance` of the first number; nothing: there is none.
+  std::optional<ContactChange> contact_change(const SweptPlace& from, const SweptPlace& to, double tolerance);
 
   /// Between the modes of two points of a line.
   ModeForms forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to, const PointModes& second);
@@ -66,6 +67,7 @@ private:
 
   const SweepProblem& problem_;
   MPI_Comm comm_;
+  std::function<void()> end_if_asked_;
   EquilibriumOptions equilibrium_options_;
   std::optional<BrakeModel> model_{}; // at the point visited last
   SweptPlace at_{};
