@@ -103,12 +103,13 @@ bool solve_with_share(const LossyMatrices& problem, LossKind kind, double share,
 }
 
 /// The pair of all losses that a pair without them becomes as they grow; nothing where it ends on the way. The steps
-/// move lambda by about an eighth of its imaginary part.
-std::optional<DenseEigenpair> grown(const LossyMatrices& problem, LossKind kind, DenseEigenpair pair)
+/// move lambda by about an eighth of its imaginary part, or a `finer` part of that.
+std::optional<DenseEigenpair> grown(const LossyMatrices& problem, LossKind kind, DenseEigenpair pair, int finer)
 {
   const auto form = [&](const MatrixXd& A) { return std::abs(pair.y.dot(A * pair.y)); };
   const double loss = form(problem[3]) / form(problem[2]);
-  const int steps = 1 + static_cast<int>(std::min(8 * loss * std::abs(pair.lambda) / pair.lambda.imag(), 40.));
+  const int steps =
+      finer * (1 + static_cast<int>(std::min(8 * loss * std::abs(pair.lambda) / pair.lambda.imag(), 40.)));
   for (int step = 1; step <= steps; ++step)
     if (!solve_with_share(problem, kind, static_cast<double>(step) / steps, pair)) return std::nullopt;
   return pair;
@@ -126,10 +127,10 @@ bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex)
   return std::abs(viscous.lambda - complex.lambda) < 0.5 * std::abs(viscous.lambda);
 }
 
-LossyMode with_losses(const LossyMatrices& problem, const DenseEigenpair& without)
+LossyMode with_losses(const LossyMatrices& problem, const DenseEigenpair& without, int finer)
 {
-  const std::optional<DenseEigenpair> viscous = grown(problem, LossKind::viscous, without);
-  LossyMode mode{viscous.value_or(without), grown(problem, LossKind::complex, without).value_or(without)};
+  const std::optional<DenseEigenpair> viscous = grown(problem, LossKind::viscous, without, finer);
+  LossyMode mode{viscous.value_or(without), grown(problem, LossKind::complex, without, finer).value_or(without)};
   if (!viscous || !is_equivalent(*viscous, mode.complex)) mode.taken = LossKind::complex;
   return mode;
 }
@@ -228,13 +229,14 @@ OnSpan on_span(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pa
 bool are_one(const TwoSidedPair& a, const TwoSidedPair& b)
 {
   constexpr double same = 1e-8; // of two defective pairs lambdas and vectors are as far apart as rounding's root
-  return std::abs(a.lambda - b.lambda) < same * std::abs(a.lambda) && 1 - std::abs(a.right.dot(b.right)) < same * same;
+  const double apart = (a.right - b.right.dot(a.right) * b.right).norm();
+  return std::abs(a.lambda - b.lambda) < same * std::abs(a.lambda) && apart < 0.1 * same;
 }
 
 /// What a pair without losses becomes with them on these matrices, followed all the way.
-void follow_losses(const LossyMatrices& problem, TwoSidedPair& pair)
+void follow_losses(const LossyMatrices& problem, TwoSidedPair& pair, int finer = 1)
 {
-  const LossyMode mode = with_losses(problem, {pair.lambda, pair.right});
+  const LossyMode mode = with_losses(problem, {pair.lambda, pair.right}, finer);
   pair.lambda = mode.pair().lambda;
   pair.right = mode.pair().y;
   pair.loss = mode.taken;
@@ -259,14 +261,18 @@ void add_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
       solved.push_back(group.places[k]);
     }
   }
+  std::vector<char> again(pairs.size(), 0);
   for (std::size_t k = 1; k < solved.size(); ++k)
-    if (are_one(pairs[solved[k - 1]], pairs[solved[k]]))
-      for (const std::size_t place : {solved[k - 1], solved[k]})
-      {
-        pairs[place] = without[place];
-        follow_losses(problem, pairs[place]);
-        refine(problem, pairs[place]);
-      }
+    for (std::size_t l = 0; l < k; ++l)
+      if (are_one(pairs[solved[l]], pairs[solved[k]])) again[solved[l]] = again[solved[k]] = 1;
+  for (const std::size_t place : solved)
+  {
+    constexpr int finer = 16; // near lock-in one step goes over to the other mode
+    if (!again[place]) continue;
+    pairs[place] = without[place];
+    follow_losses(problem, pairs[place], finer);
+    refine(problem, pairs[place]);
+  }
 }
 
 } // namespace
