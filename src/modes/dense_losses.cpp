@@ -225,7 +225,7 @@ OnSpan on_span(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pa
   return result;
 }
 
-/// Whether inverse iteration led two pairs to one.
+/// Whether Newton's method led two pairs to one.
 bool are_one(const TwoSidedPair& a, const TwoSidedPair& b)
 {
   constexpr double same = 1e-8; // of two defective pairs lambdas and vectors are as far apart as rounding's root

@@ -21,8 +21,8 @@ namespace squeal
 namespace
 {
 
-/// Backward errors on a large model, and at points put in between on any: they leave the eigenvalues of the brake of 33
-/// 224 degrees of freedom within 3e-5 of those at 1e-10, half of them within 7e-8.
+/// Backward errors on a large model, and at points put in between on any: they leave the eigenvalues of the brake of
+/// 33 224 degrees of freedom within 3e-5 of those at 1e-10, half of them within 7e-8.
 constexpr double large_tolerance = 1e-6;
 constexpr double threshold_tolerance = 1e-5; // of the number's larger end
 
@@ -314,7 +314,7 @@ private:
   struct Division
   {
     double tolerance = 0;    // of the first number: what is found between two points is found to it
-    std::ptrdiff_t left = 0; // changes of contact to be sought
+    std::ptrdiff_t left = 0; // changes of contact that may still divide it
   };
 
   /// Each pair changes once on the way, or a few do more often; more say that equilibria jump.
@@ -352,12 +352,16 @@ private:
   /// Modes jump where pairs open or close: a mode may be unstable up to there alone, and neither end shows it.
   bool divided_at_contact_change(Followed& before, Followed& now, int depth, Division& division)
   {
-    if (division.left-- <= 0) return false;
+    if (division.left == 0) return false;
     const std::optional<ContactChange> change =
         model_.contact_change({before.values, before.reversed}, {now.values, now.reversed}, division.tolerance);
     if (!change) return false;
-    if (change->failed) evaluate(between_points(now, *change->failed));
-    if (change->failed) return false;
+    --division.left;
+    if (change->failed)
+    {
+      evaluate(between_points(now, *change->failed)); // which records it
+      return false;
+    }
     std::deque<Followed> sides; // which stay where they are
     for (const double value : {change->before, change->behind})
     {

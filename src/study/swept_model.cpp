@@ -179,8 +179,7 @@ std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, 
   if (last.closed.size() != pairs || changing.in1 == first.closed.end()) return std::nullopt;
   const auto pair = static_cast<std::size_t>(changing.in1 - first.closed.begin());
 
-  // The reaction of the pair, and less its gap, each over its value at its end: continuous, and zero at the change
-  // alone
+  // The pair's reaction, or less its gap, over the value at its own end: continuous, and zero at the change alone
   const auto reaction = [&](const Equilibrium& at) { return PairView(at.reactions, at.directions).normal(pair); };
   const bool opens = first.closed[pair];
   const auto scale = [](double at_end) { return at_end > 0 ? at_end : 1; };

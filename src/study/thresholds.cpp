@@ -72,7 +72,7 @@ std::vector<Group> groups_between(const Followed& a, const Followed& b, const st
   return groups;
 }
 
-/// Whether a mode of the group becomes unstable or stable, as far as its modes can be told apart.
+/// Whether a mode of the group becomes unstable or stable, as far as its modes can be distinguished.
 bool changes(const Followed& a, const Followed& b, const Group& group)
 {
   if (!group.matched) return unstable_among(a, group.from) != unstable_among(b, group.to);
