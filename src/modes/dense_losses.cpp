@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SVD>
+#include <numeric>
 
 namespace squeal
 {
@@ -21,6 +23,7 @@ constexpr std::size_t in_group = 16;  // pairs of neighbouring frequency, of whi
 constexpr std::size_t neighbours = 3; // at each end
 constexpr int newton_steps = 60;      // each divides the error of omega by about 2/eta^2
 constexpr double settled = 1e-12;     // last change of lambda over |lambda|: beyond, there is no fixed point
+constexpr double beside = 1e-13;      // of lambda: where no pivot vanishes
 constexpr double oscillating = 1e-6;  // Im(lambda) over |lambda|: below it is the rounding of two real ones
 
 } // namespace
@@ -73,53 +76,178 @@ MatrixXcd sum(const LossyMatrices& A, const ComplexFactors& factors)
 namespace
 {
 
-/// Derivatives of the factors in lambda, at a constant omega.
-ComplexFactors derivatives(LossKind kind, Complex lambda)
+/// Loss factors on their way from none: a share of i + own Re(lambda)/Im(lambda). They grow to those of the complex
+/// problem first, which has no fixed point to find, and become their viscous equivalent from there.
+struct Losses
 {
-  return {2. * lambda, 1, 0, kind == LossKind::viscous ? 1 / lambda.imag() : 0};
+  double share = 0, own = 0;
+};
+
+constexpr Losses none{0, 0}, complex_loss{1, 0}, viscous_loss{1, 1};
+
+ComplexFactors factors_at(const Losses& losses, Complex lambda)
+{
+  return {lambda * lambda, lambda, 1, losses.share * Complex(losses.own * lambda.real() / lambda.imag(), 1)};
 }
 
-/// Newton's method on (lambda, y) with a share of K_loss, and with omega taken from the last lambda. Returns whether it
-/// found a pair that oscillates.
-bool solve_with_share(const LossyMatrices& problem, LossKind kind, double share, DenseEigenpair& pair)
+/// Derivatives of the factors in lambda, at a constant omega.
+ComplexFactors derivatives_at(const Losses& losses, Complex lambda)
+{
+  return {2. * lambda, 1, 0, losses.share * losses.own / lambda.imag()};
+}
+
+/// Newton's method on (lambda, y), with omega taken from the last lambda. Returns whether it found a pair that
+/// oscillates.
+bool solve_at(const LossyMatrices& problem, const Losses& losses, Complex& lambda, VectorXcd& y)
 {
   double last = HUGE_VAL;
   for (int step = 0; step < newton_steps && last > 1e-15; ++step)
   {
-    if (!(pair.lambda.imag() > settled * std::abs(pair.lambda))) return false;
-    ComplexFactors factor = loss_factors(kind, pair.lambda), slope = derivatives(kind, pair.lambda);
-    factor[3] *= share;
-    slope[3] *= share;
-    const VectorXcd x = Eigen::PartialPivLU<MatrixXcd>(sum(problem, factor)).solve(sum(problem, slope) * pair.y);
+    if (!(lambda.imag() > settled * std::abs(lambda))) return false;
+    const VectorXcd x = Eigen::PartialPivLU<MatrixXcd>(sum(problem, factors_at(losses, lambda)))
+                            .solve(sum(problem, derivatives_at(losses, lambda)) * y);
     if (!x.allFinite()) return true; // singular: lambda is an eigenvalue to rounding
-    const Complex change = pair.y.squaredNorm() / pair.y.dot(x);
-    const double now = std::abs(change) / std::abs(pair.lambda);
+    const Complex change = y.squaredNorm() / y.dot(x);
+    const double now = std::abs(change) / std::abs(lambda);
     if (last <= settled && now > last) return true; // beside a multiple eigenvalue x is rounding
-    pair.y = x.normalized();
-    pair.lambda -= change;
+    y = x.normalized();
+    lambda -= change;
     last = now;
   }
-  return last <= settled && pair.lambda.imag() > settled * std::abs(pair.lambda);
+  return last <= settled && lambda.imag() > settled * std::abs(lambda);
 }
 
-/// The pair of all losses that a pair without them becomes as they grow; nothing where it ends on the way. The steps
-/// move lambda by about an eighth of its imaginary part, or a `finer` part of that.
-std::optional<DenseEigenpair> grown(const LossyMatrices& problem, LossKind kind, DenseEigenpair pair, int finer)
+/// The left vector that belongs to lambda and the right one, by inverse iteration from its conjugate: their product
+/// without conjugation, which says how much of the left vector the start has, is 1.
+void find_left(const LossyMatrices& problem, const Losses& losses, TwoSidedPair& pair)
 {
-  const auto form = [&](const MatrixXd& A) { return std::abs(pair.y.dot(A * pair.y)); };
-  const double loss = form(problem[3]) / form(problem[2]);
-  const int steps =
-      finer * (1 + static_cast<int>(std::min(8 * loss * std::abs(pair.lambda) / pair.lambda.imag(), 40.)));
-  for (int step = 1; step <= steps; ++step)
-    if (!solve_with_share(problem, kind, static_cast<double>(step) / steps, pair)) return std::nullopt;
-  return pair;
+  const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, factors_at(losses, pair.lambda * (1 + beside))));
+  pair.left = pair.right.conjugate();
+  for (int iteration = 0; iteration < 2; ++iteration) pair.left = factor.transpose().solve(pair.left).normalized();
+}
+
+/// Vectors of one side as columns.
+MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, VectorXcd TwoSidedPair::*side)
+{
+  MatrixXcd vectors((pairs.front().*side).size(), static_cast<Index>(pairs.size()));
+  for (Index column = 0; const TwoSidedPair& pair : pairs) vectors.col(column++) = pair.*side;
+  return vectors;
+}
+
+/// The pairs after a change of their losses, to first order in it: the problem on the states (y, lambda y) of all of
+/// them, where near neighbours mix at once while no two become one. Each keeps the place that it has most of.
+std::vector<TwoSidedPair> changed_together(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pairs,
+                                           const Losses& from, const Losses& to)
+{
+  const auto count = static_cast<Index>(pairs.size());
+  const MatrixXcd right = vectors_of(pairs, &TwoSidedPair::right), left = vectors_of(pairs, &TwoSidedPair::left);
+  MatrixXcd H = left.transpose() * (problem[3] * right);
+  const VectorXcd mass = (left.array() * (problem[0] * right).array()).colwise().sum(),
+                  damping = (left.array() * (problem[1] * right).array()).colwise().sum();
+  for (Index i = 0; i < count; ++i)
+  {
+    const Complex lambda = pairs[static_cast<std::size_t>(i)].lambda;
+    H.row(i) *= (factors_at(from, lambda)[3] - factors_at(to, lambda)[3]) / (2. * lambda * mass(i) + damping(i));
+    H(i, i) += lambda;
+  }
+  if (!H.allFinite()) return pairs;
+  const Eigen::ComplexEigenSolver<MatrixXcd> solver(H);
+  if (solver.info() != Eigen::Success) return pairs;
+  const MatrixXcd mixed = right * solver.eigenvectors();
+  Eigen::MatrixXd parts = solver.eigenvectors().cwiseAbs();
+  std::vector<TwoSidedPair> changed = pairs;
+  for (Index rest = 0; rest < count; ++rest)
+  {
+    Index place = 0, column = 0;
+    parts.maxCoeff(&place, &column);
+    TwoSidedPair& pair = changed[static_cast<std::size_t>(place)];
+    pair.lambda = solver.eigenvalues()(column);
+    pair.right = mixed.col(column).normalized();
+    parts.row(place).setConstant(-1);
+    parts.col(column).setConstant(-1);
+  }
+  return changed;
+}
+
+/// Whether Newton's method led two pairs to one.
+bool are_one(const TwoSidedPair& a, const TwoSidedPair& b)
+{
+  constexpr double same = 1e-8; // of two defective pairs lambdas and vectors are as far apart as rounding's root
+  const double apart = (a.right - b.right.dot(a.right) * b.right).norm();
+  return std::abs(a.lambda - b.lambda) < same * std::abs(a.lambda) && apart < 0.1 * same;
+}
+
+/// The pairs that another one is the same as.
+std::vector<char> doubled(const std::vector<TwoSidedPair>& pairs)
+{
+  std::vector<char> result(pairs.size(), 0);
+  for (std::size_t k = 1; k < pairs.size(); ++k)
+    for (std::size_t l = 0; l < k; ++l)
+      if (are_one(pairs[l], pairs[k])) result[l] = result[k] = 1;
+  return result;
+}
+
+/// Follows pairs together from the one kind of losses to the other, in at least so many steps: in shorter ones where
+/// Newton's method fails or leads two pairs to one. Nothing is left of pairs that end on the way.
+std::vector<std::optional<TwoSidedPair>> follow(const LossyMatrices& problem, std::vector<TwoSidedPair> pairs,
+                                                const Losses& from, const Losses& to, int steps)
+{
+  constexpr double shortest = 1. / 64; // of a step: a pair that fails in these has ended
+  std::vector<std::optional<TwoSidedPair>> result(pairs.size());
+  std::vector<std::size_t> places(pairs.size());
+  std::iota(places.begin(), places.end(), 0);
+  const auto between = [&](double part) {
+    return Losses{from.share + part * (to.share - from.share), from.own + part * (to.own - from.own)};
+  };
+  double at = 0, step = 1. / steps;
+  while (at < 1 && !pairs.empty())
+  {
+    const double next = at + 1.5 * step < 1 ? at + step : 1;
+    const Losses losses = between(next);
+    for (TwoSidedPair& pair : pairs) find_left(problem, between(at), pair);
+    std::vector<TwoSidedPair> tried = changed_together(problem, pairs, between(at), losses);
+    std::vector<char> found;
+    for (TwoSidedPair& pair : tried) found.push_back(solve_at(problem, losses, pair.lambda, pair.right) ? 1 : 0);
+    const auto all = [](const std::vector<char>& flags, char value)
+    { return std::ranges::count(flags, value) == std::ssize(flags); };
+    if (step * steps > shortest && !(all(found, 1) && all(doubled(tried), 0)))
+    {
+      step /= 2;
+      continue;
+    }
+    pairs.clear();
+    std::vector<std::size_t> left;
+    for (std::size_t k = 0; k < tried.size(); ++k)
+      if (found[k])
+      {
+        pairs.push_back(std::move(tried[k]));
+        left.push_back(places[k]);
+      }
+    places = std::move(left);
+    at = next;
+    step = std::min(2 * step, 1. / steps);
+  }
+  for (std::size_t k = 0; k < places.size(); ++k) result[places[k]] = std::move(pairs[k]);
+  return result;
+}
+
+/// Steps that move each lambda by about an eighth of its imaginary part.
+int steps_to_losses(const LossyMatrices& problem, const std::vector<DenseEigenpair>& without)
+{
+  double moves = 0;
+  for (const auto& [lambda, y] : without)
+  {
+    const auto form = [&](const MatrixXd& A) { return std::abs(y.dot(A * y)); };
+    moves = std::max(moves, form(problem[3]) / form(problem[2]) * std::abs(lambda) / lambda.imag());
+  }
+  return 1 + static_cast<int>(std::min(8 * moves, 40.));
 }
 
 } // namespace
 
 bool solve_lossy(const LossyMatrices& problem, LossKind kind, DenseEigenpair& pair)
 {
-  return solve_with_share(problem, kind, 1, pair);
+  return solve_at(problem, kind == LossKind::viscous ? viscous_loss : complex_loss, pair.lambda, pair.y);
 }
 
 bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex)
@@ -127,12 +255,34 @@ bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex)
   return std::abs(viscous.lambda - complex.lambda) < 0.5 * std::abs(viscous.lambda);
 }
 
-LossyMode with_losses(const LossyMatrices& problem, const DenseEigenpair& without, int finer)
+std::vector<LossyMode> with_losses(const LossyMatrices& problem, const std::vector<DenseEigenpair>& without)
 {
-  const std::optional<DenseEigenpair> viscous = grown(problem, LossKind::viscous, without, finer);
-  LossyMode mode{viscous.value_or(without), grown(problem, LossKind::complex, without, finer).value_or(without)};
-  if (!viscous || !is_equivalent(*viscous, mode.complex)) mode.taken = LossKind::complex;
-  return mode;
+  std::vector<TwoSidedPair> pairs;
+  std::vector<LossyMode> modes;
+  for (const DenseEigenpair& pair : without)
+  {
+    pairs.push_back({pair.lambda, pair.y, {}});
+    modes.push_back({pair, pair, LossKind::complex});
+  }
+  const auto complex = follow(problem, std::move(pairs), none, complex_loss, steps_to_losses(problem, without));
+  std::vector<std::size_t> places;
+  pairs.clear();
+  for (std::size_t k = 0; k < modes.size(); ++k)
+  {
+    if (!complex[k]) continue;
+    modes[k].complex = {complex[k]->lambda, complex[k]->right};
+    pairs.push_back(*complex[k]);
+    places.push_back(k);
+  }
+  const auto viscous = follow(problem, std::move(pairs), complex_loss, viscous_loss, 1);
+  for (std::size_t i = 0; i < places.size(); ++i)
+  {
+    LossyMode& mode = modes[places[i]];
+    if (!viscous[i]) continue;
+    mode.viscous = {viscous[i]->lambda, viscous[i]->right};
+    if (is_equivalent(mode.viscous, mode.complex)) mode.taken = LossKind::viscous;
+  }
+  return modes;
 }
 
 std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<Complex>& eigenvalues)
@@ -142,9 +292,15 @@ std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<Complex>& ei
     if (eigenvalues[i].imag() > oscillating * std::abs(eigenvalues[i])) order.push_back(i);
   std::ranges::sort(order, {}, [&](std::size_t i) { return eigenvalues[i].imag(); });
   std::vector<NeighbouringPairs> groups;
-  for (std::size_t first = 0; first < order.size(); first += in_group)
+  for (std::size_t first = 0, end = 0; first < order.size(); first = end)
   {
-    const std::size_t end = std::min(first + in_group, order.size());
+    end = std::min(first + in_group, order.size());
+    if (end < order.size()) // at the widest of the last gaps: near neighbours mix, and stay together
+    {
+      const auto gap = [&](std::size_t i) { return eigenvalues[order[i]].imag() - eigenvalues[order[i - 1]].imag(); };
+      for (std::size_t i = end - 1; i > first + in_group / 2; --i)
+        if (gap(i) > gap(end)) end = i;
+    }
     const std::size_t from = first < neighbours ? 0 : first - neighbours, to = std::min(end + neighbours, order.size());
     groups.push_back(
         {{order.begin() + static_cast<std::ptrdiff_t>(from), order.begin() + static_cast<std::ptrdiff_t>(to)},
@@ -162,7 +318,6 @@ namespace
 /// them to two modes, which share nothing: the quotient is of any size then.
 void refine(const LossyMatrices& problem, TwoSidedPair& pair)
 {
-  constexpr double beside = 1e-13; // of lambda, so that no pivot vanishes
   DenseEigenpair right{pair.lambda, pair.right};
   if (solve_lossy(problem, pair.loss, right))
   {
@@ -225,21 +380,21 @@ OnSpan on_span(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pa
   return result;
 }
 
-/// Whether Newton's method led two pairs to one.
-bool are_one(const TwoSidedPair& a, const TwoSidedPair& b)
+/// The pairs at these places, followed together; `coordinates` turn their right vectors into those of the problem, and
+/// V takes them back.
+void follow_losses(const LossyMatrices& problem, const std::vector<std::size_t>& places,
+                   std::vector<TwoSidedPair>& pairs)
 {
-  constexpr double same = 1e-8; // of two defective pairs lambdas and vectors are as far apart as rounding's root
-  const double apart = (a.right - b.right.dot(a.right) * b.right).norm();
-  return std::abs(a.lambda - b.lambda) < same * std::abs(a.lambda) && apart < 0.1 * same;
-}
-
-/// What a pair without losses becomes with them on these matrices, followed all the way.
-void follow_losses(const LossyMatrices& problem, TwoSidedPair& pair, int finer = 1)
-{
-  const LossyMode mode = with_losses(problem, {pair.lambda, pair.right}, finer);
-  pair.lambda = mode.pair().lambda;
-  pair.right = mode.pair().y;
-  pair.loss = mode.taken;
+  std::vector<DenseEigenpair> without;
+  for (const std::size_t place : places) without.push_back({pairs[place].lambda, pairs[place].right});
+  const std::vector<LossyMode> modes = with_losses(problem, without);
+  for (std::size_t k = 0; k < places.size(); ++k)
+  {
+    TwoSidedPair& pair = pairs[places[k]];
+    pair.lambda = modes[k].pair().lambda;
+    pair.right = modes[k].pair().y;
+    pair.loss = modes[k].taken;
+  }
 }
 
 void add_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
@@ -248,31 +403,35 @@ void add_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
   for (const TwoSidedPair& pair : pairs) eigenvalues.push_back(pair.lambda);
   const std::vector<TwoSidedPair> without = pairs;
   std::vector<std::size_t> solved;
+  std::vector<TwoSidedPair> with;
   for (const NeighbouringPairs& group : neighbouring_pairs(eigenvalues))
   {
     const auto [V, coordinates, small] = on_span(problem, without, group.places);
+    std::vector<TwoSidedPair> on_group = without;
+    for (const std::size_t place : group.places)
+      on_group[place].right = (coordinates * (problem[0] * without[place].right)).normalized();
+    follow_losses(small, group.places, on_group);
     for (std::size_t k = group.first; k < group.end; ++k)
     {
-      TwoSidedPair& pair = pairs[group.places[k]];
-      pair.right = (coordinates * (problem[0] * pair.right)).normalized();
-      follow_losses(small, pair);
+      TwoSidedPair& pair = on_group[group.places[k]];
       pair.right = (V * pair.right).normalized();
       refine(problem, pair);
       solved.push_back(group.places[k]);
+      with.push_back(std::move(pair));
     }
   }
-  std::vector<char> again(pairs.size(), 0);
-  for (std::size_t k = 1; k < solved.size(); ++k)
-    for (std::size_t l = 0; l < k; ++l)
-      if (are_one(pairs[solved[l]], pairs[solved[k]])) again[solved[l]] = again[solved[k]] = 1;
-  for (const std::size_t place : solved)
+  std::vector<std::size_t> again;
+  const std::vector<char> twice = doubled(with);
+  for (std::size_t k = 0; k < solved.size(); ++k)
   {
-    constexpr int finer = 16; // near lock-in one step goes over to the other mode
-    if (!again[place]) continue;
-    pairs[place] = without[place];
-    follow_losses(problem, pairs[place], finer);
-    refine(problem, pairs[place]);
+    if (!twice[k])
+      pairs[solved[k]] = std::move(with[k]);
+    else
+      again.push_back(solved[k]);
   }
+  if (again.empty()) return;
+  follow_losses(problem, again, pairs);
+  for (const std::size_t place : again) refine(problem, pairs[place]);
 }
 
 } // namespace

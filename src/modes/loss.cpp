@@ -2,6 +2,7 @@
 
 #include "complex_subspace.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/modes/two_sided.hpp"
 
 #include <algorithm>
@@ -21,6 +22,7 @@ using Eigen::VectorXcd;
 
 constexpr int passes = 30;          // of residual correction, at most: losses of 2 and more take over 12
 constexpr double tolerance = 1e-13; // backward error
+constexpr double coinciding = 1e-7; // of lambda, and the sine between vectors: ten times what two defective pairs have
 
 /// A mode with the backward error of the pair taken.
 struct CorrectedMode : LossyMode
@@ -68,6 +70,27 @@ void solve_group(ComplexSubspace& space, Group& group, const PencilFactor& P)
   }
 }
 
+/// Whether two pairs are the same. Collective.
+bool are_one(const Eigenpair& a, const Eigenpair& b)
+{
+  if (std::abs(a.lambda - b.lambda) > coinciding * std::abs(a.lambda)) return false;
+  const Vec parts[] = {b.real, b.imaginary};
+  PetscScalar with_real[2], with_imaginary[2];
+  check(VecMDot(a.real, 2, parts, with_real));
+  check(VecMDot(a.imaginary, 2, parts, with_imaginary));
+  const double shared = std::norm(Complex(with_real[0] + with_imaginary[1], with_imaginary[0] - with_real[1]));
+  return 1 - shared < coinciding * coinciding;
+}
+
+/// A pair that stands twice; null: none. Collective.
+const Eigenpair* doubled(const std::vector<Eigenpair>& pairs)
+{
+  for (std::size_t k = 1; k < pairs.size(); ++k)
+    for (std::size_t l = 0; l < k; ++l)
+      if (are_one(pairs[l], pairs[k])) return &pairs[k];
+  return nullptr;
+}
+
 } // namespace
 
 std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
@@ -87,13 +110,16 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
         append(shapes, part);
     extend(space, shapes);
     const MatrixXd a = inner_products(space.V, shapes);
-    Group group;
-    for (std::size_t k = first; k < end; ++k)
+    std::vector<DenseEigenpair> without;
+    for (std::size_t k = 0; k < places.size(); ++k)
     {
       const auto column = static_cast<Index>(2 * k);
       const VectorXcd y = a.col(column).cast<Complex>() + Complex(0, 1) * a.col(column + 1);
-      group.push_back({with_losses(space.entries, {eigenvalues[places[k]], y.normalized()})});
+      without.push_back({eigenvalues[places[k]], y.normalized()});
     }
+    const std::vector<LossyMode> with = with_losses(space.entries, without);
+    Group group;
+    for (std::size_t k = first; k < end; ++k) group.push_back({with[k]});
     const double middle = eigenvalues[places[(first + end - 1) / 2]].imag();
     move_to(pencil, 1.0001 * middle * middle);
     solve_group(space, group, *pencil.factor);
@@ -111,6 +137,12 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
       losses[places[k]] = {loss_factor_of(mode.taken, own.lambda),
                            mode.taken == LossKind::viscous ? error : std::numeric_limits<double>::quiet_NaN()};
     }
+  }
+  if (const Eigenpair* pair = doubled(solution.pairs); pair && solution.outcome.kind == OutcomeKind::converged)
+  {
+    solution.outcome.kind = OutcomeKind::not_converged;
+    solution.outcome.reason = format("loss factors lead two modes to the one of %.6g Hz, so that a mode is missing",
+                                     pair->lambda.imag() / two_pi);
   }
   solution.outcome.residual = 0;
   for (const Eigenpair& pair : solution.pairs)

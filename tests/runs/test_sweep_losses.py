@@ -48,6 +48,16 @@ def test_points_are_single_runs(scene, key, values, ranks, converged):
             same_modes(modes_at(rows_of(sweep.output), value, key=key), single, 1e-9)
 
 
+def test_near_neighbours_that_losses_mix_stay_two(converged):
+    """Two modes of the disc about 19.19 kHz are 5 Hz apart without its loss factor, which damps by 96 Hz."""
+    run = converged(*PIN, "--set", "mesh.parameters.divisions=2", "--set", "modes.band=20000", "--set",
+                    "part.disc.loss_factor=0.01", "--set", "damping.loss_frequency=5000", "--set", "friction.coefficient=0.25",
+                    ranks=1)
+    found = lambdas(run.report)
+    assert sum(abs(one.imag - 2 * np.pi * 19190) < 2 * np.pi * 10 for one in found) == 2
+    assert len(set(np.round(found, 3))) == len(found)  # 1e-8 of 19 kHz
+
+
 def test_losses_beyond_a_viscous_equivalent(converged):
     """Beyond eta = 1 modes are those of the complex problem: the threshold between both is on the way."""
     run = converged(*LOSSY, "--set", "sweep.key=part.pin.loss_factor", "--set", "sweep.values=[0.8, 1.6]", ranks=1)

@@ -108,6 +108,44 @@ TEST_CASE("modes keep themselves as they take losses, however near to lock-in an
     }
 }
 
+TEST_CASE("near neighbours that a loss factor mixes stay two, on the way to their viscous equivalent and to i K_loss")
+{
+  std::mt19937 generator(7);
+  std::uniform_real_distribution<double> random(-1, 1);
+  const int n = 40;
+  const auto matrix = [&] { return MatrixXd::NullaryExpr(n, n, [&] { return random(generator); }).eval(); };
+  const MatrixXd M = MatrixXd::Identity(n, n), damping = 1e-2 * matrix(), friction = matrix();
+  for (const double apart : {1e-2, 1e-3, 1e-4, 1e-5})
+    for (const double eta : {1e-4, 1e-3, 1e-2, 1e-1, 0.5})
+      for (const double angle : {0.1, 0.4, 0.7}) // of the lossy direction between the two neighbours
+      {
+        INFO("apart ", apart, " eta ", eta, " angle ", angle);
+        MatrixXd K = Eigen::VectorXd::LinSpaced(n, 10, 400).asDiagonal();
+        K(20, 20) = K(19, 19) * (1 + apart);
+        K += 1e-4 * friction;
+        Eigen::VectorXd part = Eigen::VectorXd::Zero(n);
+        part(19) = std::cos(angle);
+        part(20) = std::sin(angle);
+        const LossyMatrices problem{M, damping, K, eta * K(19, 19) * part * part.transpose()};
+        std::vector<DenseEigenpair> without = solve_dense_quadratic(M, damping, K);
+        std::vector<TwoSidedPair> pairs = solve_two_sided_shared(PETSC_COMM_WORLD, M, damping, K);
+        add_losses_shared(PETSC_COMM_WORLD, problem, pairs);
+        const std::vector<LossyMode> modes = with_losses(problem, without);
+        REQUIRE(pairs.size() == static_cast<std::size_t>(n));
+        REQUIRE(modes.size() == static_cast<std::size_t>(n));
+        for (std::size_t i = 0; i < pairs.size(); ++i)
+        {
+          const auto& [lambda, right, left, loss] = pairs[i];
+          CHECK((sum(problem, loss_factors(loss, lambda)) * right).norm() < 1e-11 * (std::norm(lambda) + K.norm()));
+          for (std::size_t j = 0; j < i; ++j)
+          {
+            CHECK(std::abs(lambda - pairs[j].lambda) > 1e-9 * std::abs(lambda));
+            CHECK(std::abs(modes[i].complex.lambda - modes[j].complex.lambda) > 1e-9 * std::abs(lambda));
+          }
+        }
+      }
+}
+
 TEST_CASE("one loss factor everywhere gives the closed form of its viscous equivalent")
 {
   const MatrixXd one = MatrixXd::Identity(1, 1);

@@ -55,8 +55,8 @@ struct LossyMode
 /// Whether a fixed point belongs to the mode: of one loss factor everywhere its distance is at most 0.466, at eta = 1.
 bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex);
 
-/// What a pair without K_loss becomes as it grows from zero, in so many steps for each that is needed.
-LossyMode with_losses(const LossyMatrices& problem, const DenseEigenpair& without, int finer = 1);
+/// What pairs without K_loss become as it grows from zero, followed together so that neighbours stay apart.
+std::vector<LossyMode> with_losses(const LossyMatrices& problem, const std::vector<DenseEigenpair>& without);
 
 /// Pairs of neighbouring frequency. Those from `first` to `end` are solved together, on the span of the vectors of all.
 struct NeighbouringPairs
