@@ -8,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <numeric>
+#include <random>
 
 namespace squeal
 {
@@ -58,26 +59,111 @@ bool order_and_read(SchurForm& schur, const std::vector<lapack_logical>& chosen)
 namespace
 {
 
+/// Eigenvalues mu of a real matrix with both vectors as LAPACK has them: of conjugates one column is the real part and
+/// the next one the imaginary part. Left ones u obey u^H A = mu u^H.
+struct RealEigenvectors
+{
+  VectorXd re, im;
+  MatrixXd left, right;
+};
+
+RealEigenvectors all_eigenvectors(MatrixXd A)
+{
+  const int size = to_int(A.rows());
+  RealEigenvectors all{VectorXd(size), VectorXd(size), MatrixXd(size, size), MatrixXd(size, size)};
+  if (LAPACKE_dgeev(LAPACK_COL_MAJOR, 'V', 'V', size, A.data(), size, all.re.data(), all.im.data(), all.left.data(),
+                    size, all.right.data(), size) != 0)
+    throw Error("the QR algorithm did not converge on a dense eigenproblem");
+  return all;
+}
+
+/// An orthonormal basis of the invariant subspace of those eigenvalues whose modulus is `edge` or more, and the
+/// smallest modulus that it has.
+struct DominantSubspace
+{
+  MatrixXd basis;
+  double smallest = HUGE_VAL;
+};
+
+/// By block Arnoldi without restarts. Nothing if it takes more than a third of all columns: then the whole problem
+/// takes no longer.
+std::optional<DominantSubspace> dominant_subspace(const MatrixXd& A, double edge)
+{
+  constexpr Index in_block = 4; // more than eigenvalues coincide in structures
+  constexpr double invariant = 1e-14;
+  const Index n = A.rows(), most = n / 2;
+  std::mt19937_64 generator(1);
+  std::normal_distribution<double> normal;
+  MatrixXd Q = orthonormal_columns(MatrixXd::NullaryExpr(n, in_block, [&] { return normal(generator); })), AQ(n, 0);
+  for (Index next = 128; Q.cols() + in_block <= most;)
+  {
+    const Index known = AQ.cols();
+    AQ.conservativeResize(n, Q.cols());
+    AQ.rightCols(in_block).noalias() = A * Q.rightCols(in_block);
+    MatrixXd W = AQ.rightCols(in_block);
+    for (int time = 0; time < 2; ++time) // once leaves the basis what rounding adds to short vectors
+    {
+      W -= Q * (Q.transpose() * W);
+      W = orthonormal_columns(W);
+    }
+    if (known + in_block >= next)
+    {
+      next = Q.cols() * 5 / 4;
+      std::optional<SchurForm> schur = schur_form(Q.transpose() * AQ);
+      const auto dominates = [&](Complex mu) { return std::abs(mu) >= edge; };
+      const Index wanted = schur ? std::ranges::count_if(schur->eigenvalues, dominates) : 0;
+      if (wanted > 0 && reorder(*schur, dominates))
+      {
+        const MatrixXd basis = Q * schur->Q.leftCols(wanted);
+        const MatrixXd left_over = AQ * schur->Q.leftCols(wanted) - basis * schur->T.topLeftCorner(wanted, wanted);
+        if (left_over.norm() <= invariant * std::sqrt(static_cast<double>(n)) * schur->T.norm())
+        {
+          DominantSubspace result{basis};
+          for (Index k = 0; k < wanted; ++k)
+            result.smallest = std::min(result.smallest, std::abs(schur->eigenvalues[static_cast<std::size_t>(k)]));
+          return result;
+        }
+      }
+    }
+    Q.conservativeResize(n, Q.cols() + in_block);
+    Q.rightCols(in_block) = W;
+  }
+  return std::nullopt;
+}
+
+/// Those of eigenvalues whose modulus is `edge` or more; of all where they are too many for less work.
+RealEigenvectors dominant_eigenvectors(const MatrixXd& A, double edge)
+{
+  constexpr double beside = 1e-9;
+  const std::optional<DominantSubspace> right = edge > 0 ? dominant_subspace(A, edge) : std::nullopt;
+  if (!right) return all_eigenvectors(A);
+  const auto left = dominant_subspace(A.transpose(), (1 - beside) * right->smallest);
+  if (!left || left->basis.cols() != right->basis.cols()) return all_eigenvectors(A);
+  const Eigen::PartialPivLU<MatrixXd> between(left->basis.transpose() * right->basis);
+  RealEigenvectors small = all_eigenvectors(between.solve(left->basis.transpose() * (A * right->basis)));
+  small.right = right->basis * small.right;
+  const MatrixXd of_left = between.transpose().solve(small.left);
+  small.left = left->basis * of_left;
+  return small;
+}
+
 /// (Q mu^2 + (C + 2 shift M) mu + M) y = 0 of the scaled matrices, by LAPACK with the left vectors (a, b) of the
 /// companion matrix as well. Those of the quadratic problem are Q^-T a.
-std::vector<TwoSidedPair> solve_two_sided(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
+std::vector<TwoSidedPair> solve_two_sided(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, double limit)
 {
   std::vector<TwoSidedPair> result;
   const Index n = K.rows();
   const double stiffness = n > 0 ? norm_1(K) : 0, mass = n > 0 ? norm_1(M) : 0;
   if (mass == 0 || stiffness == 0) return result;
-  const double omega = std::sqrt(stiffness / mass), shift = 1e-2; // of nu = lambda/omega: any that is no eigenvalue
+  const bool all = !std::isfinite(limit);
+  const double omega = all ? std::sqrt(stiffness / mass) : limit;
+  const double shift = all ? 1e-2 : 0.2; // of nu = lambda/omega: any that is no eigenvalue
   const MatrixXd m = omega * omega / stiffness * M, c = omega / stiffness * C, k = K / stiffness;
-  MatrixXd A = companion(m, c, k, shift), left(2 * n, 2 * n), right(2 * n, 2 * n);
-  VectorXd re(2 * n), im(2 * n);
-  const int size = to_int(2 * n);
-  if (LAPACKE_dgeev(LAPACK_COL_MAJOR, 'V', 'V', size, A.data(), size, re.data(), im.data(), left.data(), size,
-                    right.data(), size) != 0)
-    throw Error("the QR algorithm did not converge on the dense quadratic eigenproblem");
+  const auto [re, im, left, right] = dominant_eigenvectors(companion(m, c, k, shift), all ? 0 : 1 / (1 + shift));
   const MatrixXd chi =
       solve_dense((k + shift * (c + shift * m)).transpose(), left.topRows(n),
                   "the quadratic eigenproblem is singular: some motion has neither mass nor stiffness");
-  for (Index j = 0; j < 2 * n; ++j)
+  for (Index j = 0; j < re.size(); ++j)
   {
     const Complex mu(re(j), im(j));
     if (mu.imag() < 0 || std::abs(mu) < 1e-12) continue; // a conjugate; or lambda is infinite, without mass
@@ -123,15 +209,10 @@ namespace
 InvariantSubspaces invariant_subspaces(const MatrixXd& M, const MatrixXd& K, double limit)
 {
   const char* singular = "the undamped eigenproblem is singular at its shift";
-  const MatrixXd shifted = K + limit * M;
-  MatrixXd A = solve_dense(shifted, M, singular), left(A.rows(), A.rows()), right(A.rows(), A.rows());
-  VectorXd re(A.rows()), im(A.rows());
-  const int size = to_int(A.rows());
-  if (LAPACKE_dgeev(LAPACK_COL_MAJOR, 'V', 'V', size, A.data(), size, re.data(), im.data(), left.data(), size,
-                    right.data(), size) != 0)
-    throw Error("the QR algorithm did not converge on a dense eigenproblem");
+  const MatrixXd shifted = K + limit * M, A = solve_dense(shifted, M, singular);
+  const auto [re, im, left, right] = dominant_eigenvectors(A, 1 / (2 * limit)); // |nu|, of all |theta| <= limit
   std::vector<Index> wanted; // real and imaginary parts of a pair have one |theta|
-  for (Index j = 0; j < A.rows(); ++j)
+  for (Index j = 0; j < re.size(); ++j)
     if (const Complex nu(re(j), im(j)); nu != 0. && std::abs(1. / nu - limit) <= limit) wanted.push_back(j);
   const MatrixXd chosen = left(Eigen::all, wanted);
   return {orthonormal_columns(right(Eigen::all, wanted)),
@@ -158,10 +239,11 @@ void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Index rows)
   for (std::size_t k = 0; k < pairs.size(); ++k) pairs[k].loss = losses[k];
 }
 
-std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
+std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C, const MatrixXd& K,
+                                                 double limit)
 {
   std::vector<TwoSidedPair> pairs;
-  on_rank_zero(comm, [&] { pairs = solve_two_sided(M, C, K); });
+  on_rank_zero(comm, [&] { pairs = solve_two_sided(M, C, K, limit); });
   share(comm, pairs, K.rows());
   return pairs;
 }

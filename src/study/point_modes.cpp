@@ -322,7 +322,7 @@ SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_
     for (MatrixXd& A : problem)
       if (A.size() > 0) A = (spaces.left.transpose() * A * spaces.right).eval();
   }
-  std::vector<TwoSidedPair> pairs = solve_two_sided_shared(comm, M, C, K);
+  std::vector<TwoSidedPair> pairs = solve_two_sided_shared(comm, M, C, K, std::sqrt(window.limit));
   const auto beyond = [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); };
   std::erase_if(pairs, beyond);
   if (K_loss.size() > 0)

@@ -146,6 +146,42 @@ TEST_CASE("near neighbours that a loss factor mixes stay two, on the way to thei
       }
 }
 
+TEST_CASE("pairs below a limit are those of the whole problem, with both vectors, where two coincide as well")
+{
+  std::mt19937 generator(13);
+  std::uniform_real_distribution<double> random(-1, 1);
+  const int half = 100, n = 2 * half; // of 400 eigenvalues 24 are below the limit
+  const MatrixXd M = MatrixXd::Identity(n, n);
+  for (const double friction : {0.0, 1.0, 20.0})
+  {
+    MatrixXd one = friction * MatrixXd::NullaryExpr(half, half, [&] { return random(generator); });
+    one.diagonal() += Eigen::VectorXd::LinSpaced(half, 1, half).cwiseAbs2();
+    const MatrixXd damping = 0.1 * MatrixXd::NullaryExpr(half, half, [&] { return random(generator); });
+    MatrixXd K = MatrixXd::Zero(n, n), C = K; // two structures alike
+    for (const int first : {0, half})
+    {
+      K.block(first, first, half, half) = one;
+      C.block(first, first, half, half) = damping;
+    }
+    const double limit = 6.5;
+    std::vector<TwoSidedPair> all = solve_two_sided_shared(PETSC_COMM_WORLD, M, C, K),
+                              some = solve_two_sided_shared(PETSC_COMM_WORLD, M, C, K, limit);
+    CHECK(some.size() < all.size() / 2);
+    for (std::vector<TwoSidedPair>* pairs : {&all, &some})
+      std::erase_if(*pairs, [&](const TwoSidedPair& pair) { return std::abs(pair.lambda) > limit; });
+    REQUIRE(some.size() == all.size());
+    for (const auto& [lambda, right, left, loss] : some)
+    {
+      double nearest = HUGE_VAL;
+      for (const TwoSidedPair& pair : all) nearest = std::min(nearest, std::abs(pair.lambda - lambda));
+      CHECK(nearest < 1e-8 * std::abs(lambda)); // the root of rounding, where two coincide
+      const MatrixXcd Q = lambda * lambda * M + lambda * C + K;
+      CHECK((Q * right).norm() < 1e-13 * K.norm());
+      CHECK((left.transpose() * Q).norm() < 1e-13 * K.norm());
+    }
+  }
+}
+
 TEST_CASE("one loss factor everywhere gives the closed form of its viscous equivalent")
 {
   const MatrixXd one = MatrixXd::Identity(1, 1);

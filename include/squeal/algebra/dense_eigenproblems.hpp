@@ -4,6 +4,7 @@
 /// not converge they throw Error.
 #include "squeal/algebra/dense_matrix.hpp"
 
+#include <cmath>
 #include <complex>
 #include <functional>
 #include <optional>
@@ -54,9 +55,10 @@ TwoSidedPair two_sided_pair(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C, 
 void refine_pairs_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& C, const Eigen::MatrixXd& K,
                          std::vector<TwoSidedPair>& pairs);
 
-/// The pairs of solve_dense_quadratic with their left vectors, from the matrices of rank 0, on every rank. Collective.
+/// The pairs of solve_dense_quadratic with their left vectors, from the matrices of rank 0, on every rank: all with
+/// |lambda| <= limit, and perhaps more. Collective.
 std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
-                                                 const Eigen::MatrixXd& K);
+                                                 const Eigen::MatrixXd& K, double limit = HUGE_VAL);
 
 /// Gives every rank the pairs of rank 0, whose vectors have so many rows. Collective.
 void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Eigen::Index rows);
