@@ -85,7 +85,7 @@ struct DominantSubspace
   double smallest = HUGE_VAL;
 };
 
-/// By block Arnoldi without restarts. Nothing if it takes more than a third of all columns: then the whole problem
+/// By block Arnoldi without restarts. Nothing if it takes more than half of all columns: then the whole problem
 /// takes no longer.
 std::optional<DominantSubspace> dominant_subspace(const MatrixXd& A, double edge)
 {
