@@ -91,6 +91,7 @@ std::optional<DominantSubspace> dominant_subspace(const MatrixXd& A, double edge
 {
   constexpr Index in_block = 4; // more than eigenvalues coincide in structures
   constexpr double invariant = 1e-14;
+  constexpr Index usual = 4; // times the subspace, at least, is what a space takes to have it
   const Index n = A.rows(), most = n / 2;
   std::mt19937_64 generator(1);
   std::normal_distribution<double> normal;
@@ -112,6 +113,7 @@ std::optional<DominantSubspace> dominant_subspace(const MatrixXd& A, double edge
       std::optional<SchurForm> schur = schur_form(Q.transpose() * AQ);
       const auto dominates = [&](Complex mu) { return std::abs(mu) >= edge; };
       const Index wanted = schur ? std::ranges::count_if(schur->eigenvalues, dominates) : 0;
+      if (usual * wanted > most) return std::nullopt;
       if (wanted > 0 && reorder(*schur, dominates))
       {
         const MatrixXd basis = Q * schur->Q.leftCols(wanted);
