@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <ranges>
 #include <tuple>
 
 namespace squeal
@@ -331,10 +332,13 @@ private:
   void advance(Followed& before, Followed& now, int depth, Division& division)
   {
     const bool divisible = std::abs(now.values[0] - before.values[0]) > division.tolerance;
-    if (divisible && divided_at_contact_change(before, now, depth, division)) return;
     const ModeForms between_both = forms(before, now);
     std::vector<Match> matches = follow(between_both, clear_mac);
-    if (divisible && depth < problem_.options.depth && !all_clear(before, matches))
+    const bool clear = all_clear(before, matches);
+    if (divisible && (!clear || may_change_stability(before, now, matches)) &&
+        divided_at_contact_change(before, now, depth, division))
+      return;
+    if (divisible && depth < problem_.options.depth && !clear)
     {
       const double middle = (before.values[0] + now.values[0]) / 2;
       if (std::optional<Followed> between = evaluate(between_points(now, middle)))
@@ -344,9 +348,23 @@ private:
         return;
       }
     }
-    if (!all_clear(before, matches)) matches = follow(between_both, least_clear(before, now));
+    if (!clear) matches = follow(between_both, least_clear(before, now));
     take_tracks(before, now, matches, division.tolerance);
     record(now, matches_at(now, matches));
+  }
+
+  /// Whether a mode in the band may become unstable or stable on the way: it is no farther from the limit at one of
+  /// both ends than they are from each other. Any other would need a way of three times that length.
+  bool may_change_stability(const Followed& before, const Followed& now, const std::vector<Match>& matches) const
+  {
+    const std::vector<TwoSidedPair>&from = before.modes.pairs, &to = now.modes.pairs;
+    return std::ranges::any_of(std::views::iota(std::size_t{0}, matches.size()),
+                               [&](std::size_t i)
+                               {
+                                 if (matches[i].to < 0 || !in_band(from[i], problem_.modes.band)) return false;
+                                 const auto a = from[i].lambda, b = to[static_cast<std::size_t>(matches[i].to)].lambda;
+                                 return std::min(std::abs(a.real()), std::abs(b.real())) <= std::abs(a - b);
+                               });
   }
 
   /// Modes jump where pairs open or close: a mode may be unstable up to there alone, and neither end shows it.
