@@ -26,6 +26,7 @@ namespace
 /// 33 224 degrees of freedom within 3e-5 of those at 1e-10, half of them within 7e-8.
 constexpr double large_tolerance = 1e-6;
 constexpr double threshold_tolerance = 1e-5; // of the number's larger end
+constexpr int few = 2; // pairs that change in a step whose changes are found; halves may need fewer of them
 
 class Sweeper
 {
@@ -307,8 +308,12 @@ private:
   /// What counts as clear where a step cannot be halved any further.
   double least_clear(const Followed& before, const Followed& now)
   {
-    const bool same = model_.same_pairs_closed({before.values, before.reversed}, {now.values, now.reversed});
-    return same ? clear_mac : clear_mac_across;
+    return changed_pairs(before, now) == 0 ? clear_mac : clear_mac_across;
+  }
+
+  int changed_pairs(const Followed& before, const Followed& now)
+  {
+    return model_.changed_pairs({before.values, before.reversed}, {now.values, now.reversed});
   }
 
   /// How finely a step between two points of a line is divided.
@@ -335,10 +340,11 @@ private:
     const ModeForms between_both = forms(before, now);
     std::vector<Match> matches = follow(between_both, clear_mac);
     const bool clear = all_clear(before, matches);
-    if (divisible && (!clear || may_change_stability(before, now, matches)) &&
-        divided_at_contact_change(before, now, depth, division))
-      return;
-    if (divisible && depth < problem_.options.depth && !clear)
+    const bool divides = divisible && (!clear || may_change_stability(before, now, matches));
+    const bool halvable = divides && depth < problem_.options.depth;
+    const int changed = divides ? changed_pairs(before, now) : 0;
+    if (changed > 0 && (changed <= few || !halvable) && divided_at_contact_change(before, now, depth, division)) return;
+    if (halvable && (!clear || changed > few))
     {
       const double middle = (before.values[0] + now.values[0]) / 2;
       if (std::optional<Followed> between = evaluate(between_points(now, middle)))
