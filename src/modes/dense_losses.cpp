@@ -23,6 +23,7 @@ constexpr std::size_t in_group = 16;  // pairs of neighbouring frequency, of whi
 constexpr std::size_t neighbours = 3; // at each end
 constexpr int newton_steps = 60;      // each divides the error of omega by about 2/eta^2
 constexpr double settled = 1e-12;     // last change of lambda over |lambda|: beyond, there is no fixed point
+constexpr double rounding = 1e-15;    // of lambda
 constexpr double beside = 1e-13;      // of lambda: where no pivot vanishes
 constexpr double oscillating = 1e-6;  // Im(lambda) over |lambda|: below it is the rounding of two real ones
 
@@ -100,10 +101,11 @@ ComplexFactors derivatives_at(const Losses& losses, Complex lambda)
 /// oscillates.
 bool solve_at(const LossyMatrices& problem, const Losses& losses, Complex& lambda, VectorXcd& y)
 {
+  const auto oscillates = [&] { return lambda.imag() > settled * std::abs(lambda); };
   double last = HUGE_VAL;
-  for (int step = 0; step < newton_steps && last > 1e-15; ++step)
+  for (int step = 0; step < newton_steps && last > rounding; ++step)
   {
-    if (!(lambda.imag() > settled * std::abs(lambda))) return false;
+    if (!oscillates()) return false;
     const VectorXcd x = Eigen::PartialPivLU<MatrixXcd>(sum(problem, factors_at(losses, lambda)))
                             .solve(sum(problem, derivatives_at(losses, lambda)) * y);
     if (!x.allFinite()) return true; // singular: lambda is an eigenvalue to rounding
@@ -112,9 +114,10 @@ bool solve_at(const LossyMatrices& problem, const Losses& losses, Complex& lambd
     if (last <= settled && now > last) return true; // beside a multiple eigenvalue x is rounding
     y = x.normalized();
     lambda -= change;
+    if (now / last * now <= rounding && std::isfinite(last)) return oscillates(); // what the next step would change
     last = now;
   }
-  return last <= settled && lambda.imag() > settled * std::abs(lambda);
+  return last <= settled && oscillates();
 }
 
 /// The left vector that belongs to lambda and the right one, by inverse iteration from its conjugate: their product
