@@ -369,7 +369,8 @@ private:
                                {
                                  if (matches[i].to < 0 || !in_band(from[i], problem_.modes.band)) return false;
                                  const auto a = from[i].lambda, b = to[static_cast<std::size_t>(matches[i].to)].lambda;
-                                 return std::min(std::abs(a.real()), std::abs(b.real())) <= std::abs(a.real() - b.real());
+                                 return std::min(std::abs(a.real()), std::abs(b.real())) <=
+                                        std::abs(a.real() - b.real());
                                });
   }
 
