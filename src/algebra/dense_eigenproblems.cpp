@@ -77,28 +77,21 @@ RealEigenvectors all_eigenvectors(MatrixXd A)
   return all;
 }
 
-/// An orthonormal basis of the invariant subspace of those eigenvalues whose modulus is `edge` or more, and the
-/// smallest modulus that it has.
-struct DominantSubspace
+/// An orthonormal basis of the invariant subspace of those eigenvalues whose modulus is `edge` or more, by block
+/// Arnoldi without restarts. Nothing if it takes more than half of all columns: then the whole problem takes no longer.
+std::optional<MatrixXd> dominant_subspace(const MatrixXd& A, double edge)
 {
-  MatrixXd basis;
-  double smallest = HUGE_VAL;
-};
-
-/// By block Arnoldi without restarts. Nothing if it takes more than half of all columns: then the whole problem
-/// takes no longer.
-std::optional<DominantSubspace> dominant_subspace(const MatrixXd& A, double edge)
-{
-  constexpr Index in_block = 4; // more than eigenvalues coincide in structures
+  constexpr Index in_block = 4; // rounding brings in eigenvalues that coincide more often, only later
+  constexpr Index first = 128;  // columns that are tested first: smaller spaces take no time
+  constexpr Index usual = 4;    // times the subspace, at least, is what a space takes to have it
   constexpr double invariant = 1e-14;
-  constexpr Index usual = 4; // times the subspace, at least, is what a space takes to have it
   const Index n = A.rows(), most = n / 2;
+  if (most < first) return std::nullopt;
   std::mt19937_64 generator(1);
   std::normal_distribution<double> normal;
   MatrixXd Q = orthonormal_columns(MatrixXd::NullaryExpr(n, in_block, [&] { return normal(generator); })), AQ(n, 0);
-  for (Index next = 128; Q.cols() + in_block <= most;)
+  for (Index next = first; next <= most;)
   {
-    const Index known = AQ.cols();
     AQ.conservativeResize(n, Q.cols());
     AQ.rightCols(in_block).noalias() = A * Q.rightCols(in_block);
     MatrixXd W = AQ.rightCols(in_block);
@@ -107,7 +100,7 @@ std::optional<DominantSubspace> dominant_subspace(const MatrixXd& A, double edge
       W -= Q * (Q.transpose() * W);
       W = orthonormal_columns(W);
     }
-    if (known + in_block >= next)
+    if (Q.cols() >= next)
     {
       next = Q.cols() * 5 / 4;
       std::optional<SchurForm> schur = schur_form(Q.transpose() * AQ);
@@ -118,13 +111,7 @@ std::optional<DominantSubspace> dominant_subspace(const MatrixXd& A, double edge
       {
         const MatrixXd basis = Q * schur->Q.leftCols(wanted);
         const MatrixXd left_over = AQ * schur->Q.leftCols(wanted) - basis * schur->T.topLeftCorner(wanted, wanted);
-        if (left_over.norm() <= invariant * std::sqrt(static_cast<double>(n)) * schur->T.norm())
-        {
-          DominantSubspace result{basis};
-          for (Index k = 0; k < wanted; ++k)
-            result.smallest = std::min(result.smallest, std::abs(schur->eigenvalues[static_cast<std::size_t>(k)]));
-          return result;
-        }
+        if (left_over.norm() <= invariant * std::sqrt(static_cast<double>(n)) * schur->T.norm()) return basis;
       }
     }
     Q.conservativeResize(n, Q.cols() + in_block);
@@ -133,19 +120,21 @@ std::optional<DominantSubspace> dominant_subspace(const MatrixXd& A, double edge
   return std::nullopt;
 }
 
-/// Those of eigenvalues whose modulus is `edge` or more; of all where they are too many for less work.
+/// Those of eigenvalues whose modulus is `edge` or more; of all where they are too many for less work, or one side has
+/// others than the other.
 RealEigenvectors dominant_eigenvectors(const MatrixXd& A, double edge)
 {
-  constexpr double beside = 1e-9;
-  const std::optional<DominantSubspace> right = edge > 0 ? dominant_subspace(A, edge) : std::nullopt;
+  constexpr double regular = 1e-10;
+  const std::optional<MatrixXd> right = edge > 0 ? dominant_subspace(A, edge) : std::nullopt;
   if (!right) return all_eigenvectors(A);
-  const auto left = dominant_subspace(A.transpose(), (1 - beside) * right->smallest);
-  if (!left || left->basis.cols() != right->basis.cols()) return all_eigenvectors(A);
-  const Eigen::PartialPivLU<MatrixXd> between(left->basis.transpose() * right->basis);
-  RealEigenvectors small = all_eigenvectors(between.solve(left->basis.transpose() * (A * right->basis)));
-  small.right = right->basis * small.right;
+  const std::optional<MatrixXd> left = dominant_subspace(A.transpose(), edge);
+  if (!left || left->cols() != right->cols()) return all_eigenvectors(A);
+  const Eigen::PartialPivLU<MatrixXd> between(left->transpose() * *right);
+  if (!(between.rcond() > regular)) return all_eigenvectors(A);
+  RealEigenvectors small = all_eigenvectors(between.solve(left->transpose() * (A * *right)));
+  small.right = *right * small.right;
   const MatrixXd of_left = between.transpose().solve(small.left);
-  small.left = left->basis * of_left;
+  small.left = *left * of_left;
   return small;
 }
 

@@ -1,5 +1,8 @@
 #include "squeal/modes/dense_losses.hpp"
 
+#include "squeal/base/constants.hpp"
+#include "squeal/base/error.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Eigenvalues>
@@ -137,8 +140,9 @@ MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, VectorXcd TwoSidedP
   return vectors;
 }
 
-/// The pairs after a change of their losses, to first order in it: the problem on the states (y, lambda y) of all of
-/// them, where near neighbours mix at once while no two become one. Each keeps the place that it has most of.
+/// The pairs after a change of their losses, to first order in it but for what omega changes: the problem on the states
+/// (y, lambda y) of all of them, where near neighbours mix at once while no two become one. Each keeps the place that
+/// it has most of.
 std::vector<TwoSidedPair> changed_together(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pairs,
                                            const Losses& from, const Losses& to)
 {
@@ -175,9 +179,8 @@ std::vector<TwoSidedPair> changed_together(const LossyMatrices& problem, const s
 /// Whether Newton's method led two pairs to one.
 bool are_one(const TwoSidedPair& a, const TwoSidedPair& b)
 {
-  constexpr double same = 1e-8; // of two defective pairs lambdas and vectors are as far apart as rounding's root
-  const double apart = (a.right - b.right.dot(a.right) * b.right).norm();
-  return std::abs(a.lambda - b.lambda) < same * std::abs(a.lambda) && apart < 0.1 * same;
+  return std::abs(a.lambda - b.lambda) < same_lambda * std::abs(a.lambda) &&
+         (a.right - b.right.dot(a.right) * b.right).norm() < same_vector;
 }
 
 /// The pairs that another one is the same as.
@@ -190,8 +193,8 @@ std::vector<char> doubled(const std::vector<TwoSidedPair>& pairs)
   return result;
 }
 
-/// Follows pairs together from the one kind of losses to the other, in at least so many steps: in shorter ones where
-/// Newton's method fails or leads two pairs to one. Nothing is left of pairs that end on the way.
+/// Continuation of pairs together from the one kind of losses to the other, in at least so many steps: in shorter ones
+/// where Newton's method fails or leads two pairs to one. Nothing is left of pairs that end on the way.
 std::vector<std::optional<TwoSidedPair>> follow(const LossyMatrices& problem, std::vector<TwoSidedPair> pairs,
                                                 const Losses& from, const Losses& to, int steps)
 {
@@ -203,6 +206,7 @@ std::vector<std::optional<TwoSidedPair>> follow(const LossyMatrices& problem, st
     return Losses{from.share + part * (to.share - from.share), from.own + part * (to.own - from.own)};
   };
   double at = 0, step = 1. / steps;
+  bool apart = true;
   while (at < 1 && !pairs.empty())
   {
     const double next = at + 1.5 * step < 1 ? at + step : 1;
@@ -211,13 +215,14 @@ std::vector<std::optional<TwoSidedPair>> follow(const LossyMatrices& problem, st
     std::vector<TwoSidedPair> tried = changed_together(problem, pairs, between(at), losses);
     std::vector<char> found;
     for (TwoSidedPair& pair : tried) found.push_back(solve_at(problem, losses, pair.lambda, pair.right) ? 1 : 0);
-    const auto all = [](const std::vector<char>& flags, char value)
-    { return std::ranges::count(flags, value) == std::ssize(flags); };
-    if (step * steps > shortest && !(all(found, 1) && all(doubled(tried), 0)))
+    const bool all_found = std::ranges::count(found, 0) == 0;
+    const bool all_apart = !apart || std::ranges::count(doubled(tried), 1) == 0;
+    if (step * steps > shortest && !(all_found && all_apart))
     {
       step /= 2;
       continue;
     }
+    apart = apart && all_apart; // what is one stays one
     pairs.clear();
     std::vector<std::size_t> left;
     for (std::size_t k = 0; k < tried.size(); ++k)
@@ -383,21 +388,30 @@ OnSpan on_span(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pa
   return result;
 }
 
-/// The pairs at these places, followed together; `coordinates` turn their right vectors into those of the problem, and
-/// V takes them back.
-void follow_losses(const LossyMatrices& problem, const std::vector<std::size_t>& places,
-                   std::vector<TwoSidedPair>& pairs)
+/// What pairs without losses become, but for their left vectors.
+void follow_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
 {
   std::vector<DenseEigenpair> without;
-  for (const std::size_t place : places) without.push_back({pairs[place].lambda, pairs[place].right});
+  for (const TwoSidedPair& pair : pairs) without.push_back({pair.lambda, pair.right});
   const std::vector<LossyMode> modes = with_losses(problem, without);
-  for (std::size_t k = 0; k < places.size(); ++k)
+  for (std::size_t k = 0; k < pairs.size(); ++k)
   {
-    TwoSidedPair& pair = pairs[places[k]];
-    pair.lambda = modes[k].pair().lambda;
-    pair.right = modes[k].pair().y;
-    pair.loss = modes[k].taken;
+    pairs[k].lambda = modes[k].pair().lambda;
+    pairs[k].right = modes[k].pair().y;
+    pairs[k].loss = modes[k].taken;
   }
+}
+
+/// Those of these places whose pairs are the same as another one's.
+std::vector<std::size_t> doubled_places(const std::vector<TwoSidedPair>& pairs, const std::vector<std::size_t>& places)
+{
+  std::vector<TwoSidedPair> chosen;
+  for (const std::size_t place : places) chosen.push_back(pairs[place]);
+  const std::vector<char> twice = doubled(chosen);
+  std::vector<std::size_t> result;
+  for (std::size_t k = 0; k < places.size(); ++k)
+    if (twice[k]) result.push_back(places[k]);
+  return result;
 }
 
 void add_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
@@ -406,35 +420,40 @@ void add_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
   for (const TwoSidedPair& pair : pairs) eigenvalues.push_back(pair.lambda);
   const std::vector<TwoSidedPair> without = pairs;
   std::vector<std::size_t> solved;
-  std::vector<TwoSidedPair> with;
   for (const NeighbouringPairs& group : neighbouring_pairs(eigenvalues))
   {
     const auto [V, coordinates, small] = on_span(problem, without, group.places);
-    std::vector<TwoSidedPair> on_group = without;
+    std::vector<TwoSidedPair> neighbours_too;
     for (const std::size_t place : group.places)
-      on_group[place].right = (coordinates * (problem[0] * without[place].right)).normalized();
-    follow_losses(small, group.places, on_group);
+    {
+      neighbours_too.push_back(without[place]);
+      VectorXcd& right = neighbours_too.back().right;
+      right = (coordinates * (problem[0] * right)).normalized();
+    }
+    follow_losses(small, neighbours_too);
     for (std::size_t k = group.first; k < group.end; ++k)
     {
-      TwoSidedPair& pair = on_group[group.places[k]];
+      TwoSidedPair& pair = pairs[group.places[k]];
+      pair = std::move(neighbours_too[k]);
       pair.right = (V * pair.right).normalized();
       refine(problem, pair);
       solved.push_back(group.places[k]);
-      with.push_back(std::move(pair));
     }
   }
-  std::vector<std::size_t> again;
-  const std::vector<char> twice = doubled(with);
-  for (std::size_t k = 0; k < solved.size(); ++k)
-  {
-    if (!twice[k])
-      pairs[solved[k]] = std::move(with[k]);
-    else
-      again.push_back(solved[k]);
-  }
+  std::vector<std::size_t> again = doubled_places(pairs, solved);
   if (again.empty()) return;
-  follow_losses(problem, again, pairs);
-  for (const std::size_t place : again) refine(problem, pairs[place]);
+  std::vector<TwoSidedPair> followed;
+  for (const std::size_t place : again) followed.push_back(without[place]);
+  follow_losses(problem, followed);
+  for (std::size_t k = 0; k < again.size(); ++k)
+  {
+    refine(problem, followed[k]);
+    pairs[again[k]] = std::move(followed[k]);
+  }
+  again = doubled_places(pairs, solved);
+  if (again.empty()) return;
+  const double frequency = pairs[again.front()].lambda.imag() / two_pi;
+  throw Error(format("loss factors lead two modes to the one of %.6g Hz, so that a mode is missing", frequency));
 }
 
 } // namespace

@@ -22,7 +22,6 @@ using Eigen::VectorXcd;
 
 constexpr int passes = 30;          // of residual correction, at most: losses of 2 and more take over 12
 constexpr double tolerance = 1e-13; // backward error
-constexpr double coinciding = 1e-7; // of lambda, and the sine between vectors: ten times what two defective pairs have
 
 /// A mode with the backward error of the pair taken.
 struct CorrectedMode : LossyMode
@@ -70,24 +69,27 @@ void solve_group(ComplexSubspace& space, Group& group, const PencilFactor& P)
   }
 }
 
-/// Whether two pairs are the same. Collective.
-bool are_one(const Eigenpair& a, const Eigenpair& b)
+/// Whether two pairs of a problem with this matrix are the same. Collective.
+bool are_one(const Eigenpair& a, const Eigenpair& b, Mat A)
 {
-  if (std::abs(a.lambda - b.lambda) > coinciding * std::abs(a.lambda)) return false;
-  const Vec parts[] = {b.real, b.imaginary};
-  PetscScalar with_real[2], with_imaginary[2];
-  check(VecMDot(a.real, 2, parts, with_real));
-  check(VecMDot(a.imaginary, 2, parts, with_imaginary));
-  const double shared = std::norm(Complex(with_real[0] + with_imaginary[1], with_imaginary[0] - with_real[1]));
-  return 1 - shared < coinciding * coinciding;
+  if (std::abs(a.lambda - b.lambda) >= same_lambda * std::abs(a.lambda)) return false;
+  MultiVector of_a = empty_multivector(A), of_b = of_a;
+  for (const Vec part : {a.real.get(), a.imaginary.get()}) append(of_a, part);
+  for (const Vec part : {b.real.get(), b.imaginary.get()}) append(of_b, part);
+  const MatrixXd shared = inner_products(of_b, of_a);
+  const double re = shared(0, 0) + shared(1, 1), im = shared(0, 1) - shared(1, 0); // b^H a
+  Eigen::Matrix2d times;                                                           // (b_real, b_imaginary) by b^H a
+  times << re, im, -im, re;
+  of_a.entries -= of_b.entries * times;
+  return column_norms(of_a).norm() < same_vector;
 }
 
 /// A pair that stands twice; null: none. Collective.
-const Eigenpair* doubled(const std::vector<Eigenpair>& pairs)
+const Eigenpair* doubled(const std::vector<Eigenpair>& pairs, Mat A)
 {
   for (std::size_t k = 1; k < pairs.size(); ++k)
     for (std::size_t l = 0; l < k; ++l)
-      if (are_one(pairs[l], pairs[k])) return &pairs[k];
+      if (are_one(pairs[l], pairs[k], A)) return &pairs[k];
   return nullptr;
 }
 
@@ -138,7 +140,8 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
                            mode.taken == LossKind::viscous ? error : std::numeric_limits<double>::quiet_NaN()};
     }
   }
-  if (const Eigenpair* pair = doubled(solution.pairs); pair && solution.outcome.kind == OutcomeKind::converged)
+  if (const Eigenpair* pair = doubled(solution.pairs, problem.K);
+      pair && solution.outcome.kind == OutcomeKind::converged)
   {
     solution.outcome.kind = OutcomeKind::not_converged;
     solution.outcome.reason = format("loss factors lead two modes to the one of %.6g Hz, so that a mode is missing",

@@ -26,7 +26,7 @@ namespace
 /// 33 224 degrees of freedom within 3e-5 of those at 1e-10, half of them within 7e-8.
 constexpr double large_tolerance = 1e-6;
 constexpr double threshold_tolerance = 1e-5; // of the number's larger end
-constexpr int few = 2; // pairs that change in a step whose changes are found; halves may need fewer of them
+constexpr int many_changes = 2; // of contact in a step: beyond, a half may need fewer; two bodies alike change at once
 
 class Sweeper
 {
@@ -308,12 +308,8 @@ private:
   /// What counts as clear where a step cannot be halved any further.
   double least_clear(const Followed& before, const Followed& now)
   {
-    return changed_pairs(before, now) == 0 ? clear_mac : clear_mac_across;
-  }
-
-  int changed_pairs(const Followed& before, const Followed& now)
-  {
-    return model_.changed_pairs({before.values, before.reversed}, {now.values, now.reversed});
+    const bool same = model_.same_pairs_closed({before.values, before.reversed}, {now.values, now.reversed});
+    return same ? clear_mac : clear_mac_across;
   }
 
   /// How finely a step between two points of a line is divided.
@@ -332,8 +328,8 @@ private:
     return {threshold_tolerance * size, modes ? std::ssize(at.closed) : 0};
   }
 
-  /// Follows the modes to a point, with points between where they are unclear, and on both sides of each place where
-  /// pairs open or close. Seeks the thresholds on the way.
+  /// Follows the modes to a point, with points between where they are unclear, and on both sides of places where pairs
+  /// open or close if a mode is unclear or may change its stability. Seeks the thresholds on the way.
   void advance(Followed& before, Followed& now, int depth, Division& division)
   {
     const bool divisible = std::abs(now.values[0] - before.values[0]) > division.tolerance;
@@ -342,9 +338,11 @@ private:
     const bool clear = all_clear(before, matches);
     const bool divides = divisible && (!clear || may_change_stability(before, now, matches));
     const bool halvable = divides && depth < problem_.options.depth;
-    const int changed = divides ? changed_pairs(before, now) : 0;
-    if (changed > 0 && (changed <= few || !halvable) && divided_at_contact_change(before, now, depth, division)) return;
-    if (halvable && (!clear || changed > few))
+    const int changed =
+        divides ? model_.changed_pairs({before.values, before.reversed}, {now.values, now.reversed}) : 0;
+    const bool many = changed > many_changes && halvable;
+    if (changed > 0 && !many && divided_at_contact_change(before, now, depth, division)) return;
+    if (halvable && (!clear || many))
     {
       const double middle = (before.values[0] + now.values[0]) / 2;
       if (std::optional<Followed> between = evaluate(between_points(now, middle)))
@@ -353,25 +351,32 @@ private:
         advance(*between, now, depth + 1, division);
         return;
       }
+      if (many && divided_at_contact_change(before, now, depth, division)) return;
     }
     if (!clear) matches = follow(between_both, least_clear(before, now));
     take_tracks(before, now, matches, division.tolerance);
     record(now, matches_at(now, matches));
   }
 
-  /// Whether a mode in the band may become unstable or stable on the way: it is no farther from the limit at one of
-  /// both ends than they are from each other. Any other would need a way of three times that length.
+  /// Whether a mode in the band may become unstable or stable on the way: its growth rate is no farther from zero at
+  /// one of both ends than they are from each other. Any other would need a way of three times that length.
   bool may_change_stability(const Followed& before, const Followed& now, const std::vector<Match>& matches) const
   {
     const std::vector<TwoSidedPair>&from = before.modes.pairs, &to = now.modes.pairs;
-    return std::ranges::any_of(std::views::iota(std::size_t{0}, matches.size()),
-                               [&](std::size_t i)
-                               {
-                                 if (matches[i].to < 0 || !in_band(from[i], problem_.modes.band)) return false;
-                                 const auto a = from[i].lambda, b = to[static_cast<std::size_t>(matches[i].to)].lambda;
-                                 return std::min(std::abs(a.real()), std::abs(b.real())) <=
-                                        std::abs(a.real() - b.real());
-                               });
+    const double band = problem_.modes.band;
+    std::vector<char> matched(to.size(), 0);
+    for (std::size_t i = 0; i < matches.size(); ++i)
+    {
+      if (matches[i].to < 0) continue; // unclear, or leaves the band
+      const auto place = static_cast<std::size_t>(matches[i].to);
+      matched[place] = 1;
+      if (!in_band(from[i], band) && !in_band(to[place], band)) continue;
+      const double a = from[i].lambda.real(), b = to[place].lambda.real();
+      if (std::min(std::abs(a), std::abs(b)) <= std::abs(a - b)) return true;
+    }
+    for (std::size_t k = 0; k < to.size(); ++k)
+      if (!matched[k] && in_band(to[k], band) && is_unstable(to[k].lambda)) return true;
+    return false;
   }
 
   /// Modes jump where pairs open or close: a mode may be unstable up to there alone, and neither end shows it.

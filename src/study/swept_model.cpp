@@ -1,13 +1,14 @@
 #include "swept_model.hpp"
 
 #include "squeal/algebra/root.hpp"
-#include "squeal/base/integers.hpp"
 #include "squeal/contact/pairs.hpp"
 #include "squeal/scene/numbers.hpp"
 #include "squeal/study/reversed.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
+#include <numeric>
 
 namespace squeal
 {
@@ -167,16 +168,16 @@ void SweptModel::train_at(const SweptPlace& place, double tolerance)
   if (modes.outcome.kind == OutcomeKind::converged) trained_[place] = std::move(modes);
 }
 
+bool SweptModel::same_pairs_closed(const SweptPlace& a, const SweptPlace& b)
+{
+  return equilibrium_at(a).closed == equilibrium_at(b).closed && rigid_at(a) == rigid_at(b);
+}
+
 int SweptModel::changed_pairs(const SweptPlace& a, const SweptPlace& b)
 {
-  const std::vector<char>&closed = equilibrium_at(a).closed, &closed_there = equilibrium_at(b).closed;
-  const std::vector<char>&rigid = rigid_at(a), &rigid_there = rigid_at(b);
-  if (closed.size() != closed_there.size() || rigid.size() != rigid_there.size())
-    return to_int(std::max(closed.size(), closed_there.size()));
-  int changed = 0;
-  for (std::size_t i = 0; i < closed.size(); ++i)
-    if (closed[i] != closed_there[i] || rigid[i] != rigid_there[i]) ++changed;
-  return changed;
+  const std::vector<char>&from = equilibrium_at(a).closed, &to = equilibrium_at(b).closed;
+  if (from.size() != to.size()) return 0;
+  return std::inner_product(from.begin(), from.end(), to.begin(), 0, std::plus<>(), std::not_equal_to<>());
 }
 
 std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, const SweptPlace& to, double tolerance)
@@ -218,7 +219,7 @@ std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, 
 ModeForms SweptModel::forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to,
                             const PointModes& second)
 {
-  if (first.pairs.empty() || second.pairs.empty() || changed_pairs(from, to) == 0) return forms_between(first, second);
+  if (first.pairs.empty() || second.pairs.empty() || same_pairs_closed(from, to)) return forms_between(first, second);
   const auto expand = [&](const SweptPlace& place, const PointModes& modes)
   {
     go_to(place);

@@ -38,7 +38,10 @@ public:
   /// all, then the imaginary ones.
   MultiVector vectors(const PointModes& modes, Side side) const;
 
-  /// The number of pairs that are closed at one of two points alone, or rigid there.
+  /// Whether the same pairs are closed at two points, and the same of them rigid.
+  bool same_pairs_closed(const SweptPlace& a, const SweptPlace& b);
+
+  /// The number of pairs that are closed at one of two points alone; 0 where they have other pairs.
   int changed_pairs(const SweptPlace& a, const SweptPlace& b);
 
   /// The first change of contact that is found on the way between two points of a line: of a pair that is closed at one

@@ -65,11 +65,15 @@ struct NeighbouringPairs
   std::size_t first = 0, end = 0;  // of the places
 };
 
+/// Two pairs are one where both are less apart: lambdas over |lambda|, and the sine between right vectors. Those of
+/// defective pairs are as far apart as the root of rounding at least.
+inline constexpr double same_lambda = 1e-8, same_vector = 1e-9;
+
 /// All eigenvalues that oscillate, by frequency.
 std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<std::complex<double>>& eigenvalues);
 
 /// What pairs without K_loss become with it, both vectors; from the matrices of rank 0, on every rank. Pairs that do
-/// not oscillate stay. Collective.
+/// not oscillate stay. Error: two pairs become one. Collective.
 void add_losses_shared(MPI_Comm comm, const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs);
 
 /// Makes pairs that are nearly those of the problem its own, each with its kind of loss; from the matrices of rank 0,
