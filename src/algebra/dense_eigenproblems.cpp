@@ -221,6 +221,14 @@ InvariantSubspaces invariant_subspaces_shared(MPI_Comm comm, const MatrixXd& M, 
   return spaces;
 }
 
+Eigen::MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, Eigen::VectorXcd TwoSidedPair::*side)
+{
+  if (pairs.empty()) return {};
+  Eigen::MatrixXcd vectors((pairs.front().*side).size(), static_cast<Index>(pairs.size()));
+  for (Index column = 0; const TwoSidedPair& pair : pairs) vectors.col(column++) = pair.*side;
+  return vectors;
+}
+
 void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Index rows)
 {
   std::vector<LossKind> losses;

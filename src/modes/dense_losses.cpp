@@ -132,14 +132,6 @@ void find_left(const LossyMatrices& problem, const Losses& losses, TwoSidedPair&
   for (int iteration = 0; iteration < 2; ++iteration) pair.left = factor.transpose().solve(pair.left).normalized();
 }
 
-/// Vectors of one side as columns.
-MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, VectorXcd TwoSidedPair::*side)
-{
-  MatrixXcd vectors((pairs.front().*side).size(), static_cast<Index>(pairs.size()));
-  for (Index column = 0; const TwoSidedPair& pair : pairs) vectors.col(column++) = pair.*side;
-  return vectors;
-}
-
 /// The pairs after a change of their losses, to first order in it but for what omega changes: the problem on the states
 /// (y, lambda y) of all of them, where near neighbours mix at once while no two become one. Each keeps the place that
 /// it has most of.
@@ -183,14 +175,18 @@ bool are_one(const TwoSidedPair& a, const TwoSidedPair& b)
          (a.right - b.right.dot(a.right) * b.right).norm() < same_vector;
 }
 
-/// The pairs that another one is the same as.
-std::vector<char> doubled(const std::vector<TwoSidedPair>& pairs)
+/// The places of pairs that are the same as another one.
+std::vector<std::size_t> doubled(const std::vector<TwoSidedPair>& pairs)
 {
-  std::vector<char> result(pairs.size(), 0);
-  for (std::size_t k = 1; k < pairs.size(); ++k)
-    for (std::size_t l = 0; l < k; ++l)
-      if (are_one(pairs[l], pairs[k])) result[l] = result[k] = 1;
-  return result;
+  std::vector<std::size_t> places;
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    for (std::size_t l = 0; l < pairs.size(); ++l)
+      if (l != k && are_one(pairs[l], pairs[k]))
+      {
+        places.push_back(k);
+        break;
+      }
+  return places;
 }
 
 /// Continuation of pairs together from the one kind of losses to the other, in at least so many steps: in shorter ones
@@ -207,16 +203,16 @@ std::vector<std::optional<TwoSidedPair>> follow(const LossyMatrices& problem, st
   };
   double at = 0, step = 1. / steps;
   bool apart = true;
+  for (TwoSidedPair& pair : pairs) find_left(problem, from, pair);
   while (at < 1 && !pairs.empty())
   {
     const double next = at + 1.5 * step < 1 ? at + step : 1;
     const Losses losses = between(next);
-    for (TwoSidedPair& pair : pairs) find_left(problem, between(at), pair);
     std::vector<TwoSidedPair> tried = changed_together(problem, pairs, between(at), losses);
     std::vector<char> found;
     for (TwoSidedPair& pair : tried) found.push_back(solve_at(problem, losses, pair.lambda, pair.right) ? 1 : 0);
     const bool all_found = std::ranges::count(found, 0) == 0;
-    const bool all_apart = !apart || std::ranges::count(doubled(tried), 1) == 0;
+    const bool all_apart = !apart || doubled(tried).empty();
     if (step * steps > shortest && !(all_found && all_apart))
     {
       step /= 2;
@@ -224,14 +220,15 @@ std::vector<std::optional<TwoSidedPair>> follow(const LossyMatrices& problem, st
     }
     apart = apart && all_apart; // what is one stays one
     pairs.clear();
-    std::vector<std::size_t> left;
+    std::vector<std::size_t> kept;
     for (std::size_t k = 0; k < tried.size(); ++k)
       if (found[k])
       {
+        if (next < 1) find_left(problem, losses, tried[k]);
         pairs.push_back(std::move(tried[k]));
-        left.push_back(places[k]);
+        kept.push_back(places[k]);
       }
-    places = std::move(left);
+    places = std::move(kept);
     at = next;
     step = std::min(2 * step, 1. / steps);
   }
@@ -261,6 +258,11 @@ bool solve_lossy(const LossyMatrices& problem, LossKind kind, DenseEigenpair& pa
 bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex)
 {
   return std::abs(viscous.lambda - complex.lambda) < 0.5 * std::abs(viscous.lambda);
+}
+
+std::string describe_doubled(Complex lambda)
+{
+  return format("loss factors lead two modes to the one of %.6g Hz, so that a mode is missing", lambda.imag() / two_pi);
 }
 
 std::vector<LossyMode> with_losses(const LossyMatrices& problem, const std::vector<DenseEigenpair>& without)
@@ -402,58 +404,45 @@ void follow_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pair
   }
 }
 
-/// Those of these places whose pairs are the same as another one's.
-std::vector<std::size_t> doubled_places(const std::vector<TwoSidedPair>& pairs, const std::vector<std::size_t>& places)
-{
-  std::vector<TwoSidedPair> chosen;
-  for (const std::size_t place : places) chosen.push_back(pairs[place]);
-  const std::vector<char> twice = doubled(chosen);
-  std::vector<std::size_t> result;
-  for (std::size_t k = 0; k < places.size(); ++k)
-    if (twice[k]) result.push_back(places[k]);
-  return result;
-}
-
 void add_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
 {
   std::vector<Complex> eigenvalues;
   for (const TwoSidedPair& pair : pairs) eigenvalues.push_back(pair.lambda);
-  const std::vector<TwoSidedPair> without = pairs;
-  std::vector<std::size_t> solved;
+  std::vector<std::size_t> places; // of those with losses
+  std::vector<TwoSidedPair> with;
   for (const NeighbouringPairs& group : neighbouring_pairs(eigenvalues))
   {
-    const auto [V, coordinates, small] = on_span(problem, without, group.places);
-    std::vector<TwoSidedPair> neighbours_too;
+    const auto [V, coordinates, small] = on_span(problem, pairs, group.places);
+    std::vector<TwoSidedPair> on_group;
     for (const std::size_t place : group.places)
     {
-      neighbours_too.push_back(without[place]);
-      VectorXcd& right = neighbours_too.back().right;
+      on_group.push_back(pairs[place]);
+      VectorXcd& right = on_group.back().right;
       right = (coordinates * (problem[0] * right)).normalized();
     }
-    follow_losses(small, neighbours_too);
+    follow_losses(small, on_group);
     for (std::size_t k = group.first; k < group.end; ++k)
     {
-      TwoSidedPair& pair = pairs[group.places[k]];
-      pair = std::move(neighbours_too[k]);
-      pair.right = (V * pair.right).normalized();
-      refine(problem, pair);
-      solved.push_back(group.places[k]);
+      on_group[k].right = (V * on_group[k].right).normalized();
+      refine(problem, on_group[k]);
+      places.push_back(group.places[k]);
+      with.push_back(std::move(on_group[k]));
     }
   }
-  std::vector<std::size_t> again = doubled_places(pairs, solved);
-  if (again.empty()) return;
-  std::vector<TwoSidedPair> followed;
-  for (const std::size_t place : again) followed.push_back(without[place]);
-  follow_losses(problem, followed);
-  for (std::size_t k = 0; k < again.size(); ++k)
+  if (const std::vector<std::size_t> again = doubled(with); !again.empty())
   {
-    refine(problem, followed[k]);
-    pairs[again[k]] = std::move(followed[k]);
+    std::vector<TwoSidedPair> on_all;
+    for (const std::size_t k : again) on_all.push_back(pairs[places[k]]);
+    follow_losses(problem, on_all);
+    for (std::size_t i = 0; i < again.size(); ++i)
+    {
+      refine(problem, on_all[i]);
+      with[again[i]] = std::move(on_all[i]);
+    }
+    if (const std::vector<std::size_t> still = doubled(with); !still.empty())
+      throw Error(describe_doubled(with[still.front()].lambda));
   }
-  again = doubled_places(pairs, solved);
-  if (again.empty()) return;
-  const double frequency = pairs[again.front()].lambda.imag() / two_pi;
-  throw Error(format("loss factors lead two modes to the one of %.6g Hz, so that a mode is missing", frequency));
+  for (std::size_t k = 0; k < places.size(); ++k) pairs[places[k]] = std::move(with[k]);
 }
 
 } // namespace

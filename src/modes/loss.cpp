@@ -2,7 +2,6 @@
 
 #include "complex_subspace.hpp"
 #include "squeal/algebra/shift_invert.hpp"
-#include "squeal/base/constants.hpp"
 #include "squeal/modes/two_sided.hpp"
 
 #include <algorithm>
@@ -144,8 +143,7 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
       pair && solution.outcome.kind == OutcomeKind::converged)
   {
     solution.outcome.kind = OutcomeKind::not_converged;
-    solution.outcome.reason = format("loss factors lead two modes to the one of %.6g Hz, so that a mode is missing",
-                                     pair->lambda.imag() / two_pi);
+    solution.outcome.reason = describe_doubled(pair->lambda);
   }
   solution.outcome.residual = 0;
   for (const Eigenpair& pair : solution.pairs)

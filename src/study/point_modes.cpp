@@ -80,14 +80,9 @@ VectorXd kept_norms(const MatrixXcd& a, const MatrixXd& kept)
   return (a.conjugate().cwiseProduct(real_times(kept, a))).colwise().sum().real().cwiseMax(0).cwiseSqrt();
 }
 
-/// The vectors of one side, one a column.
 MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, Side side)
 {
-  if (pairs.empty()) return {};
-  MatrixXcd a(pairs.front().right.size(), static_cast<Index>(pairs.size()));
-  for (std::size_t k = 0; k < pairs.size(); ++k)
-    a.col(static_cast<Index>(k)) = side == Side::right ? pairs[k].right : pairs[k].left;
-  return a;
+  return vectors_of(pairs, side == Side::right ? &TwoSidedPair::right : &TwoSidedPair::left);
 }
 
 /// Pairs of the projected problem, and how exact they are in the full one.

@@ -161,9 +161,9 @@ private:
     return {std::make_move_iterator(points.begin()), std::make_move_iterator(points.end())};
   }
 
-  /// Of the modes of a group the growth rates are sorted: they are continuous whether or not the modes can be told
-  /// apart, and the first one past the smaller number of unstable modes changes its sign. False: the numbers are equal,
-  /// or the group mixes with others on the way.
+  /// Of the modes of a group the growth rates are sorted: they are continuous whether or not the modes can be
+  /// distinguished, and the first one past the smaller number of unstable modes changes its sign. False: the numbers
+  /// are equal, or the group mixes with others on the way.
   bool enclose(const Followed& a, const Followed& b, const Group& group, std::deque<Followed>& points)
   {
     const std::size_t before = unstable_among(a, group.from), after = unstable_among(b, group.to);

@@ -42,6 +42,9 @@ struct TwoSidedPair
   LossKind loss = LossKind::none;
 };
 
+/// The vectors of one side as columns; empty without pairs.
+Eigen::MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, Eigen::VectorXcd TwoSidedPair::*side);
+
 /// The eigenvalues of solve_dense_quadratic alone, which take a quarter of the time.
 std::vector<std::complex<double>> dense_quadratic_eigenvalues(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
                                                               const Eigen::MatrixXd& K);

@@ -6,6 +6,7 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 
 #include <array>
+#include <string>
 
 namespace squeal
 {
@@ -68,6 +69,9 @@ struct NeighbouringPairs
 /// Two pairs are one where both are less apart: lambdas over |lambda|, and the sine between right vectors. Those of
 /// defective pairs are as far apart as the root of rounding at least.
 inline constexpr double same_lambda = 1e-8, same_vector = 1e-9;
+
+/// The sentence that says so, of the pairs' lambda.
+std::string describe_doubled(std::complex<double> lambda);
 
 /// All eigenvalues that oscillate, by frequency.
 std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<std::complex<double>>& eigenvalues);
