@@ -1,5 +1,6 @@
 #include "squeal/modes/dense_losses.hpp"
 
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/error.hpp"
 
@@ -7,6 +8,7 @@
 #include <cmath>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <numeric>
 
@@ -21,6 +23,7 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
+using Eigen::VectorXd;
 
 constexpr std::size_t in_group = 16;  // pairs of neighbouring frequency, of which those at the ends are neighbours only
 constexpr std::size_t neighbours = 3; // at each end
@@ -351,17 +354,96 @@ void refine(const LossyMatrices& problem, TwoSidedPair& pair)
   pair.lambda += eigenvalue_change(slope_of(pair.loss, pair.lambda, products[0], products[1], products[3]), residual);
 }
 
-/// Real and imaginary parts of vectors of one side.
-MatrixXd parts_of(const std::vector<TwoSidedPair>& pairs, const std::vector<std::size_t>& places,
-                  VectorXcd TwoSidedPair::*side)
+/// Real and imaginary parts of columns.
+MatrixXd parts_of(const MatrixXcd& x)
 {
-  MatrixXd parts((pairs[places.front()].*side).size(), 2 * static_cast<Index>(places.size()));
-  for (Index column = 0; const std::size_t place : places)
-  {
-    parts.col(column++) = (pairs[place].*side).real();
-    parts.col(column++) = (pairs[place].*side).imag();
-  }
+  MatrixXd parts(x.rows(), 2 * x.cols());
+  parts << x.real(), x.imag();
   return parts;
+}
+
+/// The orthonormal V with what columns add to its span. What is left of one below `adds` of it is rounding.
+MatrixXd extended(const MatrixXd& V, MatrixXd columns)
+{
+  constexpr double adds = 1e-10;
+  columns.colwise().normalize();
+  for (int pass = 0; pass < 2; ++pass) columns -= V * (V.transpose() * columns).eval();
+  Eigen::ColPivHouseholderQR<MatrixXd> factor(columns.rows(), columns.cols());
+  factor.setThreshold(adds / std::max(adds, columns.colwise().norm().maxCoeff()));
+  factor.compute(columns);
+  MatrixXd result(V.rows(), V.cols() + factor.rank());
+  result << V, factor.householderQ() * MatrixXd::Identity(columns.rows(), factor.rank());
+  return result;
+}
+
+/// Residuals of the vectors of a side, and their backward errors.
+struct Residuals
+{
+  MatrixXcd columns;
+  VectorXd errors;
+};
+
+Residuals residuals_of(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pairs,
+                       VectorXcd TwoSidedPair::*side)
+{
+  const MatrixXcd x = vectors_of(pairs, side);
+  Residuals result{MatrixXcd::Zero(x.rows(), x.cols()), {}};
+  VectorXd sizes = VectorXd::Zero(x.cols());
+  for (std::size_t k = 0; k < problem.size(); ++k)
+  {
+    MatrixXcd part = side == &TwoSidedPair::right ? real_times(problem[k], x) : real_times(problem[k].transpose(), x);
+    for (Index i = 0; const TwoSidedPair& pair : pairs) part.col(i++) *= loss_factors(pair.loss, pair.lambda)[k];
+    result.columns += part;
+    sizes += part.colwise().norm().transpose();
+  }
+  result.errors = result.columns.colwise().norm().transpose().cwiseQuotient(sizes);
+  return result;
+}
+
+/// Pairs of a problem that are nearly those on the span of the orthonormal V become the latter.
+void solve_on(const MatrixXd& V, const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
+{
+  LossyMatrices on_span;
+  for (std::size_t k = 0; k < problem.size(); ++k) on_span[k] = V.transpose() * problem[k] * V;
+  for (TwoSidedPair& pair : pairs)
+  {
+    TwoSidedPair small{pair.lambda, (V.transpose() * pair.right).normalized(), {}, pair.loss};
+    const Losses losses = pair.loss == LossKind::viscous ? viscous_loss : complex_loss;
+    if (!solve_at(on_span, losses, small.lambda, small.right)) continue;
+    find_left(on_span, losses, small);
+    pair = {small.lambda, V * small.right, V * small.left, pair.loss};
+  }
+}
+
+/// Makes pairs that are nearly those of a problem its own. Of a large one they are solved on the span of their vectors
+/// and their neighbours', of both sides, which takes in what one factor at their mean lambda makes of the residuals.
+/// Newton's method would factor the problem for each pair and step: it ends those that do not settle.
+void refine_together(const LossyMatrices& problem, const std::vector<TwoSidedPair>& near,
+                     std::vector<TwoSidedPair>& pairs)
+{
+  constexpr int passes = 12;
+  constexpr double exact = 1e-10; // backward error of a side: that of lambda is the product of both
+  MatrixXd V = extended({problem[0].rows(), 0}, parts_of(vectors_of(near, &TwoSidedPair::right)));
+  V = extended(V, parts_of(vectors_of(near, &TwoSidedPair::left)));
+  VectorXd errors = VectorXd::Constant(static_cast<Index>(pairs.size()), HUGE_VAL);
+  if (2 * V.cols() < V.rows())
+  {
+    Complex mean = 0;
+    for (const TwoSidedPair& pair : pairs) mean += pair.lambda / static_cast<double>(pairs.size());
+    const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, loss_factors(LossKind::complex, mean)));
+    for (int pass = 0; pass < passes; ++pass)
+    {
+      solve_on(V, problem, pairs);
+      const Residuals right = residuals_of(problem, pairs, &TwoSidedPair::right),
+                      left = residuals_of(problem, pairs, &TwoSidedPair::left);
+      errors = right.errors.cwiseMax(left.errors);
+      if (errors.maxCoeff() <= exact) break;
+      V = extended(V, parts_of(factor.solve(right.columns)));
+      V = extended(V, parts_of(factor.transpose().solve(left.columns)));
+    }
+  }
+  for (Index k = 0; TwoSidedPair & pair : pairs)
+    if (errors(k++) > exact) refine(problem, pair);
 }
 
 /// The problem on the span of a few pairs, M being 1. It is tested by the left vectors: those of the matrices may have
@@ -379,7 +461,10 @@ OnSpan on_span(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pa
                const std::vector<std::size_t>& places)
 {
   constexpr double independent = 1e-6; // of a start
-  const MatrixXd R = parts_of(pairs, places, &TwoSidedPair::right), L = parts_of(pairs, places, &TwoSidedPair::left);
+  std::vector<TwoSidedPair> chosen;
+  for (const std::size_t place : places) chosen.push_back(pairs[place]);
+  const MatrixXd R = parts_of(vectors_of(chosen, &TwoSidedPair::right)),
+                 L = parts_of(vectors_of(chosen, &TwoSidedPair::left));
   Eigen::JacobiSVD<MatrixXd> svd(L.transpose() * problem[0] * R, Eigen::ComputeThinU | Eigen::ComputeThinV);
   svd.setThreshold(independent);
   const Index rank = svd.rank();
@@ -413,20 +498,25 @@ void add_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
   for (const NeighbouringPairs& group : neighbouring_pairs(eigenvalues))
   {
     const auto [V, coordinates, small] = on_span(problem, pairs, group.places);
-    std::vector<TwoSidedPair> on_group;
+    std::vector<TwoSidedPair> near;
     for (const std::size_t place : group.places)
     {
-      on_group.push_back(pairs[place]);
-      VectorXcd& right = on_group.back().right;
+      near.push_back(pairs[place]);
+      VectorXcd& right = near.back().right;
       right = (coordinates * (problem[0] * right)).normalized();
     }
-    follow_losses(small, on_group);
-    for (std::size_t k = group.first; k < group.end; ++k)
+    follow_losses(small, near);
+    for (TwoSidedPair& pair : near) pair.right = (V * pair.right).normalized();
+    const std::size_t middle = (group.first + group.end) / 2; // the mean of half of them is nearer to each
+    for (const auto& [first, end] : {std::pair{group.first, middle}, std::pair{middle, group.end}})
     {
-      on_group[k].right = (V * on_group[k].right).normalized();
-      refine(problem, on_group[k]);
-      places.push_back(group.places[k]);
-      with.push_back(std::move(on_group[k]));
+      std::vector<TwoSidedPair> half(near.begin() + static_cast<std::ptrdiff_t>(first),
+                                     near.begin() + static_cast<std::ptrdiff_t>(end));
+      if (half.empty()) continue;
+      refine_together(problem, near, half);
+      places.insert(places.end(), group.places.begin() + static_cast<std::ptrdiff_t>(first),
+                    group.places.begin() + static_cast<std::ptrdiff_t>(end));
+      std::ranges::move(half, std::back_inserter(with));
     }
   }
   if (const std::vector<std::size_t> again = doubled(with); !again.empty())

@@ -1,5 +1,7 @@
 #include "following.hpp"
 
+#include "squeal/algebra/dense_matrix.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Eigenvalues>

@@ -1,5 +1,6 @@
 #include "point_modes.hpp"
 
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/contact_stiffness.hpp"
 #include "squeal/modes/real_modes.hpp"
@@ -387,14 +388,6 @@ PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const Proj
 }
 
 } // namespace
-
-MatrixXcd real_times(const MatrixXd& A, const MatrixXcd& x)
-{
-  MatrixXcd result(A.rows(), x.cols());
-  result.real() = A * x.real();
-  result.imag() = A * x.imag();
-  return result;
-}
 
 bool in_band(const TwoSidedPair& pair, double band)
 {

@@ -79,9 +79,6 @@ struct PointModes
   Eigen::MatrixXd M{}, C{};        // of the point, on the basis
 };
 
-/// A x by two real products, which BLAS does: of a real with a complex matrix Eigen makes a slow loop of its own.
-Eigen::MatrixXcd real_times(const Eigen::MatrixXd& A, const Eigen::MatrixXcd& x);
-
 enum class Side
 {
   right,

@@ -15,6 +15,15 @@ void broadcast(Eigen::MatrixXd& A, MPI_Comm comm);
 /// The same of a vector. Collective.
 void broadcast(Eigen::VectorXd& x, MPI_Comm comm);
 
+/// A x by two real products, which BLAS does: of a real with a complex matrix Eigen makes a slow loop of its own.
+template <typename Real> Eigen::MatrixXcd real_times(const Eigen::MatrixBase<Real>& A, const Eigen::MatrixXcd& x)
+{
+  Eigen::MatrixXcd result(A.rows(), x.cols());
+  result.real() = A * x.real();
+  result.imag() = A * x.imag();
+  return result;
+}
+
 /// A^-1 B by LU with row interchanges. Throws Error with the text `singular` if a pivot is zero.
 Eigen::MatrixXd solve_dense(Eigen::MatrixXd A, const Eigen::MatrixXd& B, const char* singular);
 
