@@ -63,7 +63,7 @@ def test_points_are_single_runs(pin, converged):
     rows = rows_of(pin.output)
     for mu in (0.05, 0.15, 0.35):
         single = converged(*PIN, "--set", f"friction.coefficient={mu}", ranks=1).report
-        # backward errors of both vectors are below 1e-10; lambda is off by their product, times at most 1e9 here
+        # backward errors of both vectors are below 1e-8; lambda is off by their product, times at most 1e7 here
         same_modes(modes_at(rows, mu), lambdas(single), 1e-9)
 
 
@@ -157,7 +157,7 @@ def test_what_misses_its_tolerance_fails_or_is_solved_whole(squeal, converged):
            "-sweep_passes", "0"]
     run = squeal(*ask, ranks=1)
     assert run.code == 2 and "2 of 2 points failed" in run.report["sweep"]["reason"]
-    assert "backward errors above 1e-10" in run.report["sweep"]["reason"] and modes_at(rows_of(run.output), 0.3) == []
+    assert "backward errors above 1e-08" in run.report["sweep"]["reason"] and modes_at(rows_of(run.output), 0.3) == []
     whole = converged(*ask, "-modes_dense_limit", "500", ranks=1)
     single = converged(*NINE_PAIRS, "--set", "modes.band=8000", "--set", "friction.coefficient=0.3", ranks=1).report
     same_modes(modes_at(rows_of(whole.output), 0.3), lambdas(single), 1e-9)
