@@ -35,6 +35,24 @@ NO_WAIT = {"OMPI_MCA_odls_base_sigkill_timeout": "0"}
 
 
 held = 0  # cores that this test has
+PATIENCE = 10  # [s] that runs of fewer ranks may begin before one that waits for several cores
+
+
+def lock_cores(folder, count):
+    """The locked files of as many free cores of the machine's; none where there are fewer."""
+    locked = []
+    for number in range(len(os.sched_getaffinity(0))):
+        core = open(folder / str(number), "w")
+        try:
+            fcntl.flock(core, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            locked.append(core)
+        except BlockingIOError:
+            core.close()
+        if len(locked) == count:
+            return locked
+    for core in locked:
+        core.close()
+    return []
 
 
 @contextlib.contextmanager
@@ -42,34 +60,28 @@ def cores(count):
     """Waits for as many cores that no other test takes, of those that the machine has. Ranks wait for each other at every
     message: beside a run that leaves one of them no core, each message takes a slice of the scheduler's, milliseconds."""
     global held
-    there = len(os.sched_getaffinity(0))
+    wanted = min(count, len(os.sched_getaffinity(0)))
     if held:  # by the test whose run this is
-        assert min(count, there) <= held
+        assert wanted <= held
         yield
         return
     folder = Path(tempfile.gettempdir()) / f"squeal_cores_{os.getuid()}"
     folder.mkdir(exist_ok=True)
-    with contextlib.ExitStack() as taken:
-        # one at a time gathers its cores, so that no two wait for what the other has
-        with open(folder / "gathering", "w") as gathering:
+    patient_until = time.monotonic() + PATIENCE
+    with open(folder / "gathering", "w") as gathering:  # only who has locked it takes cores
+        fcntl.flock(gathering, fcntl.LOCK_EX)
+        while not (locked := lock_cores(folder, wanted)):
+            if time.monotonic() < patient_until:
+                fcntl.flock(gathering, fcntl.LOCK_UN)
+            time.sleep(0.01)
             fcntl.flock(gathering, fcntl.LOCK_EX)
-            free = {number: taken.enter_context(open(folder / str(number), "w")) for number in range(there)}
-            missing = min(count, there)
-            while missing:
-                for number, core in list(free.items()):
-                    with contextlib.suppress(BlockingIOError):
-                        fcntl.flock(core, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                        del free[number]
-                        missing -= 1
-                        if not missing:
-                            break
-                else:
-                    time.sleep(0.01)
-        held = min(count, there)
-        try:
-            yield
-        finally:
-            held = 0
+    held = wanted
+    try:
+        yield
+    finally:
+        held = 0
+        for core in locked:
+            core.close()
 
 
 class Run:

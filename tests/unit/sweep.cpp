@@ -75,6 +75,39 @@ TEST_CASE("pairs take losses at their own frequency, with both vectors, whatever
   }
 }
 
+TEST_CASE("pairs of a problem larger than the span of their neighbours take the losses that Newton's method gives each")
+{
+  std::mt19937 generator(9);
+  std::uniform_real_distribution<double> random(-1, 1);
+  const int n = 240; // more than twice the real and imaginary parts of both vectors of 22 neighbours
+  const auto matrix = [&] { return MatrixXd::NullaryExpr(n, n, [&] { return random(generator); }).eval(); };
+  const MatrixXd M = MatrixXd::Identity(n, n), C = 1e-2 * matrix(), part = matrix().leftCols(40);
+  MatrixXd K = Eigen::VectorXd::LinSpaced(n, 10, 2400).asDiagonal();
+  K.bottomRightCorner(180, 180) *= 1e4;
+  K.block(20, 20, 2, 2) << 210, 5, -5, 220.001; // beside lock-in
+  K += 1e-2 * matrix();
+  const LossyMatrices problem{M, C, K, 0.05 * K + 0.1 * part * part.transpose()};
+  const double limit = 26; // of the lower quarter: the others are far away
+  std::vector<TwoSidedPair> pairs = solve_two_sided_shared(PETSC_COMM_WORLD, M, C, K, limit);
+  const std::vector<TwoSidedPair> without = pairs;
+  add_losses_shared(PETSC_COMM_WORLD, problem, pairs);
+  REQUIRE(pairs.size() >= 60);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+  {
+    const auto& [lambda, right, left, loss] = pairs[i];
+    if (std::abs(without[i].lambda) > limit) continue; // perhaps unfinished
+    INFO("lambda ", lambda.real(), " ", lambda.imag());
+    DenseEigenpair alone{lambda, right};
+    REQUIRE(solve_lossy(problem, loss, alone));
+    CHECK(std::abs(alone.lambda - lambda) < 1e-12 * std::abs(lambda)); // 1e-10 of either side, which count by product
+    const MatrixXcd Q = sum(problem, loss_factors(loss, lambda));
+    const double settled = 1e-10 * (2 * std::norm(lambda) + K.norm());
+    CHECK((Q * right).norm() < settled);
+    CHECK((left.transpose() * Q).norm() < settled);
+    for (std::size_t j = 0; j < i; ++j) CHECK(std::abs(lambda - pairs[j].lambda) > 1e-6 * std::abs(lambda));
+  }
+}
+
 TEST_CASE("modes keep themselves as they take losses, however near to lock-in and however little damped without")
 {
   std::mt19937 generator(3);
