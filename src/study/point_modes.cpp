@@ -91,6 +91,7 @@ struct SolvedPairs
 {
   std::vector<TwoSidedPair> pairs; // falling growth rate
   std::vector<double> right, left; // backward errors of the vectors
+  std::optional<Complex> doubled;  // a mode that loss factors make of two
 
   double backward_error(std::size_t k) const { return std::max(right[k], left[k]); }
 };
@@ -212,10 +213,10 @@ double tolerance_of(const TwoSidedPair& pair, const PointProblem& problem)
   return near ? std::min(problem.tolerance, std::max(exact_tolerance, 0.01 * problem.tolerance)) : problem.tolerance;
 }
 
-/// The largest backward error over its tolerance.
+/// The largest backward error over its tolerance; infinite where loss factors make one mode of two.
 double largest_excess(const SolvedPairs& solved, const PointProblem& problem)
 {
-  double largest = 0;
+  double largest = solved.doubled ? HUGE_VAL : 0;
   for (std::size_t k = 0; k < solved.pairs.size(); ++k)
     largest = std::max(largest, solved.backward_error(k) / tolerance_of(solved.pairs[k], problem));
   return largest;
@@ -241,7 +242,8 @@ enum class Extent
 /// The backward errors of pairs of the projected problem.
 SolvedPairs with_errors(const ModesBasis& modes, const ProjectedSliding& on_basis, std::vector<TwoSidedPair> pairs)
 {
-  SolvedPairs solved{std::move(pairs), {}, {}};
+  SolvedPairs solved{std::move(pairs), {}, {}, {}};
+  if (on_basis.K_loss.size() > 0) solved.doubled = doubled_lambda(solved.pairs);
   solved.right = backward_errors(modes, on_basis, solved.pairs, Side::right);
   solved.left = backward_errors(modes, on_basis, solved.pairs, Side::left);
   return solved;
@@ -302,6 +304,7 @@ void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const
     solved.right[k] = refined.right[i];
     solved.left[k] = refined.left[i];
   }
+  if (K_loss.size() > 0) solved.doubled = doubled_lambda(solved.pairs);
 }
 
 /// The pairs of the projected problem in the window, falling growth rate.
@@ -373,6 +376,11 @@ PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const Proj
         format("%d of %zu eigenvalues have backward errors above %.0e, the largest %.0f times its "
                "tolerance: allow more corrections by -sweep_passes",
                static_cast<int>(inexact), solved.pairs.size(), problem.tolerance, largest_excess(solved, problem));
+  }
+  if (solved.doubled)
+  {
+    result.outcome.kind = OutcomeKind::not_converged;
+    result.outcome.reason = describe_doubled(*solved.doubled);
   }
   for (std::size_t k = 0; k < solved.pairs.size(); ++k)
   {

@@ -6,6 +6,7 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 
 #include <array>
+#include <optional>
 #include <string>
 
 namespace squeal
@@ -70,14 +71,18 @@ struct NeighbouringPairs
 /// defective pairs are as far apart as the root of rounding at least.
 inline constexpr double same_lambda = 1e-8, same_vector = 1e-9;
 
-/// The sentence that says so, of the pairs' lambda.
+/// The lambda of a pair that is another one's as well, if there is any.
+std::optional<std::complex<double>> doubled_lambda(const std::vector<TwoSidedPair>& pairs);
+
+/// The sentence that says so.
 std::string describe_doubled(std::complex<double> lambda);
 
 /// All eigenvalues that oscillate, by frequency.
 std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<std::complex<double>>& eigenvalues);
 
 /// What pairs without K_loss become with it, both vectors; from the matrices of rank 0, on every rank. Pairs that do
-/// not oscillate stay. Error: two pairs become one. Collective.
+/// not oscillate stay. Two may become one: of a problem that is not yet exact, or beyond what was asked for.
+/// Collective.
 void add_losses_shared(MPI_Comm comm, const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs);
 
 /// Makes pairs that are nearly those of the problem its own, each with its kind of loss; from the matrices of rank 0,
