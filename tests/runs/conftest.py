@@ -35,7 +35,7 @@ NO_WAIT = {"OMPI_MCA_odls_base_sigkill_timeout": "0"}
 
 
 held = 0  # cores that this test has
-PATIENCE = 10  # [s] that runs of fewer ranks may begin before one that waits for several cores
+PATIENCE = 3  # [s] that runs of fewer ranks may begin before one that waits for several cores
 
 
 def lock_cores(folder, count):
