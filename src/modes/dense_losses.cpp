@@ -265,8 +265,9 @@ bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex)
 
 std::optional<Complex> doubled_lambda(const std::vector<TwoSidedPair>& pairs)
 {
-  const std::vector<std::size_t> places = doubled(pairs);
-  return places.empty() ? std::nullopt : std::optional(pairs[places.front()].lambda);
+  for (const std::size_t place : doubled(pairs))
+    if (pairs[place].loss != LossKind::none) return pairs[place].lambda;
+  return std::nullopt;
 }
 
 std::string describe_doubled(Complex lambda)
@@ -428,7 +429,8 @@ void refine_together(const LossyMatrices& problem, const std::vector<TwoSidedPai
                      std::vector<TwoSidedPair>& pairs)
 {
   constexpr int passes = 12;
-  constexpr double exact = 1e-10; // backward error of a side: that of lambda is the product of both
+  constexpr double exact = 1e-10; // of a side: lambda is off by its square over the distance to others, below `settled`
+                                  // down to distances of same_lambda
   MatrixXd V = extended({problem[0].rows(), 0}, parts_of(vectors_of(near, &TwoSidedPair::right)));
   V = extended(V, parts_of(vectors_of(near, &TwoSidedPair::left)));
   VectorXd errors = VectorXd::Constant(static_cast<Index>(pairs.size()), HUGE_VAL);
@@ -436,20 +438,21 @@ void refine_together(const LossyMatrices& problem, const std::vector<TwoSidedPai
   {
     Complex mean = 0;
     for (const TwoSidedPair& pair : pairs) mean += pair.lambda / static_cast<double>(pairs.size());
+    // of viscous pairs f differs by Re/Im(lambda), which costs passes and no exactness
     const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, loss_factors(LossKind::complex, mean)));
     for (int pass = 0; pass < passes; ++pass)
     {
       solve_on(V, problem, pairs);
       const Residuals right = residuals_of(problem, pairs, &TwoSidedPair::right),
                       left = residuals_of(problem, pairs, &TwoSidedPair::left);
-      errors = right.errors.cwiseMax(left.errors);
-      if (errors.maxCoeff() <= exact) break;
+      errors = right.errors + left.errors; // NaN of either stays
+      if ((errors.array() <= exact).all()) return;
       V = extended(V, parts_of(factor.solve(right.columns)));
       V = extended(V, parts_of(factor.transpose().solve(left.columns)));
     }
   }
   for (Index k = 0; TwoSidedPair & pair : pairs)
-    if (errors(k++) > exact) refine(problem, pair);
+    if (!(errors(k++) <= exact)) refine(problem, pair);
 }
 
 /// The problem on the span of a few pairs, M being 1. It is tested by the left vectors: those of the matrices may have

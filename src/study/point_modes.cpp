@@ -93,7 +93,7 @@ struct SolvedPairs
   std::vector<double> right, left; // backward errors of the vectors
   std::optional<Complex> doubled;  // a mode that loss factors make of two
 
-  double backward_error(std::size_t k) const { return std::max(right[k], left[k]); }
+  double backward_error(std::size_t k) const { return left[k] <= right[k] ? right[k] : left[k]; } // NaN of either
 };
 
 /// w^2 |M| + w |C| + |K|, w = |lambda|
@@ -213,10 +213,10 @@ double tolerance_of(const TwoSidedPair& pair, const PointProblem& problem)
   return near ? std::min(problem.tolerance, std::max(exact_tolerance, 0.01 * problem.tolerance)) : problem.tolerance;
 }
 
-/// The largest backward error over its tolerance; infinite where loss factors make one mode of two.
+/// The largest backward error over its tolerance.
 double largest_excess(const SolvedPairs& solved, const PointProblem& problem)
 {
-  double largest = solved.doubled ? HUGE_VAL : 0;
+  double largest = 0;
   for (std::size_t k = 0; k < solved.pairs.size(); ++k)
     largest = std::max(largest, solved.backward_error(k) / tolerance_of(solved.pairs[k], problem));
   return largest;
@@ -243,7 +243,7 @@ enum class Extent
 SolvedPairs with_errors(const ModesBasis& modes, const ProjectedSliding& on_basis, std::vector<TwoSidedPair> pairs)
 {
   SolvedPairs solved{std::move(pairs), {}, {}, {}};
-  if (on_basis.K_loss.size() > 0) solved.doubled = doubled_lambda(solved.pairs);
+  solved.doubled = doubled_lambda(solved.pairs);
   solved.right = backward_errors(modes, on_basis, solved.pairs, Side::right);
   solved.left = backward_errors(modes, on_basis, solved.pairs, Side::left);
   return solved;
@@ -304,7 +304,7 @@ void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const
     solved.right[k] = refined.right[i];
     solved.left[k] = refined.left[i];
   }
-  if (K_loss.size() > 0) solved.doubled = doubled_lambda(solved.pairs);
+  solved.doubled = doubled_lambda(solved.pairs);
 }
 
 /// The pairs of the projected problem in the window, falling growth rate.
@@ -480,7 +480,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
     SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
     if (extent == Extent::near_band) refine_few(modes, on_basis, problem, solved);
     double now = largest_excess(solved, problem);
-    if (extent == Extent::near_band && now > 1 && now > slow * before)
+    if (extent == Extent::near_band && ((now > 1 && now > slow * before) || solved.doubled))
     {
       SolvedPairs whole = solve_projected(modes, on_basis, window, Extent::whole);
       const double of_whole = largest_excess(whole, problem);
@@ -501,12 +501,13 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
       if (leads) modes.shared = modes.basis.shapes();
       continue;
     }
-    if (now > 1 && complete(modes, problem))
+    const bool misses = now > 1 || solved.doubled;
+    if (misses && complete(modes, problem))
     {
       extent = Extent::whole;
       continue;
     }
-    if (extent == Extent::near_band && now > 1) solved = solve_projected(modes, on_basis, window, Extent::whole);
+    if (extent == Extent::near_band && misses) solved = solve_projected(modes, on_basis, window, Extent::whole);
     PointModes result = modes_of(solved, problem, on_basis, modes.basis.shapes());
     result.outcome.iterations = static_cast<int>(pass);
     return result;

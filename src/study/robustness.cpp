@@ -117,8 +117,7 @@ std::vector<TwoSidedPair> two_sided_modes(const ReducedMatrices& at, double band
     add_losses_shared(MPI_COMM_SELF, {at.M, at.C, at.K, at.K_loss}, pairs);
   }
   keep_below(band);
-  if (at.K_loss.size() > 0)
-    if (const auto lambda = doubled_lambda(pairs)) throw Error(describe_doubled(*lambda));
+  if (const auto lambda = doubled_lambda(pairs)) throw Error(describe_doubled(*lambda));
   return pairs;
 }
 

@@ -71,7 +71,7 @@ struct NeighbouringPairs
 /// defective pairs are as far apart as the root of rounding at least.
 inline constexpr double same_lambda = 1e-8, same_vector = 1e-9;
 
-/// The lambda of a pair that is another one's as well, if there is any.
+/// The lambda of a pair with losses that is another one's as well, if there is any.
 std::optional<std::complex<double>> doubled_lambda(const std::vector<TwoSidedPair>& pairs);
 
 /// The sentence that says so.
