@@ -221,7 +221,7 @@ InvariantSubspaces invariant_subspaces_shared(MPI_Comm comm, const MatrixXd& M, 
   return spaces;
 }
 
-Eigen::MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, Eigen::VectorXcd TwoSidedPair::*side)
+Eigen::MatrixXcd vectors_of(std::span<const TwoSidedPair> pairs, Eigen::VectorXcd TwoSidedPair::*side)
 {
   if (pairs.empty()) return {};
   Eigen::MatrixXcd vectors((pairs.front().*side).size(), static_cast<Index>(pairs.size()));

@@ -47,6 +47,13 @@ void broadcast(VectorXd& x, MPI_Comm comm)
   MPI_Bcast(x.data(), to_int(size), MPI_DOUBLE, 0, comm);
 }
 
+MatrixXd parts_of(const Eigen::MatrixXcd& x)
+{
+  MatrixXd parts(x.rows(), 2 * x.cols());
+  parts << x.real(), x.imag();
+  return parts;
+}
+
 MatrixXd solve_dense(MatrixXd A, const MatrixXd& B, const char* singular)
 {
   if (A.size() == 0) return B;

@@ -1,23 +1,13 @@
 #include "complex_subspace.hpp"
 
-namespace squeal
-{
+#include "squeal/algebra/dense_matrix.hpp"
 
-namespace
+namespace squeal
 {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
-
-MatrixXd parts_of(const VectorXcd& a)
-{
-  MatrixXd parts(a.size(), 2);
-  parts << a.real(), a.imag();
-  return parts;
-}
-
-} // namespace
 
 ComplexSubspace empty_subspace(const std::array<Mat, 4>& matrices)
 {

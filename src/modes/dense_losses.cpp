@@ -1,6 +1,7 @@
 #include "squeal/modes/dense_losses.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/algebra/multivector.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/error.hpp"
 
@@ -8,9 +9,9 @@
 #include <cmath>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <numeric>
+#include <span>
 
 namespace squeal
 {
@@ -91,6 +92,11 @@ struct Losses
 };
 
 constexpr Losses none{0, 0}, complex_loss{1, 0}, viscous_loss{1, 1};
+
+Losses losses_of(LossKind kind)
+{
+  return kind == LossKind::viscous ? viscous_loss : complex_loss;
+}
 
 ComplexFactors factors_at(const Losses& losses, Complex lambda)
 {
@@ -255,7 +261,7 @@ int steps_to_losses(const LossyMatrices& problem, const std::vector<DenseEigenpa
 
 bool solve_lossy(const LossyMatrices& problem, LossKind kind, DenseEigenpair& pair)
 {
-  return solve_at(problem, kind == LossKind::viscous ? viscous_loss : complex_loss, pair.lambda, pair.y);
+  return solve_at(problem, losses_of(kind), pair.lambda, pair.y);
 }
 
 bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex)
@@ -361,28 +367,6 @@ void refine(const LossyMatrices& problem, TwoSidedPair& pair)
   pair.lambda += eigenvalue_change(slope_of(pair.loss, pair.lambda, products[0], products[1], products[3]), residual);
 }
 
-/// Real and imaginary parts of columns.
-MatrixXd parts_of(const MatrixXcd& x)
-{
-  MatrixXd parts(x.rows(), 2 * x.cols());
-  parts << x.real(), x.imag();
-  return parts;
-}
-
-/// The orthonormal V with what columns add to its span. What is left of one below `adds` of it is rounding.
-MatrixXd extended(const MatrixXd& V, MatrixXd columns)
-{
-  constexpr double adds = 1e-10;
-  columns.colwise().normalize();
-  for (int pass = 0; pass < 2; ++pass) columns -= V * (V.transpose() * columns).eval();
-  Eigen::ColPivHouseholderQR<MatrixXd> factor(columns.rows(), columns.cols());
-  factor.setThreshold(adds / std::max(adds, columns.colwise().norm().maxCoeff()));
-  factor.compute(columns);
-  MatrixXd result(V.rows(), V.cols() + factor.rank());
-  result << V, factor.householderQ() * MatrixXd::Identity(columns.rows(), factor.rank());
-  return result;
-}
-
 /// Residuals of the vectors of a side, and their backward errors.
 struct Residuals
 {
@@ -390,8 +374,7 @@ struct Residuals
   VectorXd errors;
 };
 
-Residuals residuals_of(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pairs,
-                       VectorXcd TwoSidedPair::*side)
+Residuals residuals_of(const LossyMatrices& problem, std::span<const TwoSidedPair> pairs, VectorXcd TwoSidedPair::*side)
 {
   const MatrixXcd x = vectors_of(pairs, side);
   Residuals result{MatrixXcd::Zero(x.rows(), x.cols()), {}};
@@ -408,33 +391,31 @@ Residuals residuals_of(const LossyMatrices& problem, const std::vector<TwoSidedP
 }
 
 /// Pairs of a problem that are nearly those on the span of the orthonormal V become the latter.
-void solve_on(const MatrixXd& V, const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
+void solve_on(const MatrixXd& V, const LossyMatrices& problem, std::span<TwoSidedPair> pairs)
 {
   LossyMatrices on_span;
   for (std::size_t k = 0; k < problem.size(); ++k) on_span[k] = V.transpose() * problem[k] * V;
   for (TwoSidedPair& pair : pairs)
   {
     TwoSidedPair small{pair.lambda, (V.transpose() * pair.right).normalized(), {}, pair.loss};
-    const Losses losses = pair.loss == LossKind::viscous ? viscous_loss : complex_loss;
+    const Losses losses = losses_of(pair.loss);
     if (!solve_at(on_span, losses, small.lambda, small.right)) continue;
     find_left(on_span, losses, small);
     pair = {small.lambda, V * small.right, V * small.left, pair.loss};
   }
 }
 
-/// Makes pairs that are nearly those of a problem its own. Of a large one they are solved on the span of their vectors
-/// and their neighbours', of both sides, which takes in what one factor at their mean lambda makes of the residuals.
-/// Newton's method would factor the problem for each pair and step: it ends those that do not settle.
-void refine_together(const LossyMatrices& problem, const std::vector<TwoSidedPair>& near,
-                     std::vector<TwoSidedPair>& pairs)
+/// Makes pairs that are nearly those of a problem its own. Of a large one they are solved on the span of V, which holds
+/// them nearly and takes in what one factor at their mean lambda makes of the residuals. Newton's method would factor
+/// the problem for each pair and step: it ends those that do not settle.
+void refine_together(const LossyMatrices& problem, MultiVector V, std::span<TwoSidedPair> pairs)
 {
+  if (pairs.empty()) return;
   constexpr int passes = 12;
   constexpr double exact = 1e-10; // of a side: lambda is off by its square over the distance to others, below `settled`
                                   // down to distances of same_lambda
-  MatrixXd V = extended({problem[0].rows(), 0}, parts_of(vectors_of(near, &TwoSidedPair::right)));
-  V = extended(V, parts_of(vectors_of(near, &TwoSidedPair::left)));
   VectorXd errors = VectorXd::Constant(static_cast<Index>(pairs.size()), HUGE_VAL);
-  if (2 * V.cols() < V.rows())
+  if (2 * V.columns() < V.entries.rows())
   {
     Complex mean = 0;
     for (const TwoSidedPair& pair : pairs) mean += pair.lambda / static_cast<double>(pairs.size());
@@ -442,13 +423,13 @@ void refine_together(const LossyMatrices& problem, const std::vector<TwoSidedPai
     const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, loss_factors(LossKind::complex, mean)));
     for (int pass = 0; pass < passes; ++pass)
     {
-      solve_on(V, problem, pairs);
+      solve_on(V.entries, problem, pairs);
       const Residuals right = residuals_of(problem, pairs, &TwoSidedPair::right),
                       left = residuals_of(problem, pairs, &TwoSidedPair::left);
       errors = right.errors + left.errors; // NaN of either stays
       if ((errors.array() <= exact).all()) return;
-      V = extended(V, parts_of(factor.solve(right.columns)));
-      V = extended(V, parts_of(factor.transpose().solve(left.columns)));
+      extend_orthonormal(V, {V.comm, parts_of(factor.solve(right.columns))});
+      extend_orthonormal(V, {V.comm, parts_of(factor.transpose().solve(left.columns))});
     }
   }
   for (Index k = 0; TwoSidedPair & pair : pairs)
@@ -466,14 +447,11 @@ struct OnSpan
 
 /// Directions of both sides go together by the singular vectors of M between them. What either side has by itself, as
 /// where real and imaginary parts are nearly parallel, would leave M singular.
-OnSpan on_span(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pairs,
-               const std::vector<std::size_t>& places)
+OnSpan on_span(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pairs)
 {
   constexpr double independent = 1e-6; // of a start
-  std::vector<TwoSidedPair> chosen;
-  for (const std::size_t place : places) chosen.push_back(pairs[place]);
-  const MatrixXd R = parts_of(vectors_of(chosen, &TwoSidedPair::right)),
-                 L = parts_of(vectors_of(chosen, &TwoSidedPair::left));
+  const MatrixXd R = parts_of(vectors_of(pairs, &TwoSidedPair::right)),
+                 L = parts_of(vectors_of(pairs, &TwoSidedPair::left));
   Eigen::JacobiSVD<MatrixXd> svd(L.transpose() * problem[0] * R, Eigen::ComputeThinU | Eigen::ComputeThinV);
   svd.setThreshold(independent);
   const Index rank = svd.rank();
@@ -506,26 +484,22 @@ void add_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
   std::vector<TwoSidedPair> with;
   for (const NeighbouringPairs& group : neighbouring_pairs(eigenvalues))
   {
-    const auto [V, coordinates, small] = on_span(problem, pairs, group.places);
     std::vector<TwoSidedPair> near;
-    for (const std::size_t place : group.places)
-    {
-      near.push_back(pairs[place]);
-      VectorXcd& right = near.back().right;
-      right = (coordinates * (problem[0] * right)).normalized();
-    }
+    for (const std::size_t place : group.places) near.push_back(pairs[place]);
+    const auto [V, coordinates, small] = on_span(problem, near);
+    for (TwoSidedPair& pair : near) pair.right = (coordinates * (problem[0] * pair.right)).normalized();
     follow_losses(small, near);
     for (TwoSidedPair& pair : near) pair.right = (V * pair.right).normalized();
+    MultiVector both{MPI_COMM_SELF, MatrixXd(V.rows(), 0)}; // left vectors are those without losses
+    for (VectorXcd TwoSidedPair::*side : {&TwoSidedPair::right, &TwoSidedPair::left})
+      extend_orthonormal(both, {both.comm, parts_of(vectors_of(near, side))});
     const std::size_t middle = (group.first + group.end) / 2; // the mean of half of them is nearer to each
     for (const auto& [first, end] : {std::pair{group.first, middle}, std::pair{middle, group.end}})
+      refine_together(problem, both, std::span(near).subspan(first, end - first));
+    for (std::size_t k = group.first; k < group.end; ++k)
     {
-      std::vector<TwoSidedPair> half(near.begin() + static_cast<std::ptrdiff_t>(first),
-                                     near.begin() + static_cast<std::ptrdiff_t>(end));
-      if (half.empty()) continue;
-      refine_together(problem, near, half);
-      places.insert(places.end(), group.places.begin() + static_cast<std::ptrdiff_t>(first),
-                    group.places.begin() + static_cast<std::ptrdiff_t>(end));
-      std::ranges::move(half, std::back_inserter(with));
+      places.push_back(group.places[k]);
+      with.push_back(std::move(near[k]));
     }
   }
   if (const std::vector<std::size_t> again = doubled(with); !again.empty())

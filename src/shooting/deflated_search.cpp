@@ -1,5 +1,7 @@
 #include "deflated_search.hpp"
 
+#include "squeal/algebra/dense_matrix.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -50,9 +52,7 @@ void bound_ritz(const StateBlock& Q, const MatrixXd& H, const MatrixXd& remainde
   search.bounded = std::abs(pair.lambda) + search.residual < 1;
   search.vector.reset();
   if (search.bounded) return;
-  MatrixXd parts(H.rows(), 2);
-  parts << pair.y.real(), pair.y.imag();
-  search.vector = combination(Q, parts);
+  search.vector = combination(Q, parts_of(pair.y));
 }
 
 } // namespace

@@ -1,5 +1,6 @@
 #include "harmonic_basis.hpp"
 
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
@@ -153,9 +154,7 @@ MultiVector residual_of(const HarmonicBasis& basis, ResponseEnd side, Index forc
                         const Eigen::VectorXcd& a)
 {
   const HarmonicSide& own = basis.problem.of(side);
-  MatrixXd parts(a.size(), 2);
-  parts << a.real(), a.imag();
-  MultiVector residual = dynamic_image(own, Complex(0, omega), combination(basis.V, parts));
+  MultiVector residual = dynamic_image(own, Complex(0, omega), combination(basis.V, parts_of(a)));
   residual.entries.col(0) -= own.forces.entries.col(force);
   return residual;
 }

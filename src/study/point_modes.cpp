@@ -453,10 +453,7 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
 MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, const std::vector<TwoSidedPair>& pairs,
                      Side side)
 {
-  const MatrixXcd a = vectors_of(pairs, side);
-  MatrixXd parts(a.rows(), 2 * a.cols());
-  parts << a.real(), a.imag();
-  const MultiVector x = kept_rows(combination_of_shapes(modes.basis, parts), contact);
+  const MultiVector x = kept_rows(combination_of_shapes(modes.basis, parts_of(vectors_of(pairs, side))), contact);
   return product(side == Side::right ? contact.Z : contact.Y, x);
 }
 

@@ -7,7 +7,7 @@
 namespace squeal
 {
 
-/// The steps that a march makes, by which its checkpoint is told from another one's.
+/// The steps that a march makes, which distinguish its checkpoint from another one's.
 struct MarchPlan
 {
   long steps = 0;

@@ -8,6 +8,7 @@
 #include <complex>
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace squeal
@@ -43,7 +44,7 @@ struct TwoSidedPair
 };
 
 /// The vectors of one side as columns; empty without pairs.
-Eigen::MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, Eigen::VectorXcd TwoSidedPair::*side);
+Eigen::MatrixXcd vectors_of(std::span<const TwoSidedPair> pairs, Eigen::VectorXcd TwoSidedPair::*side);
 
 /// The eigenvalues of solve_dense_quadratic alone, which take a quarter of the time.
 std::vector<std::complex<double>> dense_quadratic_eigenvalues(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,

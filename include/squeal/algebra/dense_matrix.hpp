@@ -24,6 +24,9 @@ template <typename Real> Eigen::MatrixXcd real_times(const Eigen::MatrixBase<Rea
   return result;
 }
 
+/// The real parts of all columns, then the imaginary ones.
+Eigen::MatrixXd parts_of(const Eigen::MatrixXcd& x);
+
 /// A^-1 B by LU with row interchanges. Throws Error with the text `singular` if a pivot is zero.
 Eigen::MatrixXd solve_dense(Eigen::MatrixXd A, const Eigen::MatrixXd& B, const char* singular);
 
