@@ -107,6 +107,7 @@ void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
   entry["directions"] = word(settings.directions);
   entry["followed_modes"] = sweep.tracks;
   entry["lost_modes"] = sweep.lost;
+  entry["steps_cut_short"] = sweep.cut_short;
   entry["least_mac"] = sweep.least_mac;
   entry["least_mac_across"] = sweep.least_mac_across;
   entry["residual"] = sweep.outcome.residual;
@@ -214,6 +215,10 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
   }
   else
     lines.push_back(unstable_points_text(sweep));
+  if (sweep.cut_short > 0)
+    lines.push_back(format("WARNING: in %d of the steps more points in between are needed than -sweep_between allows: "
+                           "modes may be mistaken there, and thresholds missed",
+                           sweep.cut_short));
   const std::vector<Track> unstable = unstable_tracks(sweep);
   for (std::size_t i = 0; i < std::min(shown, unstable.size()); ++i)
   {

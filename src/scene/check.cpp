@@ -261,7 +261,13 @@ private:
 
   void check_loss() const
   {
+    constexpr double largest_loss = 10; // rubbers at their glass transition reach 2
     const double frequency = scene_.damping.loss_frequency;
+    for (const Part& part : scene_.parts)
+      if (part.loss_factor > largest_loss)
+        fail(&part.loss_factor,
+             format("[[part]] %s loss_factor = %g is no material's: those of rubber reach 2; give a number up to %g",
+                    part.name.c_str(), part.loss_factor, largest_loss));
     const auto lossy = std::ranges::find_if(scene_.parts, [](const Part& part) { return part.loss_factor > 0; });
     if (lossy != scene_.parts.end() && frequency == 0)
       fail(&lossy->loss_factor, "[[part]] " + lossy->name +

@@ -328,6 +328,7 @@ void add_named(const Scene& scene, std::vector<SceneNumber>& numbers)
     numbers.push_back({key_of("part", part.name, "loss_factor"), part.loss_factor});
     if (part.damping) numbers.push_back({key_of("part", part.name, "alpha"), part.damping->alpha});
     if (part.damping) numbers.push_back({key_of("part", part.name, "beta"), part.damping->beta});
+    if (part.rotation) numbers.push_back({key_of("part", part.name, "rotation.rate"), part.rotation->rate});
   }
   for (const Point& point : scene.points) numbers.push_back({key_of("point", point.name, "mass"), point.mass});
   for (const RigidBody& body : scene.rigid_bodies)

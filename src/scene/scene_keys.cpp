@@ -54,7 +54,7 @@ SceneKeys keys_of(Part& p)
       {"density", &p.material.density, required, Rule::positive, "kg/m3", "mass density"},
       {"thickness", &p.thickness, optional, Rule::not_negative, "m", "of a shell; 0 is a solid"},
       {"loss_factor", &p.loss_factor, optional, Rule::not_negative, "-",
-       "eta of the stiffness K (1 + i eta); with damping.loss_frequency"},
+       "eta of the stiffness K (1 + i eta), at most 10; with damping.loss_frequency"},
       {"rotation", &p.rotation, optional, Rule::any, "table",
        "of a solid of revolution that spins: {axis, centre, rate}"},
       {"alpha", DampingTarget{&p.damping, &RayleighDamping::alpha}, optional, Rule::not_negative, "1/s",

@@ -93,6 +93,9 @@ OptionList options_of(SweepOptions& options)
       {"-sweep_passes", &options.passes, Range::not_negative, "corrections of the basis at a point, at most"},
       {"-sweep_depth", &options.depth, Range::not_negative,
        "times that a step between points is halved where modes are unclear, at most"},
+      {"-sweep_between", &options.between, Range::not_negative,
+       "points put into a step where modes are unclear or pairs open or close, besides those of its thresholds, at "
+       "most"},
       {"-sweep_groups", &options.groups, Range::not_negative,
        "groups of ranks that share the points, at most one a rank or a point; 0: as many as pay"},
   };

@@ -117,10 +117,11 @@ Checkpoint packed(const Sweep& sweep)
   Checkpoint checkpoint;
   checkpoint.set("points", std::move(points));
   checkpoint.set("thresholds", std::move(thresholds));
-  checkpoint.set("following", std::vector<double>{static_cast<double>(sweep.tracks), static_cast<double>(sweep.lost),
-                                                  sweep.least_mac, sweep.outcome.residual,
-                                                  static_cast<double>(sweep.basis), static_cast<double>(sweep.passes),
-                                                  static_cast<double>(sweep.groups), sweep.least_mac_across});
+  checkpoint.set("following",
+                 std::vector<double>{static_cast<double>(sweep.tracks), static_cast<double>(sweep.lost),
+                                     sweep.least_mac, sweep.outcome.residual, static_cast<double>(sweep.basis),
+                                     static_cast<double>(sweep.passes), static_cast<double>(sweep.groups),
+                                     sweep.least_mac_across, static_cast<double>(sweep.cut_short)});
   return checkpoint;
 }
 
@@ -148,6 +149,7 @@ Sweep unpacked(const Checkpoint& checkpoint)
   sweep.passes = following.integer();
   sweep.groups = following.integer();
   sweep.least_mac_across = following.number();
+  sweep.cut_short = following.integer();
   return sweep;
 }
 

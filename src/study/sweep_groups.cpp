@@ -91,6 +91,7 @@ public:
       }
     }
     whole_.lost += part.lost;
+    whole_.cut_short += part.cut_short;
     whole_.least_mac = std::min(whole_.least_mac, part.least_mac);
     whole_.least_mac_across = std::min(whole_.least_mac_across, part.least_mac_across);
     whole_.outcome.residual = std::max(whole_.outcome.residual, part.outcome.residual);

@@ -83,8 +83,8 @@ private:
   /// What is recorded is not of a step between points that is under way.
   void note_complete()
   {
-    complete_ = {sweep_.points.size(), sweep_.thresholds.size(), sweep_.tracks,
-                 sweep_.lost,          sweep_.least_mac,         sweep_.least_mac_across};
+    complete_ = {sweep_.points.size(), sweep_.thresholds.size(), sweep_.tracks,          sweep_.lost,
+                 sweep_.cut_short,     sweep_.least_mac,         sweep_.least_mac_across};
   }
 
   /// To what was recorded before that step.
@@ -92,7 +92,8 @@ private:
   {
     sweep_.points.resize(complete_.points);
     sweep_.thresholds.resize(complete_.thresholds);
-    std::tie(sweep_.tracks, sweep_.lost) = std::tie(complete_.tracks, complete_.lost);
+    std::tie(sweep_.tracks, sweep_.lost, sweep_.cut_short) =
+        std::tie(complete_.tracks, complete_.lost, complete_.cut_short);
     std::tie(sweep_.least_mac, sweep_.least_mac_across) = std::tie(complete_.least_mac, complete_.least_mac_across);
   }
 
@@ -144,6 +145,7 @@ private:
       {
         Division division = division_between(*before, *now);
         advance(*before, *now, 0, division);
+        sweep_.cut_short += division.cut_short;
       }
       before = std::move(now);
     }
@@ -327,6 +329,8 @@ private:
   {
     double tolerance = 0;    // of the first number: what is found between two points is found to it
     std::ptrdiff_t left = 0; // changes of contact that may still divide it
+    PetscInt points = 0;     // that may still be put in between
+    bool cut_short = false;  // it needed more
   };
 
   /// Each pair changes once on the way, or a few do more often; more say that equilibria jump.
@@ -335,7 +339,7 @@ private:
     const double size = std::max(std::abs(before.values[0]), std::abs(now.values[0]));
     const Equilibrium& at = model_.equilibrium_at({now.values, now.reversed});
     const bool modes = problem_.settings.stages >= SweepStages::modes; // which alone jump
-    return {threshold_tolerance * size, modes ? std::ssize(at.closed) : 0};
+    return {threshold_tolerance * size, modes ? std::ssize(at.closed) : 0, problem_.options.between};
   }
 
   /// Follows the modes to a point, with points between where they are unclear, and on both sides of places where pairs
@@ -346,26 +350,46 @@ private:
     const ModeForms between_both = forms(before, now);
     std::vector<Match> matches = follow(between_both, clear_mac);
     const bool clear = all_clear(before, matches);
-    const bool divides = divisible && (!clear || may_change_stability(before, now, matches));
-    const bool halvable = divides && depth < problem_.options.depth;
-    const int changed =
-        divides ? model_.changed_pairs({before.values, before.reversed}, {now.values, now.reversed}) : 0;
-    const bool many = changed > many_changes && halvable;
-    if (changed > 0 && !many && divided_at_contact_change(before, now, depth, division)) return;
-    if (halvable && (!clear || many))
-    {
-      const double middle = (before.values[0] + now.values[0]) / 2;
-      if (std::optional<Followed> between = evaluate(between_points(now, middle)))
-      {
-        advance(before, *between, depth + 1, division);
-        advance(*between, now, depth + 1, division);
-        return;
-      }
-      if (many && divided_at_contact_change(before, now, depth, division)) return;
-    }
+    if (divisible && (!clear || may_change_stability(before, now, matches)) &&
+        divided(before, now, depth, clear, division))
+      return;
     if (!clear) matches = follow(between_both, least_clear(before, now));
     take_tracks(before, now, matches, division.tolerance);
     record(now, matches_at(now, matches));
+  }
+
+  /// Follows the modes by parts of the step, if it has any reason to be divided and points are left for it.
+  bool divided(Followed& before, Followed& now, int depth, bool clear, Division& division)
+  {
+    const bool halvable = depth < problem_.options.depth;
+    const int changed = model_.changed_pairs({before.values, before.reversed}, {now.values, now.reversed});
+    if (changed == 0 && (clear || !halvable)) return false;
+    if (division.points <= 0)
+    {
+      division.cut_short = true;
+      return false;
+    }
+    const bool many = changed > many_changes && halvable;
+    if (changed > 0 && !many && divided_at_contact_change(before, now, depth, division)) return true;
+    if (halvable && (!clear || many))
+    {
+      const double middle = (before.values[0] + now.values[0]) / 2;
+      if (std::optional<Followed> between = put_between(now, middle, division))
+      {
+        advance(before, *between, depth + 1, division);
+        advance(*between, now, depth + 1, division);
+        return true;
+      }
+    }
+    return many && divided_at_contact_change(before, now, depth, division);
+  }
+
+  std::optional<Followed> put_between(const Followed& of_line, double value, Division& division)
+  {
+    --division.points;
+    std::optional<Followed> point = evaluate(between_points(of_line, value));
+    progress_->update(static_cast<double>(done_), format("a point in between, at %.6g", value));
+    return point;
   }
 
   /// Whether a mode in the band may become unstable or stable on the way: its growth rate is no farther from zero at
@@ -406,7 +430,7 @@ private:
     for (const double value : {change->before, change->behind})
     {
       if (value == before.values[0] || value == now.values[0]) continue;
-      std::optional<Followed> side = evaluate(between_points(now, value));
+      std::optional<Followed> side = put_between(now, value, division);
       if (!side) return false;
       sides.push_back(std::move(*side));
     }
@@ -503,7 +527,7 @@ private:
   struct
   {
     std::size_t points = 0, thresholds = 0;
-    int tracks = 0, lost = 0;
+    int tracks = 0, lost = 0, cut_short = 0;
     double least_mac = 1, least_mac_across = 1;
   } complete_{}; // recorded
 };

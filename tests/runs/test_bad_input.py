@@ -199,6 +199,8 @@ CASES = {
     "unknown orthotropic key": (block_scene(UPPER, ORTHOTROPIC.replace("shear =", "sheer =")), ["sheer", "shear"]),
     "loss factor without frequency": (block_scene("density = 1000", "density = 1000\nloss_factor = 0.01"),
                                       ["part]] lower", "loss_frequency", "give the squeal's frequency"]),
+    "loss factor of no material": (block_scene("density = 1000", "density = 1000\nloss_factor = 1e9"),
+                                   ["part]] lower", "loss_factor = 1e+09", "up to 10"]),
     "loss frequency without a factor": (block_scene("[modes]", "[damping]\nloss_frequency = 100\n[modes]"),
                                         ["loss_frequency", "loss_factor"]),
     "damping that no part takes": (

@@ -140,6 +140,16 @@ def test_modes_unstable_up_to_a_change_of_contact_alone_are_found(converged):
         assert behind - before == one["change"]
     for direction in (1, -1):
         assert {p["closed"] for p in sweep["points"] if p["direction"] == direction} == {8, 9}
+    assert sweep["steps_cut_short"] == 0
+
+
+def test_a_step_without_points_in_between_says_what_it_may_miss(converged):
+    """The step of the last test, one way, where a mode is unstable in its middle alone."""
+    run = converged(*NINE_PAIRS, "--set", "modes.band=11000", *sweep_of(key="part.pin.young", start=1.7e10, end=1.88e10, points=2),
+                    "-sweep_between", "0", ranks=1)
+    sweep = run.report["sweep"]
+    assert len(sweep["points"]) == 2 and sweep["thresholds"] == [] and sweep["steps_cut_short"] == 1
+    assert "WARNING: in 1 of the steps more points in between are needed than -sweep_between allows" in run.printed
 
 
 @pytest.mark.parametrize("values", ["[-1, 1]", "[-1, 0, 1]"])

@@ -86,6 +86,7 @@ struct Sweep
   std::vector<Threshold> thresholds;
   int tracks = 0;              // number of followed modes
   int lost = 0;                // modes in the band that could not be followed to the next point
+  int cut_short = 0;           // steps between points of the scene that needed more points in between than allowed
   double least_mac = 1;        // along all tracks, where the same pairs are closed or modes change little
   double least_mac_across = 1; // of modes that jump where pairs open or close
   int basis = 0;               // shapes of the basis in the end; of several groups the largest
@@ -96,10 +97,11 @@ struct Sweep
 /// Options -sweep_...
 struct SweepOptions
 {
-  double tolerance = 0; // backward error of right and left vectors on the basis; 0: chosen
-  PetscInt passes = 20; // corrections at a point, at most: the first one of a brake may need more than 8
-  PetscInt depth = 6;   // times that a step is halved, at most
-  PetscInt groups = 0;  // of ranks, at most one a rank or a point; 0: chosen
+  double tolerance = 0;   // backward error of right and left vectors on the basis; 0: chosen
+  PetscInt passes = 20;   // corrections at a point, at most: the first one of a brake may need more than 8
+  PetscInt depth = 6;     // times that a step is halved, at most
+  PetscInt between = 100; // points put into a step where modes are unclear or pairs open or close, at most
+  PetscInt groups = 0;    // of ranks, at most one a rank or a point; 0: chosen
 };
 
 OptionList options_of(SweepOptions& options);
