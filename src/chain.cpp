@@ -316,17 +316,6 @@ bool take_finer_steps(Chain& chain)
   return true;
 }
 
-void leave_to_finer_steps(SettledMotion& settled)
-{
-  MotionVerdict& verdict = settled.examined.verdict;
-  if (verdict.kind == MotionKind::undecided) return;
-  verdict.between = std::string(word(verdict.kind)) + " and what finer steps than " +
-                    std::to_string(settled.steps_per_period) + " a period would show";
-  verdict.would_decide = "steps that change neither the energy nor the largest exponent (cycle.steps_per_period)";
-  verdict.kind = MotionKind::undecided;
-  settled.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
-}
-
 void take_cycle_as_answer(Report& report, FittedCycle found)
 {
   if (found.cycle.cut_short) // whether it attracts is not known: the settled motion is
@@ -337,18 +326,39 @@ void take_cycle_as_answer(Report& report, FittedCycle found)
   report.settled = not_run<SettledMotion>(OutcomeKind::skipped, "it is the cycle, which is the answer");
 }
 
+namespace
+{
+
+/// Whether several modes oscillate and grow, each of which may lead to a motion of its own, and a few trajectories of
+/// the model cost little.
+bool may_lead_elsewhere(const Chain& chain)
+{
+  PetscInt dofs = 0;
+  check(VecGetSize(chain.model.structure.load, &dofs));
+  const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
+  return dofs <= small_model && std::ranges::count_if(chain.report.modes.unstable(), oscillates) > 1;
+}
+
+} // namespace
+
 Attractors run_attractors(const Chain& chain)
 {
   constexpr int enough = 256; // steps a period to recognise a cycle of more steps by
   CycleSettings settings = chain.scene.cycle;
   if (settings.steps_per_period == 0)
     settings.steps_per_period = std::clamp(chain.report.cycle.steps_per_period, first_steps, enough);
-  if (!settings.enabled || settings.starts == 0)
+  if (!settings.enabled || (settings.starts == 0 && !may_lead_elsewhere(chain)))
     return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
   const std::vector<ComplexMode>& modes = chain.report.modes.modes;
   const bool stable = !modes.empty() && chain.report.modes.unstable_count == 0 && chain.model.interface.pairs > 0;
-  const auto attractors = [&](const UnstableModes& started) {
-    return find_attractors({chain.sliding(), modes, started, settings, chain.options.step}, chain.options.attractors);
+  const bool chosen = settings.starts == 0;
+  if (chosen) settings.starts = 8;
+  const auto attractors = [&](const UnstableModes& started)
+  {
+    Attractors found =
+        find_attractors({chain.sliding(), modes, started, settings, chain.options.step}, chain.options.attractors);
+    if (chosen) found.outcome.kind = OutcomeKind::completed; // what has not settled is listed
+    return found;
   };
   if (!stable)
   {

@@ -100,9 +100,6 @@ bool steps_may_decide(const Chain& chain);
 /// would be too many. Not collective.
 bool take_finer_steps(Chain& chain);
 
-/// A motion that the finest steps still change is undecided.
-void leave_to_finer_steps(SettledMotion& settled);
-
 /// Where it has converged, it answers in the settled motion's stead. Not collective.
 void take_cycle_as_answer(Report& report, FittedCycle found);
 

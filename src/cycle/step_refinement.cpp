@@ -214,13 +214,17 @@ Convergence joined(Convergence before, const Convergence& after)
   return before;
 }
 
-/// Unfinds a cycle that only its own steps know. Its state moves on at the finer ones.
-void leave(LimitCycle& cycle, int finer, const std::string& reason)
+/// Unfinds a cycle that only its own steps know. The motion goes on at the finer ones, from beside it: on a cycle that
+/// repels it would stay for hundreds of periods.
+void leave(LimitCycle& cycle, int finer, Vec equilibrium, const std::string& reason)
 {
+  constexpr double smaller = 0.9; // than the cycle, about the equilibrium: contact opens no further
   cycle.outcome.kind = OutcomeKind::not_converged;
   cycle.outcome.reason =
       format("a cycle at %d steps a period that finer ones do not know: ", cycle.steps_per_period) + reason;
   cycle.free = copy_of(cycle.orbit);
+  check(VecScale(cycle.free.state, smaller));
+  check(VecAXPY(displacement(cycle.free.state), 1 - smaller, equilibrium));
   cycle.steps_per_period = finer;
   cycle.multipliers = {};
 }
@@ -305,7 +309,7 @@ void refine_small(const CycleCorrection& correction, LimitCycle& cycle)
   {
     std::string problem = find_anew(correction, steps, cycle);
     const bool found = problem.empty() || cycle.steps_per_period == steps;
-    if (!found && cycles.size() == 1) leave(cycle, steps, problem);
+    if (!found && cycles.size() == 1) leave(cycle, steps, correction.problem.sliding.equilibrium.u, problem);
     if (problem.empty()) cycles.push_back(at_hand());
     return problem;
   };

@@ -60,6 +60,10 @@ std::string stability_text(const Multipliers& multipliers)
   const double bound = largest_upper_bound(multipliers); // closer than the error, which is of both sides
   const bool decided = multipliers.stability == Stability::stable || multipliers.stability == Stability::unstable;
   const std::string which = place == 0 ? "largest" : "a";
+  if (multipliers.stability == Stability::undecided && !multipliers.complete)
+    return format(", whether it lasts is undecided (the largest multiplier found is %.4f +- %.0e, but others may be "
+                  "missing)",
+                  modulus, error);
   const std::string largest =
       modulus + error >= 1 && bound < 1 ? format(" (largest multiplier %.4f, at most %.6f)", modulus, bound)
       : decided && modulus - error <= 1 && bound >= 1 && !multipliers.seen.empty()

@@ -143,6 +143,10 @@ Sentences of_cycle(const Report& report)
   if (cycle.orbit.residual > 1e-3 && report.fidelity.used == CycleModel::full)
     sentences.push_back("a residual this large is no proof of a periodic motion");
   add_chatter(cycle.measured.history, sentences);
+  if (report.modes.unstable_count > 1 && !has_run(report.attractors.outcome))
+    sentences.push_back(format("%d modes are unstable, and other starts may lead to other motions: cycle.starts = 8 "
+                               "shows them",
+                               report.modes.unstable_count));
   if (cycle.multipliers.stability == Stability::undecided)
     sentences.push_back("whether a vibration settles on this cycle is undecided: " + cycle.multipliers.would_decide);
   if (cycle.multipliers.stability == Stability::not_examined)

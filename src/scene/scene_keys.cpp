@@ -231,7 +231,7 @@ SceneKeys keys_of(TransientSettings& t)
 {
   return {
       {"enabled", &t.enabled, optional, Rule::any, "switch", "run this stage"},
-      {"start", &t.start, optional, Rule::any, "word", "mode, estimate, rest, or a state file"},
+      {"start", &t.start, optional, Rule::any, "word", "mode, estimate, rest, equilibrium, or a state file"},
       {"amplitude", &t.amplitude, optional, Rule::not_negative, "m",
        "largest displacement at start = \"mode\"; 0: a tenth of first lift-off"},
       {"periods", &t.periods, optional, Rule::positive, "-", "length, in periods of the followed mode"},
@@ -262,7 +262,7 @@ SceneKeys keys_of(CycleSettings& c)
       {"steps_per_period", &c.steps_per_period, optional, Rule::not_negative, "-", "time steps a period; 0: chosen"},
       {"tolerance", &c.tolerance, optional, Rule::not_negative, "-", "on the full-space residual; 0: chosen"},
       {"free_periods", &c.free_periods, optional, Rule::not_negative, "-", "integrated before the first Newton step"},
-      {"starts", &c.starts, optional, Rule::not_negative, "-", "starts whose motions are listed; 0: none"},
+      {"starts", &c.starts, optional, Rule::not_negative, "-", "starts whose motions are listed; 0: chosen"},
       {"theta", &c.theta, optional, Rule::fraction, "-", "of the theta-method; 0.5 conserves energy"},
       {"save_state", &c.save_state, optional, Rule::any, "path", "state file of the cycle's start"},
   };

@@ -148,7 +148,56 @@ MeanValue energy_by_half_the_steps(const CycleProblem& problem, const SettledMot
   return batch_mean(std::span(energies).subspan(periods / 2));
 }
 
+/// The largest exponent with four times as many steps a period, from where the motion ends, over as many periods as
+/// cost a quarter of what the motion did, or 32. Its first quarter is left out, where the tangent turns to what grows
+/// most.
+MeanValue exponent_by_finer_steps(const CycleProblem& problem, const SettledMotion& motion, double theta, Vec end)
+{
+  constexpr int finer = 4;
+  constexpr std::size_t fewest = 32;
+  PeriodMap map{problem.sliding, problem.step, finer * motion.steps_per_period, theta};
+  map.reactions = problem.sliding.equilibrium.reactions;
+  Flow flow = flow_of(map);
+  set_period(map, motion.period);
+  SettledMotion fine;
+  const Owned<Vec> state = copy_of(end);
+  TangentBundle bundle = make_bundle(flow, state, 1);
+  const std::size_t periods = std::max(motion.examined.periods() / (4 * finer), fewest);
+  for (std::size_t k = 0; k < periods; ++k)
+  {
+    fine.history = {};
+    integrate_period(map, problem.probes, state, 0, fine);
+    follow_period(flow, bundle);
+  }
+  return exponents_of(bundle, periods / 4).front();
+}
+
+/// An exponent above zero that four times as many steps change by more than both bars is of the grid of time: masses
+/// that contact hits within steps, or feet without mass, scatter a motion that is regular.
+void hold_against_finer_steps(const CycleProblem& problem, double theta, Vec end, SettledMotion& motion)
+{
+  if (motion.examined.verdict.kind != MotionKind::irregular) return;
+  const MeanValue coarse = motion.examined.exponents.front(),
+                  fine = exponent_by_finer_steps(problem, motion, theta, end);
+  if (std::abs(coarse.value - fine.value) > coarse.error + fine.error)
+    leave_to_finer_steps(
+        motion, format("four times as many change the largest exponent to %.2g +- %.1g", fine.value, fine.error));
+}
+
 } // namespace
+
+void leave_to_finer_steps(SettledMotion& motion, const std::string& seen)
+{
+  MotionVerdict& verdict = motion.examined.verdict;
+  if (verdict.kind == MotionKind::undecided) return;
+  verdict.between =
+      format("%s and what finer steps than %d a period would show", word(verdict.kind), motion.steps_per_period);
+  verdict.would_decide = (seen.empty() ? "" : seen + ": ") +
+                         std::string("steps that change neither the energy nor the largest exponent would decide "
+                                     "(cycle.steps_per_period)");
+  verdict.kind = MotionKind::undecided;
+  motion.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
+}
 
 bool depends_on_steps(const SettledMotion& motion)
 {
@@ -189,6 +238,7 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
   keep_strongest(motion.shapes, motion.examined.discarded % windows * samples);
   motion.step_error =
       std::abs(energy_by_half_the_steps(problem, motion, cycle.theta, state).value - motion.fluctuating_energy.value);
+  hold_against_finer_steps(problem, cycle.theta, state, motion);
   const MotionVerdict& verdict = motion.examined.verdict;
   const bool stationary = motion.examined.discarded < motion.examined.periods();
   motion.outcome = {OutcomeKind::settled, "", static_cast<int>(motion.examined.periods()), 0};

@@ -87,10 +87,12 @@ BaseFrequencies base_frequencies(const Spectrum& spectrum)
 
 BaseFrequencies base_frequencies(const Spectrum& spectrum, double first)
 {
+  constexpr double of_grid = 0.9; // of the largest frequency: contact that alternates from step to step
   BaseFrequencies base{first, 0, 0, 0};
   const double resolution = spectrum.resolution_hz;
   for (const Line& line : spectrum.lines)
-    if (!is_combination(line.frequency_hz, base.first, 0, resolution))
+    if (line.frequency_hz < of_grid * spectrum.frequency_hz.back() &&
+        !is_combination(line.frequency_hz, base.first, 0, resolution))
     {
       base.second = line.frequency_hz;
       base.closes_after = common_periods(base.first, base.second, resolution);

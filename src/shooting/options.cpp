@@ -28,8 +28,9 @@ OptionList options_of(ShootingOptions& options)
       {"-cycle_multipliers", &options.multipliers, Range::any,
        "columns that the search for Floquet multipliers may take, 0: none; below 0: as many as it needs, within "
        "limits"},
-      {"-cycle_watched_periods", &options.watched_periods, Range::not_negative,
-       "periods integrated from beside the cycle found, to see a small motion grow or decay"},
+      {"-cycle_watched_periods", &options.watched_periods, Range::any,
+       "periods integrated from beside the cycle found, to see a small motion grow or decay; below 0: 200 where the "
+       "whole tangent of a small model does not decide, else none"},
       {"-cycle_multiplier_method", choice_of(options.multiplier_method), Range::any,
        "of the Floquet multipliers: auto, whole, oblique or arnoldi"},
   };

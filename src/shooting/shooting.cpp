@@ -85,10 +85,11 @@ struct Attempt
   bool answers() const { return converged() && !repels() && beside != Beside::unclear; }
 };
 
-/// Holds a verdict against a motion beside the orbit, until its distance has doubled or halved. Doubling shows that an
-/// undecided orbit repels. Where it does not double over periods that should make it four times as large, the verdict
-/// "unstable" is undecided: where contact only just opens, closes or sticks, the tangent holds in a neighbourhood that
-/// no motion stays in. Where the largest multiplier is hardly above 1, that many periods cost too much.
+/// Holds a verdict against a motion beside the orbit, until its distance has doubled or is a tenth: other motions may
+/// shrink it at first. Doubling shows that an undecided orbit repels, and so does growth to four times its least.
+/// Where it does neither over periods that should make it four times as large, the verdict "unstable" is undecided:
+/// where contact only just opens, closes or sticks, the tangent holds in a neighbourhood that no motion stays in. Where
+/// the largest multiplier is hardly above 1, that many periods cost too much.
 void hold_against_motion(const Search& search, Attempt& attempt)
 {
   constexpr double part = 0.01;                 // of the fluctuation: above the orbit's tolerance, below its saturation
@@ -103,8 +104,9 @@ void hold_against_motion(const Search& search, Attempt& attempt)
   if (!(std::log(4) / std::log(largest) <= static_cast<double>(at_most))) return;
   if (log.convergence.periods + at_most > options.max_periods) return;
   const std::vector<double> distances = distances_beside(problem, log, attempt.found.orbit, attempt.floquet.fastest,
-                                                         {part, 0.5 * part, 2 * part, at_most});
-  if (!(distances.back() < 2 * part)) attempt.beside = Beside::leaves;
+                                                         {part, 0.1 * part, 2 * part, at_most});
+  const double least = *std::ranges::min_element(distances);
+  if (!(distances.back() < std::min(2 * part, 4 * least))) attempt.beside = Beside::leaves;
   if (!unstable || attempt.beside == Beside::leaves) return;
   if (distances.back() > 0.5 * part) attempt.beside = Beside::unclear;
   multipliers.stability = Stability::undecided;
@@ -236,6 +238,16 @@ std::string leaving_time(const Multipliers& multipliers, double period)
                 std::abs(std::arg(fastest)) / (two_pi * period), periods, periods * period);
 }
 
+/// The periods to watch: those asked for, or as many as show where the bar of a whole matrix holds 1 how a motion grows
+/// by 1e-3 a period. Such a matrix is of few degrees of freedom.
+long watched_periods(const ShootingOptions& options, const Multipliers& multipliers)
+{
+  constexpr long enough = 200;
+  if (options.watched_periods >= 0) return options.watched_periods;
+  const bool undecided = multipliers.stability == Stability::undecided && multipliers.complete;
+  return undecided && multipliers.method == MultiplierMethod::whole ? enough : 0;
+}
+
 /// How the search for an orbit ended, in words.
 Outcome outcome_of(const Convergence& convergence, StageEnding ending, double residual)
 {
@@ -292,9 +304,10 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   ShootingResult result;
   result.outcome = outcome_of(log.convergence, ending, found.found.orbit.residual);
   std::vector<SeenGrowth> seen;
-  if (options.watched_periods > 0 && found.converged() && !found.cut_short) try
+  const long watched = watched_periods(options, found.floquet.multipliers);
+  if (watched > 0 && found.converged() && !found.cut_short) try
     {
-      seen = growths_beside(problem, log, found.found.orbit, found.floquet, options.watched_periods);
+      seen = growths_beside(problem, log, found.found.orbit, found.floquet, watched);
     }
     catch (const Interrupted&) // on all ranks alike: the verdict stands
     {
@@ -323,8 +336,10 @@ void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable
 {
   if (outcome.kind != OutcomeKind::converged || multipliers.stability != Stability::unstable) return;
   outcome.kind = other_unstable == 0 ? OutcomeKind::unstable_cycle : OutcomeKind::not_periodic;
+  const double largest = std::abs(multipliers.values.front());
+  const bool as_seen = largest - multipliers.errors.front() <= 1 && !multipliers.seen.empty();
   outcome.reason = format("the cycle found repels: a small motion beside it grows %.4g times a period (%s)",
-                          std::abs(multipliers.values.front()), word(multipliers.crossing));
+                          as_seen ? multipliers.seen.back().growth : largest, word(multipliers.crossing));
   if (other_unstable > 0) outcome.reason += format("; %zu modes are unstable", other_unstable + 1);
 }
 

@@ -150,7 +150,7 @@ struct CycleSettings
   int steps_per_period = 0;                        // [-] 0: chosen
   double tolerance = 0;                            // [-] on the residual of the full state; 0: chosen
   int free_periods = 10;                           // [-] number of periods integrated before the first Newton step
-  int starts = 0;                                  // [-] number of starts whose motions are listed; 0: none
+  int starts = 0;                                  // [-] number of starts whose motions are listed; 0: chosen
   double theta = 0.5;                              // [-] of the theta method
   std::filesystem::path save_state;                // state file of the start of the cycle; none if empty
 };

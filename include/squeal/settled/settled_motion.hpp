@@ -32,6 +32,10 @@ struct SettledMotion
 /// have a part in the kind of motion. Not collective.
 bool depends_on_steps(const SettledMotion& motion);
 
+/// Makes a kind that was decided undecided between itself and what finer steps would show, with what was seen of them.
+/// Not collective.
+void leave_to_finer_steps(SettledMotion& motion, const std::string& seen = {});
+
 /// Where the motion answers, the outcome of the search for a cycle becomes "settled". Not collective.
 void take_as_answer(const SettledMotion& motion, Outcome& of_cycle);
 

@@ -53,7 +53,7 @@ struct ShootingOptions
   PetscInt max_periods = 400;     // integrated in all
   PetscInt free_periods = 320;    // integrated freely in all, where shooting finds no cycle that attracts
   PetscInt multipliers = -1;      // columns sought; 0: none; below 0: as many as find_multipliers says
-  PetscInt watched_periods = 0;   // integrated beside the orbit found, to see its stability in time
+  PetscInt watched_periods = -1;  // integrated beside the orbit found, to see its stability in time; below 0: chosen
   MultiplierMethod multiplier_method = MultiplierMethod::automatic;
 };
 
