@@ -389,9 +389,9 @@ Preconditioner recorded_preconditioner(const CycleProblem& problem, const Reduce
   { apply(T, x, y); };
 }
 
-int steps_to_compare(int steps)
+int steps_to_compare(const Structure& structure, int steps)
 {
-  return steps <= enough_steps ? 2 * steps : 0;
+  return is_large(structure) && steps <= enough_steps ? 2 * steps : 0;
 }
 
 FloquetAnalysis examine(const CycleProblem& problem, const CycleOptions& options, const PeriodMap& map,
@@ -401,7 +401,7 @@ FloquetAnalysis examine(const CycleProblem& problem, const CycleOptions& options
   examined.reactions = map.reactions;
   Flow flow = flow_of(examined);
   add_slow_motions(problem, options.reduced, examined,
-                   map.steps > enough_steps ? map.steps : steps_to_compare(map.steps), flow);
+                   map.steps > enough_steps ? map.steps : steps_to_compare(map.sliding.structure, map.steps), flow);
   const Vec u0 = problem.sliding.equilibrium.u;
   const Preconditioner none;
   const OrbitProblem found = problem_of(

@@ -17,8 +17,8 @@ void add_slow_motions(const CycleProblem& problem, const ReducedOptions& options
 Preconditioner recorded_preconditioner(const CycleProblem& problem, const ReducedOptions& options, const PeriodMap& map,
                                        double period, Vec rate);
 
-/// The number of steps a period that tells the error of another: twice as many of few, else 0.
-int steps_to_compare(int steps);
+/// The number of steps a period that tells the error of another: twice as many of a large model with few, else 0.
+int steps_to_compare(const Structure& structure, int steps);
 
 /// Of a converged cycle of the map, by at most 128 steps a period: what the others change is in the bars.
 FloquetAnalysis examine(const CycleProblem& problem, const CycleOptions& options, const PeriodMap& map,

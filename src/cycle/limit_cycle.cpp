@@ -51,7 +51,7 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
   map.reactions = problem.sliding.equilibrium.reactions;
   map.keeps_step = is_large(problem.sliding.structure);
   Flow flow = flow_of(map);
-  add_slow_motions(problem, options.reduced, map, steps_to_compare(map.steps), flow);
+  add_slow_motions(problem, options.reduced, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
   const Preconditioner& preconditioner = make(map, flow);
   ShootingResult found = shoot(flow, preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
