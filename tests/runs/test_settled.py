@@ -206,3 +206,58 @@ def test_bars_of_multipliers_hold_what_impacts_within_a_step_change(squeal, tmp_
     cycle = squeal(scene, ranks=1).report["cycle"]
     largest = cycle["multipliers"]["values"][0]
     assert abs(abs(complex(largest["real"], largest["imaginary"])) - 0.958) <= largest["error"]
+
+
+def pads_on_discs(folder):
+    """Two pads on springs, each against the mass of a disc of its own that moves along the normal."""
+    at, belt = [0, 0, 0], [[1, 0, 0]]
+    points, springs, forces, contacts = [], [], [], []
+    for i, (m, disc, x, y, oblique, slope, c, below, load, speed) in enumerate(
+            [(0.6813, 0.3456, 0.82858, 0.6134, 0.24844, 0.8313, 0.003244, 1.2013, 1.158, 1.118),
+             (1.558, 0.5512, 1.9879, 0.80488, 0.19062, 0.8026, 0.007635, 1.4221, 1.473, 0.6337)]):
+        points += [{"name": f"pad{i}", "at": at, "mass": m, "free": "x y"}, {"name": f"disc{i}", "at": at, "mass": disc, "free": "y"}]
+        springs += [{"from": f"pad{i}", "direction": "x", "stiffness": x, "damping": c},
+                    {"from": f"pad{i}", "direction": "y", "stiffness": y, "damping": c},
+                    {"from": f"pad{i}", "direction": [1.0, -slope, 0], "stiffness": oblique},
+                    {"from": f"disc{i}", "direction": "y", "stiffness": below, "damping": 0.02}]
+        forces.append({"on": f"pad{i}", "vector": [0, -load, 0]})
+        contacts.append({"rotor": f"disc{i}", "stator": f"pad{i}", "normal": [0, 1, 0], "tangents": belt, "velocity": [speed, 0, 0]})
+    springs += [{"from": "pad0", "to": "pad1", "direction": "x", "stiffness": 0.059189, "damping": 0.002},
+                {"from": "disc0", "to": "disc1", "direction": "y", "stiffness": 0.26171, "damping": 0.002}]
+    return write_scene(folder, point=points, spring=springs, force=forces, contact=contacts, friction={"coefficient": 0.6041},
+                       modes={"band": 2.0}, cycle={"enabled": True})
+
+
+def test_a_verdict_that_impacts_leave_open_is_watched(converged, tmp_path):
+    """Impacts on masses make the bars of the multipliers 0.1 wide: beside the cycle motions decay by 0.994 a period, and an
+    integrator of its own settles on the cycle from three starts."""
+    report = converged(pads_on_discs(tmp_path), ranks=1).report
+    found = report["cycle"]["multipliers"]
+    assert found["stability"] == "stable" and "the distance of a motion beside it" in report["heard"]
+    assert found["values"][0]["error"] > 0.01 and found["seen"][-1]["growth"] == pytest.approx(0.994, abs=2e-3)
+
+
+def test_exponents_that_finer_steps_change_show_no_irregular_motion(squeal, tmp_path):
+    """Two bodies on massless feet, a torus: at 2048 steps a period two motions that begin 1e-7 apart are no further apart after 140.
+    At 64 and 256 steps small differences grow by 5.6 a period."""
+    at, belt = [0, 0, 0], [[1, 0, 0]]
+    points = [{"name": "belt", "at": at, "free": "none"}]
+    springs, forces, contacts = [], [], []
+    for i, (mass, x, y) in enumerate([(1.0, 1.0, 0.4), (1.3, 1.2, 0.6)]):
+        body, foot = f"body{i}", f"foot{i}"
+        points += [{"name": body, "at": at, "mass": mass, "free": "x y"}, {"name": foot, "at": at, "free": "x y"}]
+        springs += [{"from": body, "direction": "x", "stiffness": x, "damping": 0.02},
+                    {"from": body, "direction": "y", "stiffness": y, "damping": 0.02},
+                    {"from": body, "direction": [1, -1, 0], "stiffness": 0.3},
+                    {"from": foot, "to": body, "direction": "x", "stiffness": 20.0, "damping": 0.05},
+                    {"from": foot, "to": body, "direction": "y", "stiffness": 1.5, "damping": 0.05}]
+        forces.append({"on": body, "vector": [0, -1, 0]})
+        contacts.append({"rotor": "belt", "stator": foot, "normal": [0, 1, 0], "tangents": belt, "velocity": [0.6, 0, 0]})
+    springs.append({"from": "body0", "to": "body1", "direction": "x", "stiffness": 0.2})
+    scene = write_scene(tmp_path, point=points, spring=springs, force=forces, contact=contacts, friction={"coefficient": 0.45},
+                        modes={"band": 2.0}, cycle={"steps_per_period": 256})
+    run = squeal(scene, "-settled_periods", "128", "-cycle_free_periods", "20", ranks=1)
+    settled = run.report["settled"]
+    assert run.code == 0 and settled["exponents"][0]["mean"] > 1
+    assert settled["kind"] == "undecided" and "irregular and what finer steps than 256" in settled["reason"]
+    assert "four times as many change the largest exponent to" in settled["reason"]
