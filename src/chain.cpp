@@ -339,6 +339,13 @@ bool may_lead_elsewhere(const Chain& chain)
   return dofs <= small_model && std::ranges::count_if(chain.report.modes.unstable(), oscillates) > 1;
 }
 
+/// The modes, their pairs and five random sums; as many as are integrated together at most.
+int starts_beside(int unstable)
+{
+  constexpr int random = 5, together = 16;
+  return std::min(unstable * (unstable + 1) / 2 + random, together);
+}
+
 } // namespace
 
 Attractors run_attractors(const Chain& chain)
@@ -348,16 +355,16 @@ Attractors run_attractors(const Chain& chain)
   if (settings.steps_per_period == 0)
     settings.steps_per_period = std::clamp(chain.report.cycle.steps_per_period, first_steps, enough);
   if (!settings.enabled || (settings.starts == 0 && !may_lead_elsewhere(chain)))
-    return not_run<Attractors>(OutcomeKind::off, "the scene has no cycle.starts");
+    return not_run<Attractors>(OutcomeKind::off, "cycle.starts is 0, and no other starts are sought by themselves");
   const std::vector<ComplexMode>& modes = chain.report.modes.modes;
   const bool stable = !modes.empty() && chain.report.modes.unstable_count == 0 && chain.model.interface.pairs > 0;
   const bool chosen = settings.starts == 0;
-  if (chosen) settings.starts = 8;
+  if (chosen) settings.starts = starts_beside(chain.report.modes.unstable_count);
   const auto attractors = [&](const UnstableModes& started)
   {
     Attractors found =
         find_attractors({chain.sliding(), modes, started, settings, chain.options.step}, chain.options.attractors);
-    if (chosen) found.outcome.kind = OutcomeKind::completed; // what has not settled is listed
+    if (chosen && found.outcome.kind == OutcomeKind::not_converged) found.outcome.kind = OutcomeKind::completed;
     return found;
   };
   if (!stable)

@@ -428,6 +428,7 @@ void refine_together(const LossyMatrices& problem, MultiVector V, std::span<TwoS
                       left = residuals_of(problem, pairs, &TwoSidedPair::left);
       errors = right.errors + left.errors; // NaN of either stays
       if ((errors.array() <= exact).all()) return;
+      if (!errors.allFinite()) break;
       extend_orthonormal(V, {V.comm, parts_of(factor.solve(right.columns))});
       extend_orthonormal(V, {V.comm, parts_of(factor.transpose().solve(left.columns))});
     }

@@ -61,12 +61,11 @@ std::string stability_text(const Multipliers& multipliers)
   const bool decided = multipliers.stability == Stability::stable || multipliers.stability == Stability::unstable;
   const std::string which = place == 0 ? "largest" : "a";
   if (multipliers.stability == Stability::undecided && !multipliers.complete)
-    return format(", whether it lasts is undecided (the largest multiplier found is %.4f +- %.0e, but others may be "
-                  "missing)",
-                  modulus, error);
+    return format(", whether it lasts is undecided (%s multiplier found is %.4f +- %.0e, but others may be missing)",
+                  place == 0 ? "the largest" : "a", modulus, error);
   const std::string largest =
       modulus + error >= 1 && bound < 1 ? format(" (largest multiplier %.4f, at most %.6f)", modulus, bound)
-      : decided && modulus - error <= 1 && bound >= 1 && !multipliers.seen.empty()
+      : decided && largest_reaches_across(multipliers) && bound >= 1 && !multipliers.seen.empty()
           ? format(" (the distance of a motion beside it changes by %.4f +- %.0e times a period)",
                    multipliers.seen.back().growth, multipliers.seen.back().error)
           : format(" (%s multiplier %.4f +- %.0e)", which.c_str(), modulus, error);

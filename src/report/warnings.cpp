@@ -143,10 +143,12 @@ Sentences of_cycle(const Report& report)
   if (cycle.orbit.residual > 1e-3 && report.fidelity.used == CycleModel::full)
     sentences.push_back("a residual this large is no proof of a periodic motion");
   add_chatter(cycle.measured.history, sentences);
-  if (report.modes.unstable_count > 1 && !has_run(report.attractors.outcome))
-    sentences.push_back(format("%d modes are unstable, and other starts may lead to other motions: cycle.starts = 8 "
-                               "shows them",
-                               report.modes.unstable_count));
+  const auto grow =
+      std::ranges::count_if(report.modes.unstable(), [](const ComplexMode& mode) { return mode.frequency_hz() > 0; });
+  if (grow > 1 && !has_run(report.attractors.outcome))
+    sentences.push_back(format("%td modes are unstable, and other starts may lead to other motions: cycle.starts = 8 "
+                               "shows them, by as many motions of some hundred periods",
+                               grow));
   if (cycle.multipliers.stability == Stability::undecided)
     sentences.push_back("whether a vibration settles on this cycle is undecided: " + cycle.multipliers.would_decide);
   if (cycle.multipliers.stability == Stability::not_examined)

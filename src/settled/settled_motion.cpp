@@ -172,14 +172,14 @@ MeanValue exponent_by_finer_steps(const CycleProblem& problem, const SettledMoti
   return exponents_of(bundle, periods / 4).front();
 }
 
-/// An exponent above zero that four times as many steps change by more than both bars is of the grid of time: masses
-/// that contact hits within steps, or feet without mass, scatter a motion that is regular.
+/// An exponent above zero that four times as many steps change by more than both bars, and by a tenth, is of the grid
+/// of time: masses that contact hits within steps, or feet without mass, scatter a motion that is regular.
 void hold_against_finer_steps(const CycleProblem& problem, double theta, Vec end, SettledMotion& motion)
 {
   if (motion.examined.verdict.kind != MotionKind::irregular) return;
   const MeanValue coarse = motion.examined.exponents.front(),
                   fine = exponent_by_finer_steps(problem, motion, theta, end);
-  if (std::abs(coarse.value - fine.value) > coarse.error + fine.error)
+  if (!(std::abs(coarse.value - fine.value) <= coarse.error + fine.error + 0.1 * coarse.value)) // NaN does not confirm
     leave_to_finer_steps(
         motion, format("four times as many change the largest exponent to %.2g +- %.1g", fine.value, fine.error));
 }

@@ -28,6 +28,12 @@ Line line_at(const Spectrum& spectrum, std::size_t place)
   return {(static_cast<double>(place) + away) * spectrum.resolution_hz, here / height};
 }
 
+/// Whether a line is of contact that alternates from step to step, which fewer than 2.2 samples a period show.
+bool of_grid(const Line& line, const Spectrum& spectrum)
+{
+  return line.frequency_hz > 0.9 * spectrum.frequency_hz.back();
+}
+
 /// Whether a frequency is n f_1 + m d with d the distance of f_2 from the nearest multiple of f_1 and |m| <= 3; m none
 /// where there is no f_2. More side bands would hold any frequency. Lines are good to a tenth of the resolution.
 bool is_combination(double frequency, double first, double second, double resolution)
@@ -82,17 +88,17 @@ Spectrum spectrum_of(std::span<const double> samples, double step_size)
 
 BaseFrequencies base_frequencies(const Spectrum& spectrum)
 {
-  return spectrum.lines.empty() ? BaseFrequencies{} : base_frequencies(spectrum, spectrum.lines.front().frequency_hz);
+  const auto strongest =
+      std::ranges::find_if(spectrum.lines, [&](const Line& line) { return !of_grid(line, spectrum); });
+  return strongest == spectrum.lines.end() ? BaseFrequencies{} : base_frequencies(spectrum, strongest->frequency_hz);
 }
 
 BaseFrequencies base_frequencies(const Spectrum& spectrum, double first)
 {
-  constexpr double of_grid = 0.9; // of the largest frequency: contact that alternates from step to step
   BaseFrequencies base{first, 0, 0, 0};
   const double resolution = spectrum.resolution_hz;
   for (const Line& line : spectrum.lines)
-    if (line.frequency_hz < of_grid * spectrum.frequency_hz.back() &&
-        !is_combination(line.frequency_hz, base.first, 0, resolution))
+    if (!of_grid(line, spectrum) && !is_combination(line.frequency_hz, base.first, 0, resolution))
     {
       base.second = line.frequency_hz;
       base.closes_after = common_periods(base.first, base.second, resolution);

@@ -202,6 +202,12 @@ double largest_upper_bound(const Multipliers& multipliers)
   return multipliers.upper_bound(deciding_place(multipliers));
 }
 
+bool largest_reaches_across(const Multipliers& multipliers)
+{
+  return !multipliers.values.empty() &&
+         std::abs(std::abs(multipliers.values.front()) - 1) <= multipliers.errors.front();
+}
+
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable)
 {
@@ -233,7 +239,12 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
   const PetscInt steps = options.multipliers > 0 ? options.multipliers : dofs <= large_model ? -96 : -24;
   FloquetAnalysis result =
       multipliers_by_arnoldi(monodromy, motions_that_may_grow(problem, orbit, other_unstable), steps);
-  if (projected && result.multipliers.stability == Stability::undecided) return std::move(*projected);
+  if (projected)
+  {
+    const long periods = projected->multipliers.periods + result.multipliers.periods;
+    projected->multipliers.periods = result.multipliers.periods = periods;
+    if (result.multipliers.stability == Stability::undecided) return std::move(*projected);
+  }
   result.multipliers.refusal = projected ? projected->multipliers.would_decide : std::move(refusal);
   return result;
 }

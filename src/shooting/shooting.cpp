@@ -85,6 +85,19 @@ struct Attempt
   bool answers() const { return converged() && !repels() && beside != Beside::unclear; }
 };
 
+/// Whether a motion that began a part beside an orbit leaves it: its distance doubles, or grows to four times its least
+/// where that is above what the orbit's residual adds. NaN has left, too.
+bool leaves(const std::vector<double>& distances, double part, double residual)
+{
+  double least = HUGE_VAL;
+  for (const double distance : distances)
+  {
+    if (!(distance < 2 * part) || distance >= 4 * std::max(least, 10 * residual)) return true;
+    least = std::min(least, distance);
+  }
+  return false;
+}
+
 /// Holds a verdict against a motion beside the orbit, until its distance has doubled or is a tenth: other motions may
 /// shrink it at first. Doubling shows that an undecided orbit repels, and so does growth to four times its least.
 /// Where it does neither over periods that should make it four times as large, the verdict "unstable" is undecided:
@@ -105,8 +118,7 @@ void hold_against_motion(const Search& search, Attempt& attempt)
   if (log.convergence.periods + at_most > options.max_periods) return;
   const std::vector<double> distances = distances_beside(problem, log, attempt.found.orbit, attempt.floquet.fastest,
                                                          {part, 0.1 * part, 2 * part, at_most});
-  const double least = *std::ranges::min_element(distances);
-  if (!(distances.back() < std::min(2 * part, 4 * least))) attempt.beside = Beside::leaves;
+  if (leaves(distances, part, attempt.found.orbit.residual)) attempt.beside = Beside::leaves;
   if (!unstable || attempt.beside == Beside::leaves) return;
   if (distances.back() > 0.5 * part) attempt.beside = Beside::unclear;
   multipliers.stability = Stability::undecided;
@@ -116,6 +128,20 @@ void hold_against_motion(const Search& search, Attempt& attempt)
              "%.2g %% away after %zu periods: contact that only just opens, closes or sticks; other steps a period, or "
              "-cycle_watched_periods",
              largest, 100 * part, 100 * distances.back(), distances.size());
+}
+
+/// Watches motions beside an orbit of few degrees of freedom where only the bar of the largest multiplier, of a whole
+/// matrix, leaves the verdict open. Like the columns of that matrix the periods are none of the search's.
+void watch_undecided(const Search& search, Attempt& attempt)
+{
+  constexpr long enough = 200; // periods: a growth of 1e-3 a period shows
+  const auto& [problem, options, log, start] = search;
+  Multipliers& multipliers = attempt.floquet.multipliers;
+  const bool open = multipliers.stability == Stability::undecided && multipliers.complete &&
+                    multipliers.method == MultiplierMethod::whole && largest_reaches_across(multipliers);
+  if (options.watched_periods >= 0 || !open || attempt.beside != Beside::not_seen) return;
+  multipliers.seen = growths_beside(problem, log, attempt.found.orbit, attempt.floquet, enough);
+  decide_by_growth(multipliers.seen, multipliers);
 }
 
 /// Whether shooting has found the orbit again. Each is known up to its residual, which slow motions multiply.
@@ -159,6 +185,7 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
     attempt.floquet = find_multipliers(problem, options, attempt.found.orbit, start.other_unstable);
     sought = "a motion beside it was watched";
     hold_against_motion(search, attempt);
+    watch_undecided(search, attempt);
   }
   catch (const Interrupted&) // on all ranks alike: the orbit stays
   {
@@ -238,16 +265,6 @@ std::string leaving_time(const Multipliers& multipliers, double period)
                 std::abs(std::arg(fastest)) / (two_pi * period), periods, periods * period);
 }
 
-/// The periods to watch: those asked for, or as many as show where the bar of a whole matrix holds 1 how a motion grows
-/// by 1e-3 a period. Such a matrix is of few degrees of freedom.
-long watched_periods(const ShootingOptions& options, const Multipliers& multipliers)
-{
-  constexpr long enough = 200;
-  if (options.watched_periods >= 0) return options.watched_periods;
-  const bool undecided = multipliers.stability == Stability::undecided && multipliers.complete;
-  return undecided && multipliers.method == MultiplierMethod::whole ? enough : 0;
-}
-
 /// How the search for an orbit ended, in words.
 Outcome outcome_of(const Convergence& convergence, StageEnding ending, double residual)
 {
@@ -304,10 +321,9 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   ShootingResult result;
   result.outcome = outcome_of(log.convergence, ending, found.found.orbit.residual);
   std::vector<SeenGrowth> seen;
-  const long watched = watched_periods(options, found.floquet.multipliers);
-  if (watched > 0 && found.converged() && !found.cut_short) try
+  if (options.watched_periods > 0 && found.converged() && !found.cut_short) try
     {
-      seen = growths_beside(problem, log, found.found.orbit, found.floquet, watched);
+      seen = growths_beside(problem, log, found.found.orbit, found.floquet, options.watched_periods);
     }
     catch (const Interrupted&) // on all ranks alike: the verdict stands
     {
@@ -315,7 +331,7 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
     }
   result.multipliers = std::move(found.floquet.multipliers);
   decide_by_growth(seen, result.multipliers);
-  result.multipliers.seen = std::move(seen);
+  if (!seen.empty()) result.multipliers.seen = std::move(seen);
   refuse_repelling(result.multipliers, start.other_unstable.size(), result.outcome);
   if (found.beside != Beside::not_seen && result.outcome.kind == OutcomeKind::converged)
   {
@@ -336,10 +352,10 @@ void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable
 {
   if (outcome.kind != OutcomeKind::converged || multipliers.stability != Stability::unstable) return;
   outcome.kind = other_unstable == 0 ? OutcomeKind::unstable_cycle : OutcomeKind::not_periodic;
-  const double largest = std::abs(multipliers.values.front());
-  const bool as_seen = largest - multipliers.errors.front() <= 1 && !multipliers.seen.empty();
+  const bool as_seen = largest_reaches_across(multipliers) && !multipliers.seen.empty();
   outcome.reason = format("the cycle found repels: a small motion beside it grows %.4g times a period (%s)",
-                          as_seen ? multipliers.seen.back().growth : largest, word(multipliers.crossing));
+                          as_seen ? multipliers.seen.back().growth : std::abs(multipliers.values.front()),
+                          word(multipliers.crossing));
   if (other_unstable > 0) outcome.reason += format("; %zu modes are unstable", other_unstable + 1);
 }
 

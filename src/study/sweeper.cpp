@@ -363,33 +363,42 @@ private:
   {
     const bool halvable = depth < problem_.options.depth;
     const int changed = model_.changed_pairs({before.values, before.reversed}, {now.values, now.reversed});
-    if (changed == 0 && (clear || !halvable)) return false;
+    const bool many = changed > many_changes && halvable, halves = many || (halvable && !clear);
+    if (!halves && (changed == 0 || division.left == 0)) return false;
     if (division.points <= 0)
     {
       division.cut_short = true;
       return false;
     }
-    const bool many = changed > many_changes && halvable;
     if (changed > 0 && !many && divided_at_contact_change(before, now, depth, division)) return true;
-    if (halvable && (!clear || many))
+    if (halves)
     {
       const double middle = (before.values[0] + now.values[0]) / 2;
       if (std::optional<Followed> between = put_between(now, middle, division))
       {
-        advance(before, *between, depth + 1, division);
-        advance(*between, now, depth + 1, division);
+        advance_by_parts(before, *between, now, depth + 1, division);
         return true;
       }
     }
     return many && divided_at_contact_change(before, now, depth, division);
   }
 
+  /// Through a point in between. Either part has half of the points that may still be put in, and the second what the
+  /// first leaves.
+  void advance_by_parts(Followed& before, Followed& between, Followed& now, int depth, Division& division)
+  {
+    const PetscInt of_second = division.points / 2;
+    division.points -= of_second;
+    advance(before, between, depth, division);
+    division.points += of_second;
+    advance(between, now, depth, division);
+  }
+
   std::optional<Followed> put_between(const Followed& of_line, double value, Division& division)
   {
     --division.points;
-    std::optional<Followed> point = evaluate(between_points(of_line, value));
     progress_->update(static_cast<double>(done_), format("a point in between, at %.6g", value));
-    return point;
+    return evaluate(between_points(of_line, value));
   }
 
   /// Whether a mode in the band may become unstable or stable on the way: its growth rate is no farther from zero at

@@ -72,7 +72,7 @@ struct Multipliers
   double trivial_error = 0;           // distance of the shift's own multiplier from 1
   long periods = 0;                   // columns of the tangent, or difference quotients, over one period each
   MultiplierMethod method = MultiplierMethod::automatic; // that was used
-  std::string refusal;                                   // why the oblique projection did not serve
+  std::string refusal;                                   // why the oblique projection did not serve, or did not decide
   std::vector<SeenGrowth> seen{};                        // from smaller and smaller parts; the last is the smallest
 
   /// Of the modulus of a value.
@@ -85,6 +85,9 @@ std::size_t deciding_place(const Multipliers& multipliers);
 /// Of the moduli of all; NaN where none was examined. An orbit is stable where it is below 1, though the bar of a value
 /// that the grid of time lowers may reach across.
 double largest_upper_bound(const Multipliers& multipliers);
+
+/// Whether the bar of the largest holds 1.
+bool largest_reaches_across(const Multipliers& multipliers);
 
 /// The motion of the largest multiplier: Re(z (real + i imaginary)), z multiplied by it in every period. No other phase
 /// makes the real part longer. Its energy norm is 1.
