@@ -95,6 +95,14 @@ SettledBySteps by_steps(const SettledMotion& settled)
           exponents.empty() ? MeanValue{} : exponents.front()};
 }
 
+/// Whether it has up to small_model degrees of freedom.
+bool is_small(const Chain& chain)
+{
+  PetscInt dofs = 0;
+  check(VecGetSize(chain.model.structure.load, &dofs));
+  return dofs <= small_model;
+}
+
 bool alike(const MeanValue& a, const MeanValue& b)
 {
   return std::abs(a.value - b.value) <= a.error + b.error;
@@ -296,9 +304,7 @@ bool steps_may_decide(const Chain& chain)
   const Scene& scene = chain.scene;
   const SettledMotion& settled = chain.report.settled;
   const bool open = scene.fidelity == CycleModel::automatic && scene.cycle.steps_per_period == 0;
-  PetscInt dofs = 0;
-  check(VecGetSize(chain.model.structure.load, &dofs));
-  if (!open || chain.coarse || !has_run(settled.outcome) || dofs > small_model) return false;
+  if (!open || chain.coarse || !has_run(settled.outcome) || !is_small(chain)) return false;
   const SettledBySteps now = by_steps(settled);
   if (const std::optional<SettledBySteps>& before = chain.by_fewer_steps)
     return before->kind != now.kind || !alike(before->energy, now.energy) || !alike(before->exponent, now.exponent);
@@ -333,10 +339,8 @@ namespace
 /// the model cost little.
 bool may_lead_elsewhere(const Chain& chain)
 {
-  PetscInt dofs = 0;
-  check(VecGetSize(chain.model.structure.load, &dofs));
   const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
-  return dofs <= small_model && std::ranges::count_if(chain.report.modes.unstable(), oscillates) > 1;
+  return is_small(chain) && std::ranges::count_if(chain.report.modes.unstable(), oscillates) > 1;
 }
 
 /// The modes, their pairs and five random sums; as many as are integrated together at most.

@@ -129,6 +129,14 @@ void name_means(SettledMotion& motion, int pairs)
   motion.greatest_energy = *greatest;
 }
 
+/// Gives what an undecided kind is between as the reason.
+void note_undecided(SettledMotion& motion)
+{
+  const MotionVerdict& verdict = motion.examined.verdict;
+  if (verdict.kind == MotionKind::undecided)
+    motion.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
+}
+
 /// The mean fluctuating energy with half as many steps a period, from where the motion ends. It is of the second half
 /// of as many periods as cost a quarter of the motion's own.
 MeanValue energy_by_half_the_steps(const CycleProblem& problem, const SettledMotion& motion, double theta, Vec end)
@@ -196,7 +204,7 @@ void leave_to_finer_steps(SettledMotion& motion, const std::string& seen)
                          std::string("steps that change neither the energy nor the largest exponent would decide "
                                      "(cycle.steps_per_period)");
   verdict.kind = MotionKind::undecided;
-  motion.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
+  note_undecided(motion);
 }
 
 bool depends_on_steps(const SettledMotion& motion)
@@ -238,13 +246,11 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
   keep_strongest(motion.shapes, motion.examined.discarded % windows * samples);
   motion.step_error =
       std::abs(energy_by_half_the_steps(problem, motion, cycle.theta, state).value - motion.fluctuating_energy.value);
-  hold_against_finer_steps(problem, cycle.theta, state, motion);
-  const MotionVerdict& verdict = motion.examined.verdict;
   const bool stationary = motion.examined.discarded < motion.examined.periods();
   motion.outcome = {OutcomeKind::settled, "", static_cast<int>(motion.examined.periods()), 0};
   if (!stationary) motion.outcome.kind = OutcomeKind::not_converged;
-  if (verdict.kind == MotionKind::undecided)
-    motion.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
+  note_undecided(motion);
+  hold_against_finer_steps(problem, cycle.theta, state, motion);
   return motion;
 }
 

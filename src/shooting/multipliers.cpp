@@ -232,10 +232,11 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
   std::optional<FloquetAnalysis> projected;
   if (method == MultiplierMethod::oblique && problem.flow.slow_motions)
     projected = multipliers_by_projection(monodromy, options.multipliers, refusal);
-  const bool open = projected && projected->multipliers.stability == Stability::undecided;
   // of a large model an Arnoldi space that decides takes longer than the cycle
   const bool tries_another = options.multiplier_method == MultiplierMethod::automatic && dofs <= large_model;
-  if (projected && !(open && !projected->multipliers.complete && tries_another)) return std::move(*projected);
+  if (projected &&
+      (!tries_another || projected->multipliers.complete || projected->multipliers.stability != Stability::undecided))
+    return std::move(*projected);
   const PetscInt steps = options.multipliers > 0 ? options.multipliers : dofs <= large_model ? -96 : -24;
   FloquetAnalysis result =
       multipliers_by_arnoldi(monodromy, motions_that_may_grow(problem, orbit, other_unstable), steps);
