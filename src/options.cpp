@@ -1,6 +1,7 @@
 #include "squeal/options.hpp"
 
 #include "squeal/base/petsc.hpp"
+#include "squeal/scene/scene.hpp"
 #include "squeal/session_options.hpp"
 #include "squeal/solver_options.hpp"
 
@@ -19,6 +20,12 @@ std::string nearest_option(const std::string& option)
   std::vector<std::string> known;
   for (const Option& candidate : options_of(unused)) known.push_back(candidate.name);
   for (const SolverPrefix& prefix : solver_prefixes) known.push_back(std::string("-") + prefix.text + "…");
+  for (const std::string& key : scene_key_names())
+  {
+    std::string as_option = "-" + key;
+    std::replace(as_option.begin(), as_option.end(), '.', '_');
+    if (as_option == option) return "it is a key of the scene: --set " + key + "=…";
+  }
   const std::string nearest = nearest_word(option, known);
   return nearest.empty() ? "squeal -help lists the options" : "did you mean " + nearest + "?";
 }

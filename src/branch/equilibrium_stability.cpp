@@ -61,7 +61,7 @@ BranchEvent crossing(BrakeFamily& family, const BrakeBranchProblem& problem, std
 Modes modes_at(const SlidingEquilibrium& sliding, const BrakeBranchProblem& problem)
 {
   ModesSettings settings = problem.modes;
-  if (settings.method == ModesMethod::both) settings.method = ModesMethod::full; // which decides there
+  if (settings.method != ModesMethod::projection) settings.method = ModesMethod::full; // which decides there
   return find_modes(sliding, linearise(sliding), settings, problem.modes_options);
 }
 

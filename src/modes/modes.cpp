@@ -304,24 +304,24 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
                              modes.beyond_inertia};
   RealCount real = make_real_count(linearised.M_z, linearised.K_z, options);
   CountedSolution found;
-  if (settings.method != ModesMethod::full)
-  {
-    found.solution = solve_by_projection(problem);
-    modes.projected = modes_of(found.solution, problem);
-  }
   if (settings.method == ModesMethod::projection)
   {
+    found.solution = solve_by_projection(problem);
     found.count = count_in_band(problem.reduced, found.solution, real, settings.band);
-    modes.modes = std::exchange(modes.projected, {});
   }
   else
-  {
-    found = {}; // before the slices take memory
     found = solve_full(problem, real);
-    modes.modes = modes_of(found.solution, problem);
-  }
+  modes.modes = modes_of(found.solution, problem);
   modes.outcome = found.solution.outcome;
   modes.count = modes.beyond_inertia ? certified_whole(found.count, problem, free) : certified(found.count);
+  if (settings.method == ModesMethod::automatic)
+    modes.method = modes.count.certified_by == Certificate::none ? ModesMethod::both : ModesMethod::full;
+  if (modes.method == ModesMethod::both)
+  {
+    found = {}; // before the projection takes memory
+    QuadraticSolution beside = solve_by_projection(problem);
+    modes.projected = modes_of(beside, problem);
+  }
   drop_beyond_band(modes);
   assess(modes);
   return modes;

@@ -241,6 +241,23 @@ struct ReferenceWriter
   }
 };
 
+/// Appends the names of a table's keys.
+struct NamesWriter
+{
+  std::vector<std::string>& names;
+
+  template <class T> void operator()(const std::string&, std::vector<T>&, const char*) const {}
+  template <class T> void operator()(const std::string& key, std::optional<T>&, const char* meaning) const
+  {
+    T entry{};
+    (*this)(key, entry, meaning);
+  }
+  template <class T> void operator()(const std::string& key, T& table, const char*) const
+  {
+    for (const SceneKey& own : keys_of(table)) names.push_back(key + "." + own.name);
+  }
+};
+
 } // namespace
 
 std::string resolved_scene(const Scene& scene)
@@ -249,6 +266,14 @@ std::string resolved_scene(const Scene& scene)
   std::string text = table_text(keys_of(copy));
   for_each_table(copy, TextWriter{text});
   return text;
+}
+
+std::vector<std::string> scene_key_names()
+{
+  Scene scene;
+  std::vector<std::string> names;
+  for_each_table(scene, NamesWriter{names});
+  return names;
 }
 
 std::string scene_reference()

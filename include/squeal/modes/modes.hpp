@@ -87,7 +87,7 @@ inline Words words_of(ModeShapes)
 struct Modes
 {
   Outcome outcome;
-  ModesMethod method = ModesMethod::both;
+  ModesMethod method = ModesMethod::full; // what was solved: never automatic
   ModeShapes shapes = ModeShapes::unstable;
   double band = 0;                    // [Hz] covered: every mode below is here
   std::vector<ComplexMode> modes;     // Im(lambda) >= 0, by falling growth; of unstable ones those that oscillate first

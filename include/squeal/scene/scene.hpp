@@ -13,9 +13,10 @@ enum class ModesMethod
   projection, // projection on real modes
   full,       // full sparse quadratic problem
   both,       // the full problem, and the projection beside it
+  automatic,  // the full problem, and the projection beside it where the inertia does not confirm the count
 };
 
-inline constexpr std::array modes_method_words = {"projection", "full", "both"};
+inline constexpr std::array modes_method_words = {"projection", "full", "both", "auto"};
 
 inline Words words_of(ModesMethod)
 {
@@ -89,7 +90,7 @@ struct CycleStart
 struct ModesSettings
 {
   bool enabled = true;
-  ModesMethod method = ModesMethod::both;
+  ModesMethod method = ModesMethod::automatic;
   int real_modes = 0;            // [-] number of real modes of the projection; 0: those below the band
   int residual_passes = 3;       // [-] number of corrections of the projection
   double band = 20000;           // [Hz] modes below this frequency are reported
@@ -326,5 +327,8 @@ std::string resolved_scene(const Scene& scene);
 
 /// Returns a list of all keys of a scene file with their meanings, units and defaults.
 std::string scene_reference();
+
+/// Returns "table.key" for each key of the tables that stand once in a scene.
+std::vector<std::string> scene_key_names();
 
 } // namespace squeal
