@@ -4,7 +4,6 @@
 #include "squeal/cycle/period_log.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 namespace squeal
@@ -16,6 +15,7 @@ namespace
 void set_step(PeriodMap& map, double h)
 {
   map.kept.h = h;
+  map.step.contact = map.options.contact;
   if (h == map.step.h) return;
   map.step = make_theta_step(map.sliding.structure, map.sliding.interface, h, map.theta, map.options);
 }
@@ -28,6 +28,16 @@ double step_for(const PeriodMap& map, double period)
   if (!map.keeps_step || map.kept.h == 0 || map.kept.curvature == 0) return own;
   constexpr double part = 0.03; // a period of shooting lowers the residual by more than that of itself
   return map.kept.curvature * missing * missing / 2 <= part * map.kept.moved ? map.kept.h : own;
+}
+
+/// Of contact in a period with its rate. An error of this part of the largest reaction in every step moves the end of
+/// the period by about as much. A period of shooting lowers the residual by less than a hundred times, so that a
+/// hundredth of what comes next is neglected at most. Passes to less than `loosest` take no time.
+double contact_tolerance_for(const PeriodMap& map)
+{
+  constexpr double part = 1e-4, loosest = 1e-6;
+  const double own = map.options.contact.tolerance;
+  return map.keeps_step ? std::max(own, std::min(part * map.kept.moved, loosest)) : own;
 }
 
 } // namespace
@@ -90,6 +100,7 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
 {
   const auto& [structure, interface, equilibrium] = map.sliding;
   set_step(map, rate ? step_for(map, period) : period / map.steps);
+  if (rate) map.step.contact.tolerance = contact_tolerance_for(map);
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
   StepWork work = begin_steps(map.step, structure, interface, state);
   if (rate) begin_record(map, start);
@@ -119,8 +130,7 @@ void integrate_replayed(PeriodMap& map)
   const ReplayedPeriod replayed = std::exchange(map.replayed, {});
   const Owned<Vec> end = zeros_like(replayed.start), rate = zeros_like(replayed.start);
   const long unconverged = map.unconverged;
-  const KeptStep kept = map.kept;
-  map.kept.moved = std::numeric_limits<double>::infinity(); // it was integrated with that step
+  const KeptStep kept = std::exchange(map.kept, replayed.kept);
   map.reactions = replayed.reactions;
   integrate_period(map, replayed.period, replayed.start, end, rate);
   map.kept = kept;
@@ -131,10 +141,11 @@ void integrate_replayed(PeriodMap& map)
 void integrate_logged_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
 {
   std::vector<double> before = map.reactions;
+  const KeptStep kept = map.kept;
   map.replayed = {};
   if (replay_period(map, period, start, end, rate))
   {
-    map.replayed = {period, copy_of(start), std::move(before)};
+    map.replayed = {period, copy_of(start), std::move(before), kept};
     map.recorded_start = {};
     return;
   }

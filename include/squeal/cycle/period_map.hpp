@@ -5,8 +5,9 @@
 /// modes included.
 ///
 /// A map that keeps its step integrates a period T near N h with the h at hand. It goes on from N h to T along that
-/// derivative, as long as what this neglects is small (section 6.2). A and W are then those of the period before. All
-/// functions are collective. Those that integrate throw Interrupted where the run is asked to end.
+/// derivative, as long as what this neglects is small (section 6.2). A and W are then those of the period before. It
+/// solves contact no better than the period before calls for, too. All functions are collective. Those that integrate
+/// throw Interrupted where the run is asked to end.
 #include "squeal/shooting/flow.hpp"
 #include "squeal/transient/step_tangent.hpp"
 #include "squeal/transient/transient.hpp"
@@ -14,20 +15,21 @@
 namespace squeal
 {
 
-/// A period whose end was taken from the log of an earlier run.
-struct ReplayedPeriod
-{
-  double period = 0; // [s]
-  Owned<Vec> start{};
-  std::vector<double> reactions{}; // warm start
-};
-
 /// The step of the last period that was integrated with its rate, or asked for exactly, and how far it reaches.
 struct KeptStep
 {
   double h = 0;         // [s]; 0: none
   double curvature = 0; // [1/s2] |d2v/dT2|/|v| at the end
   double moved = 0;     // |v(T) - v(0)|/|v(0)|
+};
+
+/// A period whose end was taken from the log of an earlier run, and what the map carried into it.
+struct ReplayedPeriod
+{
+  double period = 0; // [s]
+  Owned<Vec> start{};
+  std::vector<double> reactions{}; // warm start
+  KeptStep kept{};
 };
 
 /// Keeps A and W of the last step size: none is factored for difference quotients.
