@@ -114,7 +114,7 @@ OptionList options_of(ContactSettings& settings)
       {"-transient_contact_solver", choice_of(settings.solver), Range::any,
        "block Gauss-Seidel, or the projection fixed point (fixed_point)"},
       {"-transient_contact_tolerance", &settings.tolerance, Range::positive,
-       "largest natural map of a pair over the largest reaction"},
+       "largest natural map of a pair over the largest reaction; looser far from a large model's cycle"},
       {"-transient_contact_max_it", &settings.max_iterations, Range::natural,
        "contact iterations (sweeps) allowed a step"},
       {"-transient_contact_rho", &settings.rho, Range::below_two,

@@ -30,14 +30,22 @@ double step_for(const PeriodMap& map, double period)
   return map.kept.curvature * missing * missing / 2 <= part * map.kept.moved ? map.kept.h : own;
 }
 
+constexpr double neglected = 1e-2; // of what a period moves, by its contact
+
 /// Of contact in a period with its rate. An error of this part of the largest reaction in every step moves the end of
-/// the period by about as much. A period of shooting lowers the residual by less than a hundred times, so that a
-/// hundredth of what comes next is neglected at most. Passes to less than `loosest` take no time.
+/// the period by about as much, and a period of shooting lowers the residual by less than a hundred times. Passes to
+/// less than `loosest` take no time.
 double contact_tolerance_for(const PeriodMap& map)
 {
-  constexpr double part = 1e-4, loosest = 1e-6;
+  constexpr double lowered = 1e-2, loosest = 1e-6;
   const double own = map.options.contact.tolerance;
-  return map.keeps_step ? std::max(own, std::min(part * map.kept.moved, loosest)) : own;
+  return map.keeps_step ? std::max(own, std::min(neglected * lowered * map.kept.moved, loosest)) : own;
+}
+
+/// Whether the period that ends here moved less than its contact was solved for.
+bool contact_is_too_loose(const PeriodMap& map)
+{
+  return map.step.contact.tolerance > std::max(map.options.contact.tolerance, neglected * map.kept.moved);
 }
 
 } // namespace
@@ -96,7 +104,7 @@ void end_at_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate, 
   map.kept = {h, 2 * bend / (h * h * speed), moved / first};
 }
 
-void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
+void integrate_once(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
 {
   const auto& [structure, interface, equilibrium] = map.sliding;
   set_step(map, rate ? step_for(map, period) : period / map.steps);
@@ -121,6 +129,17 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
   if (!rate) return;
   complete_rate(map, work, state, rate);
   if (map.keeps_step) end_at_period(map, period, start, end, rate, state.v);
+}
+
+/// Anew and exactly where the period came back much closer to its start than the one before.
+void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
+{
+  const std::vector<double> before = map.reactions;
+  integrate_once(map, period, start, end, rate);
+  if (!rate || !contact_is_too_loose(map)) return;
+  map.reactions = before;
+  map.kept.moved = 0;
+  integrate_once(map, period, start, end, rate);
 }
 
 /// Integrates a period that was only taken from the log: what follows needs its records.
@@ -244,6 +263,7 @@ Flow flow_of(PeriodMap& map)
   const auto integrate_many = [&map](double period, std::span<const Vec> starts, std::span<const Vec> ends)
   { integrate_periods(map, period, starts, ends); };
   Flow flow{integrate, map.sliding.structure.M, map.sliding.structure.K, integrate_many};
+  flow.is_near_with_rate = map.keeps_step;
   add_tangent(map, flow);
   return flow;
 }

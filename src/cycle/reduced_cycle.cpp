@@ -28,9 +28,6 @@ ReducedMap period_map_of(const ReducedSearch& search, int steps)
   const std::vector<double>& still = search.model.reactions;
   map.reactions = Eigen::VectorXd::Map(still.data(), static_cast<Eigen::Index>(still.size()));
   map.contact.tolerance = search.fidelity.contact_tolerance;
-  constexpr Eigen::Index worth_sharing = 250; // shapes: products of fewer take no longer than three messages
-  const MPI_Comm comm = comm_of(search.problem.sliding.structure.load);
-  if (ranks_of(comm) > 1 && search.model.size() >= worth_sharing) map.shared_by = comm;
   return map;
 }
 

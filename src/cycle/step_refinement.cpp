@@ -76,7 +76,7 @@ void measure_or_replay(MeasuredFlow& flow, double period, Vec from, Vec end, Vec
   flow.unmeasured = {};
   if (replay_period(flow.map, period, from, end, rate))
   {
-    flow.unmeasured = {period, copy_of(from), std::move(before)};
+    flow.unmeasured = {period, copy_of(from), std::move(before), {}}; // it keeps no step
     return;
   }
   flow.measured = measure_period(flow.map, flow.recording, period, from, rate);

@@ -222,6 +222,11 @@ ModeCount certified_whole(const PairCount& count, const ModesProblem& problem, P
           count.found};
 }
 
+bool is_certified_to(double band, const ModeCount& count)
+{
+  return count.certified_by != Certificate::none && count.frequency >= band * (1 - 1e-12);
+}
+
 /// Keeps of the modes beyond the band, which were found for the count, the frequencies only.
 void drop_beyond_band(Modes& modes)
 {
@@ -290,6 +295,7 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
   check(MatGetSize(linearised.K_z, &free, nullptr));
   if (free == 0)
   {
+    modes.method = ModesMethod::full;
     modes.outcome = {OutcomeKind::converged, "closed contact leaves nothing free to vibrate", 0, 0};
     modes.count_check = "confirmed: there is no mode to count";
     return modes;
@@ -315,7 +321,7 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
   modes.outcome = found.solution.outcome;
   modes.count = modes.beyond_inertia ? certified_whole(found.count, problem, free) : certified(found.count);
   if (settings.method == ModesMethod::automatic)
-    modes.method = modes.count.certified_by == Certificate::none ? ModesMethod::both : ModesMethod::full;
+    modes.method = is_certified_to(settings.band, modes.count) ? ModesMethod::full : ModesMethod::both;
   if (modes.method == ModesMethod::both)
   {
     found = {}; // before the projection takes memory

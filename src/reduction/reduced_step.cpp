@@ -3,7 +3,6 @@
 #include "reduced_contact.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/algebra/panel.hpp"
-#include "squeal/base/integers.hpp"
 #include "squeal/contact/sliding_direction.hpp"
 
 namespace squeal
@@ -76,24 +75,6 @@ void prepare(ReducedMap& map, double period)
 namespace
 {
 
-/// Calls form(first, count) for this rank's rows of a product, stored by rows of `width` numbers, and gathers the
-/// others'. The matrices of a step do not fit into a cache, a rank's rows of them may.
-template <class Form> void form_by_rows(MPI_Comm comm, Eigen::Index rows, int width, double* product, Form form)
-{
-  if (comm == MPI_COMM_NULL) return form(Eigen::Index{0}, rows);
-  const int ranks = ranks_of(comm);
-  const auto first_of = [&](int rank) { return to_int(rows) / ranks * rank + std::min(rank, to_int(rows) % ranks); };
-  std::vector<int> counts, starts;
-  for (int rank = 0; rank < ranks; ++rank)
-  {
-    starts.push_back(width * first_of(rank));
-    counts.push_back(width * first_of(rank + 1) - starts.back());
-  }
-  const int me = rank_of(comm);
-  form(Eigen::Index{first_of(me)}, Eigen::Index{first_of(me + 1) - first_of(me)});
-  MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, product, counts.data(), starts.data(), MPI_DOUBLE, comm);
-}
-
 /// What the pairs see of a step's start.
 struct PairMotion
 {
@@ -108,12 +89,8 @@ PairMotion motion_of_pairs(const ReducedMap& map, const ReducedState& state, con
   const Eigen::Index n = map.model.size();
   Rows x(n, lanes), y(map.G.rows(), lanes);
   x << v_free, state.v, state.q, VectorXd::Zero(n);
-  form_by_rows(map.shared_by, y.rows(), lanes, y.data(),
-               [&](Eigen::Index first, Eigen::Index count)
-               {
-                 dense_product(map.G.data() + first * n, static_cast<std::size_t>(count), static_cast<std::size_t>(n),
-                               lanes, x.data(), y.data() + first * lanes);
-               });
+  dense_product(map.G.data(), static_cast<std::size_t>(y.rows()), static_cast<std::size_t>(n), lanes, x.data(),
+                y.data());
   return {y.col(0), y.col(1), y.col(2)};
 }
 
@@ -176,17 +153,9 @@ bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact
 {
   VectorXd both(2 * map.model.size());
   both << state.v, state.q;
-  VectorXd next(map.model.size());
-  form_by_rows(map.shared_by, next.size(), 1, next.data(),
-               [&](Eigen::Index first, Eigen::Index count)
-               {
-                 next.segment(first, count) = map.from_load.segment(first, count);
-                 next.segment(first, count).noalias() += map.from_state.middleRows(first, count) * both;
-               });
+  VectorXd next = map.from_state * both + map.from_load;
   const bool converged = find_reactions(map, state, next, contact);
-  form_by_rows(map.shared_by, next.size(), 1, next.data(),
-               [&](Eigen::Index first, Eigen::Index count)
-               { next.segment(first, count).noalias() += map.from_reactions.middleRows(first, count) * contact.r; });
+  next.noalias() += map.from_reactions * contact.r;
   state.q += map.h * (map.theta * next + (1 - map.theta) * state.v);
   state.v = std::move(next);
   return converged;

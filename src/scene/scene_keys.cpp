@@ -212,7 +212,7 @@ SceneKeys keys_of(ModesSettings& m)
   return {
       {"enabled", &m.enabled, optional, Rule::any, "switch", "run this stage"},
       {"method", choice_of(m.method), optional, Rule::any, "word",
-       "projection on real modes, full sparse problem, or both; auto: both where the inertia confirms no count"},
+       "projection on real modes, full sparse problem, or both; auto: full, and both where the count is not confirmed"},
       {"real_modes", &m.real_modes, optional, Rule::not_negative, "-",
        "real modes of the projection; 0: those of the band"},
       {"residual_passes", &m.residual_passes, optional, Rule::not_negative, "-", "corrections of the projection"},

@@ -272,6 +272,7 @@ std::vector<std::string> scene_key_names()
 {
   Scene scene;
   std::vector<std::string> names;
+  for (const SceneKey& own : keys_of(scene)) names.push_back(own.name);
   for_each_table(scene, NamesWriter{names});
   return names;
 }

@@ -24,6 +24,7 @@ struct FullSpaceSystem
   Orbit orbit;           // evaluated last
   Owned<Vec> at, anchor; // z and the state of that orbit; the state where the phase row belongs
   Border border;
+  Owned<Vec> base; // Phi_T(x) - x there
   Orbit best;
   int collapses = 0; // points met that fall onto the equilibrium
   std::exception_ptr failure;
@@ -133,6 +134,7 @@ void form_border(FullSpaceSystem& system, Vec z)
   }
   system.anchor = copy_of(system.orbit.state);
   system.border = border_at(system.problem, system.orbit);
+  system.base = base_of_differences(system.problem, system.log, system.orbit);
 }
 
 /// (dPhi/dx - I) dx + d dT by one difference in dx, and the phase row.
@@ -152,7 +154,7 @@ void apply_jacobian(FullSpaceSystem& system, Vec dz, Vec product)
     flow.integrate(system.orbit.period, moved, end, nullptr);
     ++system.log.convergence.periods;
     check(VecAXPY(end, -1, moved));
-    check(VecAXPY(end, -1, system.orbit.defect));
+    check(VecAXPY(end, -1, system.base));
     check(VecScale(end, 1 / step));
   }
   check(VecAXPY(end, period, system.orbit.rate));
@@ -259,6 +261,7 @@ StageResult shoot_by_newton_krylov(const OrbitProblem& problem, const ShootingOp
                          {},
                          copy_of(start.state),
                          border_at(problem, start),
+                         {},
                          copy_of(start),
                          0,
                          {}};

@@ -120,6 +120,7 @@ void form_jacobian(SubspaceSystem& system, Vec y, Mat J)
   check(VecScale(system.phase, 1 / energy_norm(flow, orbit.rate)));
   set_column(system, J, 0, 0, projections(system, orbit.rate), system.period_scale / system.scale);
   const double step = system.options.difference * orbit.fluctuation;
+  const Owned<Vec> base = base_of_differences(system.problem, system.log, orbit);
   std::vector<Owned<Vec>> moved, ends;
   for (const auto& member : system.base)
   {
@@ -132,7 +133,7 @@ void form_jacobian(SubspaceSystem& system, Vec y, Mat J)
   for (std::size_t i = 0; i < ends.size(); ++i)
   {
     check(VecAXPY(ends[i], -1, moved[i]));
-    check(VecAXPY(ends[i], -1, orbit.defect));
+    check(VecAXPY(ends[i], -1, base));
     double along = 0;
     check(VecDot(system.phase, system.base[i], &along));
     set_column(system, J, static_cast<PetscInt>(i) + 1, along, projections(system, ends[i]), 1 / step);

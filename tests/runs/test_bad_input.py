@@ -170,6 +170,8 @@ CASES = {
     "unknown override": (lambda folder: [INPUTS / "oscillator" / "scene.toml", "--set", "friction.coeficient=1"],
                          ["coeficient", "coefficient"]),
     "unknown option": (lambda folder: [INPUTS / "oscillator" / "scene.toml", "-cycel_snes_monitor"], ["-cycel_snes_monitor"]),
+    "key as an option": (lambda folder: [INPUTS / "oscillator" / "scene.toml", "-cycle_start", "mode"],
+                         ["-cycle_start", "--set cycle.start="]),
     "unknown argument": (lambda folder: [INPUTS / "oscillator" / "scene.toml", "--dry-rnu"], ["--dry-rnu", "--dry-run"]),
     "no scene": (lambda folder: [], ["scene"]),
     "negative density": (block_scene("density = 1000", "density = -1000"), ["density", "-1000"]),

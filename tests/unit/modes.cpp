@@ -169,6 +169,27 @@ TEST_CASE("projection on all real modes is the full problem")
   CHECK(modes.count_check.starts_with("confirmed"));
 }
 
+TEST_CASE("the projection is made by itself only where the count of the full problem is not confirmed")
+{
+  SmallModel model = crowded_model(60, 3);
+  ModesSettings settings = settings_of(ModesMethod::automatic);
+  settings.band = 2;
+  const Modes confirmed = test::modes_of(model, all_closed(model), settings, {.dense_limit = 10});
+  CHECK(confirmed.method == ModesMethod::full);
+  CHECK(confirmed.projected.empty());
+  CHECK(confirmed.count_check.starts_with("confirmed"));
+  Rows G = zeros(60, 60); // inertia does not count what it changes
+  G[0][1] = 1e-3;
+  G[1][0] = -1e-3;
+  model.structure.G = sparse(G, G);
+  const Modes open = test::modes_of(model, all_closed(model), settings, {.dense_limit = 10});
+  CHECK(open.method == ModesMethod::both);
+  CHECK(open.projected.size() == open.modes.size());
+  const Modes whole = test::modes_of(model, all_closed(model), settings, {});
+  CHECK(whole.method == ModesMethod::full); // all pairs are there
+  CHECK(whole.projected.empty());
+}
+
 TEST_CASE("residual passes bring the growth rate of a truncated basis to that of the full problem")
 {
   const SmallModel model = crowded_model(60, 3);

@@ -46,7 +46,7 @@ struct PeriodMap
   Owned<Vec> recorded_start{};       // of that period, if its steps are the flow's own
   double recorded_step = 0;          // [s]
   ReplayedPeriod replayed{};         // the last one integrated with its rate, if it is still to be recorded
-  bool keeps_step = false;           // where factors cost more than what the line to T neglects
+  bool keeps_step = false;           // where factors and passes of contact cost more than what is neglected
   KeptStep kept{};
 };
 

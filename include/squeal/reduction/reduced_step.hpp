@@ -1,6 +1,6 @@
 #pragma once
 /// The modified theta-method on the reduced model (src/README.md, section 7.4), in few dense products. Every rank does
-/// the same, and steps are collective only on the ranks that share a map's products. Nothing throws.
+/// the same; no function is collective or throws.
 #include "squeal/contact/solver.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
@@ -40,7 +40,6 @@ struct ReducedMap
   Eigen::VectorXd reactions{};                        // [N] every period's warm start
   ContactSettings contact{};
   long unconverged = 0;
-  MPI_Comm shared_by = MPI_COMM_NULL; // ranks that take the same steps side by side; each forms its rows of products
 };
 
 /// Of an active pair, rigid ones included.

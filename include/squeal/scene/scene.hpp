@@ -13,7 +13,7 @@ enum class ModesMethod
   projection, // projection on real modes
   full,       // full sparse quadratic problem
   both,       // the full problem, and the projection beside it
-  automatic,  // the full problem, and the projection beside it where the inertia does not confirm the count
+  automatic,  // the full problem, and the projection beside it where the count up to the band is not certified
 };
 
 inline constexpr std::array modes_method_words = {"projection", "full", "both", "auto"};
@@ -328,7 +328,7 @@ std::string resolved_scene(const Scene& scene);
 /// Returns a list of all keys of a scene file with their meanings, units and defaults.
 std::string scene_reference();
 
-/// Returns "table.key" for each key of the tables that stand once in a scene.
+/// Returns "key" for the keys before all tables, and "table.key" for those of tables that stand once in a scene.
 std::vector<std::string> scene_key_names();
 
 } // namespace squeal

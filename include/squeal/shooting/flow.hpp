@@ -54,6 +54,9 @@ struct Flow
   std::function<void(std::span<const Vec> states)> apply_tangent{};
   /// The slow motions of this period, which becomes the one recorded last. Empty: none are known.
   std::function<SlowMotions(double period, Vec start)> slow_motions{};
+  /// A period with its rate ends off by a small part of what it moves its start by: too far for difference quotients
+  /// with ends of periods without.
+  bool is_near_with_rate = false;
 };
 
 /// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; x and y are states. Empty: P = -I.

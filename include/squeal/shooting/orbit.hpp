@@ -107,6 +107,9 @@ struct StageResult
 /// One evaluation of the flow. Error: as of the flow.
 Orbit evaluate(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period);
 
+/// Phi_T(x) - x of the orbit's own x and T, as quotients of differences with moved starts need it.
+Owned<Vec> base_of_differences(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit);
+
 /// Adds a record. `unknowns`: of the stage's system; 0 where nothing is solved for.
 void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, PetscInt unknowns, double residual_projected);
 
