@@ -1,12 +1,15 @@
 #include "squeal/chain.hpp"
 
+#include "squeal/algebra/multivector.hpp"
 #include "squeal/attractors/reached.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/modes/modes_checkpoint.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <Eigen/QR>
 #include <utility>
 
 namespace squeal
@@ -66,6 +69,40 @@ void pace(Chain& chain)
   paced.none.outcome = {OutcomeKind::skipped, "the mode grows without vibrating", 0, 0};
   paced.none.lift_off_amplitude = paced.none.reversal_amplitude = amplitude; // what grows from there is not at rest
   paced.start = mode_state(equilibrium, diverging, amplitude, 0);
+}
+
+/// Energy of the part of a motion that is along a mode. [J] `momentum`: M v, `force`: K (u - u0).
+double energy_along(const ComplexMode& mode, const Structure& structure, Vec momentum, Vec force)
+{
+  const MultiVector shapes = columns_of(std::array{mode.real.get(), mode.imaginary.get()});
+  double energy = 0;
+  for (const auto& [matrix, image] : {std::pair{structure.M.get(), momentum}, {structure.K.get(), force}})
+  {
+    const Eigen::MatrixXd gram = inner_products(shapes, product(matrix, shapes));
+    const Eigen::VectorXd along = inner_products(shapes, columns_of(std::array{image})).col(0);
+    energy += along.dot(gram.completeOrthogonalDecomposition().solve(along)) / 2; // both parts may be parallel
+  }
+  return energy;
+}
+
+/// Puts the mode that the given start has most of before the others, which no stage follows where none is unstable. By
+/// the period of another one a search may find several turns of a cycle for one, in steps as few as of one.
+void follow_start(Chain& chain)
+{
+  const State& start = *given_start(chain);
+  const Structure& structure = chain.model.structure;
+  std::vector<ComplexMode>& modes = chain.report.modes.modes;
+  const Owned<Vec> moved = copy_of(start.u.get()), momentum = zeros_like(start.v), force = zeros_like(start.v);
+  check(VecAXPY(moved, -1, chain.report.equilibrium.u));
+  check(MatMult(structure.M, start.v, momentum));
+  check(MatMult(structure.K, moved, force));
+  std::vector<double> energies;
+  for (const ComplexMode& mode : modes)
+    energies.push_back(mode.frequency_hz() > 0 ? energy_along(mode, structure, momentum, force) : 0);
+  const auto most = std::ranges::max_element(energies) - energies.begin(); // the first of equal ones
+  if (most == 0) return;
+  std::rotate(modes.begin(), modes.begin() + most, modes.begin() + most + 1);
+  chain.report.estimates = run_estimates(chain);
 }
 
 /// Why the search for the cycle cannot run; empty if it can.
@@ -215,6 +252,7 @@ FittedCycle run_cycle(Chain& chain)
   else
   {
     if (only_diverges(chain.unstable().modes)) pace(chain);
+    if (chain.report.modes.unstable_count == 0) follow_start(chain);
     result = find_fitted_cycle(cycle_problem(chain), {scene.fidelity, scene.accuracy, chain.begin_steps},
                                chain.options.cycle);
   }
