@@ -109,6 +109,8 @@ void examine(const TangentBundle& bundle, double period, ExaminedMotion& motion)
     motion.base =
         base_frequencies(spectrum_of(std::span(motion.beside).subspan(first * samples), step), motion.base.first);
   motion.verdict = judge_motion(motion.exponents, std::span(motion.channels.front()).subspan(first), motion.base);
+  const bool cycle = motion.verdict.kind == MotionKind::periodic && motion.base.closes_after == 0;
+  if (cycle) motion.base.second = motion.base.explained = 0; // by the exponents: that line is rounding, or dies out
 }
 
 } // namespace
