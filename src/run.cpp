@@ -25,19 +25,37 @@ namespace squeal
 namespace
 {
 
+/// Adds the time of its life to a stage's, also where the stage is interrupted.
+class StageClock
+{
+public:
+  StageClock(Report& report, Stage which) : report_(report), which_(which) {}
+  StageClock(const StageClock&) = delete;
+  StageClock& operator=(const StageClock&) = delete;
+  ~StageClock()
+  {
+    auto& timings = report_.timings;
+    const auto known = std::ranges::find(timings, which_, &Timing::stage); // the cycle may be sought twice
+    Timing& timing = known == timings.end() ? timings.emplace_back(Timing{which_}) : *known;
+    timing.seconds += MPI_Wtime() - start_;
+    timing.processor_seconds += processor_time() - processor_start_;
+  }
+
+private:
+  Report& report_;
+  Stage which_;
+  double start_ = MPI_Wtime(), processor_start_ = processor_time();
+};
+
 /// Runs one stage under its -log_view name, times it, and prints which one is at work.
 template <class Work> auto timed(Report& report, Stage which, MPI_Comm comm, Work work)
 {
   const char* const name = word(which);
   const LogStage log(name);
   if (rank_of(comm) == 0) std::printf("%s …\n", name), std::fflush(stdout);
-  const double start = MPI_Wtime(), processor_start = processor_time();
+  const StageClock clock(report, which);
   auto result = work();
   return_freed_memory();
-  const auto known = std::ranges::find(report.timings, which, &Timing::stage); // the cycle may be sought twice
-  Timing& timing = known == report.timings.end() ? report.timings.emplace_back(Timing{which}) : *known;
-  timing.seconds += MPI_Wtime() - start;
-  timing.processor_seconds += processor_time() - processor_start;
   return result;
 }
 
