@@ -85,8 +85,8 @@ double energy_along(const ComplexMode& mode, const Structure& structure, Vec mom
   return energy;
 }
 
-/// Puts the mode that the given start has most of before the others, which no stage follows where none is unstable. By
-/// the period of another one a search may find several turns of a cycle for one, in steps as few as of one.
+/// Puts the mode that the given start has most of first, the place of the followed one. By the period of another one a
+/// search may find several turns of a cycle for one, in steps as few as of one.
 void follow_start(Chain& chain)
 {
   const State& start = *given_start(chain);
@@ -414,7 +414,8 @@ Attractors run_attractors(const Chain& chain)
     const std::string reason = no_unstable_mode(chain.report);
     return reason.empty() ? attractors(chain.unstable()) : not_run<Attractors>(OutcomeKind::skipped, reason);
   }
-  // a motion may go on beside a stable equilibrium: from the mode that decays slowest, and random sums of modes
+  // a motion may go on beside a stable equilibrium: from the mode that decays slowest, or that a given start has most
+  // of, and from random sums of modes
   const Estimate estimate =
       estimate_amplitude(chain.sliding(), *chain.linearised, modes.front(), chain.options.estimate);
   if (!std::isfinite(estimate.start_amplitude))

@@ -83,7 +83,8 @@ inline Words words_of(ModeShapes)
 }
 
 /// outcome: "converged", "not converged" (fewer than expected, or backward errors above 1e-8), "skipped".
-/// residual: the largest backward error reported.
+/// residual: the largest backward error reported. Where none is unstable, the mode that a given start of the cycle's
+/// search has most of is put first.
 struct Modes
 {
   Outcome outcome;
