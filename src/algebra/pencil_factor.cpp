@@ -17,11 +17,9 @@ struct PencilFactor::Parts
 {
   MPI_Comm comm = MPI_COMM_NULL;
   RowLayout layout;
-  Triplets entries; // those of K, then those of M; MUMPS adds up entries of the same place
-  std::size_t first_of_M = 0;
-  std::vector<double> values; // K - shift M
-  Eigen::MatrixXd right;      // the columns that this rank's instance of MUMPS solves
-  bool whole = false;         // whether every rank makes the whole factor
+  std::vector<double> K, M; // entries at the places that either has, which MUMPS holds
+  Eigen::MatrixXd right;    // the columns that this rank's instance of MUMPS solves
+  bool whole = false;       // whether every rank makes the whole factor
   Mumps mumps;
 
   /// The rank that solves a column.
@@ -79,11 +77,24 @@ Triplets everywhere(Triplets entries, MPI_Comm comm)
   return all;
 }
 
-void append(Triplets added, Triplets& entries)
+/// K with zeros where M alone has entries, and M's beside them. Both come by rows and rising columns.
+std::pair<Triplets, std::vector<double>> side_by_side(const Triplets& K, const Triplets& M)
 {
-  entries.row.insert(entries.row.end(), added.row.begin(), added.row.end());
-  entries.column.insert(entries.column.end(), added.column.begin(), added.column.end());
-  entries.value.insert(entries.value.end(), added.value.begin(), added.value.end());
+  const auto place = [](const Triplets& A, std::size_t k) { return std::pair(A.row[k], A.column[k]); };
+  const std::size_t of_K = K.value.size(), of_M = M.value.size();
+  std::pair<Triplets, std::vector<double>> both;
+  auto& [entries, masses] = both;
+  for (std::size_t i = 0, j = 0; i < of_K || j < of_M;)
+  {
+    const bool in_K = j == of_M || (i < of_K && place(K, i) <= place(M, j));
+    const bool in_M = i == of_K || (j < of_M && place(M, j) <= place(K, i));
+    const auto [row, column] = in_K ? place(K, i) : place(M, j);
+    entries.row.push_back(row);
+    entries.column.push_back(column);
+    entries.value.push_back(in_K ? K.value[i++] : 0);
+    masses.push_back(in_M ? M.value[j++] : 0);
+  }
+  return both;
 }
 
 } // namespace
@@ -104,16 +115,14 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
     symmetric ? append_lower_triangle(A, own) : append_rows(A, 0, own);
     return parts.whole ? everywhere(std::move(own), parts.comm) : own;
   };
-  append(entries_of(K), parts.entries);
-  parts.first_of_M = parts.entries.value.size();
-  append(entries_of(M), parts.entries);
-  parts.values.resize(parts.entries.value.size());
+  auto [entries, masses] = side_by_side(entries_of(K), entries_of(M));
+  parts.M = std::move(masses);
   parts.mumps =
       start_mumps(parts.whole ? MPI_COMM_SELF : parts.comm, symmetric ? MumpsSymmetry::symmetric : MumpsSymmetry::none);
-  set_entries(parts.mumps, parts.entries, parts.layout.total());
+  set_entries(parts.mumps, entries, parts.layout.total());
+  parts.K = std::move(entries.value);
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 14) = to_int(options.room);
-  mumps.a_loc = parts.values.data();
   mumps.perm_in = order.position.data();
   parts.run_together([&] { run(mumps, MumpsJob::analyse); });
   mumps.perm_in = nullptr;
@@ -124,9 +133,9 @@ PencilFactor::~PencilFactor() = default;
 double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Symmetry symmetry, MPI_Comm comm)
 {
   const bool symmetric = symmetry == Symmetry::symmetric;
-  // a triplet, K - shift M, and the entry once more in MUMPS's order
-  constexpr double an_entry = sizeof(PetscScalar) + 2 * sizeof(int) + 2 * sizeof(double) + sizeof(MUMPS_INT);
-  const double entries = (symmetric ? 1 : 2) * entries_of_K; // of K and M, whole or by their lower halves
+  // the place, both entries, K - shift M, and that once more in MUMPS's order
+  constexpr double an_entry = 2 * sizeof(int) + 3 * sizeof(double) + sizeof(double) + sizeof(MUMPS_INT);
+  const double entries = (symmetric ? 0.5 : 1) * entries_of_K; // the lower half, or all
   const double numbers = symmetric ? forecast.symmetric : forecast.not_symmetric;
   const double copies = is_made_whole(forecast.entries, symmetry, comm) ? ranks_of(comm) : 1;
   return copies * (an_entry * entries + sizeof(double) * numbers);
@@ -135,10 +144,12 @@ double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Symm
 bool PencilFactor::factorise(double shift)
 {
   Parts& parts = *parts_;
-  for (std::size_t k = 0; k < parts.values.size(); ++k)
-    parts.values[k] = (k < parts.first_of_M ? 1 : -shift) * parts.entries.value[k];
+  std::vector<double> values(parts.K.size());
+  for (std::size_t k = 0; k < values.size(); ++k) values[k] = parts.K[k] - shift * parts.M[k];
+  parts.mumps->a_loc = values.data();
   bool regular = false;
   parts.run_together([&] { regular = squeal::factorise(*parts.mumps); });
+  parts.mumps->a_loc = nullptr;
   return regular;
 }
 

@@ -39,10 +39,8 @@ SQUEAL_SIMD void add_whole_rows(const double* rows, std::size_t length, std::siz
   add_block(rows, length, number, factors, target);
 }
 
-SQUEAL_SIMD void add_runs(const NearField& near, std::size_t pair, std::size_t number, const PairVector& factors,
-                          float* target)
+SQUEAL_SIMD void add_runs(const NearField::PairRow& row, std::size_t number, const PairVector& factors, float* target)
 {
-  const NearField::PairRow& row = near.rows[pair];
   const float* values = row.values.data();
   for (const auto& [first, count] : row.runs)
   {
@@ -88,13 +86,12 @@ void ContactOperator::add_product(std::size_t pair, const PairVector& change, st
 
 void ContactOperator::add_near_product(std::size_t pair, const PairVector& change, std::span<float> w) const
 {
-  add_runs(near_, pair, PairRows<std::size_t>(directions_).per_pair(), change, w.data());
+  add_runs(near_.inside[pair], PairRows<std::size_t>(directions_).per_pair(), change, w.data());
 }
 
-double ContactOperator::near_share() const
+void ContactOperator::add_product_outside(std::size_t pair, const PairVector& change, std::span<float> w) const
 {
-  const auto n = static_cast<double>(size());
-  return n == 0 ? 0 : static_cast<double>(near_.entries()) / (n * n);
+  add_runs(near_.outside[pair], PairRows<std::size_t>(directions_).per_pair(), change, w.data());
 }
 
 double ContactOperator::largest_eigenvalue(int iterations) const
@@ -125,6 +122,13 @@ void ContactOperator::set_diagonal(std::vector<PairBlock> blocks)
   for (const PairBlock& A : diagonal_) scale_.push_back(natural_scale(A, largest));
 }
 
+void ContactOperator::set_near_field(NearField near)
+{
+  near_ = std::move(near);
+  const auto n = static_cast<double>(size());
+  near_share_ = n == 0 ? 0 : static_cast<double>(near_.entries()) / (n * n);
+}
+
 ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions)
 {
   const auto count = static_cast<std::size_t>(pairs);
@@ -142,7 +146,7 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
     const CondensedStrip whole{0, n, n, W.data()};
     builder.measure(whole);
     builder.collect(whole);
-    op.near_ = builder.finish();
+    op.set_near_field(builder.finish());
     op.set_diagonal(builder.diagonal());
   }
   else
@@ -178,11 +182,14 @@ ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int di
   };
   W.products.read([&](const CondensedStrip& strip) { builder.measure(scaled(strip)); });
   W.products.read([&](const CondensedStrip& strip) { builder.collect(scaled(strip)); });
-  if (rank_of(comm) != 0) return op;
-  op.pairs_ = static_cast<std::size_t>(pairs);
-  op.directions_ = directions;
-  op.near_ = builder.finish();
-  op.set_diagonal(builder.diagonal());
+  if (rank_of(comm) == 0)
+  {
+    op.pairs_ = static_cast<std::size_t>(pairs);
+    op.directions_ = directions;
+    op.set_near_field(builder.finish());
+    op.set_diagonal(builder.diagonal());
+  }
+  if (op.shared_by_ != MPI_COMM_NULL) op.share_patches();
   return op;
 }
 

@@ -5,7 +5,11 @@
 namespace squeal
 {
 
-/// Block Gauss-Seidel on all of them at once; W r must be fresh, and is in the end.
+/// Block Gauss-Seidel on all of them at once; W r must be fresh, and is in the end. On rank 0; where others have
+/// patches of W, they must be within ServedProducts.
 void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& settings);
+
+/// The part of the other ranks in the sweeps that rank 0 has announced.
+void sweep_along(const ContactOperator& W);
 
 } // namespace squeal

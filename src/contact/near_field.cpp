@@ -1,7 +1,11 @@
 #include "near_field.hpp"
 
+#include "squeal/base/disjoint_sets.hpp"
+#include "squeal/base/integers.hpp"
+
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 namespace squeal
@@ -11,6 +15,9 @@ namespace
 {
 
 constexpr int bins_of_octave = 8, bins_above_unit = 192; // 24 octaves
+constexpr double neighbour = 0.1;     // of a pair's own block: those of neighbours on a mesh have 0.2 and more
+constexpr double strong_action = 0.5; // on a patch: sweeps patch by patch would halve the residual at best
+constexpr std::size_t most_patches = 64;
 
 double size_of(const PairBlock& block)
 {
@@ -20,7 +27,47 @@ double size_of(const PairBlock& block)
   return size;
 }
 
+/// Calls take(pair, size) for each block of a pair's rows.
+template <class Take> void for_each_block(const NearField::PairRow& row, std::size_t of_a_pair, Take take)
+{
+  const float* values = row.values.data();
+  for (const auto& [first, count] : row.runs)
+  {
+    for (std::size_t column = 0; column < count; column += of_a_pair)
+    {
+      float size = 0;
+      for (std::size_t k = 0; k < of_a_pair; ++k)
+        for (std::size_t l = 0; l < of_a_pair; ++l) size = std::max(size, std::abs(values[k * count + column + l]));
+      take((first + column) / of_a_pair, static_cast<double>(size));
+    }
+    values += of_a_pair * count;
+  }
+}
+
 } // namespace
+
+NearField::PairRow part_of(const NearField::PairRow& row, std::size_t of_a_pair,
+                           const std::function<bool(std::size_t pair)>& taken)
+{
+  NearField::PairRow part;
+  const float* values = row.values.data();
+  for (const auto& [first, count] : row.runs)
+  {
+    const auto takes = [&, first = first](std::size_t column) { return taken((first + column) / of_a_pair); };
+    for (std::size_t from = 0, to = 0; from < count; from = to)
+    {
+      to = from + of_a_pair;
+      if (!takes(from)) continue;
+      while (to < count && takes(to)) to += of_a_pair;
+      part.runs.push_back({first + from, to - from});
+      for (std::size_t k = 0; k < of_a_pair; ++k)
+        part.values.insert(part.values.end(), values + k * count + from, values + k * count + to);
+    }
+    values += of_a_pair * count;
+  }
+  part.values.shrink_to_fit();
+  return part;
+}
 
 NearFieldBuilder::NearFieldBuilder(std::size_t pairs, int directions)
     : pairs_(pairs), rows_(directions), sizes_(pairs, Sizes{})
@@ -123,19 +170,80 @@ void NearFieldBuilder::collect(const CondensedStrip& strip)
       append(own, i, now, i != j);
       if (i != j) append(waiting_[i], j, now, false);
     }
-    near_.rows.push_back(row_of(own));
+    near_rows_.push_back(row_of(own));
+  }
+}
+
+/// The patch of each pair. Pairs that a block of a tenth of their own joins are in one patch; so are patches on which
+/// others act half as strongly as they do on themselves, where all are pushed alike.
+std::vector<std::size_t> NearFieldBuilder::patch_of_pairs() const
+{
+  DisjointSets neighbours(pairs_);
+  for (std::size_t i = 0; i < pairs_; ++i)
+    for_each_block(near_rows_[i], rows_.per_pair(),
+                   [&](std::size_t j, double size)
+                   {
+                     if (size >= neighbour * std::min(size_of(diagonal_[i]), size_of(diagonal_[j])))
+                       neighbours.join(to_int(i), to_int(j));
+                   });
+  std::vector<std::size_t> first; // pairs of the patches
+  for (std::size_t i = 0; i < pairs_; ++i)
+    if (neighbours.least(to_int(i)) == to_int(i)) first.push_back(i);
+  std::vector<std::size_t> patch_of(pairs_, 0);
+  if (first.size() > most_patches) return patch_of;
+  for (std::size_t i = 0; i < pairs_; ++i)
+  {
+    const auto least = static_cast<std::size_t>(neighbours.least(to_int(i)));
+    patch_of[i] = static_cast<std::size_t>(std::lower_bound(first.begin(), first.end(), least) - first.begin());
+  }
+  Eigen::MatrixXd action = Eigen::MatrixXd::Zero(to_int(first.size()), to_int(pairs_)); // of a patch on a pair
+  for (std::size_t i = 0; i < pairs_; ++i)
+    for_each_block(near_rows_[i], rows_.per_pair(),
+                   [&](std::size_t j, double size) { action(to_int(patch_of[j]), to_int(i)) += size; });
+  for (;;)
+  {
+    double largest = strong_action;
+    std::size_t kept = 0, joined = 0;
+    for (std::size_t i = 0; i < pairs_; ++i)
+    {
+      Eigen::VectorXd others = action.col(to_int(i));
+      const double own = std::exchange(others(to_int(patch_of[i])), 0.);
+      Eigen::Index strongest = 0;
+      if (others.sum() <= largest * own) continue;
+      largest = others.sum() / own;
+      others.maxCoeff(&strongest);
+      kept = std::min(patch_of[i], static_cast<std::size_t>(strongest));
+      joined = std::max(patch_of[i], static_cast<std::size_t>(strongest));
+    }
+    if (kept == joined) return patch_of;
+    action.row(to_int(kept)) += action.row(to_int(joined));
+    action.row(to_int(joined)).setZero();
+    std::replace(patch_of.begin(), patch_of.end(), joined, kept);
   }
 }
 
 NearField NearFieldBuilder::finish()
 {
-  return std::move(near_);
+  const std::vector<std::size_t> patch_of = patch_of_pairs();
+  NearField near;
+  std::map<std::size_t, std::vector<std::size_t>> patches;
+  for (std::size_t i = 0; i < pairs_; ++i)
+  {
+    const NearField::PairRow row = std::exchange(near_rows_[i], {});
+    const auto own = [&](std::size_t j) { return patch_of[j] == patch_of[i]; };
+    near.inside.push_back(part_of(row, rows_.per_pair(), own));
+    near.outside.push_back(part_of(row, rows_.per_pair(), std::not_fn(own)));
+    patches[patch_of[i]].push_back(i);
+  }
+  for (auto& [patch, pairs] : patches) near.patches.push_back(std::move(pairs));
+  return near;
 }
 
 std::size_t NearField::entries() const
 {
   std::size_t entries = 0;
-  for (const PairRow& row : rows) entries += row.values.size();
+  for (const auto* rows : {&inside, &outside})
+    for (const PairRow& row : *rows) entries += row.values.size();
   return entries;
 }
 

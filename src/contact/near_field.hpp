@@ -4,9 +4,14 @@
 #include "squeal/contact/contact_operator.hpp"
 
 #include <array>
+#include <functional>
 
 namespace squeal
 {
+
+/// The columns of some pairs.
+NearField::PairRow part_of(const NearField::PairRow& row, std::size_t of_a_pair,
+                           const std::function<bool(std::size_t pair)>& taken);
 
 /// Strips are of whole pairs and come in the order of their columns.
 class NearFieldBuilder
@@ -23,7 +28,7 @@ public:
   /// After the first pass.
   const std::vector<PairBlock>& diagonal() const { return diagonal_; }
 
-  /// After the second pass; moves out what was collected.
+  /// After the second pass; moves out what was collected, by patches.
   NearField finish();
 
 private:
@@ -40,6 +45,7 @@ private:
 
   void append(Blocks& blocks, std::size_t column, const PairBlock& block, bool transposed) const;
   NearField::PairRow row_of(const Blocks& blocks) const;
+  std::vector<std::size_t> patch_of_pairs() const;
 
   PairBlock block(const CondensedStrip& strip, std::size_t i, std::size_t j) const;
   int bin_of(double size) const;
@@ -52,7 +58,7 @@ private:
   std::vector<double> limits_; // sizes of blocks that are left out of a pair's rows
   std::vector<PairBlock> diagonal_;
   std::vector<Blocks> waiting_; // left of the diagonal, of the pairs whose column has not come
-  NearField near_;
+  std::vector<NearField::PairRow> near_rows_;
 };
 
 } // namespace squeal

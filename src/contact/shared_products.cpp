@@ -1,8 +1,11 @@
 /// Products that ranks form together. Of a W whose columns they share: y = sum over ranks of what the lower triangle of
 /// their columns and its transpose have in W x. Columns go to ranks by equal parts of the triangle. Of a W in the
 /// factor: each rank reads its part of the factor.
+#include "gauss_seidel.hpp"
+#include "near_field.hpp"
 #include "squeal/algebra/large_pages.hpp"
 #include "squeal/algebra/panel.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/integers.hpp"
 #include "squeal/contact/contact_operator.hpp"
 
@@ -25,6 +28,59 @@ std::size_t first_column(std::size_t size, int rank, int ranks)
   return static_cast<std::size_t>(part * static_cast<double>(size)) / tile * tile;
 }
 
+/// The largest patches first, each to the rank that has least.
+std::vector<int> owners_by_size(const NearField& near, int ranks)
+{
+  std::vector<std::size_t> entries, order, load(static_cast<std::size_t>(ranks), 0);
+  for (const std::vector<std::size_t>& patch : near.patches)
+  {
+    order.push_back(order.size());
+    entries.push_back(0);
+    for (const std::size_t pair : patch) entries.back() += near.inside[pair].values.size();
+  }
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return entries[a] > entries[b]; });
+  std::vector<int> owners(order.size());
+  for (const std::size_t patch : order)
+  {
+    const auto least = std::min_element(load.begin(), load.end());
+    *least += entries[patch];
+    owners[patch] = to_int(least - load.begin());
+  }
+  return owners;
+}
+
+template <class Entry> void pass_on(std::vector<Entry>& entries, int to, MPI_Comm comm)
+{
+  unsigned long long size = entries.size();
+  if (rank_of(comm) == 0)
+  {
+    MPI_Send(&size, 1, MPI_UNSIGNED_LONG_LONG, to, 0, comm);
+    MPI_Send(entries.data(), to_int(size * sizeof(Entry)), MPI_BYTE, to, 0, comm);
+  }
+  else if (rank_of(comm) == to)
+  {
+    MPI_Recv(&size, 1, MPI_UNSIGNED_LONG_LONG, 0, 0, comm, MPI_STATUS_IGNORE);
+    entries.resize(size);
+    MPI_Recv(entries.data(), to_int(size * sizeof(Entry)), MPI_BYTE, 0, 0, comm, MPI_STATUS_IGNORE);
+  }
+}
+
+/// Leaves the columns of each rank's own pairs with it. Collective.
+void share_columns_of_row(NearField::PairRow& row, std::size_t of_a_pair, const std::vector<int>& owner_of_pair,
+                          MPI_Comm comm)
+{
+  const auto part = [&](int rank)
+  { return part_of(row, of_a_pair, [&](std::size_t pair) { return owner_of_pair[pair] == rank; }); };
+  for (int rank = 1; rank < ranks_of(comm); ++rank)
+  {
+    NearField::PairRow passed = rank_of(comm) == 0 ? part(rank) : NearField::PairRow{};
+    pass_on(passed.runs, rank, comm);
+    pass_on(passed.values, rank, comm);
+    if (rank_of(comm) == rank) row = std::move(passed);
+  }
+  if (rank_of(comm) == 0) row = part(0);
+}
+
 /// Calls work(first, width) for each strip of columns.
 template <class Work> void for_each_strip(std::size_t first, std::size_t last, Work work)
 {
@@ -33,7 +89,7 @@ template <class Work> void for_each_strip(std::size_t first, std::size_t last, W
 
 } // namespace
 
-void ContactOperator::share_columns(MPI_Comm comm)
+void ContactOperator::share(MPI_Comm comm)
 {
   rows_ = size();
   MPI_Bcast(&rows_, sizeof rows_, MPI_BYTE, 0, comm);
@@ -43,7 +99,7 @@ void ContactOperator::share_columns(MPI_Comm comm)
   for (int rank = 0; rank < ranks; ++rank)
   {
     Strips strips{first_column(rows_, rank, ranks), first_column(rows_, rank + 1, ranks), {}};
-    const auto pass_on = [&](std::size_t j, std::size_t width)
+    const auto move_strip = [&](std::size_t j, std::size_t width)
     {
       const std::size_t height = rows_ - j, count = width * height;
       if (me == 0)
@@ -62,9 +118,34 @@ void ContactOperator::share_columns(MPI_Comm comm)
     std::size_t total = 0;
     for_each_strip(strips.first, strips.last, [&](std::size_t j, std::size_t width) { total += width * (rows_ - j); });
     if (me == rank && me != 0) strips.values = vector_on_large_pages(total);
-    if (rank > 0 && (me == 0 || me == rank)) for_each_strip(strips.first, strips.last, pass_on);
+    if (rank > 0 && (me == 0 || me == rank)) for_each_strip(strips.first, strips.last, move_strip);
     if (me == rank) strips_ = std::move(strips);
   }
+  share_patches();
+}
+
+void ContactOperator::share_patches()
+{
+  std::vector<std::size_t> sizes;
+  for (const std::vector<std::size_t>& patch : near_.patches) sizes.push_back(patch.size());
+  broadcast(sizes, shared_by_);
+  if (sizes.size() < 2) return;
+  MPI_Bcast(&pairs_, sizeof pairs_, MPI_BYTE, 0, shared_by_);
+  MPI_Bcast(&directions_, 1, MPI_INT, 0, shared_by_);
+  broadcast(diagonal_, shared_by_);
+  broadcast(scale_, shared_by_);
+  near_.patches.resize(sizes.size());
+  near_.inside.resize(pairs_);
+  near_.outside.resize(pairs_);
+  for (std::vector<std::size_t>& patch : near_.patches) broadcast(patch, shared_by_);
+  owners_ = owners_by_size(near_, ranks_of(shared_by_));
+  broadcast(owners_, shared_by_);
+  std::vector<int> owner_of_pair(pairs_);
+  for (std::size_t patch = 0; patch < sizes.size(); ++patch)
+    for (const std::size_t pair : near_.patches[patch]) owner_of_pair[pair] = owners_[patch];
+  for (auto* const rows : {&near_.inside, &near_.outside})
+    for (NearField::PairRow& row : *rows)
+      share_columns_of_row(row, PairRows<std::size_t>(directions_).per_pair(), owner_of_pair, shared_by_);
 }
 
 void ContactOperator::add_strips(std::span<const double> x, std::span<double> y) const
@@ -102,39 +183,47 @@ std::vector<double> ContactOperator::multiply_by_factor(std::span<const double> 
   return y;
 }
 
-void ContactOperator::serve() const
+void ContactOperator::follow_product(std::size_t columns) const
 {
-  std::vector<double> x(rows_), y(rows_);
-  for (int more = 1;;)
-  {
-    MPI_Bcast(&more, 1, MPI_INT, 0, shared_by_); // vectors to be multiplied
-    if (!more) return;
-    if (products_)
-    {
-      (void)products_->products.product({}, static_cast<std::size_t>(more));
-      continue;
-    }
-    MPI_Bcast(x.data(), to_int(rows_), MPI_DOUBLE, 0, shared_by_);
-    std::fill(y.begin(), y.end(), 0.);
-    add_strips(x, y);
-    MPI_Reduce(y.data(), nullptr, to_int(rows_), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
-  }
+  if (!products_ && lanes_for(columns) > 1) return; // of a whole W rank 0 forms these alone
+  int of_rank_zero = 0;
+  MPI_Bcast(&of_rank_zero, 1, MPI_INT, 0, shared_by_);
+  serve(of_rank_zero);
 }
 
-void ContactOperator::end_products() const
+void ContactOperator::serve(int columns) const
 {
-  int more = 0;
-  MPI_Bcast(&more, 1, MPI_INT, 0, shared_by_);
+  if (products_)
+  {
+    (void)products_->products.product({}, static_cast<std::size_t>(columns));
+    return;
+  }
+  std::vector<double> x(rows_), y(rows_);
+  MPI_Bcast(x.data(), to_int(rows_), MPI_DOUBLE, 0, shared_by_);
+  add_strips(x, y);
+  MPI_Reduce(y.data(), nullptr, to_int(rows_), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
 }
 
 ServedProducts::ServedProducts(const ContactOperator& W) : W_(W)
 {
-  if (W.shared_by_ != MPI_COMM_NULL && rank_of(W.shared_by_) != 0) W.serve();
+  const MPI_Comm comm = W.shared_by();
+  if (comm == MPI_COMM_NULL || rank_of(comm) == 0) return;
+  for (;;)
+  {
+    int task = end_of_service;
+    MPI_Bcast(&task, 1, MPI_INT, 0, comm);
+    if (task == end_of_service) return;
+    if (task == sweeps)
+      sweep_along(W);
+    else
+      W.serve(task);
+  }
 }
 
 ServedProducts::~ServedProducts()
 {
-  if (W_.shared_by_ != MPI_COMM_NULL && rank_of(W_.shared_by_) == 0) W_.end_products();
+  int task = end_of_service;
+  if (W_.shared_by() != MPI_COMM_NULL && rank_of(W_.shared_by()) == 0) MPI_Bcast(&task, 1, MPI_INT, 0, W_.shared_by());
 }
 
 } // namespace squeal

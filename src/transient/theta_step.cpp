@@ -264,7 +264,7 @@ ContactOperator condensed_operator(const ThetaStep& step, const Interface& inter
   ContactOperator W;
   std::vector<double> entries = whole_operator(step, interface);
   if (rank_of(comm) == 0) W = make_contact_operator(std::move(entries), interface.pairs, interface.directions);
-  W.share_columns(comm);
+  W.share(comm);
   return W;
 }
 

@@ -44,7 +44,7 @@ TEST_CASE("ranks form products together, again and again, and what they do in be
     const bool first = rank_of(comm) == 0;
     ContactOperator W, alone;
     if (first) W = alone = make_contact_operator(symmetric_matrix(size), pairs, 2);
-    W.share_columns(comm);
+    W.share(comm);
     for (int round = 0; round < 3; ++round)
     {
       const ServedProducts served(W);

@@ -30,7 +30,8 @@ struct ScaledProducts
   std::vector<double> diagonal; // that is added, of every row; empty: none
 };
 
-/// The large blocks of W in single precision, in the rows of each pair by runs of neighbouring columns.
+/// The large blocks of W in single precision, in the rows of each pair by runs of neighbouring columns. The pairs form
+/// patches that act little on each other, the pins of a brake pad say.
 struct NearField
 {
   /// Of a pair's own block, in a row: a larger share makes sweeps cheaper and products with W more frequent.
@@ -44,7 +45,8 @@ struct NearField
     std::vector<Run> runs{};
     std::vector<float> values{}; // run after run, the pair's rows of each run one after the other
   };
-  std::vector<PairRow> rows;
+  std::vector<PairRow> inside, outside;            // of every pair: columns of its own patch, and of others
+  std::vector<std::vector<std::size_t>> patches{}; // pairs, ascending
 
   std::size_t entries() const;
 };
@@ -68,7 +70,8 @@ inline Words words_of(OperatorStorage)
 /// or a whole W would take more than a quarter of the memory that is `free` [bytes].
 bool stays_in_factor(double rows, double border_entries, double free);
 
-/// On rank 0. The ranks form products together where W is in the factor, or gave its columns to all of them.
+/// On rank 0. The ranks form products together where W is in the factor, or gave its columns to all of them. There each
+/// rank has patches of the near field besides, as far as there are several, and the blocks of the diagonal.
 class ContactOperator
 {
 public:
@@ -91,14 +94,28 @@ public:
   /// w += W dr of a change dr of one pair's reaction. W is whole.
   void add_product(std::size_t pair, const PairVector& change, std::span<double> w) const;
 
-  /// The same by the near field, which small operators do not have.
+  /// The same by the near field, which small operators do not have, in the rows of the pair's patch.
   void add_near_product(std::size_t pair, const PairVector& change, std::span<float> w) const;
-  bool has_near_field() const { return !near_.rows.empty(); }
-  double near_share() const; // entries of the near field over those of W
+  /// The same in the rows of other patches, of those that this rank has.
+  void add_product_outside(std::size_t pair, const PairVector& change, std::span<float> w) const;
+  bool has_near_field() const { return !near_.inside.empty(); }
+  double near_share() const { return near_share_; } // entries of the near field over those of W
 
-  /// Gives every rank its part of the columns of a large whole W. From now on products with one vector are formed from
-  /// these, within ServedProducts only. Collective.
-  void share_columns(MPI_Comm comm);
+  /// Of the near field: all patches, the rank of each, and whether ranks but the first have some.
+  const std::vector<std::vector<std::size_t>>& patches() const { return near_.patches; }
+  int owner(std::size_t patch) const { return owners_.empty() ? 0 : owners_[patch]; }
+  bool shares_patches() const { return !owners_.empty(); }
+
+  /// The ranks that form products together; MPI_COMM_NULL: rank 0 alone.
+  MPI_Comm shared_by() const { return shared_by_; }
+
+  /// Gives every rank its part of the columns of a large whole W, and of the patches. From now on products with one
+  /// vector are formed from these, within ServedProducts only. Collective.
+  void share(MPI_Comm comm);
+
+  /// On other ranks, what `multiply` of so many columns on rank 0 needs of them. Within a task of ServedProducts.
+  void follow_product(std::size_t columns) const;
+  void serve(int columns) const; // after rank 0 has said how many
 
   /// W, if it is whole.
   std::span<const double> entries() const { return values_; }
@@ -109,7 +126,6 @@ public:
 private:
   friend ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
   friend ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm);
-  friend class ServedProducts;
 
   /// Strips of eight columns of the lower triangle, one after the other, from each strip's first row on.
   struct Strips
@@ -122,8 +138,8 @@ private:
   void multiply_one(std::span<const double> x, std::span<double> y) const;
   std::vector<double> multiply_by_factor(std::span<const double> x, std::size_t columns) const;
   void add_strips(std::span<const double> x, std::span<double> y) const;
-  void serve() const;
-  void end_products() const;
+  void set_near_field(NearField near);
+  void share_patches();
 
   std::size_t pairs_ = 0;
   int directions_ = 0;
@@ -131,10 +147,19 @@ private:
   std::optional<ScaledProducts> products_; // the same on all ranks; none: W is whole
   std::vector<PairBlock> diagonal_;
   std::vector<NaturalScale> scale_;
-  NearField near_;                     // empty: W is small
+  NearField near_; // empty: W is small; w of the patches of this rank alone
+  double near_share_ = 0;
+  std::vector<int> owners_;            // of patches; empty: rank 0 has all
   MPI_Comm shared_by_ = MPI_COMM_NULL; // the ranks that form products together
   std::size_t rows_ = 0;               // of W, on all of them
   Strips strips_;                      // of this rank
+};
+
+/// What rank 0 asks of the others: their part of a product with so many columns, or one of these.
+enum Task : int
+{
+  end_of_service = 0,
+  sweeps = -1, // over their patches (gauss_seidel.hpp)
 };
 
 /// While rank 0 works with products that W's ranks form together, the constructor of the others serves until rank 0's
