@@ -189,23 +189,24 @@ double memory_of_equilibrium(const Sizes& sizes)
 /// Six matrices: M and K of the frictionless problem, M, C and K of the sliding one, and C with friction. The pencil of
 /// the search, which is made when that of the count, half as large, is gone. The vectors: the largest subspace of a
 /// slice, and its products with M, C and K.
-double memory_of_modes(const Sizes& sizes, const ModesSettings& settings, PetscInt dense_limit, MPI_Comm comm)
+double memory_of_modes(const Sizes& sizes, const ModesSettings& settings, const ModesOptions& options, MPI_Comm comm)
 {
-  if (sizes.dofs <= static_cast<double>(dense_limit)) return dense_copies * number * sizes.dofs * sizes.dofs;
+  if (sizes.dofs <= static_cast<double>(options.dense_limit)) return dense_copies * number * sizes.dofs * sizes.dofs;
   const Symmetry search = settings.method == ModesMethod::projection ? Symmetry::symmetric : Symmetry::none;
-  return 6 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, search, comm) +
+  return 6 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, search, options.pencil, comm) +
          number * vectors_of_modes * sizes.dofs;
 }
 
 /// Eight matrices: M, C and K of the sliding problem, that of loss factors, and their transposes. The pencil, the
 /// basis with its copy while it grows, and the responses with those of the basis before.
-double memory_of_response(const Sizes& sizes, const Scene& scene, const ResponseOptions& options, MPI_Comm comm)
+double memory_of_response(const Sizes& sizes, const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
 {
   const double driven = static_cast<double>(scene.response->excitation.size()),
                read = static_cast<double>(scene.probes.size());
   const double pairs = (driven > 0 ? driven : read) * read;
-  const double shapes = std::min(sizes.dofs, static_cast<double>(options.shapes) + passes_of_response);
-  return 8 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, Symmetry::none, comm) +
+  const double shapes = std::min(sizes.dofs, static_cast<double>(options.response.shapes) + passes_of_response);
+  return 8 * matrix_entry * sizes.entries +
+         forecast_pencil(sizes.factor, sizes.entries, Symmetry::none, options.pencil, comm) +
          number * (2 * shapes + passes_of_response) * sizes.dofs +
          3 * 2 * number * sizes.ranks * pairs * scene.response->count;
 }
@@ -347,9 +348,9 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   };
   add(Stage::equilibrium, memory_of_equilibrium(sizes), seconds_of_equilibrium(sizes, speed));
   if (seeks_modes(scene))
-    add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes.dense_limit, comm),
+    add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes, comm),
         seconds_of_modes(sizes, scene.modes, options.modes.dense_limit, speed));
-  if (scene.response) add(Stage::response, memory_of_response(sizes, scene, options.response, comm));
+  if (scene.response) add(Stage::response, memory_of_response(sizes, scene, options, comm));
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
     add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient),

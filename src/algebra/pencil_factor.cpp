@@ -6,9 +6,14 @@
 #include "squeal/base/integers.hpp"
 #include "symbolic_factor.hpp"
 
+#include <algorithm>
+#include <iterator>
+#include <numeric>
+
 /// A factor of moderate size is made whole by every rank, each of which solves its part of the right-hand sides. Shared
 /// by ranks, MUMPS adds up in the order in which messages arrive: results would change in rounding from run to run, and
-/// a restarted run would not give the straight run's numbers. A larger factor is shared.
+/// a restarted run would not give the straight run's numbers. A larger factor is shared, with the right-hand sides and
+/// solutions where their rows are.
 
 namespace squeal
 {
@@ -18,13 +23,8 @@ struct PencilFactor::Parts
   MPI_Comm comm = MPI_COMM_NULL;
   RowLayout layout;
   std::vector<double> K, M; // entries at the places that either has, which MUMPS holds
-  Eigen::MatrixXd right;    // the columns that this rank's instance of MUMPS solves
   bool whole = false;       // whether every rank makes the whole factor
   Mumps mumps;
-
-  /// The rank that solves a column.
-  int solver_of(int column) const { return whole ? column % ranks_of(comm) : 0; }
-  int column_stride() const { return whole ? ranks_of(comm) : 1; }
 
   /// Runs what communicates inside of MUMPS only if the ranks share one instance. Where each has its own, all agree on
   /// failures.
@@ -34,15 +34,11 @@ struct PencilFactor::Parts
 namespace
 {
 
-/// [MB] The largest factor that every rank makes whole: a few seconds of one core, and less than the brake's own
-/// memory.
-constexpr double largest_whole = 200;
-
 /// By the entries of a symmetric factor.
-bool is_made_whole(double entries, Symmetry symmetry, MPI_Comm comm)
+bool is_made_whole(double entries, Symmetry symmetry, const PencilOptions& options, MPI_Comm comm)
 {
-  const double megabytes = (symmetry == Symmetry::symmetric ? 1 : 2) * entries * sizeof(double) / 1e6;
-  return ranks_of(comm) > 1 && megabytes <= largest_whole;
+  const double gigabytes = (symmetry == Symmetry::symmetric ? 1 : 2) * entries * sizeof(double) / 1e9;
+  return ranks_of(comm) > 1 && gigabytes <= options.whole_limit;
 }
 
 struct Ordering
@@ -97,6 +93,37 @@ std::pair<Triplets, std::vector<double>> side_by_side(const Triplets& K, const T
   return both;
 }
 
+/// Sends each row of a solution, with its number in front, to its owner.
+void bring_to_owners(const std::vector<MUMPS_INT>& places, const Eigen::MatrixXd& solution, const RowLayout& layout,
+                     MPI_Comm comm, Eigen::MatrixXd& rows)
+{
+  const auto ranks = static_cast<std::size_t>(ranks_of(comm)), me = static_cast<std::size_t>(rank_of(comm));
+  const Eigen::Index columns = solution.cols();
+  std::vector<std::vector<double>> to(ranks);
+  for (std::size_t k = 0; k < places.size(); ++k)
+  {
+    const int row = to_int(places[k]) - 1;
+    const auto next = std::upper_bound(layout.starts.begin(), layout.starts.end(), row);
+    std::vector<double>& message = to[static_cast<std::size_t>(next - layout.starts.begin() - 1)];
+    message.push_back(row);
+    for (Eigen::Index j = 0; j < columns; ++j) message.push_back(solution(static_cast<Eigen::Index>(k), j));
+  }
+  std::vector<double> out, in(static_cast<std::size_t>(layout.counts[me]) * static_cast<std::size_t>(1 + columns));
+  std::vector<int> sent, sent_from, received(ranks), received_to{0};
+  for (const std::vector<double>& message : to)
+  {
+    sent_from.push_back(to_int(out.size()));
+    sent.push_back(to_int(message.size()));
+    out.insert(out.end(), message.begin(), message.end());
+  }
+  MPI_Alltoall(sent.data(), 1, MPI_INT, received.data(), 1, MPI_INT, comm);
+  std::partial_sum(received.begin(), received.end() - 1, std::back_inserter(received_to));
+  MPI_Alltoallv(out.data(), sent.data(), sent_from.data(), MPI_DOUBLE, in.data(), received.data(), received_to.data(),
+                MPI_DOUBLE, comm);
+  for (auto entry = in.begin(); entry != in.end(); entry += columns + 1)
+    rows.row(static_cast<Eigen::Index>(*entry) - layout.starts[me]) = Eigen::RowVectorXd::Map(&*entry + 1, columns);
+}
+
 } // namespace
 
 PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options)
@@ -107,7 +134,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   parts.layout = row_layout(K);
   const bool symmetric = symmetry == Symmetry::symmetric;
   Ordering order = elimination_order(K, parts.layout.total());
-  parts.whole = is_made_whole(order.entries, symmetry, parts.comm);
+  parts.whole = is_made_whole(order.entries, symmetry, options, parts.comm);
   if (parts.whole) broadcast(order.position, parts.comm);
   const auto entries_of = [&](Mat A)
   {
@@ -130,14 +157,15 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
 
 PencilFactor::~PencilFactor() = default;
 
-double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Symmetry symmetry, MPI_Comm comm)
+double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Symmetry symmetry,
+                       const PencilOptions& options, MPI_Comm comm)
 {
   const bool symmetric = symmetry == Symmetry::symmetric;
   // the place, both entries, K - shift M, and that once more in MUMPS's order
   constexpr double an_entry = 2 * sizeof(int) + 3 * sizeof(double) + sizeof(double) + sizeof(MUMPS_INT);
   const double entries = (symmetric ? 0.5 : 1) * entries_of_K; // the lower half, or all
   const double numbers = symmetric ? forecast.symmetric : forecast.not_symmetric;
-  const double copies = is_made_whole(forecast.entries, symmetry, comm) ? ranks_of(comm) : 1;
+  const double copies = is_made_whole(forecast.entries, symmetry, options, comm) ? ranks_of(comm) : 1;
   return copies * (an_entry * entries + sizeof(double) * numbers);
 }
 
@@ -175,21 +203,25 @@ MultiVector PencilFactor::solve_transposed(const MultiVector& X) const
 MultiVector PencilFactor::solve_with(Parts& parts, const MultiVector& X)
 {
   MultiVector Y = X;
-  const int rows = to_int(X.entries.rows()), columns = to_int(X.columns()), rank = rank_of(parts.comm);
-  if (columns == 0) return Y;
-  int own = 0;
+  if (X.columns() == 0) return Y;
+  control(*parts.mumps, 27) = to_int(X.columns()); // all of them at each reading of the factor
+  parts.whole || ranks_of(parts.comm) == 1 ? solve_by_columns(parts, Y) : solve_by_rows(parts, Y);
+  return Y;
+}
+
+/// Each rank solves some of the columns, with its own factor.
+void PencilFactor::solve_by_columns(Parts& parts, MultiVector& Y)
+{
+  const int rows = to_int(Y.entries.rows()), columns = to_int(Y.columns()), rank = rank_of(parts.comm),
+            ranks = ranks_of(parts.comm);
+  Eigen::MatrixXd right(parts.layout.total(), (columns - rank + ranks - 1) / ranks);
+  const auto whole = [&](int j) { return j % ranks == rank ? right.col(j / ranks).data() : nullptr; };
   for (int j = 0; j < columns; ++j)
-    if (parts.solver_of(j) == rank) ++own;
-  parts.right.resize(parts.layout.total(), own);
-  const auto whole = [&](int j)
-  { return parts.solver_of(j) == rank ? parts.right.col(j / parts.column_stride()).data() : nullptr; };
-  for (int j = 0; j < columns; ++j)
-    MPI_Gatherv(X.entries.col(j).data(), rows, MPI_DOUBLE, whole(j), parts.layout.counts.data(),
-                parts.layout.starts.data(), MPI_DOUBLE, parts.solver_of(j), parts.comm);
+    MPI_Gatherv(Y.entries.col(j).data(), rows, MPI_DOUBLE, whole(j), parts.layout.counts.data(),
+                parts.layout.starts.data(), MPI_DOUBLE, j % ranks, parts.comm);
   DMUMPS_STRUC_C& mumps = *parts.mumps;
-  control(mumps, 27) = columns; // all of them at each reading of the factor
-  mumps.rhs = parts.right.data();
-  mumps.nrhs = parts.whole ? own : columns;
+  mumps.rhs = right.data();
+  mumps.nrhs = to_int(right.cols());
   mumps.lrhs = parts.layout.total();
   parts.run_together(
       [&]
@@ -198,8 +230,32 @@ MultiVector PencilFactor::solve_with(Parts& parts, const MultiVector& X)
       });
   for (int j = 0; j < columns; ++j)
     MPI_Scatterv(whole(j), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, Y.entries.col(j).data(),
-                 rows, MPI_DOUBLE, parts.solver_of(j), parts.comm);
-  return Y;
+                 rows, MPI_DOUBLE, j % ranks, parts.comm);
+}
+
+/// All ranks solve all columns with the factor that they share. The solution comes in the rows that MUMPS chooses.
+void PencilFactor::solve_by_rows(Parts& parts, MultiVector& Y)
+{
+  DMUMPS_STRUC_C& mumps = *parts.mumps;
+  const int columns = to_int(Y.columns()), first = parts.layout.starts[static_cast<std::size_t>(rank_of(parts.comm))];
+  std::vector<MUMPS_INT> own(static_cast<std::size_t>(Y.entries.rows()));
+  std::iota(own.begin(), own.end(), first + 1);
+  const int share = std::max<int>(1, mumps.info[22]); // INFO(23): rows of the solution that come to this rank
+  std::vector<MUMPS_INT> places(static_cast<std::size_t>(share), 0);
+  Eigen::MatrixXd solution(share, columns);
+  control(mumps, 20) = 10; // right-hand sides by rows,
+  control(mumps, 21) = 1;  // and solutions
+  mumps.nrhs = columns;
+  mumps.nloc_rhs = to_int(own.size());
+  mumps.lrhs_loc = std::max(1, mumps.nloc_rhs);
+  mumps.irhs_loc = own.data();
+  mumps.rhs_loc = Y.entries.data();
+  mumps.lsol_loc = share;
+  mumps.isol_loc = places.data();
+  mumps.sol_loc = solution.data();
+  run(mumps, MumpsJob::solve);
+  places.resize(static_cast<std::size_t>(mumps.info[22]));
+  bring_to_owners(places, solution, parts.layout, parts.comm, Y.entries);
 }
 
 OptionList options_of(PencilOptions& options)
@@ -207,6 +263,8 @@ OptionList options_of(PencilOptions& options)
   return {
       {"-modes_factor_room", &options.room, Range::any,
        "[%] of memory beyond what MUMPS estimates for a factor; it grows by itself"},
+      {"-modes_whole_factor", &options.whole_limit, Range::not_negative,
+       "[GB] of a factor that every rank makes whole and solves its vectors with; a larger one is shared"},
   };
 }
 

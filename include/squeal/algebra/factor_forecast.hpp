@@ -21,6 +21,7 @@ struct FactorForecast
 FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options);
 
 /// Memory of a PencilFactor of K and M on all ranks together [bytes], by the forecast of a factor of K.
-double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Symmetry symmetry, MPI_Comm comm);
+double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Symmetry symmetry,
+                       const PencilOptions& options, MPI_Comm comm);
 
 } // namespace squeal

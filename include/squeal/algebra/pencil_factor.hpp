@@ -1,6 +1,6 @@
 #pragma once
 /// The factor of K - shift M by MUMPS, with METIS's nested dissection (src/README.md, section 8.6). It takes MUMPS's
-/// own interface, since PETSc's has no way to pass an order of elimination. Right-hand sides pass through rank 0.
+/// own interface, since PETSc's has no way to pass an order of elimination.
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/options.hpp"
 
@@ -19,7 +19,8 @@ enum class Symmetry
 /// Options of all factors by MUMPS of the modes.
 struct PencilOptions
 {
-  PetscInt room = 30; // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
+  PetscInt room = 30;        // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
+  double whole_limit = 0.2; // [GB] of a factor that every rank makes whole
 };
 
 OptionList options_of(PencilOptions& options);
@@ -47,6 +48,8 @@ public:
 private:
   struct Parts;
   static MultiVector solve_with(Parts& parts, const MultiVector& X);
+  static void solve_by_columns(Parts& parts, MultiVector& Y);
+  static void solve_by_rows(Parts& parts, MultiVector& Y);
   std::unique_ptr<Parts> parts_;
 };
 

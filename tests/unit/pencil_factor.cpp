@@ -1,0 +1,75 @@
+// ranks: 1 2 3
+// The factor of K - shift M by either way of several ranks, where every rank makes it whole and where they share it:
+// residuals of a matrix whose condition is below 1e4 are below 1e-11 of the right-hand side.
+#include "squeal/algebra/pencil_factor.hpp"
+#include "../support/small_models.hpp"
+
+#include <doctest/doctest.h>
+
+using namespace squeal;
+
+namespace
+{
+
+constexpr std::size_t size = 37; // no multiple of the ranks
+
+/// A chain whose springs also act one way, so that K is not symmetric where `one_way` is not zero.
+Owned<Mat> stiffness(double one_way)
+{
+  test::Rows K = test::zeros(size, size);
+  for (std::size_t i = 0; i < size; ++i)
+  {
+    K[i][i] = 2.1 + 0.01 * static_cast<double>(i);
+    if (i + 1 < size) K[i][i + 1] = -1 + one_way, K[i + 1][i] = -1;
+  }
+  return test::sparse(K, K);
+}
+
+/// With entries where K has none.
+Owned<Mat> mass()
+{
+  test::Rows M = test::zeros(size, size);
+  for (std::size_t i = 0; i < size; ++i)
+  {
+    M[i][i] = 1 + 0.1 * static_cast<double>(i % 3);
+    if (i + 2 < size) M[i][i + 2] = M[i + 2][i] = 0.1;
+  }
+  return test::sparse(M, M);
+}
+
+double residual(Mat K, Mat M, double shift, const MultiVector& X, const MultiVector& B)
+{
+  MultiVector R = product(K, X);
+  R.entries -= shift * product(M, X).entries + B.entries;
+  return column_norms(R).maxCoeff() / column_norms(B).minCoeff();
+}
+
+} // namespace
+
+TEST_CASE("solutions and counts do not depend on how the ranks make the factor")
+{
+  const Owned<Mat> M = mass();
+  for (const double whole_limit : {0., 1.}) // shared, and whole
+  {
+    const PencilOptions options{.whole_limit = whole_limit};
+    const Owned<Mat> K = stiffness(0.3), symmetric = stiffness(0);
+    const Owned<Mat> transposed = transpose_of(K);
+    PencilFactor factor(K, M, Symmetry::none, options), counting(symmetric, M, Symmetry::symmetric, options);
+    for (const double shift : {-1., 1.3})
+    {
+      REQUIRE(factor.factorise(shift));
+      REQUIRE(counting.factorise(shift));
+      for (const PetscInt columns : {1, 2, 7})
+      {
+        const MultiVector B = random_multivector(K, columns);
+        CHECK(residual(K, M, shift, factor.solve(B), B) < 1e-11);
+        CHECK(residual(transposed, M, shift, factor.solve_transposed(B), B) < 1e-11);
+        CHECK(residual(symmetric, M, shift, counting.solve(B), B) < 1e-11);
+      }
+      int below = counting.negative_pivots();
+      CHECK((shift < 0 ? below == 0 : below > 0));
+      MPI_Bcast(&below, 1, MPI_INT, 0, PETSC_COMM_WORLD);
+      CHECK(below == counting.negative_pivots()); // on all ranks
+    }
+  }
+}
