@@ -80,6 +80,8 @@ std::pair<Triplets, std::vector<double>> side_by_side(const Triplets& K, const T
   const std::size_t of_K = K.value.size(), of_M = M.value.size();
   std::pair<Triplets, std::vector<double>> both;
   auto& [entries, masses] = both;
+  for (auto* places : {&entries.row, &entries.column}) places->reserve(std::max(of_K, of_M)); // mostly all of them
+  for (auto* values : {&entries.value, &masses}) values->reserve(std::max(of_K, of_M));
   for (std::size_t i = 0, j = 0; i < of_K || j < of_M;)
   {
     const bool in_K = j == of_M || (i < of_K && place(K, i) <= place(M, j));
@@ -118,6 +120,7 @@ void bring_to_owners(const std::vector<MUMPS_INT>& places, const Eigen::MatrixXd
   }
   MPI_Alltoall(sent.data(), 1, MPI_INT, received.data(), 1, MPI_INT, comm);
   std::partial_sum(received.begin(), received.end() - 1, std::back_inserter(received_to));
+  to = {};
   MPI_Alltoallv(out.data(), sent.data(), sent_from.data(), MPI_DOUBLE, in.data(), received.data(), received_to.data(),
                 MPI_DOUBLE, comm);
   for (auto entry = in.begin(); entry != in.end(); entry += columns + 1)
@@ -147,7 +150,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   parts.mumps =
       start_mumps(parts.whole ? MPI_COMM_SELF : parts.comm, symmetric ? MumpsSymmetry::symmetric : MumpsSymmetry::none);
   set_entries(parts.mumps, entries, parts.layout.total());
-  parts.K = std::move(entries.value);
+  parts.K = std::move(entries.value); // MUMPS's pointer to them stays valid
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 14) = to_int(options.room);
   mumps.perm_in = order.position.data();
@@ -247,7 +250,7 @@ void PencilFactor::solve_by_rows(Parts& parts, MultiVector& Y)
   control(mumps, 21) = 1;  // and solutions
   mumps.nrhs = columns;
   mumps.nloc_rhs = to_int(own.size());
-  mumps.lrhs_loc = std::max(1, mumps.nloc_rhs);
+  mumps.lrhs_loc = std::max<MUMPS_INT>(1, mumps.nloc_rhs);
   mumps.irhs_loc = own.data();
   mumps.rhs_loc = Y.entries.data();
   mumps.lsol_loc = share;

@@ -86,12 +86,19 @@ void ContactOperator::add_product(std::size_t pair, const PairVector& change, st
 
 void ContactOperator::add_near_product(std::size_t pair, const PairVector& change, std::span<float> w) const
 {
+  add_product_in_patch(pair, change, w);
+  add_runs(near_.outside[pair], PairRows<std::size_t>(directions_).per_pair(), change, w.data());
+}
+
+void ContactOperator::add_product_in_patch(std::size_t pair, const PairVector& change, std::span<float> w) const
+{
   add_runs(near_.inside[pair], PairRows<std::size_t>(directions_).per_pair(), change, w.data());
 }
 
-void ContactOperator::add_product_outside(std::size_t pair, const PairVector& change, std::span<float> w) const
+void ContactOperator::add_product_beyond_patch(std::size_t pair, const PairVector& change, std::span<float> w) const
 {
-  add_runs(near_.outside[pair], PairRows<std::size_t>(directions_).per_pair(), change, w.data());
+  const NearField::PairRow& row = shares_patches() ? beyond_[pair] : near_.outside[pair];
+  add_runs(row, PairRows<std::size_t>(directions_).per_pair(), change, w.data());
 }
 
 double ContactOperator::largest_eigenvalue(int iterations) const

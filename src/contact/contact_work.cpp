@@ -13,18 +13,19 @@ double largest_reaction(const std::vector<double>& r)
   return largest;
 }
 
+double defect_of(const ContactWork& work, std::size_t pair, const PairVector& w, double largest)
+{
+  const double defect = natural_map(work.reaction(pair), w, work.friction, work.W.scale(pair));
+  if (!std::isfinite(defect + w[0] + w[1] + w[2])) return std::numeric_limits<double>::infinity();
+  return defect > 0 ? defect / work.scale_of(pair, largest) : 0;
+}
+
 double residual_of(const ContactWork& work)
 {
   const double largest = largest_reaction(work.r);
   double residual = 0;
   for (std::size_t pair = 0; pair < work.W.pairs(); ++pair)
-  {
-    if (!work.takes_part(pair)) continue;
-    const PairVector w = work.velocity(pair);
-    const double defect = natural_map(work.reaction(pair), w, work.friction, work.W.scale(pair));
-    if (!std::isfinite(defect + w[0] + w[1] + w[2])) return std::numeric_limits<double>::infinity();
-    if (defect > 0) residual = std::max(residual, defect / work.scale_of(pair, largest));
-  }
+    if (work.takes_part(pair)) residual = std::max(residual, defect_of(work, pair, work.velocity(pair), largest));
   return residual;
 }
 

@@ -40,6 +40,11 @@ struct ContactWork
 
 double largest_reaction(const std::vector<double>& r);
 
+/// By how much the law of a pair with the velocity w is missed, over the scale of its forces; `largest`: reaction of
+/// all pairs. Infinite where a number is not finite.
+double defect_of(const ContactWork& work, std::size_t pair, const PairVector& w, double largest);
+
+/// The largest defect of all pairs.
 double residual_of(const ContactWork& work);
 
 /// W r of each, reading W once.

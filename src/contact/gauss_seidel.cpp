@@ -2,9 +2,9 @@
 /// a pair's rows are read once for all the problems in which it moves.
 ///
 /// Let w = w_0 + dw with w_0 = W r_0 + b from the last product with W, and dw the effect of the changes since. The
-/// sweeps update dw alone. It is small, so the near field and single precision suffice; where they did not lead to
-/// convergence, W itself is swept over, where it is whole. A problem counts as converged only by the residual after a
-/// product with W.
+/// sweeps update dw alone. It is small, so the near field and single precision suffice, patch by patch where there are
+/// several. Where that did not lead to convergence, all pairs are one patch, and then W itself is swept over, where it
+/// is whole. A problem counts as converged only by the residual after a product with W.
 #include "gauss_seidel.hpp"
 
 #include "squeal/base/broadcast.hpp"
@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <type_traits>
@@ -22,11 +23,14 @@ namespace squeal
 namespace
 {
 
-constexpr int most_of_a_patch = 8; // sweeps before its reactions act on the others
+// The pins of a brake act on each other by some hundredths of what they do on themselves. Sweeping over one of them for
+// longer than to a tenth of its first defects would then be undone by what the others do to it.
+constexpr int most_of_a_patch = 8;
+constexpr double small_in_a_patch = 0.1;
 
-/// The pairs of a sweep, patch after patch. Patches are swept each by itself, for the same answer on any number of
-/// ranks: reactions act on the other patches when all have been swept.
-struct Ground
+/// The pairs that sweeps visit, patch after patch. Of several patches each is swept by itself, and reactions act on the
+/// others when all have been swept. So sweeps do not depend on the number of ranks.
+struct SweptPairs
 {
   struct Part
   {
@@ -43,45 +47,44 @@ struct Ground
     return std::span(order).subspan(part.first, part.count);
   }
   bool shared() const { return comm != MPI_COMM_NULL; }
-  bool decides() const { return !shared() || rank_of(comm) == 0; }
 };
 
-Ground one_patch(const ContactOperator& W)
+SweptPairs one_patch(const ContactOperator& W)
 {
-  Ground ground;
-  ground.order.resize(W.pairs());
-  std::iota(ground.order.begin(), ground.order.end(), 0);
-  ground.own = {{0, W.pairs()}};
-  return ground;
+  SweptPairs where;
+  where.order.resize(W.pairs());
+  std::iota(where.order.begin(), where.order.end(), 0);
+  where.own = {{0, W.pairs()}};
+  return where;
 }
 
-Ground patches_of(const ContactOperator& W)
+SweptPairs patches_of(const ContactOperator& W)
 {
-  if (W.patches().size() < 2) return one_patch(W);
-  Ground ground;
-  ground.several = true;
-  if (W.shares_patches()) ground.comm = W.shared_by();
-  const int ranks = ground.shared() ? ranks_of(ground.comm) : 1, me = ground.shared() ? rank_of(ground.comm) : 0;
+  SweptPairs where;
+  where.several = true;
+  if (W.shares_patches()) where.comm = W.shared_by();
+  const int ranks = where.shared() ? ranks_of(where.comm) : 1, me = where.shared() ? rank_of(where.comm) : 0;
   for (int rank = 0; rank < ranks; ++rank)
   {
-    const std::size_t before = ground.order.size();
+    const std::size_t before = where.order.size();
     for (std::size_t patch = 0; patch < W.patches().size(); ++patch)
     {
       if (W.owner(patch) != rank) continue;
       const std::vector<std::size_t>& pairs = W.patches()[patch];
-      if (rank == me) ground.own.push_back({ground.order.size(), pairs.size()});
-      ground.order.insert(ground.order.end(), pairs.begin(), pairs.end());
+      if (rank == me) where.own.push_back({where.order.size(), pairs.size()});
+      where.order.insert(where.order.end(), pairs.begin(), pairs.end());
     }
-    ground.counts.push_back(to_int(ground.order.size() - before));
+    where.counts.push_back(to_int(where.order.size() - before));
   }
-  return ground;
+  return where;
 }
 
 /// One problem while it is swept over. `Entry`: float for sweeps over the near field, double for sweeps over W.
 template <class Entry> struct SweptProblem
 {
   ContactWork& work;
-  std::vector<Entry> dw;       // in the rows of this rank's patches
+  std::vector<Entry> dw;       // valid in the rows of this rank's patches
+  bool by_patches = false;     // of several
   std::vector<double> known{}; // reactions whose effect on other patches dw has
   bool changed = false;        // dw is not zero
   bool finished = false;       // the sweeps have met their target, or no reaction changes any more
@@ -93,15 +96,6 @@ template <class Entry> struct SweptProblem
 };
 
 template <class Entry> using Problems = std::vector<SweptProblem<Entry>*>;
-
-template <class Entry>
-void add_product(const ContactOperator& W, std::size_t pair, const PairVector& change, std::vector<Entry>& dw)
-{
-  if constexpr (std::is_same_v<Entry, float>)
-    W.add_near_product(pair, change, dw);
-  else
-    W.add_product(pair, change, dw);
-}
 
 template <class Entry> PairVector velocity_of(const SweptProblem<Entry>& problem, std::size_t pair)
 {
@@ -119,18 +113,13 @@ template <class Entry> bool change_reaction(SweptProblem<Entry>& problem, std::s
   PairVector change{};
   for (std::size_t k = 0; k < change.size(); ++k) change[k] = next[k] - last[k];
   PairView<double>(problem.work.r, problem.work.W.directions()).set(pair, next);
-  add_product<Entry>(problem.work.W, pair, change, problem.dw);
+  const ContactOperator& W = problem.work.W;
+  if constexpr (std::is_same_v<Entry, double>)
+    W.add_product(pair, change, problem.dw);
+  else
+    problem.by_patches ? W.add_product_in_patch(pair, change, problem.dw)
+                       : W.add_near_product(pair, change, problem.dw);
   return problem.changed = true;
-}
-
-/// By how much the law of a pair is missed, over the scale of its forces; `largest`: reaction of all.
-template <class Entry>
-double defect_of(const SweptProblem<Entry>& problem, std::size_t pair, const PairVector& w, double largest)
-{
-  const ContactWork& work = problem.work;
-  const double defect = natural_map(work.reaction(pair), w, work.friction, work.W.scale(pair));
-  if (!std::isfinite(defect + w[0] + w[1] + w[2])) return std::numeric_limits<double>::infinity();
-  return defect > 0 ? defect / work.scale_of(pair, largest) : 0;
 }
 
 /// Solves one pair if its law is missed by more than `limit`. The defect before, or 0 if its reaction does not change.
@@ -140,7 +129,7 @@ template <class Entry> double visit(SweptProblem<Entry>& problem, std::size_t pa
   const ContactOperator& W = work.W;
   if (!work.takes_part(pair)) return 0;
   const PairVector w = velocity_of(problem, pair), last = work.reaction(pair);
-  const double defect = defect_of(problem, pair, w, largest);
+  const double defect = defect_of(work, pair, w, largest);
   if (defect <= limit) return 0;
   const PairBlock& A = W.diagonal(pair);
   PairVector next = solve_pair(A, velocity_without(A, last, w), W.directions(), work.friction, last);
@@ -150,37 +139,37 @@ template <class Entry> double visit(SweptProblem<Entry>& problem, std::size_t pa
 }
 
 /// Gives every rank the reactions of all patches.
-template <class Entry> void exchange_reactions(const Problems<Entry>& problems, const Ground& ground)
+template <class Entry> void exchange_reactions(const Problems<Entry>& problems, const SweptPairs& where)
 {
   const int directions = problems.front()->work.W.directions();
   const std::size_t of_a_pair = problems.size() * PairRows<std::size_t>(directions).per_pair();
   std::vector<int> counts, starts;
   int total = 0;
-  for (const int pairs : ground.counts)
+  for (const int pairs : where.counts)
   {
     starts.push_back(total);
     counts.push_back(pairs * to_int(of_a_pair));
     total += counts.back();
   }
   std::vector<double> all(static_cast<std::size_t>(total));
-  const auto for_each_entry = [&](const Ground::Part& part, auto take)
+  const auto for_each_entry = [&](const SweptPairs::Part& part, auto take)
   {
     double* entry = all.data() + part.first * of_a_pair;
-    for (const std::size_t pair : ground.pairs(part))
+    for (const std::size_t pair : where.pairs(part))
       for (SweptProblem<Entry>* problem : problems)
         for (double& reaction : PairView<double>(problem->work.r, directions).of(pair)) take(reaction, *entry++);
   };
-  for (const Ground::Part& part : ground.own)
+  for (const SweptPairs::Part& part : where.own)
     for_each_entry(part, [](double reaction, double& entry) { entry = reaction; });
-  MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, all.data(), counts.data(), starts.data(), MPI_DOUBLE, ground.comm);
-  for_each_entry({0, ground.order.size()}, [](double& reaction, double entry) { reaction = entry; });
+  MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, all.data(), counts.data(), starts.data(), MPI_DOUBLE, where.comm);
+  for_each_entry({0, where.order.size()}, [](double& reaction, double entry) { reaction = entry; });
 }
 
 /// What the reactions that changed since the last time add to dw from patch to patch.
-void act_on_other_patches(const Problems<float>& problems, const Ground& ground)
+void act_on_other_patches(const Problems<float>& problems, const SweptPairs& where)
 {
-  if (!ground.several) return;
-  if (ground.shared()) exchange_reactions(problems, ground);
+  if (!where.several) return;
+  if (where.shared()) exchange_reactions(problems, where);
   for (SweptProblem<float>* problem : problems)
   {
     const ContactWork& work = problem->work;
@@ -189,24 +178,24 @@ void act_on_other_patches(const Problems<float>& problems, const Ground& ground)
     {
       const PairVector now = work.reaction(pair), before = known.vector(pair);
       if (now == before) continue;
-      work.W.add_product_outside(pair, {now[0] - before[0], now[1] - before[1], now[2] - before[2]}, problem->dw);
+      work.W.add_product_beyond_patch(pair, {now[0] - before[0], now[1] - before[1], now[2] - before[2]}, problem->dw);
       known.set(pair, now);
     }
   }
 }
 
 /// The near field alone has patches.
-void act_on_other_patches(const Problems<double>&, const Ground&) {}
+void act_on_other_patches(const Problems<double>&, const SweptPairs&) {}
 
 /// The residual by dw, whose rounding it contains, in the pairs of this rank.
-template <class Entry> double estimated_residual(const SweptProblem<Entry>& problem, const Ground& ground)
+template <class Entry> double estimated_residual(const SweptProblem<Entry>& problem, const SweptPairs& where)
 {
   const double largest = largest_reaction(problem.work.r);
   double residual = 0;
-  for (const Ground::Part& part : ground.own)
-    for (const std::size_t pair : ground.pairs(part))
+  for (const SweptPairs::Part& part : where.own)
+    for (const std::size_t pair : where.pairs(part))
       if (problem.work.takes_part(pair))
-        residual = std::max(residual, defect_of(problem, pair, velocity_of(problem, pair), largest));
+        residual = std::max(residual, defect_of(problem.work, pair, velocity_of(problem, pair), largest));
   return residual;
 }
 
@@ -219,21 +208,20 @@ template <class Entry> void set_target(SweptProblem<Entry>& problem, const Conta
   problem.target = std::max(settings.tolerance / 4, hidden * problem.exact_residual);
 }
 
-/// After a product with W: sets the result and the next target; returns whether more sweeps may help.
-template <class Entry>
-bool continues(SweptProblem<Entry>& problem, const Ground& ground, const ContactSettings& settings)
+/// After a product with W that leaves this residual: sets the result and the next target; returns whether more sweeps
+/// may help.
+template <class Entry> bool continues(SweptProblem<Entry>& problem, double residual, const ContactSettings& settings)
 {
   ContactResult& result = problem.work.result;
   const double before = problem.exact_residual;
-  if (ground.decides()) result.residual = residual_of(problem.work);
-  if (ground.shared()) MPI_Bcast(&result.residual, 1, MPI_DOUBLE, 0, ground.comm);
-  problem.exact_residual = result.residual;
+  result.residual = problem.exact_residual = residual;
   result.converged = result.residual <= settings.tolerance;
   if (result.converged || !std::isfinite(result.residual) || result.iterations >= settings.max_iterations) return false;
-  if (problem.finished) problem.failures = result.residual > before / 2 ? problem.failures + 1 : 0;
+  // what is left may be rounding's, or the near field's; or several patches act on each other too strongly
+  if (problem.finished || problem.by_patches) problem.failures = residual > before / 2 ? problem.failures + 1 : 0;
   problem.finished = false;
   set_target(problem, settings);
-  return problem.failures < 2; // else the residual is that of rounding, or of the near field
+  return problem.failures < 2;
 }
 
 template <class Entry> void shorten_changes(SweptProblem<Entry>& problem)
@@ -252,47 +240,52 @@ struct Swept
   double sweeps = 0;   // that changed reactions
 };
 
-/// Sweeps over one patch, until the changes are small beside the first ones.
+/// Sweeps over one patch, at most so often for each problem, until the defects are small beside the first ones.
 template <class Entry> void sweep_patch(const Problems<Entry>& problems, std::span<const std::size_t> patch,
-                                        int at_most, const std::vector<double>& largest, std::vector<Swept>& swept)
+                                        const std::vector<int>& at_most, const std::vector<double>& largest,
+                                        std::vector<Swept>& swept)
 {
-  constexpr double small = 0.1;
   std::vector<double> at_first(problems.size(), 0);
-  bool continues = true;
-  for (int sweep = 0; continues && sweep < at_most; ++sweep)
+  std::vector<char> going(problems.size(), 1);
+  for (int sweep = 0; std::find(going.begin(), going.end(), 1) != going.end(); ++sweep)
   {
     std::vector<double> defects(problems.size(), 0);
     for (const std::size_t pair : patch)
       for (std::size_t k = 0; k < problems.size(); ++k)
-        defects[k] = std::max(defects[k], visit(*problems[k], pair, problems[k]->target / 8, largest[k]));
+        if (going[k]) defects[k] = std::max(defects[k], visit(*problems[k], pair, problems[k]->target / 8, largest[k]));
     if (sweep == 0) at_first = defects;
-    continues = false;
     for (std::size_t k = 0; k < problems.size(); ++k)
     {
       if (defects[k] > 0) swept[k].sweeps = std::max(swept[k].sweeps, sweep + 1.);
-      if (defects[k] > small * at_first[k]) continues = true;
+      going[k] = going[k] && sweep + 1 < at_most[k] && defects[k] > small_in_a_patch * at_first[k];
     }
   }
 }
 
 /// The most of all ranks.
-void agree(std::vector<Swept>& swept, const Ground& ground)
+void agree(std::vector<Swept>& swept, const SweptPairs& where)
 {
-  if (ground.shared())
-    MPI_Allreduce(MPI_IN_PLACE, swept.data(), to_int(2 * swept.size()), MPI_DOUBLE, MPI_MAX, ground.comm);
+  if (where.shared())
+    MPI_Allreduce(MPI_IN_PLACE, swept.data(), to_int(2 * swept.size()), MPI_DOUBLE, MPI_MAX, where.comm);
 }
 
 /// Sweeps over all patches; problems that are finished, or due for a product with W, leave the list.
-template <class Entry> void sweep_once(Problems<Entry>& sweeping, const Ground& ground, const ContactSettings& settings)
+template <class Entry>
+void sweep_once(Problems<Entry>& sweeping, const SweptPairs& where, const ContactSettings& settings)
 {
   std::vector<double> largest;
-  for (const SweptProblem<Entry>* problem : sweeping) largest.push_back(largest_reaction(problem->work.r));
+  std::vector<int> at_most;
+  for (const SweptProblem<Entry>* problem : sweeping)
+  {
+    largest.push_back(largest_reaction(problem->work.r));
+    const int left = static_cast<int>(settings.max_iterations) - problem->work.result.iterations;
+    at_most.push_back(where.several ? std::min(most_of_a_patch, left) : 1);
+  }
   std::vector<Swept> swept(sweeping.size());
-  for (const Ground::Part& part : ground.own)
-    sweep_patch(sweeping, ground.pairs(part), ground.several ? most_of_a_patch : 1, largest, swept);
-  act_on_other_patches(sweeping, ground);
-  for (std::size_t k = 0; k < sweeping.size(); ++k) swept[k].residual = estimated_residual(*sweeping[k], ground);
-  agree(swept, ground);
+  for (const SweptPairs::Part& part : where.own) sweep_patch(sweeping, where.pairs(part), at_most, largest, swept);
+  act_on_other_patches(sweeping, where);
+  for (std::size_t k = 0; k < sweeping.size(); ++k) swept[k].residual = estimated_residual(*sweeping[k], where);
+  agree(swept, where);
   Problems<Entry> remaining;
   for (std::size_t k = 0; k < sweeping.size(); ++k)
   {
@@ -303,7 +296,7 @@ template <class Entry> void sweep_once(Problems<Entry>& sweeping, const Ground& 
     result.residual = swept[k].residual;
     const bool moved = swept[k].sweeps > 0, due = result.iterations / 50 > before / 50;
     problem.changed = problem.changed || moved;
-    if (due) shorten_changes(problem);
+    if (due && !problem.by_patches) shorten_changes(problem);
     problem.finished = !(result.residual > problem.target) || !moved;
     if (!problem.finished && !due && result.iterations < settings.max_iterations) remaining.push_back(&problem);
   }
@@ -313,24 +306,24 @@ template <class Entry> void sweep_once(Problems<Entry>& sweeping, const Ground& 
 /// Makes the starts admissible: a warm start need not be, nor finite after a failed step. Where that changes reactions,
 /// their residual is known by dw alone.
 template <class Entry>
-void begin(const Problems<Entry>& problems, const Ground& ground, const ContactSettings& settings)
+void begin(const Problems<Entry>& problems, const SweptPairs& where, const ContactSettings& settings)
 {
   for (SweptProblem<Entry>* problem : problems)
   {
     ContactWork& work = problem->work;
     problem->known = work.r;
-    for (const Ground::Part& part : ground.own)
-      for (const std::size_t pair : ground.pairs(part))
+    for (const SweptPairs::Part& part : where.own)
+      for (const std::size_t pair : where.pairs(part))
         change_reaction(*problem, pair,
                         work.takes_part(pair)
                             ? admissible(work.reaction(pair), velocity_of(*problem, pair), work.friction)
                             : PairVector{});
   }
-  act_on_other_patches(problems, ground);
+  act_on_other_patches(problems, where);
   std::vector<Swept> swept;
   for (const SweptProblem<Entry>* problem : problems)
-    swept.push_back({problem->changed ? estimated_residual(*problem, ground) : 0, problem->changed ? 1. : 0.});
-  agree(swept, ground);
+    swept.push_back({problem->changed ? estimated_residual(*problem, where) : 0, problem->changed ? 1. : 0.});
+  agree(swept, where);
   for (std::size_t k = 0; k < problems.size(); ++k)
   {
     problems[k]->changed = swept[k].sweeps > 0;
@@ -341,7 +334,7 @@ void begin(const Problems<Entry>& problems, const Ground& ground, const ContactS
 }
 
 /// Forms W r, and sets dw to zero, of the problems whose reactions changed; one product with W for all.
-template <class Entry> void update_products(const Problems<Entry>& problems, const Ground& ground)
+template <class Entry> void update_products(const Problems<Entry>& problems, const SweptPairs& where)
 {
   std::vector<ContactWork*> stale;
   for (SweptProblem<Entry>* problem : problems)
@@ -351,31 +344,45 @@ template <class Entry> void update_products(const Problems<Entry>& problems, con
     problem->changed = false;
     std::fill(problem->dw.begin(), problem->dw.end(), Entry{0});
   }
-  if (ground.decides())
+  if (!where.shared() || rank_of(where.comm) == 0)
     form_products(stale);
   else if (!stale.empty())
     stale.front()->W.follow_product(stale.size());
-  if (ground.shared())
-    for (ContactWork* work : stale) MPI_Bcast(work->Wr.data(), to_int(work->Wr.size()), MPI_DOUBLE, 0, ground.comm);
+  if (where.shared())
+    for (ContactWork* work : stale) MPI_Bcast(work->Wr.data(), to_int(work->Wr.size()), MPI_DOUBLE, 0, where.comm);
 }
 
+/// Leaves the problems that are to be swept on after a product with W, for which dw is zero.
 template <class Entry>
-void sweep_until_converged(std::span<ContactWork* const> works, const Ground& ground, const ContactSettings& settings)
+void leave_unfinished(Problems<Entry>& problems, const SweptPairs& where, const ContactSettings& settings)
+{
+  std::vector<Swept> left;
+  for (const SweptProblem<Entry>* problem : problems) left.push_back({estimated_residual(*problem, where), 0});
+  agree(left, where);
+  Problems<Entry> remaining;
+  for (std::size_t k = 0; k < problems.size(); ++k)
+    if (continues(*problems[k], left[k].residual, settings)) remaining.push_back(problems[k]);
+  problems = std::move(remaining);
+}
+
+template <class Entry> void sweep_until_converged(std::span<ContactWork* const> works, const SweptPairs& where,
+                                                  const ContactSettings& settings)
 {
   std::vector<SweptProblem<Entry>> problems;
   problems.reserve(works.size());
-  for (ContactWork* work : works) problems.push_back({*work, std::vector<Entry>(work->b.size())});
-  Problems<Entry> all, active;
+  for (ContactWork* work : works) problems.push_back({*work, std::vector<Entry>(work->b.size()), where.several});
+  Problems<Entry> all, active, fresh;
   for (SweptProblem<Entry>& problem : problems) all.push_back(&problem);
-  begin(all, ground, settings);
-  for (SweptProblem<Entry>* problem : all)
-    if (problem->changed || continues(*problem, ground, settings)) active.push_back(problem);
+  begin(all, where, settings);
+  for (SweptProblem<Entry>* problem : all) (problem->changed ? active : fresh).push_back(problem);
+  leave_unfinished(fresh, where, settings);
+  active.insert(active.end(), fresh.begin(), fresh.end());
   while (!active.empty())
   {
     Problems<Entry> sweeping = active;
-    while (!sweeping.empty()) sweep_once(sweeping, ground, settings);
-    update_products<Entry>(active, ground);
-    std::erase_if(active, [&](SweptProblem<Entry>* problem) { return !continues(*problem, ground, settings); });
+    while (!sweeping.empty()) sweep_once(sweeping, where, settings);
+    update_products<Entry>(active, where);
+    leave_unfinished(active, where, settings);
   }
 }
 
@@ -388,26 +395,43 @@ struct Announced
 };
 static_assert(std::is_trivially_copyable_v<Announced>);
 
-/// Of one problem.
-void share(std::vector<double>& b, std::vector<double>& r, std::vector<double>& Wr, double& speed, MPI_Comm comm)
+/// Exchanges the problems in one message: the speed, b, r and W r of each.
+void exchange(std::span<ContactWork* const> works, std::span<std::vector<double>> b, MPI_Comm comm)
 {
-  for (std::vector<double>* entries : {&b, &r, &Wr}) broadcast(*entries, comm);
-  MPI_Bcast(&speed, 1, MPI_DOUBLE, 0, comm);
+  std::vector<double> message;
+  if (rank_of(comm) == 0)
+    for (const ContactWork* work : works)
+    {
+      message.push_back(work->speed);
+      for (const std::span<const double> entries : {std::span<const double>(work->b), {work->r}, {work->Wr}})
+        message.insert(message.end(), entries.begin(), entries.end());
+    }
+  broadcast(message, comm);
+  if (rank_of(comm) == 0) return;
+  auto entry = message.begin();
+  for (std::size_t k = 0; k < works.size(); ++k)
+  {
+    const auto size = static_cast<std::ptrdiff_t>(works[k]->W.size());
+    works[k]->speed = *entry++;
+    for (std::vector<double>* entries : {&b[k], &works[k]->r, &works[k]->Wr})
+    {
+      entries->assign(entry, entry + size);
+      entry += size;
+    }
+  }
 }
 
-void announce(std::span<ContactWork* const> works, const ContactSettings& settings)
+/// With the other ranks, which would wait for this one for ever if it left by an exception: that ends the program.
+void sweep_together(std::span<ContactWork* const> works, const ContactSettings& settings) noexcept
 {
   const ContactWork& first = *works.front();
   const MPI_Comm comm = first.W.shared_by();
-  int task = sweeps;
+  int task = task_of_sweeps;
   MPI_Bcast(&task, 1, MPI_INT, 0, comm);
   Announced announced{works.size(), settings, first.friction};
   MPI_Bcast(&announced, sizeof announced, MPI_BYTE, 0, comm);
-  for (ContactWork* work : works)
-  {
-    std::vector<double> b = work->b;
-    share(b, work->r, work->Wr, work->speed, comm);
-  }
+  exchange(works, {}, comm);
+  sweep_until_converged<float>(works, patches_of(first.W), settings);
 }
 
 } // namespace
@@ -421,11 +445,8 @@ void sweep_along(const ContactOperator& W)
   works.reserve(announced.problems);
   std::vector<ContactWork*> all;
   for (std::size_t k = 0; k < announced.problems; ++k)
-  {
-    ContactWork& work = works.emplace_back(ContactWork{W, announced.friction, b[k], r[k], {}});
-    share(b[k], work.r, work.Wr, work.speed, W.shared_by());
-    all.push_back(&work);
-  }
+    all.push_back(&works.emplace_back(ContactWork{W, announced.friction, b[k], r[k], {}}));
+  exchange(all, b, W.shared_by());
   sweep_until_converged<float>(all, patches_of(W), announced.settings);
 }
 
@@ -434,12 +455,20 @@ void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& se
   if (works.empty()) return;
   const ContactOperator& W = works.front()->W;
   std::vector<ContactWork*> left(works.begin(), works.end());
-  if (W.has_near_field())
+  const auto leave_open = [&]
   {
-    if (W.shares_patches()) announce(left, settings);
-    sweep_until_converged<float>(left, patches_of(W), settings);
     std::erase_if(left, [&](const ContactWork* work)
                   { return work->result.converged || work->result.iterations >= settings.max_iterations; });
+  };
+  if (W.patches().size() > 1)
+  {
+    W.shares_patches() ? sweep_together(left, settings) : sweep_until_converged<float>(left, patches_of(W), settings);
+    leave_open();
+  }
+  if (W.has_near_field())
+  {
+    sweep_until_converged<float>(left, one_patch(W), settings);
+    leave_open();
   }
   if (W.is_whole()) sweep_until_converged<double>(left, one_patch(W), settings);
 }

@@ -15,9 +15,9 @@ namespace
 {
 
 constexpr int bins_of_octave = 8, bins_above_unit = 192; // 24 octaves
-constexpr double neighbour = 0.1;     // of a pair's own block: those of neighbours on a mesh have 0.2 and more
-constexpr double strong_action = 0.5; // on a patch: sweeps patch by patch would halve the residual at best
-constexpr std::size_t most_patches = 64;
+constexpr double neighbour = 0.1;        // of a pair's own block: those of neighbours on a mesh have 0.2 and more
+constexpr double strong_action = 0.5;    // on a patch, over its own
+constexpr std::size_t most_patches = 64; // before any are joined
 
 double size_of(const PairBlock& block)
 {
@@ -25,23 +25,6 @@ double size_of(const PairBlock& block)
   for (const PairVector& row : block)
     for (const double entry : row) size = std::max(size, std::abs(entry));
   return size;
-}
-
-/// Calls take(pair, size) for each block of a pair's rows.
-template <class Take> void for_each_block(const NearField::PairRow& row, std::size_t of_a_pair, Take take)
-{
-  const float* values = row.values.data();
-  for (const auto& [first, count] : row.runs)
-  {
-    for (std::size_t column = 0; column < count; column += of_a_pair)
-    {
-      float size = 0;
-      for (std::size_t k = 0; k < of_a_pair; ++k)
-        for (std::size_t l = 0; l < of_a_pair; ++l) size = std::max(size, std::abs(values[k * count + column + l]));
-      take((first + column) / of_a_pair, static_cast<double>(size));
-    }
-    values += of_a_pair * count;
-  }
 }
 
 } // namespace
@@ -174,17 +157,40 @@ void NearFieldBuilder::collect(const CondensedStrip& strip)
   }
 }
 
+/// Calls take(j, size) for each block of pair i's rows: the largest |W_kl|/sqrt(W_kk W_ll), 1 of its own block.
+template <class Take> void NearFieldBuilder::for_each_block(std::size_t i, Take take) const
+{
+  const std::size_t n = rows_.per_pair();
+  const auto part = [&](std::size_t pair, std::size_t k)
+  { return diagonal_[pair][k][k] > 0 ? 1 / std::sqrt(diagonal_[pair][k][k]) : 0; };
+  const float* values = near_rows_[i].values.data();
+  for (const auto& [first, count] : near_rows_[i].runs)
+  {
+    for (std::size_t column = 0; column < count; column += n)
+    {
+      const std::size_t j = rows_.pair_of(first + column);
+      double size = 0;
+      for (std::size_t k = 0; k < n; ++k)
+        for (std::size_t l = 0; l < n; ++l)
+          size =
+              std::max(size, part(i, k) * part(j, l) * std::abs(static_cast<double>(values[k * count + column + l])));
+      take(j, size);
+    }
+    values += n * count;
+  }
+}
+
 /// The patch of each pair. Pairs that a block of a tenth of their own joins are in one patch; so are patches on which
-/// others act half as strongly as they do on themselves, where all are pushed alike.
+/// others act half as strongly as they do on themselves, where all are pushed alike. Sweeps patch by patch are expected
+/// to converge then, and are watched.
 std::vector<std::size_t> NearFieldBuilder::patch_of_pairs() const
 {
   DisjointSets neighbours(pairs_);
   for (std::size_t i = 0; i < pairs_; ++i)
-    for_each_block(near_rows_[i], rows_.per_pair(),
+    for_each_block(i,
                    [&](std::size_t j, double size)
                    {
-                     if (size >= neighbour * std::min(size_of(diagonal_[i]), size_of(diagonal_[j])))
-                       neighbours.join(to_int(i), to_int(j));
+                     if (size >= neighbour) neighbours.join(to_int(i), to_int(j));
                    });
   std::vector<std::size_t> first; // pairs of the patches
   for (std::size_t i = 0; i < pairs_; ++i)
@@ -198,8 +204,7 @@ std::vector<std::size_t> NearFieldBuilder::patch_of_pairs() const
   }
   Eigen::MatrixXd action = Eigen::MatrixXd::Zero(to_int(first.size()), to_int(pairs_)); // of a patch on a pair
   for (std::size_t i = 0; i < pairs_; ++i)
-    for_each_block(near_rows_[i], rows_.per_pair(),
-                   [&](std::size_t j, double size) { action(to_int(patch_of[j]), to_int(i)) += size; });
+    for_each_block(i, [&](std::size_t j, double size) { action(to_int(patch_of[j]), to_int(i)) += size; });
   for (;;)
   {
     double largest = strong_action;

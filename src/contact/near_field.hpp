@@ -45,6 +45,7 @@ private:
 
   void append(Blocks& blocks, std::size_t column, const PairBlock& block, bool transposed) const;
   NearField::PairRow row_of(const Blocks& blocks) const;
+  template <class Take> void for_each_block(std::size_t i, Take take) const;
   std::vector<std::size_t> patch_of_pairs() const;
 
   PairBlock block(const CondensedStrip& strip, std::size_t i, std::size_t j) const;

@@ -49,36 +49,32 @@ std::vector<int> owners_by_size(const NearField& near, int ranks)
   return owners;
 }
 
-template <class Entry> void pass_on(std::vector<Entry>& entries, int to, MPI_Comm comm)
+template <class Entry> void send(const std::vector<Entry>& entries, int to, MPI_Comm comm)
 {
-  unsigned long long size = entries.size();
-  if (rank_of(comm) == 0)
-  {
-    MPI_Send(&size, 1, MPI_UNSIGNED_LONG_LONG, to, 0, comm);
-    MPI_Send(entries.data(), to_int(size * sizeof(Entry)), MPI_BYTE, to, 0, comm);
-  }
-  else if (rank_of(comm) == to)
-  {
-    MPI_Recv(&size, 1, MPI_UNSIGNED_LONG_LONG, 0, 0, comm, MPI_STATUS_IGNORE);
-    entries.resize(size);
-    MPI_Recv(entries.data(), to_int(size * sizeof(Entry)), MPI_BYTE, 0, 0, comm, MPI_STATUS_IGNORE);
-  }
+  MPI_Send(entries.data(), to_int(entries.size() * sizeof(Entry)), MPI_BYTE, to, 0, comm);
 }
 
-/// Leaves the columns of each rank's own pairs with it. Collective.
-void share_columns_of_row(NearField::PairRow& row, std::size_t of_a_pair, const std::vector<int>& owner_of_pair,
-                          MPI_Comm comm)
+template <class Entry> std::vector<Entry> receive(MPI_Comm comm)
 {
-  const auto part = [&](int rank)
-  { return part_of(row, of_a_pair, [&](std::size_t pair) { return owner_of_pair[pair] == rank; }); };
-  for (int rank = 1; rank < ranks_of(comm); ++rank)
-  {
-    NearField::PairRow passed = rank_of(comm) == 0 ? part(rank) : NearField::PairRow{};
-    pass_on(passed.runs, rank, comm);
-    pass_on(passed.values, rank, comm);
-    if (rank_of(comm) == rank) row = std::move(passed);
-  }
-  if (rank_of(comm) == 0) row = part(0);
+  MPI_Status status;
+  int bytes = 0;
+  MPI_Probe(0, 0, comm, &status);
+  MPI_Get_count(&status, MPI_BYTE, &bytes);
+  std::vector<Entry> entries(static_cast<std::size_t>(bytes) / sizeof(Entry));
+  MPI_Recv(entries.data(), bytes, MPI_BYTE, 0, 0, comm, MPI_STATUS_IGNORE);
+  return entries;
+}
+
+void send(const NearField::PairRow& row, int to, MPI_Comm comm)
+{
+  send(row.runs, to, comm);
+  send(row.values, to, comm);
+}
+
+NearField::PairRow receive_row(MPI_Comm comm)
+{
+  std::vector<NearField::Run> runs = receive<NearField::Run>(comm);
+  return {std::move(runs), receive<float>(comm)};
 }
 
 /// Calls work(first, width) for each strip of columns.
@@ -126,26 +122,35 @@ void ContactOperator::share(MPI_Comm comm)
 
 void ContactOperator::share_patches()
 {
-  std::vector<std::size_t> sizes;
-  for (const std::vector<std::size_t>& patch : near_.patches) sizes.push_back(patch.size());
-  broadcast(sizes, shared_by_);
-  if (sizes.size() < 2) return;
+  const int me = rank_of(shared_by_), ranks = ranks_of(shared_by_);
+  std::size_t patches = near_.patches.size();
+  MPI_Bcast(&patches, sizeof patches, MPI_BYTE, 0, shared_by_);
+  if (patches < 2) return;
   MPI_Bcast(&pairs_, sizeof pairs_, MPI_BYTE, 0, shared_by_);
   MPI_Bcast(&directions_, 1, MPI_INT, 0, shared_by_);
   broadcast(diagonal_, shared_by_);
   broadcast(scale_, shared_by_);
-  near_.patches.resize(sizes.size());
-  near_.inside.resize(pairs_);
-  near_.outside.resize(pairs_);
+  near_.patches.resize(patches);
   for (std::vector<std::size_t>& patch : near_.patches) broadcast(patch, shared_by_);
-  owners_ = owners_by_size(near_, ranks_of(shared_by_));
+  if (me == 0) owners_ = owners_by_size(near_, ranks);
   broadcast(owners_, shared_by_);
-  std::vector<int> owner_of_pair(pairs_);
-  for (std::size_t patch = 0; patch < sizes.size(); ++patch)
-    for (const std::size_t pair : near_.patches[patch]) owner_of_pair[pair] = owners_[patch];
-  for (auto* const rows : {&near_.inside, &near_.outside})
-    for (NearField::PairRow& row : *rows)
-      share_columns_of_row(row, PairRows<std::size_t>(directions_).per_pair(), owner_of_pair, shared_by_);
+  std::vector<int> owner(pairs_); // of pairs
+  for (std::size_t patch = 0; patch < patches; ++patch)
+    for (const std::size_t pair : near_.patches[patch]) owner[pair] = owners_[patch];
+  near_.inside.resize(pairs_); // rank 0 keeps all, for where sweeps patch by patch do not converge
+  beyond_.resize(pairs_);
+  for (std::size_t pair = 0; pair < pairs_; ++pair)
+  {
+    if (owner[pair] != 0 && me == 0) send(near_.inside[pair], owner[pair], shared_by_);
+    if (owner[pair] != 0 && me == owner[pair]) near_.inside[pair] = receive_row(shared_by_);
+    const auto part = [&](int rank)
+    {
+      return part_of(near_.outside[pair], PairRows<std::size_t>(directions_).per_pair(),
+                     [&](std::size_t other) { return owner[other] == rank; });
+    };
+    for (int rank = 1; me == 0 && rank < ranks; ++rank) send(part(rank), rank, shared_by_);
+    beyond_[pair] = me == 0 ? part(0) : receive_row(shared_by_);
+  }
 }
 
 void ContactOperator::add_strips(std::span<const double> x, std::span<double> y) const
@@ -163,8 +168,8 @@ void ContactOperator::multiply_one(std::span<const double> x, std::span<double> 
 {
   std::fill(y.begin(), y.end(), 0.);
   if (shared_by_ == MPI_COMM_NULL) return add_symmetric_product(values_.data(), size(), size(), x.data(), y.data());
-  int more = 1;
-  MPI_Bcast(&more, 1, MPI_INT, 0, shared_by_);
+  int task = 1; // a product with one vector
+  MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
   std::vector<double> from(x.begin(), x.end());
   MPI_Bcast(from.data(), to_int(rows_), MPI_DOUBLE, 0, shared_by_);
   add_symmetric_product(values_.data(), rows_, strips_.last, x.data(), y.data());
@@ -174,8 +179,8 @@ void ContactOperator::multiply_one(std::span<const double> x, std::span<double> 
 /// On rank 0.
 std::vector<double> ContactOperator::multiply_by_factor(std::span<const double> x, std::size_t columns) const
 {
-  int more = to_int(columns);
-  if (shared_by_ != MPI_COMM_NULL) MPI_Bcast(&more, 1, MPI_INT, 0, shared_by_);
+  int task = to_int(columns);
+  if (shared_by_ != MPI_COMM_NULL) MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
   std::vector<double> y = products_->products.product(x, columns);
   const std::vector<double>& added = products_->diagonal;
   for (std::size_t i = 0; i < y.size(); ++i)
@@ -186,12 +191,12 @@ std::vector<double> ContactOperator::multiply_by_factor(std::span<const double> 
 void ContactOperator::follow_product(std::size_t columns) const
 {
   if (!products_ && lanes_for(columns) > 1) return; // of a whole W rank 0 forms these alone
-  int of_rank_zero = 0;
-  MPI_Bcast(&of_rank_zero, 1, MPI_INT, 0, shared_by_);
-  serve(of_rank_zero);
+  int task = 0;
+  MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
+  serve_product(task);
 }
 
-void ContactOperator::serve(int columns) const
+void ContactOperator::serve_product(int columns) const
 {
   if (products_)
   {
@@ -213,10 +218,10 @@ ServedProducts::ServedProducts(const ContactOperator& W) : W_(W)
     int task = end_of_service;
     MPI_Bcast(&task, 1, MPI_INT, 0, comm);
     if (task == end_of_service) return;
-    if (task == sweeps)
+    if (task == task_of_sweeps)
       sweep_along(W);
     else
-      W.serve(task);
+      W.serve_product(task);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <doctest/doctest.h>
+#include <limits>
 
 using namespace squeal;
 using test::difference;
@@ -17,19 +18,19 @@ namespace
 
 using Vector = std::vector<double>;
 
-constexpr std::size_t patches = 5, pairs_of_one = 81, pairs = patches * pairs_of_one, size = 3 * pairs;
+constexpr std::size_t pairs = 405, size = 3 * pairs; // many enough for ranks to share W
 
-/// Five bodies whose pairs come in turn, W decaying along each. `between`: of pairs of two bodies, wherever they are.
-Vector compliance_of_patches(double between)
+/// Bodies whose pairs come in turn, W decaying along each. `between`: of pairs of two bodies, wherever they are.
+Vector compliance_of_bodies(std::size_t bodies, double between)
 {
   Vector W(size * size);
   for (std::size_t i = 0; i < size; ++i)
     for (std::size_t j = 0; j < size; ++j)
     {
       const std::size_t a = i / 3, b = j / 3;
-      const double distance = std::abs(static_cast<double>(a / patches) - static_cast<double>(b / patches));
+      const double distance = std::abs(static_cast<double>(a / bodies) - static_cast<double>(b / bodies));
       const double along = i % 3 == j % 3 ? 1 : 0.2;
-      W[i * size + j] = a % patches == b % patches ? along * std::exp(-1.2 * distance) : along * between;
+      W[i * size + j] = a % bodies == b % bodies ? along * std::exp(-1.2 * distance) : along * between;
     }
   return W;
 }
@@ -45,42 +46,83 @@ Vector velocity()
   return b;
 }
 
+/// On all ranks.
+ContactOperator shared(const Vector& dense)
+{
+  ContactOperator W;
+  if (rank_of(PETSC_COMM_WORLD) == 0) W = make_contact_operator(dense, pairs, 2);
+  W.share(PETSC_COMM_WORLD);
+  return W;
+}
+
 } // namespace
 
 TEST_CASE("ranks sweep over patches side by side, to the answer of one rank")
 {
   const MPI_Comm comm = PETSC_COMM_WORLD;
-  const Vector dense = compliance_of_patches(4e-4), b = velocity();
-  ContactOperator W, alone;
-  if (rank_of(comm) == 0) W = alone = make_contact_operator(dense, pairs, 2);
-  W.share(comm);
-  CHECK(W.patches().size() == patches);
-  CHECK(W.shares_patches() == (ranks_of(comm) > 1));
-  for (std::size_t patch = 0; patch < patches; ++patch)
-    for (const std::size_t pair : W.patches()[patch]) CHECK(pair % patches == patch);
-  const ServedProducts served(W);
-  if (rank_of(comm) != 0) return;
-  for (int round = 0; round < 2; ++round) // ranks serve again and again
+  for (const std::size_t bodies : {2U, 5U}) // two: some ranks have none
   {
-    Vector together, exact;
-    const ContactResult result = solve_contact(W, b, {0.4}, {}, together),
-                        of_one = solve_contact(alone, b, {0.4}, {}, exact);
-    CHECK(result.converged);
-    CHECK(result.iterations == of_one.iterations);
-    CHECK(contact_residual(alone, {0.4}, b, together) < 1.01e-10);
-    CHECK(difference(together, exact) < 1e-12 * *std::max_element(exact.begin(), exact.end()));
-    CHECK(std::count(exact.begin(), exact.end(), 0.) > 30); // some pairs are open
+    // of all others together on a pair, over its own body: 0.05 to 0.1
+    const Vector dense = compliance_of_bodies(bodies, 4e-4);
+    const ContactOperator W = shared(dense);
+    CHECK(W.patches().size() == bodies);
+    CHECK(W.shares_patches() == (ranks_of(comm) > 1));
+    for (std::size_t patch = 0; patch < bodies; ++patch)
+      for (const std::size_t pair : W.patches()[patch]) CHECK(pair % bodies == patch);
+    const ServedProducts served(W);
+    if (rank_of(comm) != 0) continue;
+    const ContactOperator alone = make_contact_operator(dense, pairs, 2);
+    for (const double out : {0.5, std::numeric_limits<double>::infinity()}) // a pair that takes no part
+    {
+      Vector b = velocity(), together, exact;
+      b[3 * 7] = out;
+      const ContactResult result = solve_contact(W, b, {0.4}, {}, together),
+                          of_one = solve_contact(alone, b, {0.4}, {}, exact);
+      CHECK(result.converged);
+      CHECK(result.iterations == of_one.iterations);
+      CHECK(contact_residual(alone, {0.4}, b, together) < 1.01e-10);
+      CHECK(difference(together, exact) < 1e-12 * *std::max_element(exact.begin(), exact.end()));
+      CHECK(std::count(exact.begin(), exact.end(), 0.) > 30); // some pairs are open
+    }
   }
+}
+
+TEST_CASE("where patches act on each other by more than their blocks say, all pairs are swept as one")
+{
+  // Each body moves as a whole, and all of them together by x, which changes sign from pair to pair. By sums of blocks
+  // the others act on a body by 304 * 0.08/(1 + 100 * 1.0) = 0.23 of itself, but x grows by 3 * 8.1/(8.1 + 5) = 1.9
+  // a round.
+  const std::size_t bodies = 4, of_one = pairs / bodies;
+  Vector dense(size * size, 0.);
+  for (std::size_t i = 0; i < size; ++i)
+    for (std::size_t j = 0; j < size; ++j)
+    {
+      const std::size_t a = i / 3, b = j / 3, body = std::min(a / of_one, bodies - 1);
+      if (i == j) dense[i * size + j] += 5;
+      if (i % 3 != 0 || j % 3 != 0) continue;
+      if (body == std::min(b / of_one, bodies - 1)) dense[i * size + j] += 1;
+      dense[i * size + j] += 0.08 * (a % 2 == b % 2 ? 1 : -1);
+    }
+  const ContactOperator W = shared(dense);
+  CHECK(W.patches().size() == bodies);
+  const ServedProducts served(W);
+  if (rank_of(PETSC_COMM_WORLD) != 0) return;
+  Vector b(size, 0.), r;
+  for (std::size_t pair = 0; pair < pairs; ++pair) b[3 * pair] = -1.5 + std::cos(static_cast<double>(pair * pair % 17));
+  const ContactResult result = solve_contact(W, b, {0.3}, {}, r);
+  CHECK(result.converged);
+  CHECK(result.iterations > 100); // patch by patch, in vain
+  CHECK(contact_residual(make_contact_operator(dense, pairs, 2), {0.3}, b, r) < 1.01e-10);
+  ContactSettings settings;
+  settings.max_iterations = 3;
+  CHECK(solve_contact(W, b, {0.3}, settings, r = {}).iterations == 3);
 }
 
 TEST_CASE("problems solved together have the answer of each alone on ranks that share patches")
 {
-  const MPI_Comm comm = PETSC_COMM_WORLD;
-  ContactOperator W;
-  if (rank_of(comm) == 0) W = make_contact_operator(compliance_of_patches(4e-4), pairs, 2);
-  W.share(comm);
+  const ContactOperator W = shared(compliance_of_bodies(5, 4e-4));
   const ServedProducts served(W);
-  if (rank_of(comm) != 0) return;
+  if (rank_of(PETSC_COMM_WORLD) != 0) return;
   std::vector<Vector> b(3, velocity()), r(3);
   std::vector<ContactMemory> memory(3);
   std::vector<ContactProblem> problems;
@@ -103,7 +145,7 @@ TEST_CASE("bodies that act on each other like one are one patch, and the answer 
 {
   if (rank_of(PETSC_COMM_WORLD) != 0) return;
   // each of four other bodies with 81 pairs: 4 * 81 * 0.01 = 3.2 beside 1 + 2 sum of exp(-1.2 k) = 1.9 of its own
-  const ContactOperator coupled = make_contact_operator(compliance_of_patches(0.01), pairs, 2);
+  const ContactOperator coupled = make_contact_operator(compliance_of_bodies(5, 0.01), pairs, 2);
   CHECK(coupled.patches().size() == 1);
   Vector swept, projected;
   const Vector b = velocity();

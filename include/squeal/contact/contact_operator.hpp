@@ -71,7 +71,7 @@ inline Words words_of(OperatorStorage)
 bool stays_in_factor(double rows, double border_entries, double free);
 
 /// On rank 0. The ranks form products together where W is in the factor, or gave its columns to all of them. There each
-/// rank has patches of the near field besides, as far as there are several, and the blocks of the diagonal.
+/// rank has some patches of the near field besides, where there are several, and the blocks of the diagonal.
 class ContactOperator
 {
 public:
@@ -94,10 +94,11 @@ public:
   /// w += W dr of a change dr of one pair's reaction. W is whole.
   void add_product(std::size_t pair, const PairVector& change, std::span<double> w) const;
 
-  /// The same by the near field, which small operators do not have, in the rows of the pair's patch.
+  /// The same by the near field, which small operators do not have.
   void add_near_product(std::size_t pair, const PairVector& change, std::span<float> w) const;
-  /// The same in the rows of other patches, of those that this rank has.
-  void add_product_outside(std::size_t pair, const PairVector& change, std::span<float> w) const;
+  /// Its part in the rows of the pair's own patch, and in those of the other patches that this rank has.
+  void add_product_in_patch(std::size_t pair, const PairVector& change, std::span<float> w) const;
+  void add_product_beyond_patch(std::size_t pair, const PairVector& change, std::span<float> w) const;
   bool has_near_field() const { return !near_.inside.empty(); }
   double near_share() const { return near_share_; } // entries of the near field over those of W
 
@@ -113,9 +114,10 @@ public:
   /// vector are formed from these, within ServedProducts only. Collective.
   void share(MPI_Comm comm);
 
-  /// On other ranks, what `multiply` of so many columns on rank 0 needs of them. Within a task of ServedProducts.
+  /// On other ranks, their part of a product of so many columns that rank 0 forms: the whole of it, and what follows
+  /// rank 0's word of how many they are.
   void follow_product(std::size_t columns) const;
-  void serve(int columns) const; // after rank 0 has said how many
+  void serve_product(int columns) const;
 
   /// W, if it is whole.
   std::span<const double> entries() const { return values_; }
@@ -147,23 +149,17 @@ private:
   std::optional<ScaledProducts> products_; // the same on all ranks; none: W is whole
   std::vector<PairBlock> diagonal_;
   std::vector<NaturalScale> scale_;
-  NearField near_; // empty: W is small; w of the patches of this rank alone
+  NearField near_; // empty: W is small; on other ranks the rows of their patches, inside
   double near_share_ = 0;
-  std::vector<int> owners_;            // of patches; empty: rank 0 has all
-  MPI_Comm shared_by_ = MPI_COMM_NULL; // the ranks that form products together
-  std::size_t rows_ = 0;               // of W, on all of them
-  Strips strips_;                      // of this rank
+  std::vector<int> owners_;                // of patches; empty: rank 0 has all
+  std::vector<NearField::PairRow> beyond_; // the rows outside, in the columns of this rank's patches, where ranks share
+  MPI_Comm shared_by_ = MPI_COMM_NULL;     // the ranks that form products together
+  std::size_t rows_ = 0;                   // of W, on all of them
+  Strips strips_;                          // of this rank
 };
 
-/// What rank 0 asks of the others: their part of a product with so many columns, or one of these.
-enum Task : int
-{
-  end_of_service = 0,
-  sweeps = -1, // over their patches (gauss_seidel.hpp)
-};
-
-/// While rank 0 works with products that W's ranks form together, the constructor of the others serves until rank 0's
-/// object ends. Nothing where W is not shared. Collective.
+/// While rank 0 solves contact with products, and sweeps over patches, that W's ranks share, the constructor of the
+/// others serves until rank 0's object ends. Nothing where W is not shared. Collective.
 class ServedProducts
 {
 public:

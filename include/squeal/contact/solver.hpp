@@ -5,7 +5,8 @@
 /// of W itself in double precision.
 ///
 /// gauss_seidel: one exact local solve a pair and sweep. w follows each change of a reaction; pairs that no longer
-/// move are passed over. A large W is swept over through its near field, in single precision. One product with W
+/// move are passed over. A large W is swept over through its near field, in single precision, patch by patch where
+/// several act little on each other: w of other patches follows when all have been swept. One product with W
 /// between sweeps and the verdict closes the residual. Where that does not help, the sweeps read W itself.
 /// Under-relaxed when 50 sweeps bring nothing.
 /// fixed_point: the paper's r_n <- max(0, r_n - rho w_n), r_t <- proj_disc(mu r_n)(r_t - rho w_t). It contracts without
@@ -70,7 +71,7 @@ struct ContactProblem
 };
 
 /// Solves all problems, each from its `r`, which becomes the solution [N]. A problem that does not converge says so
-/// in its result. Not collective: W is one rank's.
+/// in its result. On rank 0, while the ranks that share W are within ServedProducts.
 std::vector<ContactResult> solve_contacts(const ContactOperator& W, const FrictionLaw& friction,
                                           const ContactSettings& settings, std::span<const ContactProblem> problems);
 
