@@ -19,7 +19,7 @@ enum class Symmetry
 /// Options of all factors by MUMPS of the modes.
 struct PencilOptions
 {
-  PetscInt room = 30;        // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
+  PetscInt room = 30;       // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
   double whole_limit = 0.2; // [GB] of a factor that every rank makes whole
 };
 
