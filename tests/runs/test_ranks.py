@@ -77,10 +77,11 @@ def largest_of(cycle):
     ["oscillator/scene.toml", "--set", "cycle.tolerance=1e-10"],
 ], ids=["oblique", "whole"])
 def test_multipliers(scene, converged):
-    """1e-6: two cycles found to 1e-10 differ by less, and the passes end when the largest has settled to 2.5e-7."""
+    """1e-6: two cycles found to 1e-10 differ by less, and the passes end when the largest has settled to 2.5e-7. On the
+    pin it is 1.0001, and whether a reduced model counts as many below it is a matter of rounding: which search decides
+    may differ, its value may not."""
     arguments = [INPUTS / scene[0], *scene[1:], "--set", "transient.enabled=false"]
     first, second = (converged(*arguments, ranks=ranks).report["cycle"] for ranks in (1, 2))
-    assert second["multipliers"]["method"] == first["multipliers"]["method"]
     assert largest_of(second) == pytest.approx(largest_of(first), abs=1e-6)
 
 
