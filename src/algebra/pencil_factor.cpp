@@ -7,7 +7,6 @@
 #include "symbolic_factor.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <numeric>
 
 /// A factor of moderate size is made whole by every rank, each of which solves its part of the right-hand sides. Shared
@@ -73,8 +72,8 @@ Triplets everywhere(Triplets entries, MPI_Comm comm)
   return all;
 }
 
-/// K with zeros where M alone has entries, and M's beside them. Both come by rows and rising columns.
-std::pair<Triplets, std::vector<double>> side_by_side(const Triplets& K, const Triplets& M)
+/// K on the union of both patterns, and the values of M there. Both come by rows and rising columns.
+std::pair<Triplets, std::vector<double>> on_common_pattern(const Triplets& K, const Triplets& M)
 {
   const auto place = [](const Triplets& A, std::size_t k) { return std::pair(A.row[k], A.column[k]); };
   const std::size_t of_K = K.value.size(), of_M = M.value.size();
@@ -111,7 +110,7 @@ void bring_to_owners(const std::vector<MUMPS_INT>& places, const Eigen::MatrixXd
     for (Eigen::Index j = 0; j < columns; ++j) message.push_back(solution(static_cast<Eigen::Index>(k), j));
   }
   std::vector<double> out, in(static_cast<std::size_t>(layout.counts[me]) * static_cast<std::size_t>(1 + columns));
-  std::vector<int> sent, sent_from, received(ranks), received_to{0};
+  std::vector<int> sent, sent_from, received(ranks), received_to(ranks);
   for (const std::vector<double>& message : to)
   {
     sent_from.push_back(to_int(out.size()));
@@ -119,7 +118,7 @@ void bring_to_owners(const std::vector<MUMPS_INT>& places, const Eigen::MatrixXd
     out.insert(out.end(), message.begin(), message.end());
   }
   MPI_Alltoall(sent.data(), 1, MPI_INT, received.data(), 1, MPI_INT, comm);
-  std::partial_sum(received.begin(), received.end() - 1, std::back_inserter(received_to));
+  std::exclusive_scan(received.begin(), received.end(), received_to.begin(), 0);
   to = {};
   MPI_Alltoallv(out.data(), sent.data(), sent_from.data(), MPI_DOUBLE, in.data(), received.data(), received_to.data(),
                 MPI_DOUBLE, comm);
@@ -145,7 +144,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
     symmetric ? append_lower_triangle(A, own) : append_rows(A, 0, own);
     return parts.whole ? everywhere(std::move(own), parts.comm) : own;
   };
-  auto [entries, masses] = side_by_side(entries_of(K), entries_of(M));
+  auto [entries, masses] = on_common_pattern(entries_of(K), entries_of(M));
   parts.M = std::move(masses);
   parts.mumps =
       start_mumps(parts.whole ? MPI_COMM_SELF : parts.comm, symmetric ? MumpsSymmetry::symmetric : MumpsSymmetry::none);

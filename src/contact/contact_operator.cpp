@@ -101,6 +101,12 @@ void ContactOperator::add_product_beyond_patch(std::size_t pair, const PairVecto
   add_runs(row, PairRows<std::size_t>(directions_).per_pair(), change, w.data());
 }
 
+double ContactOperator::near_share() const
+{
+  const auto n = static_cast<double>(size());
+  return n == 0 ? 0 : static_cast<double>(near_.entries()) / (n * n);
+}
+
 double ContactOperator::largest_eigenvalue(int iterations) const
 {
   std::vector<double> x(size()), y(size());
@@ -129,13 +135,6 @@ void ContactOperator::set_diagonal(std::vector<PairBlock> blocks)
   for (const PairBlock& A : diagonal_) scale_.push_back(natural_scale(A, largest));
 }
 
-void ContactOperator::set_near_field(NearField near)
-{
-  near_ = std::move(near);
-  const auto n = static_cast<double>(size());
-  near_share_ = n == 0 ? 0 : static_cast<double>(near_.entries()) / (n * n);
-}
-
 ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions)
 {
   const auto count = static_cast<std::size_t>(pairs);
@@ -153,7 +152,7 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
     const CondensedStrip whole{0, n, n, W.data()};
     builder.measure(whole);
     builder.collect(whole);
-    op.set_near_field(builder.finish());
+    op.near_ = builder.finish();
     op.set_diagonal(builder.diagonal());
   }
   else
@@ -193,7 +192,7 @@ ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int di
   {
     op.pairs_ = static_cast<std::size_t>(pairs);
     op.directions_ = directions;
-    op.set_near_field(builder.finish());
+    op.near_ = builder.finish();
     op.set_diagonal(builder.diagonal());
   }
   if (op.shared_by_ != MPI_COMM_NULL) op.share_patches();

@@ -1,6 +1,6 @@
 /// Products that ranks form together. Of a W whose columns they share: y = sum over ranks of what the lower triangle of
 /// their columns and its transpose have in W x. Columns go to ranks by equal parts of the triangle. Of a W in the
-/// factor: each rank reads its part of the factor.
+/// factor: each rank reads its part of the factor. Whole patches of the near field go to ranks, for sweeps.
 #include "gauss_seidel.hpp"
 #include "near_field.hpp"
 #include "squeal/algebra/large_pages.hpp"
@@ -95,7 +95,7 @@ void ContactOperator::share(MPI_Comm comm)
   for (int rank = 0; rank < ranks; ++rank)
   {
     Strips strips{first_column(rows_, rank, ranks), first_column(rows_, rank + 1, ranks), {}};
-    const auto move_strip = [&](std::size_t j, std::size_t width)
+    const auto pass_on = [&](std::size_t j, std::size_t width)
     {
       const std::size_t height = rows_ - j, count = width * height;
       if (me == 0)
@@ -114,7 +114,7 @@ void ContactOperator::share(MPI_Comm comm)
     std::size_t total = 0;
     for_each_strip(strips.first, strips.last, [&](std::size_t j, std::size_t width) { total += width * (rows_ - j); });
     if (me == rank && me != 0) strips.values = vector_on_large_pages(total);
-    if (rank > 0 && (me == 0 || me == rank)) for_each_strip(strips.first, strips.last, move_strip);
+    if (rank > 0 && (me == 0 || me == rank)) for_each_strip(strips.first, strips.last, pass_on);
     if (me == rank) strips_ = std::move(strips);
   }
   share_patches();

@@ -100,7 +100,7 @@ public:
   void add_product_in_patch(std::size_t pair, const PairVector& change, std::span<float> w) const;
   void add_product_beyond_patch(std::size_t pair, const PairVector& change, std::span<float> w) const;
   bool has_near_field() const { return !near_.inside.empty(); }
-  double near_share() const { return near_share_; } // entries of the near field over those of W
+  double near_share() const; // entries of the near field over those of W
 
   /// Of the near field: all patches, the rank of each, and whether ranks but the first have some.
   const std::vector<std::vector<std::size_t>>& patches() const { return near_.patches; }
@@ -140,7 +140,6 @@ private:
   void multiply_one(std::span<const double> x, std::span<double> y) const;
   std::vector<double> multiply_by_factor(std::span<const double> x, std::size_t columns) const;
   void add_strips(std::span<const double> x, std::span<double> y) const;
-  void set_near_field(NearField near);
   void share_patches();
 
   std::size_t pairs_ = 0;
@@ -149,8 +148,7 @@ private:
   std::optional<ScaledProducts> products_; // the same on all ranks; none: W is whole
   std::vector<PairBlock> diagonal_;
   std::vector<NaturalScale> scale_;
-  NearField near_; // empty: W is small; on other ranks the rows of their patches, inside
-  double near_share_ = 0;
+  NearField near_;                         // empty: W is small; on other ranks the rows of their patches, inside
   std::vector<int> owners_;                // of patches; empty: rank 0 has all
   std::vector<NearField::PairRow> beyond_; // the rows outside, in the columns of this rank's patches, where ranks share
   MPI_Comm shared_by_ = MPI_COMM_NULL;     // the ranks that form products together
