@@ -342,10 +342,14 @@ std::string problem_of_surroundings()
 }
 
 /// Without a launcher Open MPI would start a daemon beside this process, for processes that it may start: a third of
-/// the time that a start takes. It takes settings of its own from the environment alone, before MPI is up.
+/// the time that a start takes. It would also make a folder inside one that all runs of a machine share, and that the
+/// last of them removes: in about one start of a thousand while another makes its own there, which fails. It takes
+/// settings of its own from the environment alone, before MPI is up.
 void stay_alone()
 {
-  if (launched_rank().empty()) setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
+  if (!launched_rank().empty()) return;
+  setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
+  setenv("OMPI_MCA_orte_create_session_dirs", "0", 0);
 }
 
 } // namespace

@@ -35,7 +35,7 @@ def endless(tmp_path):
 
     def begin(output, *arguments):
         runs.append(start(output, *ENDLESS, *arguments))
-        wait_for(lambda: (output.parent / (output.name + ".partial") / "options.txt").exists())
+        wait_for(lambda: (output.parent / (output.name + ".partial") / "history.h5").exists())
         return runs[-1]
 
     yield begin
