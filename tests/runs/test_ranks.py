@@ -78,8 +78,8 @@ def largest_of(cycle):
 ], ids=["oblique", "whole"])
 def test_multipliers(scene, converged):
     """1e-6: two cycles found to 1e-10 differ by less, and the passes end when the largest has settled to 2.5e-7. The pin's
-    damping takes its largest to 0.9989, decided beside its bar of 1e-4; at the scene's own it is 1.0001, and rounding
-    decides which search is taken."""
+    damping takes its largest to 0.9989, decided beside its bar of 1e-4; at the scene's own it is 1.0001 +- 4e-4, undecided,
+    and rounding decides which of two reasons is said first."""
     arguments = [INPUTS / scene[0], *scene[1:], "--set", "transient.enabled=false"]
     first, second = (converged(*arguments, ranks=ranks).report["cycle"] for ranks in (1, 2))
     for key in ("method", "stability"):
