@@ -9,8 +9,6 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
-
 /// Takes the flow's own direction out of x.
 void project(const Monodromy& monodromy, Vec x)
 {
@@ -116,19 +114,14 @@ void take_out_shift(Monodromy& monodromy)
   check(VecScale(monodromy.phase, 1 / (speed * speed)));
 }
 
-/// The distance of the largest value from the nearest one of a grid of time, and by how much that one is larger.
-struct GridChange
-{
-  double distance = 0, rise = 0;
-};
-
-/// What the largest value changes by when the grid of time moves by half a step, and 4/3 of what it changes by on one
-/// of twice as many steps, which is the error of a step of order 2. Leaves the period recorded on its own grid.
-GridChange change_by_grids(const Monodromy& monodromy, Vec start, PetscInt steps, Complex largest, long& periods)
+/// What the largest value changes by on the other grids of time, each with an Arnoldi space of its own. Leaves the
+/// period recorded on its own grid.
+GridErrors change_of_largest(const Monodromy& monodromy, Vec start, PetscInt steps, std::complex<double> largest,
+                             long& periods)
 {
   const Orbit& orbit = monodromy.orbit;
-  GridChange change;
-  for (const auto& [grid, part] : {std::pair(TimeGrid{0.5, 1}, 1.), std::pair(TimeGrid{0, 2}, 4. / 3)})
+  GridErrors change(1);
+  for (const auto& [grid, part] : other_grids)
   {
     monodromy.flow.record_period(orbit.period, orbit.state, grid);
     const Krylov krylov = arnoldi(monodromy, copy_of(start), steps);
@@ -136,11 +129,9 @@ GridChange change_by_grids(const Monodromy& monodromy, Vec start, PetscInt steps
     double ignored = 0;
     const std::vector<DenseEigenpair> pairs = without_shift(monodromy, krylov, ignored);
     if (pairs.empty()) continue;
-    const std::vector<Complex> values = values_of(pairs);
-    const auto nearest = std::ranges::min_element(values, {}, [&](Complex v) { return std::abs(v - largest); });
-    const double unknown = residual_of(krylov, pairs[static_cast<std::size_t>(nearest - values.begin())]);
-    change.distance += part * (std::abs(*nearest - largest) + unknown);
-    change.rise += part * (std::max(0., std::abs(*nearest) - std::abs(largest)) + unknown);
+    const std::size_t nearest = add_changes({largest}, values_of(pairs), part, change).front();
+    for (std::vector<double>* bar : {&change.errors, &change.rises})
+      bar->front() += part * residual_of(krylov, pairs[nearest]);
   }
   monodromy.flow.record_period(orbit.period, orbit.state, {});
   return change;
@@ -166,14 +157,15 @@ FloquetAnalysis multipliers_by_arnoldi(Monodromy& monodromy, Owned<Vec> start, P
   const std::vector<DenseEigenpair> pairs = without_shift(monodromy, krylov, multipliers.trivial_error);
   multipliers.periods = static_cast<long>(krylov.base.size()) + (monodromy.exact() ? 0 : 1);
   if (pairs.empty()) return result;
-  GridChange of_grid;
-  if (monodromy.exact()) of_grid = change_by_grids(monodromy, start, steps, pairs.front().lambda, multipliers.periods);
+  GridErrors of_grid(1);
+  if (monodromy.exact())
+    of_grid = change_of_largest(monodromy, start, steps, pairs.front().lambda, multipliers.periods);
   for (const DenseEigenpair& pair : pairs)
   {
     const double own = std::max(2 * residual_of(krylov, pair), 1e-9); // rounding
     multipliers.values.push_back(pair.lambda);
-    multipliers.errors.push_back(own + of_grid.distance);
-    multipliers.upper.push_back(std::abs(pair.lambda) + own + of_grid.rise);
+    multipliers.errors.push_back(own + of_grid.errors.front());
+    multipliers.upper.push_back(std::abs(pair.lambda) + own + of_grid.rises.front());
   }
   decide(multipliers,
          {leading_converged(krylov, pairs),

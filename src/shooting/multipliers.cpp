@@ -27,25 +27,6 @@ Owned<Vec> motions_that_may_grow(const OrbitProblem& problem, const Orbit& orbit
   return start;
 }
 
-/// What the grid of time changes: of each of the values the distance to its partner, and the rise of its modulus.
-struct GridErrors
-{
-  std::vector<double> errors, rises;
-};
-
-/// Adds the parts of the changes that are taken for errors.
-void add_changes(const std::vector<Complex>& values, const std::vector<Complex>& others, double part,
-                 GridErrors& errors)
-{
-  const std::vector<std::size_t> places = nearest_places(values, others);
-  for (std::size_t i = 0; i < values.size(); ++i)
-  {
-    const Complex other = others[places[i]];
-    errors.errors[i] += part * std::abs(other - values[i]);
-    errors.rises[i] += part * std::max(0., std::abs(other) - std::abs(values[i]));
-  }
-}
-
 /// The multipliers of these places along eight periods on a grid of 8 N + 1 steps, by projection on the vectors of all
 /// of them; then what each is a period: the root that is nearest to the value.
 std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Eigen::MatrixXd& Q,
@@ -108,11 +89,11 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
     monodromy.flow.record_period(orbit.period, orbit.state, grid);
     return find_pairs();
   };
-  std::vector<DenseEigenpair> pairs = monodromy.exact() ? pairs_on({}) : find_pairs(), moved, finer;
+  std::vector<DenseEigenpair> pairs = monodromy.exact() ? pairs_on({}) : find_pairs();
+  std::vector<std::vector<DenseEigenpair>> on_others; // the other grids
   if (monodromy.exact())
   {
-    moved = pairs_on({0.5, 1});
-    finer = pairs_on({0, 2});
+    for (const OtherGrid& other : other_grids) on_others.push_back(pairs_on(other.grid));
     monodromy.flow.record_period(orbit.period, orbit.state, {});
   }
   const auto of_tangent_that_is_not_finite = [&]
@@ -123,12 +104,9 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   };
   if (!finite) return of_tangent_that_is_not_finite();
   const std::vector<Complex> values = values_of(pairs);
-  GridErrors grid{std::vector<double>(values.size(), 0.), std::vector<double>(values.size(), 0.)};
-  if (monodromy.exact())
-  {
-    add_changes(values, values_of(moved), 1, grid);
-    add_changes(values, values_of(finer), 4. / 3, grid);
-  }
+  GridErrors grid(values.size());
+  for (std::size_t k = 0; k < on_others.size(); ++k)
+    add_changes(values, values_of(on_others[k]), other_grids[k].part, grid);
   const std::size_t shift = find_shift(pairs, Q.transpose() * coordinates_of(orbit.rate, orbit.period));
   multipliers.trivial_error = std::abs(values[shift] - 1.);
   double largest_trivial_error = multipliers.trivial_error;
