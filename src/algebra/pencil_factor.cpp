@@ -40,28 +40,6 @@ bool is_made_whole(double entries, Symmetry symmetry, const PencilOptions& optio
   return ranks_of(comm) > 1 && gigabytes <= options.whole_limit;
 }
 
-struct Ordering
-{
-  std::vector<MUMPS_INT> position; // of each degree of freedom in nested dissection, counted from one as MUMPS does
-  double entries = 0;              // of a symmetric factor
-};
-
-/// On rank 0, but for the entries.
-Ordering elimination_order(Mat K, int dofs)
-{
-  const Triplets pattern = gather(lower_triangle(K), TripletContent::pattern, comm_of(K));
-  Ordering order;
-  on_rank_zero(comm_of(K),
-               [&]
-               {
-                 const SymbolicFactor symbolic = analyse(pattern, dofs, 0);
-                 for (const int position : symbolic.position) order.position.push_back(position + 1);
-                 order.entries = symbolic.entries;
-               });
-  MPI_Bcast(&order.entries, 1, MPI_DOUBLE, 0, comm_of(K));
-  return order;
-}
-
 /// The entries of all ranks on every rank.
 Triplets everywhere(Triplets entries, MPI_Comm comm)
 {
@@ -128,16 +106,32 @@ void bring_to_owners(const std::vector<MUMPS_INT>& places, const Eigen::MatrixXd
 
 } // namespace
 
-PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options)
+EliminationOrder elimination_order(Mat K)
+{
+  const Triplets pattern = gather(lower_triangle(K), TripletContent::pattern, comm_of(K));
+  EliminationOrder order;
+  on_rank_zero(comm_of(K),
+               [&]
+               {
+                 const SymbolicFactor symbolic = analyse(pattern, row_layout(K).total(), 0);
+                 for (const int position : symbolic.position) order.position.push_back(position + 1);
+                 order.entries = symbolic.entries;
+               });
+  MPI_Bcast(&order.entries, 1, MPI_DOUBLE, 0, comm_of(K));
+  broadcast(order.position, comm_of(K));
+  return order;
+}
+
+PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options, const EliminationOrder* known)
     : parts_(std::make_unique<Parts>())
 {
   Parts& parts = *parts_;
   parts.comm = comm_of(K);
   parts.layout = row_layout(K);
   const bool symmetric = symmetry == Symmetry::symmetric;
-  Ordering order = elimination_order(K, parts.layout.total());
+  const EliminationOrder order = known ? *known : elimination_order(K);
+  std::vector<MUMPS_INT> positions(order.position.begin(), order.position.end());
   parts.whole = is_made_whole(order.entries, symmetry, options, parts.comm);
-  if (parts.whole) broadcast(order.position, parts.comm);
   const auto entries_of = [&](Mat A)
   {
     Triplets own;
@@ -152,7 +146,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   parts.K = std::move(entries.value); // MUMPS's pointer to them stays valid
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 14) = to_int(options.room);
-  mumps.perm_in = order.position.data();
+  mumps.perm_in = positions.data();
   parts.run_together([&] { run(mumps, MumpsJob::analyse); });
   mumps.perm_in = nullptr;
 }

@@ -53,10 +53,10 @@ struct Leading
   double residual = HUGE_VAL; // over the smallest |nu|
 };
 
-/// The number of eigenvalues to take: those of at least `least` in modulus, at least `count`, and up to half as many
-/// again. It ends at the widest ratio of neighbours, where the space converges fastest and neither conjugates nor
-/// multiples are parted.
-std::size_t number_to_take(const std::vector<double>& descending, PetscInt count, double least)
+/// The number of eigenvalues to take: those of at least `least` in modulus, at least `count`, and up to that times
+/// `slack` more. It ends at the widest ratio of neighbours, where the space converges fastest and neither conjugates
+/// nor multiples are parted.
+std::size_t number_to_take(const std::vector<double>& descending, PetscInt count, double least, double slack)
 {
   const double rounding = 1e-13 * descending[0]; // below, a mode has no mass and does not vibrate
   const auto end = std::find_if(descending.begin(), descending.end(), [&](double nu) { return nu < rounding; });
@@ -67,7 +67,8 @@ std::size_t number_to_take(const std::vector<double>& descending, PetscInt count
   if (low == 0) return 0;
   std::size_t best = low;
   double widest = 1;
-  for (std::size_t k = low; k < std::min(size, low + low / 2 + 2); ++k)
+  const auto more = static_cast<std::size_t>(slack * static_cast<double>(low));
+  for (std::size_t k = low; k < std::min(size, low + more + 2); ++k)
     if (descending[k - 1] > descending[k] * widest)
     {
       widest = descending[k - 1] / descending[k];
@@ -76,7 +77,7 @@ std::size_t number_to_take(const std::vector<double>& descending, PetscInt count
   return widest > 1 + 1e-9 ? best : size;
 }
 
-Leading leading_subspace(const Krylov& krylov, PetscInt count, double least)
+Leading leading_subspace(const Krylov& krylov, PetscInt count, double least, double slack)
 {
   const Index order = krylov.order();
   Leading result;
@@ -86,7 +87,7 @@ Leading leading_subspace(const Krylov& krylov, PetscInt count, double least)
   std::vector<double> descending;
   for (const Complex nu : schur->eigenvalues) descending.push_back(std::abs(nu));
   std::sort(descending.rbegin(), descending.rend());
-  const std::size_t taken = number_to_take(descending, count, least);
+  const std::size_t taken = number_to_take(descending, count, least, slack);
   if (taken == 0) return result;
   const double smallest = descending[taken - 1] * (1 - 1e-12);
   result.next = taken < descending.size() ? descending[taken] : 0;
@@ -101,11 +102,11 @@ Leading leading_subspace(const Krylov& krylov, PetscInt count, double least)
 }
 
 /// Computed on rank 0 and broadcast, since what follows must be the same on every rank.
-Leading leading_subspace_shared(const Krylov& krylov, PetscInt count, double least)
+Leading leading_subspace_shared(const Krylov& krylov, PetscInt count, double least, double slack = 0.5)
 {
   Leading leading;
   const MPI_Comm comm = krylov.V.comm;
-  on_rank_zero(comm, [&] { leading = leading_subspace(krylov, count, least); });
+  on_rank_zero(comm, [&] { leading = leading_subspace(krylov, count, least, slack); });
   broadcast(leading.Q, comm);
   leading.nu.resize(leading.Q.cols());
   MPI_Bcast(leading.nu.data(), to_int(leading.nu.size()), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
@@ -128,9 +129,10 @@ void use_mumps(ST transformation)
   check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
 }
 
-ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options)
+ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options,
+                              const EliminationOrder* order)
 {
-  return {K, M, 0, std::make_unique<PencilFactor>(K, M, symmetry, options)};
+  return {K, M, 0, std::make_unique<PencilFactor>(K, M, symmetry, options, order)};
 }
 
 void move_to(ShiftInvert& pencil, double shift)
@@ -144,7 +146,7 @@ void move_to(ShiftInvert& pencil, double shift)
   throw LibraryError("K - " + std::to_string(pencil.shift) + " M of the modes is singular, and just below, too");
 }
 
-Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, double tolerance)
+Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, double tolerance, double guards)
 {
   PetscInt n = 0;
   check(MatGetSize(pencil.K, &n, nullptr));
@@ -168,7 +170,12 @@ Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, 
       smallest = std::min(smallest, std::abs(nu));
     }
     result.reach = 1 / smallest;
-    result.space = {krylov.V.comm, krylov.V.entries.leftCols(krylov.order()) * leading.Q};
+    const auto wider = static_cast<PetscInt>((1 + guards) * static_cast<double>(leading.Q.cols()));
+    MatrixXd Q = leading.Q;
+    if (wider > Q.cols())
+      if (const Leading more = leading_subspace_shared(krylov, wider, HUGE_VAL, 0.1); more.Q.cols() > Q.cols())
+        Q = more.Q;
+    result.space = {krylov.V.comm, krylov.V.entries.leftCols(krylov.order()) * Q};
   }
   return result;
 }

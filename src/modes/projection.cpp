@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <span>
 
 namespace squeal
 {
@@ -66,7 +68,6 @@ std::vector<DenseEigenpair> solve_small(const Subspace& space, const Window& win
 }
 
 constexpr std::size_t at_once = 64; // pairs expanded at a time
-constexpr double critical = -1e-3;  // growth ratio
 using Pairs = std::span<const DenseEigenpair>;
 
 /// lambda^power y of each pair: the real parts of all, then the imaginary parts.
@@ -84,32 +85,100 @@ MatrixXd coefficients(Pairs pairs, int power)
   return result;
 }
 
-/// Appends the pairs y = V a to `solution` and, of their residuals, those that are not small enough to `residuals`.
-void expand(const Subspace& space, const QuadraticNorms& norms, Pairs pairs, const Correction& correction,
-            std::vector<Eigenpair>& solution, MultiVector& residuals)
+/// Of pairs V a: the real parts of all, then the imaginary parts, over the sizes of their terms.
+struct Residuals
+{
+  MultiVector columns;
+  Eigen::VectorXd sizes{}; // of the columns
+
+  double backward_error(Index pair) const { return std::hypot(sizes(pair), sizes(sizes.size() / 2 + pair)); }
+};
+
+Residuals residuals_of(const Subspace& space, const QuadraticNorms& norms, Pairs pairs)
 {
   const auto count = static_cast<Index>(pairs.size());
-  const MatrixXd a = coefficients(pairs, 0);
-  const MultiVector y = combination(space.V, a);
-  MultiVector residual = combination(space.K.image, a);
-  residual.entries.noalias() += space.C.image.entries * coefficients(pairs, 1);
-  residual.entries.noalias() += space.M.image.entries * coefficients(pairs, 2);
-  const Eigen::VectorXd left = column_norms(residual);
-  std::vector<Index> kept;
+  Residuals residuals{combination(space.K.image, coefficients(pairs, 0))};
+  MatrixXd& columns = residuals.columns.entries;
+  columns.noalias() += space.C.image.entries * coefficients(pairs, 1);
+  columns.noalias() += space.M.image.entries * coefficients(pairs, 2);
+  residuals.sizes = column_norms(residuals.columns);
   for (Index k = 0; k < count; ++k)
   {
-    const std::complex<double> lambda = pairs[static_cast<std::size_t>(k)].lambda;
-    const double w = std::abs(lambda), scale = w * w * norms.M + w * norms.C + norms.K;
-    Eigenpair pair{lambda, {}, {}, std::hypot(left(k), left(count + k)) / scale};
-    check(MatCreateVecs(space.K.matrix, pair.real.put(), pair.imaginary.put()));
-    copy_column(y, k, pair.real);
-    copy_column(y, count + k, pair.imaginary);
-    solution.push_back(std::move(pair));
-    const double tolerance = lambda.real() > critical * w ? correction.sharp : correction.tolerance;
-    for (const Index column : {k, count + k})
-      if (left(column) > tolerance * scale) kept.push_back(column);
+    const double w = std::abs(pairs[static_cast<std::size_t>(k)].lambda);
+    for (const Index column : {k, count + k}) residuals.sizes(column) /= w * w * norms.M + w * norms.C + norms.K;
   }
-  append(residuals, {residual.comm, residual.entries(Eigen::all, kept)});
+  return residuals;
+}
+
+/// Calls visit(pairs, their residuals) for so many pairs at a time that these take little memory.
+template <class Visit> void for_residuals(const Subspace& space, const QuadraticNorms& norms, Pairs pairs, Visit visit)
+{
+  for (std::size_t first = 0; first < pairs.size(); first += at_once)
+  {
+    const Pairs some = pairs.subspan(first, std::min(at_once, pairs.size() - first));
+    visit(some, residuals_of(space, norms, some));
+  }
+}
+
+/// The residuals of pairs that are not small enough. Pairs whose residuals are move to `exact`.
+MultiVector residuals_left(const Subspace& space, const QuadraticNorms& norms, Pairs pairs,
+                           const Correction& correction, std::vector<std::complex<double>>& exact)
+{
+  MultiVector left = empty_multivector(space.K.matrix);
+  for_residuals(space, norms, pairs,
+                [&](Pairs some, const Residuals& residuals)
+                {
+                  const auto count = static_cast<Index>(some.size());
+                  std::vector<Index> kept;
+                  for (Index k = 0; k < count; ++k)
+                  {
+                    const std::complex<double> lambda = some[static_cast<std::size_t>(k)].lambda;
+                    const std::size_t before = kept.size();
+                    for (const Index column : {k, count + k})
+                      if (residuals.sizes(column) > correction.tolerance_of(lambda)) kept.push_back(column);
+                    if (kept.size() == before) exact.push_back(lambda);
+                  }
+                  append(left, {left.comm, residuals.columns.entries(Eigen::all, kept)});
+                });
+  return left;
+}
+
+/// y = V a of all pairs.
+std::vector<Eigenpair> expand(const Subspace& space, const QuadraticNorms& norms, Pairs pairs)
+{
+  std::vector<Eigenpair> result;
+  for_residuals(space, norms, pairs,
+                [&](Pairs some, const Residuals& residuals)
+                {
+                  const auto count = static_cast<Index>(some.size());
+                  const MultiVector y = combination(space.V, coefficients(some, 0));
+                  for (Index k = 0; k < count; ++k)
+                  {
+                    Eigenpair& pair = result.emplace_back();
+                    pair.lambda = some[static_cast<std::size_t>(k)].lambda;
+                    pair.backward_error = residuals.backward_error(k);
+                    check(MatCreateVecs(space.K.matrix, pair.real.put(), pair.imaginary.put()));
+                    copy_column(y, k, pair.real);
+                    copy_column(y, count + k, pair.imaginary);
+                  }
+                });
+  return result;
+}
+
+/// The pairs but those that are exact already: V only grows, in which their residuals stay small.
+std::vector<DenseEigenpair> still_open(Pairs pairs, const std::vector<std::complex<double>>& exact)
+{
+  constexpr double same = 1e-9; // what is taken for an exact neighbour's is measured in the end
+  std::vector<DenseEigenpair> open;
+  std::ranges::copy_if(pairs, std::back_inserter(open),
+                       [&](const DenseEigenpair& pair)
+                       {
+                         return std::ranges::none_of(exact,
+                                                     [&](std::complex<double> lambda) {
+                                                       return std::abs(pair.lambda - lambda) <= same * std::abs(lambda);
+                                                     });
+                       });
+  return open;
 }
 
 /// An orthonormal basis of the residuals' directions, down to `share` of the largest. No column counts for more than
@@ -138,23 +207,27 @@ QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector
   const MultiVector none = empty_multivector(problem.K);
   Subspace space{none, {problem.M, none, {}}, {problem.C, none, {}}, {problem.K, none, {}}};
   extend(space, std::move(basis));
+  std::vector<std::complex<double>> exact;
   for (int pass = 0;; ++pass)
   {
     const std::vector<DenseEigenpair> found = solve_small(space, correction.window);
-    MultiVector residuals = none;
-    result.pairs.clear();
-    const auto expand_until = [&](std::size_t end)
+    const Pairs corrected(found.data(), std::min(found.size(), static_cast<std::size_t>(correction.pairs)));
+    const auto is_better = [&](Pairs pairs)
     {
-      for (std::size_t first = result.pairs.size(); first < end; first = result.pairs.size())
-        expand(space, norms, Pairs(found).subspan(first, std::min(at_once, end - first)), correction, result.pairs,
-               residuals);
+      MultiVector left = residuals_left(space, norms, pairs, correction, exact);
+      return left.columns() > 0 && extend(space, P.solve(largest_directions(std::move(left), correction.share)));
     };
-    if (pass < correction.passes) expand_until(std::min(found.size(), static_cast<std::size_t>(correction.pairs)));
-    const bool better = pass < correction.passes && residuals.columns() > 0 &&
-                        extend(space, P.solve(largest_directions(std::move(residuals), correction.share)));
-    result.outcome.iterations = pass + better;
-    if (better) continue;
-    expand_until(found.size());
+    result.outcome.iterations = pass;
+    if (pass < correction.passes && is_better(still_open(corrected, exact))) continue;
+    result.pairs = expand(space, norms, found);
+    const auto is_exact = [&](const Eigenpair& pair)
+    { return pair.backward_error <= std::sqrt(2.) * correction.tolerance_of(pair.lambda); };
+    const std::span measured(result.pairs.data(), corrected.size());
+    if (pass < correction.passes && !exact.empty() && !std::ranges::all_of(measured, is_exact))
+    {
+      exact.clear();
+      if (is_better(corrected)) continue;
+    }
     sort_and_measure(result);
     return result;
   }

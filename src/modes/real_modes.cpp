@@ -223,7 +223,8 @@ Inertia inertia_at(double limit, Mat K, Mat M, const PencilOptions& options)
 
 ShiftInvert& pencil_of(RealCount& count)
 {
-  if (!count.pencil.factor) count.pencil = make_shift_invert(count.K, count.M, Symmetry::symmetric, count.options);
+  if (!count.pencil.factor)
+    count.pencil = make_shift_invert(count.K, count.M, Symmetry::symmetric, count.options, &order_of(count));
   return count.pencil;
 }
 
@@ -340,9 +341,12 @@ RealCount make_real_count(Mat M, Mat K, const ModesOptions& options)
 {
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
-  if (n > options.dense_limit) return {K, M, options.pencil, {}, {{0, 0}}};
+  RealCount count{.K = K, .M = M, .options = options.pencil};
+  count.below[0] = 0;
+  if (n > options.dense_limit) return count;
   const SymmetricEigenpairs all = solve_whole(M, K);
-  return {K, M, options.pencil, {all.lambda.begin(), all.lambda.end()}};
+  count.all.assign(all.lambda.begin(), all.lambda.end());
+  return count;
 }
 
 int count_below(RealCount& count, double omega)
@@ -352,6 +356,12 @@ int count_below(RealCount& count, double omega)
   const auto [known, is_new] = count.below.try_emplace(omega);
   if (!is_new) return known->second;
   return known->second = inertia_at(omega * omega, pencil_of(count)).below;
+}
+
+const EliminationOrder& order_of(RealCount& count)
+{
+  if (count.order.position.empty()) count.order = elimination_order(count.K);
+  return count.order;
 }
 
 void free_factor(RealCount& count)

@@ -17,6 +17,7 @@ namespace
 {
 
 constexpr int most_in_slice = 100;      // pairs
+constexpr double narrowest = 1e-3;      // slice, over its upper end: what lies closer is not parted
 constexpr double reach_of_count = 1.05; // over the band
 // The angle by which friction turns theta [rad], twice the change of the damping ratio: of most pairs, and of those
 // that a second search includes.
@@ -24,9 +25,12 @@ constexpr double usual_angle = 0.06, wide_angle = 0.2;
 constexpr int passes = 12;                         // of residual correction, at most
 constexpr double subspace_tolerance = 1e-9;        // for V to be invariant
 constexpr double tolerance = 1e-12, sharp = 1e-14; // backward errors of pairs, and of nearly critical ones
-constexpr double spurious = 1e-8;                  // backward error of what is no pair
-constexpr double rigid_share = 1e-6;               // theta below this part of the largest may be a free body's
-constexpr double residual_share = 1e-2;            // a pass divides residuals by about ten: a quarter of them stay
+// Vectors beside a slice's own, by their number. Without them what its ends are corrected by has most of its
+// neighbours.
+constexpr double guards = 0.3;
+constexpr double spurious = 1e-8;       // backward error of what is no pair
+constexpr double rigid_share = 1e-6;    // theta below this part of the largest may be a free body's
+constexpr double residual_share = 1e-2; // a pass divides residuals by about ten: a quarter of them stay
 
 /// The pairs with lower <= |lambda| < upper [rad/s].
 struct Slice
@@ -46,7 +50,7 @@ std::vector<Slice> make_slices(RealCount& real, double floor, double reach)
   {
     const double lower = edges.back(), upper = edges[edges.size() - 2];
     const int expected = count_below(real, upper) - count_below(real, lower);
-    if (expected > most_in_slice)
+    if (expected > most_in_slice && upper - lower > narrowest * upper)
     {
       edges.insert(edges.end() - 1, (lower + upper) / 2);
       continue;
@@ -64,7 +68,7 @@ void find_pairs(Slice& slice, const QuadraticProblem& problem, ShiftInvert& penc
   const double least = slice.lower * slice.lower, limit = slice.upper * slice.upper, middle = (least + limit) / 2;
   move_to(pencil, middle);
   const double radius = std::abs(std::polar(limit, angle) - pencil.shift);
-  Nearest nearest = solve_nearest(pencil, slice.expected, radius, subspace_tolerance);
+  Nearest nearest = solve_nearest(pencil, slice.expected, radius, subspace_tolerance, guards);
   if (!nearest.converged) return;
   for (const std::complex<double> theta : nearest.theta) slice.smallest = std::min(slice.smallest, std::abs(theta));
   const Correction correction{{least, limit}, passes, std::numeric_limits<int>::max(),
@@ -111,7 +115,7 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
   std::vector<Slice> slices = make_slices(real, floor, reach);
   const int all = count_below(real, reach);
   free_factor(real); // all counts that a complete search needs are known
-  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options, &order_of(real));
   CountedSolution result;
   Progress progress(comm_of(problem.K), "modes", all);
   const auto search = [&](double angle)

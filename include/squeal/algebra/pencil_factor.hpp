@@ -5,6 +5,7 @@
 #include "squeal/base/options.hpp"
 
 #include <memory>
+#include <vector>
 
 namespace squeal
 {
@@ -25,12 +26,23 @@ struct PencilOptions
 
 OptionList options_of(PencilOptions& options);
 
+/// A nested dissection, on every rank. It serves every matrix of nearly the same pattern.
+struct EliminationOrder
+{
+  std::vector<int> position; // of each degree of freedom, counted from one as MUMPS does
+  double entries = 0;        // of a symmetric factor
+};
+
+/// By the lower triangle of K. Collective.
+EliminationOrder elimination_order(Mat K);
+
 /// The order of elimination is found once and serves every shift. Borrows K and M. Members are collective, but for
 /// negative_pivots.
 class PencilFactor
 {
 public:
-  PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options);
+  /// `order`: one that is known; null: found here.
+  PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options, const EliminationOrder* order = nullptr);
   ~PencilFactor();
 
   /// Returns false if the shift is an eigenvalue. Throws LibraryError if memory runs out.

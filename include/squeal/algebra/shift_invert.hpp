@@ -20,14 +20,16 @@ struct ShiftInvert
   std::unique_ptr<PencilFactor> factor{}; // of K - shift M
 };
 
-/// The pencil at shift 0, not yet factored. Collective. K and M are borrowed and must outlive it.
-ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options);
+/// The pencil at shift 0, not yet factored. Collective. K and M are borrowed and must outlive it. `order`: one that is
+/// known; null: found here.
+ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options,
+                              const EliminationOrder* order = nullptr);
 
 /// Factors K - shift M, or with a slightly lower shift where this one is an eigenvalue. Throws LibraryError if memory
 /// runs out.
 void move_to(ShiftInvert& pencil, double shift);
 
-/// Orthonormal basis of the invariant subspace of all theta with |theta - shift| <= reach.
+/// Orthonormal basis of the invariant subspace of all theta with |theta - shift| <= reach, and of guards.
 struct Nearest
 {
   MultiVector space;
@@ -37,8 +39,9 @@ struct Nearest
 };
 
 /// The `count` nearest theta and all within `radius` of the shift. `tolerance`: the residual of the invariant
-/// subspace, relative to the smallest |1/(theta - shift)| in it.
-Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, double tolerance);
+/// subspace, relative to the smallest |1/(theta - shift)| in it. `guards`: by this part of its size the space is wider,
+/// of what lies next, whose residual is larger.
+Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, double tolerance, double guards = 0);
 
 /// Sets a spectral transformation of SLEPc to shift-and-invert with MUMPS's LU, before it is set up.
 void use_mumps(ST transformation);

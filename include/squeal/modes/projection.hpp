@@ -22,6 +22,12 @@ struct Correction
   double tolerance = 0; // backward error
   double sharp = 0;     // the same of nearly critical pairs
   double share = 0;     // directions of the residuals below this part of the largest are left to later passes
+
+  double tolerance_of(std::complex<double> lambda) const
+  {
+    constexpr double critical = -1e-3; // growth ratio
+    return lambda.real() > critical * std::abs(lambda) ? sharp : tolerance;
+  }
 };
 
 /// `basis` spans the first V. Backward errors are those of `problem` itself. The caller sets outcome.kind.
