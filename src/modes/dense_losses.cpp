@@ -26,8 +26,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-constexpr std::size_t in_group = 16;  // pairs of neighbouring frequency, of which those at the ends are neighbours only
-constexpr std::size_t neighbours = 3; // at each end
+constexpr std::size_t neighbours = 3; // of a group, at each end
 constexpr int newton_steps = 60;      // each divides the error of omega by about 2/eta^2
 constexpr double settled = 1e-12;     // last change of lambda over |lambda|: beyond, there is no fixed point
 constexpr double rounding = 1e-15;    // of lambda
@@ -311,7 +310,7 @@ std::vector<LossyMode> with_losses(const LossyMatrices& problem, const std::vect
   return modes;
 }
 
-std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<Complex>& eigenvalues)
+std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<Complex>& eigenvalues, std::size_t in_group)
 {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < eigenvalues.size(); ++i)

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace squeal
 {
@@ -21,11 +22,14 @@ using Eigen::VectorXcd;
 
 constexpr int passes = 30;          // of residual correction, at most: losses of 2 and more take over 12
 constexpr double tolerance = 1e-13; // backward error
+constexpr double share = 1e-3;      // directions of residuals below this part of the largest are left to later passes
 
-/// A mode with the backward error of the pair taken.
+/// A mode with the backward errors of both problems.
 struct CorrectedMode : LossyMode
 {
-  double backward_error = 0;
+  double complex_error = HUGE_VAL, viscous_error = HUGE_VAL;
+
+  double backward_error() const { return taken == LossKind::viscous ? viscous_error : complex_error; }
 };
 
 using Group = std::vector<CorrectedMode>;
@@ -38,32 +42,32 @@ void widen(VectorXcd& a, Index columns)
   a.tail(columns - known).setZero();
 }
 
-/// Solves both problems of each mode on the subspace; residuals that are not small join it, until none is left.
+/// Solves both problems of each mode on the subspace; residuals that are not small join it, until none is left. What is
+/// exact stays so, since the subspace only grows.
 void solve_group(ComplexSubspace& space, Group& group, const PencilFactor& P)
 {
   for (int pass = 0;; ++pass)
   {
     MultiVector residuals{space.V.comm, MatrixXd(space.V.entries.rows(), 0)};
-    const auto improve = [&](LossKind kind, DenseEigenpair& pair)
+    const auto improve = [&](LossKind kind, DenseEigenpair& pair, double& error)
     {
       widen(pair.y, space.V.columns());
+      if (error <= tolerance) return;
       const bool found = solve_lossy(space.entries, kind, pair);
-      double error = 0;
       const MultiVector residual = residual_of(space, loss_factors(kind, pair.lambda), pair.y, error);
       if (found && error > tolerance) append(residuals, residual);
-      return found ? error : HUGE_VAL;
+      if (!found) error = HUGE_VAL;
     };
     for (CorrectedMode& mode : group)
     {
-      mode.backward_error = improve(LossKind::complex, mode.complex);
+      improve(LossKind::complex, mode.complex, mode.complex_error);
       if (mode.taken == LossKind::complex) continue;
-      const double error = improve(LossKind::viscous, mode.viscous);
-      if (std::isfinite(error) && is_equivalent(mode.viscous, mode.complex))
-        mode.backward_error = error;
-      else
+      improve(LossKind::viscous, mode.viscous, mode.viscous_error);
+      if (!std::isfinite(mode.viscous_error) || !is_equivalent(mode.viscous, mode.complex))
         mode.taken = LossKind::complex;
     }
     if (residuals.columns() == 0 || pass == passes) return;
+    orthonormalise(residuals, share * share);
     if (!extend(space, P.solve(residuals))) return;
   }
 }
@@ -83,31 +87,40 @@ bool are_one(const Eigenpair& a, const Eigenpair& b, Mat A)
   return column_norms(of_a).norm() < same_vector;
 }
 
-/// A pair that stands twice; null: none. Collective.
-const Eigenpair* doubled(const std::vector<Eigenpair>& pairs, Mat A)
+/// The lambda of a pair that stands twice, if there is any. Collective.
+std::optional<Complex> doubled(const std::vector<Eigenpair>& pairs, Mat A)
 {
   for (std::size_t k = 1; k < pairs.size(); ++k)
     for (std::size_t l = 0; l < k; ++l)
-      if (are_one(pairs[l], pairs[k], A)) return &pairs[k];
-  return nullptr;
+      if (are_one(pairs[l], pairs[k], A)) return pairs[k].lambda;
+  return std::nullopt;
 }
 
-} // namespace
-
-std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
-                                   const PencilOptions& options)
+/// Pairs with their losses.
+struct LossyPairs
 {
-  const ComplexSubspace empty = empty_subspace({problem.M, problem.C, problem.K, K_loss});
-  std::vector<ModeLoss> losses(solution.pairs.size());
+  std::vector<Eigenpair> pairs{};
+  std::vector<ModeLoss> losses{};
+};
+
+/// Solves groups of at most so many pairs.
+LossyPairs solve_in_groups(const std::vector<Eigenpair>& without_losses, const ComplexSubspace& empty,
+                           ShiftInvert& pencil, std::size_t in_group)
+{
+  LossyPairs result;
   std::vector<Complex> eigenvalues;
-  for (const Eigenpair& pair : solution.pairs) eigenvalues.push_back(pair.lambda);
-  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
-  for (const auto& [places, first, end] : neighbouring_pairs(eigenvalues))
+  for (const Eigenpair& pair : without_losses)
+  {
+    eigenvalues.push_back(pair.lambda);
+    result.pairs.push_back({pair.lambda, copy_of(pair.real), copy_of(pair.imaginary), pair.backward_error});
+  }
+  result.losses.resize(eigenvalues.size());
+  for (const auto& [places, first, end] : neighbouring_pairs(eigenvalues, in_group))
   {
     ComplexSubspace space = empty;
     MultiVector shapes = empty.V;
     for (const std::size_t place : places)
-      for (const Vec part : {solution.pairs[place].real.get(), solution.pairs[place].imaginary.get()})
+      for (const Vec part : {without_losses[place].real.get(), without_losses[place].imaginary.get()})
         append(shapes, part);
     extend(space, shapes);
     const MatrixXd a = inner_products(space.V, shapes);
@@ -126,29 +139,47 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
     solve_group(space, group, *pencil.factor);
     for (std::size_t k = first; k < end; ++k)
     {
-      Eigenpair& pair = solution.pairs[places[k]];
+      Eigenpair& pair = result.pairs[places[k]];
       const CorrectedMode& mode = group[k - first];
       const DenseEigenpair& own = mode.pair();
       const MultiVector y = vector_of(space, own.y);
       copy_column(y, 0, pair.real);
       copy_column(y, 1, pair.imaginary);
       pair.lambda = own.lambda;
-      pair.backward_error = mode.backward_error;
+      pair.backward_error = mode.backward_error();
       const double error = std::abs(own.lambda - mode.complex.lambda) / std::abs(own.lambda);
-      losses[places[k]] = {loss_factor_of(mode.taken, own.lambda),
-                           mode.taken == LossKind::viscous ? error : std::numeric_limits<double>::quiet_NaN()};
+      result.losses[places[k]] = {loss_factor_of(mode.taken, own.lambda),
+                                  mode.taken == LossKind::viscous ? error : std::numeric_limits<double>::quiet_NaN()};
     }
   }
-  if (const Eigenpair* pair = doubled(solution.pairs, problem.K);
-      pair && solution.outcome.kind == OutcomeKind::converged)
+  return result;
+}
+
+} // namespace
+
+std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
+                                   const PencilOptions& options)
+{
+  const ComplexSubspace empty = empty_subspace({problem.M, problem.C, problem.K, K_loss});
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
+  LossyPairs found;
+  std::optional<Complex> twice;
+  for (const std::size_t in_group : {usual_group, largest_group})
+  {
+    found = solve_in_groups(solution.pairs, empty, pencil, in_group);
+    twice = doubled(found.pairs, problem.K);
+    if (!twice) break;
+  }
+  solution.pairs = std::move(found.pairs);
+  if (twice && solution.outcome.kind == OutcomeKind::converged)
   {
     solution.outcome.kind = OutcomeKind::not_converged;
-    solution.outcome.reason = describe_doubled(pair->lambda);
+    solution.outcome.reason = describe_doubled(*twice);
   }
   solution.outcome.residual = 0;
   for (const Eigenpair& pair : solution.pairs)
     solution.outcome.residual = std::max(solution.outcome.residual, pair.backward_error);
-  return losses;
+  return std::move(found.losses);
 }
 
 } // namespace squeal
