@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 namespace squeal
 {
@@ -133,7 +134,15 @@ ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<
 {
   constexpr double steady = 0.005, trend_allowed = 0.005; // of the mean
   ReachedMotion reached;
-  if (energies.size() < 2 * batches) return reached;
+  if (energies.size() < 2 * batches)
+  {
+    if (energies.empty()) return reached;
+    const std::span half = std::span(energies).subspan(energies.size() / 2);
+    const auto [least, most] = std::ranges::minmax(half);
+    reached.energy = {mean_of(energies, energies.size() / 2, half.size()), most - least};
+    reached.frequency = frequency_of(crossings);
+    return reached;
+  }
   const Window window = window_of(energies);
   reached.energy = {window.mean, 2 * window.standard_error + std::abs(window.trend)};
   if (energies.back() < rest)

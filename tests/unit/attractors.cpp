@@ -51,6 +51,11 @@ TEST_CASE("a decay towards a constant is unsettled while its trend shows, and st
   CHECK(late.kind == ReachedKind::steady);
   CHECK(std::abs(late.energy.value - 1) <= late.energy.error); // the window holds exp(-10) of the decay
   CHECK(late.frequency.value == doctest::Approx(50));
+  const ReachedMotion early = reached_by(series(10, decay), crossings(50), 1e-4); // too short for batches
+  CHECK(early.kind == ReachedKind::unsettled);
+  CHECK(early.energy.value < decay(5));
+  CHECK(early.energy.value > decay(9));
+  CHECK(early.energy.error == doctest::Approx(decay(5) - decay(9)));
 }
 
 TEST_CASE("a swinging approach to a cycle is unsettled, a steady swing is not")

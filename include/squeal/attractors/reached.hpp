@@ -44,7 +44,8 @@ std::vector<double> means_over(const std::vector<double>& samples, double length
 MeanValue frequency_of(const std::vector<double>& crossings);
 
 /// What one motion has settled on, from the mean energies of its periods and the upward zero crossings [s] of a
-/// coordinate. `rest`: an energy below it is that of a motion at rest.
+/// coordinate. `rest`: an energy below it is that of a motion at rest. Fewer than 20 periods are unsettled: the energy
+/// is the mean of their second half, its bar their range.
 ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<double>& crossings, double rest);
 
 /// Whether energies and frequencies agree within their bars, or within a percent and a thousandth.
