@@ -85,11 +85,11 @@ MatrixXd coefficients(Pairs pairs, int power)
   return result;
 }
 
-/// Of pairs V a: the real parts of all, then the imaginary parts, over the sizes of their terms.
+/// Of pairs V a: the real parts of all, then the imaginary parts.
 struct Residuals
 {
   MultiVector columns;
-  Eigen::VectorXd sizes{}; // of the columns
+  Eigen::VectorXd sizes{}; // of the columns, over the sizes of a pair's terms
 
   double backward_error(Index pair) const { return std::hypot(sizes(pair), sizes(sizes.size() / 2 + pair)); }
 };
