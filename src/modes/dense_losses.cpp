@@ -263,6 +263,49 @@ bool solve_lossy(const LossyMatrices& problem, LossKind kind, DenseEigenpair& pa
   return solve_at(problem, losses_of(kind), pair.lambda, pair.y);
 }
 
+bool solve_lossy_beside(const LossyMatrices& problem, LossKind kind, std::span<const DenseEigenpair> others,
+                        DenseEigenpair& pair)
+{
+  constexpr int apart = 4; // steps: what is left of the others is of rounding, and their lambdas are not its own
+  const Losses losses = losses_of(kind);
+  std::vector<TwoSidedPair> known;
+  for (const DenseEigenpair& other : others)
+  {
+    known.push_back({other.lambda, other.y, {}});
+    find_left(problem, losses, known.back());
+  }
+  const auto without_others = [&](VectorXcd y)
+  {
+    for (int time = 0; time < 2; ++time) // near pairs are not orthogonal to each other
+      for (const TwoSidedPair& other : known)
+      {
+        const MatrixXcd slope = sum(problem, derivatives_at(losses, other.lambda));
+        const Complex size = other.left.transpose() * (slope * other.right),
+                      part = other.left.transpose() * (slope * y);
+        y -= part / size * other.right;
+      }
+    return VectorXcd(y.normalized());
+  };
+  for (int step = 0; step < apart && pair.lambda.imag() > settled * std::abs(pair.lambda); ++step)
+  {
+    pair.y = without_others(pair.y);
+    const VectorXcd x = without_others(Eigen::PartialPivLU<MatrixXcd>(sum(problem, factors_at(losses, pair.lambda)))
+                                           .solve(sum(problem, derivatives_at(losses, pair.lambda)) * pair.y));
+    if (!x.allFinite()) return false;
+    pair.y = x;
+    const Complex residual = x.dot(sum(problem, factors_at(losses, pair.lambda)) * x),
+                  slope = x.dot(sum(problem, derivatives_at(losses, pair.lambda)) * x);
+    pair.lambda -= residual / slope;
+  }
+  return solve_lossy(problem, kind, pair);
+}
+
+bool are_one(const DenseEigenpair& a, const DenseEigenpair& b)
+{
+  constexpr double near = 1e-7, parallel = 1e-4; // vectors of near pairs are off by rounding over their distance
+  return std::abs(a.lambda - b.lambda) < near * std::abs(a.lambda) && (a.y - b.y.dot(a.y) * b.y).norm() < parallel;
+}
+
 bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex)
 {
   return std::abs(viscous.lambda - complex.lambda) < 0.5 * std::abs(viscous.lambda);

@@ -2,10 +2,12 @@
 
 #include "complex_subspace.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/modes/two_sided.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <optional>
 
@@ -42,30 +44,72 @@ void widen(VectorXcd& a, Index columns)
   a.tail(columns - known).setZero();
 }
 
+/// One of a mode's two problems.
+struct Side
+{
+  LossKind kind{};
+  DenseEigenpair LossyMode::*pair = nullptr;
+  double CorrectedMode::*error = nullptr;
+};
+
+/// Makes the pairs of a side that are not exact those of the problem on the subspace, each once. Returns which of them
+/// it found.
+std::vector<char> solve_side(const LossyMatrices& problem, const Side& side, Group& group)
+{
+  constexpr double near = 1e-5; // of lambda: what may draw a pair to itself
+  std::vector<char> found(group.size(), 0);
+  std::vector<DenseEigenpair> solved;
+  for (CorrectedMode& mode : group)
+    if (mode.*side.error <= tolerance) solved.push_back(mode.*side.pair);
+  for (std::size_t k = 0; k < group.size(); ++k)
+  {
+    DenseEigenpair& pair = group[k].*side.pair;
+    const bool is_needed = side.kind == LossKind::complex || group[k].taken == LossKind::viscous;
+    if (!is_needed || group[k].*side.error <= tolerance) continue;
+    DenseEigenpair start = pair;
+    found[k] = solve_lossy(problem, side.kind, pair) ? 1 : 0;
+    if (!found[k]) continue;
+    if (std::ranges::any_of(solved, [&](const DenseEigenpair& other) { return are_one(other, pair); }))
+    {
+      std::vector<DenseEigenpair> others;
+      std::ranges::copy_if(solved, std::back_inserter(others),
+                           [&](const DenseEigenpair& other)
+                           { return std::abs(other.lambda - pair.lambda) < near * std::abs(pair.lambda); });
+      if (solve_lossy_beside(problem, side.kind, others, start)) pair = std::move(start);
+    }
+    solved.push_back(pair);
+  }
+  return found;
+}
+
 /// Solves both problems of each mode on the subspace; residuals that are not small join it, until none is left. What is
 /// exact stays so, since the subspace only grows.
 void solve_group(ComplexSubspace& space, Group& group, const PencilFactor& P)
 {
+  constexpr Side complex{LossKind::complex, &LossyMode::complex, &CorrectedMode::complex_error},
+      viscous{LossKind::viscous, &LossyMode::viscous, &CorrectedMode::viscous_error};
   for (int pass = 0;; ++pass)
   {
+    end_if_asked(space.V.comm);
     MultiVector residuals{space.V.comm, MatrixXd(space.V.entries.rows(), 0)};
-    const auto improve = [&](LossKind kind, DenseEigenpair& pair, double& error)
+    for (const Side& side : {complex, viscous})
     {
-      widen(pair.y, space.V.columns());
-      if (error <= tolerance) return;
-      const bool found = solve_lossy(space.entries, kind, pair);
-      const MultiVector residual = residual_of(space, loss_factors(kind, pair.lambda), pair.y, error);
-      if (found && error > tolerance) append(residuals, residual);
-      if (!found) error = HUGE_VAL;
-    };
+      for (CorrectedMode& mode : group) widen((mode.*side.pair).y, space.V.columns());
+      const std::vector<char> found = solve_side(space.entries, side, group);
+      for (std::size_t k = 0; k < group.size(); ++k)
+      {
+        const auto& [lambda, y] = group[k].*side.pair;
+        double& error = group[k].*side.error;
+        if (error <= tolerance) continue;
+        error = HUGE_VAL;
+        if (!found[k]) continue;
+        const MultiVector residual = residual_of(space, loss_factors(side.kind, lambda), y, error);
+        if (error > tolerance) append(residuals, residual);
+      }
+    }
     for (CorrectedMode& mode : group)
-    {
-      improve(LossKind::complex, mode.complex, mode.complex_error);
-      if (mode.taken == LossKind::complex) continue;
-      improve(LossKind::viscous, mode.viscous, mode.viscous_error);
       if (!std::isfinite(mode.viscous_error) || !is_equivalent(mode.viscous, mode.complex))
         mode.taken = LossKind::complex;
-    }
     if (residuals.columns() == 0 || pass == passes) return;
     orthonormalise(residuals, share * share);
     if (!extend(space, P.solve(residuals))) return;

@@ -3,6 +3,7 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/run_control.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -210,6 +211,7 @@ QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector
   std::vector<std::complex<double>> exact;
   for (int pass = 0;; ++pass)
   {
+    end_if_asked(comm_of(problem.K));
     const std::vector<DenseEigenpair> found = solve_small(space, correction.window);
     const Pairs corrected(found.data(), std::min(found.size(), static_cast<std::size_t>(correction.pairs)));
     const auto is_better = [&](Pairs pairs)

@@ -3,7 +3,10 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/quadratic_residual.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/base/callback.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/progress.hpp"
+#include "squeal/base/run_control.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -54,7 +57,28 @@ QuadraticSolution solve_whole(const QuadraticProblem& problem, const Window& win
   return result;
 }
 
-Owned<PEP> make_solver(Mat M, Mat C, Mat K, PetscInt count, double shift)
+/// What each solve of TOAR is told to, and what a call threw.
+struct Watch
+{
+  MPI_Comm comm;
+  Progress progress;
+  int solves = 0;
+  std::exception_ptr failure{};
+};
+
+PetscErrorCode watch_solve(KSP, Vec, Vec, void* context)
+{
+  Watch& watch = *static_cast<Watch*>(context);
+  return guarded(watch.failure,
+                 [&]
+                 {
+                   end_if_asked(watch.comm);
+                   ++watch.solves;
+                   watch.progress.update(watch.solves, format("by Arnoldi's method, %d solves", watch.solves));
+                 });
+}
+
+Owned<PEP> make_solver(Mat M, Mat C, Mat K, PetscInt count, double shift, Watch& watch)
 {
   Owned<PEP> pep;
   check(PEPCreate(comm_of(K), pep.put()));
@@ -69,6 +93,9 @@ Owned<PEP> make_solver(Mat M, Mat C, Mat K, PetscInt count, double shift)
   ST transformation = nullptr;
   check(PEPGetST(pep, &transformation));
   use_mumps(transformation);
+  KSP solver = nullptr;
+  check(STGetKSP(transformation, &solver));
+  check(KSPSetPreSolve(solver, watch_solve, &watch));
   check(PEPSetOptionsPrefix(pep, "modes_"));
   check(PEPSetFromOptions(pep));
   return pep;
@@ -106,8 +133,9 @@ QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSe
   PetscInt count = std::min<PetscInt>(2 * settings.expected + 20, 2 * n);
   for (int attempt = 0; attempt < 6; ++attempt)
   {
-    const Owned<PEP> pep = make_solver(M, C, problem.K, count, settings.shift);
-    check(PEPSolve(pep));
+    Watch watch{comm_of(problem.K), {comm_of(problem.K), "modes", 2. * count}};
+    const Owned<PEP> pep = make_solver(M, C, problem.K, count, settings.shift, watch);
+    check_after_callbacks(PEPSolve(pep), watch.failure);
     PetscInt iterations = 0, converged = 0;
     check(PEPGetIterationNumber(pep, &iterations));
     check(PEPGetConverged(pep, &converged));

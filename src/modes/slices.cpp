@@ -117,9 +117,9 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
   free_factor(real); // all counts that a complete search needs are known
   ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options, &order_of(real));
   CountedSolution result;
-  Progress progress(comm_of(problem.K), "modes", all);
   const auto search = [&](double angle)
   {
+    Progress progress(comm_of(problem.K), angle == usual_angle ? "modes" : "modes again", all);
     bool rigid = false; // a body may be free
     std::vector<double> moduli;
     for (Slice& slice : slices)

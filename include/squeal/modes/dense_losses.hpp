@@ -7,6 +7,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 
 namespace squeal
@@ -44,6 +45,14 @@ Eigen::MatrixXcd sum(const LossyMatrices& A, const ComplexFactors& factors);
 /// Makes a pair that is nearly one of the problem its own, by Newton's method on (lambda, y). Returns whether it found
 /// one that oscillates.
 bool solve_lossy(const LossyMatrices& problem, LossKind kind, DenseEigenpair& pair);
+
+/// The same beside other pairs of the problem, by Newton's method without what its vector has of them: near ones would
+/// draw it to themselves.
+bool solve_lossy_beside(const LossyMatrices& problem, LossKind kind, std::span<const DenseEigenpair> others,
+                        DenseEigenpair& pair);
+
+/// Whether Newton's method led two pairs to one.
+bool are_one(const DenseEigenpair& a, const DenseEigenpair& b);
 
 /// A mode of its own frequency, and of the complex problem.
 struct LossyMode
