@@ -18,6 +18,7 @@ root=${SQUEAL_ROOT:-$(dirname "$(realpath "$script")")/..}
 . "$root/jobs/common"
 output=${OUTPUT:-results/many_runs}
 values=(${VALUES:-0.1 0.15 0.2 0.25 0.3 0.35 0.4 0.45})
+whole_numbers SIDE "${SIDE:-1}"
 mkdir -p "$output"
 
 # one_run HOST VALUE: on one rank of that host. Its start and its end go to times.txt.
@@ -28,7 +29,7 @@ one_run() {
   start=$(date +%s.%N)
   RANKS=1 LAUNCH="mpirun --bind-to none --host $1" squeal_run "$folder" "${arguments[@]}" >"$folder.txt" 2>&1
   ! is_done "$folder" "${arguments[@]}" || echo "$2 $start $(date +%s.%N)" >>"$output/times.txt"
-  [ "$failed" = 0 ] || echo "see $folder.txt" >&2
+  [ "$failed" = 0 ] || echo "$folder.txt: $(grep -m1 'error:' "$folder.txt")" >&2
 }
 
 side_by_side one_run "${values[@]}" -- "$@"

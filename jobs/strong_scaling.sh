@@ -18,6 +18,7 @@ root=${SQUEAL_ROOT:-$(dirname "$(realpath "$script")")/..}
 . "$root/jobs/common"
 output=${OUTPUT:-results/strong_scaling}
 counts=(${COUNTS:-$(rank_counts)})
+whole_numbers COUNTS "${counts[@]}"
 for ranks in "${counts[@]}"; do
   RANKS=$ranks squeal_run "$output/ranks_$ranks" "${SCENE:-inputs/tgv/scene.toml}" "$@"
 done

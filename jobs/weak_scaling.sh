@@ -18,6 +18,8 @@ root=${SQUEAL_ROOT:-$(dirname "$(realpath "$script")")/..}
 . "$root/jobs/common"
 output=${OUTPUT:-results/weak_scaling}
 counts=(${COUNTS:-$(rank_counts)})
+whole_numbers COUNTS "${counts[@]}"
+whole_numbers PER_RANK "${PER_RANK:-16000}"
 for ranks in "${counts[@]}"; do
   RANKS=$ranks squeal_run "$output/ranks_$ranks" "${SCENE:-inputs/tgv/scene.toml}" \
     --set "${KEY:-mesh.parameters.size}=$((ranks * ${PER_RANK:-16000}))" "$@"

@@ -6,6 +6,8 @@ import shutil
 import subprocess
 import time
 
+import pytest
+
 from conftest import INPUTS, ROOT, cores
 
 
@@ -93,6 +95,23 @@ def test_scaling_jobs_tabulate_and_draw(tmp_path):
     assert weak["dofs"][1] == "2821" and int(weak["dofs"][0]) < 1000
     for kind in ("strong", "weak"):
         assert (tmp_path / kind / "chart.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("script, knobs, message", [
+    ("strong_scaling.sh", {"COUNTS": "0 2"}, "COUNTS: '0' is no whole number from 1 on"),
+    ("weak_scaling.sh", {"COUNTS": "1 a"}, "COUNTS: 'a' is"),
+    ("weak_scaling.sh", {"COUNTS": "1 2", "PER_RANK": "-5"}, "PER_RANK: '-5' is"),
+    ("many_runs.sh", {"SIDE": "none"}, "SIDE: 'none' is"),
+])
+def test_a_bad_knob_ends_a_job_with_one_message_before_any_run(tmp_path, script, knobs, message):
+    run, printed, errors = job(tmp_path / "out", script, arguments=QUICK, **knobs, **PIN)
+    assert run.returncode == 1 and errors.startswith(message) and len(errors.splitlines()) == 1
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_jobs_say_what_they_are_for(tmp_path):
+    run, printed, errors = job(tmp_path / "out", "many_runs.sh", arguments=["--help"])
+    assert run.returncode == 0 and "Knobs: SCENE, KEY, VALUES" in printed and not (tmp_path / "out").exists()
 
 
 def test_many_runs_go_side_by_side_and_skip_those_that_are_done(tmp_path):
