@@ -27,7 +27,7 @@ namespace
 
 // Of operations and of memory read, by runs of the TGV brake with 5048, 33 224 and 97 742 degrees of freedom:
 constexpr double equilibrium_factors = 2, equilibrium_passes = 140; // over K: ordering, springs, residuals
-constexpr double modes_factors = 13, modes_vectors = 11;
+constexpr double modes_factors = 13, modes_vectors = 9;
 constexpr double read_passes = 1.3, made_factors = 2; // over factor and W; of what they take to be made
 constexpr double dense_operations = 10;               // of a cube of twice the degrees of freedom
 constexpr double seconds_of_no_model = 2.5e-5;        // a step of inputs/oscillator, which is all overhead
@@ -39,9 +39,9 @@ constexpr double reduced_steps = 20000;        // over a matrix of shapes
 constexpr int usual_steps = 128;               // a period, where they are chosen
 constexpr double day = 86400;                  // [s]
 constexpr double dense_copies = 24; // of n x n numbers in a dense quadratic problem: a pencil of size 2 n, six times
-// A slice takes at most 100 pairs and half as many again, and a pass appends two directions a pair at most. So V has
-// up to 250 columns; with its products, a copy while it grows, shapes, residuals and three right sides of a solve:
-constexpr double vectors_of_modes = 4 * 250 + 250 + 200 + 200 + 300;
+// A slice takes about 100 pairs with their guards, and passes append two directions a pair. So V has up to 300 columns;
+// with its products, a copy while it grows, shapes, residuals and three right sides of a solve:
+constexpr double vectors_of_modes = 4 * 300 + 300 + 200 + 200 + 300;
 constexpr double vectors_of_modes_kept = 200; // of the same 100 pairs
 constexpr double vectors_of_shooting = 100;   // pairs of differences, work of a step, columns of the multipliers
 // A basis grows beyond its limit by what one pass adds; with it its copy while it grows, and the random vectors:
@@ -370,14 +370,14 @@ std::string text_of(const Forecast& forecast)
   std::string text = format("  memory forecast, all ranks together: model %.3g MB", 1e-6 * forecast.held);
   for (const StageForecast& stage : forecast.stages)
     text += format(", %s %.3g MB", word(stage.stage), 1e-6 * stage.bytes);
-  text += format("; at most %.3g MB\n", 1e-6 * forecast.bytes());
+  text += format("; at most %.3g MB, with up to 120 modes\n", 1e-6 * forecast.bytes());
   if (forecast.several_ranks)
     text += format("  of what follows the model, %.3g MB on rank 0 alone\n", 1e-6 * forecast.on_rank_zero);
   text += format("  time forecast, by %.2g Gflop/s and %.2g GB/s a rank: about", 1e-9 * forecast.speed.operations,
                  1e-9 * forecast.speed.bytes);
   for (const StageForecast& stage : forecast.stages)
     if (stage.seconds > 0) text += format(" %s %s,", word(stage.stage), duration(stage.seconds).c_str());
-  text += " in all " + duration(forecast.seconds()) + "; up to 120 modes, and a motion that settles on a cycle\n";
+  text += " in all " + duration(forecast.seconds()) + "; with up to 120 modes, and a motion that settles on a cycle\n";
   if (forecast.steps > 0)
     text += format("  at most %.3g time steps of %.2g s, %s\n", forecast.steps, forecast.step_seconds,
                    duration(forecast.seconds_of_steps()).c_str());

@@ -115,11 +115,11 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
   std::vector<Slice> slices = make_slices(real, floor, reach);
   const int all = count_below(real, reach);
   free_factor(real); // all counts that a complete search needs are known
-  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options, &order_of(real));
   CountedSolution result;
   const auto search = [&](double angle)
   {
     Progress progress(comm_of(problem.K), angle == usual_angle ? "modes" : "modes again", all);
+    ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options, &order_of(real));
     bool rigid = false; // a body may be free
     std::vector<double> moduli;
     for (Slice& slice : slices)
@@ -130,7 +130,9 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
       rigid = rigid || slice.smallest < rigid_share * reach * reach;
       for (const Eigenpair& pair : slice.pairs) moduli.push_back(std::abs(pair.lambda));
     }
+    pencil = {}; // before a count that needs a factor as well
     result.count = count_pairs(std::move(moduli), real, rigid ? count_below(real, floor) : 0, end, reach);
+    free_factor(real);
   };
   search(usual_angle);
   // Pairs may have moved from one slice to its neighbour, so that only the count of all slices is certain.
