@@ -29,7 +29,7 @@ one_run() {
   start=$(date +%s.%N)
   RANKS=1 LAUNCH="mpirun --bind-to none --host $1" squeal_run "$folder" "${arguments[@]}" >"$folder.txt" 2>&1
   ! is_done "$folder" "${arguments[@]}" || echo "$2 $start $(date +%s.%N)" >>"$output/times.txt"
-  [ "$failed" = 0 ] || echo "$folder.txt: $(grep -m1 'error:' "$folder.txt")" >&2
+  [ "$failed" = 0 ] || echo "$folder.txt: $(grep -m1 'error:' "$folder.txt" || echo 'see there')" >&2
 }
 
 side_by_side one_run "${values[@]}" -- "$@"

@@ -39,8 +39,8 @@ constexpr double reduced_steps = 20000;        // over a matrix of shapes
 constexpr int usual_steps = 128;               // a period, where they are chosen
 constexpr double day = 86400;                  // [s]
 constexpr double dense_copies = 24; // of n x n numbers in a dense quadratic problem: a pencil of size 2 n, six times
-// A slice takes about 100 pairs with their guards, and passes append two directions a pair. So V has up to 300 columns;
-// with its products, a copy while it grows, shapes, residuals and three right sides of a solve:
+// A slice takes about 100 pairs with their guards, and passes append two directions a pair. So V has 300 columns on
+// the brake; with its products, a copy while it grows, shapes, residuals and three right sides of a solve:
 constexpr double vectors_of_modes = 4 * 300 + 300 + 200 + 200 + 300;
 constexpr double vectors_of_modes_kept = 200; // of the same 100 pairs
 constexpr double vectors_of_shooting = 100;   // pairs of differences, work of a step, columns of the multipliers

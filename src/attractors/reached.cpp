@@ -138,7 +138,7 @@ ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<
   {
     if (energies.empty()) return reached;
     const std::span half = std::span(energies).subspan(energies.size() / 2);
-    const auto [least, most] = std::ranges::minmax(half);
+    const auto [least, most] = std::ranges::minmax(half.size() > 1 ? half : std::span(energies));
     reached.energy = {mean_of(energies, energies.size() / 2, half.size()), most - least};
     reached.frequency = frequency_of(crossings);
     return reached;

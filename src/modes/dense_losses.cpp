@@ -268,22 +268,18 @@ bool solve_lossy_beside(const LossyMatrices& problem, LossKind kind, std::span<c
 {
   constexpr int apart = 4; // steps: what is left of the others is of rounding, and their lambdas are not its own
   const Losses losses = losses_of(kind);
-  std::vector<TwoSidedPair> known;
+  std::vector<std::pair<VectorXcd, Eigen::RowVectorXcd>> known; // a pair's vector, and what takes its part of another
   for (const DenseEigenpair& other : others)
   {
-    known.push_back({other.lambda, other.y, {}});
-    find_left(problem, losses, known.back());
+    TwoSidedPair both{other.lambda, other.y, {}};
+    find_left(problem, losses, both);
+    const Eigen::RowVectorXcd row = both.left.transpose() * sum(problem, derivatives_at(losses, both.lambda));
+    known.emplace_back(other.y, row / (row * other.y)(0));
   }
   const auto without_others = [&](VectorXcd y)
   {
     for (int time = 0; time < 2; ++time) // near pairs are not orthogonal to each other
-      for (const TwoSidedPair& other : known)
-      {
-        const MatrixXcd slope = sum(problem, derivatives_at(losses, other.lambda));
-        const Complex size = other.left.transpose() * (slope * other.right),
-                      part = other.left.transpose() * (slope * y);
-        y -= part / size * other.right;
-      }
+      for (const auto& [vector, row] : known) y -= (row * y)(0) * vector;
     return VectorXcd(y.normalized());
   };
   for (int step = 0; step < apart && pair.lambda.imag() > settled * std::abs(pair.lambda); ++step)
@@ -300,10 +296,10 @@ bool solve_lossy_beside(const LossyMatrices& problem, LossKind kind, std::span<c
   return solve_lossy(problem, kind, pair);
 }
 
-bool are_one(const DenseEigenpair& a, const DenseEigenpair& b)
+bool are_one(const DenseEigenpair& a, const DenseEigenpair& b, const Sameness& limits)
 {
-  constexpr double near = 1e-7, parallel = 1e-4; // vectors of near pairs are off by rounding over their distance
-  return std::abs(a.lambda - b.lambda) < near * std::abs(a.lambda) && (a.y - b.y.dot(a.y) * b.y).norm() < parallel;
+  return std::abs(a.lambda - b.lambda) < limits.lambda * std::abs(a.lambda) &&
+         (a.y - b.y.dot(a.y) * b.y).norm() < limits.vector;
 }
 
 bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex)

@@ -30,6 +30,7 @@ constexpr double share = 1e-3;      // directions of residuals below this part o
 struct CorrectedMode : LossyMode
 {
   double complex_error = HUGE_VAL, viscous_error = HUGE_VAL;
+  std::optional<Complex> drawn_to{}; // the lambda of another mode, which Newton's method led it to
 
   double backward_error() const { return taken == LossKind::viscous ? viscous_error : complex_error; }
 };
@@ -47,37 +48,49 @@ void widen(VectorXcd& a, Index columns)
 /// One of a mode's two problems.
 struct Side
 {
-  LossKind kind{};
-  DenseEigenpair LossyMode::*pair = nullptr;
-  double CorrectedMode::*error = nullptr;
+  LossKind kind;
+  DenseEigenpair LossyMode::*pair;
+  double CorrectedMode::*error;
 };
 
 /// Makes the pairs of a side that are not exact those of the problem on the subspace, each once. Returns which of them
-/// it found.
+/// it found; the others stay what they were.
 std::vector<char> solve_side(const LossyMatrices& problem, const Side& side, Group& group)
 {
-  constexpr double near = 1e-5; // of lambda: what may draw a pair to itself
+  constexpr double near = 1e-5, far = 1e-3; // of lambda: what may draw a pair to itself, what it cannot be
   std::vector<char> found(group.size(), 0);
   std::vector<DenseEigenpair> solved;
+  const auto is_known = [&](const DenseEigenpair& pair, const Sameness& limits)
+  { return std::ranges::any_of(solved, [&](const DenseEigenpair& other) { return are_one(other, pair, limits); }); };
   for (CorrectedMode& mode : group)
     if (mode.*side.error <= tolerance) solved.push_back(mode.*side.pair);
   for (std::size_t k = 0; k < group.size(); ++k)
   {
-    DenseEigenpair& pair = group[k].*side.pair;
-    const bool is_needed = side.kind == LossKind::complex || group[k].taken == LossKind::viscous;
-    if (!is_needed || group[k].*side.error <= tolerance) continue;
-    DenseEigenpair start = pair;
-    found[k] = solve_lossy(problem, side.kind, pair) ? 1 : 0;
-    if (!found[k]) continue;
-    if (std::ranges::any_of(solved, [&](const DenseEigenpair& other) { return are_one(other, pair); }))
+    CorrectedMode& mode = group[k];
+    const bool is_needed = side.kind == LossKind::complex || mode.taken == LossKind::viscous;
+    if (!is_needed || mode.*side.error <= tolerance) continue;
+    DenseEigenpair pair = mode.*side.pair;
+    if (!solve_lossy(problem, side.kind, pair)) continue;
+    if (is_known(pair, perhaps))
     {
+      const auto distance = [&](const DenseEigenpair& other)
+      { return std::abs(other.lambda - pair.lambda) / std::abs(pair.lambda); };
       std::vector<DenseEigenpair> others;
       std::ranges::copy_if(solved, std::back_inserter(others),
-                           [&](const DenseEigenpair& other)
-                           { return std::abs(other.lambda - pair.lambda) < near * std::abs(pair.lambda); });
-      if (solve_lossy_beside(problem, side.kind, others, start)) pair = std::move(start);
+                           [&](const DenseEigenpair& other) { return distance(other) < near; });
+      DenseEigenpair beside = mode.*side.pair;
+      if (solve_lossy_beside(problem, side.kind, others, beside) && distance(beside) < far &&
+          !is_known(beside, perhaps))
+        pair = std::move(beside);
+      else if (is_known(pair, {}))
+      {
+        mode.drawn_to = pair.lambda;
+        continue;
+      }
     }
+    found[k] = 1;
     solved.push_back(pair);
+    mode.*side.pair = std::move(pair);
   }
   return found;
 }
@@ -91,6 +104,7 @@ void solve_group(ComplexSubspace& space, Group& group, const PencilFactor& P)
   for (int pass = 0;; ++pass)
   {
     end_if_asked(space.V.comm);
+    for (CorrectedMode& mode : group) mode.drawn_to.reset();
     MultiVector residuals{space.V.comm, MatrixXd(space.V.entries.rows(), 0)};
     for (const Side& side : {complex, viscous})
     {
@@ -145,6 +159,7 @@ struct LossyPairs
 {
   std::vector<Eigenpair> pairs{};
   std::vector<ModeLoss> losses{};
+  std::optional<Complex> doubled{}; // the lambda of two modes
 };
 
 /// Solves groups of at most so many pairs.
@@ -191,6 +206,7 @@ LossyPairs solve_in_groups(const std::vector<Eigenpair>& without_losses, const C
       copy_column(y, 1, pair.imaginary);
       pair.lambda = own.lambda;
       pair.backward_error = mode.backward_error();
+      if (mode.drawn_to) result.doubled = mode.drawn_to;
       const double error = std::abs(own.lambda - mode.complex.lambda) / std::abs(own.lambda);
       result.losses[places[k]] = {loss_factor_of(mode.taken, own.lambda),
                                   mode.taken == LossKind::viscous ? error : std::numeric_limits<double>::quiet_NaN()};
@@ -207,18 +223,18 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
   const ComplexSubspace empty = empty_subspace({problem.M, problem.C, problem.K, K_loss});
   ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
   LossyPairs found;
-  std::optional<Complex> twice;
   for (const std::size_t in_group : {usual_group, largest_group})
   {
+    found = {}; // before others take memory
     found = solve_in_groups(solution.pairs, empty, pencil, in_group);
-    twice = doubled(found.pairs, problem.K);
-    if (!twice) break;
+    if (!found.doubled) found.doubled = doubled(found.pairs, problem.K);
+    if (!found.doubled) break;
   }
   solution.pairs = std::move(found.pairs);
-  if (twice && solution.outcome.kind == OutcomeKind::converged)
+  if (found.doubled && solution.outcome.kind == OutcomeKind::converged)
   {
     solution.outcome.kind = OutcomeKind::not_converged;
-    solution.outcome.reason = describe_doubled(*twice);
+    solution.outcome.reason = describe_doubled(*found.doubled);
   }
   solution.outcome.residual = 0;
   for (const Eigenpair& pair : solution.pairs)

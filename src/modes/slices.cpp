@@ -50,7 +50,7 @@ std::vector<Slice> make_slices(RealCount& real, double floor, double reach)
   {
     const double lower = edges.back(), upper = edges[edges.size() - 2];
     const int expected = count_below(real, upper) - count_below(real, lower);
-    if (expected > most_in_slice && upper - lower > narrowest * upper)
+    if (expected > most_in_slice && upper > floor && upper - lower > narrowest * upper)
     {
       edges.insert(edges.end() - 1, (lower + upper) / 2);
       continue;

@@ -51,9 +51,6 @@ bool solve_lossy(const LossyMatrices& problem, LossKind kind, DenseEigenpair& pa
 bool solve_lossy_beside(const LossyMatrices& problem, LossKind kind, std::span<const DenseEigenpair> others,
                         DenseEigenpair& pair);
 
-/// Whether Newton's method led two pairs to one.
-bool are_one(const DenseEigenpair& a, const DenseEigenpair& b);
-
 /// A mode of its own frequency, and of the complex problem.
 struct LossyMode
 {
@@ -79,6 +76,17 @@ struct NeighbouringPairs
 /// Two pairs are one where both are less apart: lambdas over |lambda|, and the sine between right vectors. Those of
 /// defective pairs are as far apart as the root of rounding at least.
 inline constexpr double same_lambda = 1e-8, same_vector = 1e-9;
+
+/// Whether Newton's method led two pairs to one, by such limits. Of near pairs it leaves vectors off by rounding over
+/// their distance, so that looser ones tell where to look.
+struct Sameness
+{
+  double lambda = same_lambda, vector = same_vector;
+};
+
+inline constexpr Sameness perhaps{1e-7, 1e-4};
+
+bool are_one(const DenseEigenpair& a, const DenseEigenpair& b, const Sameness& limits = {});
 
 /// The lambda of a pair with losses that is another one's as well, if there is any.
 std::optional<std::complex<double>> doubled_lambda(const std::vector<TwoSidedPair>& pairs);
