@@ -19,10 +19,11 @@ root=${SQUEAL_ROOT:-$(dirname "$(realpath "$script")")/..}
 output=${OUTPUT:-results/weak_scaling}
 counts=(${COUNTS:-$(rank_counts)})
 whole_numbers COUNTS "${counts[@]}"
-whole_numbers PER_RANK "${PER_RANK:-16000}"
+per_rank=${PER_RANK:-16000}
+whole_numbers PER_RANK "$per_rank"
 for ranks in "${counts[@]}"; do
   RANKS=$ranks squeal_run "$output/ranks_$ranks" "${SCENE:-inputs/tgv/scene.toml}" \
-    --set "${KEY:-mesh.parameters.size}=$((ranks * ${PER_RANK:-16000}))" "$@"
+    --set "${KEY:-mesh.parameters.size}=$((ranks * per_rank))" "$@"
 done
 finish
 python3 jobs/scaling.py weak "$output" "${counts[@]}"

@@ -129,7 +129,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   parts.comm = comm_of(K);
   parts.layout = row_layout(K);
   const bool symmetric = symmetry == Symmetry::symmetric;
-  const EliminationOrder order = known ? *known : elimination_order(K);
+  const EliminationOrder made = known ? EliminationOrder{} : elimination_order(K), &order = known ? *known : made;
   std::vector<MUMPS_INT> positions(order.position.begin(), order.position.end());
   parts.whole = is_made_whole(order.entries, symmetry, options, parts.comm);
   const auto entries_of = [&](Mat A)

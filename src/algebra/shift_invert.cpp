@@ -3,6 +3,7 @@
 #include "squeal/base/run_control.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
@@ -47,8 +48,8 @@ void grow(Krylov& krylov, const ShiftInvert& pencil)
 /// The leading columns of a Schur basis of the square part of H, and the residual of their span.
 struct Leading
 {
-  Eigen::VectorXcd nu{};      // eigenvalues of (K - shift M)^-1 M, none smaller in modulus than those left out
-  MatrixXd Q{};               // order x nu.size()
+  std::vector<Complex> nu{};  // eigenvalues of (K - shift M)^-1 M, none smaller in modulus than those left out
+  MatrixXd Q{};               // order x nu.size(), and columns for guards
   double next = 0;            // the largest |nu| that was left out
   double residual = HUGE_VAL; // over the smallest |nu|
 };
@@ -77,7 +78,7 @@ std::size_t number_to_take(const std::vector<double>& descending, PetscInt count
   return widest > 1 + 1e-9 ? best : size;
 }
 
-Leading leading_subspace(const Krylov& krylov, PetscInt count, double least, double slack)
+Leading leading_subspace(const Krylov& krylov, PetscInt count, double least, double guards)
 {
   const Index order = krylov.order();
   Leading result;
@@ -87,29 +88,34 @@ Leading leading_subspace(const Krylov& krylov, PetscInt count, double least, dou
   std::vector<double> descending;
   for (const Complex nu : schur->eigenvalues) descending.push_back(std::abs(nu));
   std::sort(descending.rbegin(), descending.rend());
-  const std::size_t taken = number_to_take(descending, count, least, slack);
-  if (taken == 0) return result;
-  const double smallest = descending[taken - 1] * (1 - 1e-12);
+  const auto down_to = [&](std::size_t taken) { return descending[taken - 1] * (1 - 1e-12); };
+  const auto take = [&](double smallest) // in front, in the order that they have
+  {
+    const auto chosen = [&](Complex nu) { return std::abs(nu) >= smallest; };
+    const auto number = std::ranges::count_if(schur->eigenvalues, chosen);
+    if (!reorder(*schur, chosen)) return false;
+    result.Q = schur->Q.leftCols(number);
+    return true;
+  };
+  const std::size_t taken = number_to_take(descending, count, least, 0.5);
+  if (taken == 0 || !take(down_to(taken))) return result;
+  result.nu.assign(schur->eigenvalues.begin(), schur->eigenvalues.begin() + result.Q.cols());
   result.next = taken < descending.size() ? descending[taken] : 0;
-  const auto chosen = [&](Complex nu) { return std::abs(nu) >= smallest; };
-  const Index number = std::count_if(schur->eigenvalues.begin(), schur->eigenvalues.end(), chosen);
-  if (!reorder(*schur, chosen)) return result;
-  result.nu = Eigen::VectorXcd::Map(schur->eigenvalues.data(), number);
-  result.Q = schur->Q.leftCols(number);
   const MatrixXd outside = krylov.H.bottomRows(krylov.H.rows() - order) * result.Q;
-  result.residual = std::sqrt(outside.colwise().squaredNorm().maxCoeff()) / smallest;
+  result.residual = std::sqrt(outside.colwise().squaredNorm().maxCoeff()) / down_to(taken);
+  const auto wider = static_cast<PetscInt>((1 + guards) * static_cast<double>(taken));
+  if (guards > 0) take(down_to(number_to_take(descending, wider, HUGE_VAL, 0.1)));
   return result;
 }
 
 /// Computed on rank 0 and broadcast, since what follows must be the same on every rank.
-Leading leading_subspace_shared(const Krylov& krylov, PetscInt count, double least, double slack = 0.5)
+Leading leading_subspace_shared(const Krylov& krylov, PetscInt count, double least, double guards)
 {
   Leading leading;
   const MPI_Comm comm = krylov.V.comm;
-  on_rank_zero(comm, [&] { leading = leading_subspace(krylov, count, least, slack); });
+  on_rank_zero(comm, [&] { leading = leading_subspace(krylov, count, least, guards); });
   broadcast(leading.Q, comm);
-  leading.nu.resize(leading.Q.cols());
-  MPI_Bcast(leading.nu.data(), to_int(leading.nu.size()), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
+  broadcast(leading.nu, comm);
   MPI_Bcast(&leading.next, 1, MPI_DOUBLE, 0, comm);
   MPI_Bcast(&leading.residual, 1, MPI_DOUBLE, 0, comm);
   return leading;
@@ -160,7 +166,7 @@ Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, 
     grow(krylov, pencil);
     const bool exhausted = krylov.V.columns() == krylov.order();
     if (!exhausted && (krylov.order() < 2 * count || round % (1 + krylov.order() / 150) != 0)) continue;
-    const Leading leading = leading_subspace_shared(krylov, count, least);
+    const Leading leading = leading_subspace_shared(krylov, count, least, guards);
     result.converged = exhausted || leading.residual < tolerance;
     if (!result.converged) continue;
     double smallest = leading.next > 0 ? HUGE_VAL : 0; // where nothing is left out the reach is unlimited
@@ -170,12 +176,7 @@ Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, 
       smallest = std::min(smallest, std::abs(nu));
     }
     result.reach = 1 / smallest;
-    const auto wider = static_cast<PetscInt>((1 + guards) * static_cast<double>(leading.Q.cols()));
-    MatrixXd Q = leading.Q;
-    if (wider > Q.cols())
-      if (const Leading more = leading_subspace_shared(krylov, wider, HUGE_VAL, 0.1); more.Q.cols() > Q.cols())
-        Q = more.Q;
-    result.space = {krylov.V.comm, krylov.V.entries.leftCols(krylov.order()) * Q};
+    result.space = {krylov.V.comm, krylov.V.entries.leftCols(krylov.order()) * leading.Q};
   }
   return result;
 }

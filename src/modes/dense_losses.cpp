@@ -176,11 +176,10 @@ std::vector<TwoSidedPair> changed_together(const LossyMatrices& problem, const s
   return changed;
 }
 
-/// Whether Newton's method led two pairs to one.
-bool are_one(const TwoSidedPair& a, const TwoSidedPair& b)
+/// The same of pairs or of their right vectors.
+bool are_one(Complex a, const VectorXcd& of_a, Complex b, const VectorXcd& of_b, const Sameness& limits)
 {
-  return std::abs(a.lambda - b.lambda) < same_lambda * std::abs(a.lambda) &&
-         (a.right - b.right.dot(a.right) * b.right).norm() < same_vector;
+  return std::abs(a - b) < limits.lambda * std::abs(a) && (of_a - of_b.dot(of_a) * of_b).norm() < limits.vector;
 }
 
 /// The places of pairs that are the same as another one.
@@ -189,7 +188,7 @@ std::vector<std::size_t> doubled(const std::vector<TwoSidedPair>& pairs)
   std::vector<std::size_t> places;
   for (std::size_t k = 0; k < pairs.size(); ++k)
     for (std::size_t l = 0; l < pairs.size(); ++l)
-      if (l != k && are_one(pairs[l], pairs[k]))
+      if (l != k && are_one(pairs[l].lambda, pairs[l].right, pairs[k].lambda, pairs[k].right, {}))
       {
         places.push_back(k);
         break;
@@ -298,8 +297,7 @@ bool solve_lossy_beside(const LossyMatrices& problem, LossKind kind, std::span<c
 
 bool are_one(const DenseEigenpair& a, const DenseEigenpair& b, const Sameness& limits)
 {
-  return std::abs(a.lambda - b.lambda) < limits.lambda * std::abs(a.lambda) &&
-         (a.y - b.y.dot(a.y) * b.y).norm() < limits.vector;
+  return are_one(a.lambda, a.y, b.lambda, b.y, limits);
 }
 
 bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex)
@@ -521,7 +519,7 @@ void add_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
   for (const TwoSidedPair& pair : pairs) eigenvalues.push_back(pair.lambda);
   std::vector<std::size_t> places; // of those with losses
   std::vector<TwoSidedPair> with;
-  for (const NeighbouringPairs& group : neighbouring_pairs(eigenvalues))
+  for (const NeighbouringPairs& group : neighbouring_pairs(eigenvalues, usual_group))
   {
     std::vector<TwoSidedPair> near;
     for (const std::size_t place : group.places) near.push_back(pairs[place]);

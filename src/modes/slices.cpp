@@ -17,7 +17,7 @@ namespace
 {
 
 constexpr int most_in_slice = 100;      // pairs
-constexpr double narrowest = 1e-3;      // slice, over its upper end: what lies closer is not parted
+constexpr double narrowest = 1e-3;      // slice, over its upper end: nearer modes are not parted
 constexpr double reach_of_count = 1.05; // over the band
 // The angle by which friction turns theta [rad], twice the change of the damping ratio: of most pairs, and of those
 // that a second search includes.
@@ -116,16 +116,16 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
   const int all = count_below(real, reach);
   free_factor(real); // all counts that a complete search needs are known
   CountedSolution result;
-  const auto search = [&](double angle)
+  const auto search = [&](bool again)
   {
-    Progress progress(comm_of(problem.K), angle == usual_angle ? "modes" : "modes again", all);
+    Progress progress(comm_of(problem.K), again ? "modes again" : "modes", all);
     ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options, &order_of(real));
     bool rigid = false; // a body may be free
     std::vector<double> moduli;
     for (Slice& slice : slices)
     {
-      if (angle == usual_angle || static_cast<int>(slice.pairs.size()) < slice.expected)
-        find_pairs(slice, problem, pencil, angle);
+      if (!again || static_cast<int>(slice.pairs.size()) < slice.expected)
+        find_pairs(slice, problem, pencil, again ? wide_angle : usual_angle);
       progress.update(count_below(real, slice.upper), format("below %.4g Hz", slice.upper / two_pi));
       rigid = rigid || slice.smallest < rigid_share * reach * reach;
       for (const Eigenpair& pair : slice.pairs) moduli.push_back(std::abs(pair.lambda));
@@ -134,9 +134,9 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
     result.count = count_pairs(std::move(moduli), real, rigid ? count_below(real, floor) : 0, end, reach);
     free_factor(real);
   };
-  search(usual_angle);
+  search(false);
   // Pairs may have moved from one slice to its neighbour, so that only the count of all slices is certain.
-  if (result.count.found < result.count.expected) search(wide_angle);
+  if (result.count.found < result.count.expected) search(true);
   result.solution = join(std::move(slices));
   return result;
 }

@@ -45,6 +45,14 @@ double stiffness(const Row& row, const std::vector<double>& weight, int i, int j
   return std::abs(i - j) == 1 ? -row.s * weight[static_cast<std::size_t>(std::max(i, j))] : 0;
 }
 
+Eigen::MatrixXd dense(const Row& row, const std::vector<double>& weight)
+{
+  const Eigen::Index n = row.masses();
+  return Eigen::MatrixXd::NullaryExpr(n, n,
+                                      [&](Eigen::Index i, Eigen::Index j)
+                                      { return stiffness(row, weight, static_cast<int>(i), static_cast<int>(j)); });
+}
+
 template <class Entry> Owned<Mat> matrix(int n, Entry entry)
 {
   Owned<Mat> A;
@@ -195,13 +203,7 @@ TEST_CASE("parts of different loss factors have the modes of dense algebra, and 
   Row row{{}, 1e4, 1.5, 90};
   for (int i = 0; i < 13; ++i) row.loss.push_back(i < 5 ? most : i < 9 ? 0.01 : 0);
   const int n = row.masses();
-  Eigen::MatrixXd K(n, n), L(n, n);
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-    {
-      K(i, j) = stiffness(row, row.shares(), i, j);
-      L(i, j) = stiffness(row, row.lossy(), i, j);
-    }
+  const Eigen::MatrixXd K = dense(row, row.shares()), L = dense(row, row.lossy());
   const Eigen::MatrixXd C_0 = row.alpha * Eigen::MatrixXd::Identity(n, n);
   const std::vector<Complex> stiff = dense_pairs(C_0, K + Complex(0, 1) * L);
   const Modes modes = modes_of(row, 1000);
@@ -242,13 +244,7 @@ TEST_CASE("every mode of a cluster that losses mix is found once")
     row.loss.push_back(holds && i % 6 == 1 ? 0.05 : 0);
   }
   const int n = row.masses();
-  Eigen::MatrixXd K(n, n), L(n, n);
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-    {
-      K(i, j) = stiffness(row, row.shares(), i, j);
-      L(i, j) = stiffness(row, row.lossy(), i, j);
-    }
+  const Eigen::MatrixXd K = dense(row, row.shares()), L = dense(row, row.lossy());
   const Modes modes = modes_of(row, 1000);
   CHECK(modes.outcome.kind == OutcomeKind::converged);
   REQUIRE(modes.modes.size() == static_cast<std::size_t>(n));

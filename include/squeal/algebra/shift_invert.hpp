@@ -40,7 +40,7 @@ struct Nearest
 
 /// The `count` nearest theta and all within `radius` of the shift. `tolerance`: the residual of the invariant
 /// subspace, relative to the smallest |1/(theta - shift)| in it. `guards`: by this part of its size the space is wider,
-/// of what lies next, whose residual is larger.
+/// of the next nearest theta, whose residual is larger.
 Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, double tolerance, double guards = 0);
 
 /// Sets a spectral transformation of SLEPc to shift-and-invert with MUMPS's LU, before it is set up.

@@ -94,13 +94,13 @@ std::optional<std::complex<double>> doubled_lambda(const std::vector<TwoSidedPai
 /// The sentence that says so.
 std::string describe_doubled(std::complex<double> lambda);
 
-/// Of pairs in a group, at most: what serves where modes lie farther apart than losses move them, in little time, and
+/// Of pairs in a group, at most: what serves where modes differ by more than losses change them, in little time, and
 /// what a cluster of modes may need.
 inline constexpr std::size_t usual_group = 16, largest_group = 64;
 
 /// All eigenvalues that oscillate, by frequency.
 std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<std::complex<double>>& eigenvalues,
-                                                  std::size_t in_group = usual_group);
+                                                  std::size_t in_group);
 
 /// What pairs without K_loss become with it, both vectors; from the matrices of rank 0, on every rank. Pairs that do
 /// not oscillate stay. Two may become one: of a problem that is not yet exact, or beyond what was asked for.
