@@ -86,14 +86,10 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   plan.entries = std::move(own);
   Triplets pattern;
   if (ranks_of(comm) > 1) pattern = gather(plan.entries, TripletContent::pattern, comm);
-  on_rank_zero(comm,
-               [&]
-               {
-                 const Triplets& all = ranks_of(comm) > 1 ? pattern : plan.entries;
-                 plan.symbolic = options.known ? options.known->analyse(all, rows_of(A), rows_of(B))
-                                               : analyse(all, rows_of(A), rows_of(B));
-                 plan.memory = cholesky_memory(plan.symbolic);
-               });
+  const Triplets& all = ranks_of(comm) > 1 ? pattern : plan.entries;
+  plan.symbolic = options.known ? options.known->analyse(all, rows_of(A), rows_of(B), comm)
+                                : analyse(all, rows_of(A), rows_of(B), comm);
+  plan.memory = cholesky_memory(plan.symbolic);
   MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);
   constexpr double gigabyte = 1e9;
   const bool too_large = ranks_of(comm) > 1 && plan.memory / ranks_of(comm) > options.limit * gigabyte;
@@ -268,15 +264,7 @@ std::vector<double> CondensedProducts::product(std::span<const double> x, std::s
 
 void CondensedProducts::read(const std::function<void(const CondensedStrip&)>& take) const
 {
-  const int width = strip_width(size());
-  for (int first = 0; first < size(); first += width)
-  {
-    const int last = std::min(first + width, size());
-    const std::vector<double> values = parts_->cholesky->schur_complement(first, last);
-    const auto begin = static_cast<std::size_t>(first);
-    if (parts_->on_rank_zero())
-      take({begin, static_cast<std::size_t>(last), static_cast<std::size_t>(size()) - begin, values.data()});
-  }
+  parts_->cholesky->read_schur_complement(strip_width(size()), take);
 }
 
 std::vector<double> Factor::forward(std::span<const Vec> b) const

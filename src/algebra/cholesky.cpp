@@ -15,20 +15,36 @@ namespace squeal
 namespace
 {
 
-/// The largest sizes of the stack of updates that wait for their parents, and of a front, of supernodes from `begin` to
-/// `end`.
-std::pair<std::size_t, std::size_t> largest_sizes(const SymbolicFactor& symbolic, std::size_t begin, std::size_t end)
+/// What elimination works in [numbers]. It is allocated once, since the system takes as long to clear memory as some
+/// fronts take to fill, and is not touched before it is needed.
+struct WorkSizes
 {
-  std::size_t waiting = 0, most = 0, front = 0;
-  for (std::size_t k = begin; k < end; ++k)
+  std::size_t waiting = 0;  // the stack of updates that wait for their parents: children come before these
+  std::size_t front = 0;    // the largest one
+  std::size_t received = 0; // the largest update of another rank's subtree
+};
+
+WorkSizes work_sizes(const SymbolicFactor& symbolic, std::span<const SharedSupernode> shared = {})
+{
+  WorkSizes sizes;
+  std::size_t waiting = 0;
+  for (const Supernode& supernode : symbolic.supernodes)
   {
-    const Supernode& supernode = symbolic.supernodes[k];
     for (const int child : supernode.children) waiting -= update_size(symbolic.supernodes[at(child)]);
     waiting += update_size(supernode);
-    most = std::max(most, waiting);
-    front = std::max(front, front_size(supernode));
+    sizes.waiting = std::max(sizes.waiting, waiting);
+    sizes.front = std::max(sizes.front, front_size(supernode));
   }
-  return {most, front};
+  for (const SharedSupernode& supernode : shared)
+    for (const Subtree& branch : supernode.branches)
+      sizes.received = std::max(sizes.received, branch.inner * branch.below.size());
+  return sizes;
+}
+
+double memory_of(const SymbolicFactor& symbolic, const WorkSizes& work)
+{
+  return sizeof(double) * static_cast<double>(symbolic.values + work.waiting + work.front + work.received) +
+         sizeof(int) * static_cast<double>(symbolic.rows.size());
 }
 
 /// This rank's entries of its columns and of shared ones. Collective.
@@ -68,6 +84,20 @@ Triplets entries_of_columns(const Triplets& own, const TreeShare& share, MPI_Com
 
 } // namespace
 
+struct Cholesky::Work
+{
+  explicit Work(const WorkSizes& sizes)
+      : waiting(std::make_unique_for_overwrite<double[]>(sizes.waiting)),
+        front(std::make_unique_for_overwrite<double[]>(sizes.front)),
+        received(std::make_unique_for_overwrite<double[]>(sizes.received)), top(waiting.get())
+  {
+  }
+
+  std::unique_ptr<double[]> waiting, front, received;
+  double* top;                 // of the stack of updates
+  std::vector<double*> left{}; // there, the updates of own subtrees' roots
+};
+
 Cholesky::Cholesky(Triplets own, SymbolicFactor symbolic, const RowLayout& layout, MPI_Comm comm)
     : comm_(comm), share_(share_tree(std::move(symbolic), comm)),
       exchange_(layout, share_.symbolic.position, share_.owner, comm)
@@ -82,13 +112,12 @@ void Cholesky::factorise(Triplets own)
   const Columns A = ordered(own, symbolic);
   own = {};
   values_ = vector_on_large_pages(symbolic.values);
-  // Updates form a stack, since children come before parents. Its memory is not touched before it is needed.
-  const auto waiting = std::make_unique_for_overwrite<double[]>(largest_sizes(symbolic, 0, share_.own).first);
-  int failed = !eliminate_own(A, waiting.get());
+  Work work(work_sizes(symbolic, share_.shared));
+  int failed = !eliminate_own(A, work);
   if (ranks_of(comm_) > 1)
   {
     MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_LOR, comm_);
-    if (!failed) failed = !eliminate_shared(A);
+    if (!failed) failed = !eliminate_shared(A, work);
     MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_LOR, comm_);
   }
   failed_ = failed;
@@ -105,91 +134,76 @@ void Cholesky::pack(const Supernode& supernode, const double* front, std::size_t
   pack_panel(front + pivots + split, height, below - split, pivots, to);
 }
 
-/// Leaves the updates of the subtrees' roots in `waiting`.
-bool Cholesky::eliminate_own(const Columns& A, double* waiting)
+/// Adds to the front what its children left on the stack, the last one first.
+void Cholesky::add_children(const Front& front, const std::vector<int>& local, Work& work) const
+{
+  for (auto number = front.supernode.children.rbegin(); number != front.supernode.children.rend(); ++number)
+  {
+    const Supernode& child = share_.symbolic.supernodes[at(*number)];
+    work.top -= update_size(child);
+    add_update(front, {at(child.inner()), {rows_of(child), at(child.below)}, work.top}, local);
+  }
+}
+
+/// Leaves the updates of the subtrees' roots on the stack.
+bool Cholesky::eliminate_own(const Columns& A, Work& work)
 {
   const SymbolicFactor& symbolic = share_.symbolic;
-  const auto values = std::make_unique_for_overwrite<double[]>(largest_sizes(symbolic, 0, share_.own).second);
   std::vector<int> local(at(symbolic.dofs + symbolic.border));
-  left_.assign(share_.own, nullptr);
-  double* top = waiting;
+  work.left.assign(share_.own, nullptr);
   for (std::size_t k = 0; k < share_.own; ++k)
   {
     const Supernode& supernode = symbolic.supernodes[k];
-    const Front front{supernode, rows_of(supernode), values.get()};
+    const Front front{supernode, rows_of(supernode), work.front.get()};
     assemble(front, A, local);
-    for (auto number = supernode.children.rbegin(); number != supernode.children.rend(); ++number)
-    {
-      const Supernode& child = symbolic.supernodes[at(*number)];
-      top -= update_size(child);
-      add_update(front, {at(child.inner()), {rows_of(child), at(child.below)}, top}, local);
-    }
+    add_children(front, local, work);
     if (!eliminate_pivots(front)) return false;
     pack(supernode, front.values, at(supernode.below));
-    copy_update(front, top);
-    left_[k] = top;
-    top += update_size(supernode);
+    copy_update(front, work.top);
+    work.left[k] = work.top;
+    work.top += update_size(supernode);
   }
   return true;
 }
 
 /// Continues where a pivot is not positive, since all ranks take part.
-bool Cholesky::eliminate_shared(const Columns& A)
+bool Cholesky::eliminate_shared(const Columns& A, Work& work)
 {
   const SymbolicFactor& symbolic = share_.symbolic;
   const int ranks = ranks_of(comm_), me = rank_of(comm_);
   std::vector<int> local(at(symbolic.dofs + symbolic.border), -1);
-  updates_.resize(share_.shared.size());
-  std::vector<double> values, received;
   bool positive = true;
   for (std::size_t k = 0; k < share_.shared.size(); ++k)
   {
     const Supernode& supernode = symbolic.supernodes[share_.own + k];
     const SharedSupernode& shared = share_.shared[k];
-    values.resize(std::max(values.size(), front_size(supernode)));
-    const Front front{supernode, rows_of(supernode), values.data()};
+    const Front front{supernode, rows_of(supernode), work.front.get()};
     for (const int row : shared.border)
       if (holder_of(row - symbolic.dofs, ranks) != me) local[at(row)] = -1;
     assemble(front, A, local);
     for (const Subtree& branch : shared.branches)
     {
-      const std::size_t size = branch.inner * branch.below.size();
-      received.resize(std::max(received.size(), size));
-      if (branch.owner == me) std::copy_n(left_[branch.root], size, received.data());
-      MPI_Bcast(received.data(), to_int(size), MPI_DOUBLE, branch.owner, comm_);
-      add_update(front, {branch.inner, branch.below, received.data()}, local);
+      double* const update = branch.owner == me ? work.left[branch.root] : work.received.get();
+      MPI_Bcast(update, to_int(branch.inner * branch.below.size()), MPI_DOUBLE, branch.owner, comm_);
+      add_update(front, {branch.inner, branch.below, update}, local);
     }
-    for (const int number : supernode.children)
-    {
-      const Supernode& child = symbolic.supernodes[at(number)];
-      std::vector<double>& update = updates_[at(number) - share_.own];
-      add_update(front, {at(child.inner()), {rows_of(child), at(child.below)}, update.data()}, local);
-      update = {};
-    }
+    add_children(front, local, work);
     positive = eliminate_pivots(front) && positive;
     pack(supernode, front.values, at(supernode.inner()));
-    updates_[k].resize(update_size(supernode));
-    copy_update(front, updates_[k].data());
+    copy_update(front, work.top);
+    work.top += update_size(supernode);
   }
-  updates_.clear();
-  left_.clear();
   return positive;
 }
 
 double cholesky_memory(const SymbolicFactor& symbolic)
 {
-  const auto [waiting, front] = largest_sizes(symbolic, 0, symbolic.supernodes.size());
-  return sizeof(double) * static_cast<double>(symbolic.values + waiting + front) +
-         sizeof(int) * static_cast<double>(symbolic.rows.size());
+  return memory_of(symbolic, work_sizes(symbolic));
 }
 
 double cholesky_memory(const TreeShare& share)
 {
-  const SymbolicFactor& symbolic = share.symbolic;
-  const auto [own, front] = largest_sizes(symbolic, 0, share.own);
-  const auto [shared, shared_front] = largest_sizes(symbolic, share.own, symbolic.supernodes.size());
-  return sizeof(double) * static_cast<double>(symbolic.values + own + shared + std::max(front, shared_front)) +
-         sizeof(int) * static_cast<double>(symbolic.rows.size());
+  return memory_of(share.symbolic, work_sizes(share.symbolic, share.shared));
 }
 
 } // namespace squeal

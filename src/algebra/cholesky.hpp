@@ -5,6 +5,7 @@
 /// so that a solve has two halves, y = L^-1 b with E y = B A^-1 b, and x = L^-T (y - E' lambda). Each rank holds its
 /// share of the elimination tree (tree_share.hpp).
 #include "position_exchange.hpp"
+#include "squeal/algebra/bordered_factor.hpp"
 #include "tree_share.hpp"
 
 namespace squeal
@@ -23,9 +24,8 @@ public:
   /// Whether A is not positive definite, the same on all ranks; the factor is then not to be used.
   bool failed() const { return failed_; }
 
-  /// Columns `first` to `last` of E E' from row `first` on, one column after the other, of which the lower triangle is
-  /// set; on rank 0. Collective.
-  std::vector<double> schur_complement(int first, int last) const;
+  /// Gives E E' to `take` on rank 0 by strips of `width` columns, of which the lower triangle is set. Collective.
+  void read_schur_complement(int width, const std::function<void(const CondensedStrip&)>& take) const;
 
   /// E E' x for each x, the border's rows one after the other; x is read and the product given on rank 0. Collective.
   std::vector<double> schur_product(std::span<const double> x, std::size_t columns) const;
@@ -43,9 +43,12 @@ public:
   double border_entries() const;
 
 private:
+  struct Work; // memory that elimination works in
+
   void factorise(Triplets own);
-  bool eliminate_own(const Columns& A, double* waiting);
-  bool eliminate_shared(const Columns& A);
+  bool eliminate_own(const Columns& A, Work& work);
+  bool eliminate_shared(const Columns& A, Work& work);
+  void add_children(const Front& front, const std::vector<int>& local, Work& work) const;
   void pack(const Supernode& supernode, const double* front, std::size_t split);
   void sum_shared_pivots();
   void subtract_shared_border();
@@ -54,11 +57,9 @@ private:
   MPI_Comm comm_;
   TreeShare share_;
   PositionExchange exchange_;
-  std::vector<double> values_;               // L and E, packed
-  std::vector<std::vector<double>> updates_; // of shared supernodes, until they are added to their parents
-  std::vector<const double*> left_;          // the same of own subtrees' roots
-  std::vector<double> work_;                 // L^-1 b: the entries of all columns at a position are neighbours
-  std::size_t columns_ = 0, lanes_ = 0;      // of `work_`: lanes_ - columns_ of each position are not used
+  std::vector<double> values_;          // L and E, packed
+  std::vector<double> work_;            // L^-1 b: the entries of all columns at a position are neighbours
+  std::size_t columns_ = 0, lanes_ = 0; // of `work_`: lanes_ - columns_ of each position are not used
   bool failed_ = false;
 };
 

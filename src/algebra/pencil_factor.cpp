@@ -110,13 +110,9 @@ EliminationOrder elimination_order(Mat K)
 {
   const Triplets pattern = gather(lower_triangle(K), TripletContent::pattern, comm_of(K));
   EliminationOrder order;
-  on_rank_zero(comm_of(K),
-               [&]
-               {
-                 const SymbolicFactor symbolic = analyse(pattern, row_layout(K).total(), 0);
-                 for (const int position : symbolic.position) order.position.push_back(position + 1);
-                 order.entries = symbolic.entries;
-               });
+  const SymbolicFactor symbolic = analyse(pattern, row_layout(K).total(), 0, comm_of(K));
+  for (const int position : symbolic.position) order.position.push_back(position + 1);
+  order.entries = symbolic.entries;
   MPI_Bcast(&order.entries, 1, MPI_DOUBLE, 0, comm_of(K));
   broadcast(order.position, comm_of(K));
   return order;

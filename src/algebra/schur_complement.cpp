@@ -57,19 +57,26 @@ struct Strip
   double* column(int j) const { return values + at(j - first) * height; }
 };
 
-/// Rows of E by columns, `height` apart.
+/// Rows of E by columns, one after the other.
 struct DenseRows
 {
-  std::vector<int> rows{}; // of the border, ascending
-  std::vector<double> values{};
+  std::vector<int> rows{};      // of the border, ascending
+  std::vector<double> values{}; // and what is left of a larger use
 };
 
+/// Memory is used again from supernode to supernode and from strip to strip: the system would take as long to clear new
+/// one as the products take.
+void enlarge(std::vector<double>& values, std::size_t size)
+{
+  if (values.size() < size) values.resize(size);
+}
+
 /// Adds the products of `left` with `right`, rows that the strip has as columns, to the strip's lower triangle.
-void add_products(const DenseRows& left, const DenseRows& right, std::size_t pivots, const Strip& strip)
+void add_products(const DenseRows& left, const DenseRows& right, std::size_t pivots, const Strip& strip,
+                  std::vector<double>& products)
 {
   constexpr std::size_t most = 128; // columns at once: of what is above their diagonal block nothing is computed
   const double one = 1, zero = 0;
-  std::vector<double> products;
   for (std::size_t j = 0; j < right.rows.size(); j += most)
   {
     const std::size_t begin = place_of_row(left.rows, right.rows[j]), width = std::min(most, right.rows.size() - j);
@@ -90,39 +97,39 @@ void add_products(const DenseRows& left, const DenseRows& right, std::size_t piv
 }
 
 /// Rows of E from the strip's first one on.
-DenseRows rows_from(const BorderRows& E, int first)
+void rows_from(const BorderRows& E, int first, DenseRows& dense)
 {
   const std::size_t begin = place_of_row(E.positions, E.dofs + first);
-  DenseRows dense;
+  dense.rows.clear();
   for (const int position : E.positions.subspan(begin)) dense.rows.push_back(position - E.dofs);
-  dense.values.resize(dense.rows.size() * E.pivots());
+  enlarge(dense.values, dense.rows.size() * E.pivots());
   if (!dense.rows.empty()) unpack_rows(E.panel, E.before + begin, dense.values.data());
-  return dense;
 }
 
 /// The leading rows, before the border's row `last`.
-DenseRows rows_before(const DenseRows& E, std::size_t pivots, int last)
+void rows_before(const DenseRows& E, std::size_t pivots, int last, DenseRows& leading)
 {
   const std::size_t count = place_of_row(E.rows, last);
-  DenseRows leading{{E.rows.begin(), E.rows.begin() + static_cast<std::ptrdiff_t>(count)}, {}};
-  leading.values.resize(count * pivots);
+  leading.rows.assign(E.rows.begin(), E.rows.begin() + static_cast<std::ptrdiff_t>(count));
+  enlarge(leading.values, count * pivots);
   for (std::size_t j = 0; j < pivots; ++j)
     std::copy_n(E.values.data() + j * E.rows.size(), count, leading.values.data() + j * count);
-  return leading;
 }
 
 /// All ranks' rows of a shared supernode that the strip has as columns. `own`: this rank's. Collective.
-DenseRows gathered(const DenseRows& own, const std::vector<int>& border, std::size_t pivots, MPI_Comm comm)
+void gather(const DenseRows& own, const std::vector<int>& border, std::size_t pivots, MPI_Comm comm, DenseRows& all,
+            std::vector<double>& received)
 {
   const int ranks = ranks_of(comm);
   std::vector<int> count(at(ranks), 0), counts, starts(count.size(), 0);
   for (const int row : border) ++count[at(holder_of(row, ranks))];
   for (const int rows : count) counts.push_back(to_int(at(rows) * pivots));
   for (std::size_t p = 1; p < counts.size(); ++p) starts[p] = starts[p - 1] + counts[p - 1];
-  std::vector<double> received(border.size() * pivots);
-  MPI_Allgatherv(own.values.data(), to_int(own.values.size()), MPI_DOUBLE, received.data(), counts.data(),
+  enlarge(received, border.size() * pivots);
+  MPI_Allgatherv(own.values.data(), to_int(own.rows.size() * pivots), MPI_DOUBLE, received.data(), counts.data(),
                  starts.data(), MPI_DOUBLE, comm);
-  DenseRows all{border, std::vector<double>(received.size())};
+  all.rows = border;
+  enlarge(all.values, border.size() * pivots);
   std::vector<std::size_t> next(starts.begin(), starts.end());
   for (std::size_t i = 0; i < border.size(); ++i)
   {
@@ -130,7 +137,6 @@ DenseRows gathered(const DenseRows& own, const std::vector<int>& border, std::si
     const std::size_t from = next[rank]++;
     for (std::size_t j = 0; j < pivots; ++j) all.values[j * border.size() + i] = received[from + j * at(count[rank])];
   }
-  return all;
 }
 
 /// own -= E' x; x has the border's rows.
@@ -152,11 +158,11 @@ void subtract_rows(const BorderRows& E, std::size_t lanes, const double* own, do
     for (std::size_t l = 0; l < lanes; ++l) y[E.row(i) * lanes + l] += part[(E.before + i) * lanes + l];
 }
 
-/// Adds the parts of all ranks on rank 0, in messages of moderate length; empties those of the others. Collective.
+/// Adds the parts of all ranks on rank 0, in messages of moderate length. Collective.
 void sum_on_rank_zero(std::vector<double>& part, MPI_Comm comm)
 {
   if (ranks_of(comm) == 1) return;
-  constexpr std::size_t together = 1 << 22; // numbers
+  constexpr std::size_t together = 1 << 16; // numbers: of longer messages Open MPI adds 1 GB/s instead of 6
   const bool first = rank_of(comm) == 0;
   for (std::size_t begin = 0; begin < part.size(); begin += together)
   {
@@ -164,36 +170,38 @@ void sum_on_rank_zero(std::vector<double>& part, MPI_Comm comm)
     MPI_Reduce(first ? MPI_IN_PLACE : from, from, to_int(std::min(together, part.size() - begin)), MPI_DOUBLE, MPI_SUM,
                0, comm);
   }
-  if (!first) part = {};
 }
 
 } // namespace
 
-std::vector<double> Cholesky::schur_complement(int first, int last) const
+void Cholesky::read_schur_complement(int width, const std::function<void(const CondensedStrip&)>& take) const
 {
-  const std::size_t height = at(share_.symbolic.border - first);
-  std::vector<double> values(height * at(last - first), 0.);
-  const Strip strip{first, last, height, values.data()};
-  for (std::size_t k = 0; k < share_.symbolic.supernodes.size(); ++k)
+  const int size = share_.symbolic.border;
+  std::vector<double> values, products, received;
+  DenseRows own, leading, all;
+  for (int first = 0; first < size; first += width)
   {
-    const BorderRows E = border_rows(share_, k, values_);
-    const std::size_t pivots = E.pivots();
-    if (k < share_.own)
+    const int last = std::min(first + width, size);
+    const std::size_t height = at(size - first);
+    values.assign(height * at(last - first), 0.);
+    const Strip strip{first, last, height, values.data()};
+    for (std::size_t k = 0; k < share_.symbolic.supernodes.size(); ++k)
     {
-      if (place_of_row(E.positions, E.dofs + first) == place_of_row(E.positions, E.dofs + last)) continue;
-      const DenseRows own = rows_from(E, first);
-      add_products(own, rows_before(own, pivots, last), pivots, strip);
-      continue;
+      const BorderRows E = border_rows(share_, k, values_);
+      const bool shared = k >= share_.own;
+      const std::span<const int> border = shared ? share_.shared[k - share_.own].border : E.positions;
+      std::vector<int> columns; // on all ranks that have some
+      for (std::size_t i = place_of_row(border, E.dofs + first); i < place_of_row(border, E.dofs + last); ++i)
+        columns.push_back(border[i] - E.dofs);
+      if (columns.empty()) continue;
+      rows_from(E, first, own);
+      rows_before(own, E.pivots(), last, leading);
+      if (shared) gather(leading, columns, E.pivots(), comm_, all, received);
+      add_products(own, shared ? all : leading, E.pivots(), strip, products);
     }
-    std::vector<int> columns;
-    for (const int position : share_.shared[k - share_.own].border)
-      if (const int row = position - share_.symbolic.dofs; row >= first && row < last) columns.push_back(row);
-    if (columns.empty()) continue;
-    const DenseRows own = rows_from(E, first);
-    add_products(own, gathered(rows_before(own, pivots, last), columns, pivots, comm_), pivots, strip);
+    sum_on_rank_zero(values, comm_);
+    if (rank_of(comm_) == 0) take({at(first), at(last), height, values.data()});
   }
-  sum_on_rank_zero(values, comm_);
-  return values;
 }
 
 std::vector<double> Cholesky::schur_product(std::span<const double> x, std::size_t columns) const
@@ -232,6 +240,7 @@ std::vector<double> Cholesky::schur_product(std::span<const double> x, std::size
   for (std::size_t k = 0; k < columns; ++k)
     for (std::size_t i = 0; i < border; ++i) result[k * border + i] = to[i * lanes + k];
   sum_on_rank_zero(result, comm_);
+  if (rank_of(comm_) != 0) result.clear();
   return result;
 }
 

@@ -1,14 +1,12 @@
 #include "symbolic_factor.hpp"
 
+#include "nested_dissection.hpp"
 #include "splitmix.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/base/run_control.hpp"
 
 #include <algorithm>
-#include <metis.h>
 #include <numeric>
-#include <span>
 #include <unordered_map>
 #include <utility>
 
@@ -17,18 +15,6 @@ namespace squeal
 
 namespace
 {
-
-/// A graph in compressed form: the neighbours of each node, one list after the other.
-struct Graph
-{
-  std::vector<idx_t> offsets, neighbours;
-
-  int nodes() const { return static_cast<int>(offsets.size()) - 1; }
-  std::span<const idx_t> of(int node) const
-  {
-    return {neighbours.data() + offsets[at(node)], neighbours.data() + offsets[at(node) + 1]};
-  }
-};
 
 /// The graph of (node, neighbour) pairs, each neighbour once and ascending; neighbours are less than `range`.
 Graph graph_of(int nodes, int range, const std::vector<std::pair<int, int>>& edges)
@@ -48,13 +34,20 @@ Graph graph_of(int nodes, int range, const std::vector<std::pair<int, int>>& edg
     std::sort(graph.neighbours.begin() + graph.offsets.back(), graph.neighbours.end());
     graph.offsets.push_back(static_cast<idx_t>(graph.neighbours.size()));
   }
-  graph.neighbours.reserve(1); // METIS takes no null pointer
   return graph;
 }
 
-/// The node of each degree of freedom. Degrees of freedom share a node if they and their neighbours are the same set,
-/// which a hash of the set decides.
-std::vector<int> nodes_of(const Triplets& lower, int dofs)
+/// Degrees of freedom that share a node: they and their neighbours are the same set, which a hash of the set decides.
+struct Nodes
+{
+  std::vector<int> of;          // each degree of freedom
+  std::vector<idx_t> sizes{};   // degrees of freedom of each node
+  std::vector<char> is_first{}; // whether a degree of freedom is the first one of its node, which stands for the others
+
+  int count() const { return static_cast<int>(sizes.size()); }
+};
+
+Nodes nodes_of(const Triplets& lower, int dofs)
 {
   const auto hash = [](int dof) { return splitmix64(static_cast<std::uint64_t>(dof)); };
   std::vector<std::uint64_t> sum(at(dofs));
@@ -67,26 +60,16 @@ std::vector<int> nodes_of(const Triplets& lower, int dofs)
     sum[at(j)] += hash(i);
   }
   std::unordered_map<std::uint64_t, int> seen;
-  std::vector<int> number(at(dofs));
+  Nodes nodes{std::vector<int>(at(dofs))};
   for (int i = 0; i < dofs; ++i)
-    number[at(i)] = seen.try_emplace(sum[at(i)], static_cast<int>(seen.size())).first->second;
-  return number;
-}
-
-/// The position of each node in METIS's nested dissection.
-std::vector<idx_t> nested_dissection(Graph& graph, std::vector<idx_t>& weights)
-{
-  std::vector<idx_t> order(weights.size()), position(weights.size()), options(METIS_NOPTIONS);
-  METIS_SetDefaultOptions(options.data());
-  options[METIS_OPTION_COMPRESS] = 0; // nodes_of has compressed the graph
-  idx_t size = graph.nodes();
-  const auto dissect = [&]
   {
-    return METIS_NodeND(&size, graph.offsets.data(), graph.neighbours.data(), weights.data(), options.data(),
-                        order.data(), position.data());
-  };
-  if (without_losing_signals(METIS_OK, dissect) != METIS_OK) throw LibraryError("METIS found no elimination order");
-  return position;
+    const auto [node, is_new] = seen.try_emplace(sum[at(i)], nodes.count());
+    nodes.is_first.push_back(is_new);
+    if (is_new) nodes.sizes.push_back(0);
+    nodes.of[at(i)] = node->second;
+    ++nodes.sizes[at(node->second)];
+  }
+  return nodes;
 }
 
 /// The graph with node i renamed position[i].
@@ -263,53 +246,75 @@ struct Edges
   std::vector<std::pair<int, int>> inner, border;
 };
 
-Edges edges_of(const Triplets& lower, int dofs, const std::vector<int>& node_of)
+Edges edges_of(const Triplets& lower, int dofs, const Nodes& nodes)
 {
   Edges edges;
   for (std::size_t k = 0; k < lower.row.size(); ++k)
   {
-    const int i = lower.row[k] - 1, j = node_of[at(lower.column[k] - 1)];
+    const int i = lower.row[k] - 1, j = lower.column[k] - 1;
     if (i >= dofs)
-      edges.border.emplace_back(j, i - dofs);
-    else if (node_of[at(i)] != j)
+      edges.border.emplace_back(nodes.of[at(j)], i - dofs);
+    else if (i != j && nodes.is_first[at(i)] && nodes.is_first[at(j)])
     {
-      edges.inner.emplace_back(node_of[at(i)], j);
-      edges.inner.emplace_back(j, node_of[at(i)]);
+      edges.inner.emplace_back(nodes.of[at(i)], nodes.of[at(j)]);
+      edges.inner.emplace_back(nodes.of[at(j)], nodes.of[at(i)]);
     }
   }
   return edges;
 }
 
-} // namespace
+/// What is ordered.
+struct Pattern
+{
+  Nodes nodes{};
+  std::vector<std::pair<int, int>> border{}; // as in Edges
+  Graph graph{};
+};
 
-SymbolicFactor analyse(const Triplets& lower, int dofs, int border)
+Pattern pattern_of(const Triplets& lower, int dofs)
+{
+  Pattern pattern{nodes_of(lower, dofs)};
+  Edges edges = edges_of(lower, dofs, pattern.nodes);
+  const int nodes = pattern.nodes.count();
+  pattern.graph = graph_of(nodes, nodes, edges.inner);
+  pattern.border = std::move(edges.border);
+  return pattern;
+}
+
+/// `position`: of each node in an order of elimination.
+SymbolicFactor analyse_in_order(Pattern pattern, std::vector<idx_t> position, int dofs, int border)
 {
   SymbolicFactor result;
   result.dofs = dofs;
   result.border = border;
-  const std::vector<int> node_of = nodes_of(lower, dofs);
-  const int nodes = node_of.empty() ? 0 : 1 + *std::max_element(node_of.begin(), node_of.end());
-  std::vector<idx_t> sizes(at(nodes), 0), ordered_sizes(sizes.size());
-  for (const int node : node_of) ++sizes[at(node)];
-  Edges edges = edges_of(lower, dofs, node_of);
-  Graph graph = graph_of(nodes, nodes, edges.inner);
-  edges.inner = {};
-
-  std::vector<idx_t> position = nested_dissection(graph, sizes);
+  auto& [nodes, to_rows, graph] = pattern;
+  std::vector<idx_t> ordered_sizes(position.size());
   const std::vector<idx_t> moved = postorder(elimination_tree(renumbered(graph, position)));
   for (idx_t& place : position) place = moved[at(place)];
   graph = renumbered(graph, position);
-  for (std::size_t i = 0; i < sizes.size(); ++i) ordered_sizes[at(position[i])] = sizes[i];
-  for (auto& [node, row] : edges.border) node = position[at(node)];
+  for (std::size_t i = 0; i < position.size(); ++i) ordered_sizes[at(position[i])] = nodes.sizes[i];
+  for (auto& [node, row] : to_rows) node = position[at(node)];
 
   const std::vector<int> parent = elimination_tree(graph);
   const Weights weight{ordered_sizes};
-  const Graph to_border = graph_of(nodes, border, edges.border);
-  std::vector<int> starts(at(nodes) + 1, 0);
+  const Graph to_border = graph_of(nodes.count(), border, to_rows);
+  std::vector<int> starts(position.size() + 1, 0);
   std::partial_sum(ordered_sizes.begin(), ordered_sizes.end(), starts.begin() + 1);
   expand(amalgamate(fundamental_supernodes(graph, to_border, parent, weight), parent, weight), starts, result);
   std::vector<int> next = starts;
-  for (const int node : node_of) result.position.push_back(next[at(position[at(node)])]++);
+  for (const int node : nodes.of) result.position.push_back(next[at(position[at(node)])]++);
+  return result;
+}
+
+} // namespace
+
+SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm)
+{
+  Pattern pattern;
+  on_rank_zero(comm, [&] { pattern = pattern_of(lower, dofs); });
+  std::vector<idx_t> position = nested_dissection({pattern.graph, pattern.nodes.sizes}, comm);
+  SymbolicFactor result;
+  on_rank_zero(comm, [&] { result = analyse_in_order(std::move(pattern), std::move(position), dofs, border); });
   return result;
 }
 
@@ -333,14 +338,16 @@ std::array<std::uint64_t, 2> hash_of(const Triplets& lower, int dofs, int border
 
 } // namespace
 
-SymbolicFactor KnownAnalyses::analyse(const Triplets& lower, int dofs, int border)
+SymbolicFactor KnownAnalyses::analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm)
 {
   constexpr std::size_t most = 6; // a model with a motion has five: K and A with and without border, one reduced
-  const std::array<std::uint64_t, 2> pattern = hash_of(lower, dofs, border);
+  std::array<std::uint64_t, 2> pattern{};
+  if (rank_of(comm) == 0) pattern = hash_of(lower, dofs, border);
+  MPI_Bcast(pattern.data(), sizeof pattern, MPI_BYTE, 0, comm);
   const auto found =
       std::find_if(known_.begin(), known_.end(), [&](const Known& known) { return known.pattern == pattern; });
   if (found == known_.end())
-    known_.push_front({pattern, squeal::analyse(lower, dofs, border)});
+    known_.push_front({pattern, squeal::analyse(lower, dofs, border, comm)});
   else
     std::rotate(known_.begin(), found, found + 1);
   if (known_.size() > most) known_.pop_back();

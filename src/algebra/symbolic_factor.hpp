@@ -44,15 +44,16 @@ struct SymbolicFactor
   double entries = 0;                // of the factor, without the zeros of packing
 };
 
-/// `lower`: the lower triangle of A and, from row dofs + 1 on, the border.
-SymbolicFactor analyse(const Triplets& lower, int dofs, int border);
+/// `lower`: the lower triangle of A and, from row dofs + 1 on, the border; read on rank 0, where the result is.
+/// Collective.
+SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm);
 
 /// The analyses of the last patterns. METIS takes as long as the factor itself where that is small.
 class KnownAnalyses
 {
 public:
   /// As above; entries in another order count as another pattern.
-  SymbolicFactor analyse(const Triplets& lower, int dofs, int border);
+  SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm);
 
 private:
   struct Known
