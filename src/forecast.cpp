@@ -219,14 +219,19 @@ bool stays_in_factor(const Sizes& sizes, OperatorStorage storage, double free)
          squeal::stays_in_factor(sizes.contact, sizes.factor.border_entries, free - memory_of_factor(sizes));
 }
 
+bool shares_operator(const Sizes& sizes)
+{
+  return is_worth_sharing(sizes.contact, static_cast<int>(sizes.ranks));
+}
+
 /// M and K together, the factor, and the near field in single precision, which may be all of W: 0.11 of it on the brake
-/// of 33 224 degrees of freedom. A whole W is on rank 0, and the others share half of it.
+/// of 33 224 degrees of freedom. W is whole on rank 0, or ranks share its lower triangle.
 double memory_of_step(const Sizes& sizes, bool in_factor)
 {
-  const double whole = sizes.condensed_operator(), near_field = whole / 2;
+  const double whole = sizes.condensed_operator(), near_field = whole / 2,
+               stored = shares_operator(sizes) ? whole / 2 : whole;
   return (2 * number + sizeof(PetscInt)) * sizes.entries / 2 + matrix_entry * sizes.entries + memory_of_factor(sizes) +
-         near_field + (in_factor ? 0 : whole * (1 + (1 - 1 / sizes.ranks) / 2)) +
-         number * vectors_of_modes_kept * sizes.dofs;
+         near_field + (in_factor ? 0 : stored) + number * vectors_of_modes_kept * sizes.dofs;
 }
 
 /// A reduced model has at most a shape for each pair, and those of the modes. Two may be held: that of the start, which
@@ -234,8 +239,8 @@ double memory_of_step(const Sizes& sizes, bool in_factor)
 /// without where it does not fit. The tangent needs a whole W.
 double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, bool in_factor, double free)
 {
-  const double least = memory_of_step(sizes, in_factor) + (in_factor ? sizes.condensed_operator() : 0) +
-                       number * vectors_of_shooting * sizes.dofs;
+  const double whole = in_factor || shares_operator(sizes) ? sizes.condensed_operator() : 0;
+  const double least = memory_of_step(sizes, in_factor) + whole + number * vectors_of_shooting * sizes.dofs;
   const auto shapes = [&](double pairs) { return memory_of_reduction(sizes.dofs, pairs + vectors_of_modes_kept); };
   const double start = fidelity == CycleModel::full ? 0 : std::min(shapes(sizes.pairs), memory_for_shapes(free));
   const double multipliers = shapes(std::min<double>(sizes.pairs, attachments_on_recorded_contact));
@@ -338,6 +343,7 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const Speed& speed = forecast.speed;
   const double free = free_memory(comm);
   const bool in_factor = stays_in_factor(sizes, options.step.storage, free);
+  // tangents need a whole W
   forecast.on_rank_zero = std::max(in_factor ? 0 : sizes.condensed_operator(), 4 * number * sizes.pairs * sizes.pairs);
   // two products a step, each of which reads half of W, or the rows of E twice
   const double contact = in_factor ? 4 * number * sizes.factor.border_entries : sizes.condensed_operator();

@@ -149,11 +149,11 @@ void scale_and_mirror(std::vector<double>& matrix, int size, double factor)
           matrix[i * n + j] = matrix[j * n + i] *= factor;
 }
 
-/// The number of columns of a strip of moderate size that is wide enough for BLAS; a multiple of 6, see read().
-int strip_width(int size)
+/// The number of columns of a strip of moderate size that is wide enough for BLAS; see read().
+std::size_t strip_width(std::size_t size)
 {
-  constexpr int least = 384, numbers = 2 << 20; // 16 MB
-  return std::max(least, numbers / std::max(1, size) / 6 * 6);
+  constexpr std::size_t least = 384, numbers = 2 << 20, together = CondensedProducts::together; // 16 MB
+  return std::max(least, numbers / std::max<std::size_t>(1, size) / together * together);
 }
 
 /// Calls work(factor) with the factor that works through rank 0, if this rank holds one.
@@ -262,9 +262,14 @@ std::vector<double> CondensedProducts::product(std::span<const double> x, std::s
   return parts_->cholesky->schur_product(x, columns);
 }
 
-void CondensedProducts::read(const std::function<void(const CondensedStrip&)>& take) const
+void CondensedProducts::read(const std::function<void(const CondensedStrip&)>& take,
+                             std::span<const std::size_t> shares) const
 {
-  parts_->cholesky->read_schur_complement(strip_width(size()), take);
+  const auto n = static_cast<std::size_t>(size());
+  const std::array<std::size_t, 2> of_rank_zero{0, n};
+  if (shares.empty()) shares = of_rank_zero;
+  for (std::size_t rank = 0; rank + 1 < shares.size(); ++rank)
+    parts_->cholesky->read_schur_complement({shares[rank], shares[rank + 1], strip_width(n)}, to_int(rank), take);
 }
 
 std::vector<double> Factor::forward(std::span<const Vec> b) const

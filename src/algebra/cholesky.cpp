@@ -52,9 +52,13 @@ Triplets entries_of_columns(const Triplets& own, const TreeShare& share, MPI_Com
 {
   const int ranks = ranks_of(comm);
   std::vector<int> counts(at(ranks), 0), starts(counts.size(), 0), received(counts.size()), places(counts.size(), 0);
+  std::vector<int> owners;
+  owners.reserve(own.row.size());
+  for (std::size_t k = 0; k < own.row.size(); ++k)
+    owners.push_back(share.owner[at(place_of(own, k, share.symbolic).second)]);
   const auto for_each_target = [&](std::size_t k, const auto& work)
   {
-    const int owner = share.owner[at(place_of(own, k, share.symbolic).second)];
+    const int owner = owners[k];
     for (int rank = owner == everyone ? 0 : owner; rank < (owner == everyone ? ranks : owner + 1); ++rank)
       work(at(rank));
   };

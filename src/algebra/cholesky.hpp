@@ -24,8 +24,15 @@ public:
   /// Whether A is not positive definite, the same on all ranks; the factor is then not to be used.
   bool failed() const { return failed_; }
 
-  /// Gives E E' to `take` on rank 0 by strips of `width` columns, of which the lower triangle is set. Collective.
-  void read_schur_complement(int width, const std::function<void(const CondensedStrip&)>& take) const;
+  /// Some columns of E E'.
+  struct Range
+  {
+    std::size_t first, last, width; // of strips
+  };
+
+  /// Gives them to `take` on one rank by strips, of which the lower triangle is set. Collective.
+  void read_schur_complement(const Range& columns, int rank,
+                             const std::function<void(const CondensedStrip&)>& take) const;
 
   /// E E' x for each x, the border's rows one after the other; x is read and the product given on rank 0. Collective.
   std::vector<double> schur_product(std::span<const double> x, std::size_t columns) const;

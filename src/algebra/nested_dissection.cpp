@@ -1,5 +1,6 @@
 #include "nested_dissection.hpp"
 
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/integers.hpp"
 #include "squeal/base/petsc.hpp"
@@ -106,22 +107,6 @@ std::vector<idx_t> joined(const std::vector<idx_t>& part, const std::array<std::
   return position;
 }
 
-void send(const std::vector<idx_t>& numbers, int to, MPI_Comm comm)
-{
-  MPI_Send(numbers.data(), to_int(numbers.size() * sizeof(idx_t)), MPI_BYTE, to, 0, comm);
-}
-
-std::vector<idx_t> receive(int from, MPI_Comm comm)
-{
-  MPI_Status status;
-  int bytes = 0;
-  MPI_Probe(from, 0, comm, &status);
-  MPI_Get_count(&status, MPI_BYTE, &bytes);
-  std::vector<idx_t> numbers(static_cast<std::size_t>(bytes) / sizeof(idx_t));
-  MPI_Recv(numbers.data(), bytes, MPI_BYTE, from, 0, comm, MPI_STATUS_IGNORE);
-  return numbers;
-}
-
 /// Orders the graph of rank `first` with the ranks before `last`; the positions are there. The others would wait for
 /// ever for one that left by an exception: that ends the program.
 std::vector<idx_t> dissect(WeightedGraph own, int first, int last, MPI_Comm comm) noexcept
@@ -140,10 +125,13 @@ std::vector<idx_t> dissect(WeightedGraph own, int first, int last, MPI_Comm comm
       other = {};
     }
     std::vector<idx_t> position = dissect(std::move(division.halves[0]), first, middle, comm);
-    return me == first ? joined(division.part, {std::move(position), receive(middle, comm)}) : position;
+    if (me != first) return position;
+    std::vector<idx_t> of_other;
+    receive(of_other, middle, comm);
+    return joined(division.part, {std::move(position), std::move(of_other)});
   }
   if (me == middle)
-    for (auto* numbers : {&own.graph.offsets, &own.graph.neighbours, &own.weights}) *numbers = receive(first, comm);
+    for (auto* numbers : {&own.graph.offsets, &own.graph.neighbours, &own.weights}) receive(*numbers, first, comm);
   std::vector<idx_t> position = dissect(std::move(own), middle, last, comm);
   if (me == middle) send(position, first, comm);
   return {};

@@ -158,32 +158,33 @@ void subtract_rows(const BorderRows& E, std::size_t lanes, const double* own, do
     for (std::size_t l = 0; l < lanes; ++l) y[E.row(i) * lanes + l] += part[(E.before + i) * lanes + l];
 }
 
-/// Adds the parts of all ranks on rank 0, in messages of moderate length. Collective.
-void sum_on_rank_zero(std::vector<double>& part, MPI_Comm comm)
+/// Adds the parts of all ranks on one of them, in messages of moderate length. Collective.
+void sum_on(int rank, std::vector<double>& part, MPI_Comm comm)
 {
   if (ranks_of(comm) == 1) return;
   constexpr std::size_t together = 1 << 16; // numbers: of longer messages Open MPI adds 1 GB/s instead of 6
-  const bool first = rank_of(comm) == 0;
+  const bool here = rank_of(comm) == rank;
   for (std::size_t begin = 0; begin < part.size(); begin += together)
   {
     double* const from = part.data() + begin;
-    MPI_Reduce(first ? MPI_IN_PLACE : from, from, to_int(std::min(together, part.size() - begin)), MPI_DOUBLE, MPI_SUM,
-               0, comm);
+    MPI_Reduce(here ? MPI_IN_PLACE : from, from, to_int(std::min(together, part.size() - begin)), MPI_DOUBLE, MPI_SUM,
+               rank, comm);
   }
 }
 
 } // namespace
 
-void Cholesky::read_schur_complement(int width, const std::function<void(const CondensedStrip&)>& take) const
+void Cholesky::read_schur_complement(const Range& columns_read, int rank,
+                                     const std::function<void(const CondensedStrip&)>& take) const
 {
-  const int size = share_.symbolic.border;
   std::vector<double> values, products, received;
   DenseRows own, leading, all;
-  for (int first = 0; first < size; first += width)
+  for (std::size_t begin = columns_read.first; begin < columns_read.last; begin += columns_read.width)
   {
-    const int last = std::min(first + width, size);
-    const std::size_t height = at(size - first);
-    values.assign(height * at(last - first), 0.);
+    const std::size_t end = std::min(begin + columns_read.width, columns_read.last);
+    const std::size_t height = at(share_.symbolic.border) - begin;
+    const int first = to_int(begin), last = to_int(end);
+    values.assign(height * (end - begin), 0.);
     const Strip strip{first, last, height, values.data()};
     for (std::size_t k = 0; k < share_.symbolic.supernodes.size(); ++k)
     {
@@ -199,8 +200,8 @@ void Cholesky::read_schur_complement(int width, const std::function<void(const C
       if (shared) gather(leading, columns, E.pivots(), comm_, all, received);
       add_products(own, shared ? all : leading, E.pivots(), strip, products);
     }
-    sum_on_rank_zero(values, comm_);
-    if (rank_of(comm_) == 0) take({at(first), at(last), height, values.data()});
+    sum_on(rank, values, comm_);
+    if (rank_of(comm_) == rank) take({begin, end, height, values.data()});
   }
 }
 
@@ -239,7 +240,7 @@ std::vector<double> Cholesky::schur_product(std::span<const double> x, std::size
   std::vector<double> result(border * columns);
   for (std::size_t k = 0; k < columns; ++k)
     for (std::size_t i = 0; i < border; ++i) result[k * border + i] = to[i * lanes + k];
-  sum_on_rank_zero(result, comm_);
+  sum_on(0, result, comm_);
   if (rank_of(comm_) != 0) result.clear();
   return result;
 }

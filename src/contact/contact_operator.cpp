@@ -69,11 +69,10 @@ void ContactOperator::multiply(std::span<const std::span<const double>> x, std::
     for (std::size_t k = 0; k < y.size(); ++k) std::copy_n(result.data() + k * n, n, y[k].data());
     return;
   }
-  if (lanes == 1) return multiply_one(x[0], y[0]);
   std::vector<double> from(n * lanes), to(n * lanes);
   for (std::size_t k = 0; k < x.size(); ++k)
     for (std::size_t i = 0; i < n; ++i) from[i * lanes + k] = x[k][i];
-  dense_product(values_.data(), n, n, lanes, from.data(), to.data());
+  multiply_lanes(x.size(), from, to);
   for (std::size_t k = 0; k < y.size(); ++k)
     for (std::size_t i = 0; i < n; ++i) y[k][i] = to[i * lanes + k];
 }
@@ -148,9 +147,10 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
   op.directions_ = directions;
   if (n > fits_the_cache)
   {
-    NearFieldBuilder builder(count, directions);
+    NearFieldBuilder builder(count, directions, PETSC_COMM_SELF);
     const CondensedStrip whole{0, n, n, W.data()};
     builder.measure(whole);
+    builder.agree();
     builder.collect(whole);
     op.near_ = builder.finish();
     op.set_diagonal(builder.diagonal());
@@ -171,12 +171,14 @@ bool stays_in_factor(double rows, double border_entries, double free)
   return 2 * border_entries < half || sizeof(double) * 2 * half > free / 4;
 }
 
-ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm)
+ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage storage, int pairs, int directions,
+                                      MPI_Comm comm)
 {
   ContactOperator op;
-  op.products_ = W;
+  const bool by_factor = storage == OperatorStorage::by_factor;
+  if (by_factor) op.products_ = W;
   if (ranks_of(comm) > 1) op.shared_by_ = comm;
-  NearFieldBuilder builder(static_cast<std::size_t>(pairs), directions);
+  NearFieldBuilder builder(static_cast<std::size_t>(pairs), directions, by_factor ? PETSC_COMM_SELF : comm);
   std::vector<double> values;
   const auto scaled = [&](const CondensedStrip& strip)
   {
@@ -186,13 +188,33 @@ ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int di
       values[(j - strip.first) * (strip.height + 1)] += W.diagonal[j];
     return CondensedStrip{strip.first, strip.last, strip.height, values.data()};
   };
-  W.products.read([&](const CondensedStrip& strip) { builder.measure(scaled(strip)); });
-  W.products.read([&](const CondensedStrip& strip) { builder.collect(scaled(strip)); });
-  if (rank_of(comm) == 0)
+  const bool first = rank_of(comm) == 0;
+  if (by_factor)
+  {
+    W.products.read([&](const CondensedStrip& strip) { builder.measure(scaled(strip)); });
+    if (first) builder.agree();
+    W.products.read([&](const CondensedStrip& strip) { builder.collect(scaled(strip)); });
+    if (first) op.near_ = builder.finish();
+  }
+  else
+  {
+    const std::size_t rows = PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs));
+    W.products.read(
+        [&](const CondensedStrip& strip)
+        {
+          const CondensedStrip now = scaled(strip);
+          builder.measure(now);
+          op.append_strips(now);
+        },
+        op.share_columns(rows, comm));
+    builder.agree();
+    op.for_each_strip([&](const CondensedStrip& strip) { builder.collect(strip); });
+    op.near_ = builder.finish();
+  }
+  if (first)
   {
     op.pairs_ = static_cast<std::size_t>(pairs);
     op.directions_ = directions;
-    op.near_ = builder.finish();
     op.set_diagonal(builder.diagonal());
   }
   if (op.shared_by_ != MPI_COMM_NULL) op.share_patches();

@@ -347,7 +347,7 @@ template <class Entry> void update_products(const Problems<Entry>& problems, con
   if (!where.shared() || rank_of(where.comm) == 0)
     form_products(stale);
   else if (!stale.empty())
-    stale.front()->W.follow_product(stale.size());
+    stale.front()->W.follow_product();
   if (where.shared())
     for (ContactWork* work : stale) MPI_Bcast(work->Wr.data(), to_int(work->Wr.size()), MPI_DOUBLE, 0, where.comm);
 }
@@ -470,7 +470,14 @@ void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& se
     sweep_until_converged<float>(left, one_patch(W), settings);
     leave_open();
   }
-  if (W.is_whole()) sweep_until_converged<double>(left, one_patch(W), settings);
+  if (left.empty() || !W.is_stored()) return;
+  if (W.shared_by() != MPI_COMM_NULL && W.entries().empty())
+  {
+    int task = task_of_holding;
+    MPI_Bcast(&task, 1, MPI_INT, 0, W.shared_by());
+    W.hold_whole();
+  }
+  sweep_until_converged<double>(left, one_patch(W), settings);
 }
 
 } // namespace squeal

@@ -1,10 +1,12 @@
 #include "near_field.hpp"
 
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/disjoint_sets.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -18,6 +20,12 @@ constexpr int bins_of_octave = 8, bins_above_unit = 192; // 24 octaves
 constexpr double neighbour = 0.1;        // of a pair's own block: those of neighbours on a mesh have 0.2 and more
 constexpr double strong_action = 0.5;    // on a patch, over its own
 constexpr std::size_t most_patches = 64; // before any are joined
+
+/// Rounded down.
+int eighths_of_octaves(double size)
+{
+  return static_cast<int>(std::floor(bins_of_octave * std::log2(size)));
+}
 
 double size_of(const PairBlock& block)
 {
@@ -52,8 +60,8 @@ NearField::PairRow part_of(const NearField::PairRow& row, std::size_t of_a_pair,
   return part;
 }
 
-NearFieldBuilder::NearFieldBuilder(std::size_t pairs, int directions)
-    : pairs_(pairs), rows_(directions), sizes_(pairs, Sizes{})
+NearFieldBuilder::NearFieldBuilder(std::size_t pairs, int directions, MPI_Comm comm)
+    : pairs_(pairs), rows_(directions), comm_(comm), sizes_(pairs, Sizes{})
 {
 }
 
@@ -71,8 +79,7 @@ PairBlock NearFieldBuilder::block(const CondensedStrip& strip, std::size_t i, st
 
 int NearFieldBuilder::bin_of(double size) const
 {
-  const double octaves = std::log2(size / unit_);
-  return static_cast<int>(std::clamp(std::floor(bins_of_octave * octaves) + bins - bins_above_unit, 0., bins - 1.));
+  return std::clamp(eighths_of_octaves(size) - *unit_ + bins - bins_above_unit, 0, bins - 1);
 }
 
 void NearFieldBuilder::measure(const CondensedStrip& strip)
@@ -84,7 +91,7 @@ void NearFieldBuilder::measure(const CondensedStrip& strip)
       if (i == j) diagonal_.push_back(now);
       const double size = size_of(now);
       if (size == 0 || !std::isfinite(size)) continue;
-      if (unit_ == 0) unit_ = size;
+      if (!unit_) unit_ = eighths_of_octaves(size);
       const auto bin = static_cast<std::size_t>(bin_of(size));
       sizes_[i][bin] += size;
       if (i != j) sizes_[j][bin] += size;
@@ -104,15 +111,43 @@ double NearFieldBuilder::limit_of(std::size_t pair) const
     if (here > 0) largest = bin;
     if (sum > NearField::left_out * own) break;
   }
-  return unit_ * std::exp2((std::min(bin, largest) + bins_above_unit - bins) / static_cast<double>(bins_of_octave));
+  return std::exp2((*unit_ + std::min(bin, largest) + bins_above_unit - bins) / static_cast<double>(bins_of_octave));
 }
 
-void NearFieldBuilder::append(Blocks& blocks, std::size_t column, const PairBlock& block, bool transposed) const
+/// Adds up the sizes of all ranks' blocks, from the first rank's unit on, and gathers the diagonal.
+void NearFieldBuilder::agree()
 {
-  blocks.columns.push_back(column);
-  for (std::size_t k = 0; k < rows_.per_pair(); ++k)
-    for (std::size_t l = 0; l < rows_.per_pair(); ++l)
-      blocks.values.push_back(static_cast<float>(transposed ? block[l][k] : block[k][l]));
+  constexpr int none = std::numeric_limits<int>::min();
+  std::vector<int> units(static_cast<std::size_t>(ranks_of(comm_)));
+  const int own = unit_.value_or(none);
+  MPI_Allgather(&own, 1, MPI_INT, units.data(), 1, MPI_INT, comm_);
+  const auto first = std::find_if(units.begin(), units.end(), [](int unit) { return unit != none; });
+  if (first != units.end() && unit_ && *unit_ != *first)
+    for (Sizes& sizes : sizes_)
+    {
+      const Sizes before = std::exchange(sizes, Sizes{});
+      for (int bin = 0; bin < bins; ++bin)
+        sizes[static_cast<std::size_t>(std::clamp(bin + *unit_ - *first, 0, bins - 1))] +=
+            before[static_cast<std::size_t>(bin)];
+    }
+  if (first != units.end()) unit_ = *first;
+  if (units.size() > 1)
+  {
+    constexpr std::size_t together = 128; // pairs: longer messages are added up more slowly
+    for (std::size_t pair = 0; pair < pairs_; pair += together)
+      MPI_Allreduce(MPI_IN_PLACE, sizes_[pair].data(), bins * to_int(std::min(together, pairs_ - pair)), MPI_DOUBLE,
+                    MPI_SUM, comm_);
+    std::vector<PairBlock> all;
+    for (int rank = 0; rank < to_int(units.size()); ++rank)
+    {
+      std::vector<PairBlock> part = diagonal_;
+      broadcast(part, comm_, rank);
+      all.insert(all.end(), part.begin(), part.end());
+    }
+    diagonal_ = std::move(all);
+  }
+  for (std::size_t pair = 0; pair < pairs_; ++pair) limits_.push_back(unit_ ? limit_of(pair) : 0);
+  sizes_ = {};
 }
 
 /// The blocks side by side in each run.
@@ -133,25 +168,44 @@ NearField::PairRow NearFieldBuilder::row_of(const Blocks& blocks) const
   return row;
 }
 
-/// Blocks that are negligible in both pairs' rows are left out, so that no row misses more than its share. The column
-/// of a pair completes its rows: what is left of the diagonal has waited, and the rest is this column transposed.
+/// Blocks that are negligible in both pairs' rows are left out, so that no row misses more than its share.
 void NearFieldBuilder::collect(const CondensedStrip& strip)
 {
-  if (limits_.empty())
-  {
-    for (std::size_t pair = 0; pair < pairs_; ++pair) limits_.push_back(limit_of(pair));
-    sizes_ = {};
-    waiting_.resize(pairs_);
-  }
   for (std::size_t j = rows_.pair_of(strip.first); j < rows_.pair_of(strip.last); ++j)
   {
-    Blocks own = std::exchange(waiting_[j], {});
+    const std::size_t before = kept_.rows.size();
     for (std::size_t i = j; i < pairs_; ++i)
     {
       const PairBlock now = block(strip, i, j);
       if (i != j && !(size_of(now) > 0 && size_of(now) >= std::min(limits_[i], limits_[j]))) continue;
-      append(own, i, now, i != j);
-      if (i != j) append(waiting_[i], j, now, false);
+      kept_.rows.push_back(to_int(i));
+      for (std::size_t k = 0; k < rows_.per_pair(); ++k)
+        for (std::size_t l = 0; l < rows_.per_pair(); ++l) kept_.values.push_back(static_cast<float>(now[k][l]));
+    }
+    kept_.counts.push_back(to_int(kept_.rows.size() - before));
+  }
+}
+
+/// The column of a pair completes its rows: what is left of the diagonal has waited, and the rest is this column
+/// transposed.
+void NearFieldBuilder::keep(const Kept& kept, std::vector<Blocks>& waiting)
+{
+  const std::size_t n = rows_.per_pair();
+  auto row = kept.rows.begin();
+  const float* block = kept.values.data();
+  for (const int count : kept.counts)
+  {
+    const std::size_t j = near_rows_.size();
+    Blocks own = std::exchange(waiting[j], {});
+    for (int k = 0; k < count; ++k, block += n * n)
+    {
+      const auto i = static_cast<std::size_t>(*row++);
+      own.columns.push_back(i);
+      for (std::size_t l = 0; l < n; ++l)
+        for (std::size_t m = 0; m < n; ++m) own.values.push_back(i == j ? block[l * n + m] : block[m * n + l]);
+      if (i == j) continue;
+      waiting[i].columns.push_back(j);
+      waiting[i].values.insert(waiting[i].values.end(), block, block + n * n);
     }
     near_rows_.push_back(row_of(own));
   }
@@ -229,8 +283,27 @@ std::vector<std::size_t> NearFieldBuilder::patch_of_pairs() const
 
 NearField NearFieldBuilder::finish()
 {
-  const std::vector<std::size_t> patch_of = patch_of_pairs();
   NearField near;
+  const auto lists_of = [](Kept& kept, auto work)
+  {
+    work(kept.counts);
+    work(kept.rows);
+    work(kept.values);
+  };
+  if (rank_of(comm_) != 0)
+  {
+    lists_of(kept_, [&](const auto& list) { send(list, 0, comm_); });
+    return near;
+  }
+  std::vector<Blocks> waiting(pairs_);
+  keep(kept_, waiting);
+  for (int rank = 1; rank < ranks_of(comm_); ++rank)
+  {
+    lists_of(kept_, [&](auto& list) { receive(list, rank, comm_); });
+    keep(kept_, waiting);
+  }
+  kept_ = {};
+  const std::vector<std::size_t> patch_of = patch_of_pairs();
   std::map<std::size_t, std::vector<std::size_t>> patches;
   for (std::size_t i = 0; i < pairs_; ++i)
   {

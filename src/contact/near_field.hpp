@@ -1,6 +1,6 @@
 #pragma once
 /// The near field of W (contact_operator.hpp), from strips of its columns: once to measure its blocks, and once more to
-/// keep those that matter.
+/// keep those that matter. Each rank may read a range of its columns, the first rank the first one.
 #include "squeal/contact/contact_operator.hpp"
 
 #include <array>
@@ -17,10 +17,14 @@ NearField::PairRow part_of(const NearField::PairRow& row, std::size_t of_a_pair,
 class NearFieldBuilder
 {
 public:
-  NearFieldBuilder(std::size_t pairs, int directions);
+  /// `comm`: the ranks that read.
+  NearFieldBuilder(std::size_t pairs, int directions, MPI_Comm comm);
 
   /// Of the first pass.
   void measure(const CondensedStrip& strip);
+
+  /// Ends the first pass. Collective.
+  void agree();
 
   /// Of the second pass.
   void collect(const CondensedStrip& strip);
@@ -28,7 +32,7 @@ public:
   /// After the first pass.
   const std::vector<PairBlock>& diagonal() const { return diagonal_; }
 
-  /// After the second pass; moves out what was collected, by patches.
+  /// After the second pass; moves out what was collected, by patches, on the first rank. Collective.
   NearField finish();
 
 private:
@@ -43,7 +47,14 @@ private:
     std::vector<float> values{};        // block by block, row by row
   };
 
-  void append(Blocks& blocks, std::size_t column, const PairBlock& block, bool transposed) const;
+  /// The blocks of some pairs' columns, from the diagonal on, that matter.
+  struct Kept
+  {
+    std::vector<int> counts{}, rows{}; // blocks of each pair, and the pairs whose rows they are in
+    std::vector<float> values{};       // block by block, row by row
+  };
+
+  void keep(const Kept& kept, std::vector<Blocks>& waiting);
   NearField::PairRow row_of(const Blocks& blocks) const;
   template <class Take> void for_each_block(std::size_t i, Take take) const;
   std::vector<std::size_t> patch_of_pairs() const;
@@ -54,11 +65,12 @@ private:
 
   std::size_t pairs_;
   PairRows<std::size_t> rows_;
-  double unit_ = 0; // a size, from which bins are counted
+  MPI_Comm comm_;
+  std::optional<int> unit_; // a size, from which bins are counted [eighths of octaves]
   std::vector<Sizes> sizes_;
   std::vector<double> limits_; // sizes of blocks that are left out of a pair's rows
   std::vector<PairBlock> diagonal_;
-  std::vector<Blocks> waiting_; // left of the diagonal, of the pairs whose column has not come
+  Kept kept_; // of this rank
   std::vector<NearField::PairRow> near_rows_;
 };
 

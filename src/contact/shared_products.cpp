@@ -18,14 +18,14 @@ namespace squeal
 namespace
 {
 
-constexpr std::size_t worth_sharing = 1000; // rows: reading less takes no longer than two messages
+constexpr std::size_t strip_width = CondensedProducts::together; // columns
 
-/// The first column of a rank: (1 - column/size)^2 = 1 - rank/ranks, at a whole strip.
-std::size_t first_column(std::size_t size, int rank, int ranks)
+/// The first column of a rank: (1 - column/rows)^2 = 1 - rank/ranks, at a whole strip.
+std::size_t first_column(std::size_t rows, int rank, int ranks)
 {
-  if (rank == ranks) return size;
+  if (rank == ranks) return rows;
   const double part = 1 - std::sqrt(1 - static_cast<double>(rank) / ranks);
-  return static_cast<std::size_t>(part * static_cast<double>(size)) / tile * tile;
+  return static_cast<std::size_t>(part * static_cast<double>(rows)) / strip_width * strip_width;
 }
 
 /// The largest patches first, each to the rank that has least.
@@ -49,23 +49,7 @@ std::vector<int> owners_by_size(const NearField& near, int ranks)
   return owners;
 }
 
-template <class Entry> void send(const std::vector<Entry>& entries, int to, MPI_Comm comm)
-{
-  MPI_Send(entries.data(), to_int(entries.size() * sizeof(Entry)), MPI_BYTE, to, 0, comm);
-}
-
-template <class Entry> std::vector<Entry> receive(MPI_Comm comm)
-{
-  MPI_Status status;
-  int bytes = 0;
-  MPI_Probe(0, 0, comm, &status);
-  MPI_Get_count(&status, MPI_BYTE, &bytes);
-  std::vector<Entry> entries(static_cast<std::size_t>(bytes) / sizeof(Entry));
-  MPI_Recv(entries.data(), bytes, MPI_BYTE, 0, 0, comm, MPI_STATUS_IGNORE);
-  return entries;
-}
-
-void send(const NearField::PairRow& row, int to, MPI_Comm comm)
+void send_row(const NearField::PairRow& row, int to, MPI_Comm comm)
 {
   send(row.runs, to, comm);
   send(row.values, to, comm);
@@ -73,51 +57,108 @@ void send(const NearField::PairRow& row, int to, MPI_Comm comm)
 
 NearField::PairRow receive_row(MPI_Comm comm)
 {
-  std::vector<NearField::Run> runs = receive<NearField::Run>(comm);
-  return {std::move(runs), receive<float>(comm)};
+  NearField::PairRow row;
+  receive(row.runs, 0, comm);
+  receive(row.values, 0, comm);
+  return row;
 }
 
-/// Calls work(first, width) for each strip of columns.
-template <class Work> void for_each_strip(std::size_t first, std::size_t last, Work work)
+/// Columns of the lower triangle of a W by rows, from the first one's row on.
+std::vector<double> columns_of(const std::vector<double>& W, std::size_t rows, std::size_t first, std::size_t last)
 {
-  for (std::size_t j = first; j < last; j += tile) work(j, std::min(tile, last - j));
+  const std::size_t height = rows - first;
+  std::vector<double> columns((last - first) * height);
+  for (std::size_t j = first; j < last; ++j) std::copy_n(&W[j * rows + first], height, &columns[(j - first) * height]);
+  return columns;
 }
 
 } // namespace
 
+bool is_worth_sharing(double rows, int ranks)
+{
+  return ranks > 1 && rows >= 1000;
+}
+
+/// Calls work(strip) for each strip of this rank.
+void ContactOperator::for_each_strip(const std::function<void(const CondensedStrip&)>& work) const
+{
+  const double* values = strips_.values.data();
+  for (std::size_t j = strips_.first; j < strips_.last; j += strip_width)
+  {
+    const std::size_t end = std::min(j + strip_width, strips_.last), height = rows_ - j;
+    work(CondensedStrip{j, end, height, values});
+    values += (end - j) * height;
+  }
+}
+
+/// Makes place for this rank's strips; returns the first column of each rank, and the end.
+std::vector<std::size_t> ContactOperator::share_columns(std::size_t rows, MPI_Comm comm)
+{
+  const int ranks = ranks_of(comm), me = rank_of(comm);
+  std::vector<std::size_t> firsts;
+  for (int rank = 0; rank <= ranks; ++rank) firsts.push_back(first_column(rows, rank, ranks));
+  shared_by_ = comm;
+  rows_ = rows;
+  const auto own = firsts.begin() + me;
+  strips_ = {own[0], own[1], {}};
+  std::size_t total = 0;
+  for_each_strip([&](const CondensedStrip& strip) { total += (strip.last - strip.first) * strip.height; });
+  strips_.values = vector_on_large_pages(total);
+  return firsts;
+}
+
+/// Appends columns of this rank, of whole strips unless they are its last ones.
+void ContactOperator::append_strips(const CondensedStrip& columns)
+{
+  for (std::size_t first = columns.first; first < columns.last; first += strip_width)
+    for (std::size_t j = first; j < std::min(first + strip_width, columns.last); ++j)
+    {
+      const double* const from = columns.values + (j - columns.first) * columns.height + (first - columns.first);
+      strips_.values.insert(strips_.values.end(), from, from + (rows_ - first));
+    }
+}
+
 void ContactOperator::share(MPI_Comm comm)
 {
-  rows_ = size();
-  MPI_Bcast(&rows_, sizeof rows_, MPI_BYTE, 0, comm);
-  const int ranks = ranks_of(comm), me = rank_of(comm);
-  if (ranks == 1 || rows_ < worth_sharing) return;
-  shared_by_ = comm;
-  for (int rank = 0; rank < ranks; ++rank)
-  {
-    Strips strips{first_column(rows_, rank, ranks), first_column(rows_, rank + 1, ranks), {}};
-    const auto pass_on = [&](std::size_t j, std::size_t width)
+  std::size_t rows = size();
+  MPI_Bcast(&rows, sizeof rows, MPI_BYTE, 0, comm);
+  if (!is_worth_sharing(static_cast<double>(rows), ranks_of(comm))) return;
+  const std::vector<std::size_t> firsts = share_columns(rows, comm);
+  const int me = rank_of(comm);
+  for (int rank = 0; rank < ranks_of(comm); ++rank)
+    for (std::size_t j = firsts[static_cast<std::size_t>(rank)]; j < firsts[static_cast<std::size_t>(rank) + 1];
+         j += strip_width)
     {
-      const std::size_t height = rows_ - j, count = width * height;
-      if (me == 0)
-      {
-        std::vector<double> strip(count);
-        for (std::size_t k = 0; k < width; ++k) std::copy_n(&values_[(j + k) * rows_ + j], height, &strip[k * height]);
-        MPI_Send(strip.data(), to_int(count), MPI_DOUBLE, rank, 0, comm);
-      }
-      else
-      {
-        strips.values.resize(strips.values.size() + count);
-        MPI_Recv(strips.values.data() + strips.values.size() - count, to_int(count), MPI_DOUBLE, 0, 0, comm,
-                 MPI_STATUS_IGNORE);
-      }
-    };
-    std::size_t total = 0;
-    for_each_strip(strips.first, strips.last, [&](std::size_t j, std::size_t width) { total += width * (rows_ - j); });
-    if (me == rank && me != 0) strips.values = vector_on_large_pages(total);
-    if (rank > 0 && (me == 0 || me == rank)) for_each_strip(strips.first, strips.last, pass_on);
-    if (me == rank) strips_ = std::move(strips);
-  }
+      const std::size_t end = std::min(j + strip_width, firsts[static_cast<std::size_t>(rank) + 1]);
+      std::vector<double> columns;
+      if (me == 0) columns = columns_of(values_, rows, j, end);
+      if (me == 0 && rank != 0) send(columns, rank, comm);
+      if (me != 0 && rank == me) receive(columns, 0, comm);
+      if (rank == me) append_strips({j, end, rows - j, columns.data()});
+    }
+  values_ = {};
   share_patches();
+}
+
+void ContactOperator::hold_whole() const
+{
+  if (shared_by_ == MPI_COMM_NULL || products_ || std::exchange(held_whole_, true)) return;
+  const int me = rank_of(shared_by_);
+  if (me != 0) return send(strips_.values, 0, shared_by_);
+  values_ = vector_on_large_pages(rows_ * rows_);
+  values_.resize(rows_ * rows_);
+  Strips part = strips_;
+  for (int rank = 0;;)
+  {
+    const double* entry = part.values.data();
+    for (std::size_t first = part.first; first < part.last; first += strip_width)
+      for (std::size_t j = first; j < std::min(first + strip_width, part.last); ++j, entry += rows_ - first)
+        for (std::size_t i = j; i < rows_; ++i) values_[i * rows_ + j] = values_[j * rows_ + i] = entry[i - first];
+    if (++rank == ranks_of(shared_by_)) return;
+    part.first = part.last;
+    part.last = first_column(rows_, rank + 1, ranks_of(shared_by_));
+    receive(part.values, rank, shared_by_);
+  }
 }
 
 void ContactOperator::share_patches()
@@ -141,39 +182,43 @@ void ContactOperator::share_patches()
   beyond_.resize(pairs_);
   for (std::size_t pair = 0; pair < pairs_; ++pair)
   {
-    if (owner[pair] != 0 && me == 0) send(near_.inside[pair], owner[pair], shared_by_);
+    if (owner[pair] != 0 && me == 0) send_row(near_.inside[pair], owner[pair], shared_by_);
     if (owner[pair] != 0 && me == owner[pair]) near_.inside[pair] = receive_row(shared_by_);
     const auto part = [&](int rank)
     {
       return part_of(near_.outside[pair], PairRows<std::size_t>(directions_).per_pair(),
                      [&](std::size_t other) { return owner[other] == rank; });
     };
-    for (int rank = 1; me == 0 && rank < ranks; ++rank) send(part(rank), rank, shared_by_);
+    for (int rank = 1; me == 0 && rank < ranks; ++rank) send_row(part(rank), rank, shared_by_);
     beyond_[pair] = me == 0 ? part(0) : receive_row(shared_by_);
   }
 }
 
-void ContactOperator::add_strips(std::span<const double> x, std::span<double> y) const
+void ContactOperator::add_strips(std::size_t lanes, const std::vector<double>& x, std::vector<double>& y) const
 {
-  const double* values = strips_.values.data();
-  for_each_strip(strips_.first, strips_.last,
-                 [&](std::size_t j, std::size_t width)
-                 {
-                   add_symmetric_product(values, rows_ - j, width, x.data() + j, y.data() + j);
-                   values += width * (rows_ - j);
-                 });
+  for_each_strip(
+      [&](const CondensedStrip& strip)
+      {
+        const std::size_t width = strip.last - strip.first, first = strip.first * lanes;
+        if (lanes == 1)
+          add_symmetric_product(strip.values, strip.height, width, x.data() + first, y.data() + first);
+        else
+          add_symmetric_product(strip.values, strip.height, width, lanes, x.data() + first, y.data() + first);
+      });
 }
 
-void ContactOperator::multiply_one(std::span<const double> x, std::span<double> y) const
+/// y = W x of so many columns, x and y by lanes.
+void ContactOperator::multiply_lanes(std::size_t columns, std::vector<double>& x, std::vector<double>& y) const
 {
-  std::fill(y.begin(), y.end(), 0.);
-  if (shared_by_ == MPI_COMM_NULL) return add_symmetric_product(values_.data(), size(), size(), x.data(), y.data());
-  int task = 1; // a product with one vector
+  const std::size_t lanes = lanes_for(columns), n = size();
+  if (shared_by_ == MPI_COMM_NULL)
+    return lanes == 1 ? add_symmetric_product(values_.data(), n, n, x.data(), y.data())
+                      : dense_product(values_.data(), n, n, lanes, x.data(), y.data());
+  int task = to_int(columns);
   MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
-  std::vector<double> from(x.begin(), x.end());
-  MPI_Bcast(from.data(), to_int(rows_), MPI_DOUBLE, 0, shared_by_);
-  add_symmetric_product(values_.data(), rows_, strips_.last, x.data(), y.data());
-  MPI_Reduce(MPI_IN_PLACE, y.data(), to_int(rows_), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
+  MPI_Bcast(x.data(), to_int(x.size()), MPI_DOUBLE, 0, shared_by_);
+  add_strips(lanes, x, y);
+  MPI_Reduce(MPI_IN_PLACE, y.data(), to_int(y.size()), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
 }
 
 /// On rank 0.
@@ -188,9 +233,8 @@ std::vector<double> ContactOperator::multiply_by_factor(std::span<const double> 
   return y;
 }
 
-void ContactOperator::follow_product(std::size_t columns) const
+void ContactOperator::follow_product() const
 {
-  if (!products_ && lanes_for(columns) > 1) return; // of a whole W rank 0 forms these alone
   int task = 0;
   MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
   serve_product(task);
@@ -198,15 +242,16 @@ void ContactOperator::follow_product(std::size_t columns) const
 
 void ContactOperator::serve_product(int columns) const
 {
+  const auto count = static_cast<std::size_t>(columns);
   if (products_)
   {
-    (void)products_->products.product({}, static_cast<std::size_t>(columns));
+    (void)products_->products.product({}, count);
     return;
   }
-  std::vector<double> x(rows_), y(rows_);
-  MPI_Bcast(x.data(), to_int(rows_), MPI_DOUBLE, 0, shared_by_);
-  add_strips(x, y);
-  MPI_Reduce(y.data(), nullptr, to_int(rows_), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
+  std::vector<double> x(rows_ * lanes_for(count)), y(x.size());
+  MPI_Bcast(x.data(), to_int(x.size()), MPI_DOUBLE, 0, shared_by_);
+  add_strips(lanes_for(count), x, y);
+  MPI_Reduce(y.data(), nullptr, to_int(y.size()), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
 }
 
 ServedProducts::ServedProducts(const ContactOperator& W) : W_(W)
@@ -220,6 +265,8 @@ ServedProducts::ServedProducts(const ContactOperator& W) : W_(W)
     if (task == end_of_service) return;
     if (task == task_of_sweeps)
       sweep_along(W);
+    else if (task == task_of_holding)
+      W.hold_whole();
     else
       W.serve_product(task);
   }

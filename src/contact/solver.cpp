@@ -142,7 +142,7 @@ std::vector<ContactResult> solve_contacts(const ContactOperator& W, const Fricti
     }
     form_products(cold);
     gauss_seidel(all, settings);
-    if (!W.is_whole()) // sweeps over the near field may not converge where friction is strong
+    if (!W.is_stored()) // sweeps over the near field may not converge where friction is strong
       for (ContactWork& work : works)
         if (!work.result.converged) fixed_point(work, settings);
     break;

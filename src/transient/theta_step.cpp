@@ -257,9 +257,11 @@ ContactOperator condensed_operator(const ThetaStep& step, const Interface& inter
   const MPI_Comm comm = comm_of(interface.B);
   const auto products = step.factor.condensed_products();
   const auto rows = static_cast<double>(interface.size());
-  if (products && storage != OperatorStorage::whole &&
-      (storage == OperatorStorage::by_factor || stays_in_factor(rows, products->entries(), free_memory(comm))))
-    return make_contact_operator({*products, step.h, added_by_compliance(step, interface)}, interface.pairs,
+  if (products && storage == OperatorStorage::automatic)
+    storage = stays_in_factor(rows, products->entries(), free_memory(comm)) ? OperatorStorage::by_factor
+                                                                            : OperatorStorage::whole;
+  if (products && (storage == OperatorStorage::by_factor || is_worth_sharing(rows, ranks_of(comm))))
+    return make_contact_operator({*products, step.h, added_by_compliance(step, interface)}, storage, interface.pairs,
                                  interface.directions, comm);
   ContactOperator W;
   std::vector<double> entries = whole_operator(step, interface);

@@ -118,8 +118,12 @@ public:
   /// The product with each of `columns` vectors x, one after the other; x is read on rank 0.
   std::vector<double> product(std::span<const double> x, std::size_t columns) const;
 
-  /// Gives `take` a strip after the other, of whole pairs of two or three rows and of moderate size, on rank 0.
-  void read(const std::function<void(const CondensedStrip&)>& take) const;
+  /// Columns that strips do not part, but for the last ones: whole pairs of two or three rows, and whole tiles.
+  static constexpr std::size_t together = 24;
+
+  /// Gives `take` a strip after the other, of moderate size: on rank 0, or on the rank whose columns they are.
+  /// `shares`: the first column of each rank, a multiple of `together`, and the end.
+  void read(const std::function<void(const CondensedStrip&)>& take, std::span<const std::size_t> shares = {}) const;
 
 private:
   friend class Factor;

@@ -3,8 +3,8 @@
 /// How it is stored is known to this type alone: solvers use its products, the blocks of its diagonal, and its rows
 /// added up pair by pair.
 ///
-/// It is whole on rank 0, or it stays in the factor of A as W = scale E E' (section 8.1): a product then reads the rows
-/// of E, which all ranks hold a part of.
+/// Its lower triangle is stored by columns, of which each rank has a share; one rank alone has all of W. Or it stays in
+/// the factor of A as W = scale E E' (section 8.1): a product then reads the rows of E, which all ranks hold a part of.
 ///
 /// The near field (section 4.7) holds the blocks that matter during sweeps, in single precision. Of a row it lacks the
 /// smallest ones, whose sizes add up to a hundredth of the pair's own block. What it leaves out is met by a product
@@ -15,6 +15,7 @@
 
 #include <cstddef>
 #include <Eigen/Core>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -51,7 +52,7 @@ struct NearField
   std::size_t entries() const;
 };
 
-/// Where W is stored. automatic: whole, but where stays_in_factor says so.
+/// Where W is stored. automatic: by its entries, but where stays_in_factor says so.
 enum class OperatorStorage
 {
   automatic,
@@ -70,7 +71,7 @@ inline Words words_of(OperatorStorage)
 /// or a whole W would take more than a quarter of the memory that is `free` [bytes].
 bool stays_in_factor(double rows, double border_entries, double free);
 
-/// On rank 0. The ranks form products together where W is in the factor, or gave its columns to all of them. There each
+/// On rank 0. The ranks form products together where W is in the factor, or its columns are on all of them. There each
 /// rank has some patches of the near field besides, where there are several, and the blocks of the diagonal.
 class ContactOperator
 {
@@ -88,10 +89,13 @@ public:
   /// y_k = W x_k, reading W once.
   void multiply(std::span<const std::span<const double>> x, std::span<const std::span<double>> y) const;
 
-  /// Whether rank 0 has all entries; the same on all ranks of a W in the factor.
-  bool is_whole() const { return !products_; }
+  /// Whether all entries are stored, on rank 0 or on all that share them; the same on all ranks.
+  bool is_stored() const { return !products_; }
 
-  /// w += W dr of a change dr of one pair's reaction. W is whole.
+  /// Gathers shared entries on rank 0, which keeps them all besides. Collective.
+  void hold_whole() const;
+
+  /// w += W dr of a change dr of one pair's reaction. Rank 0 has all entries.
   void add_product(std::size_t pair, const PairVector& change, std::span<double> w) const;
 
   /// The same by the near field, which small operators do not have.
@@ -110,16 +114,16 @@ public:
   /// The ranks that form products together; MPI_COMM_NULL: rank 0 alone.
   MPI_Comm shared_by() const { return shared_by_; }
 
-  /// Gives every rank its part of the columns of a large whole W, and of the patches. From now on products with one
-  /// vector are formed from these, within ServedProducts only. Collective.
+  /// Gives every rank its share of the columns of a large W, and of the patches. From now on products are formed from
+  /// these, within ServedProducts only. Collective.
   void share(MPI_Comm comm);
 
   /// On other ranks, their part of a product of so many columns that rank 0 forms: the whole of it, and what follows
   /// rank 0's word of how many they are.
-  void follow_product(std::size_t columns) const;
+  void follow_product() const;
   void serve_product(int columns) const;
 
-  /// W, if it is whole.
+  /// All entries by rows, on rank 0, of a stored W that is not shared, or after hold_whole.
   std::span<const double> entries() const { return values_; }
 
   /// By power iteration: a lower bound.
@@ -127,25 +131,29 @@ public:
 
 private:
   friend ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
-  friend ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm);
+  friend ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage storage, int pairs,
+                                               int directions, MPI_Comm comm);
 
-  /// Strips of eight columns of the lower triangle, one after the other, from each strip's first row on.
+  /// Strips of a few columns of the lower triangle, one after the other, from each strip's first row on.
   struct Strips
   {
     std::size_t first = 0, last = 0; // columns
-    std::vector<double> values{};    // not on rank 0, which has W
+    std::vector<double> values{};
   };
 
   void set_diagonal(std::vector<PairBlock> blocks);
-  void multiply_one(std::span<const double> x, std::span<double> y) const;
+  void multiply_lanes(std::size_t columns, std::vector<double>& x, std::vector<double>& y) const;
   std::vector<double> multiply_by_factor(std::span<const double> x, std::size_t columns) const;
-  void add_strips(std::span<const double> x, std::span<double> y) const;
+  void add_strips(std::size_t lanes, const std::vector<double>& x, std::vector<double>& y) const;
+  void for_each_strip(const std::function<void(const CondensedStrip&)>& work) const;
+  std::vector<std::size_t> share_columns(std::size_t rows, MPI_Comm comm);
+  void append_strips(const CondensedStrip& columns);
   void share_patches();
 
   std::size_t pairs_ = 0;
   int directions_ = 0;
-  std::vector<double> values_;             // by rows; empty: W is in the factor
-  std::optional<ScaledProducts> products_; // the same on all ranks; none: W is whole
+  mutable std::vector<double> values_;     // by rows, where rank 0 has all of them
+  std::optional<ScaledProducts> products_; // the same on all ranks; none: entries are stored
   std::vector<PairBlock> diagonal_;
   std::vector<NaturalScale> scale_;
   NearField near_;                         // empty: W is small; on other ranks the rows of their patches, inside
@@ -153,7 +161,8 @@ private:
   std::vector<NearField::PairRow> beyond_; // the rows outside, in the columns of this rank's patches, where ranks share
   MPI_Comm shared_by_ = MPI_COMM_NULL;     // the ranks that form products together
   std::size_t rows_ = 0;                   // of W, on all of them
-  Strips strips_;                          // of this rank
+  Strips strips_;                          // of this rank, where ranks share
+  mutable bool held_whole_ = false;        // besides; the same on all ranks
 };
 
 /// While rank 0 solves contact with products, and sweeps over patches, that W's ranks share, the constructor of the
@@ -173,8 +182,13 @@ private:
 /// From a dense symmetric W, stored by rows. Error: the number of its entries does not fit.
 ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
 
-/// From products with the factor's rows, of which the near field is formed strip by strip, twice. Collective.
-ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm);
+/// Whether ranks share an operator of so many rows: reading less takes no longer than two messages.
+bool is_worth_sharing(double rows, int ranks);
+
+/// From products with the factor's rows, strip by strip. by_factor: the near field reads them twice, and W stays in the
+/// factor. whole: each rank stores a share; is_worth_sharing. Collective.
+ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage storage, int pairs, int directions,
+                                      MPI_Comm comm);
 
 /// target += sum of factors[k] row_k over the rows of one pair (1 to 3), `length` long, one after the other. Arithmetic
 /// of one rank.
