@@ -118,8 +118,9 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
   {
     own.factor = Factor(); // two of them side by side would be the most that a run ever holds
     held.kappa = typical_stiffness(structure.K);
-    held.augmented = copy_of(structure.K);
-    check(MatAXPY(held.augmented, held.kappa, normal_springs(interface), DIFFERENT_NONZERO_PATTERN));
+    held.augmented = normal_springs(interface); // K added to these saves a copy of K
+    check(MatScale(held.augmented, held.kappa));
+    check(MatAXPY(held.augmented, 1, structure.K, DIFFERENT_NONZERO_PATTERN));
     check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
     Factored with_contact = factor_positive(held.augmented, interface, options);
     if (!with_contact.loose && (own.loose || with_contact.resistance > 10 * own.resistance))
