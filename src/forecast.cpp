@@ -221,7 +221,7 @@ bool stays_in_factor(const Sizes& sizes, OperatorStorage storage, double free)
 
 bool shares_operator(const Sizes& sizes)
 {
-  return is_worth_sharing(sizes.contact, static_cast<int>(sizes.ranks));
+  return sizes.factor.border_entries > 0 && is_worth_sharing(sizes.contact, static_cast<int>(sizes.ranks));
 }
 
 /// M and K together, the factor, and the near field in single precision, which may be all of W: 0.11 of it on the brake
@@ -343,8 +343,9 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const Speed& speed = forecast.speed;
   const double free = free_memory(comm);
   const bool in_factor = stays_in_factor(sizes, options.step.storage, free);
-  // tangents need a whole W
-  forecast.on_rank_zero = std::max(in_factor ? 0 : sizes.condensed_operator(), 4 * number * sizes.pairs * sizes.pairs);
+  const bool whole_operator = scene.cycle.enabled || (!in_factor && !shares_operator(sizes)); // tangents need one
+  forecast.on_rank_zero =
+      std::max(whole_operator ? sizes.condensed_operator() : 0, 4 * number * sizes.pairs * sizes.pairs);
   // two products a step, each of which reads half of W, or the rows of E twice
   const double contact = in_factor ? 4 * number * sizes.factor.border_entries : sizes.condensed_operator();
   forecast.step_seconds =

@@ -268,8 +268,15 @@ void CondensedProducts::read(const std::function<void(const CondensedStrip&)>& t
   const auto n = static_cast<std::size_t>(size());
   const std::array<std::size_t, 2> of_rank_zero{0, n};
   if (shares.empty()) shares = of_rank_zero;
+  std::vector<Cholesky::WantedColumns> strips;
   for (std::size_t rank = 0; rank + 1 < shares.size(); ++rank)
-    parts_->cholesky->read_schur_complement({shares[rank], shares[rank + 1], strip_width(n)}, to_int(rank), take);
+    for (std::size_t first = shares[rank]; first < shares[rank + 1]; first += strip_width(n))
+      strips.push_back({first, std::min(first + strip_width(n), shares[rank + 1]), to_int(rank)});
+  // those of all ranks in turn: each takes its own while the others form theirs
+  std::stable_sort(strips.begin(), strips.end(),
+                   [&](const auto& a, const auto& b)
+                   { return a.first - shares[at(a.rank)] < b.first - shares[at(b.rank)]; });
+  parts_->cholesky->read_schur_complement(strips, take);
 }
 
 std::vector<double> Factor::forward(std::span<const Vec> b) const

@@ -24,14 +24,15 @@ public:
   /// Whether A is not positive definite, the same on all ranks; the factor is then not to be used.
   bool failed() const { return failed_; }
 
-  /// Some columns of E E'.
-  struct Range
+  /// Some columns of E E', and the rank that takes them.
+  struct WantedColumns
   {
-    std::size_t first, last, width; // of strips
+    std::size_t first, last;
+    int rank;
   };
 
-  /// Gives them to `take` on one rank by strips, of which the lower triangle is set. Collective.
-  void read_schur_complement(const Range& columns, int rank,
+  /// Gives `take` one strip after the other, of which the lower triangle is set. Collective.
+  void read_schur_complement(std::span<const WantedColumns> strips,
                              const std::function<void(const CondensedStrip&)>& take) const;
 
   /// E E' x for each x, the border's rows one after the other; x is read and the product given on rank 0. Collective.

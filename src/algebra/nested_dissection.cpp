@@ -54,11 +54,17 @@ struct Division
   std::array<WeightedGraph, 2> halves; // nodes in their order
 };
 
-/// Where METIS fails, the first half is the whole graph.
+/// Where METIS fails, and where little is to be divided, the first half is the whole graph: METIS divides by zero
+/// without nodes, which dense graphs leave of a half.
 Division divided(WeightedGraph whole)
 {
   auto& [graph, weights] = whole;
   Division division{std::vector<idx_t>(weights.size(), 0), {}};
+  if (graph.nodes() < worth_dividing)
+  {
+    division.halves[0] = std::move(whole);
+    return division;
+  }
   std::vector<idx_t> options = metis_options();
   idx_t size = graph.nodes(), separator = 0;
   graph.neighbours.reserve(1);

@@ -174,14 +174,13 @@ void sum_on(int rank, std::vector<double>& part, MPI_Comm comm)
 
 } // namespace
 
-void Cholesky::read_schur_complement(const Range& columns_read, int rank,
+void Cholesky::read_schur_complement(std::span<const WantedColumns> strips,
                                      const std::function<void(const CondensedStrip&)>& take) const
 {
   std::vector<double> values, products, received;
   DenseRows own, leading, all;
-  for (std::size_t begin = columns_read.first; begin < columns_read.last; begin += columns_read.width)
+  for (const auto& [begin, end, rank] : strips)
   {
-    const std::size_t end = std::min(begin + columns_read.width, columns_read.last);
     const std::size_t height = at(share_.symbolic.border) - begin;
     const int first = to_int(begin), last = to_int(end);
     values.assign(height * (end - begin), 0.);

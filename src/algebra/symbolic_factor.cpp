@@ -72,14 +72,20 @@ Nodes nodes_of(const Triplets& lower, int dofs)
   return nodes;
 }
 
-/// The graph with node i renamed position[i].
+/// The graph with node i renamed position[i]; neighbours are ascending.
 Graph renumbered(const Graph& graph, const std::vector<idx_t>& position)
 {
-  std::vector<std::pair<int, int>> edges;
-  edges.reserve(graph.neighbours.size());
-  for (int node = 0; node < graph.nodes(); ++node)
-    for (const idx_t neighbour : graph.of(node)) edges.emplace_back(position[at(node)], position[at(neighbour)]);
-  return graph_of(graph.nodes(), graph.nodes(), edges);
+  std::vector<int> node_at(position.size());
+  for (int node = 0; node < graph.nodes(); ++node) node_at[at(position[at(node)])] = node;
+  Graph result;
+  result.neighbours.reserve(graph.neighbours.size());
+  for (const int node : node_at)
+  {
+    for (const idx_t neighbour : graph.of(node)) result.neighbours.push_back(position[at(neighbour)]);
+    std::sort(result.neighbours.begin() + result.offsets.back(), result.neighbours.end());
+    result.offsets.push_back(static_cast<idx_t>(result.neighbours.size()));
+  }
+  return result;
 }
 
 /// Parents in the elimination tree (Liu 1990), -1 for a root: the first row below the pivot in each node's column.
@@ -341,17 +347,20 @@ std::array<std::uint64_t, 2> hash_of(const Triplets& lower, int dofs, int border
 SymbolicFactor KnownAnalyses::analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm)
 {
   constexpr std::size_t most = 6; // a model with a motion has five: K and A with and without border, one reduced
-  std::array<std::uint64_t, 2> pattern{};
-  if (rank_of(comm) == 0) pattern = hash_of(lower, dofs, border);
-  MPI_Bcast(pattern.data(), sizeof pattern, MPI_BYTE, 0, comm);
+  const bool first = rank_of(comm) == 0;
+  const std::array<std::uint64_t, 2> pattern = first ? hash_of(lower, dofs, border) : std::array<std::uint64_t, 2>{};
   const auto found =
       std::find_if(known_.begin(), known_.end(), [&](const Known& known) { return known.pattern == pattern; });
-  if (found == known_.end())
-    known_.push_front({pattern, squeal::analyse(lower, dofs, border, comm)});
-  else
-    std::rotate(known_.begin(), found, found + 1);
-  if (known_.size() > most) known_.pop_back();
-  return known_.front().symbolic;
+  int is_known = first && found != known_.end();
+  MPI_Bcast(&is_known, 1, MPI_INT, 0, comm);
+  if (is_known && first) std::rotate(known_.begin(), found, found + 1);
+  if (!is_known)
+  {
+    SymbolicFactor symbolic = squeal::analyse(lower, dofs, border, comm);
+    if (first) known_.push_front({pattern, std::move(symbolic)}); // others may be the first one of a group of ranks
+    if (known_.size() > most) known_.pop_back();
+  }
+  return first ? known_.front().symbolic : SymbolicFactor();
 }
 
 } // namespace squeal

@@ -52,7 +52,7 @@ SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm com
 class KnownAnalyses
 {
 public:
-  /// As above; entries in another order count as another pattern.
+  /// As above; entries in another order count as another pattern. The first rank of `comm` alone knows it again.
   SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm);
 
 private:

@@ -4,7 +4,7 @@
 /// Let w = w_0 + dw with w_0 = W r_0 + b from the last product with W, and dw the effect of the changes since. The
 /// sweeps update dw alone. It is small, so the near field and single precision suffice, patch by patch where there are
 /// several. Where that did not lead to convergence, all pairs are one patch, and then W itself is swept over, where it
-/// is whole. A problem counts as converged only by the residual after a product with W.
+/// is stored. A problem counts as converged only by the residual after a product with W.
 #include "gauss_seidel.hpp"
 
 #include "squeal/base/broadcast.hpp"
@@ -471,12 +471,7 @@ void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& se
     leave_open();
   }
   if (left.empty() || !W.is_stored()) return;
-  if (W.shared_by() != MPI_COMM_NULL && W.entries().empty())
-  {
-    int task = task_of_holding;
-    MPI_Bcast(&task, 1, MPI_INT, 0, W.shared_by());
-    W.hold_whole();
-  }
+  W.ask_for_whole();
   sweep_until_converged<double>(left, one_patch(W), settings);
 }
 

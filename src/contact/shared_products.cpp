@@ -6,11 +6,13 @@
 #include "squeal/algebra/large_pages.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/base/broadcast.hpp"
+#include "squeal/base/error.hpp"
 #include "squeal/base/integers.hpp"
 #include "squeal/contact/contact_operator.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace squeal
 {
@@ -79,16 +81,26 @@ bool is_worth_sharing(double rows, int ranks)
   return ranks > 1 && rows >= 1000;
 }
 
-/// Calls work(strip) for each strip of this rank.
+namespace
+{
+
+/// Calls work(first, last) for the columns of each strip.
+template <class Work> void for_each_strip_of(std::size_t first, std::size_t last, Work work)
+{
+  for (; first < last; first += strip_width) work(first, std::min(first + strip_width, last));
+}
+
+} // namespace
+
 void ContactOperator::for_each_strip(const std::function<void(const CondensedStrip&)>& work) const
 {
-  const double* values = strips_.values.data();
-  for (std::size_t j = strips_.first; j < strips_.last; j += strip_width)
-  {
-    const std::size_t end = std::min(j + strip_width, strips_.last), height = rows_ - j;
-    work(CondensedStrip{j, end, height, values});
-    values += (end - j) * height;
-  }
+  std::size_t before = 0; // numbers
+  for_each_strip_of(strips_.first, strips_.last,
+                    [&](std::size_t first, std::size_t last)
+                    {
+                      work({first, last, rows_ - first, strips_.values.data() + before});
+                      before += (last - first) * (rows_ - first);
+                    });
 }
 
 /// Makes place for this rank's strips; returns the first column of each rank, and the end.
@@ -100,22 +112,26 @@ std::vector<std::size_t> ContactOperator::share_columns(std::size_t rows, MPI_Co
   shared_by_ = comm;
   rows_ = rows;
   const auto own = firsts.begin() + me;
-  strips_ = {own[0], own[1], {}};
   std::size_t total = 0;
-  for_each_strip([&](const CondensedStrip& strip) { total += (strip.last - strip.first) * strip.height; });
-  strips_.values = vector_on_large_pages(total);
+  for_each_strip_of(own[0], own[1],
+                    [&](std::size_t first, std::size_t last) { total += (last - first) * (rows - first); });
+  strips_ = {own[0], own[1], vector_on_large_pages(total)};
   return firsts;
 }
 
 /// Appends columns of this rank, of whole strips unless they are its last ones.
 void ContactOperator::append_strips(const CondensedStrip& columns)
 {
-  for (std::size_t first = columns.first; first < columns.last; first += strip_width)
-    for (std::size_t j = first; j < std::min(first + strip_width, columns.last); ++j)
-    {
-      const double* const from = columns.values + (j - columns.first) * columns.height + (first - columns.first);
-      strips_.values.insert(strips_.values.end(), from, from + (rows_ - first));
-    }
+  for_each_strip_of(columns.first, columns.last,
+                    [&](std::size_t first, std::size_t last)
+                    {
+                      for (std::size_t j = first; j < last; ++j)
+                      {
+                        const double* const from =
+                            columns.values + (j - columns.first) * columns.height + (first - columns.first);
+                        strips_.values.insert(strips_.values.end(), from, from + (rows_ - first));
+                      }
+                    });
 }
 
 void ContactOperator::share(MPI_Comm comm)
@@ -126,39 +142,68 @@ void ContactOperator::share(MPI_Comm comm)
   const std::vector<std::size_t> firsts = share_columns(rows, comm);
   const int me = rank_of(comm);
   for (int rank = 0; rank < ranks_of(comm); ++rank)
-    for (std::size_t j = firsts[static_cast<std::size_t>(rank)]; j < firsts[static_cast<std::size_t>(rank) + 1];
-         j += strip_width)
-    {
-      const std::size_t end = std::min(j + strip_width, firsts[static_cast<std::size_t>(rank) + 1]);
-      std::vector<double> columns;
-      if (me == 0) columns = columns_of(values_, rows, j, end);
-      if (me == 0 && rank != 0) send(columns, rank, comm);
-      if (me != 0 && rank == me) receive(columns, 0, comm);
-      if (rank == me) append_strips({j, end, rows - j, columns.data()});
-    }
+  {
+    const auto own = firsts.begin() + rank;
+    for_each_strip_of(own[0], own[1],
+                      [&](std::size_t first, std::size_t last)
+                      {
+                        std::vector<double> columns;
+                        if (me == 0) columns = columns_of(values_, rows, first, last);
+                        if (me == 0 && rank != 0) send(columns, rank, comm);
+                        if (me != 0 && rank == me) receive(columns, 0, comm);
+                        if (rank == me) append_strips({first, last, rows - first, columns.data()});
+                      });
+  }
   values_ = {};
   share_patches();
 }
 
-void ContactOperator::hold_whole() const
+void ContactOperator::make_place() const
 {
-  if (shared_by_ == MPI_COMM_NULL || products_ || std::exchange(held_whole_, true)) return;
-  const int me = rank_of(shared_by_);
-  if (me != 0) return send(strips_.values, 0, shared_by_);
   values_ = vector_on_large_pages(rows_ * rows_);
   values_.resize(rows_ * rows_);
-  Strips part = strips_;
-  for (int rank = 0;;)
+}
+
+/// Both triangles of the columns of a rank.
+void ContactOperator::fill_whole(std::size_t first_column, std::size_t last_column, const double* entry) const
+{
+  for_each_strip_of(first_column, last_column,
+                    [&](std::size_t first, std::size_t last)
+                    {
+                      for (std::size_t j = first; j < last; ++j, entry += rows_ - first)
+                        for (std::size_t i = j; i < rows_; ++i)
+                          values_[i * rows_ + j] = values_[j * rows_ + i] = entry[i - first];
+                    });
+}
+
+void ContactOperator::gather() const
+{
+  held_whole_ = true;
+  if (rank_of(shared_by_) != 0) return send(strips_.values, 0, shared_by_);
+  fill_whole(strips_.first, strips_.last, strips_.values.data());
+  const int ranks = ranks_of(shared_by_);
+  std::vector<double> columns;
+  for (int rank = 1; rank < ranks; ++rank)
   {
-    const double* entry = part.values.data();
-    for (std::size_t first = part.first; first < part.last; first += strip_width)
-      for (std::size_t j = first; j < std::min(first + strip_width, part.last); ++j, entry += rows_ - first)
-        for (std::size_t i = j; i < rows_; ++i) values_[i * rows_ + j] = values_[j * rows_ + i] = entry[i - first];
-    if (++rank == ranks_of(shared_by_)) return;
-    part.first = part.last;
-    part.last = first_column(rows_, rank + 1, ranks_of(shared_by_));
-    receive(part.values, rank, shared_by_);
+    receive(columns, rank, shared_by_);
+    fill_whole(first_column(rows_, rank, ranks), first_column(rows_, rank + 1, ranks), columns.data());
   }
+}
+
+void ContactOperator::hold_whole() const
+{
+  if (shared_by_ == MPI_COMM_NULL || products_ || held_whole_) return;
+  on_rank_zero(shared_by_, [&] { make_place(); });
+  gather();
+}
+
+void ContactOperator::ask_for_whole() const
+{
+  if (shared_by_ == MPI_COMM_NULL || products_ || held_whole_) return;
+  make_place(); // before the others wait for it: there may be none
+  int task = task_of_gathering;
+  MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
+  gather();
 }
 
 void ContactOperator::share_patches()
@@ -265,8 +310,8 @@ ServedProducts::ServedProducts(const ContactOperator& W) : W_(W)
     if (task == end_of_service) return;
     if (task == task_of_sweeps)
       sweep_along(W);
-    else if (task == task_of_holding)
-      W.hold_whole();
+    else if (task == task_of_gathering)
+      W.gather();
     else
       W.serve_product(task);
   }

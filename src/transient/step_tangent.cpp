@@ -298,7 +298,10 @@ void advance_tangents(const ThetaStep& step, const Structure& structure, const I
                       std::span<const StepRecord> records, std::span<TangentColumn> columns)
 {
   std::vector<double> formed;
-  step.W.is_stored() ? step.W.hold_whole() : void(formed = whole_operator(step, interface));
+  if (step.W.is_stored())
+    step.W.hold_whole();
+  else
+    formed = whole_operator(step, interface);
   const std::span<const double> W = step.W.is_stored() ? step.W.entries() : formed;
   const std::optional<ProportionalDamping> damping = proportional_damping(structure);
   for (std::size_t first = 0; first < columns.size(); first += at_once)

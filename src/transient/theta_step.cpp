@@ -219,7 +219,8 @@ OptionList options_of(StepOptions& options)
       {"-transient_contact_law", choice_of(options.law), Range::any,
        "contact on displacements, or on velocities (velocity)"},
       {"-transient_contact_operator", choice_of(options.storage), Range::any,
-       "W whole, or in the factor of the step (by_factor), which takes no memory of its own"},
+       "W stored, by columns on several ranks (whole), or in the factor of the step (by_factor), which takes no "
+       "memory"},
       {"-transient_refuse", &options.refuse, Range::any,
        "false: march even where theta and the step give misleading growth rates"},
   };

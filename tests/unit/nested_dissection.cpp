@@ -10,6 +10,7 @@
 #include <doctest/doctest.h>
 #include <numeric>
 #include <petscsys.h>
+#include <set>
 
 using namespace squeal;
 
@@ -76,6 +77,33 @@ TEST_CASE("each node has a position of its own, in graphs of no node, of a few, 
       std::iota(all.begin(), all.end(), 0);
       CHECK(position == all);
     }
+}
+
+TEST_CASE("dense graphs, of which METIS makes halves without nodes, have an order on all ranks")
+{
+  constexpr int nodes = 2100;
+  WeightedGraph whole;
+  for (int node = 0; is_first() && node < nodes; ++node)
+  {
+    for (int other = 0; other < nodes; ++other)
+      if (other != node) whole.graph.neighbours.push_back(other);
+    whole.graph.offsets.push_back(static_cast<idx_t>(whole.graph.neighbours.size()));
+    whole.weights.push_back(1);
+  }
+  const std::vector<idx_t> position = nested_dissection(std::move(whole), PETSC_COMM_WORLD);
+  if (is_first()) CHECK(std::set<idx_t>(position.begin(), position.end()).size() == nodes);
+}
+
+TEST_CASE("an analysis that all ranks made serves the first rank, and each of them alone makes its own")
+{
+  const Triplets lower = pattern_of(grid(50).graph);
+  KnownAnalyses known;
+  for (int round = 0; round < 2; ++round)
+  {
+    const SymbolicFactor together = known.analyse(is_first() ? lower : Triplets(), 2500, 0, PETSC_COMM_WORLD);
+    CHECK(together.supernodes.empty() == !is_first());
+    CHECK(known.analyse(lower, 2500, 0, PETSC_COMM_SELF).position.size() == 2500);
+  }
 }
 
 TEST_CASE("ranks find an order as good as that of one of them")

@@ -34,7 +34,7 @@ inline Words words_of(FactorKind)
   return factor_kind_words;
 }
 
-/// The orders of elimination of the last patterns, on rank 0.
+/// The orders of elimination of the last patterns, on the first rank of those that factor.
 class KnownAnalyses;
 
 /// One that knows none yet.
@@ -105,7 +105,7 @@ private:
 
 /// The condensed operator B A^-1 B' = E E' of the rows E = B L^-T that a supernodal factor A = L L' holds
 /// (src/README.md, section 8.1). It belongs to the factor, wherever that is moved to, and ends with it. Its members are
-/// collective; what they return is on rank 0 only, empty elsewhere.
+/// collective.
 class CondensedProducts
 {
 public:
@@ -115,7 +115,7 @@ public:
   /// Numbers of E that a product reads, on all ranks.
   double entries() const;
 
-  /// The product with each of `columns` vectors x, one after the other; x is read on rank 0.
+  /// The product with each of `columns` vectors x, one after the other; x is read and the product given on rank 0.
   std::vector<double> product(std::span<const double> x, std::size_t columns) const;
 
   /// Columns that strips do not part, but for the last ones: whole pairs of two or three rows, and whole tiles.

@@ -92,8 +92,10 @@ public:
   /// Whether all entries are stored, on rank 0 or on all that share them; the same on all ranks.
   bool is_stored() const { return !products_; }
 
-  /// Gathers shared entries on rank 0, which keeps them all besides. Collective.
+  /// Gathers shared entries on rank 0, which keeps them all besides. hold_whole: collective. ask_for_whole: of rank 0,
+  /// while the others are within ServedProducts.
   void hold_whole() const;
+  void ask_for_whole() const;
 
   /// w += W dr of a change dr of one pair's reaction. Rank 0 has all entries.
   void add_product(std::size_t pair, const PairVector& change, std::span<double> w) const;
@@ -118,8 +120,8 @@ public:
   /// these, within ServedProducts only. Collective.
   void share(MPI_Comm comm);
 
-  /// On other ranks, their part of a product of so many columns that rank 0 forms: the whole of it, and what follows
-  /// rank 0's word of how many they are.
+  /// On other ranks, their part of a product that rank 0 forms: the whole of it, and what follows rank 0's word of how
+  /// many columns it has.
   void follow_product() const;
   void serve_product(int columns) const;
 
@@ -130,6 +132,7 @@ public:
   double largest_eigenvalue(int iterations) const;
 
 private:
+  friend class ServedProducts;
   friend ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
   friend ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage storage, int pairs,
                                                int directions, MPI_Comm comm);
@@ -148,6 +151,9 @@ private:
   void for_each_strip(const std::function<void(const CondensedStrip&)>& work) const;
   std::vector<std::size_t> share_columns(std::size_t rows, MPI_Comm comm);
   void append_strips(const CondensedStrip& columns);
+  void make_place() const;
+  void fill_whole(std::size_t first_column, std::size_t last_column, const double* entry) const;
+  void gather() const;
   void share_patches();
 
   std::size_t pairs_ = 0;
@@ -160,7 +166,7 @@ private:
   std::vector<int> owners_;                // of patches; empty: rank 0 has all
   std::vector<NearField::PairRow> beyond_; // the rows outside, in the columns of this rank's patches, where ranks share
   MPI_Comm shared_by_ = MPI_COMM_NULL;     // the ranks that form products together
-  std::size_t rows_ = 0;                   // of W, on all of them
+  std::size_t rows_ = 0;                   // of W, on all ranks that share its columns
   Strips strips_;                          // of this rank, where ranks share
   mutable bool held_whole_ = false;        // besides; the same on all ranks
 };

@@ -29,7 +29,7 @@ struct ThetaStep
   double h = 0, theta = 0.5;              // [s], [-]
   std::optional<PairedMatrices> matrices; // M and K, unless they are dense
   Factor factor;                          // of A bordered by B
-  ContactOperator W;                      // on rank 0
+  ContactOperator W;                      // on rank 0, which other ranks serve
   ContactLaw law = ContactLaw::displacement;
   Opposed opposed = Opposed::theta;
   ContactSettings contact;
