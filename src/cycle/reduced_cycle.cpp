@@ -3,6 +3,7 @@
 #include "floquet.hpp"
 #include "preconditioner.hpp"
 #include "squeal/base/integers.hpp"
+#include "squeal/base/run_control.hpp"
 #include "step_refinement.hpp"
 
 #include "squeal/shooting/full_space.hpp"
@@ -122,7 +123,7 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
   double missed = 1, correction = 0;
   // compared every tenth period: whatever the rounding, it stops at the same
   const auto periodic = [&] { return missed <= 5e-3 && fidelity.reduced_periods % 10 == 0; };
-  while (!periodic() && fidelity.reduced_periods < periods)
+  while (!periodic() && fidelity.reduced_periods < periods && !is_asked_here())
   {
     missed = run_one_period(map, motion, correction);
     ++fidelity.reduced_periods;
@@ -134,6 +135,7 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
     motion.period += std::clamp(correction, -0.2 * motion.period, 0.2 * motion.period);
     correction = 0;
   }
+  end_if_asked(comm_of(search.problem.sliding.structure.load)); // each rank runs by itself, and all end together
   motion.period += correction;
   fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
@@ -227,17 +229,26 @@ ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start
   ConvergenceLog log{progress};
   const Owned<Vec> first = vector_of(start.state);
   OrbitProblem problem{flow, preconditioner, zeros_like(first), start.period, search.tolerance, 0};
-  Orbit begin = evaluate(problem, log, first, start.period);
-  problem.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
   const ShootingOptions& shooting = search.options.shooting;
-  StageResult found = shoot_in_full_space(problem, shooting, log, std::move(begin));
-  if (found.ending == StageEnding::converged)
-    found = prefer_half_period(problem, shooting, log, std::move(found)); // which spares the full model that test
+  const MPI_Comm comm = comm_of(search.problem.sliding.structure.load);
+  StageResult found;
+  try
+  {
+    Orbit begin = evaluate(problem, log, first, start.period);
+    problem.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
+    found = shoot_in_full_space(problem, shooting, log, std::move(begin));
+    if (found.ending == StageEnding::converged)
+      found = prefer_half_period(problem, shooting, log, std::move(found)); // which spares the full model that test
+  }
+  catch (const Interrupted&) // this rank, which shoots by itself: all end together
+  {
+  }
+  end_if_asked(comm);
   ReducedCycle cycle{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0};
   cycle.energy = mean_energy(map, cycle.period, cycle.state);
   search.fidelity.reduced_periods += log.convergence.periods + 1;
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
-  share_from_first_rank(cycle, comm_of(search.problem.sliding.structure.load));
+  share_from_first_rank(cycle, comm);
   return cycle;
 }
 

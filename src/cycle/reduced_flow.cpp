@@ -1,6 +1,7 @@
 #include "squeal/cycle/reduced_flow.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/base/run_control.hpp"
 
 namespace squeal
 {
@@ -112,6 +113,7 @@ Flow flow_of(ReducedMap& map, const EnergyMatrices& energy)
 {
   const auto period_map = [&map](double period, Vec start, Vec end, Vec rate)
   {
+    if (is_asked_here()) throw Interrupted{};
     const PeriodEnd period_end = end_of_period(map, period, reduced_state(start));
     put(period_end.end, end);
     if (rate) put(period_end.rate, rate);
