@@ -60,11 +60,6 @@ Division divided(WeightedGraph whole)
 {
   auto& [graph, weights] = whole;
   Division division{std::vector<idx_t>(weights.size(), 0), {}};
-  if (graph.nodes() < worth_dividing)
-  {
-    division.halves[0] = std::move(whole);
-    return division;
-  }
   std::vector<idx_t> options = metis_options();
   idx_t size = graph.nodes(), separator = 0;
   graph.neighbours.reserve(1);
@@ -73,7 +68,7 @@ Division divided(WeightedGraph whole)
     return METIS_ComputeVertexSeparator(&size, graph.offsets.data(), graph.neighbours.data(), weights.data(),
                                         options.data(), &separator, division.part.data());
   };
-  if (without_losing_signals(METIS_OK, divide) != METIS_OK)
+  if (size < worth_dividing || without_losing_signals(METIS_OK, divide) != METIS_OK)
   {
     division.part.assign(weights.size(), 0);
     division.halves[0] = std::move(whole);

@@ -176,8 +176,6 @@ ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage s
 {
   ContactOperator op;
   const bool by_factor = storage == OperatorStorage::by_factor;
-  if (by_factor) op.products_ = W;
-  if (ranks_of(comm) > 1) op.shared_by_ = comm;
   NearFieldBuilder builder(static_cast<std::size_t>(pairs), directions, by_factor ? PETSC_COMM_SELF : comm);
   std::vector<double> values;
   const auto scaled = [&](const CondensedStrip& strip)
@@ -191,6 +189,8 @@ ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage s
   const bool first = rank_of(comm) == 0;
   if (by_factor)
   {
+    op.products_ = W;
+    if (ranks_of(comm) > 1) op.shared_by_ = comm;
     W.products.read([&](const CondensedStrip& strip) { builder.measure(scaled(strip)); });
     if (first) builder.agree();
     W.products.read([&](const CondensedStrip& strip) { builder.collect(scaled(strip)); });

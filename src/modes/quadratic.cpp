@@ -57,7 +57,7 @@ QuadraticSolution solve_whole(const QuadraticProblem& problem, const Window& win
   return result;
 }
 
-/// What each solve of TOAR is told to, and what a call threw.
+/// What counts the solves of TOAR and shows their number, and the exception of a call.
 struct Watch
 {
   MPI_Comm comm;
