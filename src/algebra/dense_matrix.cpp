@@ -47,6 +47,41 @@ void broadcast(VectorXd& x, MPI_Comm comm)
   MPI_Bcast(x.data(), to_int(size), MPI_DOUBLE, 0, comm);
 }
 
+namespace
+{
+
+Share share_of(Eigen::Index count, int rank, int ranks)
+{
+  const Eigen::Index first = count * rank / ranks;
+  return {first, count * (rank + 1) / ranks - first};
+}
+
+} // namespace
+
+Share share_of(Eigen::Index count, MPI_Comm comm)
+{
+  return share_of(count, rank_of(comm), ranks_of(comm));
+}
+
+void gather_shares(double* values, Eigen::Index count, Eigen::Index length, MPI_Comm comm)
+{
+  const int ranks = ranks_of(comm);
+  if (ranks == 1) return;
+  std::vector<int> firsts, counts;
+  for (int rank = 0; rank < ranks; ++rank)
+  {
+    const Share share = share_of(count, rank, ranks);
+    firsts.push_back(to_int(share.first * length));
+    counts.push_back(to_int(share.count * length));
+  }
+  MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DOUBLE, values, counts.data(), firsts.data(), MPI_DOUBLE, comm);
+}
+
+void gather_columns(MatrixXd& A, MPI_Comm comm)
+{
+  gather_shares(A.data(), A.cols(), A.rows(), comm);
+}
+
 MatrixXd parts_of(const Eigen::MatrixXcd& x)
 {
   MatrixXd parts(x.rows(), 2 * x.cols());
@@ -56,11 +91,18 @@ MatrixXd parts_of(const Eigen::MatrixXcd& x)
 
 MatrixXd solve_dense(MatrixXd A, const MatrixXd& B, const char* singular)
 {
-  if (A.size() == 0) return B;
+  MatrixXd X = B;
+  solve_dense_in_place(std::move(A), X, singular);
+  return X;
+}
+
+void solve_dense_in_place(MatrixXd A, Eigen::Ref<MatrixXd> B, const char* singular)
+{
+  if (A.size() == 0) return;
   if (!A.allFinite()) throw Error(singular); // LAPACK would return without the permutation that Eigen then applies
   const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> factor(A);
   if ((factor.matrixLU().diagonal().array() == 0).any()) throw Error(singular);
-  return factor.solve(B);
+  B = factor.solve(B);
 }
 
 MatrixXd orthonormal_columns(const MatrixXd& A)

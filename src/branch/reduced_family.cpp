@@ -324,8 +324,7 @@ Owned<Vec> ReducedFamily::lifted(const VectorXd& state) const
 
 Preconditioner ReducedFamily::lifted_preconditioner(double period, const VectorXd& state)
 {
-  lifted_correction_ =
-      monodromy_correction(at_->map, period, {state.head(own_.size()), state.tail(own_.size())}, PETSC_COMM_SELF);
+  lifted_correction_ = monodromy_correction(at_->map, period, {state.head(own_.size()), state.tail(own_.size())});
   return preconditioner_of(lifted_correction_, own_, problem_.sliding.structure);
 }
 
@@ -336,11 +335,11 @@ SlowMotions ReducedFamily::slow_motions(double period, Vec start)
   const auto moved = record_contacts(map, period, moved_on(map, period / map.steps / 2, state));
   other_grid_.reset();
   recorded_ = record_contacts(map, period, state);
-  const ReducedSpectrum spectrum = large_multipliers(map, period, recorded_, deciding_values, PETSC_COMM_SELF);
+  const ReducedSpectrum spectrum = large_multipliers(map, period, recorded_, deciding_values);
   SlowMotions slow;
   slow.periods = 2;
   slow.values = spectrum.values;
-  set_changes(spectrum, multipliers_along(spectrum, map, period, moved, PETSC_COMM_SELF), slow);
+  set_changes(spectrum, multipliers_along(spectrum, map, period, moved), slow);
   slow.right = states_of_columns(spectrum.right);
   slow.left = states_of_columns(energy_representatives(own_, spectrum.left));
   slow.confirmed = [] { return true; }; // these are its own
@@ -420,7 +419,7 @@ FlowFamily ReducedFamily::flows()
   family.flow.apply_tangent = [this](std::span<const Vec> states)
   {
     ReducedMap& map = other_grid_ ? *other_grid_ : at_->map;
-    copy_columns(apply_tangent(map, map.h * map.steps, recorded_, columns_of_states(states), PETSC_COMM_SELF), states);
+    copy_columns(apply_tangent(map, map.h * map.steps, recorded_, columns_of_states(states)), states);
   };
   family.flow.slow_motions = [this](double period, Vec start) { return slow_motions(period, start); };
   family.set_parameter = [this](double parameter) { set_parameter(parameter); };
@@ -430,7 +429,7 @@ FlowFamily ReducedFamily::flows()
   family.measure = [this](const Orbit& orbit) { return measure(orbit); };
   family.preconditioner = preconditioner_of(correction_);
   family.renew_preconditioner = [this](double period, Vec start)
-  { correction_ = monodromy_correction(at_->map, period, reduced_state(start), PETSC_COMM_SELF); };
+  { correction_ = monodromy_correction(at_->map, period, reduced_state(start)); };
   return family;
 }
 

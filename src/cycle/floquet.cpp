@@ -255,13 +255,12 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
 void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, int other_steps, double period,
                      const std::function<std::vector<RecordedContact>(int)>& contacts, SlowMotions& slow)
 {
-  const MPI_Comm comm = map.model.shapes.comm;
   const auto change = [&](const std::vector<Complex>& values, std::size_t i)
   { return std::abs(values[i]) - std::abs(spectrum.values[i]); };
-  set_changes(spectrum, multipliers_along(spectrum, map, period, contacts(RecordedPeriods::moved), comm), slow);
+  set_changes(spectrum, multipliers_along(spectrum, map, period, contacts(RecordedPeriods::moved)), slow);
   if (other_steps == 0) return;
-  ReducedMap other{map.model, other_steps, map.theta};
-  const auto compared = multipliers_along(spectrum, other, period, contacts(RecordedPeriods::other), comm);
+  ReducedMap other{map.model, other_steps, map.theta, map.comm};
+  const auto compared = multipliers_along(spectrum, other, period, contacts(RecordedPeriods::other));
   for (std::size_t i = 0; i < slow.errors.size(); ++i)
   {
     slow.errors[i] += 4. / 3 * std::abs(change(compared, i));
@@ -277,21 +276,21 @@ bool holds_every_motion(const ReducedModel& model, int eliminated, Vec state)
 
 /// Whether three quarters of the shapes give as many multipliers above 0.95.
 bool confirmed_by_fewer_shapes(const ReducedMap& map, double period, std::span<const RecordedContact> contacts,
-                               const std::vector<Complex>& values, MPI_Comm comm)
+                               const std::vector<Complex>& values)
 {
   const ReducedModel smaller = truncated(map.model, (3 * map.model.size() + 3) / 4);
-  ReducedMap few{smaller, map.steps, map.theta};
-  return as_many_above(0.95, values, large_multipliers(few, period, contacts, deciding_values, comm).values);
+  ReducedMap few{smaller, map.steps, map.theta, map.comm};
+  return as_many_above(0.95, values, large_multipliers(few, period, contacts, deciding_values).values);
 }
 
 /// Whether the model without its highest modes has the same multipliers above 0.95. The attachments stay: friction on
 /// pairs without their own flexibility is another problem.
 bool confirmed_by_fewer_modes(const ReducedMap& map, double period, std::span<const RecordedContact> contacts,
-                              const std::vector<Complex>& values, MPI_Comm comm)
+                              const std::vector<Complex>& values)
 {
   const ReducedModel smaller = without_modes_apart(map.model);
-  ReducedMap few{smaller, map.steps, map.theta};
-  return alike(0.95, values, large_multipliers(few, period, contacts, deciding_values, comm).values);
+  ReducedMap few{smaller, map.steps, map.theta, map.comm};
+  return alike(0.95, values, large_multipliers(few, period, contacts, deciding_values).values);
 }
 
 /// x = (A_r - m)^-1 x: the reduced resolvent on the state's coordinates, -1/m on what those miss.
@@ -336,9 +335,9 @@ SlowMotions slow_motions_of(const CycleProblem& problem, const ReducedOptions& o
     return recorded_contacts(*model, problem.sliding.interface.directions,
                              periods.records[static_cast<std::size_t>(which)]);
   };
-  ReducedMap own{*model, map.steps, map.theta};
+  ReducedMap own{*model, map.steps, map.theta, comm};
   auto recorded = contacts(RecordedPeriods::own);
-  ReducedSpectrum spectrum = large_multipliers(own, period, recorded, deciding_values, comm);
+  ReducedSpectrum spectrum = large_multipliers(own, period, recorded, deciding_values);
   slow.values = spectrum.values;
   // no motion beside a cycle that shooting finds doubles in a period: shapes that do not fit friction do
   if (!slow.values.empty() && std::abs(slow.values.front()) > 2)
@@ -353,9 +352,9 @@ SlowMotions slow_motions_of(const CycleProblem& problem, const ReducedOptions& o
   const bool whole = holds_every_motion(*model, eliminated_pairs(problem, periods), start);
   slow.confirmed = [=, steps = map.steps, theta = map.theta, recorded = std::move(recorded), values = spectrum.values]
   {
-    const ReducedMap along{*model, steps, theta};
-    return whole || confirmed_by_fewer_shapes(along, period, recorded, values, comm) ||
-           confirmed_by_fewer_modes(along, period, recorded, values, comm);
+    const ReducedMap along{*model, steps, theta, comm};
+    return whole || confirmed_by_fewer_shapes(along, period, recorded, values) ||
+           confirmed_by_fewer_modes(along, period, recorded, values);
   };
   slow.correct = [model, columns = std::move(spectrum.columns), &structure = problem.sliding.structure](
                      Complex m, Vec real, Vec imaginary) { correct(*model, structure, columns, m, real, imaginary); };
@@ -380,9 +379,9 @@ Preconditioner recorded_preconditioner(const CycleProblem& problem, const Reduce
   std::string missing;
   const auto model = model_for(problem, options, periods, memory_for_shapes(1), missing); // it is kept while shooting
   if (!model) return {};
-  ReducedMap reduced{*model, map.steps, map.theta};
+  ReducedMap reduced{*model, map.steps, map.theta, comm_of(structure.load)};
   const auto contacts = recorded_contacts(*model, interface.directions, periods.records[RecordedPeriods::own]);
-  const MatrixXd columns = monodromy(reduced, period, contacts, comm_of(structure.load));
+  const MatrixXd columns = monodromy(reduced, period, contacts);
   const auto correction = std::make_shared<const MonodromyCorrection>(
       monodromy_correction(*model, columns, coordinates(*model, structure, displacement(rate), velocity(rate))));
   return [model, correction, apply = preconditioner_of(*correction, *model, structure)](double T, Vec x, Vec y)

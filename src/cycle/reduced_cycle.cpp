@@ -25,7 +25,7 @@ double doubled_energy(const ReducedModel& model, const ReducedState& state)
 
 ReducedMap period_map_of(const ReducedSearch& search, int steps)
 {
-  ReducedMap map{search.model, steps, search.problem.settings.theta};
+  ReducedMap map{search.model, steps, search.problem.settings.theta, comm_of(search.problem.sliding.structure.load)};
   const std::vector<double>& still = search.model.reactions;
   map.reactions = Eigen::VectorXd::Map(still.data(), static_cast<Eigen::Index>(still.size()));
   map.contact.tolerance = search.fidelity.contact_tolerance;
@@ -118,13 +118,13 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
   Fidelity& fidelity = search.fidelity;
   const PetscInt periods = search.options.reduced.free_periods;
   ReducedMap map = period_map_of(search, search.steps);
-  Progress progress(comm_of(search.problem.sliding.structure.load), "reduced model, free",
-                    static_cast<double>(periods));
+  Progress progress(map.comm, "reduced model, free", static_cast<double>(periods));
   double missed = 1, correction = 0;
   // compared every tenth period: whatever the rounding, it stops at the same
   const auto periodic = [&] { return missed <= 5e-3 && fidelity.reduced_periods % 10 == 0; };
-  while (!periodic() && fidelity.reduced_periods < periods && !is_asked_here())
+  while (!periodic() && fidelity.reduced_periods < periods)
   {
+    end_if_asked(map.comm);
     missed = run_one_period(map, motion, correction);
     ++fidelity.reduced_periods;
     progress.update(
@@ -135,7 +135,6 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
     motion.period += std::clamp(correction, -0.2 * motion.period, 0.2 * motion.period);
     correction = 0;
   }
-  end_if_asked(comm_of(search.problem.sliding.structure.load)); // each rank runs by itself, and all end together
   motion.period += correction;
   fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
@@ -167,8 +166,7 @@ void update_correction(ReducedSearch& search, const FreeMotion& motion)
 {
   const double clock = MPI_Wtime();
   ReducedMap map = period_map_of(search, search.steps);
-  search.correction =
-      monodromy_correction(map, motion.period, motion.state, comm_of(search.problem.sliding.structure.load));
+  search.correction = monodromy_correction(map, motion.period, motion.state);
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
 
@@ -230,25 +228,16 @@ ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start
   const Owned<Vec> first = vector_of(start.state);
   OrbitProblem problem{flow, preconditioner, zeros_like(first), start.period, search.tolerance, 0};
   const ShootingOptions& shooting = search.options.shooting;
-  const MPI_Comm comm = comm_of(search.problem.sliding.structure.load);
-  StageResult found;
-  try
-  {
-    Orbit begin = evaluate(problem, log, first, start.period);
-    problem.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
-    found = shoot_in_full_space(problem, shooting, log, std::move(begin));
-    if (found.ending == StageEnding::converged)
-      found = prefer_half_period(problem, shooting, log, std::move(found)); // which spares the full model that test
-  }
-  catch (const Interrupted&) // this rank, which shoots by itself: all end together
-  {
-  }
-  end_if_asked(comm);
+  Orbit begin = evaluate(problem, log, first, start.period);
+  problem.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
+  StageResult found = shoot_in_full_space(problem, shooting, log, std::move(begin));
+  if (found.ending == StageEnding::converged)
+    found = prefer_half_period(problem, shooting, log, std::move(found)); // which spares the full model that test
   ReducedCycle cycle{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0};
   cycle.energy = mean_energy(map, cycle.period, cycle.state);
   search.fidelity.reduced_periods += log.convergence.periods + 1;
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
-  share_from_first_rank(cycle, comm);
+  share_from_first_rank(cycle, map.comm);
   return cycle;
 }
 

@@ -113,7 +113,7 @@ Flow flow_of(ReducedMap& map, const EnergyMatrices& energy)
 {
   const auto period_map = [&map](double period, Vec start, Vec end, Vec rate)
   {
-    if (is_asked_here()) throw Interrupted{};
+    end_if_asked(map.comm);
     const PeriodEnd period_end = end_of_period(map, period, reduced_state(start));
     put(period_end.end, end);
     if (rate) put(period_end.rate, rate);
@@ -121,10 +121,10 @@ Flow flow_of(ReducedMap& map, const EnergyMatrices& energy)
   return {period_map, energy.M, energy.K, {}};
 }
 
-MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm)
+MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state)
 {
   const ReducedState flow = end_of_period(map, period, state).rate;
-  return monodromy_correction(map.model, monodromy(map, period, record_contacts(map, period, state), comm), flow);
+  return monodromy_correction(map.model, monodromy(map, period, record_contacts(map, period, state)), flow);
 }
 
 MonodromyCorrection monodromy_correction(const ReducedModel& model, const MatrixXd& columns, const ReducedState& f)

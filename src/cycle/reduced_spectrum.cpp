@@ -61,13 +61,13 @@ MatrixXd with_fast_rows(const MatrixXd& X, Index size, Index slow)
 } // namespace
 
 ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
-                                  const LargeValues& wanted, MPI_Comm comm)
+                                  const LargeValues& wanted)
 {
   const Index size = map.model.size(), slow = map.model.slow;
-  const MatrixXd columns = monodromy(map, period, contacts, comm);
+  const MatrixXd columns = monodromy(map, period, contacts);
   ReducedSpectrum result;
   MatrixXd right, left;
-  on_rank_zero(comm,
+  on_rank_zero(map.comm,
                [&]
                {
                  const MatrixXd square = slow_rows(columns, size, slow);
@@ -83,12 +83,12 @@ ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<cons
                  for (std::size_t i = 0; i < count; ++i)
                    left.col(static_cast<Index>(i)) = left_columns.col(static_cast<Index>(places[i]));
                });
-  broadcast_values(result.values, comm);
-  broadcast(right, comm);
-  broadcast(left, comm);
+  broadcast_values(result.values, map.comm);
+  broadcast(right, map.comm);
+  broadcast(left, map.comm);
   // what the slow coordinates miss of both comes with one more passage
   result.right = columns * right;
-  result.left = apply_adjoint(map, period, contacts, with_fast_rows(left, size, slow), comm);
+  result.left = apply_adjoint(map, period, contacts, with_fast_rows(left, size, slow));
   for (MatrixXd* vectors : {&result.right, &result.left}) *vectors = orthonormal_columns(*vectors);
   result.columns = columns;
   return result;
@@ -124,11 +124,11 @@ void set_changes(const ReducedSpectrum& spectrum, const std::vector<Complex>& mo
 }
 
 std::vector<Complex> multipliers_along(const ReducedSpectrum& spectrum, ReducedMap& map, double period,
-                                       std::span<const RecordedContact> contacts, MPI_Comm comm)
+                                       std::span<const RecordedContact> contacts)
 {
-  const MatrixXd image = apply_tangent(map, period, contacts, spectrum.right, comm);
+  const MatrixXd image = apply_tangent(map, period, contacts, spectrum.right);
   std::vector<Complex> values;
-  on_rank_zero(comm,
+  on_rank_zero(map.comm,
                [&]
                {
                  const Eigen::ColPivHouseholderQR<MatrixXd> gram(spectrum.left.transpose() * spectrum.right);
@@ -136,7 +136,7 @@ std::vector<Complex> multipliers_along(const ReducedSpectrum& spectrum, ReducedM
                      values_of(solve_dense_unsymmetric(gram.solve(spectrum.left.transpose() * image)));
                  for (const std::size_t place : nearest_places(spectrum.values, found)) values.push_back(found[place]);
                });
-  broadcast_values(values, comm);
+  broadcast_values(values, map.comm);
   return values;
 }
 

@@ -39,6 +39,13 @@ std::vector<PairBlock> own_blocks(const MatrixXd& W, const ReducedModel& model)
   return result;
 }
 
+/// This rank's share of the columns.
+auto own_columns(MatrixXd& A, MPI_Comm comm)
+{
+  const Share share = share_of(A.cols(), comm);
+  return A.middleCols(share.first, share.count);
+}
+
 } // namespace
 
 CompliantGap gap_law(const ReducedMap& map, std::size_t pair)
@@ -57,13 +64,16 @@ void prepare(ReducedMap& map, double period)
   MatrixXd right(n, 2 * n + rows + 1);
   right << model.M - h * (1 - theta) * model.C - h * h * theta * (1 - theta) * model.K, -h * model.K, h * model.H,
       h * model.force;
-  right = solve_dense(model.M + h * theta * model.C + h * h * theta * theta * model.K, right,
-                      "reduced model: a motion has neither mass nor stiffness");
+  solve_dense_in_place(model.M + h * theta * model.C + h * h * theta * theta * model.K, own_columns(right, map.comm),
+                       "reduced model: a motion has neither mass nor stiffness");
+  gather_columns(right, map.comm);
   map.h = h;
   map.from_state = right.leftCols(2 * n);
   map.from_reactions = right.middleCols(2 * n, rows);
   map.from_load = right.col(2 * n + rows);
-  map.W = model.G * map.from_reactions;
+  map.W.resize(rows, rows);
+  own_columns(map.W, map.comm).noalias() = model.G * own_columns(map.from_reactions, map.comm);
+  gather_columns(map.W, map.comm);
   const std::vector<Eigen::Index> normal = normal_rows(model);
   for (std::size_t i = 0; i < normal.size(); ++i) map.W(normal[i], normal[i]) += gap_law(map, i).by_reaction;
   map.G = model.G;
@@ -81,7 +91,7 @@ struct PairMotion
   VectorXd free, before, position; // G v_free, G v, G q
 };
 
-/// By one reading of G.
+/// By one reading of G, whose rows are shared.
 PairMotion motion_of_pairs(const ReducedMap& map, const ReducedState& state, const VectorXd& v_free)
 {
   constexpr int lanes = 4; // one of them idle
@@ -89,8 +99,10 @@ PairMotion motion_of_pairs(const ReducedMap& map, const ReducedState& state, con
   const Eigen::Index n = map.model.size();
   Rows x(n, lanes), y(map.G.rows(), lanes);
   x << v_free, state.v, state.q, VectorXd::Zero(n);
-  dense_product(map.G.data(), static_cast<std::size_t>(y.rows()), static_cast<std::size_t>(n), lanes, x.data(),
-                y.data());
+  const Share own = share_of(y.rows(), map.comm);
+  dense_product(map.G.data() + own.first * n, static_cast<std::size_t>(own.count), static_cast<std::size_t>(n), lanes,
+                x.data(), y.data() + own.first * lanes);
+  gather_shares(y.data(), y.rows(), lanes, map.comm);
   return {y.col(0), y.col(1), y.col(2)};
 }
 
@@ -151,11 +163,16 @@ bool find_reactions(const ReducedMap& map, const ReducedState& state, const Vect
 
 bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact)
 {
-  VectorXd both(2 * map.model.size());
+  const Eigen::Index n = map.model.size();
+  const Share own = share_of(n, map.comm);
+  VectorXd both(2 * n), next(n);
   both << state.v, state.q;
-  VectorXd next = map.from_state * both + map.from_load;
+  auto rows = next.segment(own.first, own.count);
+  rows = map.from_state.middleRows(own.first, own.count) * both + map.from_load.segment(own.first, own.count);
+  gather_shares(next.data(), n, 1, map.comm);
   const bool converged = find_reactions(map, state, next, contact);
-  next.noalias() += map.from_reactions * contact.r;
+  rows.noalias() += map.from_reactions.middleRows(own.first, own.count) * contact.r;
+  gather_shares(next.data(), n, 1, map.comm);
   state.q += map.h * (map.theta * next + (1 - map.theta) * state.v);
   state.v = std::move(next);
   return converged;
@@ -200,6 +217,11 @@ PeriodEnd end_of_period(ReducedMap& map, double period, ReducedState state)
   PeriodEnd result{state, {}};
   (void)advance(map, state, contact);
   result.rate = {(state.q - last_but_one.q) / (2 * map.h), (state.v - last_but_one.v) / (2 * map.h)};
+  for (ReducedState* shared : {&result.end, &result.rate}) // bit by bit: all ranks decide on it
+  {
+    broadcast(shared->q, map.comm);
+    broadcast(shared->v, map.comm);
+  }
   return result;
 }
 

@@ -8,6 +8,7 @@
 #include "squeal/contact/sliding_direction.hpp"
 
 #include <Eigen/LU>
+#include <ranges>
 
 namespace squeal
 {
@@ -41,8 +42,42 @@ struct LinearStep
   std::vector<Index> rows; // of the closed pairs
   MatrixXd rates;          // b
   std::vector<Turn> turns; // T is the identity but there
-  Eigen::PartialPivLU<MatrixXd> A{};
+  MatrixXd A{};            // P A = L U once it is factored
+  Eigen::VectorXi order{}; // P
 };
+
+void factor(LinearStep& step)
+{
+  if (step.rows.empty()) return;
+  const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> in_place(step.A);
+  step.order = in_place.permutationP().indices();
+}
+
+/// Gives every rank the factor that `root` has.
+void share_factor(LinearStep& step, int root, MPI_Comm comm)
+{
+  if (ranks_of(comm) == 1) return;
+  step.order.resize(step.A.rows());
+  MPI_Bcast(step.A.data(), to_int(step.A.size()), MPI_DOUBLE, root, comm);
+  MPI_Bcast(step.order.data(), to_int(step.order.size()), MPI_INT, root, comm);
+}
+
+/// A^-1 x.
+MatrixXd solve(const LinearStep& step, const MatrixXd& x)
+{
+  MatrixXd result = Eigen::PermutationMatrix<Eigen::Dynamic>(step.order) * x;
+  step.A.triangularView<Eigen::UnitLower>().solveInPlace(result);
+  step.A.triangularView<Eigen::Upper>().solveInPlace(result);
+  return result;
+}
+
+/// A'^-1 x.
+MatrixXd solve_transposed(const LinearStep& step, MatrixXd x)
+{
+  step.A.triangularView<Eigen::Upper>().transpose().solveInPlace(x);
+  step.A.triangularView<Eigen::UnitLower>().transpose().solveInPlace(x);
+  return Eigen::PermutationMatrix<Eigen::Dynamic>(step.order).transpose() * x;
+}
 
 void turn(const LinearStep& step, MatrixXd& x)
 {
@@ -53,7 +88,8 @@ void turn(const LinearStep& step, MatrixXd& x)
   }
 }
 
-/// A of the closed pairs at w and r of the step: friction that slides follows the normal reactions and turns.
+/// A of the closed pairs at w and r of the step, not yet factored: friction that slides follows the normal reactions
+/// and turns.
 void linearise_contact(const ReducedMap& map, const RecordedContact& contact, const std::vector<std::size_t>& closed,
                        LinearStep& step)
 {
@@ -81,7 +117,7 @@ void linearise_contact(const ReducedMap& map, const RecordedContact& contact, co
   }
   for (Index i = 0; i < A.rows(); ++i) // of pairs that stick there may be more rows than the shapes can tell apart
     A(i, i) = A.row(i).isZero(0) ? 1 : A(i, i) * (1 + 1e-10);
-  step.A.compute(A);
+  step.A = std::move(A);
 }
 
 /// db of all rows for changes of the start (v, q), without past sliding.
@@ -90,7 +126,10 @@ MatrixXd free_rates(const ReducedMap& map)
   const ReducedModel& model = map.model;
   const Index n = model.size();
   const PairRows<Index> rows(model.directions);
-  MatrixXd rates = model.G * map.from_state;
+  MatrixXd rates(model.G.rows(), 2 * n);
+  const Share own = share_of(2 * n, map.comm);
+  rates.middleCols(own.first, own.count).noalias() = model.G * map.from_state.middleCols(own.first, own.count);
+  gather_columns(rates, map.comm);
   for (Index pair = 0; pair < static_cast<Index>(model.active.size()); ++pair)
   {
     const auto normal = model.G.row(rows.normal(pair));
@@ -130,7 +169,7 @@ void advance_columns(const ReducedMap& map, const LinearStep& step, MatrixXd& X)
   {
     MatrixXd db = step.rates * X;
     turn(step, db);
-    v.noalias() -= map.from_reactions(Eigen::all, step.rows) * step.A.solve(db);
+    v.noalias() -= map.from_reactions(Eigen::all, step.rows) * solve(step, db);
   }
   X.bottomRows(n) += map.h * (map.theta * v + (1 - map.theta) * X.topRows(n));
   X.topRows(n) = v;
@@ -146,7 +185,7 @@ void go_back(const ReducedMap& map, const LinearStep& step, MatrixXd& X)
   start.bottomRows(n) += X.bottomRows(n);
   if (!step.rows.empty())
   {
-    MatrixXd y = step.A.transpose().solve(MatrixXd(map.from_reactions(Eigen::all, step.rows).transpose() * v));
+    MatrixXd y = solve_transposed(step, map.from_reactions(Eigen::all, step.rows).transpose() * v);
     turn(step, y);
     start.noalias() -= step.rates.transpose() * y;
   }
@@ -162,35 +201,29 @@ MatrixXd halves_exchanged(const MatrixXd& X)
   return result;
 }
 
-/// This rank's share of the columns.
-struct Share
-{
-  Index first, last;
-};
-
-Share share_of(Index columns, MPI_Comm comm)
-{
-  return {columns * rank_of(comm) / ranks_of(comm), columns * (rank_of(comm) + 1) / ranks_of(comm)};
-}
-
-/// All columns on every rank. Every entry is one rank's: a sum of it and zeros has the same bits everywhere.
-MatrixXd gathered(const MatrixXd& own, Index columns, MPI_Comm comm)
-{
-  MatrixXd result = MatrixXd::Zero(own.rows(), columns);
-  result.middleCols(share_of(columns, comm).first, own.cols()) = own;
-  MPI_Allreduce(MPI_IN_PLACE, result.data(), to_int(result.size()), MPI_DOUBLE, MPI_SUM, comm);
-  return result;
-}
-
-/// The columns (q, v) after work(rates, X) on this rank's share of them, X with rows (v, q).
-template <class Work>
-MatrixXd through_period(ReducedMap& map, double period, const MatrixXd& columns, MPI_Comm comm, Work work)
+/// The columns (q, v) after a passage(step, X) of each contact, X with rows (v, q): this rank's share of the columns.
+/// Each rank factors its share of the steps.
+template <class Contacts, class Passage> MatrixXd
+through_period(ReducedMap& map, double period, const Contacts& contacts, const MatrixXd& columns, Passage passage)
 {
   prepare(map, period);
-  const Share share = share_of(columns.cols(), comm);
-  MatrixXd X = halves_exchanged(columns.middleCols(share.first, share.last - share.first));
-  work(free_rates(map), X);
-  return gathered(halves_exchanged(X), columns.cols(), comm);
+  const MatrixXd rates = free_rates(map);
+  const Share own = share_of(columns.cols(), map.comm);
+  MatrixXd X = halves_exchanged(columns.middleCols(own.first, own.count));
+  const auto rank = static_cast<std::size_t>(rank_of(map.comm)), ranks = static_cast<std::size_t>(ranks_of(map.comm));
+  const auto step_at = [&](std::size_t i) { return linear_step(map, rates, contacts[static_cast<std::ptrdiff_t>(i)]); };
+  LinearStep factored;
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+  {
+    if (i % ranks == 0 && i + rank < contacts.size()) factor(factored = step_at(i + rank));
+    LinearStep step = i % ranks == rank ? std::move(factored) : step_at(i);
+    share_factor(step, static_cast<int>(i % ranks), map.comm);
+    passage(step, X);
+  }
+  MatrixXd result(columns.rows(), columns.cols());
+  result.middleCols(own.first, own.count) = halves_exchanged(X);
+  gather_columns(result, map.comm);
+  return result;
 }
 
 } // namespace
@@ -204,6 +237,8 @@ std::vector<RecordedContact> record_contacts(ReducedMap& map, double period, Red
   {
     if (!advance(map, state, contact)) ++map.unconverged;
     RecordedContact& now = contacts.emplace_back(RecordedContact{contact.r, contact.w, {}});
+    broadcast(now.r, map.comm); // ranks that see other pairs closed would factor other matrices
+    broadcast(now.w, map.comm);
     for (std::size_t pair = 0; pair < map.model.active.size(); ++pair)
       now.opposes_theta.push_back(!opposes_end(PairView<const double>(contact.past, map.model.directions), pair));
   }
@@ -231,34 +266,26 @@ std::vector<RecordedContact> recorded_contacts(const ReducedModel& model, int di
 }
 
 MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
-                       const MatrixXd& columns, MPI_Comm comm)
+                       const MatrixXd& columns)
 {
-  return through_period(map, period, columns, comm,
-                        [&](const MatrixXd& rates, MatrixXd& X)
-                        {
-                          for (const RecordedContact& contact : contacts)
-                            advance_columns(map, linear_step(map, rates, contact), X);
-                        });
+  return through_period(map, period, contacts, columns,
+                        [&](const LinearStep& step, MatrixXd& X) { advance_columns(map, step, X); });
 }
 
 MatrixXd apply_adjoint(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
-                       const MatrixXd& columns, MPI_Comm comm)
+                       const MatrixXd& columns)
 {
-  return through_period(map, period, columns, comm,
-                        [&](const MatrixXd& rates, MatrixXd& X)
-                        {
-                          for (std::size_t i = contacts.size(); i-- > 0;)
-                            go_back(map, linear_step(map, rates, contacts[i]), X);
-                        });
+  return through_period(map, period, contacts | std::views::reverse, columns,
+                        [&](const LinearStep& step, MatrixXd& X) { go_back(map, step, X); });
 }
 
-MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedContact> contacts, MPI_Comm comm)
+MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedContact> contacts)
 {
   const Index n = map.model.size(), slow = map.model.slow;
   MatrixXd columns = MatrixXd::Zero(2 * n, 2 * slow);
   columns.topLeftCorner(slow, slow).diagonal().setOnes();
   columns.block(n, slow, slow, slow).diagonal().setOnes();
-  return apply_tangent(map, period, contacts, columns, comm);
+  return apply_tangent(map, period, contacts, columns);
 }
 
 } // namespace squeal

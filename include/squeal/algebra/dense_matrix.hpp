@@ -1,5 +1,5 @@
 #pragma once
-/// Dense matrices that are whole on one rank or on all: copies, broadcasts and linear systems.
+/// Dense matrices that are whole on one rank or on all: copies, broadcasts, shares and linear systems.
 #include "squeal/base/petsc.hpp"
 
 #include <Eigen/Core>
@@ -15,6 +15,21 @@ void broadcast(Eigen::MatrixXd& A, MPI_Comm comm);
 /// The same of a vector. Collective.
 void broadcast(Eigen::VectorXd& x, MPI_Comm comm);
 
+/// Consecutive columns, rows or entries: a rank's part of them.
+struct Share
+{
+  Eigen::Index first = 0, count = 0;
+};
+
+/// This rank's part of `count` columns, rows or entries. Not collective.
+Share share_of(Eigen::Index count, MPI_Comm comm);
+
+/// Gives every rank the entries that the others computed of `count` ones of `length` numbers each, one after the other.
+/// Collective.
+void gather_shares(double* values, Eigen::Index count, Eigen::Index length, MPI_Comm comm);
+/// The same of columns. Collective.
+void gather_columns(Eigen::MatrixXd& A, MPI_Comm comm);
+
 /// A x by two real products, which BLAS does: of a real with a complex matrix Eigen makes a slow loop of its own.
 template <typename Real> Eigen::MatrixXcd real_times(const Eigen::MatrixBase<Real>& A, const Eigen::MatrixXcd& x)
 {
@@ -29,6 +44,8 @@ Eigen::MatrixXd parts_of(const Eigen::MatrixXcd& x);
 
 /// A^-1 B by LU with row interchanges. Throws Error with the text `singular` if a pivot is zero.
 Eigen::MatrixXd solve_dense(Eigen::MatrixXd A, const Eigen::MatrixXd& B, const char* singular);
+/// The same in the place of B.
+void solve_dense_in_place(Eigen::MatrixXd A, Eigen::Ref<Eigen::MatrixXd> B, const char* singular);
 
 /// An orthonormal basis of the span of independent columns.
 Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& A);

@@ -25,7 +25,7 @@ struct EnergyMatrices
 
 EnergyMatrices energy_matrices(const ReducedModel& model);
 
-/// Borrows both.
+/// Borrows both. Its map's ranks integrate together and have the same results bit by bit.
 Flow flow_of(ReducedMap& map, const EnergyMatrices& energy);
 
 /// D = (dPhi_r/dx S S' - f f^+ - I)^-1 + I at a state of the reduced model, as left x right. f is the flow, along which
@@ -36,8 +36,8 @@ struct MonodromyCorrection
   Eigen::MatrixXd left, right;
 };
 
-/// Collective: each rank does its share of the columns.
-MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state, MPI_Comm comm);
+/// Collective among the map's ranks.
+MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state);
 
 /// From the columns of a monodromy matrix along the slow coordinates of q and of v, and the flow.
 MonodromyCorrection monodromy_correction(const ReducedModel& model, const Eigen::MatrixXd& columns,

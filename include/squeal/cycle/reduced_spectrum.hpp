@@ -29,9 +29,9 @@ struct LargeValues
 /// Those that a verdict is about.
 inline constexpr LargeValues deciding_values{0.85, 4, 48};
 
-/// Collective.
+/// Collective among the map's ranks.
 ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
-                                  const LargeValues& wanted, MPI_Comm comm);
+                                  const LargeValues& wanted);
 
 /// Columns (q, v) that act on a state by the energy product as these left vectors do by the plain one.
 Eigen::MatrixXd energy_representatives(const ReducedModel& model, const Eigen::MatrixXd& left);
@@ -40,8 +40,8 @@ Eigen::MatrixXd energy_representatives(const ReducedModel& model, const Eigen::M
 void set_changes(const ReducedSpectrum& spectrum, const std::vector<std::complex<double>>& moved, SlowMotions& slow);
 
 /// The multipliers that these vectors give on other contact or with other steps: eigenvalues of (L'R)^-1 L'Phi R, in
-/// the order of the spectrum's values. Collective.
+/// the order of the spectrum's values. Collective among the map's ranks.
 std::vector<std::complex<double>> multipliers_along(const ReducedSpectrum& spectrum, ReducedMap& map, double period,
-                                                    std::span<const RecordedContact> contacts, MPI_Comm comm);
+                                                    std::span<const RecordedContact> contacts);
 
 } // namespace squeal

@@ -1,6 +1,7 @@
 #pragma once
-/// The modified theta-method on the reduced model (src/README.md, section 7.4), in few dense products. Every rank does
-/// the same; no function is collective or throws.
+/// The modified theta-method on the reduced model (src/README.md, section 7.4), in few dense products. The ranks of a
+/// map follow one motion together: each has its share of the products, and all solve contact. Functions that take a map
+/// that may change, and advance(), are collective among them.
 #include "squeal/contact/solver.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
@@ -29,6 +30,7 @@ struct ReducedMap
   const ReducedModel& model;
   int steps = 0;
   double theta = 0.5;
+  MPI_Comm comm = MPI_COMM_SELF;                      // of the ranks that follow the motion
   double h = 0;                                       // [s] of the matrices below
   Eigen::MatrixXd from_state{};                       // v_free = from_state (v, q) + from_load
   Eigen::VectorXd from_load{};                        // h A^-1 f
@@ -45,7 +47,8 @@ struct ReducedMap
 /// Of an active pair, rigid ones included.
 CompliantGap gap_law(const ReducedMap& map, std::size_t pair);
 
-/// The matrices of the period's step size, unless they are those already.
+/// The matrices of the period's step size, unless they are those already. Throws Error where a motion has neither mass
+/// nor stiffness.
 void prepare(ReducedMap& map, double period);
 
 /// One step. Returns whether contact converged.

@@ -1,6 +1,6 @@
 #pragma once
-/// The derivative of the reduced period map (src/README.md, sections 4.13 and 7.5). Functions that take a communicator
-/// are collective; of the others every rank does the same.
+/// The derivative of the reduced period map (src/README.md, sections 4.13 and 7.5). Functions that take a map are
+/// collective among its ranks.
 #include "squeal/reduction/reduced_step.hpp"
 #include "squeal/transient/step_record.hpp"
 
@@ -24,15 +24,15 @@ std::vector<RecordedContact> recorded_contacts(const ReducedModel& model, int di
                                                std::span<const StepRecord> records);
 
 /// Columns of changes of the start, (q, v), to those of the period's end: the product of the steps' own tangents on the
-/// recorded contact. Collective: each rank does its share of the columns.
+/// recorded contact. Each rank does its share of the columns, and factors the contact of its share of the steps.
 Eigen::MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
-                              const Eigen::MatrixXd& columns, MPI_Comm comm);
+                              const Eigen::MatrixXd& columns);
 
 /// Columns x to (dPhi/dx)'x.
 Eigen::MatrixXd apply_adjoint(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
-                              const Eigen::MatrixXd& columns, MPI_Comm comm);
+                              const Eigen::MatrixXd& columns);
 
 /// The derivative of a period's end (q, v) in the coordinates q and v of the slow shapes.
-Eigen::MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedContact> contacts, MPI_Comm comm);
+Eigen::MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedContact> contacts);
 
 } // namespace squeal
