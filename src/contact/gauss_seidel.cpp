@@ -3,8 +3,9 @@
 ///
 /// Let w = w_0 + dw with w_0 = W r_0 + b from the last product with W, and dw the effect of the changes since. The
 /// sweeps update dw alone. It is small, so the near field and single precision suffice, patch by patch where there are
-/// several. Where that did not lead to convergence, all pairs are one patch, and then W itself is swept over, where it
-/// is stored. A problem counts as converged only by the residual after a product with W.
+/// several, and by pieces of a large one, whose even and odd pieces take turns. Where that did not lead to convergence,
+/// all pairs are one patch, and then W itself is swept over, where it is stored. A problem counts as converged only by
+/// the residual after a product with W.
 #include "gauss_seidel.hpp"
 
 #include "squeal/base/broadcast.hpp"
@@ -28,34 +29,51 @@ namespace
 constexpr int most_of_a_patch = 8;
 constexpr double small_in_a_patch = 0.1;
 
-/// The pairs that sweeps visit, patch after patch. Of several patches each is swept by itself, and reactions act on the
-/// others when all have been swept. So sweeps do not depend on the number of ranks.
-struct SweptPairs
+/// Patches that are swept side by side.
+struct Turn
 {
   struct Part
   {
     std::size_t first, count; // of `order`
   };
-  std::vector<std::size_t> order{}; // all pairs, rank by rank
+  std::vector<std::size_t> order{}; // pairs, rank by rank
   std::vector<Part> own{};          // patches of this rank
-  bool several = false;             // patches, on all ranks
-  MPI_Comm comm = MPI_COMM_NULL;    // ranks that sweep side by side
-  std::vector<int> counts{};        // pairs of each of them
+  std::vector<int> counts{};        // pairs of each rank that shares them
 
   std::span<const std::size_t> pairs(const Part& part) const
   {
     return std::span(order).subspan(part.first, part.count);
   }
+};
+
+/// The pairs that sweeps visit, patch after patch. Of several patches each is swept by itself, and reactions act on the
+/// others at the end of a turn: when all have been swept, or the even or odd pieces of a single patch. So sweeps do not
+/// depend on the number of ranks.
+struct SweptPairs
+{
+  std::vector<Turn> turns{};
+  bool several = false;          // patches, on all ranks
+  MPI_Comm comm = MPI_COMM_NULL; // ranks that sweep side by side
+
   bool shared() const { return comm != MPI_COMM_NULL; }
+  bool by_pieces() const { return turns.size() > 1; }
+
+  /// work(pair) of all of this rank's.
+  template <class Work> void for_each_own(Work work) const
+  {
+    for (const Turn& turn : turns)
+      for (const Turn::Part& part : turn.own)
+        for (const std::size_t pair : turn.pairs(part)) work(pair);
+  }
 };
 
 SweptPairs one_patch(const ContactOperator& W)
 {
-  SweptPairs where;
-  where.order.resize(W.pairs());
-  std::iota(where.order.begin(), where.order.end(), 0);
-  where.own = {{0, W.pairs()}};
-  return where;
+  Turn all;
+  all.order.resize(W.pairs());
+  std::iota(all.order.begin(), all.order.end(), 0);
+  all.own = {{0, W.pairs()}};
+  return {{all}};
 }
 
 SweptPairs patches_of(const ContactOperator& W)
@@ -64,18 +82,21 @@ SweptPairs patches_of(const ContactOperator& W)
   where.several = true;
   if (W.shares_patches()) where.comm = W.shared_by();
   const int ranks = where.shared() ? ranks_of(where.comm) : 1, me = where.shared() ? rank_of(where.comm) : 0;
-  for (int rank = 0; rank < ranks; ++rank)
-  {
-    const std::size_t before = where.order.size();
-    for (std::size_t patch = 0; patch < W.patches().size(); ++patch)
+  where.turns.resize(W.patches_take_turns() ? 2 : 1);
+  for (std::size_t number = 0; number < where.turns.size(); ++number)
+    for (int rank = 0; rank < ranks; ++rank)
     {
-      if (W.owner(patch) != rank) continue;
-      const std::vector<std::size_t>& pairs = W.patches()[patch];
-      if (rank == me) where.own.push_back({where.order.size(), pairs.size()});
-      where.order.insert(where.order.end(), pairs.begin(), pairs.end());
+      Turn& turn = where.turns[number];
+      const std::size_t before = turn.order.size();
+      for (std::size_t patch = number; patch < W.patches().size(); patch += where.turns.size())
+      {
+        if (W.owner(patch) != rank) continue;
+        const std::vector<std::size_t>& pairs = W.patches()[patch];
+        if (rank == me) turn.own.push_back({turn.order.size(), pairs.size()});
+        turn.order.insert(turn.order.end(), pairs.begin(), pairs.end());
+      }
+      turn.counts.push_back(to_int(turn.order.size() - before));
     }
-    where.counts.push_back(to_int(where.order.size() - before));
-  }
   return where;
 }
 
@@ -138,43 +159,43 @@ template <class Entry> double visit(SweptProblem<Entry>& problem, std::size_t pa
   return change_reaction(problem, pair, next) ? defect : 0;
 }
 
-/// Gives every rank the reactions of all patches.
-template <class Entry> void exchange_reactions(const Problems<Entry>& problems, const SweptPairs& where)
+/// Gives every rank the reactions of all patches of a turn.
+template <class Entry> void exchange_reactions(const Problems<Entry>& problems, const Turn& turn, MPI_Comm comm)
 {
   const int directions = problems.front()->work.W.directions();
   const std::size_t of_a_pair = problems.size() * PairRows<std::size_t>(directions).per_pair();
   std::vector<int> counts, starts;
   int total = 0;
-  for (const int pairs : where.counts)
+  for (const int pairs : turn.counts)
   {
     starts.push_back(total);
     counts.push_back(pairs * to_int(of_a_pair));
     total += counts.back();
   }
   std::vector<double> all(static_cast<std::size_t>(total));
-  const auto for_each_entry = [&](const SweptPairs::Part& part, auto take)
+  const auto for_each_entry = [&](const Turn::Part& part, auto take)
   {
     double* entry = all.data() + part.first * of_a_pair;
-    for (const std::size_t pair : where.pairs(part))
+    for (const std::size_t pair : turn.pairs(part))
       for (SweptProblem<Entry>* problem : problems)
         for (double& reaction : PairView<double>(problem->work.r, directions).of(pair)) take(reaction, *entry++);
   };
-  for (const SweptPairs::Part& part : where.own)
+  for (const Turn::Part& part : turn.own)
     for_each_entry(part, [](double reaction, double& entry) { entry = reaction; });
-  MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, all.data(), counts.data(), starts.data(), MPI_DOUBLE, where.comm);
-  for_each_entry({0, where.order.size()}, [](double& reaction, double entry) { reaction = entry; });
+  MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, all.data(), counts.data(), starts.data(), MPI_DOUBLE, comm);
+  for_each_entry({0, turn.order.size()}, [](double& reaction, double entry) { reaction = entry; });
 }
 
-/// What the reactions that changed since the last time add to dw from patch to patch.
-void act_on_other_patches(const Problems<float>& problems, const SweptPairs& where)
+/// What the reactions of a turn that changed since the last time add to dw from patch to patch.
+void act_on_other_patches(const Problems<float>& problems, const SweptPairs& where, const Turn& turn)
 {
   if (!where.several) return;
-  if (where.shared()) exchange_reactions(problems, where);
+  if (where.shared()) exchange_reactions(problems, turn, where.comm);
   for (SweptProblem<float>* problem : problems)
   {
     const ContactWork& work = problem->work;
     const PairView<double> known(problem->known, work.W.directions());
-    for (std::size_t pair = 0; pair < work.W.pairs(); ++pair)
+    for (const std::size_t pair : turn.order)
     {
       const PairVector now = work.reaction(pair), before = known.vector(pair);
       if (now == before) continue;
@@ -185,17 +206,19 @@ void act_on_other_patches(const Problems<float>& problems, const SweptPairs& whe
 }
 
 /// The near field alone has patches.
-void act_on_other_patches(const Problems<double>&, const SweptPairs&) {}
+void act_on_other_patches(const Problems<double>&, const SweptPairs&, const Turn&) {}
 
 /// The residual by dw, whose rounding it contains, in the pairs of this rank.
 template <class Entry> double estimated_residual(const SweptProblem<Entry>& problem, const SweptPairs& where)
 {
   const double largest = largest_reaction(problem.work.r);
   double residual = 0;
-  for (const SweptPairs::Part& part : where.own)
-    for (const std::size_t pair : where.pairs(part))
-      if (problem.work.takes_part(pair))
-        residual = std::max(residual, defect_of(problem.work, pair, velocity_of(problem, pair), largest));
+  where.for_each_own(
+      [&](std::size_t pair)
+      {
+        if (problem.work.takes_part(pair))
+          residual = std::max(residual, defect_of(problem.work, pair, velocity_of(problem, pair), largest));
+      });
   return residual;
 }
 
@@ -279,11 +302,14 @@ void sweep_once(Problems<Entry>& sweeping, const SweptPairs& where, const Contac
   {
     largest.push_back(largest_reaction(problem->work.r));
     const int left = static_cast<int>(settings.max_iterations) - problem->work.result.iterations;
-    at_most.push_back(where.several ? std::min(most_of_a_patch, left) : 1);
+    at_most.push_back(where.several && !where.by_pieces() ? std::min(most_of_a_patch, left) : 1);
   }
   std::vector<Swept> swept(sweeping.size());
-  for (const SweptPairs::Part& part : where.own) sweep_patch(sweeping, where.pairs(part), at_most, largest, swept);
-  act_on_other_patches(sweeping, where);
+  for (const Turn& turn : where.turns)
+  {
+    for (const Turn::Part& part : turn.own) sweep_patch(sweeping, turn.pairs(part), at_most, largest, swept);
+    act_on_other_patches(sweeping, where, turn);
+  }
   for (std::size_t k = 0; k < sweeping.size(); ++k) swept[k].residual = estimated_residual(*sweeping[k], where);
   agree(swept, where);
   Problems<Entry> remaining;
@@ -296,7 +322,7 @@ void sweep_once(Problems<Entry>& sweeping, const SweptPairs& where, const Contac
     result.residual = swept[k].residual;
     const bool moved = swept[k].sweeps > 0, due = result.iterations / 50 > before / 50;
     problem.changed = problem.changed || moved;
-    if (due && !problem.by_patches) shorten_changes(problem);
+    if (due && (!problem.by_patches || where.by_pieces())) shorten_changes(problem);
     problem.finished = !(result.residual > problem.target) || !moved;
     if (!problem.finished && !due && result.iterations < settings.max_iterations) remaining.push_back(&problem);
   }
@@ -312,14 +338,16 @@ void begin(const Problems<Entry>& problems, const SweptPairs& where, const Conta
   {
     ContactWork& work = problem->work;
     problem->known = work.r;
-    for (const SweptPairs::Part& part : where.own)
-      for (const std::size_t pair : where.pairs(part))
-        change_reaction(*problem, pair,
-                        work.takes_part(pair)
-                            ? admissible(work.reaction(pair), velocity_of(*problem, pair), work.friction)
-                            : PairVector{});
+    where.for_each_own(
+        [&](std::size_t pair)
+        {
+          change_reaction(*problem, pair,
+                          work.takes_part(pair)
+                              ? admissible(work.reaction(pair), velocity_of(*problem, pair), work.friction)
+                              : PairVector{});
+        });
   }
-  act_on_other_patches(problems, where);
+  for (const Turn& turn : where.turns) act_on_other_patches(problems, where, turn);
   std::vector<Swept> swept;
   for (const SweptProblem<Entry>* problem : problems)
     swept.push_back({problem->changed ? estimated_residual(*problem, where) : 0, problem->changed ? 1. : 0.});

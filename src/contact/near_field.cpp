@@ -17,9 +17,8 @@ namespace
 {
 
 constexpr int bins_of_octave = 8, bins_above_unit = 192; // 24 octaves
-constexpr double neighbour = 0.1;        // of a pair's own block: those of neighbours on a mesh have 0.2 and more
-constexpr double strong_action = 0.5;    // on a patch, over its own
-constexpr std::size_t most_patches = 64; // before any are joined
+constexpr double strong_action = 0.5;                    // on a patch, over its own
+constexpr std::size_t most_patches = 64;                 // before any are joined
 
 /// Rounded down.
 int eighths_of_octaves(double size)
@@ -58,6 +57,21 @@ NearField::PairRow part_of(const NearField::PairRow& row, std::size_t of_a_pair,
   }
   part.values.shrink_to_fit();
   return part;
+}
+
+void set_patches(NearField& near, const std::vector<std::size_t>& patch_of, std::size_t of_a_pair)
+{
+  std::map<std::size_t, std::vector<std::size_t>> patches;
+  for (std::size_t i = 0; i < patch_of.size(); ++i)
+  {
+    const NearField::PairRow row = std::exchange(near.inside[i], {});
+    const auto own = [&](std::size_t j) { return patch_of[j] == patch_of[i]; };
+    near.inside[i] = part_of(row, of_a_pair, own);
+    near.outside[i] = part_of(row, of_a_pair, std::not_fn(own));
+    patches[patch_of[i]].push_back(i);
+  }
+  near.patches.clear();
+  for (auto& [patch, pairs] : patches) near.patches.push_back(std::move(pairs));
 }
 
 NearFieldBuilder::NearFieldBuilder(std::size_t pairs, int directions, MPI_Comm comm)
@@ -211,29 +225,6 @@ void NearFieldBuilder::keep(const Kept& kept, std::vector<Blocks>& waiting)
   }
 }
 
-/// Calls take(j, size) for each block of pair i's rows: the largest |W_kl|/sqrt(W_kk W_ll), 1 of its own block.
-template <class Take> void NearFieldBuilder::for_each_block(std::size_t i, Take take) const
-{
-  const std::size_t n = rows_.per_pair();
-  const auto part = [&](std::size_t pair, std::size_t k)
-  { return diagonal_[pair][k][k] > 0 ? 1 / std::sqrt(diagonal_[pair][k][k]) : 0; };
-  const float* values = near_rows_[i].values.data();
-  for (const auto& [first, count] : near_rows_[i].runs)
-  {
-    for (std::size_t column = 0; column < count; column += n)
-    {
-      const std::size_t j = rows_.pair_of(first + column);
-      double size = 0;
-      for (std::size_t k = 0; k < n; ++k)
-        for (std::size_t l = 0; l < n; ++l)
-          size =
-              std::max(size, part(i, k) * part(j, l) * std::abs(static_cast<double>(values[k * count + column + l])));
-      take(j, size);
-    }
-    values += n * count;
-  }
-}
-
 /// The patch of each pair. Pairs that a block of a tenth of their own joins are in one patch; so are patches on which
 /// others act half as strongly as they do on themselves, where all are pushed alike. Sweeps patch by patch are expected
 /// to converge then, and are watched.
@@ -241,7 +232,7 @@ std::vector<std::size_t> NearFieldBuilder::patch_of_pairs() const
 {
   DisjointSets neighbours(pairs_);
   for (std::size_t i = 0; i < pairs_; ++i)
-    for_each_block(i,
+    for_each_block(near_rows_[i], i, diagonal_, rows_,
                    [&](std::size_t j, double size)
                    {
                      if (size >= neighbour) neighbours.join(to_int(i), to_int(j));
@@ -258,7 +249,8 @@ std::vector<std::size_t> NearFieldBuilder::patch_of_pairs() const
   }
   Eigen::MatrixXd action = Eigen::MatrixXd::Zero(to_int(first.size()), to_int(pairs_)); // of a patch on a pair
   for (std::size_t i = 0; i < pairs_; ++i)
-    for_each_block(i, [&](std::size_t j, double size) { action(to_int(patch_of[j]), to_int(i)) += size; });
+    for_each_block(near_rows_[i], i, diagonal_, rows_,
+                   [&](std::size_t j, double size) { action(to_int(patch_of[j]), to_int(i)) += size; });
   for (;;)
   {
     double largest = strong_action;
@@ -304,16 +296,9 @@ NearField NearFieldBuilder::finish()
   }
   kept_ = {};
   const std::vector<std::size_t> patch_of = patch_of_pairs();
-  std::map<std::size_t, std::vector<std::size_t>> patches;
-  for (std::size_t i = 0; i < pairs_; ++i)
-  {
-    const NearField::PairRow row = std::exchange(near_rows_[i], {});
-    const auto own = [&](std::size_t j) { return patch_of[j] == patch_of[i]; };
-    near.inside.push_back(part_of(row, rows_.per_pair(), own));
-    near.outside.push_back(part_of(row, rows_.per_pair(), std::not_fn(own)));
-    patches[patch_of[i]].push_back(i);
-  }
-  for (auto& [patch, pairs] : patches) near.patches.push_back(std::move(pairs));
+  near.inside = std::move(near_rows_);
+  near.outside.resize(pairs_);
+  set_patches(near, patch_of, rows_.per_pair());
   return near;
 }
 

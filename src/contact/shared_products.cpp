@@ -30,6 +30,15 @@ std::size_t first_column(std::size_t rows, int rank, int ranks)
   return static_cast<std::size_t>(part * static_cast<double>(rows)) / strip_width * strip_width;
 }
 
+/// Pieces that are swept side by side are of one size: neighbours to each rank.
+std::vector<int> owners_of_pieces(std::size_t pieces, int ranks)
+{
+  std::vector<int> owners;
+  for (std::size_t piece = 0; piece < pieces; ++piece)
+    owners.push_back(to_int(piece / 2 * static_cast<std::size_t>(ranks) / ((pieces + 1) / 2)));
+  return owners;
+}
+
 /// The largest patches first, each to the rank that has least.
 std::vector<int> owners_by_size(const NearField& near, int ranks)
 {
@@ -209,6 +218,7 @@ void ContactOperator::ask_for_whole() const
 void ContactOperator::share_patches()
 {
   const int me = rank_of(shared_by_), ranks = ranks_of(shared_by_);
+  if (me == 0) divide_single_patch(near_, diagonal_, PairRows<std::size_t>(directions_));
   std::size_t patches = near_.patches.size();
   MPI_Bcast(&patches, sizeof patches, MPI_BYTE, 0, shared_by_);
   if (patches < 2) return;
@@ -218,7 +228,8 @@ void ContactOperator::share_patches()
   broadcast(scale_, shared_by_);
   near_.patches.resize(patches);
   for (std::vector<std::size_t>& patch : near_.patches) broadcast(patch, shared_by_);
-  if (me == 0) owners_ = owners_by_size(near_, ranks);
+  MPI_Bcast(&near_.in_turn, sizeof near_.in_turn, MPI_BYTE, 0, shared_by_);
+  if (me == 0) owners_ = near_.in_turn ? owners_of_pieces(patches, ranks) : owners_by_size(near_, ranks);
   broadcast(owners_, shared_by_);
   std::vector<int> owner(pairs_); // of pairs
   for (std::size_t patch = 0; patch < patches; ++patch)

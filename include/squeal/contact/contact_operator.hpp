@@ -48,6 +48,7 @@ struct NearField
   };
   std::vector<PairRow> inside, outside;            // of every pair: columns of its own patch, and of others
   std::vector<std::vector<std::size_t>> patches{}; // pairs, ascending
+  bool in_turn = false; // patches are pieces of a single one: all even ones are swept, then all odd ones
 
   std::size_t entries() const;
 };
@@ -110,6 +111,7 @@ public:
 
   /// Of the near field: all patches, the rank of each, and whether ranks but the first have some.
   const std::vector<std::vector<std::size_t>>& patches() const { return near_.patches; }
+  bool patches_take_turns() const { return near_.in_turn; }
   int owner(std::size_t patch) const { return owners_.empty() ? 0 : owners_[patch]; }
   bool shares_patches() const { return !owners_.empty(); }
 
