@@ -492,6 +492,7 @@ void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& se
   {
     W.shares_patches() ? sweep_together(left, settings) : sweep_until_converged<float>(left, patches_of(W), settings);
     leave_open();
+    for (ContactWork* work : left) work->result.as_one = true;
   }
   if (W.has_near_field())
   {

@@ -128,6 +128,7 @@ Json transient_entry(const Report& report)
   entry["energy_defect_max"] = transient.energy_defect_max;
   entry["residual"] = transient.outcome.residual;
   entry["contact_iterations_mean"] = transient.contact_iterations_mean;
+  entry["contact_steps_as_one"] = transient.contact_steps_as_one;
   entry["seconds_per_step"] = transient.seconds_per_step;
   return entry;
 }

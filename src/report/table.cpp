@@ -124,6 +124,9 @@ std::string transient_text(const Report& report)
     text += row("", format("the step's own error: growth rate %+.1e, frequency %+.1e", bias.growth, bias.frequency));
   text += row("", format("energy defect %.1e of the energy, contact residual %.1e", transient.energy_defect_max,
                          transient.outcome.residual));
+  if (transient.contact_steps_as_one > 0)
+    text += row("", format("contact did not converge patch by patch in %ld steps: all pairs were swept as one",
+                           transient.contact_steps_as_one));
   return text;
 }
 

@@ -58,7 +58,8 @@ Checkpoint MarchCheckpoint::made(const MarchProgress& progress) const
   checkpoint.set("summary",
                  std::vector<double>{static_cast<double>(summary.steps), static_cast<double>(summary.unconverged),
                                      summary.first_unconverged, summary.contact_residual_max, summary.energy_defect_max,
-                                     progress.iterations, slides_ ? 1. : 0., summary.fall_of_friction_max});
+                                     progress.iterations, slides_ ? 1. : 0., summary.fall_of_friction_max,
+                                     static_cast<double>(summary.as_one)});
   checkpoint.set("amplitude time", amplitude_.time);
   checkpoint.set("amplitude logarithm", amplitude_.log_modulus);
   put_history(progress.history, checkpoint);
@@ -87,6 +88,7 @@ void MarchCheckpoint::read(const Checkpoint& checkpoint, const MarchProgress& pr
   progress.iterations = summary.at(5);
   slides_ = summary.at(6) != 0;
   progress.summary.fall_of_friction_max = summary.at(7);
+  progress.summary.as_one = static_cast<long>(summary.at(8));
   amplitude_.time = checkpoint.list("amplitude time");
   amplitude_.log_modulus = checkpoint.list("amplitude logarithm");
   take_history(checkpoint, progress.history);

@@ -129,6 +129,7 @@ std::vector<std::size_t> solve_once(const StepBatch& batch, std::vector<StepProb
     report.contact_iterations += results[j].iterations;
     report.contact_residual = results[j].residual;
     report.contact_converged = results[j].converged;
+    report.contact_as_one = report.contact_as_one || results[j].as_one;
     report.fall_of_friction = fall_at_pairs(step.W, law, states[k].reactions);
     const std::vector<double> w = sum(works[k].memory.Wr.front(), b[j]);
     if (works[k].record) works[k].record->contact_velocity = w;
@@ -144,7 +145,7 @@ std::vector<std::size_t> solve_once(const StepBatch& batch, std::vector<StepProb
 void share_from_rank_zero(const StepBatch& batch, const std::string& problem)
 {
   const MPI_Comm comm = comm_of(batch.interface.B);
-  const std::size_t size = batch.interface.size(), length = size + 4;
+  const std::size_t size = batch.interface.size(), length = size + 5;
   std::vector<double> message(1 + length * batch.states.size());
   message[0] = problem.empty() ? 0 : 1;
   for (std::size_t k = 0; k < batch.states.size(); ++k)
@@ -155,7 +156,8 @@ void share_from_rank_zero(const StepBatch& batch, const std::string& problem)
     entries[1] = report.contact_residual;
     entries[2] = report.contact_converged ? 1 : 0;
     entries[3] = report.fall_of_friction;
-    std::copy(batch.states[k].reactions.begin(), batch.states[k].reactions.end(), entries + 4);
+    entries[4] = report.contact_as_one ? 1 : 0;
+    std::copy(batch.states[k].reactions.begin(), batch.states[k].reactions.end(), entries + 5);
   }
   MPI_Bcast(message.data(), to_int(message.size()), MPI_DOUBLE, 0, comm);
   if (message[0] != 0) agree(comm, problem);
@@ -167,7 +169,8 @@ void share_from_rank_zero(const StepBatch& batch, const std::string& problem)
     report.contact_residual = entries[1];
     report.contact_converged = entries[2] != 0;
     report.fall_of_friction = entries[3];
-    std::copy_n(entries + 4, size, batch.states[k].reactions.begin());
+    report.contact_as_one = entries[4] != 0;
+    std::copy_n(entries + 5, size, batch.states[k].reactions.begin());
   }
 }
 

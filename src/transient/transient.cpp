@@ -193,6 +193,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     summary.contact_residual_max = std::max(summary.contact_residual_max, report.contact_residual);
     summary.fall_of_friction_max = std::max(summary.fall_of_friction_max, report.fall_of_friction);
     iterations += report.contact_iterations;
+    summary.as_one += report.contact_as_one;
     const double defect = std::abs(report.energy_defect);
     const double scale = std::max({report.energy, std::abs(report.contact_work), std::abs(report.load_work)});
     if (defect > 0) summary.energy_defect_max = std::max(summary.energy_defect_max, defect / scale);
@@ -279,6 +280,7 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   trajectory.law = step.law;
   trajectory.energy_defect_max = summary.energy_defect_max;
   trajectory.contact_iterations_mean = summary.contact_iterations_mean;
+  trajectory.contact_steps_as_one = summary.as_one;
   if (mode)
   {
     trajectory.periods = static_cast<double>(summary.steps) * step.h * std::abs(mode->lambda.imag()) / two_pi;

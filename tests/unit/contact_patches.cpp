@@ -107,6 +107,7 @@ TEST_CASE("ranks sweep over a single large patch by pieces, to the answer of one
     const ContactResult result = solve_contact(W, b, {0.4}, {}, together),
                         of_one = solve_contact(alone, b, {0.4}, {}, exact);
     CHECK(result.converged);
+    CHECK_FALSE(result.as_one);
     CHECK(result.iterations <= 1.2 * of_one.iterations); // slices far apart act on each other by less than rounding
     CHECK(contact_residual(alone, {0.4}, b, together) < 1.01e-10);
     // a residual of 1e-10 of the largest reaction, and cond(W) = (1 + e^-0.5)^2/(1 - e^-0.5)^2 < 20
@@ -187,6 +188,7 @@ TEST_CASE("where patches act on each other by more than their blocks say, all pa
   const ContactResult result = solve_contact(W, b, {0.3}, {}, r);
   CHECK(result.converged);
   CHECK(result.iterations > 100); // patch by patch, in vain
+  CHECK(result.as_one);
   CHECK(contact_residual(make_contact_operator(dense, pairs, 2), {0.3}, b, r) < 1.01e-10);
   ContactSettings settings;
   settings.max_iterations = 3;

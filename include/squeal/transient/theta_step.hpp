@@ -116,6 +116,7 @@ struct StepReport
   int contact_iterations = 0;
   double contact_residual = 0; // natural map, relative
   bool contact_converged = true;
+  bool contact_as_one = false; // as of ContactResult
   double fall_of_friction = 0; // largest |mu'| r_n W_t of a pair, at rest: at 1 the step may have several solutions
 };
 
