@@ -47,8 +47,8 @@ struct Turn
 };
 
 /// The pairs that sweeps visit, patch after patch. Of several patches each is swept by itself, and reactions act on the
-/// others at the end of a turn: when all have been swept, or the even or odd pieces of a single patch. So sweeps do not
-/// depend on the number of ranks.
+/// others at the end of a turn: when all have been swept, or the even or odd pieces of a single patch, which several
+/// ranks divide. So sweeps do not depend on the number of ranks, but for those of a single patch on one rank.
 struct SweptPairs
 {
   std::vector<Turn> turns{};
@@ -462,6 +462,30 @@ void sweep_together(std::span<ContactWork* const> works, const ContactSettings& 
   sweep_until_converged<float>(works, patches_of(first.W), settings);
 }
 
+/// Reactions that sweeps began with, and W times them.
+struct SweepStart
+{
+  std::vector<double> r, Wr;
+};
+
+std::vector<SweepStart> starts_of(std::span<ContactWork* const> works)
+{
+  std::vector<SweepStart> starts;
+  for (const ContactWork* work : works) starts.push_back({work->r, work->Wr});
+  return starts;
+}
+
+/// Where patches swept by themselves led away from the law, the next sweeps begin where these did.
+void begin_as_one(ContactWork& work, const SweepStart& start)
+{
+  work.result.as_one = true;
+  const double reached = residual_of(work);
+  SweepStart end{std::exchange(work.r, start.r), std::exchange(work.Wr, start.Wr)};
+  if (!(reached < residual_of(work))) return;
+  work.r = std::move(end.r);
+  work.Wr = std::move(end.Wr);
+}
+
 } // namespace
 
 void sweep_along(const ContactOperator& W)
@@ -490,9 +514,12 @@ void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& se
   };
   if (W.patches().size() > 1)
   {
+    const std::vector<SweepStart> starts = starts_of(left);
+    const std::vector<ContactWork*> all = left;
     W.shares_patches() ? sweep_together(left, settings) : sweep_until_converged<float>(left, patches_of(W), settings);
     leave_open();
-    for (ContactWork* work : left) work->result.as_one = true;
+    for (std::size_t k = 0; k < all.size(); ++k)
+      if (std::ranges::find(left, all[k]) != left.end()) begin_as_one(*all[k], starts[k]);
   }
   if (W.has_near_field())
   {

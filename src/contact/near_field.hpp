@@ -47,7 +47,7 @@ template <class Take> void for_each_block(const NearField::PairRow& row, std::si
 }
 
 /// Divides a single patch into pieces, those of even and of odd numbers to be swept in turn, if it is large enough for
-/// ranks to share the sweeps. `diagonal`: the blocks of W's.
+/// ranks to share the sweeps and the pieces push each other little. `diagonal`: the blocks of W's.
 void divide_single_patch(NearField& near, const std::vector<PairBlock>& diagonal, const PairRows<std::size_t>& rows);
 
 /// Strips are of whole pairs and come in the order of their columns.

@@ -1,7 +1,7 @@
 /// Pieces of a single patch that ranks sweep side by side: all even ones, then all odd ones.
 ///
-/// Each piece is a slice of the patch, so that it touches the two next to it, which are of the other parity. Pieces of
-/// one parity see each other's changes when all have been swept (src/README.md, section 4.7).
+/// Each piece is a slice of the patch, so that it touches those next to it, of the other parity. Pieces of one parity
+/// see each other's changes when all have been swept (src/README.md, section 4.7), and push each other little.
 #include "near_field.hpp"
 
 #include <numeric>
@@ -16,8 +16,9 @@ namespace
 // Half a sweep over fewer pairs takes no longer than the messages between pieces.
 constexpr std::size_t least_to_divide = 1000; // pairs
 constexpr std::size_t least_of_a_piece = 512; // pairs, where there are more pieces than that
-constexpr std::size_t fewest_pieces = 4;      // two of them are swept side by side, whatever acts between these
-constexpr double strong_beside = 0.25;        // of pieces that are swept side by side on another, over its own
+constexpr std::size_t fewest_pieces = 4;
+constexpr double strong_beside = 0.25; // of pieces that are swept side by side on another, over its own
+constexpr double strong_of_two = 0.5;  // the same of two pieces a turn, as of patches
 
 /// The near field of a patch that has all pairs.
 struct Patch
@@ -61,9 +62,10 @@ std::vector<std::size_t> from_end_to_end(const Patch& patch)
   return order;
 }
 
-/// Whether other pieces of the same parity push each pair far less than its own piece does, where all are pushed alike.
-bool sweep_side_by_side(const Patch& patch, const std::vector<std::size_t>& piece_of)
+/// The most that other pieces of the same parity push a pair, over its own piece, where all are pushed alike.
+double push_beside(const Patch& patch, const std::vector<std::size_t>& piece_of)
 {
+  double most = 0;
   for (std::size_t i = 0; i < patch.pairs(); ++i)
   {
     double own = 0, beside = 0;
@@ -75,9 +77,9 @@ bool sweep_side_by_side(const Patch& patch, const std::vector<std::size_t>& piec
                            else if (piece_of[j] % 2 == piece_of[i] % 2)
                              beside += size;
                          });
-    if (beside > strong_beside * own) return false;
+    most = std::max(most, beside / own);
   }
-  return true;
+  return most;
 }
 
 /// Whether a pair has a neighbour in another piece of the same parity.
@@ -95,9 +97,8 @@ bool neighbours_side_by_side(const Patch& patch, const std::vector<std::size_t>&
 }
 
 /// The piece of each pair of a single patch: slices from one end of it to the other, as many as may be swept side by
-/// side. Slices by the pairs' numbers, where these run from end to end, leave long runs of columns in one piece. Four
-/// always may: two coupled halves of a symmetric positive definite W converge when they take each other's last
-/// reactions.
+/// side; none where even two a turn push each other too much. Slices by the pairs' numbers, where these run from end to
+/// end, leave long runs of columns in one piece.
 std::vector<std::size_t> pieces_of(const Patch& patch)
 {
   const std::size_t pairs = patch.pairs();
@@ -115,10 +116,11 @@ std::vector<std::size_t> pieces_of(const Patch& patch)
     order = from_end_to_end(patch);
     best = cut(fewest_pieces);
   }
+  if (!(push_beside(patch, best) <= strong_of_two)) return {};
   for (std::size_t pieces = 2 * fewest_pieces; pairs / pieces >= least_of_a_piece; pieces *= 2)
   {
     std::vector<std::size_t> finer = cut(pieces);
-    if (!sweep_side_by_side(patch, finer)) break;
+    if (!(push_beside(patch, finer) <= strong_beside)) break;
     best = std::move(finer);
   }
   return best;
@@ -129,7 +131,9 @@ std::vector<std::size_t> pieces_of(const Patch& patch)
 void divide_single_patch(NearField& near, const std::vector<PairBlock>& diagonal, const PairRows<std::size_t>& rows)
 {
   if (near.patches.size() != 1 || near.inside.size() < least_to_divide) return;
-  set_patches(near, pieces_of({near, diagonal, rows}), rows.per_pair());
+  const std::vector<std::size_t> piece_of = pieces_of({near, diagonal, rows});
+  if (piece_of.empty()) return;
+  set_patches(near, piece_of, rows.per_pair());
   near.in_turn = true;
 }
 

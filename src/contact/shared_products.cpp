@@ -218,7 +218,7 @@ void ContactOperator::ask_for_whole() const
 void ContactOperator::share_patches()
 {
   const int me = rank_of(shared_by_), ranks = ranks_of(shared_by_);
-  if (me == 0) divide_single_patch(near_, diagonal_, PairRows<std::size_t>(directions_));
+  if (me == 0 && ranks > 1) divide_single_patch(near_, diagonal_, PairRows<std::size_t>(directions_));
   std::size_t patches = near_.patches.size();
   MPI_Bcast(&patches, sizeof patches, MPI_BYTE, 0, shared_by_);
   if (patches < 2) return;

@@ -38,6 +38,7 @@ double mean_energy(ReducedMap& map, double period, const ReducedState& start)
   double energy = 0;
   integrate(map, period, start,
             [&](const ReducedState& now) { energy += doubled_energy(map.model, now) / (2. * map.steps); });
+  MPI_Bcast(&energy, 1, MPI_DOUBLE, 0, map.comm);
   return energy;
 }
 
@@ -108,7 +109,11 @@ double run_one_period(ReducedMap& map, FreeMotion& motion, double& correction)
   defect.v += correction * f.v;
   motion.state = period_end.end;
   motion.energy = doubled_energy(model, motion.state) / 2;
-  return std::sqrt(doubled_energy(model, defect) / (2 * motion.energy));
+  double decides[] = {std::sqrt(doubled_energy(model, defect) / (2 * motion.energy)), motion.energy, correction};
+  MPI_Bcast(decides, 3, MPI_DOUBLE, 0, map.comm); // ranks that decide apart would wait for each other
+  motion.energy = decides[1];
+  correction = decides[2];
+  return decides[0];
 }
 
 /// Free periods until one comes back to within half a percent, or its energy exceeds `most`.
@@ -158,6 +163,7 @@ ReducedState state_in_phase(const ReducedSearch& search, const FreeMotion& motio
               before = after;
               last = now;
             });
+  share_state(found, map.comm);
   return found;
 }
 
@@ -170,19 +176,78 @@ void update_correction(ReducedSearch& search, const FreeMotion& motion)
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
 
-/// Gives every rank what rank 0 has, bit by bit: ranks that decide apart would wait for each other.
-void share_from_first_rank(ReducedCycle& cycle, MPI_Comm comm)
+/// Tells the other ranks whether rank 0 asks for one more period; returns it. Collective.
+bool one_more_period(bool asked, MPI_Comm comm)
 {
-  std::vector<double> values = {cycle.converged ? 1. : 0., cycle.period, cycle.energy};
-  values.insert(values.end(), cycle.state.q.begin(), cycle.state.q.end());
-  values.insert(values.end(), cycle.state.v.begin(), cycle.state.v.end());
-  MPI_Bcast(values.data(), to_int(values.size()), MPI_DOUBLE, 0, comm);
-  cycle.converged = values[0] > 0;
-  cycle.period = values[1];
-  cycle.energy = values[2];
-  const Eigen::Index n = cycle.state.q.size();
-  cycle.state.q = Eigen::VectorXd::Map(&values[3], n);
-  cycle.state.v = Eigen::VectorXd::Map(&values[3] + n, n);
+  int more = asked ? 1 : 0;
+  MPI_Bcast(&more, 1, MPI_INT, 0, comm);
+  return more != 0;
+}
+
+/// What shooting found, and in how many periods.
+struct Shot
+{
+  ReducedCycle cycle;
+  long periods = 0;
+};
+
+/// Shoots from `start`, on one rank: its periods are integrated by `flow`.
+Shot shoot(const ReducedSearch& search, const ReducedCycle& start, const Flow& flow)
+{
+  const Preconditioner preconditioner = preconditioner_of(search.correction);
+  Progress progress(PETSC_COMM_SELF, "reduced", 20);
+  ConvergenceLog log{progress};
+  const Owned<Vec> first = vector_of(start.state);
+  OrbitProblem problem{flow, preconditioner, zeros_like(first), start.period, search.tolerance, 0};
+  const ShootingOptions& shooting = search.options.shooting;
+  Orbit begin = evaluate(problem, log, first, start.period);
+  problem.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
+  StageResult found = shoot_in_full_space(problem, shooting, log, std::move(begin));
+  if (found.ending == StageEnding::converged)
+    found = prefer_half_period(problem, shooting, log, std::move(found)); // which spares the full model that test
+  return {{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0},
+          log.convergence.periods};
+}
+
+/// Rank 0 shoots, and the other ranks integrate its periods along: they decide nothing, and cannot decide otherwise.
+Shot shoot_together(const ReducedSearch& search, const ReducedCycle& start, ReducedMap& map)
+{
+  Shot shot{start, 0};
+  Flow flow = flow_of(map, search.energy);
+  const auto together = flow.integrate;
+  bool alone = true; // what goes wrong is not known to the other ranks
+  flow.integrate = [&](double period, Vec from, Vec end, Vec rate)
+  {
+    alone = false;
+    one_more_period(true, map.comm);
+    together(period, from, end, rate);
+    alone = true;
+  };
+  std::string problem;
+  if (rank_of(map.comm) == 0)
+  {
+    try
+    {
+      shot = shoot(search, start, flow);
+    }
+    catch (const std::exception& error)
+    {
+      if (!alone) throw;
+      problem = error.what();
+    }
+    one_more_period(false, map.comm);
+  }
+  else
+    for (const Owned<Vec> state = vector_of(start.state); one_more_period(false, map.comm);)
+      together(start.period, state, state, nullptr);
+  agree(map.comm, problem);
+  double values[] = {shot.cycle.converged ? 1. : 0., shot.cycle.period, static_cast<double>(shot.periods)};
+  MPI_Bcast(values, 3, MPI_DOUBLE, 0, map.comm);
+  shot.cycle.converged = values[0] > 0;
+  shot.cycle.period = values[1];
+  shot.periods = static_cast<long>(values[2]);
+  share_state(shot.cycle.state, map.comm);
+  return shot;
 }
 
 /// Why a reduced model of the active pairs would not be small; empty if it would.
@@ -221,24 +286,11 @@ ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start
 {
   const double clock = MPI_Wtime();
   ReducedMap map = period_map_of(search, steps);
-  const Flow flow = flow_of(map, search.energy);
-  const Preconditioner preconditioner = preconditioner_of(search.correction);
-  Progress progress(PETSC_COMM_SELF, "reduced", 20);
-  ConvergenceLog log{progress};
-  const Owned<Vec> first = vector_of(start.state);
-  OrbitProblem problem{flow, preconditioner, zeros_like(first), start.period, search.tolerance, 0};
-  const ShootingOptions& shooting = search.options.shooting;
-  Orbit begin = evaluate(problem, log, first, start.period);
-  problem.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
-  StageResult found = shoot_in_full_space(problem, shooting, log, std::move(begin));
-  if (found.ending == StageEnding::converged)
-    found = prefer_half_period(problem, shooting, log, std::move(found)); // which spares the full model that test
-  ReducedCycle cycle{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0};
-  cycle.energy = mean_energy(map, cycle.period, cycle.state);
-  search.fidelity.reduced_periods += log.convergence.periods + 1;
+  Shot shot = shoot_together(search, start, map);
+  shot.cycle.energy = mean_energy(map, shot.cycle.period, shot.cycle.state);
+  search.fidelity.reduced_periods += shot.periods + 1;
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
-  share_from_first_rank(cycle, map.comm);
-  return cycle;
+  return shot.cycle;
 }
 
 void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cycle)

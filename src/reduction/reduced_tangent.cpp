@@ -48,7 +48,8 @@ struct LinearStep
 
 void factor(LinearStep& step)
 {
-  if (step.rows.empty()) return;
+  step.order = Eigen::VectorXi::LinSpaced(step.A.rows(), 0, to_int(step.A.rows()) - 1);
+  if (step.rows.empty() || !step.A.allFinite()) return; // LAPACK would leave the order unset
   const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> in_place(step.A);
   step.order = in_place.permutationP().indices();
 }
@@ -231,6 +232,7 @@ through_period(ReducedMap& map, double period, const Contacts& contacts, const M
 std::vector<RecordedContact> record_contacts(ReducedMap& map, double period, ReducedState state)
 {
   prepare(map, period);
+  share_state(state, map.comm);
   std::vector<RecordedContact> contacts;
   ReducedContact contact{map.reactions};
   for (int i = 0; i < map.steps; ++i)
@@ -241,6 +243,7 @@ std::vector<RecordedContact> record_contacts(ReducedMap& map, double period, Red
     broadcast(now.w, map.comm);
     for (std::size_t pair = 0; pair < map.model.active.size(); ++pair)
       now.opposes_theta.push_back(!opposes_end(PairView<const double>(contact.past, map.model.directions), pair));
+    MPI_Bcast(now.opposes_theta.data(), to_int(now.opposes_theta.size()), MPI_CHAR, 0, map.comm);
   }
   return contacts;
 }

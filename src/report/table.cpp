@@ -125,7 +125,7 @@ std::string transient_text(const Report& report)
   text += row("", format("energy defect %.1e of the energy, contact residual %.1e", transient.energy_defect_max,
                          transient.outcome.residual));
   if (transient.contact_steps_as_one > 0)
-    text += row("", format("contact did not converge patch by patch in %ld steps: all pairs were swept as one",
+    text += row("", format("contact did not converge by patches or pieces in %ld steps: all pairs were swept as one",
                            transient.contact_steps_as_one));
   return text;
 }

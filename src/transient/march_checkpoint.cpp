@@ -88,7 +88,7 @@ void MarchCheckpoint::read(const Checkpoint& checkpoint, const MarchProgress& pr
   progress.iterations = summary.at(5);
   slides_ = summary.at(6) != 0;
   progress.summary.fall_of_friction_max = summary.at(7);
-  progress.summary.as_one = static_cast<long>(summary.at(8));
+  progress.summary.as_one = summary.size() > 8 ? static_cast<long>(summary[8]) : 0;
   amplitude_.time = checkpoint.list("amplitude time");
   amplitude_.log_modulus = checkpoint.list("amplitude logarithm");
   take_history(checkpoint, progress.history);

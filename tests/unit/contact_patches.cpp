@@ -110,27 +110,24 @@ TEST_CASE("ranks sweep over a single large patch by pieces, to the answer of one
     CHECK_FALSE(result.as_one);
     CHECK(result.iterations <= 1.2 * of_one.iterations); // slices far apart act on each other by less than rounding
     CHECK(contact_residual(alone, {0.4}, b, together) < 1.01e-10);
-    // a residual of 1e-10 of the largest reaction, and cond(W) = (1 + e^-0.5)^2/(1 - e^-0.5)^2 < 20
+    // a residual of 1e-10 of the largest reaction, and cond(W) = 1.1/0.9 (1 + e^-0.5)^2/(1 - e^-0.5)^2 < 21
     CHECK(difference(together, exact) < 1e-8 * *std::max_element(exact.begin(), exact.end()));
     CHECK(std::count(exact.begin(), exact.end(), 0.) > 100); // some pairs are open
   }
 }
 
-TEST_CASE("pieces of a patch that push each other as strongly as themselves lead to the answer, too")
+TEST_CASE("a large patch whose pieces would push each other as strongly as themselves stays whole")
 {
-  // Of a motion of all pairs alike, a piece of 275 feels 275/(275 + 4) of its own push from the one swept beside it:
-  // two such halves of a positive definite W converge, whatever couples them.
+  // Of a motion of all pairs alike, a piece of 275 feels 275/(275 + 4) of its own push from the one beside it.
   const Vector dense = compliance_of_line(1, 0.5, 1);
   const ContactOperator W = shared(dense, large, 1);
   const ServedProducts served(W);
   if (rank_of(PETSC_COMM_WORLD) != 0) return;
-  const ContactOperator alone = make_contact_operator(dense, large, 1);
+  CHECK(W.patches().size() == 1);
   const Vector b = velocity_of_line(1);
-  Vector r, of_one;
-  const ContactResult result = solve_contact(W, b, {0.3}, {}, r);
-  CHECK(result.converged);
-  CHECK(result.iterations <= 1.2 * solve_contact(alone, b, {0.3}, {}, of_one).iterations);
-  CHECK(contact_residual(alone, {0.3}, b, r) < 1.01e-10);
+  Vector r;
+  CHECK(solve_contact(W, b, {0.3}, {}, r).converged);
+  CHECK(contact_residual(make_contact_operator(dense, large, 1), {0.3}, b, r) < 1.01e-10);
 }
 
 TEST_CASE("ranks sweep over patches side by side, to the answer of one rank")

@@ -109,7 +109,8 @@ public:
   bool has_near_field() const { return !near_.inside.empty(); }
   double near_share() const; // entries of the near field over those of W
 
-  /// Of the near field: all patches, the rank of each, and whether ranks but the first have some.
+  /// Of the near field: all patches, whether they are pieces that take turns (NearField), the rank of each, and whether
+  /// ranks but the first have some.
   const std::vector<std::vector<std::size_t>>& patches() const { return near_.patches; }
   bool patches_take_turns() const { return near_.in_turn; }
   int owner(std::size_t patch) const { return owners_.empty() ? 0 : owners_[patch]; }

@@ -1,7 +1,7 @@
 #pragma once
 /// The modified theta-method on the reduced model (src/README.md, section 7.4), in few dense products. The ranks of a
-/// map follow one motion together: each has its share of the products, and all solve contact. Functions that take a map
-/// that may change, and advance(), are collective among them.
+/// map follow one motion together, from rank 0's start: each has its share of the products, where these are large, and
+/// all solve contact. Functions that take a map that may change, and advance(), are collective among them.
 #include "squeal/contact/solver.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
@@ -31,6 +31,7 @@ struct ReducedMap
   int steps = 0;
   double theta = 0.5;
   MPI_Comm comm = MPI_COMM_SELF;                      // of the ranks that follow the motion
+  MPI_Comm sharing = MPI_COMM_SELF;                   // those that share its products: all of them, or this one alone
   double h = 0;                                       // [s] of the matrices below
   Eigen::MatrixXd from_state{};                       // v_free = from_state (v, q) + from_load
   Eigen::VectorXd from_load{};                        // h A^-1 f
@@ -54,6 +55,9 @@ void prepare(ReducedMap& map, double period);
 /// One step. Returns whether contact converged.
 bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact);
 
+/// Gives all ranks rank 0's state. Collective.
+void share_state(ReducedState& state, MPI_Comm comm);
+
 /// N steps of the period; `watch` after each.
 ReducedState integrate(ReducedMap& map, double period, ReducedState state,
                        const std::function<void(const ReducedState&)>& watch);
@@ -64,7 +68,7 @@ struct PeriodEnd
   ReducedState end, rate;
 };
 
-/// The end of a period of this length and its derivative in the length.
+/// The end of a period of this length and its derivative in the length, bit by bit the same on the map's ranks.
 PeriodEnd end_of_period(ReducedMap& map, double period, ReducedState state);
 
 } // namespace squeal
