@@ -2,7 +2,6 @@
 
 #include "floquet.hpp"
 #include "preconditioner.hpp"
-#include "squeal/base/integers.hpp"
 #include "squeal/base/run_control.hpp"
 #include "step_refinement.hpp"
 

@@ -53,8 +53,7 @@ struct ContactResult
   int iterations = 0; // sweeps
   double residual = 0;
   bool converged = false;
-  bool as_one =
-      false; // patches, or the pieces of one, swept by themselves did not converge: all pairs were swept as one
+  bool as_one = false; // all pairs were swept as one: patches, or pieces of one, did not converge by themselves
 };
 
 /// The last solutions of one trajectory, latest first, and W times them: a warm start then needs no product with W.
