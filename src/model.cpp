@@ -5,6 +5,7 @@
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/ties.hpp"
 #include "squeal/solid/matrix_rows.hpp"
+#include "squeal/solid/mesh_piece.hpp"
 #include "squeal/solid/probes.hpp"
 
 #include <algorithm>
@@ -131,20 +132,53 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   return model;
 }
 
+/// On rank 0 the mesh, elsewhere nothing, unless a stage makes models on groups of ranks. A signal to the run reaches
+/// its mesher as well, which ends by it: the mesh is no error then.
+Mesh read_mesh_unless_ended(const Scene& scene, MPI_Comm comm)
+{
+  Mesh mesh;
+  try
+  {
+    on_rank_zero(comm, [&] { mesh = read_mesh(scene); });
+  }
+  catch (const Error&)
+  {
+    end_if_asked(comm);
+    throw;
+  }
+  if (scene.sweep || scene.robustness) broadcast_mesh(mesh, comm);
+  return mesh;
+}
+
+/// `mesh` is whole on rank 0.
 Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
 {
   Model model;
-  model.mesh = std::move(mesh);
+  MeshPiece piece;
+  ContactPairs contact;
+  const bool has_all = rank_of(comm) == 0;
+  if (has_all) piece.mesh = std::move(mesh);
   end_if_asked(comm);
-  const ContactPairs contact = make_pairs(model.mesh, scene);
+  on_rank_zero(comm, [&] { contact = make_pairs(piece.mesh, scene); });
+  broadcast_pairs(contact, comm);
   end_if_asked(comm);
-  const Partition partition = partition_mesh(model.mesh, contact.pairs, comm);
-  model.dofs = number_dofs(model.mesh, scene, partition, comm);
+  const auto number = [&]
+  {
+    piece.partition = partition_mesh(piece.mesh, contact.pairs, ranks_of(comm));
+    piece.dofs = number_dofs(piece.mesh, scene, piece.partition, comm);
+  };
+  on_rank_zero(comm, number);
+  distribute(piece, comm);
   end_if_asked(comm);
-  model.structure = assemble(model.mesh, scene, partition, model.dofs, comm);
-  model.interface = make_interface(contact.pairs, scene, model.dofs, comm);
+  model.structure = assemble(piece.mesh, scene, piece.partition, piece.dofs, comm);
+  model.interface = make_interface(contact.pairs, scene, piece.dofs, comm);
   model.coverage = contact.coverage;
-  model.probes = probe_rows(scene.probes, model.mesh, model.dofs, comm);
+  model.probes = probe_rows(scene.probes, piece.mesh, piece.dofs, comm);
+  model.mesh = has_all ? std::move(piece.mesh) : std::move(mesh);
+  if (has_all)
+    model.dofs = std::move(piece.dofs);
+  else
+    model.dofs.size = piece.dofs.size;
   return model;
 }
 
@@ -152,7 +186,8 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
 
 Model build_model(const Scene& scene, MPI_Comm comm)
 {
-  Model model = scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh(scene, comm), comm);
+  Model model =
+      scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh_unless_ended(scene, comm), comm);
   double mass = 0;
   check(MatNorm(model.structure.M, NORM_1, &mass));
   if (mass == 0 && (scene.modes.enabled || scene.transient.enabled || scene.cycle.enabled))
@@ -179,9 +214,13 @@ ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)
   summary.elements = model.structure.elements;
   summary.pairs = model.interface.pairs;
   summary.coverage = model.coverage;
-  summary.warnings = warnings_of(model, scene);
   summary.ranks = ranks_of(comm);
-  summary.length = length_of(model.mesh);
+  const auto look = [&]
+  {
+    summary.warnings = warnings_of(model, scene);
+    summary.length = length_of(model.mesh);
+  };
+  on_rank_zero(comm, look);
   double stiffness = 0, mass = 0;
   check(MatNorm(model.structure.K, NORM_1, &stiffness));
   check(MatNorm(model.structure.M, NORM_1, &mass));

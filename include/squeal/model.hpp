@@ -10,15 +10,17 @@ namespace squeal
 /// A model in all its parts.
 struct Model
 {
-  Mesh mesh;   // empty on a matrix scene
-  DofMap dofs; // empty on a matrix scene
+  // Whole on rank 0, empty on a matrix scene. Scenes with stages that make models on groups of ranks, [sweep] and
+  // [robustness], have the mesh on every rank.
+  Mesh mesh;
+  DofMap dofs; // rank 0's; elsewhere the sizes alone
   Structure structure;
   Interface interface;
   std::vector<Coverage> coverage; // one a contact; empty on a matrix scene
   Owned<Mat> probes;              // a row per probe of the scene
 };
 
-/// Collective. Error: as of the mesh, the structure and the interface; no mass.
+/// Collective. Error: as of the mesh, the structure and the interface; no mass. Rank 0 reads and numbers the mesh.
 Model build_model(const Scene& scene, MPI_Comm comm);
 
 /// The model of a scene on the same mesh, in the same layout. Collective.
@@ -27,7 +29,7 @@ Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm);
 /// Structure and contact of the scene with other values of its numbers, likewise. Collective.
 BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers, MPI_Comm comm);
 
-/// What the model is, as far as it is known before anything is solved. Collective.
+/// What the model is, as far as it is known before anything is solved; warnings and length on rank 0. Collective.
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm);
 
 /// What the probes read of a displacement [m], whole on every rank. Collective.

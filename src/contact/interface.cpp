@@ -130,11 +130,9 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
     if (contact.tangents.size() != 1) interface.directions = 2;
     compliant = compliant || contact.compliance > 0;
   }
-  std::vector<SparseRow> rows;
-  const auto [first, last] = local_range(interface.pairs, comm);
-  for (PetscInt i = 0; i < interface.pairs; ++i)
+  std::vector<SparseRow> rows; // all of them, on rank 0
+  for (const ContactPair& pair : pairs)
   {
-    const ContactPair& pair = pairs[static_cast<std::size_t>(i)];
     const Contact& contact = scene.contacts[static_cast<std::size_t>(pair.contact)];
     const Vec3& at = pair.position;
     const Vec3 velocity = tangential(drive_velocity(contact, at), pair.normal);
@@ -145,7 +143,7 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
     interface.tangents.push_back({axes[0], axes.size() > 1 ? axes[1] : Vec3{}});
     interface.gap.push_back(contact.gap + pair.gap);
     if (compliant) interface.compliance.push_back(contact.compliance / (pair.area > 0 ? pair.area : 1));
-    if (i < first || i >= last) continue;
+    if (rank_of(comm) != 0) continue;
     axes.insert(axes.begin(), pair.normal);
     for (const Vec3& axis : axes)
     {
@@ -153,7 +151,7 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
       for (const auto& [node, weight] : pair.nodes) add_displacement(dofs, node, weight * axis, rows.back());
     }
   }
-  interface.B = matrix_of_rows(rows, dofs.last - dofs.first, comm);
+  interface.B = matrix_of_rows(dealt_rows(rows, interface.pairs, comm), dofs.last - dofs.first, comm);
   check_interface(interface, "contact", comm);
   return interface;
 }

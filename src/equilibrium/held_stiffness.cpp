@@ -139,12 +139,12 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
   }
   if (own.loose && own.indefinite)
     throw Error("equilibrium: the stiffness is not positive definite: a motion that is largest at " +
-                describe(structure.names, *own.loose) +
+                describe(structure.names, *own.loose, comm_of(structure.K)) +
                 " is driven on, not back, and the structure diverges (buckles) from any rest; look for a stiffness of "
                 "the wrong sign, or a load beyond the critical one");
   if (own.loose)
     throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
-                describe(structure.names, *own.loose) + "; give it a support or a spring");
+                describe(structure.names, *own.loose, comm_of(structure.K)) + "; give it a support or a spring");
   held.factor = std::move(own.factor);
   return held;
 }

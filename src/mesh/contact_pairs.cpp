@@ -5,6 +5,7 @@
 #include "squeal/mesh/contact_pairs.hpp"
 
 #include "dual_rows.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/names.hpp"
 
@@ -243,6 +244,14 @@ void add_surface_pairs(const Mesh& mesh, const Scene& scene, int index, ContactP
   std::move(pairs.begin(), pairs.end(), std::back_inserter(result.pairs));
 }
 
+/// A pair without its nodes, as it is sent.
+struct SentPair
+{
+  int rotor_node, stator_node, node, contact, slave_nodes, nodes; // nodes: their number
+  Vec3 position, normal;
+  double area, gap;
+};
+
 } // namespace
 
 ContactPairs make_pairs(const Mesh& mesh, const Scene& scene)
@@ -266,6 +275,37 @@ ContactPairs make_pairs(const Mesh& mesh, const Scene& scene)
     result.pairs.push_back({a, b, b, mesh.nodes[a], normal, 0, static_cast<int>(i), 0, {{b, 1}, {a, -1}}, 1});
   }
   return result;
+}
+
+void broadcast_pairs(ContactPairs& contact, MPI_Comm comm)
+{
+  std::vector<SentPair> sent;
+  std::vector<PairNode> nodes;
+  for (const ContactPair& p : contact.pairs)
+  {
+    sent.push_back({p.rotor_node, p.stator_node, p.node, p.contact, p.slave_nodes, static_cast<int>(p.nodes.size()),
+                    p.position, p.normal, p.area, p.gap});
+    nodes.insert(nodes.end(), p.nodes.begin(), p.nodes.end());
+  }
+  broadcast(sent, comm);
+  broadcast(nodes, comm);
+  broadcast(contact.coverage, comm);
+  contact.pairs.clear();
+  auto first = nodes.cbegin();
+  for (const SentPair& s : sent)
+  {
+    contact.pairs.push_back({s.rotor_node,
+                             s.stator_node,
+                             s.node,
+                             s.position,
+                             s.normal,
+                             s.area,
+                             s.contact,
+                             s.gap,
+                             {first, first + s.nodes},
+                             s.slave_nodes});
+    first += s.nodes;
+  }
 }
 
 } // namespace squeal

@@ -1,9 +1,8 @@
-/// The mesh of a scene on every rank: from the file on rank 0, with the scene's points and reference points.
+/// The mesh of a scene: from its file, with the scene's points and reference points.
 #include "squeal/mesh/mesh.hpp"
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/base/run_control.hpp"
 #include "squeal/mesh/build.hpp"
 #include "squeal/mesh/names.hpp"
 #include "superelements.hpp"
@@ -23,28 +22,17 @@ template <class T> void broadcast_lists(std::map<std::string, std::vector<T>>& l
     broadcast(lists[name], comm);
 }
 
-Mesh read_on_rank_zero(const Scene& scene, MPI_Comm comm)
+Mesh read_file(const Scene& scene)
 {
-  Mesh mesh;
-  const auto read = [&]
+  const FileMesh file = read_mesh_file(*scene.mesh);
+  try
   {
-    const FileMesh file = read_mesh_file(*scene.mesh);
-    try
-    {
-      mesh = build_mesh(file, scene);
-    }
-    catch (const Error& error)
-    {
-      throw Error(scene.mesh->file.string() + ": " + error.what());
-    }
-  };
-  on_rank_zero(comm, read);
-  broadcast(mesh.nodes, comm);
-  broadcast(mesh.elements, comm);
-  broadcast_lists(mesh.surfaces, comm);
-  broadcast_lists(mesh.node_groups, comm);
-  broadcast_lists(mesh.dimensions, comm);
-  return mesh;
+    return build_mesh(file, scene);
+  }
+  catch (const Error& error)
+  {
+    throw Error(scene.mesh->file.string() + ": " + error.what());
+  }
 }
 
 void add_point(const std::string& name, const Vec3& position, Mesh& mesh)
@@ -71,35 +59,38 @@ void check_names(const Mesh& mesh, const Scene& scene)
   for (const Probe& probe : scene.probes) named_nodes(mesh, probe.on, "probe '" + probe.name + "'");
 }
 
-/// A signal to the run reaches its mesher as well, which ends by it: the mesh is no error then.
-Mesh read_unless_ended(const Scene& scene, MPI_Comm comm)
-{
-  try
-  {
-    return read_on_rank_zero(scene, comm);
-  }
-  catch (const Error&)
-  {
-    end_if_asked(comm);
-    throw;
-  }
-}
-
 } // namespace
 
-Mesh read_mesh(const Scene& scene, MPI_Comm comm)
+Mesh read_mesh(const Scene& scene)
 {
   Mesh mesh;
   if (scene.mesh)
-    mesh = read_unless_ended(scene, comm);
+    mesh = read_file(scene);
   else if (!scene.parts.empty())
     throw Error("part '" + scene.parts.front().name + "' needs a mesh: add [mesh] file = \"...\"");
   for (const Point& point : scene.points) add_point(point.name, point.at, mesh);
   for (const RigidBody& body : scene.rigid_bodies) add_point(body.name, body.at, mesh);
   if (mesh.nodes.empty()) throw Error("the scene has neither a mesh nor points: nothing to compute");
   check_names(mesh, scene);
-  add_superelements(scene, mesh, comm);
+  add_superelements(scene, mesh);
   return mesh;
+}
+
+void broadcast_mesh(Mesh& mesh, MPI_Comm comm)
+{
+  broadcast(mesh.nodes, comm);
+  broadcast(mesh.elements, comm);
+  broadcast_lists(mesh.surfaces, comm);
+  broadcast_lists(mesh.node_groups, comm);
+  broadcast_lists(mesh.dimensions, comm);
+  std::map<std::string, std::vector<int>> points;
+  for (const auto& [name, node] : mesh.points) points[name] = {node};
+  broadcast_lists(points, comm);
+  for (const auto& [name, node] : points) mesh.points[name] = node.front();
+  auto superelements = mesh.superelements.size();
+  MPI_Bcast(&superelements, sizeof superelements, MPI_BYTE, 0, comm);
+  mesh.superelements.resize(superelements);
+  for (std::vector<SuperelementRow>& rows : mesh.superelements) broadcast(rows, comm);
 }
 
 } // namespace squeal

@@ -115,10 +115,8 @@ int most_frequent(std::vector<int> values)
 
 } // namespace
 
-Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs, MPI_Comm comm)
+Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs, int ranks)
 {
-  int ranks = 1;
-  MPI_Comm_size(comm, &ranks);
   Partition partition{std::vector<int>(mesh.nodes.size()), std::vector<int>(mesh.elements.size())};
   if (ranks == 1) return partition;
   const std::size_t nodes = mesh.nodes.size();
@@ -128,8 +126,7 @@ Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs
   const Vertices vertices = merge_pairs(nodes, pairs);
   std::vector<int> owner(vertices.count);
   std::iota(owner.begin(), owner.end(), 0); // used as it is where pairs leave fewer vertices than ranks
-  if (vertices.count >= ranks) on_rank_zero(comm, [&] { owner = partition_graph(node_graph(mesh, vertices), ranks); });
-  MPI_Bcast(owner.data(), vertices.count, MPI_INT, 0, comm);
+  if (vertices.count >= ranks) owner = partition_graph(node_graph(mesh, vertices), ranks);
   for (std::size_t i = 0; i < nodes; ++i) partition.node_rank[i] = owner[vertices.of_node[i]];
   for (std::size_t e = 0; e < mesh.elements.size(); ++e)
   {

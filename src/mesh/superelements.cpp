@@ -2,7 +2,6 @@
 /// of its own, six a node.
 #include "superelements.hpp"
 
-#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/row_motions.hpp"
@@ -71,20 +70,12 @@ std::map<long, int> joined_nodes(const Mesh& mesh, const Superelement& superelem
 
 } // namespace
 
-void add_superelements(const Scene& scene, Mesh& mesh, MPI_Comm comm)
+void add_superelements(const Scene& scene, Mesh& mesh)
 {
   for (const Superelement& superelement : scene.superelements)
   {
-    std::vector<NodeMotion> rows;
-    std::vector<PlacedNode> placed;
-    on_rank_zero(comm,
-                 [&]
-                 {
-                   rows = read_row_motions(superelement.folder / "dofs.txt");
-                   placed = read_placed_nodes(superelement.folder / "nodes.txt");
-                 });
-    broadcast(rows, comm);
-    broadcast(placed, comm);
+    const std::vector<NodeMotion> rows = read_row_motions(superelement.folder / "dofs.txt");
+    const std::vector<PlacedNode> placed = read_placed_nodes(superelement.folder / "nodes.txt");
     const auto joined = joined_nodes(mesh, superelement, placed, rows);
     std::vector<SuperelementRow> own;
     int coordinates = 0;

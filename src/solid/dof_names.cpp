@@ -1,5 +1,6 @@
 #include "dof_names.hpp"
 
+#include "squeal/base/broadcast.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
 
@@ -41,6 +42,13 @@ std::string describe(const DofNames& names, PetscInt dof)
   const int node = static_cast<int>(nodal_dof / 6);
   return names.bodies[names.body[node]] + ", " + node_text(node, names.at[node]) + ", direction " +
          motion_words[nodal_dof % 6];
+}
+
+std::string describe(const DofNames& names, PetscInt dof, MPI_Comm comm)
+{
+  std::string text = rank_of(comm) == 0 ? describe(names, dof) : std::string();
+  broadcast(text, comm);
+  return text;
 }
 
 } // namespace squeal

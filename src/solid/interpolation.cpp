@@ -110,42 +110,41 @@ private:
 Interpolation::Interpolation(const NumberedMesh& from, const NumberedMesh& to, const Scene& scene, MPI_Comm comm)
     : from_(from), to_(to)
 {
-  on_every_rank(comm,
-                [&]
-                {
-                  NodeReader reader(from.mesh, to.mesh, scene);
-                  int last = -1; // the node whose shares were added last
-                  std::size_t begin = 0;
-                  for (PetscInt dof = to.dofs.first; dof < to.dofs.last; ++dof)
-                  {
-                    const auto node = static_cast<int>(to.dofs.names.nodal_dof[static_cast<std::size_t>(dof)] / 6);
-                    if (node != last)
-                    {
-                      begin = shares_.size();
-                      for (const auto& [k, weight] : reader.of(node)) shares_.push_back({k, weight});
-                    }
-                    last = node;
-                    offsets_.push_back(begin);
-                    ends_.push_back(shares_.size());
-                  }
-                });
+  on_rank_zero(comm,
+               [&]
+               {
+                 NodeReader reader(from.mesh, to.mesh, scene);
+                 int last = -1; // the node whose shares were added last
+                 std::size_t begin = 0;
+                 for (const PetscInt nodal_dof : to.dofs.names.nodal_dof)
+                 {
+                   const auto node = static_cast<int>(nodal_dof / 6);
+                   if (node != last)
+                   {
+                     begin = shares_.size();
+                     for (const auto& [k, weight] : reader.of(node)) shares_.push_back({k, weight});
+                   }
+                   last = node;
+                   offsets_.push_back(begin);
+                   ends_.push_back(shares_.size());
+                 }
+               });
 }
 
 void Interpolation::apply(Vec coarse, Vec fine) const
 {
   const std::vector<double> q = all_entries(coarse);
-  double* entries = nullptr;
-  check(VecGetArray(fine, &entries));
   for (std::size_t i = 0; i < offsets_.size(); ++i)
   {
-    const std::size_t dof = static_cast<std::size_t>(to_.dofs.first) + i;
-    const PetscInt motion = to_.dofs.names.nodal_dof[dof] % 6;
-    entries[i] = 0;
+    const PetscInt motion = to_.dofs.names.nodal_dof[i] % 6;
+    double entry = 0;
     for (std::size_t k = offsets_[i]; k < ends_[i]; ++k)
       for (const DofTerm& term : from_.dofs.terms_of(6 * PetscInt{shares_[k].node} + motion))
-        entries[i] += shares_[k].weight * term.factor * q[static_cast<std::size_t>(term.dof)];
+        entry += shares_[k].weight * term.factor * q[static_cast<std::size_t>(term.dof)];
+    check(VecSetValue(fine, static_cast<PetscInt>(i), entry, INSERT_VALUES));
   }
-  check(VecRestoreArray(fine, &entries));
+  check(VecAssemblyBegin(fine));
+  check(VecAssemblyEnd(fine));
 }
 
 } // namespace squeal

@@ -41,24 +41,25 @@ void check_acts(const DofMap& dofs, const std::vector<int>& nodes, const Force& 
 
 } // namespace
 
-Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const Partition& partition, const DofMap& dofs,
-                         MPI_Comm comm)
+Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const DofMap& dofs, MPI_Comm comm)
 {
-  const int rank = rank_of(comm);
   Owned<Vec> load;
   check(VecCreate(comm, load.put()));
   check(VecSetSizes(load, dofs.last - dofs.first, dofs.size));
   check(VecSetType(load, VECSTANDARD));
-  for (const Force& force : scene.forces)
+  const auto add_all = [&]
   {
-    const auto nodes = named_nodes(mesh, force.on, "force");
-    check_acts(dofs, nodes, force);
-    if (rank != 0) continue;
-    for (const int node : nodes) add_force(load, dofs, node, (1. / static_cast<double>(nodes.size())) * force.vector);
-  }
-  for (const Pressure& pressure : scene.pressures)
-    for (const Face& face : named_faces(mesh, pressure.on, "pressure"))
-      if (partition.node_rank[face.nodes[0]] == rank) add_pressure(load, dofs, mesh, face, pressure.value);
+    for (const Force& force : scene.forces)
+    {
+      const auto nodes = named_nodes(mesh, force.on, "force");
+      check_acts(dofs, nodes, force);
+      for (const int node : nodes) add_force(load, dofs, node, (1. / static_cast<double>(nodes.size())) * force.vector);
+    }
+    for (const Pressure& pressure : scene.pressures)
+      for (const Face& face : named_faces(mesh, pressure.on, "pressure"))
+        add_pressure(load, dofs, mesh, face, pressure.value);
+  };
+  on_rank_zero(comm, add_all);
   check(VecAssemblyBegin(load));
   check(VecAssemblyEnd(load));
   return load;

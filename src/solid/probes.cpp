@@ -54,20 +54,20 @@ std::vector<int> probed_nodes(const std::vector<Probe>& probes, const Mesh& mesh
 
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const DofMap& dofs, MPI_Comm comm)
 {
-  std::vector<SparseRow> rows;
-  const std::vector<int> nodes = probed_nodes(probes, mesh);
-  const auto [first, last] = local_range(static_cast<PetscInt>(probes.size()), comm);
-  for (PetscInt i = 0; i < static_cast<PetscInt>(probes.size()); ++i) // all on every rank, so that all throw errors
+  std::vector<SparseRow> rows; // all of them, on rank 0
+  const auto add_all = [&]
   {
-    const Probe& probe = probes[static_cast<std::size_t>(i)];
-    SparseRow row;
-    add_displacement(dofs, nodes[static_cast<std::size_t>(i)], probe.direction, row);
-    if (std::all_of(row.begin(), row.end(), [](const auto& entry) { return entry.second == 0; }))
-      throw Error("probe " + probe.name + ": the motion of " + probe.on +
-                  " in its direction is held, so it would read 0");
-    if (i >= first && i < last) rows.push_back(std::move(row));
-  }
-  return matrix_of_rows(rows, dofs.last - dofs.first, comm);
+    for (const Probe& probe : probes)
+    {
+      SparseRow& row = rows.emplace_back();
+      add_displacement(dofs, probed_node(probe, mesh), probe.direction, row);
+      if (std::all_of(row.begin(), row.end(), [](const auto& entry) { return entry.second == 0; }))
+        throw Error("probe " + probe.name + ": the motion of " + probe.on +
+                    " in its direction is held, so it would read 0");
+    }
+  };
+  on_rank_zero(comm, add_all);
+  return matrix_of_rows(dealt_rows(rows, static_cast<PetscInt>(probes.size()), comm), dofs.last - dofs.first, comm);
 }
 
 } // namespace squeal

@@ -1,5 +1,7 @@
 #include "squeal/solid/sparse_rows.hpp"
 
+#include "squeal/base/broadcast.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +12,62 @@ void add_displacement(const DofMap& dofs, int node, const Vec3& direction, Spars
 {
   for (int c = 0; c < 3; ++c)
     for (const DofTerm& term : dofs.terms_of(6 * PetscInt{node} + c)) row[term.dof] += direction[c] * term.factor;
+}
+
+namespace
+{
+
+/// Rows one after the other, as they are sent.
+struct SentRows
+{
+  std::vector<std::size_t> sizes;
+  std::vector<DofTerm> entries;
+};
+
+SentRows sent(std::span<const SparseRow> rows)
+{
+  SentRows result;
+  for (const SparseRow& row : rows)
+  {
+    result.sizes.push_back(row.size());
+    for (const auto& [dof, factor] : row) result.entries.push_back({dof, factor});
+  }
+  return result;
+}
+
+} // namespace
+
+std::vector<SparseRow> dealt_rows(const std::vector<SparseRow>& rows, PetscInt count, MPI_Comm comm)
+{
+  const std::size_t of_item = count > 0 ? rows.size() / static_cast<std::size_t>(count) : 0;
+  const auto rows_of = [&](int rank)
+  {
+    const auto [first, last] = range_of(count, rank, ranks_of(comm));
+    return std::span(rows).subspan(static_cast<std::size_t>(first) * of_item,
+                                   static_cast<std::size_t>(last - first) * of_item);
+  };
+  if (rank_of(comm) == 0)
+  {
+    for (int to = 1; to < ranks_of(comm); ++to)
+    {
+      const SentRows others = sent(rows_of(to));
+      send(others.sizes, to, comm);
+      send(others.entries, to, comm);
+    }
+    const auto own = rows_of(0);
+    return {own.begin(), own.end()};
+  }
+  SentRows received;
+  receive(received.sizes, 0, comm);
+  receive(received.entries, 0, comm);
+  std::vector<SparseRow> own;
+  auto entry = received.entries.cbegin();
+  for (const std::size_t size : received.sizes)
+  {
+    SparseRow& row = own.emplace_back();
+    for (std::size_t i = 0; i < size; ++i, ++entry) row.emplace_hint(row.end(), entry->dof, entry->factor);
+  }
+  return own;
 }
 
 Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm)
@@ -38,7 +96,11 @@ Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_col
 
 std::pair<PetscInt, PetscInt> local_range(PetscInt count, MPI_Comm comm)
 {
-  const PetscInt ranks = ranks_of(comm), rank = rank_of(comm);
+  return range_of(count, rank_of(comm), ranks_of(comm));
+}
+
+std::pair<PetscInt, PetscInt> range_of(PetscInt count, PetscInt rank, PetscInt ranks)
+{
   const PetscInt size = count / ranks, rest = count % ranks;
   const PetscInt first = rank * size + std::min(rank, rest);
   return {first, first + size + (rank < rest ? 1 : 0)};

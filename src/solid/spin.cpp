@@ -202,8 +202,12 @@ void add_spin(Structure& structure, const Mesh& mesh, const Scene& scene, const 
 {
   if (std::ranges::none_of(scene.parts, spins)) return;
   const MPI_Comm comm = comm_of(structure.K);
-  for (std::size_t i = 0; i < scene.parts.size(); ++i)
-    if (spins(scene.parts[i])) check_revolution(mesh, scene.parts[i], static_cast<int>(i));
+  const auto check_all = [&]
+  {
+    for (std::size_t i = 0; i < scene.parts.size(); ++i)
+      if (spins(scene.parts[i])) check_revolution(mesh, scene.parts[i], static_cast<int>(i));
+  };
+  on_rank_zero(comm, check_all);
   const std::vector<Spinning> elements = spinning_elements(mesh, scene, partition, dofs, rank_of(comm));
 
   Owned<Mat> centrifugal;

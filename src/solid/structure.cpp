@@ -1,7 +1,7 @@
 /// M, C, K and the load on the free degrees of freedom: sums of T_e' A_e T_e over contributions, u_e = T_e q.
 ///
-/// A contribution is that of an element, or lumped: the mass of a point or rigid body, a spring, a superelement. Every
-/// rank holds the whole mesh, so that it counts the entries of its own rows exactly and without communication.
+/// A contribution is that of an element, or lumped: the mass of a point or rigid body, a spring, a superelement. A rank
+/// has all elements that share a degree of freedom with it, so that it counts the entries of its own rows exactly.
 /// Contributions to rows of other ranks are sent at the end of the assembly. All three matrices receive every
 /// contribution, zeros included, which gives them one pattern.
 #include "squeal/solid/structure.hpp"
@@ -10,6 +10,7 @@
 #include "local_dofs.hpp"
 #include "matrices.hpp"
 #include "spin.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
@@ -62,17 +63,6 @@ Contribution spring_contribution(const Mesh& mesh, const Spring& spring)
   return {nodal_dofs_of(nodes, 3), 0 * square, spring.damping * square, spring.stiffness * square};
 }
 
-std::vector<Contribution> lumped_contributions(const Mesh& mesh, const Scene& scene)
-{
-  std::vector<Contribution> result;
-  for (const Point& point : scene.points)
-    result.push_back(mass_contribution(point_node(mesh, point.name, "point"), point.mass, {}));
-  for (const RigidBody& body : scene.rigid_bodies)
-    result.push_back(mass_contribution(point_node(mesh, body.name, "rigid body"), body.mass, body.inertia));
-  for (const Spring& spring : scene.springs) result.push_back(spring_contribution(mesh, spring));
-  return result;
-}
-
 /// Returns a small matrix in a file, whole. Throws Error unless it is symmetric and of this order.
 Eigen::MatrixXd small_matrix(const std::filesystem::path& file, Eigen::Index order)
 {
@@ -93,33 +83,35 @@ Eigen::MatrixXd small_matrix(const std::filesystem::path& file, Eigen::Index ord
   return A;
 }
 
-/// The superelements; their matrices on rank 0 alone. Collective.
-std::vector<Contribution> superelement_contributions(const Mesh& mesh, const Scene& scene, MPI_Comm comm)
+Contribution superelement_contribution(const std::vector<SuperelementRow>& rows, const std::filesystem::path& folder,
+                                       const RayleighDamping& damping)
+{
+  for (const char* other : {"F.petsc", "G.petsc", "H.petsc"})
+    if (is_file(folder / other))
+      throw Error((folder / other).string() + ": a superelement has M, K and C alone: remove the file, and put forces "
+                                              "into [[force]] by node");
+  Contribution added;
+  for (const SuperelementRow& row : rows) added.nodal_dofs.push_back(6 * PetscInt{row.node} + row.motion);
+  const auto order = static_cast<Eigen::Index>(added.nodal_dofs.size());
+  added.M = small_matrix(folder / "M.petsc", order);
+  added.K = small_matrix(folder / "K.petsc", order);
+  if (is_file(folder / "C.petsc"))
+    added.C = small_matrix(folder / "C.petsc", order);
+  else
+    added.C = damping.alpha * added.M + damping.beta * added.K;
+  return added;
+}
+
+std::vector<Contribution> lumped_contributions(const Mesh& mesh, const Scene& scene)
 {
   std::vector<Contribution> result;
+  for (const Point& point : scene.points)
+    result.push_back(mass_contribution(point_node(mesh, point.name, "point"), point.mass, {}));
+  for (const RigidBody& body : scene.rigid_bodies)
+    result.push_back(mass_contribution(point_node(mesh, body.name, "rigid body"), body.mass, body.inertia));
+  for (const Spring& spring : scene.springs) result.push_back(spring_contribution(mesh, spring));
   for (std::size_t i = 0; i < mesh.superelements.size(); ++i)
-  {
-    Contribution& added = result.emplace_back();
-    for (const SuperelementRow& row : mesh.superelements[i])
-      added.nodal_dofs.push_back(6 * PetscInt{row.node} + row.motion);
-    const auto order = static_cast<Eigen::Index>(added.nodal_dofs.size());
-    const std::filesystem::path& folder = scene.superelements[i].folder;
-    const auto read = [&]
-    {
-      for (const char* other : {"F.petsc", "G.petsc", "H.petsc"})
-        if (is_file(folder / other))
-          throw Error((folder / other).string() +
-                      ": a superelement has M, K and C alone: remove the file, and put forces "
-                      "into [[force]] by node");
-      added.M = small_matrix(folder / "M.petsc", order);
-      added.K = small_matrix(folder / "K.petsc", order);
-      if (is_file(folder / "C.petsc"))
-        added.C = small_matrix(folder / "C.petsc", order);
-      else
-        added.C = scene.damping.alpha * added.M + scene.damping.beta * added.K;
-    };
-    on_rank_zero(comm, read);
-  }
+    result.push_back(superelement_contribution(mesh.superelements[i], scene.superelements[i].folder, scene.damping));
   return result;
 }
 
@@ -160,18 +152,40 @@ RowCounts count_entries(const DofMap& dofs, const std::vector<std::vector<PetscI
   return counts;
 }
 
-/// Counts the entries that all contributions give this rank's rows.
-RowCounts count_entries(const Mesh& mesh, const DofMap& dofs, const std::vector<Contribution>& lumped)
+/// The free degrees of freedom of each of rank 0's contributions, on every rank.
+std::vector<std::vector<PetscInt>> free_dofs_of(const DofMap& dofs, const std::vector<Contribution>& lumped,
+                                                MPI_Comm comm)
+{
+  std::vector<PetscInt> sizes, together;
+  for (const Contribution& contribution : lumped)
+  {
+    const std::vector<PetscInt> free = free_dofs(dofs, contribution.nodal_dofs);
+    sizes.push_back(static_cast<PetscInt>(free.size()));
+    together.insert(together.end(), free.begin(), free.end());
+  }
+  broadcast(sizes, comm);
+  broadcast(together, comm);
+  std::vector<std::vector<PetscInt>> result;
+  auto first = together.cbegin();
+  for (const PetscInt size : sizes)
+  {
+    result.emplace_back(first, first + size);
+    first += size;
+  }
+  return result;
+}
+
+/// Counts the entries that elements and lumped contributions, by their free degrees of freedom, give this rank's rows.
+RowCounts count_entries(const Mesh& mesh, const DofMap& dofs, std::vector<std::vector<PetscInt>> lumped)
 {
   std::vector<std::vector<PetscInt>> cliques; // those with a row of this rank
-  const auto add = [&](const std::vector<PetscInt>& nodal_dofs)
+  const auto add = [&](std::vector<PetscInt> free)
   {
-    auto free = free_dofs(dofs, nodal_dofs);
     const auto own = std::lower_bound(free.begin(), free.end(), dofs.first);
     if (own != free.end() && *own < dofs.last) cliques.push_back(std::move(free));
   };
-  for (const Element& element : mesh.elements) add(nodal_dofs_of(element));
-  for (const Contribution& contribution : lumped) add(contribution.nodal_dofs);
+  for (const Element& element : mesh.elements) add(free_dofs(dofs, nodal_dofs_of(element)));
+  for (std::vector<PetscInt>& free : lumped) add(std::move(free));
   return count_entries(dofs, cliques);
 }
 
@@ -193,7 +207,7 @@ double loss_omega(const Scene& scene)
 
 /// Returns the contribution of an element. Throws std::runtime_error with its part and place if its Jacobian is not
 /// positive.
-Contribution element_contribution(const Mesh& mesh, const Scene& scene, std::size_t index)
+Contribution element_contribution(const Mesh& mesh, const Scene& scene, const Partition& partition, std::size_t index)
 {
   const Element& element = mesh.elements[index];
   const Part& part = scene.parts[element.part];
@@ -209,8 +223,11 @@ Contribution element_contribution(const Mesh& mesh, const Scene& scene, std::siz
   }
   catch (const std::runtime_error& error)
   {
-    throw Error("part " + part.name + ", element " + std::to_string(index) + " with " +
-                node_text(element.nodes[0], x[0]) + ": " + error.what());
+    const bool whole = partition.element_numbers.empty();
+    const auto node = static_cast<std::size_t>(element.nodes[0]);
+    throw Error("part " + part.name + ", element " +
+                std::to_string(whole ? static_cast<int>(index) : partition.element_numbers[index]) + " with " +
+                node_text(whole ? element.nodes[0] : partition.node_numbers[node], x[0]) + ": " + error.what());
   }
 }
 
@@ -219,12 +236,13 @@ Contribution element_contribution(const Mesh& mesh, const Scene& scene, std::siz
 Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partition, const DofMap& dofs, MPI_Comm comm)
 {
   Structure structure;
-  structure.elements = static_cast<std::int64_t>(mesh.elements.size());
+  const std::int64_t own = std::ranges::count(partition.element_rank, rank_of(comm));
+  MPI_Allreduce(&own, &structure.elements, 1, MPI_INT64_T, MPI_SUM, comm);
   structure.names = dofs.names;
-  auto lumped = lumped_contributions(mesh, scene);
-  for (Contribution& added : superelement_contributions(mesh, scene, comm)) lumped.push_back(std::move(added));
+  std::vector<Contribution> lumped; // on rank 0
+  on_rank_zero(comm, [&] { lumped = lumped_contributions(mesh, scene); });
   {
-    const auto counts = count_entries(mesh, dofs, lumped);
+    const auto counts = count_entries(mesh, dofs, free_dofs_of(dofs, lumped, comm));
     for (Owned<Mat>* A : {&structure.M, &structure.C, &structure.K}) *A = empty_matrix(dofs, counts, comm);
     structure.loss_omega = loss_omega(scene);
     if (structure.loss_omega > 0) structure.K_loss = empty_matrix(dofs, counts, comm);
@@ -233,11 +251,10 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
   {
     for (std::size_t i = 0; i < mesh.elements.size(); ++i)
       if (partition.element_rank[i] == rank_of(comm))
-        add_contribution(structure, dofs, element_contribution(mesh, scene, i));
+        add_contribution(structure, dofs, element_contribution(mesh, scene, partition, i));
   };
   on_every_rank(comm, add_own_elements);
-  if (rank_of(comm) == 0)
-    for (const Contribution& contribution : lumped) add_contribution(structure, dofs, contribution);
+  for (const Contribution& contribution : lumped) add_contribution(structure, dofs, contribution);
   for (Mat A : {structure.M.get(), structure.C.get(), structure.K.get(), structure.K_loss.get()})
   {
     if (!A) continue;
@@ -246,7 +263,7 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
     mark_symmetric(A);
   }
   add_spin(structure, mesh, scene, partition, dofs);
-  structure.load = assemble_load(mesh, scene, partition, dofs, comm);
+  structure.load = assemble_load(mesh, scene, dofs, comm);
   return structure;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 /// Two blocks that gmsh meshes, and the errors of reading them.
+#include "squeal/base/error.hpp"
 #include "squeal/mesh/mesh.hpp"
 #include "temporary_folder.hpp"
 
@@ -54,6 +55,15 @@ inline Scene block_scene(const std::filesystem::path& file)
   contact.stator = "high_face";
   scene.contacts = {contact};
   return scene;
+}
+
+/// The scene's mesh on every rank; its file is rank 0's. Collective.
+inline Mesh read_everywhere(const Scene& scene)
+{
+  Mesh mesh;
+  on_rank_zero(MPI_COMM_WORLD, [&] { mesh = read_mesh(scene); });
+  broadcast_mesh(mesh, MPI_COMM_WORLD);
+  return mesh;
 }
 
 /// The text of the Error that work throws; empty if it throws none.

@@ -129,7 +129,7 @@ struct Built
 
 inline Built build(const Mesh& mesh, const Scene& scene, MPI_Comm comm)
 {
-  const Partition partition = partition_mesh(mesh, {}, comm);
+  const Partition partition = partition_mesh(mesh, {}, ranks_of(comm));
   Built built;
   built.dofs = number_dofs(mesh, scene, partition, comm);
   built.structure = assemble(mesh, scene, partition, built.dofs, comm);

@@ -63,7 +63,7 @@ struct Joined
 
 Joined join(const Stack& s)
 {
-  const Partition partition = partition_mesh(s.mesh, s.pairs, world);
+  const Partition partition = partition_mesh(s.mesh, s.pairs, ranks_of(world));
   const DofMap dofs = number_dofs(s.mesh, s.scene, partition, world);
   Joined joined{assemble(s.mesh, s.scene, partition, dofs, world), {}};
   joined.interface = make_interface(s.pairs, s.scene, dofs, world);

@@ -96,7 +96,7 @@ TEST_CASE("a solid numbered inside out is mended, mid-sides too")
 TEST_CASE("faces look out of the solid they bound")
 {
   const TemporaryFile file(blocks, ".geo");
-  const Mesh mesh = read_mesh(block_scene(file.path()), comm);
+  const Mesh mesh = read_everywhere(block_scene(file.path()));
   const std::map<std::string, double> outward = {{"low_face", 1}, {"base", -1}, {"high_face", -1}, {"roof", 1}};
   for (const auto& [name, sign] : outward)
     for (const Face& face : mesh.surfaces.at(name))
@@ -113,7 +113,7 @@ TEST_CASE("a wrong name is answered with the nearest right one")
   {
     Scene scene = block_scene(file.path());
     change(scene);
-    return problem_of([&] { read_mesh(scene, comm); });
+    return problem_of([&] { read_everywhere(scene); });
   };
   CHECK(has(problem([](Scene& s) { s.parts[0].name = "lowe"; }), "did you mean 'low'?"));
   CHECK(has(problem([](Scene& s) { s.contacts[0].rotor = "low_fase"; }), "did you mean 'low_face'?"));
@@ -128,28 +128,28 @@ TEST_CASE("a group of two dimensions holds no support: all of its volume would b
 {
   const TemporaryFile file(std::string(blocks) + "Physical Volume(\"roof\", 77) = {2};\n", ".geo");
   Scene scene = block_scene(file.path());
-  CHECK(read_mesh(scene, comm).surfaces.at("roof").size() == 9); // as a surface it has one meaning
+  CHECK(read_everywhere(scene).surfaces.at("roof").size() == 9); // as a surface it has one meaning
   scene.supports = {{"roof", {true, true, true, false, false, false}}};
-  CHECK(has(problem_of([&] { read_mesh(scene, comm); }), "\"roof\" names surfaces and volumes of the mesh"));
+  CHECK(has(problem_of([&] { read_everywhere(scene); }), "\"roof\" names surfaces and volumes of the mesh"));
 }
 
 TEST_CASE("gmsh's own words reach the message")
 {
   const TemporaryFile file("Point(1) = {0, 0} 1;\n", ".geo");
-  CHECK(has(problem_of([&] { read_mesh(block_scene(file.path()), comm); }), "syntax error"));
+  CHECK(has(problem_of([&] { read_everywhere(block_scene(file.path())); }), "syntax error"));
 }
 
 TEST_CASE("an empty mesh is an error, and 4-node tetrahedra are read")
 {
   const TemporaryFile empty("Point(1) = {0, 0, 0};\n", ".geo");
-  CHECK(has(problem_of([&] { read_mesh(block_scene(empty.path()), comm); }), "no elements"));
+  CHECK(has(problem_of([&] { read_everywhere(block_scene(empty.path())); }), "no elements"));
   const TemporaryFile tets("SetFactory(\"OpenCASCADE\"); Box(1) = {0, 0, 0, 1, 1, 1};\n"
                            "Physical Volume(\"low\") = {1}; Mesh.MeshSizeMin = 1;\n",
                            ".geo");
   Scene scene = block_scene(tets.path());
   scene.parts.pop_back();
   scene.contacts.clear();
-  const Mesh mesh = read_mesh(scene, comm);
+  const Mesh mesh = read_everywhere(scene);
   double volume = 0;
   for (const Element& element : mesh.elements)
   {
@@ -178,7 +178,7 @@ TEST_CASE("a geometry is meshed with its parameters, and every rank has the same
   scene.mesh->parameters = {{"n", 4}};
   scene.mesh->scale = 0.5;
   scene.points = {{"weight", {0, 0, 7}, 1, {}}};
-  const Mesh mesh = read_mesh(scene, comm);
+  const Mesh mesh = read_everywhere(scene);
   CHECK(mesh.elements.size() == 2 * 4 * 4 * 2);
   CHECK(mesh.nodes.size() == 2 * 5 * 5 * 3 + 1);
   CHECK(mesh.points.at("weight") == static_cast<int>(mesh.nodes.size()) - 1);

@@ -22,7 +22,7 @@ TEST_CASE("matching blocks pair node by node: coincident, normal upward, areas t
 {
   const TemporaryFile file(blocks, ".geo");
   const Scene scene = block_scene(file.path());
-  const Mesh mesh = read_mesh(scene, comm);
+  const Mesh mesh = read_everywhere(scene);
   const std::vector<ContactPair> pairs = make_pairs(mesh, scene).pairs;
   CHECK(pairs.size() == 16);
   double area = 0;
@@ -42,7 +42,7 @@ TEST_CASE("surfaces that face each other on a part of them touch there, and the 
 {
   const TemporaryFile file(std::string("shift = 0.25;\n") + blocks, ".geo");
   const Scene scene = block_scene(file.path());
-  const ContactPairs contact = make_pairs(read_mesh(scene, comm), scene);
+  const ContactPairs contact = make_pairs(read_everywhere(scene), scene);
   double area = 0;
   for (const ContactPair& pair : contact.pairs) area += pair.area;
   CHECK(area == doctest::Approx(0.75).epsilon(1e-12));
@@ -55,7 +55,7 @@ TEST_CASE("surfaces that do not meet say how far they are apart and where, or th
 {
   const TemporaryFile file(std::string("shift = 1.25;\n") + blocks, ".geo");
   Scene scene = block_scene(file.path());
-  Mesh mesh = read_mesh(scene, comm);
+  Mesh mesh = read_everywhere(scene);
   CHECK(has(problem_of([&] { make_pairs(mesh, scene); }), "no face of one is opposite a face of the other"));
   scene.contacts[0].stator = "base"; // below the low block, which looks down as the high one's face does
   scene.contacts[0].rotor = "roof";
@@ -66,7 +66,7 @@ TEST_CASE("with a reach, partners face each other along the normal, and their di
 {
   const TemporaryFile file(blocks, ".geo");
   Scene scene = block_scene(file.path());
-  Mesh mesh = read_mesh(scene, comm);
+  Mesh mesh = read_everywhere(scene);
   Contact& contact = scene.contacts[0];
   const Vec3 up = make_pairs(mesh, scene).pairs.front().normal;
   for (const int node : mesh.node_groups.at(contact.stator)) mesh.nodes[node] = mesh.nodes[node] + 0.01 * up;
@@ -92,7 +92,7 @@ TEST_CASE("a finer stator has a pair a node, a finer rotor too where it is the s
 {
   const TemporaryFile file(std::string("n = 2; top_n = 4;\n") + blocks, ".geo");
   Scene scene = block_scene(file.path());
-  const Mesh mesh = read_mesh(scene, comm);
+  const Mesh mesh = read_everywhere(scene);
   CHECK(make_pairs(mesh, scene).pairs.size() == 25);
   scene.contacts[0].slave = SlaveSide::rotor;
   CHECK(make_pairs(mesh, scene).pairs.size() == 9);
@@ -136,7 +136,7 @@ TEST_CASE("a surface with a solid on both sides cannot be in contact")
   std::string text = blocks;
   text.replace(text.find("Geometry.AutoCoherence = 0;"), 27, "");
   const TemporaryFile file(text + "\nCoherence;\n", ".geo");
-  const std::string problem = problem_of([&] { read_mesh(block_scene(file.path()), comm); });
+  const std::string problem = problem_of([&] { read_everywhere(block_scene(file.path())); });
   CHECK(has(problem, "solid on both sides"));
   CHECK(has(problem, "own copy"));
 }
@@ -150,7 +150,7 @@ TEST_CASE("a scene of points needs no mesh, and its pair is the two points")
   contact.stator = "pad";
   contact.normal = Vec3{0, 0, 2};
   scene.contacts = {contact};
-  const std::vector<ContactPair> pairs = make_pairs(read_mesh(scene, comm), scene).pairs;
+  const std::vector<ContactPair> pairs = make_pairs(read_everywhere(scene), scene).pairs;
   CHECK(pairs.size() == 1);
   CHECK(pairs[0].rotor_node == 0);
   CHECK(pairs[0].stator_node == 1);
@@ -161,9 +161,9 @@ TEST_CASE("the partition keeps pairs together, is balanced, and the same on ever
 {
   const TemporaryFile file(std::string("n = 12;\n") + blocks, ".geo");
   const Scene scene = block_scene(file.path());
-  const Mesh mesh = read_mesh(scene, comm);
+  const Mesh mesh = read_everywhere(scene);
   const std::vector<ContactPair> pairs = make_pairs(mesh, scene).pairs;
-  const Partition partition = partition_mesh(mesh, pairs, comm);
+  const Partition partition = partition_mesh(mesh, pairs, ranks_of(comm));
   for (const ContactPair& pair : pairs)
     CHECK(partition.node_rank[pair.rotor_node] == partition.node_rank[pair.stator_node]);
   std::vector<double> share(ranks_of(comm));
@@ -175,7 +175,7 @@ TEST_CASE("the partition keeps pairs together, is balanced, and the same on ever
     CHECK(std::any_of(nodes.begin(), nodes.begin() + 8,
                       [&](int n) { return partition.node_rank[n] == partition.element_rank[e]; }));
   }
-  CHECK(partition_mesh(mesh, pairs, comm).node_rank == partition.node_rank);
+  CHECK(partition_mesh(mesh, pairs, ranks_of(comm)).node_rank == partition.node_rank);
   std::vector<int> first = partition.node_rank;
   MPI_Bcast(first.data(), static_cast<int>(first.size()), MPI_INT, 0, comm);
   CHECK(first == partition.node_rank);
@@ -186,8 +186,8 @@ TEST_CASE("few points go to ranks without leaving one empty, and too few are ref
   Mesh mesh;
   mesh.nodes.resize(4);
   std::set<int> used;
-  for (const int rank : partition_mesh(mesh, {}, comm).node_rank) used.insert(rank);
+  for (const int rank : partition_mesh(mesh, {}, ranks_of(comm)).node_rank) used.insert(rank);
   CHECK(static_cast<int>(used.size()) == ranks_of(comm));
   mesh.nodes.resize(1);
-  if (ranks_of(comm) > 1) CHECK_THROWS_AS(partition_mesh(mesh, {}, comm), Error);
+  if (ranks_of(comm) > 1) CHECK_THROWS_AS(partition_mesh(mesh, {}, ranks_of(comm)), Error);
 }

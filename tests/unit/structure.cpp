@@ -4,6 +4,7 @@
 #include "../support/approx.hpp"
 #include "../support/bricks.hpp"
 #include "squeal/solid/matrix_rows.hpp"
+#include "squeal/solid/mesh_piece.hpp"
 #include "squeal/solid/probes.hpp"
 
 #include <algorithm>
@@ -259,6 +260,116 @@ TEST_CASE("a probe reads the node it names")
   CHECK(read == approx(0.6 * expected[1] + 0.8 * expected[2], round_off));
   CHECK_THROWS_WITH_AS(probe_rows({{"tip", "block:x+", {}, {}}}, mesh, built.dofs, world),
                        doctest::Contains("9 nodes; 'at'"), Error);
+}
+
+/// Bricks that a tie and a rigid body couple far apart, shells on them, a spring between two ends.
+struct Coupled
+{
+  Scene scene;
+  Mesh mesh;
+};
+
+Coupled coupled_parts()
+{
+  Coupled c;
+  c.scene.parts = {{"low", steel, 0, {}}, {"high", steel, 0, {}}, {"strip", steel, 0.004, {}}};
+  c.scene.damping = {3, 1e-6};
+  c.scene.rigid_bodies = {{"cap", {"low:x-"}, {0, 0, 0.1}, 5, {1, 1, 1}, all}};
+  c.scene.points = {{"weight", {1, 0, 0.3}, 2, {true, true, true}}};
+  c.scene.springs = {{"weight", "cap", {0, 0, 1}, 1e6, 3}};
+  c.scene.ties = {{"high:z-", "low:z+"}};
+  c.scene.supports = {{"low:x+", all}};
+  c.scene.forces = {{"high:x+", {1, 2, 3}}};
+  c.scene.pressures = {{"high:z+", 1e5}};
+  Mesh high;
+  add_box(c.mesh, "low", 0, {0, 0, 0}, {1, 0.2, 0.1}, {27, 2, 1});
+  add_box(high, "high", 1, {0, 0, 0.1}, {1, 0.2, 0.2}, {24, 3, 1});
+  append(c.mesh, high);
+  add_strip(c.mesh, "strip", 2, {{1, 0, 0.2}, {0.3, 0, 0}, {0, 0.2, 0}, 4, 3});
+  add_points(c.mesh, c.scene);
+  return c;
+}
+
+/// As a run has it: all on rank 0, pieces elsewhere.
+MeshPiece in_pieces(const Coupled& c)
+{
+  MeshPiece piece;
+  const auto number = [&]
+  {
+    const Partition partition = partition_mesh(c.mesh, {}, ranks_of(world));
+    piece = {c.mesh, partition, number_dofs(c.mesh, c.scene, partition, world)};
+  };
+  on_rank_zero(world, number);
+  distribute(piece, world);
+  return piece;
+}
+
+double distance_between(Mat A, Mat B)
+{
+  Owned<Mat> difference = copy_of(A);
+  check(MatAXPY(difference, -1, B, DIFFERENT_NONZERO_PATTERN));
+  return norm_of(difference) / norm_of(A);
+}
+
+TEST_CASE("ranks that have pieces of a mesh make the matrices of ranks that have all of it")
+{
+  const Coupled c = coupled_parts();
+  const Built whole = build(c.mesh, c.scene, world);
+  const MeshPiece piece = in_pieces(c);
+  const Structure structure = assemble(piece.mesh, c.scene, piece.partition, piece.dofs, world);
+  CHECK(piece.dofs.first == whole.dofs.first);
+  CHECK(piece.dofs.last == whole.dofs.last);
+  CHECK(structure.elements == static_cast<std::int64_t>(c.mesh.elements.size()));
+  CHECK(structure.names.nodal_dof == whole.structure.names.nodal_dof);
+  CHECK(describe(structure.names, piece.dofs.size - 1, world) == describe(whole.dofs.names, whole.dofs.size - 1));
+  constexpr double order_of_sums = 1e-15;
+  CHECK(distance_between(whole.structure.M, structure.M) < order_of_sums);
+  CHECK(distance_between(whole.structure.C, structure.C) < order_of_sums);
+  CHECK(distance_between(whole.structure.K, structure.K) < order_of_sums);
+  const Owned<Vec> load = copy_of(whole.structure.load);
+  check(VecAXPY(load, -1, structure.load));
+  double difference = 0;
+  check(VecNorm(load, NORM_INFINITY, &difference));
+  CHECK(difference == 0); // all of it is rank 0's
+  const std::vector<Probe> probes{{"tip", "strip:end", Vec3{1.3, 0.2, 0.2}, {0, 0.6, 0.8}}, {"end", "weight", {}, {1}}};
+  const auto P = probe_rows(probes, piece.mesh, piece.dofs, world);
+  CHECK(distance_between(probe_rows(probes, c.mesh, whole.dofs, world), P) == 0);
+  if (rank_of(world) == 0) return;
+  CHECK(piece.mesh.elements.size() < c.mesh.elements.size());
+  CHECK(piece.mesh.nodes.size() < c.mesh.nodes.size());
+  CHECK(piece.dofs.terms.size() < whole.dofs.terms.size());
+  CHECK(piece.mesh.node_groups.empty());
+}
+
+TEST_CASE("an element that is inside out is named by its number in the whole mesh")
+{
+  Coupled c = coupled_parts();
+  for (std::size_t e : {4U, 20U, 40U}) // one at least on another rank
+    std::swap(c.mesh.elements[e].nodes[1], c.mesh.elements[e].nodes[3]);
+  const auto text = [](auto make)
+  {
+    try
+    {
+      make();
+    }
+    catch (const Error& error)
+    {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string whole = text([&] { (void)build(c.mesh, c.scene, world); });
+  const MeshPiece piece = in_pieces(c);
+  CHECK(whole != "");
+  CHECK(text([&] { (void)assemble(piece.mesh, c.scene, piece.partition, piece.dofs, world); }) == whole);
+  // each rank's own message is made of its own piece
+  for (std::size_t i = 0; i < piece.partition.element_numbers.size(); ++i)
+  {
+    const Element &part = piece.mesh.elements[i],
+                  &own = c.mesh.elements[static_cast<std::size_t>(piece.partition.element_numbers[i])];
+    for (int k = 0; k < 4; ++k)
+      CHECK(piece.partition.node_numbers[static_cast<std::size_t>(part.nodes[k])] == own.nodes[k]);
+  }
 }
 
 TEST_CASE("rows of a matrix scene are read, pushed and held by row and by node")

@@ -171,7 +171,7 @@ Model model_of(const Blocks& blocks)
 {
   Model model;
   model.pairs = make_pairs(blocks.mesh, blocks.scene).pairs;
-  const Partition partition = partition_mesh(blocks.mesh, model.pairs, world);
+  const Partition partition = partition_mesh(blocks.mesh, model.pairs, ranks_of(world));
   model.dofs = number_dofs(blocks.mesh, blocks.scene, partition, world);
   model.structure = assemble(blocks.mesh, blocks.scene, partition, model.dofs, world);
   model.interface = make_interface(model.pairs, blocks.scene, model.dofs, world);

@@ -44,8 +44,10 @@ struct ContactPairs
 
 /// Returns the pairs in the order of the contacts, in each by the rotor's nodes. Throws Error for a missing surface or
 /// point, and for a slave surface that supports or rigid bodies hold. It does so for surfaces that share nodes, are
-/// nowhere within reach of each other, look the same way or are inside each other. Not collective: the mesh is whole
-/// on every rank.
+/// nowhere within reach of each other, look the same way or are inside each other. The mesh must be whole.
 ContactPairs make_pairs(const Mesh& mesh, const Scene& scene);
+
+/// Gives every rank the pairs that rank 0 has. Collective.
+void broadcast_pairs(ContactPairs& contact, MPI_Comm comm);
 
 } // namespace squeal

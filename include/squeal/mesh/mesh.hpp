@@ -1,6 +1,6 @@
 #pragma once
-/// The mesh, its contact pairs and its partition. Every rank holds the whole mesh; matrices and vectors are
-/// distributed. This room includes no PETSc.
+/// The mesh, its contact pairs and its partition. Rank 0 holds the whole mesh and prepares all that needs it; another
+/// rank receives the elements that it assembles (squeal/solid/mesh_piece.hpp). This room includes no PETSc.
 #include "squeal/scene/scene.hpp"
 
 #include <map>
@@ -71,10 +71,12 @@ struct Mesh
 };
 
 /// Returns the scene's mesh with its points and reference points; without a mesh file it holds these points only.
-/// Collective: rank 0 reads the file through libgmsh and broadcasts it. Nodes that no element uses are dropped, and
-/// elements numbered inside out are renumbered. Throws Error for a missing or unreadable file, a mesh without
-/// elements, a shape that has no kernel, and solid elements in no part. It does so for a part, group or point that the
-/// mesh does not have.
-Mesh read_mesh(const Scene& scene, MPI_Comm comm);
+/// Reads the file through libgmsh; not collective. Nodes that no element uses are dropped, and elements numbered inside
+/// out are renumbered. Throws Error for a missing or unreadable file, a mesh without elements, a shape that has no
+/// kernel, and solid elements in no part. It does so for a part, group or point that the mesh does not have.
+Mesh read_mesh(const Scene& scene);
+
+/// Gives every rank the mesh that rank 0 has. Collective.
+void broadcast_mesh(Mesh& mesh, MPI_Comm comm);
 
 } // namespace squeal

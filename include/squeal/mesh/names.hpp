@@ -2,8 +2,7 @@
 /// Look-up of nodes and surfaces by the names that a scene uses.
 ///
 /// `user` says in messages which table of the scene asks, such as "spring" or "probe tip". Every function throws Error
-/// for an unknown name, with the nearest known one. The mesh is whole on every rank, so that all ranks find or throw
-/// the same.
+/// for an unknown name, with the nearest known one. The mesh must be whole.
 #include "squeal/mesh/mesh.hpp"
 
 namespace squeal

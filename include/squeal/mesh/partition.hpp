@@ -10,11 +10,12 @@ struct Partition
 {
   std::vector<int> node_rank;
   std::vector<int> element_rank; // the rank that owns most of the element's nodes
+  // Of a piece of the mesh, for messages: numbers in the whole one, ascending; empty: the same.
+  std::vector<int> node_numbers{}, element_numbers{};
 };
 
-/// Returns a partition by METIS, the same on every rank. The two heaviest nodes of a pair, one of
-/// each side, have the same owner. Collective.
-/// Throws Error if there are more ranks than nodes.
-Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs, MPI_Comm comm);
+/// Returns a partition by METIS, the same at every call. The two heaviest nodes of a pair, one of each side, have the
+/// same owner. The mesh must be whole. Throws Error if there are more ranks than nodes.
+Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs, int ranks);
 
 } // namespace squeal

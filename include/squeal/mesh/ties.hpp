@@ -27,8 +27,7 @@ struct TiedNodes
 
 /// A slave node of a surface below a tenth of its uncovered area is left free. Throws Error for a missing surface and
 /// for surfaces that share nodes or do not meet, and for a node of an edge that is beyond the reach. It does so for a
-/// node that is tied twice, and for a slave node that is on the master of a tie. Not collective: the mesh is whole on
-/// every rank.
+/// node that is tied twice, and for a slave node that is on the master of a tie. The mesh must be whole.
 TiedNodes tied_nodes(const Mesh& mesh, const Scene& scene);
 
 } // namespace squeal

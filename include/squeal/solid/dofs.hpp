@@ -15,17 +15,23 @@ namespace squeal
 /// What each free degree of freedom is. Texts are made on demand only, since a model has many degrees of freedom.
 struct DofNames
 {
+  // On rank 0; on a matrix scene none:
   std::vector<std::string> bodies; // "part disc", "point tip", "rigid body carrier"
   std::vector<int> body;           // index in `bodies` of each node
   std::vector<Vec3> at;            // [m] position of each node
-  std::vector<PetscInt> nodal_dof; // of each free degree of freedom; empty on a matrix scene
+  // On every rank:
+  std::vector<PetscInt> nodal_dof; // of each free degree of freedom, in the whole mesh; empty on a matrix scene
   // On a matrix scene, of each free degree of freedom:
   std::vector<PetscInt> file_rows;      // row of the files
   std::vector<NodeMotion> file_motions; // empty without dofs.txt
 };
 
-/// Returns "part disc, node 12 at (x, y, z), direction ry", or "dof 12 (node 1017, x)" on a matrix scene.
+/// Returns "part disc, node 12 at (x, y, z), direction ry", or "dof 12 (node 1017, x)" on a matrix scene. Not
+/// collective; the names must be whole.
 std::string describe(const DofNames& names, PetscInt dof);
+
+/// By rank 0's names. Collective.
+std::string describe(const DofNames& names, PetscInt dof, MPI_Comm comm);
 
 /// An entry of a row of T.
 struct DofTerm
@@ -34,24 +40,25 @@ struct DofTerm
   double factor = 0; // [-, m]
 };
 
-/// The rows of T, the same on every rank. Both nodes of a contact pair have their degrees of freedom on one rank.
+/// The rows of T of the nodes of a mesh, or of a piece of it. Both nodes of a contact pair have their degrees of
+/// freedom on one rank.
 struct DofMap
 {
   PetscInt size = 0;                // number of free degrees of freedom on all ranks
   PetscInt first = 0;               // this rank owns first to last - 1
   PetscInt last = 0;                // end of this rank's range
   std::vector<std::size_t> offsets; // of each nodal degree of freedom in `terms`, and the end
-  std::vector<DofTerm> terms;       // all rows
+  std::vector<DofTerm> terms;
   DofNames names;
 
   /// Row of a nodal degree of freedom. It is empty where the motion is fixed or the node does not have it.
   std::span<const DofTerm> terms_of(PetscInt nodal_dof) const;
 };
 
-/// Numbers the free degrees of freedom and eliminates supports and rigid bodies. Collective. The rotation of a node
-/// that shells and solids share follows the least-squares rotation of the solid nodes around it. The moments of the
-/// shell then act on the solid as couples. Throws Error for a support or rigid body that contradicts another, and if
-/// nothing is free.
+/// Numbers the free degrees of freedom of a whole mesh and eliminates supports and rigid bodies. Not collective: `comm`
+/// says which rank this is. The rotation of a node that shells and solids share follows the least-squares rotation of
+/// the solid nodes around it. The moments of the shell then act on the solid as couples. Throws Error for a support or
+/// rigid body that contradicts another, and if nothing is free.
 DofMap number_dofs(const Mesh& mesh, const Scene& scene, const Partition& partition, MPI_Comm comm);
 
 } // namespace squeal

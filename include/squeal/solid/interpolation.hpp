@@ -6,7 +6,7 @@
 namespace squeal
 {
 
-/// A mesh with its numbering.
+/// A mesh with its numbering, whole on rank 0.
 struct NumberedMesh
 {
   const Mesh& mesh;
@@ -33,8 +33,8 @@ private:
   };
 
   NumberedMesh from_, to_;
-  std::vector<std::size_t> offsets_; // of each of this rank's degrees of freedom in shares_, and the end of its shares
-  std::vector<std::size_t> ends_;
+  // On rank 0, of each degree of freedom in shares_, and the end of its shares:
+  std::vector<std::size_t> offsets_, ends_;
   std::vector<Share> shares_; // those of a node once, however many degrees of freedom it has
 };
 

@@ -24,8 +24,8 @@ struct Structure
   DofNames names;
 };
 
-/// Returns the structure of a mesh or point scene. Collective.
-/// Throws Error for an element whose Jacobian is not positive, with its part and place.
+/// Returns the structure of a mesh or point scene from a rank's piece of it (mesh_piece.hpp); rank 0 has the whole.
+/// Collective. Throws Error for an element whose Jacobian is not positive, with its part and place.
 Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partition, const DofMap& dofs, MPI_Comm comm);
 
 /// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder, and of G.petsc and H.petsc where
