@@ -143,6 +143,7 @@ void find_on_model(const CycleProblem& problem, const CycleOptions& options, Ste
   {
     result.cycle.outcome.kind = problem.unstable.modes.size() > 1 ? OutcomeKind::refused : OutcomeKind::not_converged;
     result.cycle.outcome.reason = fidelity.reason;
+    result.cycle.orbit.residual = std::nan(""); // no period of the full model was made
     return;
   }
   find_by_full_model(problem, options, steps, result);

@@ -124,6 +124,7 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
   ReducedMap map = period_map_of(search, search.steps);
   Progress progress(map.comm, "reduced model, free", static_cast<double>(periods));
   double missed = 1, correction = 0;
+  const auto limited = [&] { return std::clamp(correction, -0.2 * motion.period, 0.2 * motion.period); };
   // compared every tenth period: whatever the rounding, it stops at the same
   const auto periodic = [&] { return missed <= 5e-3 && fidelity.reduced_periods % 10 == 0; };
   while (!periodic() && fidelity.reduced_periods < periods)
@@ -136,10 +137,10 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
         format("T %.6g s, energy %.3g J, comes back to %.1e", motion.period + correction, motion.energy, missed));
     if (motion.energy > most || !std::isfinite(missed)) break;
     if (std::abs(correction) < 2e-3 * motion.period) continue; // a new period costs new matrices
-    motion.period += std::clamp(correction, -0.2 * motion.period, 0.2 * motion.period);
+    motion.period += limited();
     correction = 0;
   }
-  motion.period += correction;
+  motion.period += limited();
   fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
 
@@ -204,7 +205,8 @@ Shot shoot(const ReducedSearch& search, const ReducedCycle& start, const Flow& f
   StageResult found = shoot_in_full_space(problem, shooting, log, std::move(begin));
   if (found.ending == StageEnding::converged)
     found = prefer_half_period(problem, shooting, log, std::move(found)); // which spares the full model that test
-  return {{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0},
+  return {{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0,
+           found.orbit.residual},
           log.convergence.periods};
 }
 
@@ -240,11 +242,13 @@ Shot shoot_together(const ReducedSearch& search, const ReducedCycle& start, Redu
     for (const Owned<Vec> state = vector_of(start.state); one_more_period(false, map.comm);)
       together(start.period, state, state, nullptr);
   agree(map.comm, problem);
-  double values[] = {shot.cycle.converged ? 1. : 0., shot.cycle.period, static_cast<double>(shot.periods)};
-  MPI_Bcast(values, 3, MPI_DOUBLE, 0, map.comm);
+  double values[] = {shot.cycle.converged ? 1. : 0., shot.cycle.period, shot.cycle.residual,
+                     static_cast<double>(shot.periods)};
+  MPI_Bcast(values, 4, MPI_DOUBLE, 0, map.comm);
   shot.cycle.converged = values[0] > 0;
   shot.cycle.period = values[1];
-  shot.periods = static_cast<long>(values[2]);
+  shot.cycle.residual = values[2];
+  shot.periods = static_cast<long>(values[3]);
   share_state(shot.cycle.state, map.comm);
   return shot;
 }
@@ -335,7 +339,9 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
   ++search.fidelity.reduced_periods;
   update_correction(search, free);
   cycle = find_reduced_cycle(search, {false, free.state, free.period, 0}, search.steps);
-  return cycle.converged ? "" : "no cycle of the reduced model was found";
+  if (cycle.converged) return {};
+  return format("no cycle of the reduced model was found: its shooting ended at a residual of %.1e, %.0e asked for",
+                cycle.residual, search.tolerance);
 }
 
 } // namespace squeal

@@ -27,6 +27,7 @@ struct ReducedCycle
   ReducedState state;
   double period = 0; // [s]
   double energy = 0; // [J] mean fluctuating
+  double residual = 0;
 };
 
 /// The reduced model's first cycle, from the estimate, with as many active pairs as its motion needs. It runs free

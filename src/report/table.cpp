@@ -140,8 +140,9 @@ std::string cycle_text(const Report& report, const Scene& scene)
                                     : std::string("not tried");
   const std::string judged =
       cycle.tolerance > 0 ? format("tolerance %.0e", cycle.tolerance) : std::string("ended by the accuracy below");
-  text +=
-      row("", format("residual: full space %.2e (%s), projected ", cycle.orbit.residual, judged.c_str()) + projected);
+  if (std::isfinite(cycle.orbit.residual))
+    text +=
+        row("", format("residual: full space %.2e (%s), projected ", cycle.orbit.residual, judged.c_str()) + projected);
   text += row("", format("%d Newton steps, %ld periods integrated, %d steps a period", cycle.convergence.iterations,
                          cycle.convergence.periods, cycle.steps_per_period));
   for (const SeenGrowth& seen : cycle.multipliers.seen)
@@ -206,7 +207,8 @@ std::string settled_text(const SettledMotion& settled, const Scene& scene)
 std::string fidelity_text(const Fidelity& fidelity)
 {
   if (fidelity.asked == CycleModel::full) return "";
-  std::string text = row("fidelity", format("%s: %s model used", word(fidelity.asked), word(fidelity.used)) +
+  std::string text = row("fidelity", format("%s: %s model %s", word(fidelity.asked), word(fidelity.used),
+                                                fidelity.full_periods > 0 ? "used" : "tried") +
                                          (fidelity.reason.empty() ? "" : ", " + fidelity.reason));
   if (fidelity.full_periods == 0) return text;
   if (fidelity.used == CycleModel::reduced)

@@ -77,6 +77,13 @@ void doubt_contacts(const Scene& scene, double length, std::vector<std::string>&
   }
 }
 
+void doubt_cycle(const Scene& scene, std::vector<std::string>& doubts)
+{
+  if (scene.cycle.enabled && scene.fidelity == CycleModel::reduced && scene.cycle.tolerance > 0)
+    doubts.push_back("cycle.tolerance is for the full model's shooting: with fidelity = \"reduced\" nothing uses it, "
+                     "and accuracy decides");
+}
+
 void doubt_damping(const RayleighDamping& damping, std::vector<std::string>& doubts)
 {
   for (const auto& [frequency_hz, measured] : damping.measured)
@@ -108,6 +115,7 @@ std::vector<std::string> doubts_about(const Scene& scene, double length)
   if (scene.mesh && length > 0 && is_outside(length, 0.01, 1000))
     doubts.push_back(format("the model is %.3g m long: is mesh.scale right?", length));
   if (length > 0) doubt_contacts(scene, length, doubts);
+  doubt_cycle(scene, doubts);
   doubt_damping(scene.damping, doubts);
   return doubts;
 }
