@@ -208,7 +208,7 @@ std::string fidelity_text(const Fidelity& fidelity)
 {
   if (fidelity.asked == CycleModel::full) return "";
   std::string text = row("fidelity", format("%s: %s model %s", word(fidelity.asked), word(fidelity.used),
-                                                fidelity.full_periods > 0 ? "used" : "tried") +
+                                            fidelity.full_periods > 0 ? "used" : "tried") +
                                          (fidelity.reason.empty() ? "" : ", " + fidelity.reason));
   if (fidelity.full_periods == 0) return text;
   if (fidelity.used == CycleModel::reduced)
