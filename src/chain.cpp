@@ -118,11 +118,17 @@ std::string no_cycle_start(const Chain& chain)
 
 CycleProblem cycle_problem(const Chain& chain)
 {
-  return {chain.sliding(),          *chain.linearised,
-          chain.report.modes.modes, chain.unstable(),
-          chain.scene.cycle,        chain.options.step,
-          chain.options.modes,      chain.model.probes,
-          given_start(chain),       chain.carried ? chain.carried->period : 0};
+  return {chain.sliding(),
+          *chain.linearised,
+          chain.report.modes.modes,
+          chain.unstable(),
+          chain.scene.cycle,
+          chain.options.step,
+          chain.options.modes,
+          chain.model.probes,
+          given_start(chain),
+          chain.carried ? chain.carried->period : 0,
+          chain.carried ? chain.carried->rounds : 1};
 }
 
 SettledBySteps by_steps(const SettledMotion& settled)
@@ -278,7 +284,7 @@ FittedCycle run_cycle_from_settled(Chain& chain)
 {
   const SettledMotion& settled = chain.report.settled;
   const double period = period_of(settled.examined.base);
-  chain.carried = CarriedCycle{copy_of(settled.end), period};
+  chain.carried = CarriedCycle{copy_of(settled.end), period, std::max(settled.examined.base.closes_after, 1)};
   if (chain.paced) chain.paced->mode.lambda = {0, two_pi / period};
   CycleSettings settings = chain.scene.cycle;
   if (settings.steps_per_period > 0) // the steps that it was seen at

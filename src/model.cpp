@@ -132,8 +132,8 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   return model;
 }
 
-/// On rank 0 the mesh, elsewhere nothing, unless a stage makes models on groups of ranks. A signal to the run reaches
-/// its mesher as well, which ends by it: the mesh is no error then.
+/// On rank 0 the mesh, elsewhere nothing. A signal to the run reaches its mesher as well, which ends by it: the mesh is
+/// no error then.
 Mesh read_mesh_unless_ended(const Scene& scene, MPI_Comm comm)
 {
   Mesh mesh;
@@ -146,18 +146,16 @@ Mesh read_mesh_unless_ended(const Scene& scene, MPI_Comm comm)
     end_if_asked(comm);
     throw;
   }
-  if (scene.sweep || scene.robustness) broadcast_mesh(mesh, comm);
   return mesh;
 }
 
-/// `mesh` is whole on rank 0.
+/// `mesh`: on rank 0.
 Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
 {
   Model model;
   MeshPiece piece;
   ContactPairs contact;
-  const bool has_all = rank_of(comm) == 0;
-  if (has_all) piece.mesh = std::move(mesh);
+  piece.mesh = std::move(mesh);
   end_if_asked(comm);
   on_rank_zero(comm, [&] { contact = make_pairs(piece.mesh, scene); });
   broadcast_pairs(contact, comm);
@@ -170,13 +168,15 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
   on_rank_zero(comm, number);
   distribute(piece, comm);
   end_if_asked(comm);
-  model.structure = assemble(piece.mesh, scene, piece.partition, piece.dofs, comm);
+  model.structure = assemble(piece, scene, comm);
   model.interface = make_interface(contact.pairs, scene, piece.dofs, comm);
   model.coverage = contact.coverage;
   model.probes = probe_rows(scene.probes, piece.mesh, piece.dofs, comm);
-  model.mesh = has_all ? std::move(piece.mesh) : std::move(mesh);
-  if (has_all)
+  if (rank_of(comm) == 0)
+  {
+    model.mesh = std::move(piece.mesh);
     model.dofs = std::move(piece.dofs);
+  }
   else
     model.dofs.size = piece.dofs.size;
   return model;
@@ -188,6 +188,7 @@ Model build_model(const Scene& scene, MPI_Comm comm)
 {
   Model model =
       scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh_unless_ended(scene, comm), comm);
+  if (scene.sweep || scene.robustness) broadcast_mesh(model.mesh, comm); // they make models on groups of ranks
   double mass = 0;
   check(MatNorm(model.structure.M, NORM_1, &mass));
   if (mass == 0 && (scene.modes.enabled || scene.transient.enabled || scene.cycle.enabled))
@@ -198,7 +199,8 @@ Model build_model(const Scene& scene, MPI_Comm comm)
 
 Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm)
 {
-  return scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, model.mesh, comm);
+  if (scene.matrices) return model_of_matrices(scene, comm);
+  return model_of_mesh(scene, rank_of(comm) == 0 ? model.mesh : Mesh{}, comm);
 }
 
 BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers, MPI_Comm comm)

@@ -207,11 +207,12 @@ ExitCode exit_code_of(const Report& report)
   return ExitCode::converged;
 }
 
-/// The summary with the warnings that follow from the scene.
+/// The summary with the warnings that follow from the scene, on rank 0.
 ModelSummary summary_with_doubts(const Model& model, const Scene& scene, MPI_Comm comm)
 {
   ModelSummary summary = summary_of(model, scene, comm);
-  for (const std::string& doubt : doubts_about(scene, summary.length)) summary.warnings.push_back(doubt);
+  if (rank_of(comm) == 0)
+    for (const std::string& doubt : doubts_about(scene, summary.length)) summary.warnings.push_back(doubt);
   return summary;
 }
 

@@ -31,6 +31,7 @@ struct CarriedCycle
 {
   State state;
   double period = 0; // [s]
+  int rounds = 1;    // as many as the period may be of the cycle
 };
 
 /// The cycle of the coarse mesh about the equilibrium of the fine one. Its time is scaled by the frequencies of the two

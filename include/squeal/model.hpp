@@ -10,10 +10,10 @@ namespace squeal
 /// A model in all its parts.
 struct Model
 {
-  // Whole on rank 0, empty on a matrix scene. Scenes with stages that make models on groups of ranks, [sweep] and
+  // On rank 0; empty on a matrix scene. Scenes with stages that make models on groups of ranks, [sweep] and
   // [robustness], have the mesh on every rank.
   Mesh mesh;
-  DofMap dofs; // rank 0's; elsewhere the sizes alone
+  DofMap dofs; // rank 0's; elsewhere its size alone
   Structure structure;
   Interface interface;
   std::vector<Coverage> coverage; // one a contact; empty on a matrix scene

@@ -151,7 +151,7 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
       for (const auto& [node, weight] : pair.nodes) add_displacement(dofs, node, weight * axis, rows.back());
     }
   }
-  interface.B = matrix_of_rows(dealt_rows(rows, interface.pairs, comm), dofs.last - dofs.first, comm);
+  interface.B = matrix_of_rows(scattered_rows(std::move(rows), interface.pairs, comm), dofs.last - dofs.first, comm);
   check_interface(interface, "contact", comm);
   return interface;
 }

@@ -84,7 +84,7 @@ std::string find_by_reduced_model(ReducedSearch& search, StepChoice steps, Limit
   if (search.problem.unstable.modes.size() > 1)
     return "several modes are unstable: only the full model's shooting excites them all";
   if (search.problem.given_period > 0 && search.fidelity.asked == CycleModel::automatic)
-    return "the search starts from the cycle of the coarser mesh, which the full model takes up at once";
+    return "the search starts from a cycle that is nearly known, which the full model takes up at once";
   ReducedCycle reduced;
   if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
   const double clock = MPI_Wtime();

@@ -87,8 +87,9 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
 
 CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
 {
-  return {problem.sliding, problem.linearised,    problem.modes,  problem.unstable, settings,
-          problem.step,    problem.modes_options, problem.probes, problem.given,    problem.given_period};
+  return {problem.sliding, problem.linearised,   problem.modes,         problem.unstable,
+          settings,        problem.step,         problem.modes_options, problem.probes,
+          problem.given,   problem.given_period, problem.given_rounds};
 }
 
 std::vector<State> other_unstable_motions(const CycleProblem& problem)
@@ -191,7 +192,7 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
     return skipped;
   }
   const double first_event = std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude) * unit_norm(problem);
-  const bool is_cycle = problem.given_period > 0; // of a coarser mesh: it needs no free periods
+  const bool is_cycle = problem.given_period > 0; // it needs no free periods
   ShootingStart start{equilibrium.u,
                       first->u,
                       first->v,
@@ -199,7 +200,8 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
                       {mode.real, mode.imaginary, equilibrium.u},
                       {},
                       first_event,
-                      is_cycle};
+                      is_cycle,
+                      problem.given_rounds};
   start.other_unstable = other_unstable_states(problem);
   if (is_cycle && problem.settings.start.kind == CycleStartKind::coarse)
     return find_cycle_near(problem, options, std::move(start));

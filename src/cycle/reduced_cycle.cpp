@@ -204,9 +204,10 @@ Shot shoot(const ReducedSearch& search, const ReducedCycle& start, const Flow& f
   problem.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
   StageResult found = shoot_in_full_space(problem, shooting, log, std::move(begin));
   if (found.ending == StageEnding::converged)
-    found = prefer_half_period(problem, shooting, log, std::move(found)); // which spares the full model that test
+    found = prefer_fewer_rounds(problem, shooting, log, 2, std::move(found)); // which spares the full model that test
+  const bool at_rest = found.ending == StageEnding::collapsed;
   return {{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0,
-           found.orbit.residual},
+           at_rest ? std::nan("") : found.orbit.residual},
           log.convergence.periods};
 }
 
@@ -340,6 +341,7 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
   update_correction(search, free);
   cycle = find_reduced_cycle(search, {false, free.state, free.period, 0}, search.steps);
   if (cycle.converged) return {};
+  if (std::isnan(cycle.residual)) return "no cycle of the reduced model was found: its shooting fell to rest";
   return format("no cycle of the reduced model was found: its shooting ended at a residual of %.1e, %.0e asked for",
                 cycle.residual, search.tolerance);
 }

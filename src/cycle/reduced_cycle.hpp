@@ -25,9 +25,9 @@ struct ReducedCycle
 {
   bool converged = false;
   ReducedState state;
-  double period = 0; // [s]
-  double energy = 0; // [J] mean fluctuating
-  double residual = 0;
+  double period = 0;   // [s]
+  double energy = 0;   // [J] mean fluctuating
+  double residual = 0; // NaN: of a motion that fell to rest
 };
 
 /// The reduced model's first cycle, from the estimate, with as many active pairs as its motion needs. It runs free

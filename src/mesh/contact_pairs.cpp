@@ -290,6 +290,9 @@ void broadcast_pairs(ContactPairs& contact, MPI_Comm comm)
   broadcast(sent, comm);
   broadcast(nodes, comm);
   broadcast(contact.coverage, comm);
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  if (rank == 0) return;
   contact.pairs.clear();
   auto first = nodes.cbegin();
   for (const SentPair& s : sent)

@@ -79,7 +79,7 @@ void doubt_contacts(const Scene& scene, double length, std::vector<std::string>&
 
 void doubt_cycle(const Scene& scene, std::vector<std::string>& doubts)
 {
-  if (scene.cycle.enabled && scene.fidelity == CycleModel::reduced && scene.cycle.tolerance > 0)
+  if (scene.cycle.enabled && scene.fidelity == CycleModel::reduced && scene.cycle.tolerance > 0 && !scene.branch)
     doubts.push_back("cycle.tolerance is for the full model's shooting: with fidelity = \"reduced\" nothing uses it, "
                      "and accuracy decides");
 }

@@ -38,13 +38,21 @@ StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptio
   return result;
 }
 
-StageResult prefer_half_period(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
-                               StageResult found)
+StageResult prefer_fewer_rounds(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
+                                int rounds, StageResult found)
 {
-  Orbit half = evaluate(problem, log, found.orbit.state, found.orbit.period / 2);
-  if (!(half.residual < 1e-2)) return found;
-  StageResult once = shoot_in_full_space(problem, options, log, std::move(half));
-  return once.ending == StageEnding::converged ? std::move(once) : std::move(found);
+  for (int prime = 2; rounds > 1; ++prime)
+    for (; rounds % prime == 0; rounds /= prime)
+    {
+      const double period = found.orbit.period / prime;
+      const OrbitProblem once{problem.flow, problem.preconditioner, copy_of(problem.equilibrium.get()),
+                              period,       problem.tolerance,      problem.least_fluctuation};
+      Orbit part = evaluate(once, log, found.orbit.state, period);
+      if (!(part.residual < 1e-2)) continue;
+      StageResult shorter = shoot_in_full_space(once, options, log, std::move(part));
+      if (shorter.ending == StageEnding::converged) found = std::move(shorter);
+    }
+  return found;
 }
 
 } // namespace squeal

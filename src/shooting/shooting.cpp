@@ -152,7 +152,7 @@ bool is_again(const Orbit& orbit, const Orbit& known)
          std::abs(orbit.fluctuation / known.fluctuation - 1) < of_fluctuation;
 }
 
-/// Whether the orbit is that of a cheaper model, on which half the period was tried.
+/// Whether the orbit is that of the start, whose rounds are known.
 bool repeats_start(const Search& search, const Orbit& orbit)
 {
   constexpr double of_period = 0.1; // far from half of it
@@ -171,8 +171,8 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
     orbit = shoot_on_subspaces(problem, options, log, std::move(orbit), start.shapes);
   Attempt attempt{shoot_once(problem, options, log, std::move(orbit)), {}, first_return};
   if (!attempt.converged()) return attempt;
-  if (!repeats_start(search, attempt.found.orbit))
-    attempt.found = prefer_half_period(problem, options, log, std::move(attempt.found));
+  const int rounds = repeats_start(search, attempt.found.orbit) ? start.rounds : 2;
+  attempt.found = prefer_fewer_rounds(problem, options, log, rounds, std::move(attempt.found));
   if (known && known->converged() && is_again(attempt.found.orbit, known->found.orbit))
   {
     attempt.floquet.multipliers = known->floquet.multipliers;

@@ -23,13 +23,13 @@ std::vector<PetscInt> rank_starts(const MeshPiece& whole, int ranks)
   return starts;
 }
 
-/// The elements that each rank needs, ascending.
+/// The elements that each rank but the first needs, ascending.
 std::vector<std::vector<int>> elements_by_rank(const MeshPiece& whole, const std::vector<PetscInt>& starts)
 {
   std::vector<std::vector<int>> result(starts.size() - 1);
   const auto give = [&](std::size_t rank, int element)
   {
-    if (result[rank].empty() || result[rank].back() != element) result[rank].push_back(element);
+    if (rank > 0 && (result[rank].empty() || result[rank].back() != element)) result[rank].push_back(element);
   };
   for (std::size_t e = 0; e < whole.mesh.elements.size(); ++e)
   {
@@ -46,7 +46,7 @@ std::vector<std::vector<int>> elements_by_rank(const MeshPiece& whole, const std
 MeshPiece piece_of(const MeshPiece& whole, const std::vector<int>& elements, std::vector<int>& place)
 {
   MeshPiece piece;
-  std::vector<int>& nodes = piece.partition.node_numbers;
+  std::vector<int>& nodes = piece.node_numbers;
   for (const int e : elements)
     for (const int node : nodes_of(whole.mesh.elements[static_cast<std::size_t>(e)]))
       if (place[static_cast<std::size_t>(node)] < 0)
@@ -67,7 +67,7 @@ MeshPiece piece_of(const MeshPiece& whole, const std::vector<int>& elements, std
       piece.dofs.offsets.push_back(piece.dofs.terms.size());
     }
   }
-  piece.partition.element_numbers = elements;
+  piece.element_numbers = elements;
   for (const int e : elements)
   {
     Element element = whole.mesh.elements[static_cast<std::size_t>(e)];
@@ -85,8 +85,8 @@ template <class Piece, class Pass> void for_each_list(Piece& piece, Pass pass)
   pass(piece.mesh.nodes);
   pass(piece.mesh.elements);
   pass(piece.partition.element_rank);
-  pass(piece.partition.node_numbers);
-  pass(piece.partition.element_numbers);
+  pass(piece.node_numbers);
+  pass(piece.element_numbers);
   pass(piece.dofs.offsets);
   pass(piece.dofs.terms);
 }

@@ -67,7 +67,8 @@ Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const 
     }
   };
   on_rank_zero(comm, add_all);
-  return matrix_of_rows(dealt_rows(rows, static_cast<PetscInt>(probes.size()), comm), dofs.last - dofs.first, comm);
+  return matrix_of_rows(scattered_rows(std::move(rows), static_cast<PetscInt>(probes.size()), comm),
+                        dofs.last - dofs.first, comm);
 }
 
 } // namespace squeal

@@ -37,7 +37,7 @@ SentRows sent(std::span<const SparseRow> rows)
 
 } // namespace
 
-std::vector<SparseRow> dealt_rows(const std::vector<SparseRow>& rows, PetscInt count, MPI_Comm comm)
+std::vector<SparseRow> scattered_rows(std::vector<SparseRow> rows, PetscInt count, MPI_Comm comm)
 {
   const std::size_t of_item = count > 0 ? rows.size() / static_cast<std::size_t>(count) : 0;
   const auto rows_of = [&](int rank)
@@ -54,8 +54,8 @@ std::vector<SparseRow> dealt_rows(const std::vector<SparseRow>& rows, PetscInt c
       send(others.sizes, to, comm);
       send(others.entries, to, comm);
     }
-    const auto own = rows_of(0);
-    return {own.begin(), own.end()};
+    rows.resize(rows_of(0).size());
+    return rows;
   }
   SentRows received;
   receive(received.sizes, 0, comm);

@@ -207,11 +207,11 @@ double loss_omega(const Scene& scene)
 
 /// Returns the contribution of an element. Throws std::runtime_error with its part and place if its Jacobian is not
 /// positive.
-Contribution element_contribution(const Mesh& mesh, const Scene& scene, const Partition& partition, std::size_t index)
+Contribution element_contribution(const MeshPiece& piece, const Scene& scene, std::size_t index)
 {
-  const Element& element = mesh.elements[index];
+  const Element& element = piece.mesh.elements[index];
   const Part& part = scene.parts[element.part];
-  const std::vector<Vec3> x = positions_of(mesh, element);
+  const std::vector<Vec3> x = positions_of(piece.mesh, element);
   try
   {
     ElementMatrices matrices = element_matrices(element.shape, x, part.material, part.thickness);
@@ -223,20 +223,22 @@ Contribution element_contribution(const Mesh& mesh, const Scene& scene, const Pa
   }
   catch (const std::runtime_error& error)
   {
-    const bool whole = partition.element_numbers.empty();
-    const auto node = static_cast<std::size_t>(element.nodes[0]);
-    throw Error("part " + part.name + ", element " +
-                std::to_string(whole ? static_cast<int>(index) : partition.element_numbers[index]) + " with " +
-                node_text(whole ? element.nodes[0] : partition.node_numbers[node], x[0]) + ": " + error.what());
+    const bool whole = piece.element_numbers.empty();
+    const int number = whole ? static_cast<int>(index) : piece.element_numbers[index], node = element.nodes[0];
+    throw Error("part " + part.name + ", element " + std::to_string(number) + " with " +
+                node_text(whole ? node : piece.node_numbers[static_cast<std::size_t>(node)], x[0]) + ": " +
+                error.what());
   }
 }
 
 } // namespace
 
-Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partition, const DofMap& dofs, MPI_Comm comm)
+Structure assemble(const MeshPiece& piece, const Scene& scene, MPI_Comm comm)
 {
+  const Mesh& mesh = piece.mesh;
+  const DofMap& dofs = piece.dofs;
   Structure structure;
-  const std::int64_t own = std::ranges::count(partition.element_rank, rank_of(comm));
+  const std::int64_t own = std::ranges::count(piece.partition.element_rank, rank_of(comm));
   MPI_Allreduce(&own, &structure.elements, 1, MPI_INT64_T, MPI_SUM, comm);
   structure.names = dofs.names;
   std::vector<Contribution> lumped; // on rank 0
@@ -250,8 +252,8 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
   const auto add_own_elements = [&]
   {
     for (std::size_t i = 0; i < mesh.elements.size(); ++i)
-      if (partition.element_rank[i] == rank_of(comm))
-        add_contribution(structure, dofs, element_contribution(mesh, scene, partition, i));
+      if (piece.partition.element_rank[i] == rank_of(comm))
+        add_contribution(structure, dofs, element_contribution(piece, scene, i));
   };
   on_every_rank(comm, add_own_elements);
   for (const Contribution& contribution : lumped) add_contribution(structure, dofs, contribution);
@@ -262,7 +264,7 @@ Structure assemble(const Mesh& mesh, const Scene& scene, const Partition& partit
     check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
     mark_symmetric(A);
   }
-  add_spin(structure, mesh, scene, partition, dofs);
+  add_spin(structure, piece, scene);
   structure.load = assemble_load(mesh, scene, dofs, comm);
   return structure;
 }

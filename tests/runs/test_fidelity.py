@@ -1,5 +1,7 @@
 """No more model than the scene needs: what the reduced model says of itself is true, and it is refused where it is none."""
 
+import re
+
 import numpy as np
 import pytest
 from conftest import INPUTS
@@ -104,6 +106,16 @@ def test_several_unstable_modes_are_refused(squeal):
     run = squeal(*PIN, "--set", "damping.beta=3e-8", "--set", "fidelity=reduced", ranks=1)
     assert run.code == 2 and run.report["modes"]["unstable_count"] > 1
     assert run.report["cycle"]["outcome"] == "refused" and "several modes" in run.report["cycle"]["reason"]
+
+
+def test_a_reduced_search_cut_short_says_where_it_ended(squeal):
+    """No period of the full model is made, so that it has no residual; the warning is of a key that nothing uses."""
+    run = squeal(*PIN, "--set", "fidelity=reduced", "--set", "cycle.tolerance=1e-7", "-cycle_max_periods", "3", ranks=1)
+    cycle = run.report["cycle"]
+    assert run.code == 2 and cycle["outcome"] == "not converged" and cycle["residual_full"] is None
+    assert re.search(r"ended at a residual of [1-9]\.\de-\d\d, 3e-07 asked for", cycle["reason"])
+    assert "reduced model tried" in run.printed and "residual: full space" not in run.printed
+    assert "nothing uses it" in run.printed
 
 
 @pytest.mark.parametrize("speed, exact", [(0.3, 0.773368), (2, 4.627213)])

@@ -132,7 +132,7 @@ inline Built build(const Mesh& mesh, const Scene& scene, MPI_Comm comm)
   const Partition partition = partition_mesh(mesh, {}, ranks_of(comm));
   Built built;
   built.dofs = number_dofs(mesh, scene, partition, comm);
-  built.structure = assemble(mesh, scene, partition, built.dofs, comm);
+  built.structure = assemble({mesh, partition, built.dofs}, scene, comm);
   return built;
 }
 

@@ -65,7 +65,7 @@ Joined join(const Stack& s)
 {
   const Partition partition = partition_mesh(s.mesh, s.pairs, ranks_of(world));
   const DofMap dofs = number_dofs(s.mesh, s.scene, partition, world);
-  Joined joined{assemble(s.mesh, s.scene, partition, dofs, world), {}};
+  Joined joined{assemble({s.mesh, partition, dofs}, s.scene, world), {}};
   joined.interface = make_interface(s.pairs, s.scene, dofs, world);
   return joined;
 }

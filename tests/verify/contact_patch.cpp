@@ -173,7 +173,7 @@ Model model_of(const Blocks& blocks)
   model.pairs = make_pairs(blocks.mesh, blocks.scene).pairs;
   const Partition partition = partition_mesh(blocks.mesh, model.pairs, ranks_of(world));
   model.dofs = number_dofs(blocks.mesh, blocks.scene, partition, world);
-  model.structure = assemble(blocks.mesh, blocks.scene, partition, model.dofs, world);
+  model.structure = assemble({blocks.mesh, partition, model.dofs}, blocks.scene, world);
   model.interface = make_interface(model.pairs, blocks.scene, model.dofs, world);
   return model;
 }

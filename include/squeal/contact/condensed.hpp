@@ -10,7 +10,7 @@ namespace squeal
 {
 
 /// A factored, bordered by the interface's B. Collective.
-/// Error: A singular, naming (`describe`) the offending degree of freedom.
+/// Error: A singular, naming (`describe`) the offending degree of freedom by the names of rank 0 of A's ranks.
 Factor factor_held(Mat A, const Interface& interface, const DofNames& names, const FactorOptions& options);
 
 /// A symmetric matrix A, bordered by the interface's B, and whether it is positive definite.

@@ -36,7 +36,8 @@ struct BrakeModel
 };
 
 /// Rows n, t1, t2 of every pair: n.w and t.w, with w the weighted sum of its nodes' displacements. Tangents: the
-/// scene's, else t1 along the drive. Error: zero drive velocity at a pair where mu > 0. Collective.
+/// scene's, else t1 along the drive. Pairs are whole on every rank, T on rank 0. Error: zero drive velocity at a pair
+/// where mu > 0. Collective.
 Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm);
 
 /// B.petsc gap.petsc drive.petsc of a folder; directions = (rows of B) / pairs - 1. No pairs where none is there.

@@ -44,6 +44,7 @@ struct CycleProblem
   Mat probes = nullptr;
   const State* given = nullptr; // where CycleStartKind::transient, ::coarse and ::file start
   double given_period = 0;      // [s] of the cycle that is given; 0: none is, and the mode's is taken
+  int given_rounds = 1;         // as many as that period may be of the cycle
 };
 
 /// The problem with other settings, which it borrows.

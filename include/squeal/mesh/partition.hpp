@@ -10,8 +10,6 @@ struct Partition
 {
   std::vector<int> node_rank;
   std::vector<int> element_rank; // the rank that owns most of the element's nodes
-  // Of a piece of the mesh, for messages: numbers in the whole one, ascending; empty: the same.
-  std::vector<int> node_numbers{}, element_numbers{};
 };
 
 /// Returns a partition by METIS, the same at every call. The two heaviest nodes of a pair, one of each side, have the

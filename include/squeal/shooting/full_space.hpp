@@ -14,9 +14,10 @@ StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& optio
 StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
                                 Orbit start);
 
-/// An orbit gone round twice is a solution, too. Where half the period nearly closes the one found, that solution is
-/// returned, else `found`. Collective. Takes the steps of a period, and of a search where half of it nearly closes.
-StageResult prefer_half_period(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
-                               StageResult found);
+/// An orbit gone round several times is a solution, too. Where the period over a prime factor of `rounds` nearly closes
+/// the one found, that solution is returned, else `found`. Collective. Takes for each factor the steps of a period, and
+/// of a search where it nearly closes.
+StageResult prefer_fewer_rounds(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
+                                int rounds, StageResult found);
 
 } // namespace squeal

@@ -21,7 +21,8 @@ struct ShootingStart
       other_unstable{}; // motions (u, v) of other unstable modes, which an orbit may leave unexcited
   double first_event =
       std::numeric_limits<double>::infinity(); // energy norm where a nonlinearity begins to limit growth
-  bool is_cycle = false;                       // that of a cheaper model, gone round once
+  bool is_cycle = false;                       // that of a cheaper model, or on which a motion has settled
+  int rounds = 1;                              // of a cycle: as many as the period may be of it
 };
 
 /// What a scene asks of the solver.

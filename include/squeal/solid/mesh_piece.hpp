@@ -12,6 +12,7 @@ struct MeshPiece
   Mesh mesh;
   Partition partition; // node_rank: on rank 0 alone
   DofMap dofs;
+  std::vector<int> node_numbers{}, element_numbers{}; // in the whole mesh, ascending; empty: the same
 };
 
 /// Gives every other rank its piece of rank 0's mesh, in the order of the whole. Collective.

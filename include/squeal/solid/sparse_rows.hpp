@@ -11,9 +11,9 @@ using SparseRow = std::map<PetscInt, double>; // coefficient of each free degree
 /// Adds direction . u(node) to a row.
 void add_displacement(const DofMap& dofs, int node, const Vec3& direction, SparseRow& row);
 
-/// Gives each rank, of the rows that rank 0 has for `count` items, the same number for each, those of the items in its
-/// local range. Collective.
-std::vector<SparseRow> dealt_rows(const std::vector<SparseRow>& rows, PetscInt count, MPI_Comm comm);
+/// Scatters rank 0's rows, the same number for each of `count` items: each rank gets those of the items in its local
+/// range. Collective.
+std::vector<SparseRow> scattered_rows(std::vector<SparseRow> rows, PetscInt count, MPI_Comm comm);
 
 /// Returns the AIJ matrix with this rank's rows. Collective.
 Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm);
@@ -22,7 +22,7 @@ Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_col
 /// collective.
 std::pair<PetscInt, PetscInt> local_range(PetscInt count, MPI_Comm comm);
 
-/// The range of any rank.
+/// The range [first, last) of any rank.
 std::pair<PetscInt, PetscInt> range_of(PetscInt count, PetscInt rank, PetscInt ranks);
 
 } // namespace squeal
