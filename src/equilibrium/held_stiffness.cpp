@@ -48,7 +48,8 @@ std::vector<int> bodies_of(Mat K)
   for_each_row(K,
                [&](PetscInt row, std::span<const PetscInt> columns, std::span<const double>)
                {
-                 for (const PetscInt column : columns) sets.join(to_int(row), to_int(column));
+                 for (const PetscInt column : columns) // K is symmetric
+                   if (column < row) sets.join(to_int(row), to_int(column));
                });
   std::vector<int> body(static_cast<std::size_t>(sets.size()));
   for (int changed = 1; changed != 0;) // until what this rank joined agrees with the others

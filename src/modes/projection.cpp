@@ -1,12 +1,14 @@
 #include "squeal/modes/projection.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/run_control.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <Eigen/QR>
 #include <iterator>
 #include <span>
 
@@ -69,6 +71,9 @@ std::vector<DenseEigenpair> solve_small(const Subspace& space, const Window& win
 }
 
 constexpr std::size_t at_once = 64; // pairs expanded at a time
+// Columns of V, over those that a restart keeps. Pairs that friction turns far take eight passes and more, whose dense
+// problems would take most of the time; with half as many columns twice as many passes follow.
+constexpr Index most_of_kept = 2;
 using Pairs = std::span<const DenseEigenpair>;
 
 /// lambda^power y of each pair: the real parts of all, then the imaginary parts.
@@ -84,6 +89,30 @@ MatrixXd coefficients(Pairs pairs, int power)
     result.col(count + k) = column.imag();
   }
   return result;
+}
+
+/// V keeps the span of its first columns and of the pairs alone. Collective.
+void restart(Subspace& space, Index first, Pairs pairs)
+{
+  constexpr double dependent = 1e-10; // of kept vectors, over the largest
+  const Index size = space.V.columns();
+  MatrixXd Q; // rank 0's: other processors may find another rank
+  on_rank_zero(space.V.comm,
+               [&]
+               {
+                 MatrixXd kept(size, first + 2 * static_cast<Index>(pairs.size()));
+                 kept << MatrixXd::Identity(size, first), coefficients(pairs, 0);
+                 Eigen::ColPivHouseholderQR<MatrixXd> orthogonal(kept);
+                 orthogonal.setThreshold(dependent);
+                 Q = orthogonal.householderQ() * MatrixXd::Identity(size, orthogonal.rank());
+               });
+  broadcast(Q, space.V.comm);
+  space.V = combination(space.V, Q);
+  for (Projected* projected : {&space.M, &space.C, &space.K})
+  {
+    projected->image = combination(projected->image, Q);
+    projected->entries = Q.transpose() * projected->entries * Q;
+  }
 }
 
 /// Of pairs V a: the real parts of all, then the imaginary parts.
@@ -166,7 +195,7 @@ std::vector<Eigenpair> expand(const Subspace& space, const QuadraticNorms& norms
   return result;
 }
 
-/// The pairs but those that are exact already: V only grows, in which their residuals stay small.
+/// The pairs but those that are exact already: V keeps them, so that their residuals stay small.
 std::vector<DenseEigenpair> still_open(Pairs pairs, const std::vector<std::complex<double>>& exact)
 {
   constexpr double same = 1e-9; // what is taken for an exact neighbour's is measured in the end
@@ -208,6 +237,7 @@ QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector
   const MultiVector none = empty_multivector(problem.K);
   Subspace space{none, {problem.M, none, {}}, {problem.C, none, {}}, {problem.K, none, {}}};
   extend(space, std::move(basis));
+  const Index first = space.V.columns();
   std::vector<std::complex<double>> exact;
   for (int pass = 0;; ++pass)
   {
@@ -217,7 +247,11 @@ QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector
     const auto is_better = [&](Pairs pairs)
     {
       MultiVector left = residuals_left(space, norms, pairs, correction, exact);
-      return left.columns() > 0 && extend(space, P.solve(largest_directions(std::move(left), correction.share)));
+      if (left.columns() == 0) return false;
+      MultiVector more = P.solve(largest_directions(std::move(left), correction.share));
+      const Index kept = first + 2 * static_cast<Index>(found.size());
+      if (space.V.columns() + more.columns() > most_of_kept * kept) restart(space, first, found);
+      return extend(space, std::move(more));
     };
     result.outcome.iterations = pass;
     if (pass < correction.passes && is_better(still_open(corrected, exact))) continue;

@@ -22,7 +22,7 @@ constexpr double reach_of_count = 1.05; // over the band
 // The angle by which friction turns theta [rad], twice the change of the damping ratio: of most pairs, and of those
 // that a second search includes.
 constexpr double usual_angle = 0.06, wide_angle = 0.2;
-constexpr int passes = 12;                         // of residual correction, at most
+constexpr int passes = 16;                         // of residual correction, at most
 constexpr double subspace_tolerance = 1e-9;        // for V to be invariant
 constexpr double tolerance = 1e-12, sharp = 1e-14; // backward errors of pairs, and of nearly critical ones
 // Vectors beside a slice's own, by their number. Without them what its ends are corrected by has most of its
