@@ -34,9 +34,10 @@ NodeMotion motion_in(const std::string& line, const std::string& place)
   const bool is_form = (words >> found.node >> motion) && !(words >> rest);
   const auto* const known = std::find(motion_words.begin(), motion_words.end(), motion);
   if (!is_form || (known == motion_words.end() && motion != "-"))
-    throw Error(place + ": '" + shortened(line) +
-                "': expected a node's number and one of x y z rx ry rz, such as '1017 x'; or '-' for what is no motion "
-                "of a node");
+    throw Error(
+        place + ": '" + shortened(line) +
+        "': expected a node's number and one of x y z rx ry rz, such as '1017 x'; or any number and '-', such as "
+        "'1 -', for what is no motion of a node");
   if (known != motion_words.end()) found.motion = static_cast<int>(known - motion_words.begin());
   return found;
 }

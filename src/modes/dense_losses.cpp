@@ -29,6 +29,7 @@ using Eigen::VectorXd;
 constexpr std::size_t neighbours = 3; // of a group, at each end
 constexpr int newton_steps = 60;      // each divides the error of omega by about 2/eta^2
 constexpr double settled = 1e-12;     // last change of lambda over |lambda|: beyond, there is no fixed point
+constexpr double sensitive = 1e-9;    // the same of a lambda that rounding keeps from settling, by its condition
 constexpr double rounding = 1e-15;    // of lambda
 constexpr double beside = 1e-13;      // of lambda: where no pivot vanishes
 constexpr double oscillating = 1e-6;  // Im(lambda) over |lambda|: below it is the rounding of two real ones
@@ -128,7 +129,7 @@ bool solve_at(const LossyMatrices& problem, const Losses& losses, Complex& lambd
     if (now / last * now <= rounding && std::isfinite(last)) return oscillates(); // what the next step would change
     last = now;
   }
-  return last <= settled && oscillates();
+  return last <= sensitive && oscillates();
 }
 
 /// The left vector that belongs to lambda and the right one, by inverse iteration from its conjugate: their product
