@@ -338,6 +338,9 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const Sizes sizes = sizes_of(model, options.factor);
   const MPI_Comm comm = comm_of(model.structure.K);
   forecast.several_ranks = sizes.ranks > 1;
+  forecast.factor = sizes.factor.kind;
+  forecast.factor_share = sizes.factor.bytes / sizes.ranks;
+  forecast.factor_limit = 1e9 * options.factor.limit;
   forecast.held = sum_of_ranks(resident_memory(), comm);
   if (taken == SpeedTaken::measured) forecast.speed = measured_speed(comm);
   const Speed& speed = forecast.speed;
@@ -372,9 +375,19 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   return forecast;
 }
 
+std::string factor_text(const Forecast& forecast)
+{
+  std::string text =
+      format("  factor: %s, %.3g MB a rank foreseen", word(forecast.factor), 1e-6 * forecast.factor_share);
+  if (forecast.several_ranks && forecast.factor_limit >= 0)
+    text += format("; a supernodal one may take %.3g MB (-factor_limit)", 1e-6 * forecast.factor_limit);
+  return text + "\n";
+}
+
 std::string text_of(const Forecast& forecast)
 {
-  std::string text = format("  memory forecast, all ranks together: model %.3g MB", 1e-6 * forecast.held);
+  std::string text =
+      factor_text(forecast) + format("  memory forecast, all ranks together: model %.3g MB", 1e-6 * forecast.held);
   for (const StageForecast& stage : forecast.stages)
     text += format(", %s %.3g MB", word(stage.stage), 1e-6 * stage.bytes);
   text += format("; at most %.3g MB, with up to 120 modes\n", 1e-6 * forecast.bytes());

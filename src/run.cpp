@@ -270,7 +270,9 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   make_coarse_model(scene, model, comm, coarse);
   std::optional<State> cycle_file = read_start_files(scene, model.structure);
   end_if_asked(comm);
-  if (!options.force) agree(comm, problem_of(forecast_of(model, scene, options, SpeedTaken::usual), comm));
+  const Forecast forecast = forecast_of(model, scene, options, SpeedTaken::usual);
+  if (rank_of(comm) == 0) std::printf("%s", factor_text(forecast).c_str());
+  if (!options.force) agree(comm, problem_of(forecast, comm));
 
   Chain chain{scene, options, model, report, {}};
   chain.cycle_file = std::move(cycle_file);

@@ -37,6 +37,8 @@ struct Forecast
   double steps = 0;                  // of time, at most
   double step_seconds = 0;           // one step
   bool several_ranks = false;
+  FactorKind factor = FactorKind::automatic; // of K bordered by B, and what it takes of a rank [bytes]
+  double factor_share = 0, factor_limit = 0; // limit: of a supernodal one
   Speed speed;
 
   double bytes() const;
@@ -47,7 +49,10 @@ struct Forecast
 /// Collective. Analyses K bordered by B and counts steps; solves nothing.
 Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options, SpeedTaken taken);
 
-/// The forecast in a line each of memory, time of stages and steps.
+/// How the matrices will be factored, in a line.
+std::string factor_text(const Forecast& forecast);
+
+/// The forecast in a line each of the factor, memory, time of stages and steps.
 std::string text_of(const Forecast& forecast);
 
 /// Collective. Why the run is not started without --force: it would take more memory than the machine and this

@@ -92,7 +92,8 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   plan.memory = cholesky_memory(plan.symbolic);
   MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);
   constexpr double gigabyte = 1e9;
-  const bool too_large = ranks_of(comm) > 1 && plan.memory / ranks_of(comm) > options.limit * gigabyte;
+  const bool too_large =
+      ranks_of(comm) > 1 && options.limit >= 0 && plan.memory / ranks_of(comm) > options.limit * gigabyte;
   if (kind == FactorKind::automatic) plan.kind = too_large ? FactorKind::mumps : FactorKind::supernodal;
   return plan;
 }
@@ -335,8 +336,8 @@ OptionList options_of(FactorOptions& options)
   return {
       {"-factor", choice_of(options.kind), Range::any,
        "of the step and of equilibrium: supernodal, mumps (both on all ranks), dense (on rank 0)"},
-      {"-factor_limit", &options.limit, Range::not_negative,
-       "GB of a rank's share in a supernodal factor; beyond it several ranks take MUMPS"},
+      {"-factor_limit", &options.limit, Range::any,
+       "GB of a rank's share in a supernodal factor; beyond it several ranks take MUMPS; -1: half of the free memory"},
   };
 }
 
@@ -348,10 +349,12 @@ FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
   if (plan.kind == FactorKind::dense)
   {
     const double n = dofs, rows = n + border;
-    return {sizeof(double) * n * rows, n * n, n * n, n * n / 2, 0, operations_of(n, border), operations_of(n, 0)};
+    return {plan.kind,          sizeof(double) * n * rows, n * n, n * n, n * n / 2, 0, operations_of(n, border),
+            operations_of(n, 0)};
   }
   FactorForecast forecast = multifrontal_forecast(plan.symbolic);
   MPI_Bcast(&forecast, sizeof forecast, MPI_BYTE, 0, comm);
+  forecast.kind = plan.kind;
   if (plan.kind == FactorKind::mumps)
   {
     forecast.border_entries = 0;

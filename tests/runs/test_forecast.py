@@ -31,3 +31,12 @@ def test_the_memory_of_a_run_is_its_forecast(converged, model, ranks, stage):
     taken = 1e-6 * converged(*arguments, ranks=ranks).report["model"]["memory_bytes"]
     assert stage in stages and most == max(stages.values())
     assert taken / 1.3 < most < 1.3 * taken
+
+
+@pytest.mark.parametrize("options, kind", [([], "supernodal"), (["-factor_limit", "0"], "mumps"), (["-factor", "mumps"], "mumps")])
+def test_the_factor_is_chosen_by_its_forecast_and_told(converged, options, kind):
+    printed = converged(*MODELS["pin"], *STAGES["equilibrium"], *options, ranks=2).printed
+    line = next(line for line in printed.splitlines() if line.strip().startswith("factor:"))
+    share, limit = (float(number) for number in re.findall(r"(\S+) MB", line))
+    assert f"factor: {kind}," in line and share > 0
+    assert limit == 0 if "-factor_limit" in options else limit > 100 * share  # half of what is free here

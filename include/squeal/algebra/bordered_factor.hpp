@@ -44,7 +44,7 @@ std::shared_ptr<KnownAnalyses> no_analyses();
 struct FactorOptions
 {
   FactorKind kind = FactorKind::automatic;
-  double limit = 4; // [GB] of a rank's share in a supernodal factor; beyond it several ranks take MUMPS
+  double limit = -1; // [GB] of a rank's share in a supernodal factor; beyond it several ranks take MUMPS; -1: none
   std::shared_ptr<KnownAnalyses> known{}; // one for all copies; null: every matrix is analysed anew
 };
 

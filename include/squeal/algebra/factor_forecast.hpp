@@ -9,6 +9,7 @@ namespace squeal
 /// Of all ranks together.
 struct FactorForecast
 {
+  FactorKind kind = FactorKind::automatic; // that it will be
   double bytes = 0;                        // of a Factor while it is made, without its Schur complement
   double symmetric = 0, not_symmetric = 0; // numbers in MUMPS's L D L' and L U of A while they are made
   double entries = 0;                      // of L of A alone
