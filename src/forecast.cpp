@@ -340,7 +340,7 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   forecast.several_ranks = sizes.ranks > 1;
   forecast.factor = sizes.factor.kind;
   forecast.factor_share = sizes.factor.bytes / sizes.ranks;
-  forecast.factor_limit = 1e9 * options.factor.limit;
+  forecast.factor_limit = 1e9 * options.factor.share_limit();
   forecast.held = sum_of_ranks(resident_memory(), comm);
   if (taken == SpeedTaken::measured) forecast.speed = measured_speed(comm);
   const Speed& speed = forecast.speed;
@@ -379,7 +379,7 @@ std::string factor_text(const Forecast& forecast)
 {
   std::string text =
       format("  factor: %s, %.3g MB a rank foreseen", word(forecast.factor), 1e-6 * forecast.factor_share);
-  if (forecast.several_ranks && forecast.factor_limit >= 0)
+  if (forecast.several_ranks)
     text += format("; a supernodal one may take %.3g MB (-factor_limit)", 1e-6 * forecast.factor_limit);
   return text + "\n";
 }

@@ -72,7 +72,7 @@ ProgramOptions read_program_options(MPI_Comm comm)
   ProgramOptions options;
   on_every_rank(comm, [&] { read_options(options_of(options)); });
   constexpr double part = 0.5; // of the free memory: the rest is for matrices, W and reduced models
-  if (options.factor.limit < 0) options.factor.limit = 1e-9 * part * free_memory(comm) / ranks_of(comm);
+  options.factor.by_memory = 1e-9 * part * free_memory(comm) / ranks_of(comm);
   options.factor.known = no_analyses();
   options.equilibrium.factor = options.modes.factor = options.step.factor = options.factor;
   options.modes.pencil = options.pencil;

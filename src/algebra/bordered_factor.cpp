@@ -92,8 +92,7 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   plan.memory = cholesky_memory(plan.symbolic);
   MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);
   constexpr double gigabyte = 1e9;
-  const bool too_large =
-      ranks_of(comm) > 1 && options.limit >= 0 && plan.memory / ranks_of(comm) > options.limit * gigabyte;
+  const bool too_large = ranks_of(comm) > 1 && plan.memory / ranks_of(comm) > options.share_limit() * gigabyte;
   if (kind == FactorKind::automatic) plan.kind = too_large ? FactorKind::mumps : FactorKind::supernodal;
   return plan;
 }

@@ -10,6 +10,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -44,7 +45,10 @@ std::shared_ptr<KnownAnalyses> no_analyses();
 struct FactorOptions
 {
   FactorKind kind = FactorKind::automatic;
-  double limit = -1; // [GB] of a rank's share in a supernodal factor; beyond it several ranks take MUMPS; -1: none
+  double limit = -1; // [GB] of a rank's share in a supernodal factor; beyond it several ranks take MUMPS; -1: by memory
+  double by_memory = std::numeric_limits<double>::infinity(); // [GB] the limit that -1 stands for, of this run
+
+  double share_limit() const { return limit < 0 ? by_memory : limit; } // [GB]
   std::shared_ptr<KnownAnalyses> known{}; // one for all copies; null: every matrix is analysed anew
 };
 
