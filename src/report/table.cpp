@@ -207,11 +207,11 @@ std::string settled_text(const SettledMotion& settled, const Scene& scene)
 std::string fidelity_text(const Fidelity& fidelity)
 {
   if (fidelity.asked == CycleModel::full) return "";
-  std::string told = std::string(word(fidelity.asked)) + ": ";
+  std::string outcome = std::string(word(fidelity.asked)) + ": ";
   if (fidelity.full_periods + fidelity.reduced_periods > 0)
-    told += format("%s model %s", word(fidelity.used), fidelity.full_periods > 0 ? "used" : "tried") +
-            (fidelity.reason.empty() ? "" : ", ");
-  std::string text = row("fidelity", told + fidelity.reason);
+    outcome += format("%s model %s", word(fidelity.used), fidelity.full_periods > 0 ? "used" : "tried") +
+               (fidelity.reason.empty() ? "" : ", ");
+  std::string text = row("fidelity", outcome + fidelity.reason);
   if (fidelity.full_periods == 0) return text;
   if (fidelity.used == CycleModel::reduced)
     text +=
