@@ -79,7 +79,7 @@ const std::array known_arguments = {
     Argument{"--help", nullptr, "this text; -help and -h as well",
              [](Arguments& arguments, const std::string&) { arguments.help = true; }},
     Argument{"--allow-scripts", nullptr,
-             "lets the scene's geometry hold any statement of gmsh, which may run commands and write files",
+             "lets the scene's geometry run commands and write files, as gmsh's statements can",
              [](Arguments& arguments, const std::string&) { arguments.allow_scripts = true; }},
     Argument{"--force", nullptr, "runs even where the forecast says more than a day, or more memory than is free",
              [](Arguments& arguments, const std::string&) { arguments.force = true; }},

@@ -1,9 +1,10 @@
 /// squeal_mesher: reads a mesh, or meshes a geometry, with libgmsh. squeal starts it; see src/mesh/mesher_process.cpp.
 ///
-///   squeal_mesher file NAME [parameter value]…     reads the file of this name
-///   squeal_mesher script NAME [parameter value]…   reads a checked script from its descriptor
+///   squeal_mesher shut-in NAME [parameter value]…   reads the file of this name in a sandbox
+///   squeal_mesher free NAME [parameter value]…      lets a geometry run what it holds
 ///
 /// The answer goes to a descriptor of its own. This program knows no MPI.
+#include "mesh/sandbox.hpp"
 #include "squeal/base/available_memory.hpp"
 #include "squeal/mesh/file_mesh.hpp"
 
@@ -117,25 +118,22 @@ FileMesh read_or_generate(const std::string& file)
 MesherAnswer answer_of(int argc, char** argv)
 {
   MesherAnswer answer;
-  const bool script = std::string(argv[1]) == word(MesherInput::script);
   try
   {
     initialise(argc, argv);
-    answer.mesh = read_or_generate(script ? "/proc/self/fd/" + std::to_string(script_descriptor) : argv[2]);
+    answer.mesh = read_or_generate(argv[2]);
   }
   catch (const std::string& text) // libgmsh before 4.9 throws strings
   {
-    answer = {{}, text};
+    answer.problem = text;
   }
   catch (const std::bad_alloc&)
   {
-    answer = {{},
-              script ? "memory ran out: make the mesh coarser"
-                     : "memory ran out: the mesh is larger than this machine holds, or the file is corrupt"};
+    answer.problem = "memory ran out: the mesh is larger than this machine holds, or the file is corrupt";
   }
   catch (const std::exception& error)
   {
-    answer = {{}, error.what()};
+    answer.problem = error.what();
   }
   return answer;
 }
@@ -159,8 +157,11 @@ int main(int argc, char** argv)
 #ifndef __SANITIZE_ADDRESS__        // it reserves more addresses than there are bytes
   limit_memory();
 #endif
-  for (int inherited = script_descriptor + 1; inherited < 1024; ++inherited) close(inherited); // MPI's
-  const std::string bytes = packed(answer_of(argc, argv));
+  for (int inherited = answer_descriptor + 1; inherited < 1024; ++inherited) close(inherited); // MPI's
+  const std::string open = argv[1] == std::string(word(MesherRights::shut_in)) ? shut_in() : "";
+  MesherAnswer answer = answer_of(argc, argv);
+  answer.left_open = open;
+  const std::string bytes = packed(answer);
   for (std::size_t sent = 0; sent < bytes.size();)
   {
     const ssize_t size = write(answer_descriptor, bytes.data() + sent, bytes.size() - sent);

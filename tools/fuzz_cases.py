@@ -67,10 +67,10 @@ on = "bar"
 at = [2, 0, 0]
 direction = "z"
 """
-# Statements that must not be run; a file of this name betrays them.
 # texts that are no message of squeal's own
 RAW = re.compile(r"PETSC ERROR|MPI_ABORT|MPI_Abort|terminate called|what\(\)|\.[ch]pp\b|\.c:\d|filesystem error|std::|Segmentation|"
                  r"HDF5-DIAG|Traceback|Caught signal|PETSc error|bad_alloc|basic_string|Backtrace|double free|corrupted")
+# Statements that must change nothing; a file of this name betrays them.
 CANARY = "PWNED"
 HOSTILE = [f'SystemCall "touch {CANARY}";', f"System 'touch {CANARY}';", f'Printf("x") > "{CANARY}";', f'Save "{CANARY}";',
            f'Field[1] = ExternalProcess; Field[1].CommandLine = "touch {CANARY}"; Background Field = 1;',

@@ -72,6 +72,7 @@ std::string packed(const MesherAnswer& answer)
   Writer writer;
   writer.add(magic);
   writer.add_list(answer.problem);
+  writer.add_list(answer.left_open);
   writer.add_list(answer.mesh.nodes);
   writer.add<std::uint64_t>(answer.mesh.blocks.size());
   for (const ElementBlock& block : answer.mesh.blocks)
@@ -94,6 +95,7 @@ MesherAnswer unpacked(const std::string& bytes)
   MesherAnswer answer;
   if (reader.next<std::uint64_t>() != magic) throw std::runtime_error("it is no mesh");
   answer.problem = reader.next_list<std::string>();
+  answer.left_open = reader.next_list<std::string>();
   answer.mesh.nodes = reader.next_list<std::vector<Vec3>>();
   const auto blocks = reader.next<std::uint64_t>();
   for (std::uint64_t b = 0; b < blocks; ++b)

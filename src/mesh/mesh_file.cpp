@@ -3,9 +3,10 @@
 
 #include "mesher_process.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/script.hpp"
+#include "squeal/mesh/mesh_input.hpp"
 
 #include <algorithm>
+#include <cstdio>
 
 namespace squeal
 {
@@ -25,28 +26,22 @@ void check_parameters(const MeshSource& source, const std::vector<std::string>& 
 /// Throws Error for a file that the mesher must not see.
 MesherTask task_of(const MeshSource& source)
 {
-  MesherTask task{source.file.string(), {}, source.parameters};
-  const bool trusted = source.statements == Statements::any;
-  const bool geometry = trusted ? source.file.extension() == ".geo" : is_script(source.file);
-  if (!is_file(source.file)) throw Error(shortened(source.file) + ": no such mesh file");
-  if (geometry)
-  {
-    const Script script = read_script(source.file, source.statements);
-    task.script = script.text;
-    check_parameters(source, script.parameters);
-  }
+  const MeshInput input = scan_mesh_input(source.file);
+  if (source.statements == Statements::listed) check_first_bytes(source.file);
+  if (is_geometry(source.file))
+    check_parameters(source, input.parameters);
   else if (!source.parameters.empty())
-    throw Error(task.file + ": [mesh.parameters] need a .geo geometry; a mesh file has none. Remove them");
-  return task;
+    throw Error(source.file.string() + ": [mesh.parameters] need a .geo geometry; a mesh file has none. Remove them");
+  const bool trusted = source.statements == Statements::any;
+  return {source.file.string(), trusted ? MesherRights::free : MesherRights::shut_in, source.parameters};
 }
 
-/// Puts the file's own name in the place of the one that gmsh was given.
-std::string with_name(std::string text, const std::string& file)
+/// Throws the mesher's error. A file that cannot be opened may be one that the script wanted to write.
+[[noreturn]] void fail(const MeshSource& source, const std::string& problem)
 {
-  const std::string given = "/proc/self/fd/" + std::to_string(script_descriptor);
-  for (std::size_t at = text.find(given); at != std::string::npos; at = text.find(given, at + file.size()))
-    text.replace(at, given.size(), file);
-  return text;
+  const bool refused = source.statements == Statements::listed && problem.find("open file") != std::string::npos;
+  throw Error(source.file.string() + ": gmsh cannot read or mesh it: " + problem +
+              (refused ? "; no file is written unless --allow-scripts is given" : ""));
 }
 
 } // namespace
@@ -57,7 +52,9 @@ FileMesh read_mesh_file(const MeshSource& source)
 {
   const std::string name = source.file.string();
   MesherAnswer answer = run_mesher(task_of(source));
-  if (!answer.problem.empty()) throw Error(name + ": gmsh cannot read or mesh it: " + with_name(answer.problem, name));
+  if (!answer.left_open.empty())
+    std::printf("  %s is not shut in on this system: %s\n", name.c_str(), answer.left_open.c_str());
+  if (!answer.problem.empty()) fail(source, answer.problem);
   for (Vec3& node : answer.mesh.nodes) node = source.scale * node;
   return std::move(answer.mesh);
 }

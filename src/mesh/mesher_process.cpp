@@ -16,7 +16,6 @@
 #include <filesystem>
 #include <poll.h>
 #include <spawn.h>
-#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -84,20 +83,9 @@ std::vector<char*> pointers_to(std::vector<std::string>& texts)
   return pointers;
 }
 
-/// A file in memory that holds the script, so that nothing is left behind however the run ends.
-int script_file(const std::string& text)
-{
-  const int file = memfd_create("geometry", MFD_CLOEXEC);
-  if (file < 0 || write(file, text.data(), text.size()) != static_cast<ssize_t>(text.size()))
-    throw Error(std::string("the mesher's script cannot be handed over: ") + std::strerror(errno));
-  lseek(file, 0, SEEK_SET);
-  return file;
-}
-
 std::vector<std::string> arguments_of(const MesherTask& task)
 {
-  std::vector<std::string> arguments = {mesher_program().string(),
-                                        word(task.script.empty() ? MesherInput::file : MesherInput::script), task.file};
+  std::vector<std::string> arguments = {mesher_program().string(), word(task.rights), task.file};
   for (const auto& [name, value] : task.parameters)
   {
     arguments.push_back(name);
@@ -107,7 +95,7 @@ std::vector<std::string> arguments_of(const MesherTask& task)
 }
 
 /// Starts the mesher, which writes its answer to `answer`.
-pid_t start(const MesherTask& task, int answer, int script)
+pid_t start(const MesherTask& task, int answer)
 {
   std::vector<std::string> arguments = arguments_of(task), environment = environment_without_mpi();
   posix_spawn_file_actions_t actions;
@@ -116,7 +104,6 @@ pid_t start(const MesherTask& task, int answer, int script)
   posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, answer, answer_descriptor);
-  if (script >= 0) posix_spawn_file_actions_adddup2(&actions, script, script_descriptor);
   pid_t child = -1;
   const int failed = posix_spawn(&child, arguments[0].c_str(), &actions, nullptr, pointers_to(arguments).data(),
                                  pointers_to(environment).data());
@@ -171,9 +158,7 @@ MesherAnswer run_mesher(const MesherTask& task)
   // than both.
   const Descriptor from(ends[0]);
   Descriptor low(ends[1]), to(fcntl(low, F_DUPFD_CLOEXEC, 10));
-  const Descriptor low_script(task.script.empty() ? -1 : script_file(task.script));
-  const Descriptor script(task.script.empty() ? -1 : fcntl(low_script, F_DUPFD_CLOEXEC, 10));
-  const pid_t child = start(task, to, script);
+  const pid_t child = start(task, to);
   to.close();
   low.close();
   const std::string bytes = read_answer(from, task.file);
@@ -188,6 +173,9 @@ MesherAnswer run_mesher(const MesherTask& task)
   }
   catch (const std::exception&)
   {
+    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGSYS)
+      throw Error(task.file + ": it starts a program, as SystemCall does, which no file may do; --allow-scripts lets "
+                              "a geometry that you trust run what it holds");
     throw Error(task.file + ": the mesher (gmsh) " + end_of(status) +
                 ": the file is malformed, or gmsh cannot mesh this geometry; try it in gmsh itself");
   }

@@ -7,11 +7,11 @@
 namespace squeal
 {
 
-/// What the mesher is to read: a file, or a checked script of this text.
+/// What the mesher is to read.
 struct MesherTask
 {
-  std::string file;                         // also the name in messages
-  std::string script;                       // empty: the file itself
+  std::string file;
+  MesherRights rights{};
   std::map<std::string, double> parameters; // values for DefineConstant
 };
 

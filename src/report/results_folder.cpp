@@ -4,7 +4,7 @@
 #include "squeal/base/error.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/whole_file.hpp"
-#include "squeal/mesh/script.hpp"
+#include "squeal/mesh/mesh_input.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -324,11 +324,9 @@ bool is_same_file(const fs::path& a, const fs::path& b)
 namespace
 {
 
-/// Appends a mesh file; of a geometry the files that it includes, too.
-void append_mesh(const fs::path& file, Statements statements, std::vector<fs::path>& inputs)
+void append_mesh(const fs::path& file, std::vector<fs::path>& inputs)
 {
-  if (!is_script(file)) return inputs.push_back(file);
-  const std::vector<fs::path> files = read_script(file, statements).files;
+  const std::vector<fs::path> files = scan_mesh_input(file).files;
   inputs.insert(inputs.end(), files.begin(), files.end());
 }
 
@@ -351,9 +349,8 @@ void append_matrices(const fs::path& folder, std::vector<fs::path>& inputs)
 std::vector<fs::path> inputs_of(const Scene& scene)
 {
   std::vector<fs::path> inputs = {scene.file};
-  if (scene.mesh) append_mesh(scene.mesh->file, scene.mesh->statements, inputs);
-  if (scene.mesh && !scene.cycle.coarse_mesh.empty())
-    append_mesh(scene.cycle.coarse_mesh, scene.mesh->statements, inputs);
+  if (scene.mesh) append_mesh(scene.mesh->file, inputs);
+  if (scene.mesh && !scene.cycle.coarse_mesh.empty()) append_mesh(scene.cycle.coarse_mesh, inputs);
   if (scene.matrices) append_matrices(*scene.matrices, inputs);
   for (const Superelement& superelement : scene.superelements) append_matrices(superelement.folder, inputs);
   if (scene.transient.start.kind == StartKind::file) inputs.push_back(scene.transient.start.file);

@@ -36,11 +36,36 @@ def refused(run, *words):
     assert "PETSC ERROR" not in run.errors and "MPI_ABORT" not in run.errors
 
 
-@pytest.mark.parametrize("name", ["blocks.geo", "innocent.msh"])
+@pytest.mark.parametrize("name", ["blocks.geo", "innocent.msh", "blocks.txt"])
 def test_no_command_of_a_mesh_file_is_run(squeal, tmp_path, name):
     scene = write_blocks(tmp_path, f'SystemCall "id > {tmp_path}/PWNED";\n' + BLOCKS_GEO, name)
     refused(squeal(scene, "--dry-run"), name, "SystemCall")
     assert not (tmp_path / "PWNED").exists()
+
+
+@pytest.mark.parametrize("statement", ["System 'touch PWNED';", "NonBlockingSystemCall 'touch PWNED';", 'Merge "fake.msh";',
+                                       'Include "fake.msh";', 'If (1) SystemCall Str("touch ", "PWNED"); EndIf'])
+def test_a_command_however_given_is_one_message(squeal, tmp_path, statement):
+    (tmp_path / "fake.msh").write_text('SystemCall "touch PWNED";\n')
+    scene = write_blocks(tmp_path, statement.replace("PWNED", f"{tmp_path}/PWNED") + "\n" + BLOCKS_GEO)
+    refused(squeal(scene, "--dry-run", ranks=1), "blocks.geo", "SystemCall", "--allow-scripts")
+    assert not list(tmp_path.rglob("PWNED"))
+
+
+@pytest.mark.parametrize("statement", ['Save "PWNED.msh";', 'Printf("x") > "PWNED";', 'Printf("x") >> "old";', 'CreateDir "PWNED";',
+                                       'Print "PWNED.geo_unrolled";', 'Mesh 3; Save "old";', 'General.ErrorFileName = "PWNED"; Abort;',
+                                       'OnelabRun("x", "touch PWNED");'])
+def test_nothing_is_written(squeal, tmp_path, statement):
+    """Where gmsh tells that it cannot, this is the message; otherwise the mesh is as if the statement were not there."""
+    for name in ["PWNED", "old"]:
+        statement = statement.replace(f'"{name}', f'"{tmp_path}/{name}')
+    (tmp_path / "old").write_text("kept")
+    scene = write_blocks(tmp_path, BLOCKS_GEO + statement + "\n")
+    before = sorted(tmp_path.iterdir())
+    run = squeal(scene, "--dry-run", ranks=1)
+    if run.code != 0:
+        refused(run, "blocks.geo")
+    assert sorted(tmp_path.iterdir()) == before and (tmp_path / "old").read_text() == "kept"
 
 
 def test_allow_scripts_lets_the_user_have_it(squeal, tmp_path):

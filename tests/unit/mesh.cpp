@@ -2,7 +2,7 @@
 #include "../support/blocks.hpp"
 #include "squeal/mesh/build.hpp"
 #include "squeal/mesh/mesh_file.hpp"
-#include "squeal/mesh/script.hpp"
+#include "squeal/mesh/mesh_input.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <doctest/doctest.h>
@@ -168,7 +168,7 @@ TEST_CASE("parameters are found in lists, with braces, comments and includes")
                                 std::string(1000000, 'x') + "*/",
                             ".geo");
   if (rank_of(comm) != 0) return; // the file is rank 0's
-  CHECK(read_script(outer.path(), Statements::listed).parameters == std::vector<std::string>{"deep", "a", "d", "e"});
+  CHECK(scan_mesh_input(outer.path()).parameters == std::vector<std::string>{"deep", "a", "d", "e"});
 }
 
 TEST_CASE("a geometry is meshed with its parameters, and every rank has the same mesh")

@@ -33,7 +33,8 @@ struct FileMesh
 struct MesherAnswer
 {
   FileMesh mesh;
-  std::string problem; // empty if there is a mesh
+  std::string problem;   // empty if there is a mesh
+  std::string left_open; // by a kernel that cannot shut the mesher in; empty if all is shut
 };
 
 /// Returns an answer as bytes.
@@ -42,21 +43,21 @@ std::string packed(const MesherAnswer& answer);
 /// Returns the answer that was packed. Throws std::runtime_error if the bytes are not a whole one.
 MesherAnswer unpacked(const std::string& bytes);
 
-/// What the mesher reads: a file of the name given, or a checked script from its descriptor.
-enum class MesherInput
+/// What a file may do in the mesher.
+enum class MesherRights
 {
-  file,
-  script,
+  shut_in, // it starts no program, opens no connection and writes no file
+  free,    // all that gmsh runs
 };
 
-inline constexpr std::array mesher_input_names = {"file", "script"};
+inline constexpr std::array mesher_rights_names = {"shut-in", "free"};
 
-inline Words words_of(MesherInput)
+inline Words words_of(MesherRights)
 {
-  return mesher_input_names;
+  return mesher_rights_names;
 }
 
-/// Descriptors of the mesher: it writes its answer to one, and reads a checked script from the other.
-inline constexpr int answer_descriptor = 3, script_descriptor = 4;
+/// The descriptor that the mesher writes its answer to.
+inline constexpr int answer_descriptor = 3;
 
 } // namespace squeal

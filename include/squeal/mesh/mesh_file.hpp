@@ -10,9 +10,9 @@ namespace squeal
 {
 
 /// Returns the content of a mesh file, or of the mesh that gmsh generates on a geometry, in metres. To be called on
-/// one rank. Throws Error for a missing file, for a content that does not fit the ending of the name, and for a
-/// statement that a geometry may not hold. It does so for a failure or a crash of gmsh, with its message. It does so
-/// for a parameter that the .geo does not define, and in a build without libgmsh.
+/// one rank. Throws Error for a missing file, for a content that does not fit the ending of the name, and for a file
+/// that starts programs. It does so for a failure or a crash of gmsh, with its message. It does so for a parameter that
+/// the .geo does not define, and in a build without libgmsh.
 FileMesh read_mesh_file(const MeshSource& source);
 
 } // namespace squeal
