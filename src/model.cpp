@@ -132,6 +132,28 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   return model;
 }
 
+/// The structure and its contact under another law of friction, of which no matrix depends.
+BrakeModel with_friction(const Model& model, const FrictionLaw& friction)
+{
+  const Structure& own = model.structure;
+  const Interface& contact = model.interface;
+  BrakeModel result{{},
+                    {contact.pairs, contact.directions, copy_of(contact.B), contact.gap, contact.drive,
+                     contact.geometry, contact.tangents, contact.compliance, friction}};
+  Structure& structure = result.structure;
+  for (const auto matrix :
+       {&Structure::M, &Structure::C, &Structure::K, &Structure::G, &Structure::H, &Structure::K_loss})
+    if ((own.*matrix).get()) structure.*matrix = copy_of((own.*matrix).get());
+  for (Mat A : {structure.M.get(), structure.C.get(), structure.K.get(), structure.K_loss.get()})
+    if (A) mark_symmetric(A);
+  structure.loss_omega = own.loss_omega;
+  structure.load = copy_of(own.load);
+  structure.elements = own.elements;
+  structure.names = own.names;
+  check_interface(result.interface, "contact", comm_of(own.load));
+  return result;
+}
+
 /// On rank 0 the mesh, elsewhere nothing. A signal to the run reaches its mesher as well, which ends by it: the mesh is
 /// no error then.
 Mesh read_mesh_unless_ended(const Scene& scene, MPI_Comm comm)
@@ -205,7 +227,13 @@ Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm)
 
 BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers, MPI_Comm comm)
 {
-  Model changed = rebuild_model(model, scene_with(scene, numbers), comm);
+  const Scene other = scene_with(scene, numbers);
+  const auto is_friction = [&](const SceneNumber& number)
+  { return effect_of_number(scene, number.key) == Effect::friction; };
+  int relation = MPI_UNEQUAL;
+  MPI_Comm_compare(comm, comm_of(model.structure.load), &relation);
+  if (relation == MPI_IDENT && std::ranges::all_of(numbers, is_friction)) return with_friction(model, other.friction);
+  Model changed = rebuild_model(model, other, comm);
   return {std::move(changed.structure), std::move(changed.interface)};
 }
 

@@ -1,14 +1,12 @@
-/// Numbers of a scene, found in the scene's own text and replaced there, and checks of the tables that name them.
+/// Names of a scene's numbers, and checks of the tables that name them.
 #include "squeal/scene/numbers.hpp"
 
-#include "scene_keys.hpp"
+#include "bound_numbers.hpp"
 #include "scene_numbers.hpp"
 #include "squeal/base/error.hpp"
 #include "toml_values.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <map>
 
 namespace squeal
 {
@@ -23,18 +21,6 @@ const std::vector<std::string> physical = {"part",     "point",   "rigid_body", 
 /// Tables on which the mesh or the given matrices depend.
 constexpr std::array of_the_mesh = {"mesh", "matrices"};
 
-std::string text_of_number(double value)
-{
-  char digits[32];
-  return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
-}
-
-/// The scene with all defaults, as a document.
-toml::table document_of(const Scene& scene)
-{
-  return toml::parse(resolved_scene(scene), std::string_view("scene"));
-}
-
 /// Does a check; the text of an Error of it then begins with `prefix`.
 template <class Check> void prefixed(const std::string& prefix, Check check)
 {
@@ -48,37 +34,6 @@ template <class Check> void prefixed(const std::string& prefix, Check check)
   }
 }
 
-/// Finds the keys of a table, and how many words of a number's key come before one of them.
-struct KeysFinder
-{
-  const std::string& table;
-  SceneKeys& keys;
-  std::size_t& words;
-
-  template <class T> void operator()(const std::string& key, std::vector<T>&, const char*) const
-  {
-    T entry{};
-    take(key, keys_of(entry), 2);
-  }
-  template <class T> void operator()(const std::string& key, std::optional<T>&, const char*) const
-  {
-    T entry{};
-    take(key, keys_of(entry), 1);
-  }
-  template <class T> void operator()(const std::string& key, T& member, const char*) const
-  {
-    take(key, keys_of(member), 1);
-  }
-
-private:
-  void take(const std::string& key, SceneKeys found, std::size_t before) const
-  {
-    if (key != table) return;
-    keys = std::move(found);
-    words = before;
-  }
-};
-
 } // namespace
 
 double number_at(const Scene& scene, const std::string& key, NumberTable table)
@@ -91,13 +46,13 @@ double number_at(const Scene& scene, const std::string& key, NumberTable table)
   if (std::find(physical.begin(), physical.end(), first) == physical.end())
     throw refusal("is not a number of the structure, its contact or its loads" + hint_or_list(first, physical) +
                   ", such as " + friction_coefficient_key);
-  toml::table document = document_of(scene);
-  const toml::node* node = find_value(document, key);
-  if (!node)
+  Scene copy = scene; // keys bind members that can be written
+  const FoundValue found = find_number(copy, key);
+  if (found.kind.empty())
     throw refusal(std::string("is not in the scene: name a number as --set does, such as ") + friction_coefficient_key);
-  if (!node->is_number())
-    throw refusal("is " + kind_of(*node) + ", not a number; of a list name an entry, such as force.0.vector.2");
-  return *node->value<double>();
+  if (!found.number)
+    throw refusal("is " + found.kind + ", not a number; of a list name an entry, such as force.0.vector.2");
+  return *found.number->value;
 }
 
 void need_scene(const Scene& scene, const SceneNumber& number, const std::string& place, const std::string& label)
@@ -183,27 +138,6 @@ private:
 
 } // namespace
 
-std::string unit_of_number(const std::string& key)
-{
-  const std::vector<std::string> words = words_of_key(key);
-  Scene scene;
-  Rotation rotation;
-  Orthotropy orthotropy;
-  const std::map<std::string, SceneKeys> nested{{"rotation", keys_of(rotation)}, {"orthotropic", keys_of(orthotropy)}};
-  SceneKeys keys;
-  std::size_t place = 0;
-  for_each_table(scene, KeysFinder{words.front(), keys, place});
-  for (; place < words.size(); ++place)
-  {
-    const auto found = std::ranges::find(keys, words[place], &SceneKey::name);
-    if (found == keys.end()) break;
-    if (has_unit(found->unit)) return found->unit;
-    const auto below = nested.find(found->name);
-    keys = below == nested.end() ? SceneKeys() : below->second;
-  }
-  return "-";
-}
-
 namespace
 {
 
@@ -266,18 +200,6 @@ std::string label_of_number(const Scene& scene, const std::string& key)
 {
   const std::string name = name_of_number(scene, key);
   return name.empty() ? key : key + " (" + name + ")";
-}
-
-Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)
-{
-  toml::table document = document_of(scene);
-  for (const auto& [key, value] : numbers) apply_override(document, key + "=" + text_of_number(value));
-  Scene changed;
-  changed.file = scene.file;
-  Places places{scene.file.string(), {}};
-  read_tables(document, changed, places);
-  check_scene(changed, places);
-  return changed;
 }
 
 void resolve_branch(Scene& scene, const Places& places)

@@ -188,28 +188,21 @@ private:
   /// Throws Error for a value of the key that is not as expected.
   [[noreturn]] void fail(const toml::node& node, const std::string& expected) const
   {
-    const std::string unit = has_unit(value_.key.unit) ? " [" + value_.key.unit + "]" : "";
-    throw Error(place_of(node) + ": " + value_.label + value_.key.name + " = " + text_of(node) + ": expected " +
-                expected + unit);
+    refuse_value(value_.key, place_of(node) + ": " + value_.label, text_of(node), expected);
   }
 
   /// Throws Error for what is not finite, and where the third power would not be.
   void need_computable(const toml::node& node, double value, const std::string& expected) const
   {
     if (!std::isfinite(value)) fail(node, expected);
-    if (std::abs(value) > largest_number)
-      fail(node, "a number of at most 1e100 in size, so that powers of it are finite");
+    if (const std::string problem = problem_of_number(Rule::any, value); !problem.empty()) fail(node, problem);
   }
 
   double number(const toml::node& node) const
   {
-    const Bounds bounds = bounds_of(value_.key.rule);
-    if (!node.is_number()) fail(node, std::string(bounds.text) + ", not " + kind_of(node));
+    if (!node.is_number()) fail(node, std::string(bounds_of(value_.key.rule).text) + ", not " + kind_of(node));
     const double value = *node.value<double>();
-    const bool inside = bounds.open ? value > bounds.least && value < bounds.greatest
-                                    : value >= bounds.least && value <= bounds.greatest;
-    if (!inside) fail(node, bounds.text);
-    need_computable(node, value, bounds.text);
+    if (const std::string problem = problem_of_number(value_.key.rule, value); !problem.empty()) fail(node, problem);
     return value;
   }
 
@@ -335,6 +328,21 @@ private:
 };
 
 } // namespace
+
+std::string problem_of_number(Rule rule, double value)
+{
+  const Bounds bounds = bounds_of(rule);
+  const bool inside =
+      bounds.open ? value > bounds.least && value < bounds.greatest : value >= bounds.least && value <= bounds.greatest;
+  if (!inside || !std::isfinite(value)) return bounds.text;
+  return std::abs(value) > largest_number ? "a number of at most 1e100 in size, so that powers of it are finite" : "";
+}
+
+void refuse_value(const SceneKey& key, const std::string& place, const std::string& text, const std::string& expected)
+{
+  throw Error(place + key.name + " = " + text + ": expected " + expected +
+              (has_unit(key.unit) ? " [" + key.unit + "]" : ""));
+}
 
 void read_value(const ValuePlace& value, const toml::node& node)
 {

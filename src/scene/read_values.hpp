@@ -17,6 +17,13 @@ struct ValuePlace
   const std::filesystem::path& folder; // that paths are relative to
 };
 
+/// What a value should be instead, by a rule; empty: the rule allows it.
+std::string problem_of_number(Rule rule, double value);
+
+/// Throws Error for a value of a key that is not as expected. `place`: of the value, with the label of the table.
+[[noreturn]] void refuse_value(const SceneKey& key, const std::string& place, const std::string& text,
+                               const std::string& expected);
+
 /// Sets the member of the key; leaves one that is filled from a table. Throws Error for a value that is not of the
 /// key's kind, or outside its rule.
 void read_value(const ValuePlace& value, const toml::node& node);

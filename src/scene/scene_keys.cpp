@@ -9,7 +9,8 @@ namespace squeal
 namespace
 {
 constexpr Need optional = Need::optional, required = Need::required;
-}
+using enum Effect;
+} // namespace
 
 bool has_unit(const std::string& unit)
 {
@@ -47,20 +48,21 @@ SceneKeys keys_of(Part& p)
 {
   return {
       {"name", &p.name, required, Rule::any, "text", "named group of the mesh"},
-      {"young", &p.material.young, optional, Rule::not_negative, "Pa", "Young's modulus; required unless orthotropic"},
-      {"poisson", &p.material.poisson, optional, Rule::poisson, "-", "Poisson's ratio"},
+      {"young", &p.material.young, optional, Rule::not_negative, "Pa", "Young's modulus; required unless orthotropic",
+       stiffness_and_mass},
+      {"poisson", &p.material.poisson, optional, Rule::poisson, "-", "Poisson's ratio", stiffness_and_mass},
       {"orthotropic", &p.material.orthotropy, optional, Rule::any, "table",
-       "of a solid, instead of young and poisson: {young, poisson, shear, axis_1, axis_2}"},
-      {"density", &p.material.density, required, Rule::positive, "kg/m3", "mass density"},
-      {"thickness", &p.thickness, optional, Rule::not_negative, "m", "of a shell; 0 is a solid"},
+       "of a solid, instead of young and poisson: {young, poisson, shear, axis_1, axis_2}", stiffness_and_mass},
+      {"density", &p.material.density, required, Rule::positive, "kg/m3", "mass density", mass},
+      {"thickness", &p.thickness, optional, Rule::not_negative, "m", "of a shell; 0 is a solid", stiffness_and_mass},
       {"loss_factor", &p.loss_factor, optional, Rule::not_negative, "-",
-       "eta of the stiffness K (1 + i eta), at most 10; with damping.loss_frequency"},
+       "eta of the stiffness K (1 + i eta), at most 10; with damping.loss_frequency", damping},
       {"rotation", &p.rotation, optional, Rule::any, "table",
-       "of a solid of revolution that spins: {axis, centre, rate}"},
+       "of a solid of revolution that spins: {axis, centre, rate}", stiffness_and_mass},
       {"alpha", DampingTarget{&p.damping, &RayleighDamping::alpha}, optional, Rule::not_negative, "1/s",
-       "own Rayleigh damping, mass part"},
+       "own Rayleigh damping, mass part", damping},
       {"beta", DampingTarget{&p.damping, &RayleighDamping::beta}, optional, Rule::not_negative, "s",
-       "own Rayleigh damping, stiffness part"},
+       "own Rayleigh damping, stiffness part", damping},
   };
 }
 
@@ -79,8 +81,8 @@ SceneKeys keys_of(Point& p)
 {
   return {
       {"name", &p.name, required, Rule::any, "text", "name for springs, forces, contacts, probes"},
-      {"at", &p.at, required, Rule::any, "m", "position"},
-      {"mass", &p.mass, optional, Rule::not_negative, "kg", "point mass"},
+      {"at", &p.at, required, Rule::any, "m", "position", mesh},
+      {"mass", &p.mass, optional, Rule::not_negative, "kg", "point mass", mass},
       {"free", &p.free, required, Rule::any, "motions", "free motions: any of x y z rx ry rz, all, none"},
   };
 }
@@ -90,9 +92,9 @@ SceneKeys keys_of(RigidBody& b)
   return {
       {"name", &b.name, required, Rule::any, "text", "name for springs, forces, probes"},
       {"surfaces", &b.surfaces, required, Rule::any, "texts", "named surface, or a list of them"},
-      {"at", &b.at, required, Rule::any, "m", "reference point"},
-      {"mass", &b.mass, optional, Rule::not_negative, "kg", "mass at the reference point"},
-      {"inertia", &b.inertia, optional, Rule::any, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about that point"},
+      {"at", &b.at, required, Rule::any, "m", "reference point", mesh},
+      {"mass", &b.mass, optional, Rule::not_negative, "kg", "mass at the reference point", mass},
+      {"inertia", &b.inertia, optional, Rule::any, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about that point", mass},
       {"free", &b.free, required, Rule::any, "motions", "free motions: any of x y z rx ry rz, all, none"},
   };
 }
@@ -102,9 +104,10 @@ SceneKeys keys_of(Spring& s)
   return {
       {"from", &s.from, required, Rule::any, "text", "point or rigid body"},
       {"to", &s.to, optional, Rule::any, "text", "point, rigid body or ground"},
-      {"direction", &s.direction, required, Rule::direction, "-", "line of action: x, y, z or a vector"},
-      {"stiffness", &s.stiffness, optional, Rule::not_negative, "N/m", "of the spring"},
-      {"damping", &s.damping, optional, Rule::not_negative, "N s/m", "of the dashpot"},
+      {"direction", &s.direction, required, Rule::direction, "-", "line of action: x, y, z or a vector",
+       stiffness_and_mass},
+      {"stiffness", &s.stiffness, optional, Rule::not_negative, "N/m", "of the spring", stiffness_and_mass},
+      {"damping", &s.damping, optional, Rule::not_negative, "N s/m", "of the dashpot", damping},
   };
 }
 
@@ -130,7 +133,7 @@ SceneKeys keys_of(Force& f)
   return {
       {"on", &f.on, required, Rule::any, "text",
        "point, rigid body, or named group (force shared by its nodes); rows or nodes of a matrix scene"},
-      {"vector", &f.vector, required, Rule::any, "N", "total force"},
+      {"vector", &f.vector, required, Rule::any, "N", "total force", load},
   };
 }
 
@@ -138,7 +141,7 @@ SceneKeys keys_of(Pressure& p)
 {
   return {
       {"on", &p.on, required, Rule::any, "text", "named surface"},
-      {"value", &p.value, required, Rule::any, "Pa", "positive presses onto the solid"},
+      {"value", &p.value, required, Rule::any, "Pa", "positive presses onto the solid", load},
   };
 }
 
@@ -156,18 +159,19 @@ SceneKeys keys_of(Contact& c)
   return {
       {"rotor", &c.rotor, required, Rule::any, "text", "named surface or point that the drive moves"},
       {"stator", &c.stator, required, Rule::any, "text", "named surface or point that slides on it"},
-      {"gap", &c.gap, optional, Rule::any, "m", "initial gap, positive when open"},
+      {"gap", &c.gap, optional, Rule::any, "m", "initial gap, positive when open", contact},
       {"reach", &c.reach, optional, Rule::not_negative, "m",
-       "largest distance of the surfaces along the normal, which adds to the gap"},
+       "largest distance of the surfaces along the normal, which adds to the gap", mesh},
       {"normal", &c.normal, optional, Rule::direction, "-",
-       "out of the rotor; required for points, else that of the slave surface at each node"},
+       "out of the rotor; required for points, else that of the slave surface at each node", mesh},
       {"compliance", &c.compliance, optional, Rule::not_negative, "m3/N",
-       "approach of the surfaces over pressure, in series with the pairs; of points m/N; 0: rigid"},
+       "approach of the surfaces over pressure, in series with the pairs; of points m/N; 0: rigid", contact},
       {"slave", choice_of(c.slave), optional, Rule::any, "word",
        "side whose nodes have the pairs: the finer or softer one"},
-      {"tangents", &c.tangents, optional, Rule::direction, "-", "one direction: plane friction along it; or two"},
-      {"rotation", &c.rotation, optional, Rule::any, "table", "of the rotor: {axis, centre, rate}"},
-      {"velocity", &c.velocity, optional, Rule::any, "m/s", "of the rotor's surface, instead of a rotation"},
+      {"tangents", &c.tangents, optional, Rule::direction, "-", "one direction: plane friction along it; or two",
+       contact},
+      {"rotation", &c.rotation, optional, Rule::any, "table", "of the rotor: {axis, centre, rate}", contact},
+      {"velocity", &c.velocity, optional, Rule::any, "m/s", "of the rotor's surface, instead of a rotation", contact},
   };
 }
 
@@ -185,11 +189,12 @@ SceneKeys keys_of(Tie& t)
 SceneKeys keys_of(FrictionLaw& f)
 {
   return {
-      {"coefficient", &f.coefficient, optional, Rule::not_negative, "-",
-       "Coulomb's mu; with decay_speed at high speed"},
-      {"static_coefficient", &f.static_coefficient, optional, Rule::not_negative, "-", "mu at rest, with decay_speed"},
+      {"coefficient", &f.coefficient, optional, Rule::not_negative, "-", "Coulomb's mu; with decay_speed at high speed",
+       friction},
+      {"static_coefficient", &f.static_coefficient, optional, Rule::not_negative, "-", "mu at rest, with decay_speed",
+       friction},
       {"decay_speed", &f.decay_speed, optional, Rule::not_negative, "m/s",
-       "mu goes as exp(-speed/decay_speed) from rest to high speed; 0: constant"},
+       "mu goes as exp(-speed/decay_speed) from rest to high speed; 0: constant", friction},
       {"direction_damping", &f.direction_damping, optional, Rule::any, "switch",
        "keep mu r_n/|v_d| (I - e e') in the modes"},
   };
@@ -198,10 +203,10 @@ SceneKeys keys_of(FrictionLaw& f)
 SceneKeys keys_of(RayleighDamping& d)
 {
   return {
-      {"alpha", &d.alpha, optional, Rule::not_negative, "1/s", "mass part"},
-      {"beta", &d.beta, optional, Rule::not_negative, "s", "stiffness part"},
+      {"alpha", &d.alpha, optional, Rule::not_negative, "1/s", "mass part", damping},
+      {"beta", &d.beta, optional, Rule::not_negative, "s", "stiffness part", damping},
       {"loss_frequency", &d.loss_frequency, optional, Rule::not_negative, "Hz",
-       "where loss factors have their viscous equivalent in time; modes take it at their own frequency"},
+       "where loss factors have their viscous equivalent in time; modes take it at their own frequency", damping},
       {"measured", &d.measured, optional, Rule::positive, "table",
        "instead of alpha and beta, which are fitted to [[frequency in Hz, damping ratio], ...] of modes"},
   };

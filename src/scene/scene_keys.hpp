@@ -1,7 +1,7 @@
 #pragma once
-/// The keys of a scene file, each bound to the member it fills, with its unit, rule and meaning.
+/// The keys of a scene file, each bound to the member it fills, with its unit, rule, meaning and effect on the model.
 /// Reading, range checks, the resolved text and the reference all use this one description.
-#include "squeal/scene/scene.hpp"
+#include "squeal/scene/numbers.hpp"
 
 #include <variant>
 
@@ -51,6 +51,7 @@ struct SceneKey
   Rule rule;
   std::string unit; // a physical unit, or a word for the kind of value
   std::string meaning;
+  Effect effect = Effect::nothing; // of a number
 };
 
 using SceneKeys = std::vector<SceneKey>;

@@ -1,7 +1,9 @@
 // ranks: 1
 #include "squeal/scene/scene.hpp"
 #include "../support/temporary_folder.hpp"
+#include "squeal/scene/numbers.hpp"
 
+#include <cmath>
 #include <doctest/doctest.h>
 
 using namespace squeal;
@@ -368,4 +370,47 @@ TEST_CASE("the reference lists every key of the resolved scene")
   for (const char* key : {"coefficient", "steps_per_period", "free_periods", "step_size", "theta", "surfaces", "axis",
                           "direction_damping", "kg/m3", "default"})
     CHECK(reference.find(key) != std::string::npos);
+}
+
+TEST_CASE("a number is set through its member as a file would set it, and its key says what it changes")
+{
+  Scene scene;
+  scene.points = {{"tip", {}, 1, {}}, {"base", {}, 0, {}}};
+  scene.springs = {{"tip", ground, {1, 0, 0}, 100, 2}};
+  scene.forces = {{"tip", {0, 0, -5}}};
+  scene.contacts.emplace_back();
+  scene.contacts[0].rotor = "base";
+  scene.contacts[0].stator = "tip";
+  scene.contacts[0].normal = Vec3{0, 0, 1};
+  scene.contacts[0].velocity = {1, 0, 0};
+  const auto with = [&](const std::string& key, double value)
+  {
+    const SceneNumber number{key, value};
+    return scene_with(scene, std::span(&number, 1));
+  };
+  CHECK(with("point.tip.mass", 3).points[0].mass == 3);
+  CHECK(with("spring.0.stiffness", 7).springs[0].stiffness == 7);
+  CHECK(with("force.0.vector.2", -9).forces[0].vector[2] == -9);
+  CHECK(with("contact.0.velocity.0", 2).contacts[0].velocity == Vec3{2, 0, 0});
+  CHECK(with("friction.coefficient", 0.4).friction.coefficient == 0.4);
+  CHECK(with("spring.0.direction.1", 1).springs[0].direction[1] == doctest::Approx(std::sqrt(0.5)));
+  CHECK_THROWS_WITH_AS(with("spring.0.stiffness", -1),
+                       "--set spring.0.stiffness=-1: [[spring]] stiffness = -1: expected zero or a positive number "
+                       "[N/m]",
+                       Error);
+  CHECK_THROWS_AS(with("spring.1.stiffness", 1), Error);
+  CHECK_THROWS_AS(with("force.0.vector.3", 1), Error);
+
+  const auto effect = [&](const char* key) { return effect_of_number(scene, key); };
+  CHECK(effect("cycle.theta") == Effect::nothing);
+  CHECK(effect("force.0.vector.2") == Effect::load);
+  CHECK(effect("friction.coefficient") == Effect::friction);
+  CHECK(effect("contact.0.rotation.rate") == Effect::contact);
+  CHECK(effect("damping.alpha") == Effect::damping);
+  CHECK(effect("part.disc.density") == Effect::mass);
+  CHECK(effect("part.disc.young") == Effect::stiffness_and_mass);
+  CHECK(effect("part.disc.orthotropic.young.0") == Effect::stiffness_and_mass);
+  CHECK(effect("point.tip.at.0") == Effect::mesh);
+  scene.parts.emplace_back().rotation = Rotation{};
+  CHECK(effect("part.disc.density") == Effect::stiffness_and_mass);
 }

@@ -14,8 +14,24 @@ struct SceneNumber
   double value = 0;
 };
 
-/// The key of the friction coefficient: matrices do not depend on it.
+/// The key of the friction coefficient.
 inline constexpr const char* friction_coefficient_key = "friction.coefficient";
+
+/// The parts of a model that a number of the scene enters: these are made again where it changes.
+enum class Effect
+{
+  nothing,
+  load,
+  friction,           // its law
+  contact,            // gaps, drive, compliance, and the rows of the pairs where tangents turn with the drive
+  damping,            // C, and the stiffness that loss factors multiply
+  mass,               // M, and C by its part of M
+  stiffness_and_mass, // M, C and K
+  mesh,               // all: nodes, their numbering, the pairs
+};
+
+/// What a change of a scene's number changes, by its key: density changes the stiffness of a part that spins as well.
+Effect effect_of_number(const Scene& scene, const std::string& key);
 
 /// Returns the scene with other values of numbers that it has. Throws Error if that is no scene.
 Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers);
