@@ -189,10 +189,10 @@ struct FrictionLaw
   double decay_speed = 0;        // [m/s] 0: mu is `coefficient` at every speed
 };
 
-/// The statements that a geometry may hold.
+/// What the statements of a geometry may do.
 enum class Statements
 {
-  listed, // geometry, sizes, physical groups, constants, loops
+  listed, // geometry and mesh: gmsh is shut in, starts no program and writes nothing
   any,    // whatever gmsh runs: commands of the shell among them
 };
 
