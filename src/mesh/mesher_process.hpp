@@ -7,7 +7,7 @@
 namespace squeal
 {
 
-/// What the mesher is to read.
+/// A file that the mesher is to read.
 struct MesherTask
 {
   std::string file;

@@ -29,7 +29,7 @@ struct FileMesh
   std::vector<ElementBlock> blocks;
 };
 
-/// What the mesher sends: a mesh, or why there is none.
+/// The answer of the mesher: a mesh, or why there is none.
 struct MesherAnswer
 {
   FileMesh mesh;
@@ -43,7 +43,7 @@ std::string packed(const MesherAnswer& answer);
 /// Returns the answer that was packed. Throws std::runtime_error if the bytes are not a whole one.
 MesherAnswer unpacked(const std::string& bytes);
 
-/// What a file may do in the mesher.
+/// Rights of a file in the mesher.
 enum class MesherRights
 {
   shut_in, // it starts no program, opens no connection and writes no file

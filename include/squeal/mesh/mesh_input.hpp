@@ -1,5 +1,5 @@
 #pragma once
-/// What a mesh or a geometry says about itself before gmsh reads it. Not collective.
+/// Statements of a mesh or a geometry about itself before gmsh reads it. Not collective.
 #include <filesystem>
 #include <string>
 #include <vector>

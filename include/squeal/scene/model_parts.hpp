@@ -189,7 +189,7 @@ struct FrictionLaw
   double decay_speed = 0;        // [m/s] 0: mu is `coefficient` at every speed
 };
 
-/// What the statements of a geometry may do.
+/// Rights of the statements in a geometry.
 enum class Statements
 {
   listed, // geometry and mesh: gmsh is shut in, starts no program and writes nothing
