@@ -94,7 +94,10 @@ FoundValue find_among(const SceneKeys& keys, const std::string& label, WordsLeft
 
 template <class Table> FoundValue ValueFinder::of_table(std::optional<Table>& table) const
 {
-  return table ? find_among(keys_of(*table), label_ + key_.name + " ", words_) : FoundValue{};
+  if (!table) return {};
+  SceneKeys keys = keys_of(*table);
+  for (SceneKey& key : keys) key.need = Need::required; // a table within braces has all of its values
+  return find_among(keys, label_ + key_.name + " ", words_);
 }
 
 /// Looks for a value in each table of a scene.

@@ -411,6 +411,9 @@ TEST_CASE("a number is set through its member as a file would set it, and its ke
   CHECK(effect("part.disc.young") == Effect::stiffness_and_mass);
   CHECK(effect("part.disc.orthotropic.young.0") == Effect::stiffness_and_mass);
   CHECK(effect("point.tip.at.0") == Effect::mesh);
+  scene.contacts[0].rotation = Rotation{{0, 0, 1}, {}, 5};
+  scene.contacts[0].velocity = {};
+  CHECK(with("contact.0.rotation.centre.0", 0.5).contacts[0].rotation->centre[0] == 0.5);
   scene.parts.emplace_back().rotation = Rotation{};
   CHECK(effect("part.disc.density") == Effect::stiffness_and_mass);
 }
