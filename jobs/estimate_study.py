@@ -18,7 +18,7 @@ import numpy as np
 
 plt = common.pyplot(dpi=120, font_size=9)
 SMALL = {"mesh.parameters.size": 4000, "mesh.parameters.pin_radius": 0.0175, "mesh.parameters.pin_height": 0.04,
-         "modes.band": 5000, "modes.method": "full", "transient.enabled": False, "accuracy": 0.01}
+         "damping.alpha": 0, "modes.band": 5000, "modes.method": "full", "transient.enabled": False, "accuracy": 0.01}
 WORDS = ["-cycle_multipliers", 0, "-cycle_max_periods", 120, "-cycle_free_periods", 20, "-settled_periods", 16,
          "-settled_exponents", 1]
 GRID = {1.1e-6: (0.19, 0.195, 0.2, 0.21, 0.22, 0.24, 0.25, 0.3), 9e-7: (0.165, 0.175, 0.19, 0.2),

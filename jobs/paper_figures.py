@@ -21,7 +21,7 @@ from plot_spectra import FLOOR, spectrogram_of
 
 plt = common.pyplot(dpi=120, font_size=9)
 SMALL = {"mesh.parameters.size": 4000, "mesh.parameters.pin_radius": 0.0175, "mesh.parameters.pin_height": 0.04,
-         "damping.beta": 1.1e-6, "modes.band": 5000, "modes.method": "full"}
+         "damping.alpha": 0, "damping.beta": 1.1e-6, "modes.band": 5000, "modes.method": "full"}
 STILL = {"transient.enabled": False, "cycle.enabled": False}
 MARCH = STILL | {"transient.enabled": True, "transient.steps_per_period": 64}
 SHOOT = {"transient.enabled": False, "cycle.tolerance": 1e-8}
@@ -30,7 +30,7 @@ SEVEN = ["-cycle_finish", "none", "-cycle_base_growths", 0, "-cycle_subspace_new
          "-settled_periods", 64, "-settled_exponents", 1]
 TOLERANCE = ["-transient_contact_tolerance", 1e-8]
 RUNS = {
-    "modes": ({"modes.method": "full", **STILL}, []),
+    "modes": ({"modes.method": "full", "damping.alpha": 0, "damping.beta": 1.58e-6, **STILL}, []),
     "mode": (SMALL | MARCH | {"transient.start": "mode", "transient.amplitude": 2e-7, "transient.periods": 1500}, TOLERANCE),
     "estimate": (SMALL | MARCH | {"transient.start": "estimate", "transient.periods": 700}, TOLERANCE),
     "auto": (SMALL | SHOOT | {"fidelity": "auto"}, []),

@@ -51,6 +51,14 @@ def test_readme_prints_what_the_program_prints(converged):
         assert any(same(quoted, line) for line in left), f"README says\n{quoted}\nsqueal prints\n" + "\n".join(near[:3])
 
 
+def test_the_first_command_names_a_scene_with_both_parts_of_damping():
+    """README's first command runs the brake, whose hub and disc the mass part of Rayleigh damping damps."""
+    first = block_of(ROOT / "README.md", "tools/")[0].split()
+    assert first[:2] == ["tools/run", "inputs/tgv"]
+    scene = (ROOT / first[1] / "scene.toml").read_text()
+    assert re.search(r"^alpha = ", scene, re.M) and re.search(r"^beta = ", scene, re.M)
+
+
 def test_own_model_runs(converged, tmp_path):
     """README's own model in ten lines, on the mesh whose groups it names."""
     scene = tmp_path / "scene.toml"
