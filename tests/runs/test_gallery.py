@@ -1,0 +1,26 @@
+"""Each small scene of a study or law ends with exit code 0 and has its number. They are those of inputs/README.md."""
+
+import pytest
+from conftest import INPUTS
+
+# Folder, key of report.json, value: thresholds are found to 1e-5 of the range, all else is closer.
+NUMBERS = [
+    ("branch", "cycle.period", 5.956421),
+    ("sweep", "sweep.thresholds.0.values.0", 0.2585137),
+    ("sensitivity", "sensitivity.modes.0.growth_rate", 940.4109),
+    ("change", "sensitivity.modes.0.changes.1.computed.growth_rate", 963.1345),
+    ("response", "response.peaks.0.receptance", 1.143748e-06),
+    ("robustness", "modes.modes.0.growth_rate", 940.4109),
+    ("tie", "modes.count_found", 8),
+    ("loss_factors", "sweep.thresholds.0.values.0", 0.09971377),
+    ("compliance", "sweep.thresholds.0.values.0", 1.734422e-12),
+    ("orthotropic", "modes.modes.0.growth_rate", 182.1206),
+]
+
+
+@pytest.mark.parametrize("folder, key, value", NUMBERS)
+def test_scene_has_its_number(converged, folder, key, value):
+    found = converged(INPUTS / folder / "scene.toml", ranks=1).report
+    for name in key.split("."):
+        found = found[int(name) if name.isdigit() else name]
+    assert found == pytest.approx(value, rel=1e-4)
