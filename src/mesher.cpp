@@ -4,9 +4,9 @@
 ///   squeal_mesher free NAME [parameter value]…      lets a geometry run what it holds
 ///
 /// The answer goes to a descriptor of its own. This program knows no MPI.
-#include "mesh/sandbox.hpp"
 #include "squeal/base/available_memory.hpp"
 #include "squeal/mesh/file_mesh.hpp"
+#include "squeal/mesh/sandbox.hpp"
 
 #include <algorithm>
 #include <csignal>

@@ -3,7 +3,7 @@
 /// gmsh takes every file for a script that it does not recognise, and its scripts can run commands and write files.
 /// A new process ends the mesher with SIGSYS, so that a command is a message and not a mesh without it. The other calls
 /// fail, because libraries make some of them for reasons of their own.
-#include "sandbox.hpp"
+#include "squeal/mesh/sandbox.hpp"
 
 #include <array>
 #include <cerrno>
