@@ -253,8 +253,6 @@ void PencilFactor::solve_by_rows(Parts& parts, MultiVector& Y)
 OptionList options_of(PencilOptions& options)
 {
   return {
-      {"-modes_factor_room", &options.room, Range::not_negative,
-       "[%] of memory beyond what MUMPS estimates for a factor; it grows by itself"},
       {"-modes_whole_factor", &options.whole_limit, Range::not_negative,
        "[GB] of a factor that every rank makes whole and solves its vectors with; a larger one is shared"},
   };

@@ -119,8 +119,6 @@ OptionList options_of(ContactSettings& settings)
        "contact iterations (sweeps) allowed a step"},
       {"-transient_contact_rho", &settings.rho, Range::below_two,
        "of the fixed point, over 1/lambda_max(W); 0: chosen; it contracts below 2 only"},
-      {"-transient_contact_extrapolation", &settings.extrapolation, Range::up_to_two,
-       "highest order in time of the warm start; the best one is taken"},
   };
 }
 

@@ -266,8 +266,6 @@ OptionList options_of(ModesOptions& options)
        "eigenproblems up to this size are solved whole by LAPACK"},
       {"-modes_solver", choice_of(options.solver), Range::any,
        "of larger problems: slices of frequency, or TOAR around zero (toar)"},
-      {"-modes_candidates", &options.candidates, Range::natural,
-       "pairs that each residual pass of the projection corrects"},
       {"-modes_shapes", choice_of(options.shapes), Range::any,
        "modes whose shapes the fields file holds: the unstable ones or all"},
   };

@@ -122,8 +122,6 @@ OptionList options_of(SettledOptions& options)
        "at most integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 beyond 10 000 "
        "degrees of freedom"},
       {"-settled_exponents", &options.exponents, Range::natural, "Lyapunov exponents of a settled motion"},
-      {"-settled_shapes", &options.shapes, Range::not_negative,
-       "shapes at most on which a settled motion is kept, for its sound; 0: none"},
   };
 }
 

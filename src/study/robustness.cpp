@@ -375,9 +375,6 @@ OptionList options_of(RobustnessOptions& options)
 {
   return {
       {"-robustness_training", &options.training, Range::natural, "points whose modes make the basis"},
-      {"-robustness_tolerance", &options.tolerance, Range::positive, "backward error of the modes of those points"},
-      {"-robustness_truncation", &options.truncation, Range::positive,
-       "part of a mode, in energy norm, that the basis may leave out"},
   };
 }
 

@@ -91,8 +91,6 @@ OptionList options_of(SweepOptions& options)
        "backward error of right and left vectors above which the basis is corrected; 0: 1e-8, 1e-10 up to "
        "-modes_dense_limit and 1e-6 beyond 10 000 degrees of freedom"},
       {"-sweep_passes", &options.passes, Range::not_negative, "corrections of the basis at a point, at most"},
-      {"-sweep_depth", &options.depth, Range::not_negative,
-       "times that a step between points is halved where modes are unclear, at most"},
       {"-sweep_between", &options.between, Range::not_negative,
        "points put into a step where modes are unclear or pairs open or close, besides those of its thresholds, at "
        "most"},
