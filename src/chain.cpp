@@ -64,8 +64,11 @@ void pace(Chain& chain)
   if (!std::isfinite(amplitude)) amplitude = part;
   chain.paced.emplace();
   PacedDivergence& paced = *chain.paced;
-  paced.mode = {{0, diverging.growth_rate()}, copy_of(diverging.real.get()), zeros_like(equilibrium.u),
-                diverging.reactions,          diverging.backward_error,      diverging.loss_error};
+  paced.mode = {{0, diverging.growth_rate()},
+                copy_of(diverging.real.get()),
+                zeros_like(equilibrium.u),
+                diverging.reactions,
+                diverging.backward_error};
   paced.none.outcome = {OutcomeKind::skipped, "the mode grows without vibrating", 0, 0};
   paced.none.lift_off_amplitude = paced.none.reversal_amplitude = amplitude; // what grows from there is not at rest
   paced.start = mode_state(equilibrium, diverging, amplitude, 0);

@@ -231,11 +231,7 @@ Eigen::MatrixXcd vectors_of(std::span<const TwoSidedPair> pairs, Eigen::VectorXc
 
 void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Index rows)
 {
-  std::vector<LossKind> losses;
-  for (const TwoSidedPair& pair : pairs) losses.push_back(pair.loss);
   share_pairs(comm, pairs, rows, {&TwoSidedPair::right, &TwoSidedPair::left});
-  broadcast(losses, comm);
-  for (std::size_t k = 0; k < pairs.size(); ++k) pairs[k].loss = losses[k];
 }
 
 std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C, const MatrixXd& K,

@@ -27,51 +27,23 @@ using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
 constexpr std::size_t neighbours = 3; // of a group, at each end
-constexpr int newton_steps = 60;      // each divides the error of omega by about 2/eta^2
-constexpr double settled = 1e-12;     // last change of lambda over |lambda|: beyond, there is no fixed point
-constexpr double sensitive = 1e-9;    // the same of a lambda that rounding keeps from settling, by its condition
-constexpr double rounding = 1e-15;    // of lambda
-constexpr double beside = 1e-13;      // of lambda: where no pivot vanishes
-constexpr double oscillating = 1e-6;  // Im(lambda) over |lambda|: below it is the rounding of two real ones
+constexpr int newton_steps = 60;
+constexpr double settled = 1e-12;    // last change of lambda over |lambda|
+constexpr double sensitive = 1e-9;   // the same of a lambda that rounding keeps from settling, by its condition
+constexpr double rounding = 1e-15;   // of lambda
+constexpr double beside = 1e-13;     // of lambda: where no pivot vanishes
+constexpr double oscillating = 1e-6; // Im(lambda) over |lambda|: below it is the rounding of two real ones
 
 } // namespace
 
-Complex loss_factor_of(LossKind kind, Complex lambda)
+Complex loss_factor_of(Complex lambda)
 {
-  switch (kind)
-  {
-  case LossKind::none:
-    return 0;
-  case LossKind::viscous:
-    return lambda / lambda.imag();
-  case LossKind::complex:
-    return {0, 1};
-  }
-  return 0;
+  return {0, lambda.imag() > 0 ? 1. : 0.};
 }
 
-EigenvalueSlope slope_of(LossKind kind, Complex lambda, Complex mass, Complex damping, Complex loss)
+ComplexFactors loss_factors(Complex lambda)
 {
-  EigenvalueSlope result{2. * lambda * mass + damping, 0};
-  if (kind != LossKind::viscous) return result;
-  const double omega = lambda.imag();
-  result.slope += loss / omega;
-  result.turn = -lambda / (omega * omega) * loss;
-  return result;
-}
-
-Complex eigenvalue_change(const EigenvalueSlope& slope, Complex residual)
-{
-  const Complex of_imaginary = Complex(0, 1) * slope.slope + slope.turn; // the equation is real-linear in d lambda
-  Eigen::Matrix2d A;
-  A << slope.slope.real(), of_imaginary.real(), slope.slope.imag(), of_imaginary.imag();
-  const Eigen::Vector2d change = -(A.inverse() * Eigen::Vector2d(residual.real(), residual.imag()));
-  return {change(0), change(1)};
-}
-
-ComplexFactors loss_factors(LossKind kind, Complex lambda)
-{
-  return {lambda * lambda, lambda, 1, loss_factor_of(kind, lambda)};
+  return {lambda * lambda, lambda, 1, loss_factor_of(lambda)};
 }
 
 MatrixXcd sum(const LossyMatrices& A, const ComplexFactors& factors)
@@ -84,49 +56,35 @@ MatrixXcd sum(const LossyMatrices& A, const ComplexFactors& factors)
 namespace
 {
 
-/// Loss factors on their way from none: a share of i + own Re(lambda)/Im(lambda). They grow to those of the complex
-/// problem first, which has no fixed point to find, and become their viscous equivalent from there.
-struct Losses
+/// The problem with a share of i K_loss.
+MatrixXcd with_share(const LossyMatrices& A, double share, Complex lambda)
 {
-  double share = 0, own = 0;
-};
-
-constexpr Losses none{0, 0}, complex_loss{1, 0}, viscous_loss{1, 1};
-
-Losses losses_of(LossKind kind)
-{
-  return kind == LossKind::viscous ? viscous_loss : complex_loss;
+  return sum(A, {lambda * lambda, lambda, 1, Complex(0, share)});
 }
 
-ComplexFactors factors_at(const Losses& losses, Complex lambda)
+/// Its derivative in lambda.
+MatrixXcd derivative(const LossyMatrices& A, Complex lambda)
 {
-  return {lambda * lambda, lambda, 1, losses.share * Complex(losses.own * lambda.real() / lambda.imag(), 1)};
+  return 2. * lambda * A[0] + A[1];
 }
 
-/// Derivatives of the factors in lambda, at a constant omega.
-ComplexFactors derivatives_at(const Losses& losses, Complex lambda)
-{
-  return {2. * lambda, 1, 0, losses.share * losses.own / lambda.imag()};
-}
-
-/// Newton's method on (lambda, y), with omega taken from the last lambda. Returns whether it found a pair that
-/// oscillates.
-bool solve_at(const LossyMatrices& problem, const Losses& losses, Complex& lambda, VectorXcd& y)
+/// Newton's method on (lambda, y). Returns whether it found a pair that oscillates.
+bool solve_at(const LossyMatrices& problem, double share, Complex& lambda, VectorXcd& y)
 {
   const auto oscillates = [&] { return lambda.imag() > settled * std::abs(lambda); };
   double last = HUGE_VAL;
   for (int step = 0; step < newton_steps && last > rounding; ++step)
   {
     if (!oscillates()) return false;
-    const VectorXcd x = Eigen::PartialPivLU<MatrixXcd>(sum(problem, factors_at(losses, lambda)))
-                            .solve(sum(problem, derivatives_at(losses, lambda)) * y);
+    const VectorXcd x =
+        Eigen::PartialPivLU<MatrixXcd>(with_share(problem, share, lambda)).solve(derivative(problem, lambda) * y);
     if (!x.allFinite()) return true; // singular: lambda is an eigenvalue to rounding
     const Complex change = y.squaredNorm() / y.dot(x);
     const double now = std::abs(change) / std::abs(lambda);
     if (last <= settled && now > last) return true; // beside a multiple eigenvalue x is rounding
     y = x.normalized();
     lambda -= change;
-    if (now / last * now <= rounding && std::isfinite(last)) return oscillates(); // what the next step would change
+    if (now <= settled && now / last * now <= rounding) return oscillates(); // what the next step would change
     last = now;
   }
   return last <= sensitive && oscillates();
@@ -134,18 +92,18 @@ bool solve_at(const LossyMatrices& problem, const Losses& losses, Complex& lambd
 
 /// The left vector that belongs to lambda and the right one, by inverse iteration from its conjugate: their product
 /// without conjugation, which says how much of the left vector the start has, is 1.
-void find_left(const LossyMatrices& problem, const Losses& losses, TwoSidedPair& pair)
+void find_left(const LossyMatrices& problem, double share, TwoSidedPair& pair)
 {
-  const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, factors_at(losses, pair.lambda * (1 + beside))));
+  const Eigen::PartialPivLU<MatrixXcd> factor(with_share(problem, share, pair.lambda * (1 + beside)));
   pair.left = pair.right.conjugate();
   for (int iteration = 0; iteration < 2; ++iteration) pair.left = factor.transpose().solve(pair.left).normalized();
 }
 
-/// The pairs after a change of their losses, to first order in it but for what omega changes: the problem on the states
+/// The pairs after a change of the share of their losses, to first order in it: the problem on the states
 /// (y, lambda y) of all of them, where near neighbours mix at once while no two become one. Each keeps the place that
 /// it has most of.
 std::vector<TwoSidedPair> changed_together(const LossyMatrices& problem, const std::vector<TwoSidedPair>& pairs,
-                                           const Losses& from, const Losses& to)
+                                           double from, double to)
 {
   const auto count = static_cast<Index>(pairs.size());
   const MatrixXcd right = vectors_of(pairs, &TwoSidedPair::right), left = vectors_of(pairs, &TwoSidedPair::left);
@@ -155,7 +113,7 @@ std::vector<TwoSidedPair> changed_together(const LossyMatrices& problem, const s
   for (Index i = 0; i < count; ++i)
   {
     const Complex lambda = pairs[static_cast<std::size_t>(i)].lambda;
-    H.row(i) *= (factors_at(from, lambda)[3] - factors_at(to, lambda)[3]) / (2. * lambda * mass(i) + damping(i));
+    H.row(i) *= Complex(0, from - to) / (2. * lambda * mass(i) + damping(i));
     H(i, i) += lambda;
   }
   if (!H.allFinite()) return pairs;
@@ -197,28 +155,24 @@ std::vector<std::size_t> doubled(const std::vector<TwoSidedPair>& pairs)
   return places;
 }
 
-/// Continuation of pairs together from the one kind of losses to the other, in at least so many steps: in shorter ones
-/// where Newton's method fails or leads two pairs to one. Nothing is left of pairs that end on the way.
+/// Continuation of pairs together from no losses to all of them, in at least so many steps: in shorter ones where
+/// Newton's method fails or leads two pairs to one. Nothing is left of pairs that end on the way.
 std::vector<std::optional<TwoSidedPair>> follow(const LossyMatrices& problem, std::vector<TwoSidedPair> pairs,
-                                                const Losses& from, const Losses& to, int steps)
+                                                int steps)
 {
   constexpr double shortest = 1. / 64; // of a step: a pair that fails in these has ended
   std::vector<std::optional<TwoSidedPair>> result(pairs.size());
   std::vector<std::size_t> places(pairs.size());
   std::iota(places.begin(), places.end(), 0);
-  const auto between = [&](double part) {
-    return Losses{from.share + part * (to.share - from.share), from.own + part * (to.own - from.own)};
-  };
   double at = 0, step = 1. / steps;
   bool apart = true;
-  for (TwoSidedPair& pair : pairs) find_left(problem, from, pair);
+  for (TwoSidedPair& pair : pairs) find_left(problem, 0, pair);
   while (at < 1 && !pairs.empty())
   {
     const double next = at + 1.5 * step < 1 ? at + step : 1;
-    const Losses losses = between(next);
-    std::vector<TwoSidedPair> tried = changed_together(problem, pairs, between(at), losses);
+    std::vector<TwoSidedPair> tried = changed_together(problem, pairs, at, next);
     std::vector<char> found;
-    for (TwoSidedPair& pair : tried) found.push_back(solve_at(problem, losses, pair.lambda, pair.right) ? 1 : 0);
+    for (TwoSidedPair& pair : tried) found.push_back(solve_at(problem, next, pair.lambda, pair.right) ? 1 : 0);
     const bool all_found = std::ranges::count(found, 0) == 0;
     const bool all_apart = !apart || doubled(tried).empty();
     if (step * steps > shortest && !(all_found && all_apart))
@@ -232,7 +186,7 @@ std::vector<std::optional<TwoSidedPair>> follow(const LossyMatrices& problem, st
     for (std::size_t k = 0; k < tried.size(); ++k)
       if (found[k])
       {
-        if (next < 1) find_left(problem, losses, tried[k]);
+        if (next < 1) find_left(problem, next, tried[k]);
         pairs.push_back(std::move(tried[k]));
         kept.push_back(places[k]);
       }
@@ -258,22 +212,20 @@ int steps_to_losses(const LossyMatrices& problem, const std::vector<DenseEigenpa
 
 } // namespace
 
-bool solve_lossy(const LossyMatrices& problem, LossKind kind, DenseEigenpair& pair)
+bool solve_lossy(const LossyMatrices& problem, DenseEigenpair& pair)
 {
-  return solve_at(problem, losses_of(kind), pair.lambda, pair.y);
+  return solve_at(problem, 1, pair.lambda, pair.y);
 }
 
-bool solve_lossy_beside(const LossyMatrices& problem, LossKind kind, std::span<const DenseEigenpair> others,
-                        DenseEigenpair& pair)
+bool solve_lossy_beside(const LossyMatrices& problem, std::span<const DenseEigenpair> others, DenseEigenpair& pair)
 {
   constexpr int apart = 4; // steps: what is left of the others is of rounding, and their lambdas are not its own
-  const Losses losses = losses_of(kind);
   std::vector<std::pair<VectorXcd, Eigen::RowVectorXcd>> known; // a pair's vector, and what takes its part of another
   for (const DenseEigenpair& other : others)
   {
     TwoSidedPair both{other.lambda, other.y, {}};
-    find_left(problem, losses, both);
-    const Eigen::RowVectorXcd row = both.left.transpose() * sum(problem, derivatives_at(losses, both.lambda));
+    find_left(problem, 1, both);
+    const Eigen::RowVectorXcd row = both.left.transpose() * derivative(problem, both.lambda);
     known.emplace_back(other.y, row / (row * other.y)(0));
   }
   const auto without_others = [&](VectorXcd y)
@@ -285,15 +237,15 @@ bool solve_lossy_beside(const LossyMatrices& problem, LossKind kind, std::span<c
   for (int step = 0; step < apart && pair.lambda.imag() > settled * std::abs(pair.lambda); ++step)
   {
     pair.y = without_others(pair.y);
-    const VectorXcd x = without_others(Eigen::PartialPivLU<MatrixXcd>(sum(problem, factors_at(losses, pair.lambda)))
-                                           .solve(sum(problem, derivatives_at(losses, pair.lambda)) * pair.y));
+    const VectorXcd x = without_others(Eigen::PartialPivLU<MatrixXcd>(with_share(problem, 1, pair.lambda))
+                                           .solve(derivative(problem, pair.lambda) * pair.y));
     if (!x.allFinite()) return false;
     pair.y = x;
-    const Complex residual = x.dot(sum(problem, factors_at(losses, pair.lambda)) * x),
-                  slope = x.dot(sum(problem, derivatives_at(losses, pair.lambda)) * x);
+    const Complex residual = x.dot(with_share(problem, 1, pair.lambda) * x),
+                  slope = x.dot(derivative(problem, pair.lambda) * x);
     pair.lambda -= residual / slope;
   }
-  return solve_lossy(problem, kind, pair);
+  return solve_lossy(problem, pair);
 }
 
 bool are_one(const DenseEigenpair& a, const DenseEigenpair& b, const Sameness& limits)
@@ -301,15 +253,10 @@ bool are_one(const DenseEigenpair& a, const DenseEigenpair& b, const Sameness& l
   return are_one(a.lambda, a.y, b.lambda, b.y, limits);
 }
 
-bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex)
-{
-  return std::abs(viscous.lambda - complex.lambda) < 0.5 * std::abs(viscous.lambda);
-}
-
 std::optional<Complex> doubled_lambda(const std::vector<TwoSidedPair>& pairs)
 {
   for (const std::size_t place : doubled(pairs))
-    if (pairs[place].loss != LossKind::none) return pairs[place].lambda;
+    if (pairs[place].lambda.imag() > 0) return pairs[place].lambda;
   return std::nullopt;
 }
 
@@ -318,34 +265,15 @@ std::string describe_doubled(Complex lambda)
   return format("loss factors lead two modes to the one of %.6g Hz, so that a mode is missing", lambda.imag() / two_pi);
 }
 
-std::vector<LossyMode> with_losses(const LossyMatrices& problem, const std::vector<DenseEigenpair>& without)
+std::vector<DenseEigenpair> with_losses(const LossyMatrices& problem, const std::vector<DenseEigenpair>& without)
 {
   std::vector<TwoSidedPair> pairs;
-  std::vector<LossyMode> modes;
-  for (const DenseEigenpair& pair : without)
-  {
-    pairs.push_back({pair.lambda, pair.y, {}});
-    modes.push_back({pair, pair, LossKind::complex});
-  }
-  const auto complex = follow(problem, std::move(pairs), none, complex_loss, steps_to_losses(problem, without));
-  std::vector<std::size_t> places;
-  pairs.clear();
-  for (std::size_t k = 0; k < modes.size(); ++k)
-  {
-    if (!complex[k]) continue;
-    modes[k].complex = {complex[k]->lambda, complex[k]->right};
-    pairs.push_back(*complex[k]);
-    places.push_back(k);
-  }
-  const auto viscous = follow(problem, std::move(pairs), complex_loss, viscous_loss, 1);
-  for (std::size_t i = 0; i < places.size(); ++i)
-  {
-    LossyMode& mode = modes[places[i]];
-    if (!viscous[i]) continue;
-    mode.viscous = {viscous[i]->lambda, viscous[i]->right};
-    if (is_equivalent(mode.viscous, mode.complex)) mode.taken = LossKind::viscous;
-  }
-  return modes;
+  for (const auto& [lambda, y] : without) pairs.push_back({lambda, y, {}});
+  const auto found = follow(problem, std::move(pairs), steps_to_losses(problem, without));
+  std::vector<DenseEigenpair> result = without;
+  for (std::size_t k = 0; k < result.size(); ++k)
+    if (found[k]) result[k] = {found[k]->lambda, found[k]->right};
+  return result;
 }
 
 std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<Complex>& eigenvalues, std::size_t in_group)
@@ -376,24 +304,10 @@ std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<Complex>& ei
 namespace
 {
 
-/// Newton's method from the pair's right vector, then inverse iteration for the left one of the same lambda, which is
-/// that of the two-sided Rayleigh quotient in the end. Beside lock-in inverse iteration of both sides at once may lead
-/// them to two modes, which share nothing: the quotient is of any size then.
-void refine(const LossyMatrices& problem, TwoSidedPair& pair)
+/// Moves lambda by the two-sided Rayleigh quotient.
+void take_quotient(const LossyMatrices& problem, TwoSidedPair& pair)
 {
-  DenseEigenpair right{pair.lambda, pair.right};
-  if (solve_lossy(problem, pair.loss, right))
-  {
-    pair.lambda = right.lambda;
-    pair.right = right.y;
-  }
-  const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, loss_factors(pair.loss, pair.lambda * (1 + beside))));
-  for (int iteration = 0; iteration < 2; ++iteration)
-  {
-    pair.right = factor.solve(pair.right).normalized();
-    pair.left = factor.transpose().solve(pair.left).normalized();
-  }
-  const ComplexFactors factors = loss_factors(pair.loss, pair.lambda);
+  const ComplexFactors factors = loss_factors(pair.lambda);
   std::array<Complex, 4> products{};
   Complex residual = 0;
   for (std::size_t k = 0; k < 4; ++k)
@@ -401,7 +315,27 @@ void refine(const LossyMatrices& problem, TwoSidedPair& pair)
     products[k] = pair.left.transpose() * (problem[k] * pair.right);
     residual += factors[k] * products[k];
   }
-  pair.lambda += eigenvalue_change(slope_of(pair.loss, pair.lambda, products[0], products[1], products[3]), residual);
+  pair.lambda -= residual / (2. * pair.lambda * products[0] + products[1]);
+}
+
+/// Newton's method from the pair's right vector, then inverse iteration for the left one of the same lambda, which is
+/// that of the two-sided Rayleigh quotient in the end. Beside lock-in inverse iteration of both sides at once may lead
+/// them to two modes, which share nothing: the quotient is of any size then.
+void refine(const LossyMatrices& problem, TwoSidedPair& pair)
+{
+  DenseEigenpair right{pair.lambda, pair.right};
+  if (solve_lossy(problem, right))
+  {
+    pair.lambda = right.lambda;
+    pair.right = right.y;
+  }
+  const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, loss_factors(pair.lambda * (1 + beside))));
+  for (int iteration = 0; iteration < 2; ++iteration)
+  {
+    pair.right = factor.solve(pair.right).normalized();
+    pair.left = factor.transpose().solve(pair.left).normalized();
+  }
+  take_quotient(problem, pair);
 }
 
 /// Residuals of the vectors of a side, and their backward errors.
@@ -419,7 +353,7 @@ Residuals residuals_of(const LossyMatrices& problem, std::span<const TwoSidedPai
   for (std::size_t k = 0; k < problem.size(); ++k)
   {
     MatrixXcd part = side == &TwoSidedPair::right ? real_times(problem[k], x) : real_times(problem[k].transpose(), x);
-    for (Index i = 0; const TwoSidedPair& pair : pairs) part.col(i++) *= loss_factors(pair.loss, pair.lambda)[k];
+    for (Index i = 0; const TwoSidedPair& pair : pairs) part.col(i++) *= loss_factors(pair.lambda)[k];
     result.columns += part;
     sizes += part.colwise().norm().transpose();
   }
@@ -434,11 +368,10 @@ void solve_on(const MatrixXd& V, const LossyMatrices& problem, std::span<TwoSide
   for (std::size_t k = 0; k < problem.size(); ++k) on_span[k] = V.transpose() * problem[k] * V;
   for (TwoSidedPair& pair : pairs)
   {
-    TwoSidedPair small{pair.lambda, (V.transpose() * pair.right).normalized(), {}, pair.loss};
-    const Losses losses = losses_of(pair.loss);
-    if (!solve_at(on_span, losses, small.lambda, small.right)) continue;
-    find_left(on_span, losses, small);
-    pair = {small.lambda, V * small.right, V * small.left, pair.loss};
+    TwoSidedPair small{pair.lambda, (V.transpose() * pair.right).normalized(), {}};
+    if (!solve_at(on_span, 1, small.lambda, small.right)) continue;
+    find_left(on_span, 1, small);
+    pair = {small.lambda, V * small.right, V * small.left};
   }
 }
 
@@ -456,15 +389,18 @@ void refine_together(const LossyMatrices& problem, MultiVector V, std::span<TwoS
   {
     Complex mean = 0;
     for (const TwoSidedPair& pair : pairs) mean += pair.lambda / static_cast<double>(pairs.size());
-    // of viscous pairs f differs by Re/Im(lambda), which costs passes and no exactness
-    const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, loss_factors(LossKind::complex, mean)));
+    const Eigen::PartialPivLU<MatrixXcd> factor(sum(problem, loss_factors(mean)));
     for (int pass = 0; pass < passes; ++pass)
     {
       solve_on(V.entries, problem, pairs);
       const Residuals right = residuals_of(problem, pairs, &TwoSidedPair::right),
                       left = residuals_of(problem, pairs, &TwoSidedPair::left);
       errors = right.errors + left.errors; // NaN of either stays
-      if ((errors.array() <= exact).all()) return;
+      if ((errors.array() <= exact).all())
+      {
+        for (TwoSidedPair& pair : pairs) take_quotient(problem, pair); // the span has rounding of its own
+        return;
+      }
       if (!errors.allFinite()) break;
       extend_orthonormal(V, {V.comm, parts_of(factor.solve(right.columns))});
       extend_orthonormal(V, {V.comm, parts_of(factor.transpose().solve(left.columns))});
@@ -505,12 +441,11 @@ void follow_losses(const LossyMatrices& problem, std::vector<TwoSidedPair>& pair
 {
   std::vector<DenseEigenpair> without;
   for (const TwoSidedPair& pair : pairs) without.push_back({pair.lambda, pair.right});
-  const std::vector<LossyMode> modes = with_losses(problem, without);
+  const std::vector<DenseEigenpair> with = with_losses(problem, without);
   for (std::size_t k = 0; k < pairs.size(); ++k)
   {
-    pairs[k].lambda = modes[k].pair().lambda;
-    pairs[k].right = modes[k].pair().y;
-    pairs[k].loss = modes[k].taken;
+    pairs[k].lambda = with[k].lambda;
+    pairs[k].right = with[k].y;
   }
 }
 

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <optional>
 
 namespace squeal
@@ -26,13 +25,12 @@ constexpr int passes = 30;          // of residual correction, at most: losses o
 constexpr double tolerance = 1e-13; // backward error
 constexpr double share = 1e-3;      // directions of residuals below this part of the largest are left to later passes
 
-/// A mode with the backward errors of both problems.
-struct CorrectedMode : LossyMode
+/// A mode with its backward error in the whole problem.
+struct CorrectedMode
 {
-  double complex_error = HUGE_VAL, viscous_error = HUGE_VAL;
+  DenseEigenpair pair;
+  double error = HUGE_VAL;
   std::optional<Complex> drawn_to{}; // the lambda of another mode, which Newton's method led it to
-
-  double backward_error() const { return taken == LossKind::viscous ? viscous_error : complex_error; }
 };
 
 using Group = std::vector<CorrectedMode>;
@@ -45,17 +43,9 @@ void widen(VectorXcd& a, Index columns)
   a.tail(columns - known).setZero();
 }
 
-/// One of a mode's two problems.
-struct Side
-{
-  LossKind kind;
-  DenseEigenpair LossyMode::*pair;
-  double CorrectedMode::*error;
-};
-
-/// Makes the pairs of a side that are not exact those of the problem on the subspace, each once. Returns which of them
-/// it found; the others stay what they were.
-std::vector<char> solve_side(const LossyMatrices& problem, const Side& side, Group& group)
+/// Makes the pairs that are not exact those of the problem on the subspace, each once. Returns which of them it found;
+/// the others stay what they were.
+std::vector<char> solve_on_subspace(const LossyMatrices& problem, Group& group)
 {
   constexpr double near = 1e-5, far = 1e-3; // of lambda: what may draw a pair to itself, what it cannot be
   std::vector<char> found(group.size(), 0);
@@ -63,14 +53,13 @@ std::vector<char> solve_side(const LossyMatrices& problem, const Side& side, Gro
   const auto is_known = [&](const DenseEigenpair& pair, const Sameness& limits)
   { return std::ranges::any_of(solved, [&](const DenseEigenpair& other) { return are_one(other, pair, limits); }); };
   for (CorrectedMode& mode : group)
-    if (mode.*side.error <= tolerance) solved.push_back(mode.*side.pair);
+    if (mode.error <= tolerance) solved.push_back(mode.pair);
   for (std::size_t k = 0; k < group.size(); ++k)
   {
     CorrectedMode& mode = group[k];
-    const bool is_needed = side.kind == LossKind::complex || mode.taken == LossKind::viscous;
-    if (!is_needed || mode.*side.error <= tolerance) continue;
-    DenseEigenpair pair = mode.*side.pair;
-    if (!solve_lossy(problem, side.kind, pair)) continue;
+    if (mode.error <= tolerance) continue;
+    DenseEigenpair pair = mode.pair;
+    if (!solve_lossy(problem, pair)) continue;
     if (is_known(pair, perhaps))
     {
       const auto distance = [&](const DenseEigenpair& other)
@@ -78,9 +67,8 @@ std::vector<char> solve_side(const LossyMatrices& problem, const Side& side, Gro
       std::vector<DenseEigenpair> others;
       std::ranges::copy_if(solved, std::back_inserter(others),
                            [&](const DenseEigenpair& other) { return distance(other) < near; });
-      DenseEigenpair beside = mode.*side.pair;
-      if (solve_lossy_beside(problem, side.kind, others, beside) && distance(beside) < far &&
-          !is_known(beside, perhaps))
+      DenseEigenpair beside = mode.pair;
+      if (solve_lossy_beside(problem, others, beside) && distance(beside) < far && !is_known(beside, perhaps))
         pair = std::move(beside);
       else if (is_known(pair, {}))
       {
@@ -90,40 +78,32 @@ std::vector<char> solve_side(const LossyMatrices& problem, const Side& side, Gro
     }
     found[k] = 1;
     solved.push_back(pair);
-    mode.*side.pair = std::move(pair);
+    mode.pair = std::move(pair);
   }
   return found;
 }
 
-/// Solves both problems of each mode on the subspace; residuals that are not small join it, until none is left. What is
+/// Solves the modes on the subspace; residuals that are not small join it, until none is left. What is
 /// exact stays so, since the subspace only grows.
 void solve_group(ComplexSubspace& space, Group& group, const PencilFactor& P)
 {
-  constexpr Side complex{LossKind::complex, &LossyMode::complex, &CorrectedMode::complex_error},
-      viscous{LossKind::viscous, &LossyMode::viscous, &CorrectedMode::viscous_error};
   for (int pass = 0;; ++pass)
   {
     end_if_asked(space.V.comm);
     for (CorrectedMode& mode : group) mode.drawn_to.reset();
     MultiVector residuals{space.V.comm, MatrixXd(space.V.entries.rows(), 0)};
-    for (const Side& side : {complex, viscous})
+    for (CorrectedMode& mode : group) widen(mode.pair.y, space.V.columns());
+    const std::vector<char> found = solve_on_subspace(space.entries, group);
+    for (std::size_t k = 0; k < group.size(); ++k)
     {
-      for (CorrectedMode& mode : group) widen((mode.*side.pair).y, space.V.columns());
-      const std::vector<char> found = solve_side(space.entries, side, group);
-      for (std::size_t k = 0; k < group.size(); ++k)
-      {
-        const auto& [lambda, y] = group[k].*side.pair;
-        double& error = group[k].*side.error;
-        if (error <= tolerance) continue;
-        error = HUGE_VAL;
-        if (!found[k]) continue;
-        const MultiVector residual = residual_of(space, loss_factors(side.kind, lambda), y, error);
-        if (error > tolerance) append(residuals, residual);
-      }
+      const auto& [lambda, y] = group[k].pair;
+      double& error = group[k].error;
+      if (error <= tolerance) continue;
+      error = HUGE_VAL;
+      if (!found[k]) continue;
+      const MultiVector residual = residual_of(space, loss_factors(lambda), y, error);
+      if (error > tolerance) append(residuals, residual);
     }
-    for (CorrectedMode& mode : group)
-      if (!std::isfinite(mode.viscous_error) || !is_equivalent(mode.viscous, mode.complex))
-        mode.taken = LossKind::complex;
     if (residuals.columns() == 0 || pass == passes) return;
     orthonormalise(residuals, share * share);
     if (!extend(space, P.solve(residuals))) return;
@@ -154,11 +134,10 @@ std::optional<Complex> doubled(const std::vector<Eigenpair>& pairs, Mat A)
   return std::nullopt;
 }
 
-/// Pairs with their losses.
+/// Pairs with losses.
 struct LossyPairs
 {
   std::vector<Eigenpair> pairs{};
-  std::vector<ModeLoss> losses{};
   std::optional<Complex> doubled{}; // the lambda of two modes
 };
 
@@ -173,7 +152,6 @@ LossyPairs solve_in_groups(const std::vector<Eigenpair>& without_losses, const C
     eigenvalues.push_back(pair.lambda);
     result.pairs.push_back({pair.lambda, copy_of(pair.real), copy_of(pair.imaginary), pair.backward_error});
   }
-  result.losses.resize(eigenvalues.size());
   for (const auto& [places, first, end] : neighbouring_pairs(eigenvalues, in_group))
   {
     ComplexSubspace space = empty;
@@ -190,7 +168,7 @@ LossyPairs solve_in_groups(const std::vector<Eigenpair>& without_losses, const C
       const VectorXcd y = a.col(column).cast<Complex>() + Complex(0, 1) * a.col(column + 1);
       without.push_back({eigenvalues[places[k]], y.normalized()});
     }
-    const std::vector<LossyMode> with = with_losses(space.entries, without);
+    const std::vector<DenseEigenpair> with = with_losses(space.entries, without);
     Group group;
     for (std::size_t k = first; k < end; ++k) group.push_back({with[k]});
     const double middle = eigenvalues[places[(first + end - 1) / 2]].imag();
@@ -200,16 +178,13 @@ LossyPairs solve_in_groups(const std::vector<Eigenpair>& without_losses, const C
     {
       Eigenpair& pair = result.pairs[places[k]];
       const CorrectedMode& mode = group[k - first];
-      const DenseEigenpair& own = mode.pair();
+      const DenseEigenpair& own = mode.pair;
       const MultiVector y = vector_of(space, own.y);
       copy_column(y, 0, pair.real);
       copy_column(y, 1, pair.imaginary);
       pair.lambda = own.lambda;
-      pair.backward_error = mode.backward_error();
+      pair.backward_error = mode.error;
       if (mode.drawn_to) result.doubled = mode.drawn_to;
-      const double error = std::abs(own.lambda - mode.complex.lambda) / std::abs(own.lambda);
-      result.losses[places[k]] = {loss_factor_of(mode.taken, own.lambda),
-                                  mode.taken == LossKind::viscous ? error : std::numeric_limits<double>::quiet_NaN()};
     }
   }
   return result;
@@ -217,8 +192,8 @@ LossyPairs solve_in_groups(const std::vector<Eigenpair>& without_losses, const C
 
 } // namespace
 
-std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
-                                   const PencilOptions& options)
+void correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
+                  const PencilOptions& options)
 {
   const ComplexSubspace empty = empty_subspace({problem.M, problem.C, problem.K, K_loss});
   ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
@@ -239,7 +214,6 @@ std::vector<ModeLoss> correct_loss(QuadraticSolution& solution, const QuadraticP
   solution.outcome.residual = 0;
   for (const Eigenpair& pair : solution.pairs)
     solution.outcome.residual = std::max(solution.outcome.residual, pair.backward_error);
-  return std::move(found.losses);
 }
 
 } // namespace squeal

@@ -60,10 +60,10 @@ void set_shape(ComplexMode& mode, const ClosedContact& contact, const Eigenpair&
   check(VecAXPBY(mode.imaginary, turn.imag(), turn.real(), real));
 }
 
-/// Adds to the reactions those to the mode's own damping of loss factors beyond C's, (own - lambda/omega) K_loss phi.
-void add_loss_reactions(const Structure& structure, const ClosedContact& contact, Complex own, ComplexMode& mode)
+/// Adds to the reactions those to complex stiffness beyond C's equivalent of it, (i - lambda/omega) K_loss phi.
+void add_loss_reactions(const Structure& structure, const ClosedContact& contact, ComplexMode& mode)
 {
-  const Complex factor = own - mode.lambda / structure.loss_omega;
+  const Complex factor = Complex(0, 1) - mode.lambda / structure.loss_omega;
   const Owned<Vec> force = zeros_like(mode.real);
   Owned<Vec> rows;
   check(MatCreateVecs(contact.reaction, nullptr, rows.put()));
@@ -103,18 +103,14 @@ struct ModesProblem
   bool beyond_inertia; // gyroscopic or circulatory parts may change the number of pairs in a band
 };
 
-/// The modes of a solution, each with the damping of loss factors at its own frequency.
+/// The modes of a solution, with loss factors.
 std::vector<ComplexMode> modes_of(QuadraticSolution& solution, const ModesProblem& problem)
 {
   if (!problem.K_loss.get()) return modes_of(solution, problem.linearised);
-  const std::vector<ModeLoss> losses = correct_loss(solution, problem.reduced, problem.K_loss, problem.options.pencil);
+  correct_loss(solution, problem.reduced, problem.K_loss, problem.options.pencil);
   std::vector<ComplexMode> modes = modes_of(solution, problem.linearised);
-  for (std::size_t i = 0; i < modes.size(); ++i)
-  {
-    modes[i].loss_error = losses[i].error;
-    if (modes[i].lambda.imag() > 0)
-      add_loss_reactions(problem.structure, problem.linearised.contact, losses[i].factor, modes[i]);
-  }
+  for (ComplexMode& mode : modes)
+    if (mode.lambda.imag() > 0) add_loss_reactions(problem.structure, problem.linearised.contact, mode);
   std::stable_sort(modes.begin(), modes.end(),
                    [](const ComplexMode& a, const ComplexMode& b) { return a.lambda.real() > b.lambda.real(); });
   return modes;

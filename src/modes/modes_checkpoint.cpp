@@ -42,8 +42,7 @@ void keep_mode(const ComplexMode& mode, const FileOrder& order, const std::strin
     reactions.push_back(reaction.imag());
   }
   Checkpoint checkpoint;
-  checkpoint.set("numbers",
-                 std::vector<double>{mode.lambda.real(), mode.lambda.imag(), mode.backward_error, mode.loss_error});
+  checkpoint.set("numbers", std::vector<double>{mode.lambda.real(), mode.lambda.imag(), mode.backward_error});
   checkpoint.set("reactions", std::move(reactions));
   checkpoint.set("real", order.gather(mode.real));
   checkpoint.set("imaginary", order.gather(mode.imaginary));
@@ -64,7 +63,6 @@ ComplexMode mode_from(const Checkpoint& checkpoint, const Structure& structure, 
   mode.real = zeros_like(structure.load);
   mode.imaginary = zeros_like(structure.load);
   mode.backward_error = numbers.at(2);
-  mode.loss_error = numbers.at(3);
   for (std::size_t i = 0; i + 1 < reactions.size(); i += 2) mode.reactions.emplace_back(reactions[i], reactions[i + 1]);
   order.scatter(checkpoint.list("real"), mode.real);
   order.scatter(checkpoint.list("imaginary"), mode.imaginary);

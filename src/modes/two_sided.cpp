@@ -37,28 +37,22 @@ Complex bilinear(const MultiVector& x, const MultiVector& y)
 }
 
 /// By the two-sided Rayleigh quotient.
-Complex change_of_lambda(const ComplexSubspace& space, LossKind kind, Complex lambda, const MultiVector& left,
+Complex change_of_lambda(const ComplexSubspace& space, Complex lambda, const MultiVector& left,
                          const MultiVector& right)
 {
   std::array<Complex, 4> products{};
   Complex residual = 0;
-  const ComplexFactors factor = loss_factors(kind, lambda);
+  const ComplexFactors factor = loss_factors(lambda);
   for (std::size_t k = 0; k < 4; ++k)
     if (space.matrices[k])
     {
       products[k] = bilinear(left, product(space.matrices[k], right));
       residual += factor[k] * products[k];
     }
-  return eigenvalue_change(slope_of(kind, lambda, products[0], products[1], products[3]), residual);
+  return -residual / (2. * lambda * products[0] + products[1]);
 }
 
 } // namespace
-
-LossKind loss_kind_of(const ComplexMode& mode)
-{
-  if (mode.lambda.imag() == 0) return LossKind::none;
-  return std::isnan(mode.loss_error) ? LossKind::complex : LossKind::viscous;
-}
 
 TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, const PencilOptions& options)
 {
@@ -71,7 +65,7 @@ TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, con
           make_shift_invert(matrices.K, matrices.M, Symmetry::none, options)};
 }
 
-TwoSidedMode find_two_sided(TwoSidedProblem& problem, LossKind kind, Complex lambda, const MultiVector& start)
+TwoSidedMode find_two_sided(TwoSidedProblem& problem, Complex lambda, const MultiVector& start)
 {
   const auto& [M, C, K] = problem.matrices;
   move_to(problem.pencil, -(1 + beside) * (lambda * lambda).real());
@@ -83,15 +77,15 @@ TwoSidedMode find_two_sided(TwoSidedProblem& problem, LossKind kind, Complex lam
   TwoSidedMode mode{lambda, {}, {}, HUGE_VAL};
   for (int pass = 0;; ++pass)
   {
-    const ComplexFactors before = loss_factors(kind, mode.lambda);
+    const ComplexFactors before = loss_factors(mode.lambda);
     const VectorXcd y = null_vector(right, before), x = null_vector(left, before);
     mode.right = vector_of(right, y);
     mode.left = vector_of(left, x);
     const bool follows = mode.backward_error < near;
-    if (follows) mode.lambda += change_of_lambda(right, kind, mode.lambda, mode.left, mode.right);
-    if (kind == LossKind::none) mode.lambda.imag(0);
+    if (follows) mode.lambda += change_of_lambda(right, mode.lambda, mode.left, mode.right);
+    if (lambda.imag() == 0) mode.lambda.imag(0);
     double of_right = 0, of_left = 0;
-    const ComplexFactors now = loss_factors(kind, mode.lambda);
+    const ComplexFactors now = loss_factors(mode.lambda);
     const MultiVector r = residual_of(right, now, y, of_right), s = residual_of(left, now, x, of_left);
     mode.backward_error = std::max(of_right, of_left);
     if ((follows && mode.backward_error <= tolerance) || pass == passes) return mode;

@@ -67,7 +67,6 @@ Json mode_list(const std::vector<ComplexMode>& modes)
                     {"growth_rate", mode.growth_rate()},
                     {"damping_ratio", mode.damping_ratio()},
                     {"backward_error", mode.backward_error},
-                    {"loss_error", mode.loss_error},
                     {"unstable", is_unstable(mode.lambda)}});
   return list;
 }

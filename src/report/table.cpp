@@ -74,18 +74,6 @@ std::string modes_text(const Modes& modes)
       row("", format("%d unstable of %zu modes below %.5g Hz, method \"%s\", largest backward error %.1e",
                      modes.unstable_count, modes.modes.size(), modes.band, word(modes.method), modes.outcome.residual));
   if (!modes.count_check.empty()) text += row("", "count: " + modes.count_check);
-  double loss_error = 0;
-  for (const ComplexMode& mode : modes.modes) loss_error = std::max(loss_error, mode.loss_error);
-  if (loss_error > 0)
-    text += row("", format("loss factors are viscous at each mode's own frequency: at most %.1e of its eigenvalue from "
-                           "complex stiffness",
-                           loss_error));
-  const auto without = std::ranges::count_if(modes.modes, [](const auto& mode) { return std::isnan(mode.loss_error); });
-  if (without > 0)
-    text +=
-        row("", format("%td modes lose too much for a viscous equivalent at their own frequency: these are of complex "
-                       "stiffness",
-                       without));
   text += row("", format("%12s %14s %12s %16s", "frequency", "growth rate", "damping", "backward error"));
   text += row("", format("%12s %14s %12s %16s", "[Hz]", "[1/s]", "[%]", "[-]"));
   const std::size_t unstable = static_cast<std::size_t>(std::max(modes.unstable_count, 0));

@@ -206,7 +206,7 @@ SceneKeys keys_of(RayleighDamping& d)
       {"alpha", &d.alpha, optional, Rule::not_negative, "1/s", "mass part", damping},
       {"beta", &d.beta, optional, Rule::not_negative, "s", "stiffness part", damping},
       {"loss_frequency", &d.loss_frequency, optional, Rule::not_negative, "Hz",
-       "where loss factors have their viscous equivalent in time; modes take it at their own frequency", damping},
+       "where loss factors have their viscous equivalent in time; modes take complex stiffness", damping},
       {"measured", &d.measured, optional, Rule::positive, "table",
        "instead of alpha and beta, which are fitted to [[frequency in Hz, damping ratio], ...] of modes"},
   };

@@ -90,8 +90,7 @@ AtHeldVectors at_held_vectors(const SlidingEquilibrium& sliding, const HeldVecto
   {
     const Complex lambda = vectors.lambda[j], mass = bilinear(M, j, count), damping = bilinear(C, j, count),
                   loss = bilinear(L, j, count);
-    Complex residual =
-        lambda * (lambda * mass + damping) + bilinear(K, j, count) + loss_factor_of(vectors.loss[j], lambda) * loss;
+    Complex residual = lambda * (lambda * mass + damping) + bilinear(K, j, count) + loss_factor_of(lambda) * loss;
     double stiffness = hermitian(k, j, count);
     const PairMotions of_left = pair_motions(interface, vectors.left, j, count, structure.load),
                       of_right = pair_motions(interface, vectors.right, j, count, structure.load);
@@ -104,7 +103,7 @@ AtHeldVectors at_held_vectors(const SlidingEquilibrium& sliding, const HeldVecto
       if (equilibrium.closed[i] && compliance > 0) stiffness += std::norm(of_right.normal[i]) / compliance;
     }
     held.residual.push_back(residual);
-    held.slopes.push_back(slope_of(vectors.loss[j], lambda, mass, damping, loss));
+    held.slopes.push_back(2. * lambda * mass + damping);
     held.mass.push_back(hermitian(m, j, count));
     held.damping.push_back(hermitian(c, j, count));
     held.stiffness.push_back(stiffness);
@@ -160,9 +159,8 @@ void set_multipliers(const SensitivityProblem& problem, const SlidingMatrices& m
   const ClosedContact& contact = problem.linearised.contact;
   const std::size_t count = vectors.count();
   const Complex lambda = vectors.lambda[mode];
-  // of linearised.C, which holds the loss at its own frequency
-  const Complex loss =
-      structure.K_loss.get() ? loss_factor_of(vectors.loss[mode], lambda) - lambda / structure.loss_omega : 0;
+  // beyond linearised.C, which holds the loss at the stated frequency
+  const Complex loss = structure.K_loss.get() ? loss_factor_of(lambda) - lambda / structure.loss_omega : 0;
   const std::array<Complex, 4> factors{lambda * lambda, lambda, 1, loss};
   const auto of_mode = [&](const MultiVector& X)
   {
@@ -209,13 +207,12 @@ HeldVectors unstable_vectors(const SensitivityProblem& problem, Sensitivity& res
   const QuadraticProblem matrices = sliding_problem(structure, problem.linearised);
   const Owned<Mat> K_loss = structure.K_loss.get() ? project(structure.K_loss, contact.Y, contact.Z) : Owned<Mat>{};
   TwoSidedProblem two_sided = make_two_sided(matrices, K_loss, problem.modes_options.pencil);
-  HeldVectors vectors{{}, {}, empty_multivector(structure.K), empty_multivector(structure.K)};
+  HeldVectors vectors{{}, empty_multivector(structure.K), empty_multivector(structure.K)};
   std::vector<TwoSidedMode> modes;
   for (const ComplexMode& mode : problem.modes.unstable())
   {
-    const LossKind kind = loss_kind_of(mode);
     const std::array shape{mode.real.get(), mode.imaginary.get()};
-    modes.push_back(find_two_sided(two_sided, kind, mode.lambda, kept_rows(columns_of(shape), contact)));
+    modes.push_back(find_two_sided(two_sided, mode.lambda, kept_rows(columns_of(shape), contact)));
     const auto& [lambda, right, left, error] = modes.back();
     if (!(error < exact) || !(std::abs(lambda - mode.lambda) < same * std::abs(lambda)))
     {
@@ -223,10 +220,9 @@ HeldVectors unstable_vectors(const SensitivityProblem& problem, Sensitivity& res
       result.outcome = {OutcomeKind::not_converged,
                         format("the left vector of the unstable mode at %.6g Hz was not found", mode.frequency_hz()), 0,
                         error};
-      return {{}, {}, empty_multivector(structure.K), empty_multivector(structure.K)};
+      return {{}, empty_multivector(structure.K), empty_multivector(structure.K)};
     }
     vectors.lambda.push_back(lambda);
-    vectors.loss.push_back(kind);
     ModeCauses& causes = result.modes.emplace_back();
     causes.lambda = lambda;
     causes.backward_error = error;

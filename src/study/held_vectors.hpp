@@ -14,7 +14,6 @@ namespace squeal
 struct HeldVectors
 {
   std::vector<std::complex<double>> lambda{};
-  std::vector<LossKind> loss{};
   MultiVector right, left;
   std::vector<std::vector<std::complex<double>>> reactions{}, sides{}; // by modes and pairs; 0 on open pairs
 
@@ -31,7 +30,7 @@ struct PairMotions
 struct AtHeldVectors
 {
   std::vector<std::complex<double>> residual; // left'(Q right - R' reactions) + sides'(B_n right + c reactions)
-  std::vector<EigenvalueSlope> slopes;        // of left' Q right
+  std::vector<std::complex<double>> slopes;   // left' Q'(lambda) right
   // right^H A right of M, C without friction and losses, K with the springs of the pairs, and the K of loss factors
   std::vector<double> mass, damping, stiffness, loss;
 };

@@ -124,7 +124,7 @@ std::vector<double> backward_errors(const ModesBasis& modes, const ProjectedSlid
   for (Index k = 0; k < a.cols(); ++k)
   {
     const auto& pair = pairs[static_cast<std::size_t>(k)];
-    const Complex lambda = pair.lambda, f = loss_factor_of(pair.loss, lambda);
+    const Complex lambda = pair.lambda, f = loss_factor_of(lambda);
     // the random entries are spread evenly over (-1, 1): their mean square is 1/3
     const double residual = (lambda * (lambda * M.col(k) + C.col(k)) + K.col(k) + f * L.col(k)).norm() *
                             std::sqrt(3. / static_cast<double>(tests));
@@ -187,7 +187,7 @@ void append_residuals(const ModesBasis& modes, const PointProblem& problem, cons
   if (point.stiffness.get()) add(1, on_pairs(point.stiffness, x));
   if (structure.K_loss.get())
   {
-    const auto f = [](const TwoSidedPair& pair) { return loss_factor_of(pair.loss, pair.lambda); };
+    const auto f = [](const TwoSidedPair& pair) { return loss_factor_of(pair.lambda); };
     add(1, product(structure.K_loss, mixed(times(weights, f))));
   }
   if (structure.G.get()) add(of_skew, product(structure.G, v));
@@ -243,7 +243,7 @@ enum class Extent
 SolvedPairs with_errors(const ModesBasis& modes, const ProjectedSliding& on_basis, std::vector<TwoSidedPair> pairs)
 {
   SolvedPairs solved{std::move(pairs), {}, {}, {}};
-  solved.doubled = doubled_lambda(solved.pairs);
+  if (on_basis.K_loss.size() > 0) solved.doubled = doubled_lambda(solved.pairs);
   solved.right = backward_errors(modes, on_basis, solved.pairs, Side::right);
   solved.left = backward_errors(modes, on_basis, solved.pairs, Side::left);
   return solved;
@@ -304,7 +304,7 @@ void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const
     solved.right[k] = refined.right[i];
     solved.left[k] = refined.left[i];
   }
-  solved.doubled = doubled_lambda(solved.pairs);
+  if (K_loss.size() > 0) solved.doubled = doubled_lambda(solved.pairs);
 }
 
 /// The pairs of the projected problem in the window, falling growth rate.

@@ -115,9 +115,9 @@ std::vector<TwoSidedPair> two_sided_modes(const ReducedMatrices& at, double band
   {
     keep_below(followed_band * band);
     add_losses_shared(MPI_COMM_SELF, {at.M, at.C, at.K, at.K_loss}, pairs);
+    if (const auto lambda = doubled_lambda(pairs)) throw Error(describe_doubled(*lambda));
   }
   keep_below(band);
-  if (const auto lambda = doubled_lambda(pairs)) throw Error(describe_doubled(*lambda));
   return pairs;
 }
 

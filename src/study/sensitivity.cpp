@@ -86,7 +86,7 @@ void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, 
       put_in(causes.falling_friction_powers, contact, scale * dampings[i].of_speed);
       put_in(causes.turning_friction_powers, contact, scale * dampings[i].of_direction);
     }
-    const double loss = std::real(std::conj(lambda) * loss_factor_of(vectors.loss[j], lambda)) * held.loss[j];
+    const double loss = std::real(std::conj(lambda) * loss_factor_of(lambda)) * held.loss[j];
     causes.damping_power = 2 * (std::norm(lambda) * held.damping[j] + loss) / energy;
     causes.defect = sum - causes.damping_power - 2 * lambda.real();
   }
@@ -225,7 +225,7 @@ private:
       Complex residual = 0;
       for (const auto& [weight, model] : models) residual += weight * model.residual[j];
       result[j].known = true;
-      result[j].lambda = eigenvalue_change(held_.slopes[j], residual / step);
+      result[j].lambda = -residual / (step * held_.slopes[j]);
     }
     return result;
   }
@@ -293,7 +293,7 @@ private:
   /// Of an eigenvalue, over its size.
   double change(const AtHeldVectors& other, std::size_t mode) const
   {
-    return std::abs(eigenvalue_change(held_.slopes[mode], other.residual[mode] - held_.residual[mode])) /
+    return std::abs((other.residual[mode] - held_.residual[mode]) / held_.slopes[mode]) /
            std::abs(vectors_.lambda[mode]);
   }
 
@@ -361,7 +361,7 @@ void find_probe_derivatives(const SensitivityProblem& problem, const HeldVectors
     {
       const Complex unit = Complex(left_re[i], left_im[i]) * Complex(right_re[i], right_im[i]);
       const Complex lambda = vectors.lambda[j];
-      const auto by = [&](Complex factor) { return eigenvalue_change(held.slopes[j], factor * unit); };
+      const auto by = [&](Complex factor) { return -factor * unit / held.slopes[j]; };
       result.modes[j].probes.push_back({by(lambda * lambda), by(lambda), by(1)});
     }
   }

@@ -89,19 +89,16 @@ def lossy_bar(folder, eta):
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_a_loss_factor_damps_every_mode_at_its_own_frequency(converged, tmp_path, ranks):
-    """lambda^2 + lambda eta w^2/omega + w^2 = 0 with omega = Im(lambda); beside it i w sqrt(1 + i eta)."""
+def test_a_loss_factor_is_complex_stiffness_at_every_mode(converged, tmp_path, ranks):
+    """lambda = i w sqrt(1 + i eta)"""
     eta = 0.06
     plain, lossy = (converged(lossy_bar(tmp_path / f"{e}", e), ranks=ranks).report["modes"]["modes"] for e in (0, eta))
     w = 2 * np.pi * np.sort([mode["frequency_hz"] for mode in plain])
     lossy = sorted(lossy, key=lambda mode: mode["frequency_hz"])
     assert len(w) == len(lossy) > 5
-    omega = w * np.sqrt((1 + np.sqrt(1 - eta**2)) / 2)
-    exact = -eta * w**2 / (2 * omega) + 1j * omega
-    error = np.abs(exact - 1j * w * np.sqrt(1 + 1j * eta)) / w
-    for mode, value, distance in zip(lossy, exact, error):
+    exact = 1j * w * np.sqrt(1 + 1j * eta)
+    for mode, value in zip(lossy, exact):
         assert abs(2 * np.pi * mode["frequency_hz"] * 1j + mode["growth_rate"] - value) < 1e-9 * abs(value)
-        assert mode["loss_error"] == pytest.approx(distance, rel=1e-4)
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

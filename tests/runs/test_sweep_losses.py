@@ -67,13 +67,10 @@ def test_modes_that_losses_merge_on_the_first_basis_are_two_on_a_better_one(conv
     same_modes(modes_at(rows_of(run.output), 0.9, key="part.pin.loss_factor"), lambdas(single), 1e-9)
 
 
-def test_losses_beyond_a_viscous_equivalent(converged):
-    """Beyond eta = 1 modes are those of the complex problem: the threshold between both is on the way."""
+def test_losses_as_large_as_the_stiffness(converged):
     run = converged(*LOSSY, "--set", "sweep.key=part.pin.loss_factor", "--set", "sweep.values=[0.8, 1.6]", ranks=1)
     for eta in (0.8, 1.6):
         single = converged(*LOSSY, "--set", f"part.pin.loss_factor={eta}", ranks=1).report
-        errors = [mode["loss_error"] for mode in single["modes"]["modes"]]
-        assert (None in errors) == (eta > 1), errors
         same_modes(modes_at(rows_of(run.output), eta, key="part.pin.loss_factor"), lambdas(single), 1e-9)
 
 

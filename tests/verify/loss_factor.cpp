@@ -1,9 +1,6 @@
 // ranks: 1 2
-// Modes with loss factors. With one eta everywhere lambda^2 + lambda eta w^2/omega + w^2 = 0 with omega = Im(lambda)
-// has
-//     omega^2 = w^2 (1 + sqrt(1 - eta^2))/2,   Re(lambda) = -eta w^2/(2 omega),
-// beside i w sqrt(1 + i eta) of complex stiffness, w the undamped frequency. With several eta both problems are solved
-// dense, one mode at a time.
+// Modes with loss factors: those of complex stiffness. With one eta everywhere they are i w sqrt(1 + i eta), w the
+// undamped frequency. With several eta the problem is solved dense.
 #include "../support/linearised.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 
@@ -117,7 +114,7 @@ std::vector<Complex> dense_pairs(const Eigen::MatrixXcd& C, const Eigen::MatrixX
 
 } // namespace
 
-TEST_CASE("one loss factor everywhere gives the viscous equivalent in closed form, whatever frequency C is stated at")
+TEST_CASE("one loss factor everywhere gives complex stiffness in closed form, whatever frequency C is stated at")
 {
   for (const int n : {8, 1500}) // solved whole, and by slices
     for (const double eta : {0.02, 0.4})
@@ -135,16 +132,12 @@ TEST_CASE("one loss factor everywhere gives the viscous equivalent in closed for
         for (const ComplexMode* mode : ordered)
         {
           const double w = 2 * std::sqrt(row.s) * std::sin(++j * std::numbers::pi / (2 * (n + 1)));
-          const double omega = w * std::sqrt((1 + std::sqrt(1 - eta * eta)) / 2);
-          const Complex exact(-eta * w * w / (2 * omega), omega);
-          const Complex complex = Complex(0, w) * std::sqrt(Complex(1, eta));
-          CHECK(std::abs(mode->lambda - exact) < 1e-9 * w); // rounding of K at the end of a stiff row
-          CHECK(std::abs(mode->loss_error - std::abs(exact - complex) / std::abs(exact)) < 1e-9);
+          CHECK(std::abs(mode->lambda - Complex(0, w) * std::sqrt(Complex(1, eta))) < 1e-9 * w);
         }
       }
 }
 
-TEST_CASE("losses beyond every viscous equivalent give the modes of complex stiffness")
+TEST_CASE("large losses give the modes of complex stiffness")
 {
   constexpr int n = 8;
   for (const double eta : {1.0001, 1.3, 5.})
@@ -159,42 +152,39 @@ TEST_CASE("losses beyond every viscous equivalent give the modes of complex stif
     {
       const double w = 2 * std::sqrt(2e4) * std::sin(++j * std::numbers::pi / (2 * (n + 1)));
       CHECK(std::abs(mode->lambda - Complex(0, w) * std::sqrt(Complex(1, eta))) < 1e-11 * w); // rounding
-      CHECK(std::isnan(mode->loss_error));
     }
   }
 }
 
-TEST_CASE("beside strong viscous damping each mode has its equivalent or is that of complex stiffness")
+TEST_CASE("beside strong viscous damping modes are those of complex stiffness")
 {
   constexpr int n = 8;
   constexpr double eta = 0.2;
-  int without = 0;
   for (const double alpha : {48., 49., 97., 140., 190., 230.}) // critical is 2 w, of the lowest 98.2
   {
     CAPTURE(alpha);
     const Modes modes = modes_of({std::vector<double>(n + 1, eta), 2e4, alpha, 20}, 1000);
     CHECK(modes.outcome.residual < 1e-12);
+    int vibrating = 0;
     for (const ComplexMode& mode : modes.modes)
     {
       if (mode.lambda.imag() == 0) continue; // without frequency
-      const bool equivalent = !std::isnan(mode.loss_error);
-      const Complex loss = equivalent ? mode.lambda / mode.lambda.imag() : Complex(0, 1);
-      // w^2 (1 + eta loss) + alpha lambda + lambda^2 = 0 for one w^2 of the row
-      const Complex square = -mode.lambda * (mode.lambda + alpha) / (1. + eta * loss);
+      ++vibrating;
+      // w^2 (1 + i eta) + alpha lambda + lambda^2 = 0 for one w^2 of the row
+      const Complex square = -mode.lambda * (mode.lambda + alpha) / Complex(1, eta);
       double nearest = HUGE_VAL;
       for (int j = 1; j <= n; ++j)
         nearest =
             std::min(nearest, std::abs(square - 8e4 * std::pow(std::sin(j * std::numbers::pi / (2 * (n + 1))), 2)));
       CHECK(nearest < 1e-9 * 8e4);
-      without += !equivalent;
     }
+    CHECK(vibrating >= n - 2);
   }
-  CHECK(without > 0);
 }
 
-TEST_CASE("parts of different loss factors have the modes of dense algebra, and the distance to complex stiffness")
+TEST_CASE("parts of different loss factors have the modes of dense algebra")
 {
-  double most = 0.3; // a shim's: some modes have no viscous equivalent
+  double most = 0.3;
   SUBCASE("of linings") {}
   SUBCASE("of shims")
   {
@@ -204,28 +194,14 @@ TEST_CASE("parts of different loss factors have the modes of dense algebra, and 
   for (int i = 0; i < 13; ++i) row.loss.push_back(i < 5 ? most : i < 9 ? 0.01 : 0);
   const int n = row.masses();
   const Eigen::MatrixXd K = dense(row, row.shares()), L = dense(row, row.lossy());
-  const Eigen::MatrixXd C_0 = row.alpha * Eigen::MatrixXd::Identity(n, n);
-  const std::vector<Complex> stiff = dense_pairs(C_0, K + Complex(0, 1) * L);
+  const std::vector<Complex> stiff = dense_pairs(row.alpha * Eigen::MatrixXd::Identity(n, n), K + Complex(0, 1) * L);
   const Modes modes = modes_of(row, 1000);
   REQUIRE(modes.modes.size() == static_cast<std::size_t>(n));
-  double largest = 0;
   for (const ComplexMode& mode : modes.modes)
   {
     CHECK(mode.backward_error < 1e-12);
-    if (std::isnan(mode.loss_error))
-    {
-      CHECK(most > 1);
-      CHECK(std::abs(mode.lambda - nearest(stiff, mode.lambda)) < 1e-11 * std::abs(mode.lambda));
-      continue;
-    }
-    Complex own = mode.lambda;
-    for (int i = 0; i < 40; ++i) own = nearest(dense_pairs(C_0 + L / own.imag(), K.cast<Complex>()), own);
-    CHECK(std::abs(mode.lambda - own) < 1e-11 * std::abs(own)); // rounding of the companion matrix
-    const double distance = std::abs(own - nearest(stiff, own)) / std::abs(own);
-    CHECK(std::abs(mode.loss_error - distance) < 1e-10);
-    largest = std::max(largest, distance);
+    CHECK(std::abs(mode.lambda - nearest(stiff, mode.lambda)) < 1e-11 * std::abs(mode.lambda)); // rounding
   }
-  CHECK(largest > 1e-4); // the two differ
   CHECK(std::is_sorted(modes.modes.begin(), modes.modes.end(),
                        [](const ComplexMode& a, const ComplexMode& b) { return a.lambda.real() > b.lambda.real(); }));
 }
@@ -251,7 +227,7 @@ TEST_CASE("every mode of a cluster that losses mix is found once")
   for (auto mode = modes.modes.begin(); mode != modes.modes.end(); ++mode)
   {
     const Complex lambda = mode->lambda;
-    Eigen::MatrixXcd Q = K + lambda / lambda.imag() * L;
+    Eigen::MatrixXcd Q = K + Complex(0, 1) * L;
     Q.diagonal().array() += lambda * (lambda + row.alpha);
     const Eigen::VectorXd singular = Eigen::BDCSVD<Eigen::MatrixXcd>(Q).singularValues();
     CHECK(singular.tail<1>()(0) < 1e-12 * singular(0));

@@ -26,21 +26,12 @@ struct DenseEigenpair
 std::vector<DenseEigenpair> solve_dense_quadratic(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
                                                   const Eigen::MatrixXd& K);
 
-/// What loss factors are in a mode.
-enum class LossKind
-{
-  none,    // the mode does not oscillate, or nothing has a loss factor
-  viscous, // of the mode's own frequency
-  complex, // i K_loss: there is no viscous equivalent
-};
-
 /// An eigenvalue with both of its vectors: Q(lambda) right = 0, left' Q(lambda) = 0, Q = lambda^2 M + lambda C + K; the
 /// prime transposes without conjugation. 2-norms are 1. Q may have loss factors too (dense_losses.hpp).
 struct TwoSidedPair
 {
   std::complex<double> lambda;
   Eigen::VectorXcd right, left;
-  LossKind loss = LossKind::none;
 };
 
 /// The vectors of one side as columns; empty without pairs.

@@ -1,7 +1,7 @@
 #pragma once
 /// Dense quadratic eigenproblems with loss factors (src/README.md, section 3.11):
 ///     Q(lambda) y = 0,   Q = lambda^2 M + lambda C + K + f K_loss
-/// f is lambda/Im(lambda) where loss factors have their viscous equivalent at the mode's own frequency, else i; 0 of a
+/// f is i, of complex stiffness K + i K_loss, where lambda oscillates (Im(lambda) > 0); 0 of a
 /// real lambda. Matrices are square, of one size and not symmetric in general.
 #include "squeal/algebra/dense_eigenproblems.hpp"
 
@@ -14,27 +14,13 @@ namespace squeal
 {
 
 /// f
-std::complex<double> loss_factor_of(LossKind kind, std::complex<double> lambda);
-
-/// x'Q'(lambda) y d lambda, whose derivative of f K_loss is by Im(lambda) as well: `slope` d lambda + `turn` Im(d
-/// lambda).
-struct EigenvalueSlope
-{
-  std::complex<double> slope, turn;
-};
-
-/// From the products of left and right vectors with M, C and K_loss.
-EigenvalueSlope slope_of(LossKind kind, std::complex<double> lambda, std::complex<double> mass,
-                         std::complex<double> damping, std::complex<double> loss);
-
-/// The change of lambda that takes away a residual x'Q y.
-std::complex<double> eigenvalue_change(const EigenvalueSlope& slope, std::complex<double> residual);
+std::complex<double> loss_factor_of(std::complex<double> lambda);
 
 /// Of M, C, K and K_loss.
 using ComplexFactors = std::array<std::complex<double>, 4>;
 
-/// At lambda, f by what loss factors are in the mode.
-ComplexFactors loss_factors(LossKind kind, std::complex<double> lambda);
+/// lambda^2, lambda, 1 and f
+ComplexFactors loss_factors(std::complex<double> lambda);
 
 /// M, C, K and K_loss.
 using LossyMatrices = std::array<Eigen::MatrixXd, 4>;
@@ -44,27 +30,14 @@ Eigen::MatrixXcd sum(const LossyMatrices& A, const ComplexFactors& factors);
 
 /// Makes a pair that is nearly one of the problem its own, by Newton's method on (lambda, y). Returns whether it found
 /// one that oscillates.
-bool solve_lossy(const LossyMatrices& problem, LossKind kind, DenseEigenpair& pair);
+bool solve_lossy(const LossyMatrices& problem, DenseEigenpair& pair);
 
 /// The same beside other pairs of the problem, by Newton's method without what its vector has of them: near ones would
 /// draw it to themselves.
-bool solve_lossy_beside(const LossyMatrices& problem, LossKind kind, std::span<const DenseEigenpair> others,
-                        DenseEigenpair& pair);
-
-/// A mode of its own frequency, and of the complex problem.
-struct LossyMode
-{
-  DenseEigenpair viscous{}, complex{};
-  LossKind taken = LossKind::viscous; // complex where there is no fixed point
-
-  const DenseEigenpair& pair() const { return taken == LossKind::viscous ? viscous : complex; }
-};
-
-/// Whether a fixed point belongs to the mode: of one loss factor everywhere its distance is at most 0.466, at eta = 1.
-bool is_equivalent(const DenseEigenpair& viscous, const DenseEigenpair& complex);
+bool solve_lossy_beside(const LossyMatrices& problem, std::span<const DenseEigenpair> others, DenseEigenpair& pair);
 
 /// What pairs without K_loss become as it grows from zero, followed together so that neighbours stay apart.
-std::vector<LossyMode> with_losses(const LossyMatrices& problem, const std::vector<DenseEigenpair>& without);
+std::vector<DenseEigenpair> with_losses(const LossyMatrices& problem, const std::vector<DenseEigenpair>& without);
 
 /// Pairs of neighbouring frequency. Those from `first` to `end` are solved together, on the span of the vectors of all.
 struct NeighbouringPairs
@@ -107,7 +80,7 @@ std::vector<NeighbouringPairs> neighbouring_pairs(const std::vector<std::complex
 /// Collective.
 void add_losses_shared(MPI_Comm comm, const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs);
 
-/// Makes pairs that are nearly those of the problem its own, each with its kind of loss; from the matrices of rank 0,
+/// Makes pairs that are nearly those of the problem its own; from the matrices of rank 0,
 /// on every rank. Collective.
 void refine_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs);
 

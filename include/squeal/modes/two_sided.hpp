@@ -1,8 +1,7 @@
 #pragma once
 /// A mode with its left vector, of the whole problem whatever its matrices (src/README.md, sections 3.11 and 11.1):
 ///     Q(lambda) y = 0,   Q(lambda)'x = 0,   Q = lambda^2 M + lambda C + K + f K_loss
-/// f is lambda/Im(lambda) where loss factors have their viscous equivalent at the mode's own frequency, else i; 0 of a
-/// real lambda.
+/// f is i of complex stiffness, 0 of a real lambda.
 ///
 /// Both vectors are sought on subspaces of their own. Residuals r join them as P^-1 r and P'^-1 r, P = K - tau M,
 /// tau = -Re(lambda^2), until both are small; the two-sided Rayleigh quotient then moves lambda.
@@ -13,8 +12,6 @@
 
 namespace squeal
 {
-
-LossKind loss_kind_of(const ComplexMode& mode);
 
 /// The problem and its transposed one.
 struct TwoSidedProblem
@@ -37,7 +34,6 @@ struct TwoSidedMode
 };
 
 /// The mode near a lambda with a right vector. Collective. Error: memory runs out.
-TwoSidedMode find_two_sided(TwoSidedProblem& problem, LossKind kind, std::complex<double> lambda,
-                            const MultiVector& right);
+TwoSidedMode find_two_sided(TwoSidedProblem& problem, std::complex<double> lambda, const MultiVector& right);
 
 } // namespace squeal
