@@ -22,8 +22,6 @@ struct ComplexMode
   Owned<Vec> real, imaginary;                  // in the structure's dofs; largest entry of |phi| is 1
   std::vector<std::complex<double>> reactions; // normal reaction per pair [N per m of the mode]; 0 on open pairs
   double backward_error = 0;
-  double loss_error = 0; // distance of lambda to that of complex stiffness over |lambda|; 0 without loss factors; NaN
-                         // where the losses have no viscous equivalent: lambda is that of complex stiffness
 
   double frequency_hz() const; // |Im(lambda)| / 2 pi
   double growth_rate() const { return lambda.real(); }
