@@ -180,7 +180,7 @@ void print_help()
               "%s\n"
               "Algorithm options (PETSc options database) [default]\n%s\n"
               "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes\n %s\n"
-              "e.g. -cycle_snes_monitor, -modes_pep_monitor, -cycle_full_ksp_rtol 1e-3.\n\n"
+              "e.g. -cycle_snes_monitor, -modes_pep_monitor, -cycle_snes_rtol 1e-3.\n\n"
               "Options of the whole run, PETSc's:\n%s",
               SQUEAL_VERSION, argument_reference().c_str(), scene_reference().c_str(), option_reference().c_str(),
               prefixes.c_str(), session_option_reference().c_str());

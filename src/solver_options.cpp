@@ -21,19 +21,11 @@ PetscErrorCode keep_message(MPI_Comm, int, const char*, const char*, PetscErrorC
   return code;
 }
 
-/// How a Newton iteration knows its Jacobian.
-enum class Jacobian
-{
-  as_entries, // on a subspace, by every rank for itself
-  as_product, // in the full space
-};
-
 /// A solver of a stage, with the options of that database; null: the program's own. With a database of its own it
 /// solves x = 1, or for 20 eigenvalues, which no stage wants fewer of.
 struct Trial
 {
   const char* object; // the prefix that it has
-  Jacobian jacobian;  // of a Newton iteration
   PetscErrorCode (*run)(const Trial& trial, MPI_Comm comm, PetscOptions database);
 };
 
@@ -50,52 +42,24 @@ PetscErrorCode keep_jacobian(SNES, Vec, Mat, Mat, void*)
   return PETSC_SUCCESS;
 }
 
-PetscErrorCode copy_vector(Mat, Vec x, Vec product)
-{
-  return VecCopy(x, product);
-}
-
-PetscErrorCode copy_through(PC, Vec x, Vec product)
-{
-  return VecCopy(x, product);
-}
-
-PetscErrorCode make_identity(Jacobian jacobian, MPI_Comm comm, Mat* identity)
+PetscErrorCode make_identity(MPI_Comm comm, Mat* identity)
 {
   constexpr PetscInt size = 8;
   PetscFunctionBeginUser;
-  if (jacobian == Jacobian::as_entries)
-  {
-    PetscCall(MatCreateSeqDense(comm, size, size, nullptr, identity));
-    PetscCall(MatShift(*identity, 1));
-  }
-  else
-  {
-    PetscCall(MatCreateShell(comm, PETSC_DECIDE, PETSC_DECIDE, size, size, nullptr, identity));
-    PetscCall(MatShellSetOperation(*identity, MATOP_MULT, reinterpret_cast<void (*)(void)>(copy_vector)));
-  }
+  PetscCall(MatCreateSeqDense(comm, size, size, nullptr, identity));
+  PetscCall(MatShift(*identity, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode rehearse_snes(SNES snes, Jacobian jacobian, MPI_Comm comm)
+PetscErrorCode rehearse_snes(SNES snes, MPI_Comm comm)
 {
   Owned<Mat> identity;
   Owned<Vec> x, residual;
-  KSP ksp = nullptr;
-  PC pc = nullptr;
   PetscFunctionBeginUser;
-  PetscCall(make_identity(jacobian, comm, identity.put()));
+  PetscCall(make_identity(comm, identity.put()));
   PetscCall(MatCreateVecs(identity, x.put(), residual.put()));
   PetscCall(SNESSetFunction(snes, residual, residual_of_ones, nullptr));
   PetscCall(SNESSetJacobian(snes, identity, identity, keep_jacobian, nullptr));
-  PetscCall(SNESGetKSP(snes, &ksp));
-  PetscCall(KSPGetPC(ksp, &pc));
-  if (jacobian == Jacobian::as_product)
-  {
-    PetscCall(KSPSetPCSide(ksp, PC_RIGHT));
-    PetscCall(PCSetType(pc, PCSHELL));
-    PetscCall(PCShellSetApply(pc, copy_through));
-  }
   PetscCall(SNESSetFromOptions(snes));
   PetscCall(SNESSolve(snes, nullptr, x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -106,12 +70,12 @@ PetscErrorCode try_snes(const Trial& trial, MPI_Comm comm, PetscOptions database
   Owned<SNES> snes;
   PetscInt iterations = 0; // looked at by PETSc in the solve only
   PetscFunctionBeginUser;
-  if (database && trial.jacobian == Jacobian::as_entries) comm = PETSC_COMM_SELF;
+  if (database) comm = PETSC_COMM_SELF;
   PetscCall(SNESCreate(comm, snes.put()));
   PetscCall(PetscObjectSetOptions(reinterpret_cast<PetscObject>(snes.get()), database));
   PetscCall(SNESSetOptionsPrefix(snes, trial.object));
   if (database)
-    PetscCall(rehearse_snes(snes, trial.jacobian, comm));
+    PetscCall(rehearse_snes(snes, comm));
   else
     PetscCall(SNESSetFromOptions(snes));
   PetscCall(SNESGetTolerances(snes, nullptr, nullptr, nullptr, &iterations, nullptr));
@@ -197,8 +161,7 @@ std::string problem_of_type(const std::string& name, const std::string& value)
   return "option -" + shortened(name) + " " + shortened(value) + ": it is one of" + list;
 }
 
-constexpr std::array trials = {Trial{"cycle_full_", Jacobian::as_product, try_snes},
-                               Trial{"cycle_", Jacobian::as_entries, try_snes}, Trial{"modes_", {}, try_pep}};
+constexpr std::array trials = {Trial{"cycle_", try_snes}, Trial{"modes_", try_pep}};
 
 // Parts of names that objects ask for only while they are set up or solve; a trial does not get there.
 constexpr std::array asked_later = {"_test_", "_compare_", "_mat_"};

@@ -82,7 +82,7 @@ NUMBERS = ["0", "-1", "1e308", "-1e308", "1e-308", "nan", "inf", "-inf", "1e15",
 TEXTS = ["", ".", "..", "/", "a/b", "x" * 3000, "é€𝄞", "\\u0000", "ground", "pad", "disc", "no such", "*", "%s%n", "-help", "$HOME"]
 OPTIONS = ["-log_view", "-info", "-history", "-options_file", "-malloc_debug", "-options_left", "-fp_trap", "-log_trace",
            "-mat_type", "-vec_type", "-on_error_abort", "-start_in_debugger", "-cycle_snes_type", "-cycle_snes_monitor",
-           "-cycle_full_ksp_type", "-cycle_full_ksp_rtol", "-cycle_snes_max_it", "-modes_pep_type", "-modes_st_type",
+           "-cycle_snes_max_it", "-modes_pep_type", "-modes_st_type",
            "-modes_pep_nev", "-nox", "-no_such", "--help", "--version", "--output", "--set", "--force", "-", "--", "-3", "−x",
            "-cycle_snes_view", "-cycle_snes_linesearch_type", "-cycle_pc_type", "-cycle_ksp_type"]
 VALUES = ["magic", "0", "-1", "1", "1e400", "nan", "inf", "4294967297", ":/no/such/x", "/dev/null", ".", "", "true", "x" * 3000,

@@ -16,10 +16,9 @@ struct SolverPrefix
   Stage stage;        // that the object works in
 };
 
-inline constexpr std::array solver_prefixes = {
-    SolverPrefix{"modes_pep_", "modes_", Stage::modes}, SolverPrefix{"modes_st_", "modes_", Stage::modes},
-    SolverPrefix{"cycle_snes_", "cycle_", Stage::cycle}, SolverPrefix{"cycle_full_snes_", "cycle_full_", Stage::cycle},
-    SolverPrefix{"cycle_full_ksp_", "cycle_full_", Stage::cycle}};
+inline constexpr std::array solver_prefixes = {SolverPrefix{"modes_pep_", "modes_", Stage::modes},
+                                               SolverPrefix{"modes_st_", "modes_", Stage::modes},
+                                               SolverPrefix{"cycle_snes_", "cycle_", Stage::cycle}};
 
 /// The prefix of an option's name, which stands without its dash; null if it has none of these.
 const SolverPrefix* solver_prefix_of(const std::string& name);

@@ -2,7 +2,6 @@
 
 #include "exact_newton.hpp"
 #include "free_periods.hpp"
-#include "newton_krylov.hpp"
 #include "squeal/shooting/multisecant.hpp"
 
 namespace squeal
@@ -12,7 +11,6 @@ StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& optio
 {
   if (start.residual <= problem.tolerance) return {std::move(start), StageEnding::converged};
   if (options.finish == Finish::none) return {std::move(start), StageEnding::stalled};
-  if (options.finish == Finish::newton_krylov) return shoot_by_newton_krylov(problem, options, log, start);
   if (has_small_tangent(problem)) return shoot_by_exact_newton(problem, options, log, start);
   Multisecant memory;
   return shoot_by_multisecant(problem, options, log, memory, start);
@@ -22,20 +20,11 @@ StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptio
                                 Orbit start)
 {
   StageResult result = shoot_once(problem, options, log, std::move(start));
-  const auto given_up = [&]
-  { return result.ending != StageEnding::converged && log.convergence.periods < options.max_periods; };
-  if (options.finish != Finish::multisecant) return result;
-  if (given_up())
-  {
-    Orbit again = integrate_free_periods(problem, log, result.orbit.state, result.orbit.period, {10, 0});
-    if (collapsing(problem, again)) return {std::move(again), StageEnding::collapsed};
-    result = shoot_once(problem, options, log, std::move(again));
-  }
-  if (!given_up()) return result;
-  const StageEnding before = result.ending;
-  result = shoot_by_newton_krylov(problem, options, log, result.orbit);
-  if (result.ending == StageEnding::stalled) result.ending = before;
-  return result;
+  const bool given_up = result.ending != StageEnding::converged && log.convergence.periods < options.max_periods;
+  if (!given_up || options.finish == Finish::none) return result;
+  Orbit again = integrate_free_periods(problem, log, result.orbit.state, result.orbit.period, {10, 0});
+  if (collapsing(problem, again)) return {std::move(again), StageEnding::collapsed};
+  return shoot_once(problem, options, log, std::move(again));
 }
 
 StageResult prefer_fewer_rounds(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,

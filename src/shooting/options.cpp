@@ -12,7 +12,7 @@ OptionList options_of(ShootingOptions& options)
        "times the subspace may grow by what it missed; below 0: 4 without a finish, else 0"},
       {"-cycle_difference", &options.difference, Range::positive,
        "difference step over the fluctuation, in the energy norm"},
-      {"-cycle_finish", choice_of(options.finish), Range::any, "full-space finish: multisecant, newton_krylov or none"},
+      {"-cycle_finish", choice_of(options.finish), Range::any, "full-space finish: multisecant or none"},
       {"-cycle_clamp", &options.clamp, Range::positive, "longest step of the finish over the fluctuation"},
       {"-cycle_stall", &options.stall, Range::not_negative,
        "iterations without progress before an attempt of the finish is given up"},

@@ -2,7 +2,6 @@
 
 #include "beside_orbit.hpp"
 #include "free_periods.hpp"
-#include "newton_krylov.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/shooting/full_space.hpp"
@@ -362,7 +361,6 @@ void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable
 void declare_solver_options()
 {
   declare_subspace_options();
-  declare_newton_krylov_options();
 }
 
 } // namespace squeal

@@ -1,6 +1,5 @@
 #include "subspace_newton.hpp"
 
-#include "shell_preconditioner.hpp"
 #include "squeal/base/callback.hpp"
 #include "squeal/base/integers.hpp"
 
@@ -244,7 +243,16 @@ void set_callbacks(SNES snes, SubspaceSystem& system, Mat J, Vec R)
   check(SNESSetFunction(snes, R, residual_callback, &system));
   check(SNESSetJacobian(snes, J, J, jacobian_callback, &system));
   check(SNESSetConvergenceTest(snes, convergence_callback, &system, nullptr));
-  set_shell_preconditioner(snes, {"least squares by singular values", &system, least_squares_callback});
+  KSP ksp = nullptr;
+  PC pc = nullptr;
+  PetscBool shell = PETSC_FALSE;
+  check(SNESGetKSP(snes, &ksp));
+  check(KSPGetPC(ksp, &pc));
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &shell));
+  if (!shell) return; // the user's choice
+  check(PCShellSetContext(pc, &system));
+  check(PCShellSetName(pc, "least squares by singular values"));
+  check(PCShellSetApply(pc, least_squares_callback));
 }
 
 } // namespace

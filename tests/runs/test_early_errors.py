@@ -27,7 +27,7 @@ def refused(run, *words):
 TOAR = ["-modes_solver", "toar", "-modes_dense_limit", "1"]
 # what is given, and words of the message
 OPTIONS = {
-    "no such word": (["-cycle_finish", "magic"], ["-cycle_finish", "newton_krylov"]),
+    "no such word": (["-cycle_finish", "magic"], ["-cycle_finish", "multisecant"]),
     "zero": (["-cycle_clamp", "0"], ["-cycle_clamp", "above 0"]),
     "text for a number": (["-cycle_max_periods", "many"], ["-cycle_max_periods", "many"]),
     "infinite": (["-cycle_difference", "inf"], ["-cycle_difference", "finite"]),
@@ -35,7 +35,7 @@ OPTIONS = {
     "an object of PETSc's that squeal has not": (["-mat_type", "magic"], ["-mat_type"]),
     "no type of solver": (["-cycle_snes_type", "magic"], ["-cycle_snes_type magic", "newtonls"]),
     "no type of eigensolver": (["-modes_solver", "toar", "-modes_pep_type", "magic"], ["-modes_pep_type magic", "toar"]),
-    "no type of linear solver": (["-cycle_full_ksp_type", "magic"], ["-cycle_full_ksp_type magic", "gmres"]),
+    "no type of linear solver": (["-modes_st_ksp_type", "magic", "-modes_solver", "toar"], ["-modes_st_ksp_type magic", "gmres"]),
     "a mesh that is a folder": (["--set", "mesh.file=."], ["is a folder"]),
     "a mesh that is a device": (["--set", "mesh.file=/dev/zero"], ["no plain file"]),
     "a name that ends a line of C": (["--set", 'probe.0.name="a\\u0000b"'], ["probe", "control characters"]),
@@ -45,18 +45,16 @@ OPTIONS = {
     "a solver inside another": (["-cycle_ksp_rtol", "1"], ["-cycle_ksp_rtol"]),
     "a solver that slices leave out": (["-modes_pep_tol", "1e-9"], ["-modes_pep_tol", "toar"]),
     "fewer iterations than none": (["-cycle_snes_max_it", "-7"], ["-cycle_", "max_it", "-7"]),
-    "fewer iterations of the finish than none": (["-cycle_full_snes_max_it", "-7"], ["-cycle_full_", "max_it", "-7"]),
     "no option of the eigensolver": (["-modes_solver", "toar", "-modes_pep_tool", "1"], ["-modes_pep_tool"]),
-    "no option of the linear solver": (["-cycle_full_ksp_rtoll", "1"], ["-cycle_full_ksp_rtoll"]),
+    "no option of the linear solver": (["-modes_solver", "toar", "-modes_st_ksp_rtoll", "1"], ["-modes_st_ksp_rtoll"]),
     "a type that needs more than an operator": ([*TOAR, "-modes_pep_type", "jd"], ["-modes_pep_type jd", "toar"]),
     "a Newton method that needs subdomains": (["-cycle_snes_type", "aspin"], ["-cycle_snes_type aspin", "newtonls"]),
     "an eigensolver of symmetric problems": ([*TOAR, "-modes_pep_type", "stoar"], ["-modes_", "Hermitian"]),
     "a transformation that the eigensolver cannot use": ([*TOAR, "-modes_st_type", "filter"], ["-modes_", "shift"]),
     "a basis too small for its vectors": ([*TOAR, "-modes_pep_ncv", "1"], ["-modes_", "ncv"]),
-    "a linear solver of symmetric problems": (["-cycle_finish", "newton_krylov", "-cycle_full_ksp_type", "cg"], ["-cycle_full_", "cg"]),
     "a Newton method without its parts": (["-cycle_subspace_newtons", "5", "-cycle_snes_type", "shell"], ["-cycle_", "SNESShell"]),
     "a solver's view of no format": (["-cycle_snes_view", "::magic"], ["-cycle_snes_view", "ascii_info"]),
-    "a solver's view on the screen": (["-cycle_full_snes_monitor_solution", "draw"], ["-cycle_full_snes_monitor_solution", "draw"]),
+    "a solver's view on the screen": (["-cycle_snes_monitor_solution", "draw"], ["-cycle_snes_monitor_solution", "draw"]),
     "a solver's view where there is no folder": ([*TOAR, "-modes_pep_view", ":/no/such/y"], ["-modes_pep_view", "/no/such"]),
     "less than one step": (["--set", "transient.periods=1e-9"], ["transient.periods", "one time step"]),
     "no file of options": (["-options_file", "missing"], ["-options_file", "missing"]),
@@ -106,7 +104,7 @@ def test_options_of_solvers_are_taken(squeal):
     """Also where the run finds out only later whether it needs the solver, and where a part of it asks for the option."""
     run = squeal(OSCILLATOR, "--dry-run", "-modes_solver", "toar", "-modes_pep_tol", "1e-9", "-modes_st_pc_type", "lu",
                  "-modes_st_ksp_type", "preonly", "-modes_pep_view", "-cycle_snes_monitor", "-cycle_snes_rtol", "1e-9",
-                 "-cycle_snes_linesearch_type", "basic", "-cycle_full_snes_max_it", "3", "-cycle_full_ksp_gmres_restart", "9",
+                 "-cycle_snes_linesearch_type", "basic", "-cycle_snes_max_it", "3",
                  ranks=1)
     assert run.code == 0, run.errors
 

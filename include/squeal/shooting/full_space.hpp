@@ -10,7 +10,7 @@ namespace squeal
 /// One attempt: Newton with the whole matrix of a small system's exact tangent, else the multisecant iteration.
 StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit start);
 
-/// The same; where it gives up, ten free periods and one more attempt; where that gives up, Newton-Krylov.
+/// The same; where it gives up, ten free periods and one more attempt.
 StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
                                 Orbit start);
 

@@ -10,12 +10,11 @@ namespace squeal
 /// The solver of the full-space equations that ends a shooting.
 enum class Finish
 {
-  multisecant,   // and Newton-Krylov where it gives up
-  newton_krylov, // alone
-  none,          // the orbit of the subspace is the result
+  multisecant, // or Newton with the whole tangent of a small system
+  none,        // the orbit of the subspace is the result
 };
 
-inline constexpr std::array finish_words = {"multisecant", "newton_krylov", "none"};
+inline constexpr std::array finish_words = {"multisecant", "none"};
 
 inline Words words_of(Finish)
 {

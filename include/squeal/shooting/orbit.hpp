@@ -48,13 +48,12 @@ enum class ShootingStage
   subspace,       // Newton on the coordinates of a few given shapes
   grown_subspace, // the same with the defects of earlier stages among the shapes
   multisecant,
-  newton_krylov,
   full_period,  // one evaluation of a full model's flow
   exact_newton, // with the whole matrix of the exact tangent
 };
 
-inline constexpr std::array shooting_stage_words = {"free",          "reduced",     "grown base", "multisecant",
-                                                    "newton-krylov", "full period", "newton"};
+inline constexpr std::array shooting_stage_words = {"free",        "reduced",     "grown base",
+                                                    "multisecant", "full period", "newton"};
 
 inline Words words_of(ShootingStage)
 {

@@ -58,8 +58,8 @@ OrbitProblem problem_of(const Flow& flow, const Preconditioner& preconditioner, 
 ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, const ShootingStart& start,
                      const ShootingSettings& settings, const ShootingOptions& options);
 
-/// Makes the options of the solvers (-cycle_snes_..., -cycle_full_snes_..., -cycle_full_ksp_...) known to PETSc even
-/// where they never run. Collective.
+/// Makes the options of the solver on the subspace (-cycle_snes_...) known to PETSc even where it never runs.
+/// Collective.
 void declare_solver_options();
 
 } // namespace squeal
