@@ -13,7 +13,7 @@
 # What is done stays: stop it when you like and start it again.
 # Knobs: SCENE, MU (list), PERIODS (of the direct integration), STEPS (a period, of both), AMPLITUDE, RANKS, LAUNCH,
 # OUTPUT, and any further arguments for squeal. The small brake: SCENE=inputs/tgv/scene.toml MU="$(seq 0.2 0.02 0.4)" STEPS=64 with
-# the arguments of src/README.md, section 1.7.
+# the arguments of tests/evidence/README.md.
 set -eu
 # Where squeal is: SQUEAL_ROOT, or the folder above this script, of which Slurm runs a copy.
 script=$0
