@@ -1,11 +1,13 @@
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/checkpoint.hpp"
+#include "squeal/base/markdown.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/forecast.hpp"
 #include "squeal/given_options.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"
+#include "squeal/scene/reference.hpp"
 #include "squeal/session_options.hpp"
 #include "squeal/solver_options.hpp"
 
@@ -30,7 +32,7 @@ struct Arguments
   std::vector<std::string> overrides;
   RunLimits limits;
   Beginning beginning = Beginning::afresh;
-  bool dry_run = false, help = false, version = false, allow_scripts = false, force = false;
+  bool dry_run = false, help = false, version = false, allow_scripts = false, force = false, reference = false;
   std::string problem;                     // said after MPI is up, once
   std::vector<std::string> option_sources; // beside the command line
 };
@@ -78,6 +80,12 @@ const std::array known_arguments = {
              [](Arguments& arguments, const std::string&) { arguments.version = true; }},
     Argument{"--help", nullptr, "this text; -help and -h as well",
              [](Arguments& arguments, const std::string&) { arguments.help = true; }},
+    Argument{"--reference", "keys", "the page of all keys, options and arguments, as Markdown",
+             [](Arguments& arguments, const std::string& value)
+             {
+               arguments.reference = value == "keys";
+               if (!arguments.reference) arguments.problem = "--reference " + shortened(value) + ": it takes keys";
+             }},
     Argument{"--allow-scripts", nullptr,
              "lets the scene's geometry run commands and write files, as gmsh's statements can",
              [](Arguments& arguments, const std::string&) { arguments.allow_scripts = true; }},
@@ -184,6 +192,32 @@ void print_help()
               "Options of the whole run, PETSc's:\n%s",
               SQUEAL_VERSION, argument_reference().c_str(), scene_reference().c_str(), option_reference().c_str(),
               prefixes.c_str(), session_option_reference().c_str());
+}
+
+/// The page inputs/KEYS.md.
+void print_key_page()
+{
+  std::string arguments = markdown_head({"argument", "meaning"}), prefixes;
+  for (const Argument& known : known_arguments)
+    arguments +=
+        markdown_row({markdown_code(known.name + (known.value ? std::string(" ") + known.value : "")), known.meaning});
+  for (const SolverPrefix& prefix : solver_prefixes) prefixes += std::string(" `-") + prefix.text + "`";
+  std::printf(
+      "# Keys and options\n\n"
+      "`squeal --reference keys` writes this page from the program's own tables. [README.md](README.md) is the "
+      "guide.\n\n"
+      "## Keys of a scene\n\n"
+      "A default of *required* must be given; no default means that a key may be absent. The column *changes* names "
+      "what\n"
+      "is made again where a number changes. Motions are any of `x`, `y`, `z`, `rx`, `ry` and `rz` in one text, or "
+      "`all`,\n"
+      "or `none`. A direction is a text such as `\"x\"` or `\"-y\"`, or a vector.\n%s"
+      "\n## Arguments\n\n%s\n## Options\n\n"
+      "Options are of PETSc's database: of the command line, `PETSC_OPTIONS`, and files `.petscrc`.\n\n%s"
+      "\n## Options of solvers\n\nOptions of PETSc's and SLEPc's own solvers follow the prefixes%s.\n"
+      "One that no solver asks for is an error. Those of the whole run are:\n\n```text\n%s```\n",
+      scene_page().c_str(), arguments.c_str(), option_page().c_str(), prefixes.c_str(),
+      session_option_reference().c_str());
 }
 
 void print_versions()
@@ -371,9 +405,9 @@ int main(int argc, char** argv)
   Session session(argc, argv, nullptr);
   note_ranks();
   const int rank = rank_of(PETSC_COMM_WORLD);
-  if (arguments.help || arguments.version)
+  if (arguments.help || arguments.version || arguments.reference)
   {
-    if (rank == 0) arguments.help ? print_help() : print_versions();
+    if (rank == 0) arguments.help ? print_help() : arguments.version ? print_versions() : print_key_page();
     return 0;
   }
   try

@@ -1,6 +1,7 @@
 #include "squeal/options.hpp"
 
 #include "squeal/base/free_memory.hpp"
+#include "squeal/base/markdown.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/scene/scene.hpp"
 #include "squeal/session_options.hpp"
@@ -65,6 +66,19 @@ std::string option_reference()
     text << option.meaning << " [" << value_of(option) << "]\n";
   }
   return text.str();
+}
+
+std::string option_page()
+{
+  ProgramOptions standard;
+  std::string text = markdown_head({"option", "default", "values", "meaning"});
+  for (const Option& option : options_of(standard))
+  {
+    std::string values;
+    for (const char* one : words_of(option)) values += (values.empty() ? "" : ", ") + markdown_code(one);
+    text += markdown_row({markdown_code(option.name), markdown_code(value_of(option)), values, option.meaning});
+  }
+  return text;
 }
 
 ProgramOptions read_program_options(MPI_Comm comm)

@@ -41,6 +41,9 @@ std::string problem_of_option_name(const std::string& name);
 /// A line for each option: name, meaning, default.
 std::string option_reference();
 
+/// A table of Markdown with a row for each option.
+std::string option_page();
+
 /// The options of PETSc's database. Collective. Error: a value that an option does not take. Names are checked before
 /// PETSc starts (squeal/session_options.hpp).
 ProgramOptions read_program_options(MPI_Comm comm);

@@ -334,9 +334,10 @@ OptionList options_of(FactorOptions& options)
 {
   return {
       {"-factor", choice_of(options.kind), Range::any,
-       "of the step and of equilibrium: supernodal, mumps (both on all ranks), dense (on rank 0)"},
+       "factorisation for the step and the equilibrium: supernodal, mumps (both on all ranks), dense (on rank 0)"},
       {"-factor_limit", &options.limit, Range::any,
-       "GB of a rank's share in a supernodal factor; beyond it several ranks take MUMPS; -1: half of the free memory"},
+       "[GB] largest share of a rank in a supernodal factor; beyond it several ranks take MUMPS; -1: half of the free "
+       "memory. Every run prints its choice, with what is foreseen"},
   };
 }
 

@@ -254,7 +254,8 @@ OptionList options_of(PencilOptions& options)
 {
   return {
       {"-modes_whole_factor", &options.whole_limit, Range::not_negative,
-       "[GB] of a factor that every rank makes whole and solves its vectors with; a larger one is shared"},
+       "[GB] of a factor that every rank makes whole, with results that repeat to the last bit; a larger one is "
+       "shared"},
   };
 }
 

@@ -137,8 +137,9 @@ bool all_settled(const std::vector<ReachedMotion>& motions, long periods)
 
 OptionList options_of(AttractorOptions& options)
 {
-  return {{"-attractors_periods", &options.periods, Range::positive, "that each start is integrated over, at most"},
-          {"-attractors_seed", &options.seed, Range::not_negative, "of the random starts"}};
+  return {{"-attractors_periods", &options.periods, Range::positive,
+           "largest number of periods over which the motions of cycle.starts are integrated"},
+          {"-attractors_seed", &options.seed, Range::not_negative, "seed of the random starts"}};
 }
 
 Attractors find_attractors(const AttractorProblem& problem, const AttractorOptions& options)

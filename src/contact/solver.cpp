@@ -114,11 +114,12 @@ OptionList options_of(ContactSettings& settings)
       {"-transient_contact_solver", choice_of(settings.solver), Range::any,
        "block Gauss-Seidel, or the projection fixed point (fixed_point)"},
       {"-transient_contact_tolerance", &settings.tolerance, Range::positive,
-       "largest natural map of a pair over the largest reaction; looser far from a large model's cycle"},
+       "largest natural map of a pair over the largest reaction; beyond 10 000 degrees of freedom periods of shooting "
+       "that are still far from the cycle take up to 1e-6"},
       {"-transient_contact_max_it", &settings.max_iterations, Range::natural,
-       "contact iterations (sweeps) allowed a step"},
+       "largest number of contact iterations (sweeps) a step"},
       {"-transient_contact_rho", &settings.rho, Range::below_two,
-       "of the fixed point, over 1/lambda_max(W); 0: chosen; it contracts below 2 only"},
+       "step of the fixed point over 1/lambda_max(W); 0: chosen by the program"},
   };
 }
 

@@ -288,9 +288,8 @@ Outcome failure(const StatusSolution& solution, const Interface& interface)
   if (solution.outcome == StatusOutcome::cycles)
     outcome.reason = format("the sets of closed pairs repeat without end at mu = %g: friction is too large", friction);
   else if (solution.outcome == StatusOutcome::singular)
-    outcome.reason = format("no set of closed pairs balances the load at mu = %g: the structure tips, slides away or "
-                            "lifts off",
-                            friction);
+    outcome.reason = format(
+        "no set of closed pairs balances the load at mu = %g: the structure tips, slides away or lifts off", friction);
   else
     outcome = {OutcomeKind::not_converged, "no fitting set of closed pairs within -equilibrium_max_it",
                solution.iterations, 1};
@@ -321,11 +320,12 @@ bool stays_at_rest(const Structure& structure, const Interface& interface)
 OptionList options_of(EquilibriumOptions& options)
 {
   return {
-      {"-equilibrium_max_it", &options.max_iterations, Range::natural, "status iterations before giving up"},
+      {"-equilibrium_max_it", &options.max_iterations, Range::natural,
+       "status iterations before the equilibrium is given up"},
       {"-equilibrium_check_max_it", &options.check_max_iterations, Range::any,
-       "iterations of the fixed point that checks the reactions; -1: 20000 up to 600 pairs, else none"},
+       "iterations of the fixed point that checks the equilibrium; -1: 20000 up to 600 pairs, else 0"},
       {"-equilibrium_check_rho", &options.check_rho, Range::inside_two,
-       "of that fixed point, over 1/lambda_max(D_nn); it contracts below 2 only"},
+       "step of that fixed point over 1/lambda_max, below 2"},
   };
 }
 

@@ -261,9 +261,9 @@ OptionList options_of(ModesOptions& options)
       {"-modes_dense_limit", &options.dense_limit, Range::not_negative,
        "eigenproblems up to this size are solved whole by LAPACK"},
       {"-modes_solver", choice_of(options.solver), Range::any,
-       "of larger problems: slices of frequency, or TOAR around zero (toar)"},
+       "solver of larger problems: slices of frequency, or SLEPc's TOAR around zero (toar)"},
       {"-modes_shapes", choice_of(options.shapes), Range::any,
-       "modes whose shapes the fields file holds: the unstable ones or all"},
+       "modes whose shapes fields.h5 holds: the unstable ones, or all"},
   };
 }
 

@@ -1,6 +1,10 @@
 /// The resolved scene as text, and the reference of all keys.
 #include "toml_values.hpp"
 
+#include "squeal/base/markdown.hpp"
+#include "squeal/scene/reference.hpp"
+
+#include <array>
 #include <charconv>
 #include <sstream>
 
@@ -206,10 +210,11 @@ struct TextWriter
   }
 };
 
-/// The lines "key meaning [unit, default]" of a table.
-std::string reference_text(const SceneKeys& keys)
+/// A table of the help: its head and a line "key meaning [unit, default]" for each key.
+std::string help_table(const std::string& head, const char* meaning, const SceneKeys& keys)
 {
   std::ostringstream text;
+  text << head << "  " << meaning << "\n";
   for (const SceneKey& key : keys)
   {
     std::string note = key.need == Need::required ? "required" : value_text(key);
@@ -220,24 +225,54 @@ std::string reference_text(const SceneKeys& keys)
   return text.str();
 }
 
-/// Appends a table of the reference.
+/// What a key's value must be: one of its words, or a number by its rule. Empty: the unit says it.
+std::string rule_text(const SceneKey& key)
+{
+  static constexpr std::array rules = {
+      "",          "above 0",       "0 or above",     "above -1, below 0.5", "above 0, at most 1",
+      "direction", "existing file", "existing folder"};
+  Words words;
+  if (const auto* choice = std::get_if<Choice>(&key.target)) words = choice->words;
+  if (std::holds_alternative<Start*>(key.target)) words = words_of(StartKind::file);
+  if (std::holds_alternative<CycleStart*>(key.target)) words = words_of(CycleStartKind::file);
+  std::string text = rules.at(static_cast<std::size_t>(key.rule));
+  for (const char* one : words) text += (text.empty() ? "" : ", ") + markdown_code(one);
+  return text;
+}
+
+/// A section of the page of keys: heading, and a row for each key.
+std::string page_table(const std::string& head, const char* meaning, const SceneKeys& keys)
+{
+  static constexpr std::array effects = {"",        "load", "friction",        "contact",
+                                         "damping", "mass", "stiffness, mass", "mesh"};
+  std::string text = "\n### " + markdown_code(head) + ": " + meaning + "\n\n" +
+                     markdown_head({"key", "unit", "default", "value", "changes", "meaning"});
+  for (const SceneKey& key : keys)
+    text += markdown_row({markdown_code(key.name), key.unit,
+                          key.need == Need::required ? "required" : markdown_code(value_text(key)), rule_text(key),
+                          effects.at(static_cast<std::size_t>(key.effect)), key.meaning});
+  return text;
+}
+
+/// Appends a table of a reference.
 struct ReferenceWriter
 {
   std::string& text;
+  std::string (*table_text)(const std::string& head, const char* meaning, const SceneKeys& keys);
 
   template <class T> void operator()(const std::string& key, std::vector<T>&, const char* meaning) const
   {
     T entry{};
-    text += "[[" + key + "]]  " + meaning + "\n" + reference_text(keys_of(entry));
+    text += table_text("[[" + key + "]]", meaning, keys_of(entry));
   }
   template <class T> void operator()(const std::string& key, std::optional<T>&, const char* meaning) const
   {
     T entry{};
-    text += "[" + key + "]  " + meaning + "\n" + reference_text(keys_of(entry));
+    text += table_text("[" + key + "]", meaning, keys_of(entry));
   }
   template <class T> void operator()(const std::string& key, T& table, const char* meaning) const
   {
-    text += "[" + key + "]  " + meaning + "\n" + reference_text(keys_of(table));
+    text += table_text("[" + key + "]", meaning, keys_of(table));
   }
 };
 
@@ -281,11 +316,22 @@ std::string scene_reference()
 {
   Scene scene;
   Rotation rotation;
-  std::string text = "Keys of a scene file (TOML, SI units) [unit, default]:\n" + reference_text(keys_of(scene));
-  for_each_table(scene, ReferenceWriter{text});
   Orthotropy orthotropy;
-  return text + "rotation = { ... } of a contact or a part\n" + reference_text(keys_of(rotation)) +
-         "orthotropic = { ... } of a part\n" + reference_text(keys_of(orthotropy));
+  std::string text = help_table("Keys of a scene file (TOML, SI units)", "[unit, default]:", keys_of(scene));
+  for_each_table(scene, ReferenceWriter{text, help_table});
+  return text + help_table("rotation = { ... }", "of a contact or a part", keys_of(rotation)) +
+         help_table("orthotropic = { ... }", "of a part", keys_of(orthotropy));
+}
+
+std::string scene_page()
+{
+  Scene scene;
+  Rotation rotation;
+  Orthotropy orthotropy;
+  std::string text = page_table("scene", "at the top of the file", keys_of(scene));
+  for_each_table(scene, ReferenceWriter{text, page_table});
+  return text + page_table("rotation = { … }", "of a contact or a part, which its numbers change", keys_of(rotation)) +
+         page_table("orthotropic = { … }", "of a part, which its numbers change", keys_of(orthotropy));
 }
 
 } // namespace squeal

@@ -119,9 +119,9 @@ OptionList options_of(SettledOptions& options)
 {
   return {
       {"-settled_periods", &options.periods, Range::not_negative,
-       "at most integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 beyond 10 000 "
-       "degrees of freedom"},
-      {"-settled_exponents", &options.exponents, Range::natural, "Lyapunov exponents of a settled motion"},
+       "largest number of periods integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 "
+       "beyond 10 000 degrees of freedom"},
+      {"-settled_exponents", &options.exponents, Range::natural, "number of Lyapunov exponents of a settled motion"},
   };
 }
 

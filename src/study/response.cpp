@@ -305,8 +305,10 @@ void solve_band(const ResponseProblem& problem, const Equations& equations, Resp
 OptionList options_of(ResponseOptions& options)
 {
   return {
-      {"-response_tolerance", &options.tolerance, Range::positive, "residuals of the responses, over a unit force"},
-      {"-response_shapes", &options.shapes, Range::natural, "of a basis; where more are needed the band is parted"},
+      {"-response_tolerance", &options.tolerance, Range::positive,
+       "geometric mean of the residual forces of the responses and of the transposed problem, over a unit force"},
+      {"-response_shapes", &options.shapes, Range::natural,
+       "number of shapes of a basis; where more are needed the band is parted"},
   };
 }
 

@@ -374,7 +374,8 @@ template <class Work> SampleFailure for_own(int count, MPI_Comm comm, Progress& 
 OptionList options_of(RobustnessOptions& options)
 {
   return {
-      {"-robustness_training", &options.training, Range::natural, "points whose modes make the basis"},
+      {"-robustness_training", &options.training, Range::natural,
+       "points whose modes make the reduced basis of random samples"},
   };
 }
 

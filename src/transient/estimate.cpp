@@ -273,7 +273,7 @@ double first_amplitude(double level, double size)
 OptionList options_of(EstimateOptions& options)
 {
   return {{"-estimate_lift_off_multiple", &options.lift_off_multiple, Range::positive,
-           "of first lift-off: where vibrations start without an energy balance"}};
+           "start amplitude over first lift-off where there is no energy balance"}};
 }
 
 Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,

@@ -188,9 +188,8 @@ bool GyroscopicPasses::go_on(double change, double h)
   const bool falls = change <= 0.9 * last_;
   if (count_ > 1 && (change <= enough || (!falls && change <= rounding))) return false;
   if (++count_ > most || (count_ > 10 && !falls && change > 1))
-    throw Error(format("a step of %g s is too long for the gyroscopic part: its passes do not converge; take more "
-                       "steps a period",
-                       h));
+    throw Error(format(
+        "a step of %g s is too long for the gyroscopic part: its passes do not converge; take more steps a period", h));
   last_ = change;
   return true;
 }
@@ -215,14 +214,14 @@ OptionList options_of(StepOptions& options)
 {
   OptionList list = {
       {"-transient_friction", choice_of(options.opposed), Range::any,
-       "opposes the sliding velocity at theta, or at the end of the step (end)"},
+       "friction opposes the sliding velocity at theta, or at the end of the step (end)"},
       {"-transient_contact_law", choice_of(options.law), Range::any,
        "contact on displacements, or on velocities (velocity)"},
       {"-transient_contact_operator", choice_of(options.storage), Range::any,
-       "W stored, by columns on several ranks (whole), or in the factor of the step (by_factor), which takes no "
-       "memory"},
+       "the condensed contact operator W: stored, by columns on several ranks (whole), or in the factor of the step "
+       "(by_factor), which takes no memory; a quarter of the free memory decides"},
       {"-transient_refuse", &options.refuse, Range::any,
-       "false: march even where theta and the step give misleading growth rates"},
+       "false: march even where theta and the step falsify growth rates"},
   };
   for (Option& option : options_of(options.contact)) list.push_back(std::move(option));
   return list;

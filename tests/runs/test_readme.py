@@ -1,13 +1,16 @@
-"""README.md and inputs/README.md, held against what the program prints and writes."""
+"""README.md and the pages of inputs, held against what the program prints and writes."""
 
 import json
 import re
 import subprocess
 import sys
+import tomllib
 
 import h5py
 import pytest
 from conftest import INPUTS, ROOT, Run
+
+GUIDE, KEYS, RESULTS = (INPUTS / f"{name}.md" for name in ("README", "KEYS", "RESULTS"))
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?(?!\w)")
 # Relative tolerance of the numbers of a line. Iterations, and which pair opens in which step, move with the rounding.
@@ -67,9 +70,19 @@ def test_own_model_runs(converged, tmp_path):
     assert run.report["cycle"]["outcome"] == "converged"
 
 
+def test_the_example_of_the_guide_is_the_pin():
+    """The guide's whole small example, key by key."""
+    shown = tomllib.loads("\n".join(block_of(GUIDE, 'title = "pin on disc"')))
+    assert shown == tomllib.loads((INPUTS / "pin_on_disc" / "scene.toml").read_text())
+
+
+def test_the_guide_is_short():
+    assert GUIDE.stat().st_size <= 25000
+
+
 def test_the_lock_in_chart_of_the_guide(converged, tmp_path):
     """The overrides that inputs/README.md gives for one's own mesh, here on the pin, and the picture that it names."""
-    (command,) = [line.split() for line in (INPUTS / "README.md").read_text().splitlines() if line.startswith("    tools/run inputs/mine")
+    (command,) = [line.split() for line in GUIDE.read_text().splitlines() if line.startswith("    tools/run inputs/mine")
                   and "sweep.key" in line]
     run = converged(INPUTS / "pin_on_disc" / "scene.toml", *command[2:], "--set", "mesh.parameters.divisions=2", "--set",
                     "sweep.to=0.3", "--set", "sweep.points=3", ranks=1)
@@ -104,6 +117,11 @@ def helped(tmp_path_factory):
     return Run(["-help"], 1, tmp_path_factory.mktemp("help")).printed
 
 
+def test_keys_are_what_the_program_writes(tmp_path):
+    """`squeal --reference keys > inputs/KEYS.md` renews the page."""
+    assert Run(["--reference", "keys"], 1, tmp_path).printed == KEYS.read_text()
+
+
 def test_every_scene_key_is_explained(helped):
     section, known = "scene", {}
     for line in helped.partition("Keys of a scene file")[2].partition("Algorithm options")[0].splitlines()[1:]:
@@ -112,11 +130,11 @@ def test_every_scene_key_is_explained(helped):
         elif key := re.match(r"  (\w+) .*?\[([^\[\]]*(?:\[.*\])?)\]$", line):
             known[section, key[1]] = split_unit(key[2])
     page = {}
-    for heading, cells in tables(INPUTS / "README.md"):
+    for heading, cells in tables(KEYS):
         inline = re.match(r"(rotation|orthotropic) = ", heading)
         section = inline[0] if inline else heading
         if section in {name for name, _ in known}:
-            assert cells[3], f"{section} {cells[0]} has no meaning"
+            assert cells[-1], f"{section} {cells[0]} has no meaning"
             page[section, cells[0]] = (cells[1], cells[2])
     assert len(known) > 60
     assert page == known
@@ -124,7 +142,7 @@ def test_every_scene_key_is_explained(helped):
 
 def test_every_option_is_explained(helped):
     known = dict(re.findall(r"^  (-\w+) .* \[(.*)\]$", helped, re.M))
-    page = {cells[0]: cells[1] for heading, cells in tables(INPUTS / "README.md") if heading == "Options"}
+    page = {cells[0]: cells[1] for heading, cells in tables(KEYS) if heading == "Options"}
     assert len(known) > 30
     assert page == known
 
@@ -205,12 +223,12 @@ def compare(documented, written):
 
 def test_every_key_of_the_report_is_explained(written):
     found = set.union(*(paths_of(json.loads((folder / "report.json").read_text())) for folder in written))
-    compare([cells[0] for heading, cells in tables(INPUTS / "README.md") if heading == "report.json"], found)
+    compare([cells[0] for heading, cells in tables(RESULTS) if heading == "report.json"], found)
 
 
 @pytest.mark.parametrize("name", ["history.h5", "fields.h5"])
 def test_every_data_set_is_explained(written, name):
-    page = {cells[0]: cells[1] for heading, cells in tables(INPUTS / "README.md") if heading == name}
+    page = {cells[0]: cells[1] for heading, cells in tables(RESULTS) if heading == name}
     found = {}
     for folder in written:
         found.update(data_sets_of(folder / name))
@@ -221,7 +239,7 @@ def test_every_data_set_is_explained(written, name):
 
 def test_words_of_outcomes_and_choices_are_explained():
     """Every word that the program may write or read, from the tables of its sources."""
-    pages = (ROOT / "README.md").read_text() + (INPUTS / "README.md").read_text()
+    pages = "".join(page.read_text() for page in (ROOT / "README.md", GUIDE, KEYS, RESULTS))
     found = 0
     for file in [*(ROOT / "include").rglob("*.hpp"), *(ROOT / "src").rglob("*.[ch]pp")]:
         for words in re.findall(r"std::array \w+_words\s*=\s*\{(.*?)\}", file.read_text(), re.S):
@@ -269,6 +287,7 @@ def test_every_test_has_a_row():
 
 def pages_of_readers():
     pages = [page for page in ROOT.rglob("README.md") if "build" not in page.relative_to(ROOT).parts]
+    pages += sorted(INPUTS.glob("[A-Z]*S.md"))
     assert len(pages) >= 8
     return pages
 
@@ -280,7 +299,7 @@ def anchors_of(page):
 
 
 def test_links_lead_somewhere():
-    """Every relative link and picture of every README exists, and so does the heading that a link names."""
+    """Every relative link and picture of every page exists, and so does the heading that a link names."""
     for page in pages_of_readers():
         for target, anchor in re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)\)", page.read_text()):
             if "://" not in target:

@@ -5,7 +5,7 @@
 namespace squeal
 {
 
-/// The whole report as JSON text: SI units, null for what is not a number. inputs/README.md lists the keys.
+/// The whole report as JSON text: SI units, null for what is not a number. inputs/RESULTS.md lists the keys.
 std::string report_json(const Report& report, const Scene& scene);
 
 } // namespace squeal
