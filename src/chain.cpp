@@ -4,11 +4,13 @@
 #include "squeal/attractors/reached.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/cycle/cycle_checkpoint.hpp"
 #include "squeal/modes/modes_checkpoint.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <Eigen/QR>
 #include <utility>
 
@@ -131,7 +133,8 @@ CycleProblem cycle_problem(const Chain& chain)
           chain.model.probes,
           given_start(chain),
           chain.carried ? chain.carried->period : 0,
-          chain.carried ? chain.carried->rounds : 1};
+          chain.carried ? chain.carried->rounds : 1,
+          chain.resumed ? &*chain.resumed : nullptr};
 }
 
 SettledBySteps by_steps(const SettledMotion& settled)
@@ -139,14 +142,6 @@ SettledBySteps by_steps(const SettledMotion& settled)
   const std::vector<MeanValue>& exponents = settled.examined.exponents;
   return {settled.examined.verdict.kind, settled.fluctuating_energy,
           exponents.empty() ? MeanValue{} : exponents.front()};
-}
-
-/// Whether it has up to small_model degrees of freedom.
-bool is_small(const Chain& chain)
-{
-  PetscInt dofs = 0;
-  check(VecGetSize(chain.model.structure.load, &dofs));
-  return dofs <= small_model;
 }
 
 bool alike(const MeanValue& a, const MeanValue& b)
@@ -164,6 +159,13 @@ bool motion_goes_on(const Report& report)
 }
 
 } // namespace
+
+bool is_small(const Chain& chain)
+{
+  PetscInt dofs = 0;
+  check(VecGetSize(chain.model.structure.load, &dofs));
+  return dofs <= small_model;
+}
 
 bool follows_a_mode(const TransientSettings& settings)
 {
@@ -249,6 +251,31 @@ Trajectory run_transient(const Chain& chain)
                    transient_start(chain.sliding(), chain.unstable(), settings), chain.model.probes);
 }
 
+namespace
+{
+
+FittedCycle find_cycle(const Chain& chain)
+{
+  return find_fitted_cycle(cycle_problem(chain), {chain.scene.fidelity, chain.scene.accuracy, chain.begin_steps},
+                           chain.options.cycle);
+}
+
+/// The cycle from the orbit that the run that is gone on with had reached. Nothing where there is none, or where it
+/// leads to no cycle: the search then begins as in a run in one go.
+std::optional<FittedCycle> resumed_cycle(Chain& chain)
+{
+  if (!std::exchange(chain.resumes, false)) return {};
+  chain.resumed = kept_cycle(chain.model.structure);
+  if (!chain.resumed) return {};
+  if (rank_of(comm_of(chain.model.structure.load)) == 0) std::printf("  goes on from the checkpoint of the cycle\n");
+  FittedCycle found = find_cycle(chain);
+  chain.resumed.reset();
+  if (found.cycle.outcome.kind == OutcomeKind::converged || found.cycle.cut_short) return found;
+  return {};
+}
+
+} // namespace
+
 FittedCycle run_cycle(Chain& chain)
 {
   const Scene& scene = chain.scene;
@@ -262,8 +289,13 @@ FittedCycle run_cycle(Chain& chain)
   {
     if (only_diverges(chain.unstable().modes)) pace(chain);
     if (chain.report.modes.unstable_count == 0) follow_start(chain);
-    result = find_fitted_cycle(cycle_problem(chain), {scene.fidelity, scene.accuracy, chain.begin_steps},
-                               chain.options.cycle);
+    std::optional<FittedCycle> resumed = resumed_cycle(chain);
+    result = resumed ? std::move(*resumed) : find_cycle(chain);
+    const LimitCycle& cycle = result.cycle;
+    const Structure& structure = chain.model.structure;
+    if (cycle.outcome.kind == OutcomeKind::converged &&
+        (cycle.cut_short || checkpoint_is_worth_it(comm_of(structure.load))))
+      keep_cycle(structure, cycle.orbit.state, cycle.orbit.period);
   }
   return result;
 }
@@ -316,6 +348,7 @@ CoarseStart run_coarse(Chain& fine)
   const Model& model = fine.coarse->model;
   Report report;
   Chain chain{scene, options, model, report, {}};
+  chain.resumes = false; // the checkpoint is of the fine mesh
   report.equilibrium = find_equilibrium(model.structure, model.interface, options.equilibrium);
   if (report.equilibrium.outcome.kind == OutcomeKind::converged)
   {
@@ -377,59 +410,6 @@ void take_cycle_as_answer(Report& report, FittedCycle found)
   report.cycle = std::move(found.cycle);
   report.fidelity = std::move(found.fidelity);
   report.settled = not_run<SettledMotion>(OutcomeKind::skipped, "it is the cycle, which is the answer");
-}
-
-namespace
-{
-
-/// Whether several modes oscillate and grow, each of which may lead to a motion of its own, and a few trajectories of
-/// the model cost little.
-bool may_lead_elsewhere(const Chain& chain)
-{
-  const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
-  return is_small(chain) && std::ranges::count_if(chain.report.modes.unstable(), oscillates) > 1;
-}
-
-/// The modes, their pairs and five random sums; as many as are integrated together at most.
-int starts_beside(int unstable)
-{
-  constexpr int random = 5, together = 16;
-  return std::min(unstable * (unstable + 1) / 2 + random, together);
-}
-
-} // namespace
-
-Attractors run_attractors(const Chain& chain)
-{
-  constexpr int enough = 256; // steps a period to recognise a cycle of more steps by
-  CycleSettings settings = chain.scene.cycle;
-  if (settings.steps_per_period == 0)
-    settings.steps_per_period = std::clamp(chain.report.cycle.steps_per_period, first_steps, enough);
-  if (!settings.enabled || (settings.starts == 0 && !may_lead_elsewhere(chain)))
-    return not_run<Attractors>(OutcomeKind::off, "cycle.starts is 0, and no other starts are sought by themselves");
-  const std::vector<ComplexMode>& modes = chain.report.modes.modes;
-  const bool stable = !modes.empty() && chain.report.modes.unstable_count == 0 && chain.model.interface.pairs > 0;
-  const bool chosen = settings.starts == 0;
-  if (chosen) settings.starts = starts_beside(chain.report.modes.unstable_count);
-  const auto attractors = [&](const UnstableModes& started)
-  {
-    Attractors found =
-        find_attractors({chain.sliding(), modes, started, settings, chain.options.step}, chain.options.attractors);
-    if (chosen && found.outcome.kind == OutcomeKind::not_converged) found.outcome.kind = OutcomeKind::completed;
-    return found;
-  };
-  if (!stable)
-  {
-    const std::string reason = no_unstable_mode(chain.report);
-    return reason.empty() ? attractors(chain.unstable()) : not_run<Attractors>(OutcomeKind::skipped, reason);
-  }
-  // a motion may go on beside a stable equilibrium: from the mode that decays slowest, or that a given start has most
-  // of, and from random sums of modes
-  const Estimate estimate =
-      estimate_amplitude(chain.sliding(), *chain.linearised, modes.front(), chain.options.estimate);
-  if (!std::isfinite(estimate.start_amplitude))
-    return not_run<Attractors>(OutcomeKind::skipped, "no amplitude is known at which contact opens or slip reverses");
-  return attractors({std::span(modes).first(1), std::span(&estimate, 1)});
 }
 
 } // namespace squeal

@@ -5,7 +5,6 @@
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/chain.hpp"
 #include "squeal/cycle/fidelity.hpp"
-#include "squeal/cycle/period_log.hpp"
 #include "squeal/forecast.hpp"
 #include "squeal/reduction/model_files.hpp"
 #include "squeal/scene/doubts.hpp"
@@ -109,7 +108,6 @@ template <class Work> auto stage(Report& report, Stage which, MPI_Comm comm, Wor
     report.ended_by = who_asked_to_end();
     leave_out(" in this stage");
   }
-  if (!report.ended_by.empty() && rank_of(comm) == 0) keep_period_log();
   return result;
 }
 
@@ -261,7 +259,6 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
 {
   Report report;
   report.run = results.run();
-  begin_period_log();
   const Model model = timed(report, Stage::model, comm, [&] { return build_model(scene, comm); });
   check_step_law(options.step, model.interface);
   report.model = summary_with_doubts(model, scene, comm);
@@ -303,11 +300,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   seek_motion(chain,
               [&](Stage which, const auto& work)
               {
-                if (which == Stage::settled) // the cycle is in the report
-                {
-                  if (has_run(report.cycle.outcome)) save();
-                  if (checkpoint_is_worth_it(comm) && rank_of(comm) == 0) keep_period_log();
-                }
+                if (which == Stage::settled && has_run(report.cycle.outcome)) save(); // the cycle is in the report
                 return stage(report, which, comm, work);
               });
   if (has_run(report.settled.outcome)) save();

@@ -43,6 +43,8 @@ struct Chain
   std::optional<PacedDivergence> paced{}; // where no unstable mode oscillates, once a cycle is sought
   int begin_steps = first_steps;          // a period, of the search for the cycle where the scene leaves them open
   std::optional<SettledBySteps> by_fewer_steps{}; // of the search before this one
+  std::optional<ResumedOrbit> resumed{};          // of the run that is gone on with, during the first search
+  bool resumes = true; // the first search begins from the orbit of the run that is gone on with
 
   SlidingEquilibrium sliding() const { return {model.structure, model.interface, report.equilibrium}; }
   UnstableModes unstable() const
@@ -59,6 +61,9 @@ template <class Result> Result not_run(OutcomeKind kind, const std::string& reas
   result.outcome = {kind, reason, 0, 0};
   return result;
 }
+
+/// Whether the model has up to small_model degrees of freedom.
+bool is_small(const Chain& chain);
 
 /// Why a stage of unstable modes cannot run; empty if it can.
 std::string no_unstable_mode(const Report& report);

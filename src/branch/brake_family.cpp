@@ -64,7 +64,6 @@ void BrakeFamily::set_parameter(double parameter)
   {
     at_->parameter = parameter;
     at_->model.interface.friction.coefficient = parameter;
-    at_->map.replayed = {};
     at_->map.recorded_start = {}; // what is recorded belongs to the other friction
     at_->equilibrium_known = false;
     return;

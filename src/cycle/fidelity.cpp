@@ -65,7 +65,8 @@ std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& red
     cycle = measure_reduced_cycle(correction, start);
     return {};
   }
-  cycle = find_cycle_from(problem, search.options, start, preconditioner, 0);
+  cycle = problem.resumed ? find_cycle_from_resumed(problem, search.options, preconditioner)
+                          : find_cycle_from(problem, search.options, start, preconditioner, 0);
   search.fidelity.full_periods = cycle.convergence.periods;
   if (cycle.cut_short) return {};
   if (cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium || cycle.outcome.kind == OutcomeKind::not_periodic)

@@ -4,6 +4,7 @@
 #include "preconditioner.hpp"
 
 #include "squeal/base/run_control.hpp"
+#include "squeal/cycle/cycle_checkpoint.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -52,6 +53,8 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
   map.keeps_step = is_large(problem.sliding.structure);
   Flow flow = flow_of(map);
   add_slow_motions(problem, options.reduced, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
+  CycleKeeper keeper(problem.sliding.structure);
+  keeper.watch(flow);
   const Preconditioner& preconditioner = make(map, flow);
   ShootingResult found = shoot(flow, preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
@@ -89,7 +92,7 @@ CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& set
 {
   return {problem.sliding, problem.linearised,   problem.modes,         problem.unstable,
           settings,        problem.step,         problem.modes_options, problem.probes,
-          problem.given,   problem.given_period, problem.given_rounds};
+          problem.given,   problem.given_period, problem.given_rounds,  problem.resumed};
 }
 
 std::vector<State> other_unstable_motions(const CycleProblem& problem)
@@ -123,7 +126,7 @@ LimitCycle find_cycle_near(const CycleProblem& problem, const CycleOptions& opti
     const Owned<Vec> state = state_of(start.u, start.v), rate = zeros_like(state);
     end = zeros_like(state);
     flow.integrate(start.period, state, end, rate);
-    flow.record_period(start.period, state, {}); // where it was taken from the log of an earlier run
+    flow.record_period(start.period, state, {});
     start.u = displacement(end);
     start.v = velocity(end);
     try
@@ -177,8 +180,19 @@ double equivalent_amplitude(const CycleProblem& problem, const State& state)
   return fluctuation_norm(problem, state) / unit_norm(problem);
 }
 
+LimitCycle find_cycle_from_resumed(const CycleProblem& problem, const CycleOptions& options,
+                                   const Preconditioner& preconditioner)
+{
+  const ResumedOrbit& orbit = *problem.resumed;
+  ShootingStart start{problem.sliding.equilibrium.u, orbit.state.u, orbit.state.v, orbit.period};
+  start.is_cycle = true;
+  return find_cycle_from(problem, options, start, preconditioner, 0);
+}
+
 LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions& options)
 {
+  if (problem.resumed)
+    return find_cycle_from_resumed(problem, options, estimated_preconditioner(problem, options.band_factor));
   const ComplexMode& mode = problem.unstable.modes.front();
   const Estimate& estimate = problem.unstable.estimates.front();
   const Equilibrium& equilibrium = problem.sliding.equilibrium;

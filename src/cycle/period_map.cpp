@@ -1,10 +1,8 @@
 #include "squeal/cycle/period_map.hpp"
 
 #include "squeal/base/run_control.hpp"
-#include "squeal/cycle/period_log.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace squeal
 {
@@ -142,36 +140,6 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
   integrate_once(map, period, start, end, rate);
 }
 
-/// Integrates a period that was only taken from the log: what follows needs its records.
-void integrate_replayed(PeriodMap& map)
-{
-  if (!map.replayed.start.get()) return;
-  const ReplayedPeriod replayed = std::exchange(map.replayed, {});
-  const Owned<Vec> end = zeros_like(replayed.start), rate = zeros_like(replayed.start);
-  const long unconverged = map.unconverged;
-  const KeptStep kept = std::exchange(map.kept, replayed.kept);
-  map.reactions = replayed.reactions;
-  integrate_period(map, replayed.period, replayed.start, end, rate);
-  map.kept = kept;
-  map.unconverged = unconverged;
-}
-
-/// Takes a period with its rate from the log, or integrates and logs it.
-void integrate_logged_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
-{
-  std::vector<double> before = map.reactions;
-  const KeptStep kept = map.kept;
-  map.replayed = {};
-  if (replay_period(map, period, start, end, rate))
-  {
-    map.replayed = {period, copy_of(start), std::move(before), kept};
-    map.recorded_start = {};
-    return;
-  }
-  integrate_period(map, period, start, end, rate);
-  log_period(map, period, start, end, rate);
-}
-
 /// Several trajectories over one period, together as far as their memory allows.
 void integrate_periods(PeriodMap& map, double period, std::span<const Vec> starts, std::span<const Vec> ends)
 {
@@ -219,7 +187,6 @@ void move_by_part(const PeriodMap& map, double part, State& state)
 
 void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& grid)
 {
-  integrate_replayed(map);
   const int steps = grid.steps(map.steps);
   set_step(map, period / steps);
   if (grid.shift == 0 && steps == map.steps && is_recorded(map, start)) return;
@@ -259,7 +226,7 @@ void add_tangent(PeriodMap& map, Flow& flow)
 Flow flow_of(PeriodMap& map)
 {
   const auto integrate = [&map](double period, Vec start, Vec end, Vec rate)
-  { (rate ? integrate_logged_period : integrate_period)(map, period, start, end, rate); };
+  { integrate_period(map, period, start, end, rate); };
   const auto integrate_many = [&map](double period, std::span<const Vec> starts, std::span<const Vec> ends)
   { integrate_periods(map, period, starts, ends); };
   Flow flow{integrate, map.sliding.structure.M, map.sliding.structure.K, integrate_many};

@@ -4,7 +4,7 @@
 
 #include "squeal/base/constants.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/cycle/period_log.hpp"
+#include "squeal/cycle/cycle_checkpoint.hpp"
 #include "squeal/shooting/multisecant.hpp"
 
 #include <algorithm>
@@ -64,38 +64,16 @@ struct MeasuredFlow
 {
   PeriodMap map;
   Recording recording{};
-  MeasuredPeriod measured{};   // of the last period, unless that is still to be measured
-  ReplayedPeriod unmeasured{}; // the last period, if it was taken from the log of an earlier run
+  MeasuredPeriod measured{}; // of the last period
   Flow flow{};
+  std::optional<CycleKeeper> keeper{};
 };
 
-/// Takes a period from the log, or integrates and logs it.
-void measure_or_replay(MeasuredFlow& flow, double period, Vec from, Vec end, Vec rate)
+void measure(MeasuredFlow& flow, double period, Vec from, Vec end, Vec rate)
 {
-  std::vector<double> before = flow.map.reactions;
-  flow.unmeasured = {};
-  if (replay_period(flow.map, period, from, end, rate))
-  {
-    flow.unmeasured = {period, copy_of(from), std::move(before), {}}; // it keeps no step
-    return;
-  }
   flow.measured = measure_period(flow.map, flow.recording, period, from, rate);
   check(VecCopy(flow.measured.end.u, displacement(end)));
   check(VecCopy(flow.measured.end.v, velocity(end)));
-  log_period(flow.map, period, from, end, rate);
-}
-
-/// What was measured on the flow's last period.
-MeasuredPeriod& last_measured(MeasuredFlow& flow)
-{
-  if (!flow.unmeasured.start.get()) return flow.measured;
-  const ReplayedPeriod missing = std::exchange(flow.unmeasured, {});
-  const Owned<Vec> rate = zeros_like(missing.start);
-  const long unconverged = flow.map.unconverged;
-  flow.map.reactions = missing.reactions;
-  flow.measured = measure_period(flow.map, flow.recording, missing.period, missing.start, rate);
-  flow.map.unconverged = unconverged;
-  return flow.measured;
 }
 
 void make_flow(const CycleCorrection& correction, MeasuredFlow& result)
@@ -106,8 +84,9 @@ void make_flow(const CycleCorrection& correction, MeasuredFlow& result)
       std::min(result.map.options.contact.tolerance, 1e-3 * correction.fidelity.accuracy);
   result.recording = {problem.probes, correction.options.samples};
   const auto integrate = [&result](double period, Vec from, Vec end, Vec rate)
-  { measure_or_replay(result, period, from, end, rate); };
+  { measure(result, period, from, end, rate); };
   result.flow = {integrate, problem.sliding.structure.M, problem.sliding.structure.K};
+  result.keeper.emplace(problem.sliding.structure).watch(result.flow);
 }
 
 /// The full model's iteration, from one number of steps a period to the next.
@@ -121,7 +100,7 @@ struct FullShooting
   Multisecant multisecant{};
   Orbit orbit{};
 
-  CycleAtSteps cycle() const { return {flow.map.steps, orbit.period, last_measured(flow).mean_fluctuating_energy}; }
+  CycleAtSteps cycle() const { return {flow.map.steps, orbit.period, flow.measured.mean_fluctuating_energy}; }
 };
 
 void restart(FullShooting& shooting, Vec state, double period, int steps)
@@ -384,7 +363,7 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
   cycle.outcome.residual = shooting.orbit.residual;
   cycle.steps_per_period = flow.map.steps;
   cycle.orbit = std::move(shooting.orbit);
-  cycle.measured = std::move(last_measured(flow));
+  cycle.measured = std::move(flow.measured);
   cycle.costs = {flow.map.step.factor_seconds, flow.map.step.condensed_seconds};
   if (!is_large(problem.sliding.structure)) examine_refined(correction, flow.map, cycle);
 }
@@ -428,7 +407,7 @@ LimitCycle measure_reduced_cycle(const CycleCorrection& correction, const Shooti
   cycle.convergence = std::move(log.convergence);
   correction.fidelity.full_periods = cycle.convergence.periods;
   const Undisturbed last_period;
-  cycle.measured = std::move(last_measured(flow));
+  cycle.measured = std::move(flow.measured);
   cycle.costs = {flow.map.step.factor_seconds, flow.map.step.condensed_seconds};
   return cycle;
 }

@@ -3,7 +3,6 @@
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/cycle/period_log.hpp"
 #include "sweep_checkpoint.hpp"
 #include "sweep_groups.hpp"
 
@@ -30,7 +29,6 @@ std::vector<std::size_t> places_of_motions(const Sweep& sweep)
 SweptMotion motion_at(const SweepProblem& problem, const SweptPlace& place, const std::string& name, MPI_Comm comm)
 {
   const CheckpointNames names(name + ".");
-  begin_period_log();
   SweptMotion motion;
   try
   {
@@ -40,18 +38,11 @@ SweptMotion motion_at(const SweepProblem& problem, const SweptPlace& place, cons
   {
     throw;
   }
-  catch (const Interrupted&)
-  {
-    if (rank_of(comm) == 0) keep_period_log();
-    begin_period_log();
-    throw;
-  }
   catch (const Error& error)
   {
     motion.outcome = {OutcomeKind::not_converged, error.what(), 0, 0};
     motion.heard = std::string("nothing is known: ") + error.what();
   }
-  begin_period_log();
   return motion;
 }
 
@@ -130,7 +121,6 @@ Sweep with_motions(const std::function<Sweep()>& linear, const SweepProblem& pro
     if (sweep.outcome.kind == OutcomeKind::interrupted) return sweep;
     keep_sweep(sweep, name_of_modes, comm);
   }
-  if (rank_of(comm) == 0) keep_period_log(); // of the stages before
   const std::vector<std::size_t> places = places_of_motions(sweep);
   const int groups = groups_of(problem.options.groups, {places.size(), 1}, comm);
   try

@@ -3,10 +3,6 @@
 #include "../support/cycle_of.hpp"
 #include "../support/pressed_masses.hpp"
 #include "../support/small_models.hpp"
-#include "../support/temporary_folder.hpp"
-
-#include "squeal/base/checkpoint.hpp"
-#include "squeal/cycle/period_log.hpp"
 
 #include <algorithm>
 #include <array>
@@ -109,63 +105,4 @@ TEST_CASE("where the step is kept, contact is solved to a small part of what the
   CHECK(error <= 1e-4 * moved * speed);
   record_period(kept, period, end, {});
   CHECK(kept.step.contact.tolerance == 1e-12);
-}
-
-namespace
-{
-
-/// The end of a sequence of periods, each from the end of the one before, on a map that keeps its step.
-struct Sequence
-{
-  Owned<Vec> end;
-  std::vector<double> steps; // [s] of each period
-};
-
-Sequence periods_from(const SlidingEquilibrium& sliding, Vec start, std::span<const double> periods)
-{
-  PeriodMap map{sliding, {}, 200, 0.5};
-  map.keeps_step = true;
-  Sequence sequence{copy_of(start), {}};
-  const Owned<Vec> end = zeros_like(start), rate = zeros_like(start);
-  for (const double period : periods)
-  {
-    flow_of(map).integrate(period, sequence.end, end, rate);
-    check(VecCopy(end, sequence.end));
-    sequence.steps.push_back(map.kept.h);
-  }
-  return sequence;
-}
-
-} // namespace
-
-TEST_CASE("a kept step goes on from the log of periods to the last bit")
-{
-  const SmallModel model = unilateral_oscillator(0.3, 1);
-  const LimitCycle cycle = cycle_of(model, 200, 5, 1e-8);
-  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
-  const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
-  const double first = 1.01 * cycle.orbit.period;
-  const std::array periods = {first, first * (1 + 1e-6), first * (1 + 2e-6), first * (1 + 1e-1), first * (1 + 3e-6)};
-  const Sequence straight = periods_from(sliding, cycle.orbit.state, periods);
-  CHECK(straight.steps[2] == straight.steps[0]); // kept
-  CHECK(straight.steps[3] != straight.steps[0]);
-
-  const TemporaryFolder folder;
-  for (const std::size_t before : {1u, 2u, 3u, 4u})
-  {
-    open_checkpoints({folder.path, "", false});
-    begin_period_log();
-    periods_from(sliding, cycle.orbit.state, std::span(periods).first(before));
-    if (rank_of(PETSC_COMM_WORLD) == 0) keep_period_log();
-    MPI_Barrier(PETSC_COMM_WORLD);
-    open_checkpoints({folder.path, "", true});
-    begin_period_log();
-    const Sequence resumed = periods_from(sliding, cycle.orbit.state, periods);
-    CHECK(resumed.steps == straight.steps);
-    PetscBool same = PETSC_FALSE;
-    check(VecEqual(resumed.end, straight.end, &same));
-    CHECK(same == PETSC_TRUE);
-  }
-  open_checkpoints({});
-  begin_period_log();
 }

@@ -31,6 +31,13 @@ struct LimitCycle
   bool cut_short = false;  // the run was asked to end in the search for multipliers, or for finer steps
 };
 
+/// An orbit near a cycle, of a search that was ended before.
+struct ResumedOrbit
+{
+  State state;
+  double period = 0; // [s]
+};
+
 /// The brake about its sliding equilibrium, and what is asked of its cycle.
 struct CycleProblem
 {
@@ -42,9 +49,10 @@ struct CycleProblem
   const StepOptions& step;
   const ModesOptions& modes_options; // of real modes beyond the band
   Mat probes = nullptr;
-  const State* given = nullptr; // where CycleStartKind::transient, ::coarse and ::file start
-  double given_period = 0;      // [s] of the cycle that is given; 0: none is, and the mode's is taken
-  int given_rounds = 1;         // as many as that period may be of the cycle
+  const State* given = nullptr;          // where CycleStartKind::transient, ::coarse and ::file start
+  double given_period = 0;               // [s] of the cycle that is given; 0: none is, and the mode's is taken
+  int given_rounds = 1;                  // as many as that period may be of the cycle
+  const ResumedOrbit* resumed = nullptr; // where shooting at the full model goes on, whatever it started from
 };
 
 /// The problem with other settings, which it borrows.
@@ -65,6 +73,10 @@ double equivalent_amplitude(const CycleProblem& problem, const State& state);
 
 /// The cycle from the scene's start.
 LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions& options);
+
+/// The cycle from the resumed orbit.
+LimitCycle find_cycle_from_resumed(const CycleProblem& problem, const CycleOptions& options,
+                                   const Preconditioner& preconditioner);
 
 /// The cycle from any start, after a number of free periods.
 LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,

@@ -23,15 +23,6 @@ struct KeptStep
   double moved = 0;     // |v(T) - v(0)|/|v(0)|
 };
 
-/// A period whose end was taken from the log of an earlier run, and what the map carried into it.
-struct ReplayedPeriod
-{
-  double period = 0; // [s]
-  Owned<Vec> start{};
-  std::vector<double> reactions{}; // warm start
-  KeptStep kept{};
-};
-
 /// Keeps A and W of the last step size: none is factored for difference quotients.
 struct PeriodMap
 {
@@ -45,7 +36,6 @@ struct PeriodMap
   std::vector<StepRecord> records{}; // of the period recorded last, with the step at hand
   Owned<Vec> recorded_start{};       // of that period, if its steps are the flow's own
   double recorded_step = 0;          // [s]
-  ReplayedPeriod replayed{};         // the last one integrated with its rate, if it is still to be recorded
   bool keeps_step = false;           // where factors and passes of contact cost more than what is neglected
   KeptStep kept{};
 };
