@@ -255,7 +255,8 @@ std::string find_anew(const CycleCorrection& correction, int steps, LimitCycle& 
   const Vec state = cycle.orbit.state;
   StartBesideCycle beside = start_beside_cycle(correction, displacement(state), velocity(state), cycle.orbit.period);
   beside.start.other_unstable = other_unstable_states(problem);
-  const CycleProblem finer = with_settings(problem, settings);
+  CycleProblem finer = with_settings(problem, settings);
+  finer.resumed = nullptr; // which led to the cycle at hand
   LimitCycle next = find_cycle_from(finer, beside.options, beside.start, correction.preconditioner, 0);
   if (next.outcome.kind != OutcomeKind::converged)
   {
