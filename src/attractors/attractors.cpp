@@ -36,8 +36,8 @@ public:
     for (std::size_t i = 0; i < std::min(coordinates, problem.modes.size()); ++i)
       shapes_.push_back(problem.modes[i].real);
     for (NamedStart& start : starts) states_.push_back(std::move(start.state));
-    for (State& state : states_) works_.push_back(begin_steps(step_, structure, interface, state));
     restore_swarm(progress());
+    for (State& state : states_) works_.push_back(begin_steps(step_, structure, interface, state));
   }
 
   long periods() const { return steps_ / steps_per_period_; }
@@ -89,7 +89,7 @@ private:
     return frequency.value > 0 ? 2 / frequency.value : step_.h * steps_per_period_;
   }
 
-  SwarmProgress progress() { return {problem_.sliding.structure, step_.h, steps_, states_, works_, watched_}; }
+  SwarmProgress progress() { return {problem_.sliding.structure, step_.h, steps_, states_, watched_}; }
 
   /// Takes the energy of the fluctuation and the velocities along the modes.
   void watch(const StepReport& report, std::size_t k)

@@ -25,7 +25,6 @@ struct SwarmProgress
   double step_size; // [s]
   long& steps;
   std::vector<State>& states;
-  std::vector<StepWork>& works;
   std::vector<Watched>& watched;
 };
 

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 namespace
 {
 
-constexpr std::string_view head = "squeal checkpoint 1\n";
+constexpr std::string_view head = "squeal checkpoint 2\n";
 
 constexpr const char* request_file = "request.txt";
 
@@ -60,30 +60,6 @@ std::string lack_of_room(std::size_t bytes)
   return "less than 16 MB would be free in " + place().folder.parent_path().string();
 }
 
-void append(std::uint64_t number, std::string& bytes)
-{
-  bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
-}
-
-/// Takes bytes from the front of a text, as far as it reaches.
-class Taker
-{
-public:
-  explicit Taker(std::string_view rest) : rest_(rest) {}
-  bool take(void* target, std::size_t size)
-  {
-    if (size > rest_.size()) return false;
-    if (size == 0) return true; // the target of an empty list is null, which memcpy must not be given
-    std::memcpy(target, rest_.data(), size);
-    rest_.remove_prefix(size);
-    return true;
-  }
-  std::size_t left() const { return rest_.size(); }
-
-private:
-  std::string_view rest_;
-};
-
 } // namespace
 
 std::uint64_t check_sum(std::string_view bytes, std::uint64_t so_far)
@@ -92,62 +68,66 @@ std::uint64_t check_sum(std::string_view bytes, std::uint64_t so_far)
   return so_far;
 }
 
-const std::vector<double>& Checkpoint::list(const std::string& name) const
+void Checkpoint::pass(double& number)
 {
-  const auto found = lists_.find(name);
-  if (found == lists_.end()) throw Error("the checkpoint has no " + name + ": run again without --restart");
-  return found->second;
+  if (!reads_)
+    numbers_.push_back(number);
+  else if (next_ < numbers_.size())
+    number = numbers_[next_++];
+  else
+    throw Error("the checkpoint is cut short: run again without --restart");
 }
 
-double Checkpoint::number(const std::string& name) const
+void Checkpoint::pass_size(std::size_t& size)
 {
-  const std::vector<double>& values = list(name);
-  if (values.size() != 1) throw Error("the checkpoint's " + name + " is no number: run again without --restart");
-  return values.front();
-}
-
-std::vector<int> Checkpoint::integers(const std::string& name) const
-{
-  const std::vector<double>& values = list(name);
-  return {values.begin(), values.end()};
+  auto number = static_cast<double>(size);
+  pass(number);
+  if (reads_ && !(number >= 0 && number <= static_cast<double>(numbers_.size() - next_)))
+    throw Error("the checkpoint is cut short: run again without --restart");
+  size = static_cast<std::size_t>(number);
 }
 
 std::string Checkpoint::bytes() const
 {
   std::string bytes(head);
-  append(lists_.size(), bytes);
-  for (const auto& [name, values] : lists_)
-  {
-    append(name.size(), bytes);
-    bytes += name;
-    append(values.size(), bytes);
-    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double));
-  }
-  append(check_sum(bytes), bytes);
+  bytes.append(reinterpret_cast<const char*>(numbers_.data()), numbers_.size() * sizeof(double));
+  const std::uint64_t sum = check_sum(bytes);
+  bytes.append(reinterpret_cast<const char*>(&sum), sizeof sum);
   return bytes;
 }
 
 std::optional<Checkpoint> Checkpoint::from(const std::string& bytes)
 {
-  std::uint64_t sum = 0, count = 0, size = 0;
-  if (bytes.size() < head.size() + sizeof sum || bytes.compare(0, head.size(), head) != 0) return {};
+  std::uint64_t sum = 0;
+  if (bytes.size() < head.size() + sizeof sum || !bytes.starts_with(head)) return {};
   const std::string_view content = std::string_view(bytes).substr(0, bytes.size() - sizeof sum);
   std::memcpy(&sum, bytes.data() + content.size(), sizeof sum);
   if (sum != check_sum(content)) return {};
   Checkpoint checkpoint;
-  Taker rest(content.substr(head.size()));
-  rest.take(&count, sizeof count);
-  for (std::uint64_t i = 0; i < count; ++i)
-  {
-    if (!rest.take(&size, sizeof size) || size > rest.left()) return {};
-    std::string name(size, ' ');
-    rest.take(name.data(), size);
-    if (!rest.take(&size, sizeof size) || size > rest.left() / sizeof(double)) return {};
-    std::vector<double> values(size);
-    rest.take(values.data(), size * sizeof(double));
-    checkpoint.set(name, std::move(values));
-  }
+  checkpoint.reads_ = true;
+  checkpoint.numbers_.resize((content.size() - head.size()) / sizeof(double));
+  if (!checkpoint.numbers_.empty()) // else its data may be null, which memcpy must not be given
+    std::memcpy(checkpoint.numbers_.data(), content.data() + head.size(), checkpoint.numbers_.size() * sizeof(double));
   return checkpoint;
+}
+
+void describe(Checkpoint& checkpoint, std::complex<double>& number)
+{
+  double real = number.real(), imaginary = number.imag();
+  describe_all(checkpoint, real, imaginary);
+  number = {real, imaginary};
+}
+
+void describe(Checkpoint& checkpoint, std::string& text)
+{
+  std::vector<char> letters(text.begin(), text.end());
+  describe(checkpoint, letters);
+  text.assign(letters.begin(), letters.end());
+}
+
+void describe(Checkpoint& checkpoint, Outcome& outcome)
+{
+  describe_all(checkpoint, outcome.kind, outcome.reason, outcome.iterations, outcome.residual);
 }
 
 void open_checkpoints(const CheckpointPlace& given)

@@ -27,28 +27,30 @@ bool is_near(Vec start, Vec end)
   return by <= near * first;
 }
 
+void describe_orbit(Checkpoint& checkpoint, const FileOrder& order, const std::array<Vec, 2>& state, double& period)
+{
+  for (const Vec part : state) order.describe(checkpoint, part);
+  describe(checkpoint, period);
+}
+
 } // namespace
 
 std::optional<ResumedOrbit> kept_cycle(const Structure& structure)
 {
-  const std::optional<Checkpoint> checkpoint = kept_everywhere(name_of_file, comm_of(structure.load));
+  std::optional<Checkpoint> checkpoint = kept_everywhere(name_of_file, comm_of(structure.load));
   if (!checkpoint) return {};
   const FileOrder order(structure);
-  ResumedOrbit cycle{{zeros_like(structure.load), zeros_like(structure.load), 0, {}}, checkpoint->number("period")};
-  order.scatter(checkpoint->list("u"), cycle.state.u);
-  order.scatter(checkpoint->list("v"), cycle.state.v);
-  return cycle;
+  ResumedOrbit orbit{{zeros_like(structure.load), zeros_like(structure.load), 0, {}}};
+  describe_orbit(*checkpoint, order, {orbit.state.u, orbit.state.v}, orbit.period);
+  return orbit;
 }
 
 void keep_cycle(const Structure& structure, Vec start, double period)
 {
   checkpoint_made();
   if (!checkpoints_are_kept()) return;
-  const FileOrder order(structure);
   Checkpoint checkpoint;
-  checkpoint.set("u", order.gather(displacement(start)));
-  checkpoint.set("v", order.gather(velocity(start)));
-  checkpoint.set("period", period);
+  describe_orbit(checkpoint, FileOrder(structure), {displacement(start), velocity(start)}, period);
   if (rank_of(comm_of(structure.load)) == 0) keep(checkpoint, name_of_file);
 }
 

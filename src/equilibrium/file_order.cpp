@@ -49,4 +49,12 @@ void FileOrder::scatter(std::span<const double> entries, Vec x) const
   check(VecScatterEnd(scatter_, whole_, x, INSERT_VALUES, SCATTER_REVERSE));
 }
 
+void FileOrder::describe(Checkpoint& checkpoint, Vec x) const
+{
+  std::vector<double> entries;
+  if (!checkpoint.reads()) entries = gather(x);
+  squeal::describe(checkpoint, entries);
+  if (checkpoint.reads()) scatter(entries, x);
+}
+
 } // namespace squeal

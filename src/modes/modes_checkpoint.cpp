@@ -14,124 +14,83 @@ namespace
 
 constexpr const char* name_of_file = "modes";
 
-/// Text as a list of its bytes.
-std::vector<double> list_of(const std::string& text)
-{
-  return {text.begin(), text.end()};
-}
-
-std::string text_of(const std::vector<double>& list)
-{
-  std::string text;
-  for (const double byte : list) text += static_cast<char>(byte);
-  return text;
-}
-
 /// The file of one mode: all of them may be more than what fits into the memory once more.
 std::string file_of(const char* route, std::size_t number)
 {
   return format("modes.%s.%06zu", route, number);
 }
 
-void keep_mode(const ComplexMode& mode, const FileOrder& order, const std::string& file)
+void describe_mode(Checkpoint& checkpoint, const FileOrder& order, ComplexMode& mode)
 {
-  std::vector<double> reactions;
-  for (const std::complex<double>& reaction : mode.reactions)
+  describe_all(checkpoint, mode.lambda, mode.backward_error, mode.reactions);
+  order.describe(checkpoint, mode.real);
+  order.describe(checkpoint, mode.imaginary);
+}
+
+void keep_all(std::vector<ComplexMode>& modes, const FileOrder& order, const char* route)
+{
+  for (std::size_t i = 0; i < modes.size(); ++i)
   {
-    reactions.push_back(reaction.real());
-    reactions.push_back(reaction.imag());
+    Checkpoint checkpoint;
+    describe_mode(checkpoint, order, modes[i]);
+    if (rank_of(comm_of(modes[i].real)) == 0) keep(checkpoint, file_of(route, i));
   }
-  Checkpoint checkpoint;
-  checkpoint.set("numbers", std::vector<double>{mode.lambda.real(), mode.lambda.imag(), mode.backward_error});
-  checkpoint.set("reactions", std::move(reactions));
-  checkpoint.set("real", order.gather(mode.real));
-  checkpoint.set("imaginary", order.gather(mode.imaginary));
-  if (rank_of(comm_of(mode.real)) == 0) keep(checkpoint, file);
-}
-
-void keep_all(const std::vector<ComplexMode>& modes, const FileOrder& order, const char* route)
-{
-  for (std::size_t i = 0; i < modes.size(); ++i) keep_mode(modes[i], order, file_of(route, i));
-}
-
-ComplexMode mode_from(const Checkpoint& checkpoint, const Structure& structure, const FileOrder& order)
-{
-  const std::vector<double>& numbers = checkpoint.list("numbers");
-  const std::vector<double>& reactions = checkpoint.list("reactions");
-  ComplexMode mode;
-  mode.lambda = {numbers.at(0), numbers.at(1)};
-  mode.real = zeros_like(structure.load);
-  mode.imaginary = zeros_like(structure.load);
-  mode.backward_error = numbers.at(2);
-  for (std::size_t i = 0; i + 1 < reactions.size(); i += 2) mode.reactions.emplace_back(reactions[i], reactions[i + 1]);
-  order.scatter(checkpoint.list("real"), mode.real);
-  order.scatter(checkpoint.list("imaginary"), mode.imaginary);
-  return mode;
 }
 
 /// False: one of them is missing.
-bool take_all(const Structure& structure, double count, const char* route, std::vector<ComplexMode>& modes)
+bool take_all(const Structure& structure, std::vector<ComplexMode>& modes, const char* route)
 {
   const FileOrder order(structure);
-  while (static_cast<double>(modes.size()) < count)
+  for (std::size_t i = 0; i < modes.size(); ++i)
   {
-    const auto checkpoint = kept_everywhere(file_of(route, modes.size()), comm_of(structure.load));
+    std::optional<Checkpoint> checkpoint = kept_everywhere(file_of(route, i), comm_of(structure.load));
     if (!checkpoint) return false;
-    modes.push_back(mode_from(*checkpoint, structure, order));
+    modes[i].real = zeros_like(structure.load);
+    modes[i].imaginary = zeros_like(structure.load);
+    describe_mode(*checkpoint, order, modes[i]);
   }
   return true;
 }
 
+/// All but the modes themselves, of which only the numbers are kept.
+void describe_search(Checkpoint& checkpoint, Modes& modes)
+{
+  std::size_t found = modes.modes.size(), projected = modes.projected.size();
+  describe_all(checkpoint, found, projected, modes.outcome, modes.method, modes.shapes, modes.band, modes.beyond_band,
+               modes.unstable_count, modes.routes_disagree, modes.beyond_inertia, modes.count.certified_by,
+               modes.count.frequency, modes.count.expected, modes.count.found, modes.count_check);
+  modes.modes.resize(found);
+  modes.projected.resize(projected);
+}
+
 } // namespace
 
-void keep_modes(const Modes& modes, const Structure& structure)
+void keep_modes(Modes& modes, const Structure& structure)
 {
   checkpoint_made();
   if (!checkpoints_are_kept()) return;
   const MPI_Comm comm = comm_of(structure.load);
   const FileOrder order(structure);
-  Checkpoint checkpoint;
   keep_all(modes.modes, order, "found");
   keep_all(modes.projected, order, "projected");
-  checkpoint.set("counts", std::vector<double>{static_cast<double>(modes.modes.size()),
-                                               static_cast<double>(modes.projected.size())});
-  checkpoint.set("numbers", std::vector<double>{
-                                static_cast<double>(ranks_of(comm)), static_cast<double>(modes.outcome.kind),
-                                static_cast<double>(modes.outcome.iterations), modes.outcome.residual,
-                                static_cast<double>(modes.method), static_cast<double>(modes.shapes), modes.band,
-                                static_cast<double>(modes.unstable_count), static_cast<double>(modes.routes_disagree),
-                                static_cast<double>(modes.beyond_inertia), modes.count.frequency,
-                                static_cast<double>(modes.count.expected), static_cast<double>(modes.count.found),
-                                static_cast<double>(modes.count.certified_by)});
-  checkpoint.set("beyond band", modes.beyond_band);
-  checkpoint.set("reason", list_of(modes.outcome.reason));
-  checkpoint.set("count check", list_of(modes.count_check));
+  Checkpoint checkpoint;
+  int ranks = ranks_of(comm);
+  describe(checkpoint, ranks);
+  describe_search(checkpoint, modes);
   if (rank_of(comm) == 0) keep(checkpoint, name_of_file);
 }
 
 std::optional<Modes> kept_modes(const Structure& structure)
 {
   const MPI_Comm comm = comm_of(structure.load);
-  const auto checkpoint = kept_everywhere(name_of_file, comm);
+  std::optional<Checkpoint> checkpoint = kept_everywhere(name_of_file, comm);
   if (!checkpoint) return {};
-  const std::vector<double>& numbers = checkpoint->list("numbers");
-  if (static_cast<int>(numbers.at(0)) != ranks_of(comm)) return {}; // pairs are numbered otherwise
-  const std::vector<double>& counts = checkpoint->list("counts");
+  int ranks = 0;
+  describe(*checkpoint, ranks);
+  if (ranks != ranks_of(comm)) return {}; // pairs are numbered otherwise
   Modes modes;
-  if (!take_all(structure, counts.at(0), "found", modes.modes)) return {};
-  if (!take_all(structure, counts.at(1), "projected", modes.projected)) return {};
-  modes.outcome = {static_cast<OutcomeKind>(numbers.at(1)), text_of(checkpoint->list("reason")),
-                   static_cast<int>(numbers.at(2)), numbers.at(3)};
-  modes.method = static_cast<ModesMethod>(numbers.at(4));
-  modes.shapes = static_cast<ModeShapes>(numbers.at(5));
-  modes.band = numbers.at(6);
-  modes.unstable_count = static_cast<int>(numbers.at(7));
-  modes.routes_disagree = numbers.at(8) != 0;
-  modes.beyond_inertia = numbers.at(9) != 0;
-  modes.count = {static_cast<Certificate>(numbers.at(13)), numbers.at(10), static_cast<int>(numbers.at(11)),
-                 static_cast<int>(numbers.at(12))};
-  modes.beyond_band = checkpoint->list("beyond band");
-  modes.count_check = text_of(checkpoint->list("count check"));
+  describe_search(*checkpoint, modes);
+  if (!take_all(structure, modes.modes, "found") || !take_all(structure, modes.projected, "projected")) return {};
   if (rank_of(comm) == 0) std::printf("  of the checkpoint\n");
   return modes;
 }

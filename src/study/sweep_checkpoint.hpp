@@ -6,13 +6,10 @@
 namespace squeal
 {
 
-Checkpoint packed(const Sweep& sweep);
+/// The points, without their motions, and the thresholds.
+void describe(Checkpoint& checkpoint, Sweep& sweep);
 
-/// Error: it is cut short.
-Sweep unpacked(const Checkpoint& checkpoint);
-
-Checkpoint packed(const SweptMotion& motion);
-SweptMotion motion_from(const Checkpoint& checkpoint);
+void describe(Checkpoint& checkpoint, SweptMotion& motion);
 
 /// Keeps the points so far under a name. Collective.
 void keep_sweep(const Sweep& sweep, const std::string& name, MPI_Comm comm);

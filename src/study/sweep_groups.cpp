@@ -178,9 +178,9 @@ std::vector<Sweep> shared(const Sweep& own, const RankGroup& group, int groups, 
   std::vector<Sweep> parts;
   for (int g = 0; g < groups; ++g)
   {
-    std::string bytes = g == group.number() ? packed(own).bytes() : std::string();
+    std::string bytes = g == group.number() ? written(own).bytes() : std::string();
     broadcast(bytes, comm, first_rank(g, groups, ranks_of(comm)));
-    parts.push_back(unpacked(*Checkpoint::from(bytes)));
+    parts.push_back(value_of<Sweep>(*Checkpoint::from(bytes)));
   }
   return parts;
 }

@@ -56,14 +56,14 @@ void seek_motions(Sweep& sweep, const std::vector<std::size_t>& places, const Sw
     SweepPoint& point = sweep.points[place];
     const std::string name = format("sweep_motion_%06zu", place);
     if (const std::optional<Checkpoint> kept = kept_everywhere(name, comm))
-      point.motion = motion_from(*kept);
+      point.motion = value_of<SweptMotion>(*kept);
     else
     {
       end_if_asked(comm);
       point.motion = motion_at(problem, {point.values, point.reversed}, name, comm);
       if (checkpoints_are_kept() && rank_of(comm) == 0)
       {
-        keep(packed(*point.motion), name);
+        keep(written(*point.motion), name);
         const CheckpointNames names(name + ".");
         CheckpointNames::remove_all();
       }
@@ -103,9 +103,9 @@ void seek_in_groups(Sweep& sweep, const std::vector<std::size_t>& places, const 
     for (const std::size_t place : share_of(places, g, groups))
     {
       std::optional<SweptMotion>& motion = sweep.points[place].motion;
-      std::string bytes = g == group.number() && motion ? packed(*motion).bytes() : std::string();
+      std::string bytes = g == group.number() && motion ? written(*motion).bytes() : std::string();
       broadcast(bytes, comm, first_rank(g, groups, ranks_of(comm)));
-      if (!bytes.empty()) motion = motion_from(*Checkpoint::from(bytes));
+      if (!bytes.empty()) motion = value_of<SweptMotion>(*Checkpoint::from(bytes));
     }
   if (ended) throw Interrupted{};
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// The checkpoint of a march: everything that its next step depends on, to the last bit, and what was recorded so far.
+/// The checkpoint of a march: its state, and what was recorded so far.
 #include "squeal/base/checkpoint.hpp"
 #include "squeal/transient/growth.hpp"
 #include "squeal/transient/transient.hpp"
@@ -20,7 +20,6 @@ struct MarchProgress
   MarchSummary& summary;
   double& iterations; // of contact in all
   State& state;
-  StepWork& work;
   History& history;
 };
 
@@ -37,8 +36,7 @@ public:
   void keep(const MarchProgress& progress) const;
 
 private:
-  Checkpoint made(const MarchProgress& progress) const;
-  void read(const Checkpoint& checkpoint, const MarchProgress& progress) const;
+  bool describe(Checkpoint& checkpoint, const MarchProgress& progress) const; // false: it is of another march
 
   const Structure& structure_;
   MarchPlan plan_;

@@ -177,10 +177,10 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     check(VecGetSize(probe_values, &rows));
     history.probes.resize(static_cast<std::size_t>(rows));
   }
-  StepWork work = begin_steps(step, structure, interface, state);
   double iterations = 0;
-  const MarchProgress progress{summary, iterations, state, work, history};
+  const MarchProgress progress{summary, iterations, state, history};
   if (checkpoint) checkpoint->restore(progress);
+  StepWork work = begin_steps(step, structure, interface, state);
   while (summary.steps < steps)
   {
     const auto next = static_cast<std::size_t>(summary.steps);

@@ -1,13 +1,17 @@
 #pragma once
-/// Checkpoints: named lists of numbers from which a run that was killed goes on. Every stage that computes for long
-/// keeps its own file of them; all are made and read on rank 0.
+/// Checkpoints: lists of numbers from which a run that was killed goes on. Every stage that computes for long keeps its
+/// own file of them; all are made on rank 0.
+#include "squeal/base/outcome.hpp"
+
+#include <array>
+#include <complex>
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <mpi.h>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 namespace squeal
@@ -17,29 +21,78 @@ namespace squeal
 inline constexpr std::uint64_t empty_check_sum = 14695981039346656037ull;
 std::uint64_t check_sum(std::string_view bytes, std::uint64_t so_far = empty_check_sum);
 
-/// Named lists, and their bytes with a check sum.
+/// A list of numbers that is either written or read: describe() appends a value to the one, and sets it from the other.
 class Checkpoint
 {
 public:
-  void set(const std::string& name, std::vector<double> values) { lists_[name] = std::move(values); }
-  void set(const std::string& name, double value) { lists_[name] = {value}; }
-  void set(const std::string& name, const std::vector<int>& values)
-  {
-    set(name, std::vector<double>(values.begin(), values.end()));
-  }
+  bool reads() const { return reads_; }
 
-  /// Error: there is no such list, or it is not one number.
-  const std::vector<double>& list(const std::string& name) const;
-  double number(const std::string& name) const;
-  std::vector<int> integers(const std::string& name) const;
-  bool has(const std::string& name) const { return lists_.contains(name); }
+  /// Error: the list that is read has ended.
+  void pass(double& number);
+
+  /// Error: the list that is read has not as many left.
+  void pass_size(std::size_t& size);
 
   std::string bytes() const;                                       // with a check sum
-  static std::optional<Checkpoint> from(const std::string& bytes); // nothing: they are damaged
+  static std::optional<Checkpoint> from(const std::string& bytes); // to be read; nothing: they are damaged
 
 private:
-  std::map<std::string, std::vector<double>> lists_;
+  std::vector<double> numbers_;
+  std::size_t next_ = 0; // to be read
+  bool reads_ = false;
 };
+
+inline void describe(Checkpoint& checkpoint, double& number)
+{
+  checkpoint.pass(number);
+}
+
+template <class Whole>
+requires std::is_integral_v<Whole> || std::is_enum_v<Whole>
+void describe(Checkpoint& checkpoint, Whole& value)
+{
+  auto number = static_cast<double>(value);
+  checkpoint.pass(number);
+  value = static_cast<Whole>(number);
+}
+
+template <class Value, std::size_t size> void describe(Checkpoint& checkpoint, std::array<Value, size>& values)
+{
+  for (Value& value : values) describe(checkpoint, value);
+}
+
+template <class Value> void describe(Checkpoint& checkpoint, std::vector<Value>& values)
+{
+  std::size_t size = values.size();
+  checkpoint.pass_size(size);
+  values.resize(size);
+  for (Value& value : values) describe(checkpoint, value);
+}
+
+void describe(Checkpoint& checkpoint, std::complex<double>& number);
+void describe(Checkpoint& checkpoint, std::string& text);
+void describe(Checkpoint& checkpoint, Outcome& outcome);
+
+template <class... Values> void describe_all(Checkpoint& checkpoint, Values&... values)
+{
+  (describe(checkpoint, values), ...);
+}
+
+/// A list that holds the value.
+template <class Value> Checkpoint written(Value value)
+{
+  Checkpoint checkpoint;
+  describe(checkpoint, value);
+  return checkpoint;
+}
+
+/// The value that a list holds. Error: the list is too short.
+template <class Value> Value value_of(Checkpoint checkpoint)
+{
+  Value value;
+  describe(checkpoint, value);
+  return value;
+}
 
 /// Where a run keeps its checkpoints.
 struct CheckpointPlace

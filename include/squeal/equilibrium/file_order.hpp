@@ -1,6 +1,7 @@
 #pragma once
 /// The order of the degrees of freedom in files, which does not depend on the number of ranks. It is that of a matrix
 /// scene's matrices, else by node of the mesh and direction (x y z rx ry rz), free ones only.
+#include "squeal/base/checkpoint.hpp"
 #include "squeal/solid/structure.hpp"
 
 namespace squeal
@@ -17,6 +18,9 @@ public:
 
   /// Sets the vector from the list on rank 0, which has its size; the lists of other ranks are not read.
   void scatter(std::span<const double> entries, Vec x) const;
+
+  /// Moves the vector into the checkpoint that is written, or out of the one that is read.
+  void describe(Checkpoint& checkpoint, Vec x) const;
 
 private:
   Owned<Vec> whole_; // on rank 0

@@ -5,8 +5,8 @@
 namespace squeal
 {
 
-/// Collective.
-void keep_modes(const Modes& modes, const Structure& structure);
+/// Leaves the modes as they are. Collective.
+void keep_modes(Modes& modes, const Structure& structure);
 
 /// Those of the run that is gone on with; nothing where there are none, or where it had another number of ranks.
 /// Collective.
