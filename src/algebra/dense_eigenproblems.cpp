@@ -1,5 +1,6 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 
+#include "eigenvectors.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/integers.hpp"
 
@@ -8,7 +9,6 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <numeric>
-#include <random>
 
 namespace squeal
 {
@@ -18,159 +18,102 @@ namespace
 
 using Complex = std::complex<double>;
 using Eigen::Index;
+using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
+using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-double norm_1(const MatrixXd& A)
+template <class Matrix> double norm_1(const Matrix& A)
 {
-  return A.cwiseAbs().colwise().sum().maxCoeff();
+  return A.size() > 0 ? A.cwiseAbs().colwise().sum().maxCoeff() : 0;
 }
 
-/// With nu = shift + 1/mu and Q = Q(shift),  Q mu^2 + (C + 2 shift M) mu + M = 0. Its companion matrix is
-/// [-Q^-1 (C + 2 shift M), -Q^-1 M; I, 0] on (mu y, y).
-MatrixXd companion(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, double shift)
+/// LU with row interchanges. Throws Error with the text `singular` if a pivot is zero.
+template <class Matrix> Eigen::PartialPivLU<Matrix> regular_factor(const Matrix& A, const char* singular)
 {
-  const Index n = K.rows();
-  MatrixXd right(n, 2 * n), A(2 * n, 2 * n);
-  right << -C - 2 * shift * M, -M;
-  A << solve_dense(K + shift * (C + shift * M), right,
-                   "the quadratic eigenproblem is singular: some motion has neither mass nor stiffness"),
-      MatrixXd::Identity(n, n), MatrixXd::Zero(n, n);
-  return A;
+  if (!A.allFinite()) throw Error(singular); // LAPACK would return without the permutation that Eigen then applies
+  Eigen::PartialPivLU<Matrix> factor(A);
+  if ((factor.matrixLU().diagonal().cwiseAbs().array() == 0).any()) throw Error(singular);
+  return factor;
 }
 
-/// Reorders a Schur form by LAPACK's trsen, since Eigen has no such function, and reads the eigenvalues from it.
-bool order_and_read(SchurForm& schur, const std::vector<lapack_logical>& chosen)
+/// A^-T x
+MatrixXcd solve_transposed(const Eigen::PartialPivLU<MatrixXd>& A, const MatrixXcd& x)
 {
-  const int n = to_int(schur.T.rows());
-  VectorXd real(n), imaginary(n), work(std::max(1, n));
-  int count = 0, integers = 0;
-  double condition = 0, separation = 0;
-  const int info = LAPACKE_dtrsen_work(LAPACK_COL_MAJOR, 'N', 'V', chosen.data(), n, schur.T.data(), n, schur.Q.data(),
-                                       n, real.data(), imaginary.data(), &count, &condition, &separation, work.data(),
-                                       to_int(work.size()), &integers, 1);
-  schur.eigenvalues.clear();
-  for (Index i = 0; i < n; ++i) schur.eigenvalues.emplace_back(real(i), imaginary(i));
-  return info == 0;
+  MatrixXcd result(x.rows(), x.cols());
+  result.real() = A.transpose().solve(x.real());
+  result.imag() = A.transpose().solve(x.imag());
+  return result;
 }
 
-} // namespace
-
-namespace
+MatrixXcd solve_transposed(const Eigen::PartialPivLU<MatrixXcd>& A, const MatrixXcd& x)
 {
-
-/// Eigenvalues mu of a real matrix with both vectors as LAPACK has them: of conjugates one column is the real part and
-/// the next one the imaginary part. Left ones u obey u^H A = mu u^H.
-struct RealEigenvectors
-{
-  VectorXd re, im;
-  MatrixXd left, right;
-};
-
-RealEigenvectors all_eigenvectors(MatrixXd A)
-{
-  const int size = to_int(A.rows());
-  RealEigenvectors all{VectorXd(size), VectorXd(size), MatrixXd(size, size), MatrixXd(size, size)};
-  if (LAPACKE_dgeev(LAPACK_COL_MAJOR, 'V', 'V', size, A.data(), size, all.re.data(), all.im.data(), all.left.data(),
-                    size, all.right.data(), size) != 0)
-    throw Error("the QR algorithm did not converge on a dense eigenproblem");
-  return all;
+  return A.transpose().solve(x);
 }
 
-/// An orthonormal basis of the invariant subspace of those eigenvalues whose modulus is `edge` or more, by block
-/// Arnoldi without restarts. Nothing if it takes more than half of all columns: then the whole problem takes no longer.
-std::optional<MatrixXd> dominant_subspace(const MatrixXd& A, double edge)
-{
-  constexpr Index in_block = 4; // rounding brings in eigenvalues that coincide more often, only later
-  constexpr Index first = 128;  // columns that are tested first: smaller spaces take no time
-  constexpr Index usual = 4;    // times the subspace, at least, is what a space takes to have it
-  constexpr double invariant = 1e-14;
-  const Index n = A.rows(), most = n / 2;
-  if (most < first) return std::nullopt;
-  std::mt19937_64 generator(1);
-  std::normal_distribution<double> normal;
-  MatrixXd Q = orthonormal_columns(MatrixXd::NullaryExpr(n, in_block, [&] { return normal(generator); })), AQ(n, 0);
-  for (Index next = first; next <= most;)
-  {
-    AQ.conservativeResize(n, Q.cols());
-    AQ.rightCols(in_block).noalias() = A * Q.rightCols(in_block);
-    MatrixXd W = AQ.rightCols(in_block);
-    for (int time = 0; time < 2; ++time) // once leaves the basis what rounding adds to short vectors
-    {
-      W -= Q * (Q.transpose() * W);
-      W = orthonormal_columns(W);
-    }
-    if (Q.cols() >= next)
-    {
-      next = Q.cols() * 5 / 4;
-      std::optional<SchurForm> schur = schur_form(Q.transpose() * AQ);
-      const auto dominates = [&](Complex mu) { return std::abs(mu) >= edge; };
-      const Index wanted = schur ? std::ranges::count_if(schur->eigenvalues, dominates) : 0;
-      if (usual * wanted > most) return std::nullopt;
-      if (wanted > 0 && reorder(*schur, dominates))
-      {
-        const MatrixXd basis = Q * schur->Q.leftCols(wanted);
-        const MatrixXd left_over = AQ * schur->Q.leftCols(wanted) - basis * schur->T.topLeftCorner(wanted, wanted);
-        if (left_over.norm() <= invariant * std::sqrt(static_cast<double>(n)) * schur->T.norm()) return basis;
-      }
-    }
-    Q.conservativeResize(n, Q.cols() + in_block);
-    Q.rightCols(in_block) = W;
-  }
-  return std::nullopt;
-}
-
-/// Those of eigenvalues whose modulus is `edge` or more; of all where they are too many for less work, or one side has
-/// others than the other.
-RealEigenvectors dominant_eigenvectors(const MatrixXd& A, double edge)
-{
-  constexpr double regular = 1e-10;
-  const std::optional<MatrixXd> right = edge > 0 ? dominant_subspace(A, edge) : std::nullopt;
-  if (!right) return all_eigenvectors(A);
-  const std::optional<MatrixXd> left = dominant_subspace(A.transpose(), edge);
-  if (!left || left->cols() != right->cols()) return all_eigenvectors(A);
-  const Eigen::PartialPivLU<MatrixXd> between(left->transpose() * *right);
-  if (!(between.rcond() > regular)) return all_eigenvectors(A);
-  RealEigenvectors small = all_eigenvectors(between.solve(left->transpose() * (A * *right)));
-  small.right = *right * small.right;
-  const MatrixXd of_left = between.transpose().solve(small.left);
-  small.left = *left * of_left;
-  return small;
-}
-
-/// (Q mu^2 + (C + 2 shift M) mu + M) y = 0 of the scaled matrices, by LAPACK with the left vectors (a, b) of the
-/// companion matrix as well. Those of the quadratic problem are Q^-T a.
-std::vector<TwoSidedPair> solve_two_sided(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, double limit)
+/// The pairs of a quadratic problem with Im(lambda) >= 0 and the wanted vectors; with both vectors all with
+/// |lambda| <= limit, and perhaps more.
+///
+/// With lambda = omega nu, nu = shift + 1/mu and Q = Q(shift) of the scaled matrices, Q mu^2 + (C + 2 shift M) mu + M
+/// is singular. Its companion matrix is [-Q^-1 (C + 2 shift M), -Q^-1 M; I, 0] on (mu y, y). Left vectors of the
+/// quadratic problem are Q^-T conj(a) by those (a, b) of the companion matrix.
+template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& M, const Matrix& C, const Matrix& K,
+                                                                  Vectors which, double limit)
 {
   std::vector<TwoSidedPair> result;
   const Index n = K.rows();
-  const double stiffness = n > 0 ? norm_1(K) : 0, mass = n > 0 ? norm_1(M) : 0;
+  const double stiffness = norm_1(K), mass = norm_1(M);
   if (mass == 0 || stiffness == 0) return result;
   const bool all = !std::isfinite(limit);
   const double omega = all ? std::sqrt(stiffness / mass) : limit;
-  const double shift = all ? 1e-2 : 0.2; // of nu = lambda/omega: any that is no eigenvalue
-  const MatrixXd m = omega * omega / stiffness * M, c = omega / stiffness * C, k = K / stiffness;
-  const auto [re, im, left, right] = dominant_eigenvectors(companion(m, c, k, shift), all ? 0 : 1 / (1 + shift));
-  const MatrixXd chi =
-      solve_dense((k + shift * (c + shift * m)).transpose(), left.topRows(n),
-                  "the quadratic eigenproblem is singular: some motion has neither mass nor stiffness");
-  for (Index j = 0; j < re.size(); ++j)
+  const double shift = all ? 1e-2 : 0.2; // of nu: any that is no eigenvalue
+  const Matrix m = omega * omega / stiffness * M, c = omega / stiffness * C, k = K / stiffness;
+  const auto factor =
+      regular_factor(Matrix(k + shift * (c + shift * m)),
+                     "the quadratic eigenproblem is singular: some motion has neither mass nor stiffness");
+  Matrix A = Matrix::Zero(2 * n, 2 * n);
+  A.topLeftCorner(n, n) = factor.solve(-c - 2 * shift * m);
+  A.topRightCorner(n, n) = factor.solve(-m);
+  A.bottomLeftCorner(n, n).setIdentity();
+  const auto [mu, left, right] =
+      which == Vectors::both ? dominant_eigenvectors(A, all ? 0 : 1 / (1 + shift)) : eigenvectors(std::move(A), which);
+  std::vector<Index> chosen;
+  for (Index j = 0; j < mu.size(); ++j) // Im(lambda) >= 0, and lambda is finite: it is not without mass
+    if (mu(j).imag() <= 0 && std::abs(mu(j)) >= 1e-12) chosen.push_back(j);
+  MatrixXcd chi;
+  if (left.cols() > 0) chi = solve_transposed(factor, left(Eigen::seqN(0, n), chosen).conjugate());
+  for (Index place = 0; const Index j : chosen)
   {
-    const Complex mu(re(j), im(j));
-    if (mu.imag() < 0 || std::abs(mu) < 1e-12) continue; // a conjugate; or lambda is infinite, without mass
-    // LAPACK's left vectors u obey u^H A = mu u^H. Im(1/mu) < 0 where Im(mu) > 0: the pair's conjugate is taken.
-    const auto part = std::abs(mu) > 1 ? right.topRows(n) : right.bottomRows(n);
-    TwoSidedPair pair{std::conj(omega * (shift + 1.0 / mu)), part.col(j).cast<Complex>(), chi.col(j).cast<Complex>()};
-    if (mu.imag() != 0)
-    {
-      pair.right.imag() = -part.col(j + 1);
-      pair.left.imag() = chi.col(j + 1);
-    }
-    pair.right.normalize();
-    pair.left.normalize();
-    result.push_back(std::move(pair));
+    TwoSidedPair& pair = result.emplace_back();
+    pair.lambda = omega * (shift + 1.0 / mu(j));
+    // of mu y and y the one of larger entries
+    if (right.cols() > 0) pair.right = right.col(j).segment(std::abs(mu(j)) > 1 ? 0 : n, n).normalized();
+    if (left.cols() > 0) pair.left = chi.col(place++).normalized();
   }
   return result;
+}
+
+std::vector<DenseEigenpair> right_pairs(std::vector<TwoSidedPair> pairs)
+{
+  std::vector<DenseEigenpair> result;
+  for (TwoSidedPair& pair : pairs) result.push_back({pair.lambda, std::move(pair.right)});
+  return result;
+}
+
+/// By the eigenvalues nu = 1/(theta + limit) of (K + limit M)^-1 M, whose left vectors u give (K + limit M)^-T u.
+InvariantSubspaces invariant_subspaces(const MatrixXd& M, const MatrixXd& K, double limit)
+{
+  const auto factor = regular_factor(MatrixXd(K + limit * M), "the undamped eigenproblem is singular at its shift");
+  const auto [nu, left, right] = dominant_eigenvectors(MatrixXd(factor.solve(M)), 1 / (2 * limit)); // |theta| <= limit
+  std::vector<DenseEigenpair> of_right, of_left; // real and imaginary parts of a pair have one |theta|
+  for (Index j = 0; j < nu.size(); ++j)
+    if (nu(j) != 0. && std::abs(1. / nu(j) - limit) <= limit)
+    {
+      of_right.push_back({nu(j), right.col(j)});
+      of_left.push_back({nu(j), left.col(j)});
+    }
+  return {orthonormal_columns(real_columns(of_right, K.rows())),
+          orthonormal_columns(factor.transpose().solve(real_columns(of_left, K.rows())))};
 }
 
 /// Gives every rank the pairs of rank 0, whose vectors have the names `vectors` and `rows` entries.
@@ -189,25 +132,6 @@ template <class Pair> void share_pairs(MPI_Comm comm, std::vector<Pair>& pairs, 
       MPI_Bcast((pair.*member).data(), to_int(rows), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
     }
   }
-}
-
-} // namespace
-
-namespace
-{
-
-/// By the eigenvalues nu = 1/(theta + limit) of (K + limit M)^-1 M, whose left vectors u give (K + limit M)^-T u.
-InvariantSubspaces invariant_subspaces(const MatrixXd& M, const MatrixXd& K, double limit)
-{
-  const char* singular = "the undamped eigenproblem is singular at its shift";
-  const MatrixXd shifted = K + limit * M, A = solve_dense(shifted, M, singular);
-  const auto [re, im, left, right] = dominant_eigenvectors(A, 1 / (2 * limit)); // |nu|, of all |theta| <= limit
-  std::vector<Index> wanted; // real and imaginary parts of a pair have one |theta|
-  for (Index j = 0; j < re.size(); ++j)
-    if (const Complex nu(re(j), im(j)); nu != 0. && std::abs(1. / nu - limit) <= limit) wanted.push_back(j);
-  const MatrixXd chosen = left(Eigen::all, wanted);
-  return {orthonormal_columns(right(Eigen::all, wanted)),
-          orthonormal_columns(solve_dense(shifted.transpose(), chosen, singular))};
 }
 
 } // namespace
@@ -234,48 +158,25 @@ void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Index rows)
   share_pairs(comm, pairs, rows, {&TwoSidedPair::right, &TwoSidedPair::left});
 }
 
-std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C, const MatrixXd& K,
-                                                 double limit)
+template <class Matrix> std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const Matrix& M,
+                                                                         const Matrix& C, const Matrix& K, double limit)
 {
   std::vector<TwoSidedPair> pairs;
-  on_rank_zero(comm, [&] { pairs = solve_two_sided(M, C, K, limit); });
+  on_rank_zero(comm, [&] { pairs = solve_companion(M, C, K, Vectors::both, limit); });
   share(comm, pairs, K.rows());
   return pairs;
 }
 
 std::vector<DenseEigenpair> solve_dense_quadratic(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
 {
-  std::vector<DenseEigenpair> result;
-  const Index n = K.rows();
-  if (n == 0) return result;
-  const double stiffness = norm_1(K), mass = norm_1(M);
-  if (mass == 0 || stiffness == 0) return result;
-  const double omega = std::sqrt(stiffness / mass), shift = 1e-2; // of nu = lambda/omega: any that is no eigenvalue
-  const Eigen::EigenSolver<MatrixXd> solver(
-      companion(omega * omega / stiffness * M, omega / stiffness * C, K / stiffness, shift));
-  if (solver.info() != Eigen::Success)
-    throw Error("the QR algorithm did not converge on the dense quadratic eigenproblem");
-  // The columns of a pair with Im(mu) > 0 are the real and the imaginary part of its vector.
-  const MatrixXd& vectors = solver.pseudoEigenvectors();
-  for (Index k = 0; k < 2 * n; ++k)
-  {
-    const Complex mu = solver.eigenvalues()(k);
-    if (mu.imag() < 0 || std::abs(mu) < 1e-12) continue; // a conjugate; or lambda is infinite, without mass
-    // Of mu y and y the one of larger entries is taken. Im(1/mu) < 0 where Im(mu) > 0: the pair's conjugate is taken.
-    const auto part = std::abs(mu) > 1 ? vectors.topRows(n) : vectors.bottomRows(n);
-    DenseEigenpair pair{std::conj(omega * (shift + 1.0 / mu)), part.col(k).cast<Complex>()};
-    if (mu.imag() != 0) pair.y.imag() = -part.col(k + 1);
-    pair.y.normalize();
-    result.push_back(std::move(pair));
-  }
-  return result;
+  return right_pairs(solve_companion(M, C, K, Vectors::right, HUGE_VAL));
 }
 
-std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C,
-                                                         const MatrixXd& K)
+template <class Matrix> std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Matrix& M,
+                                                                                 const Matrix& C, const Matrix& K)
 {
   std::vector<DenseEigenpair> pairs;
-  on_rank_zero(comm, [&] { pairs = solve_dense_quadratic(M, C, K); });
+  on_rank_zero(comm, [&] { pairs = right_pairs(solve_companion(M, C, K, Vectors::right, HUGE_VAL)); });
   share_pairs(comm, pairs, K.rows(), {&DenseEigenpair::y});
   return pairs;
 }
@@ -319,31 +220,19 @@ SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const MatrixXd& 
 
 std::vector<Complex> dense_quadratic_eigenvalues(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
 {
-  std::vector<Complex> result;
-  const double stiffness = K.rows() > 0 ? norm_1(K) : 0, mass = K.rows() > 0 ? norm_1(M) : 0;
-  if (mass == 0 || stiffness == 0) return result;
-  const double omega = std::sqrt(stiffness / mass), shift = 1e-2; // of nu = lambda/omega: any that is no eigenvalue
-  MatrixXd A = companion(omega * omega / stiffness * M, omega / stiffness * C, K / stiffness, shift);
-  VectorXd re(A.rows()), im(A.rows());
-  const int size = to_int(A.rows());
-  if (LAPACKE_dgeev(LAPACK_COL_MAJOR, 'N', 'N', size, A.data(), size, re.data(), im.data(), nullptr, size, nullptr,
-                    size) != 0)
-    throw Error("the QR algorithm did not converge on the dense quadratic eigenproblem");
-  for (Index j = 0; j < A.rows(); ++j)
-    if (const Complex mu(re(j), im(j)); mu.imag() >= 0 && std::abs(mu) >= 1e-12)
-      result.push_back(std::conj(omega * (shift + 1.0 / mu)));
-  return result;
+  return values_of(right_pairs(solve_companion(M, C, K, Vectors::none, HUGE_VAL)));
 }
 
 namespace
 {
 
 /// Three steps of inverse iteration from the pair's vectors.
-void iterate(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, TwoSidedPair& pair)
+template <class Matrix> void iterate(const Matrix& M, const Matrix& C, const Matrix& K, TwoSidedPair& pair)
 {
   const Complex near = pair.lambda * (1 + 1e-10); // so that no pivot vanishes
-  const Eigen::MatrixXcd Q = near * near * M.cast<Complex>() + near * C.cast<Complex>() + K.cast<Complex>();
-  const Eigen::PartialPivLU<Eigen::MatrixXcd> factor(Q);
+  const MatrixXcd Q =
+      near * near * M.template cast<Complex>() + near * C.template cast<Complex>() + K.template cast<Complex>();
+  const Eigen::PartialPivLU<MatrixXcd> factor(Q);
   for (int iteration = 0; iteration < 3; ++iteration)
   {
     pair.right = factor.solve(pair.right).normalized();
@@ -352,9 +241,10 @@ void iterate(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, TwoSidedPa
 }
 
 /// The root of left'(lambda^2 M + lambda C + K) right that is nearest to the pair's lambda.
-Complex rayleigh_quotient(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, const TwoSidedPair& pair)
+template <class Matrix>
+Complex rayleigh_quotient(const Matrix& M, const Matrix& C, const Matrix& K, const TwoSidedPair& pair)
 {
-  const auto form = [&](const MatrixXd& A) -> Complex { return pair.left.transpose() * (A * pair.right); };
+  const auto form = [&](const Matrix& A) -> Complex { return pair.left.transpose() * (A * pair.right); };
   const Complex m = form(M), c = form(C), k = form(K), root = std::sqrt(c * c - 4. * m * k);
   const Complex one = (root - c) / (2. * m), other = (-root - c) / (2. * m);
   return std::abs(one - pair.lambda) < std::abs(other - pair.lambda) ? one : other;
@@ -364,13 +254,13 @@ Complex rayleigh_quotient(const MatrixXd& M, const MatrixXd& C, const MatrixXd& 
 
 TwoSidedPair two_sided_pair(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, Complex lambda)
 {
-  TwoSidedPair pair{lambda, Eigen::VectorXcd::Ones(K.rows()), Eigen::VectorXcd::Ones(K.rows())};
+  TwoSidedPair pair{lambda, VectorXcd::Ones(K.rows()), VectorXcd::Ones(K.rows())};
   iterate(M, C, K, pair);
   return pair;
 }
 
-void refine_pairs_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& C, const MatrixXd& K,
-                         std::vector<TwoSidedPair>& pairs)
+template <class Matrix> void refine_pairs_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Matrix& K,
+                                                 std::vector<TwoSidedPair>& pairs)
 {
   const auto refine = [&]
   {
@@ -452,20 +342,17 @@ std::vector<std::size_t> nearest_places(const std::vector<std::complex<double>>&
   return places;
 }
 
-std::optional<SchurForm> schur_form(const MatrixXd& A)
-{
-  const Eigen::RealSchur<MatrixXd> solver(A);
-  if (solver.info() != Eigen::Success) return std::nullopt;
-  SchurForm schur{solver.matrixT(), solver.matrixU(), {}};
-  order_and_read(schur, std::vector<lapack_logical>(static_cast<std::size_t>(A.rows()), 0));
-  return schur;
-}
-
-bool reorder(SchurForm& schur, const std::function<bool(Complex)>& chosen)
-{
-  std::vector<lapack_logical> marks;
-  for (const Complex eigenvalue : schur.eigenvalues) marks.push_back(chosen(eigenvalue));
-  return order_and_read(schur, marks);
-}
+template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const MatrixXd&, const MatrixXd&, const MatrixXd&,
+                                                          double);
+template std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm, const MatrixXd&, const MatrixXd&,
+                                                                  const MatrixXd&);
+template void refine_pairs_shared(MPI_Comm, const MatrixXd&, const MatrixXd&, const MatrixXd&,
+                                  std::vector<TwoSidedPair>&);
+template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&,
+                                                          const MatrixXcd&, double);
+template std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&,
+                                                                  const MatrixXcd&);
+template void refine_pairs_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&, const MatrixXcd&,
+                                  std::vector<TwoSidedPair>&);
 
 } // namespace squeal

@@ -1,14 +1,13 @@
 #include "loss.hpp"
 
-#include "complex_subspace.hpp"
 #include "squeal/algebra/shift_invert.hpp"
-#include "squeal/base/run_control.hpp"
-#include "squeal/modes/two_sided.hpp"
+#include "squeal/modes/dense_losses.hpp"
+#include "squeal/modes/projection.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <optional>
+#include <limits>
 
 namespace squeal
 {
@@ -18,174 +17,127 @@ namespace
 
 using Complex = std::complex<double>;
 using Eigen::Index;
+using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
-using Eigen::VectorXcd;
 
-constexpr int passes = 30;          // of residual correction, at most: losses of 2 and more take over 12
-constexpr double tolerance = 1e-13; // backward error
-constexpr double share = 1e-3;      // directions of residuals below this part of the largest are left to later passes
+constexpr int passes = 30;            // of residual correction, at most: losses of 2 and more take over 12
+constexpr double tolerance = 1e-13;   // backward error
+constexpr double share = 1e-3;        // directions of residuals below this part of the largest wait for the next pass
+constexpr double independent = 1e-6;  // the same of a first subspace
+constexpr double spurious = 1e-8;     // backward error of what is no pair
+constexpr double near_end = 0.98;     // of the largest |lambda|: pairs from there on may leave the slices
+constexpr std::size_t neighbours = 3; // of a slice's pairs, at each end
 
-/// A mode with its backward error in the whole problem.
-struct CorrectedMode
+/// Pairs of a slice, at most, and how far beyond its ends |lambda| pairs are corrected too, since they may come in.
+struct Width
 {
-  DenseEigenpair pair;
-  double error = HUGE_VAL;
-  std::optional<Complex> drawn_to{}; // the lambda of another mode, which Newton's method led it to
+  std::size_t pairs = 0;
+  double beyond = 0;
 };
 
-using Group = std::vector<CorrectedMode>;
+/// What serves where modes differ by more than losses change them, in little time, and what a cluster may need.
+constexpr Width usual{16, 0.02}, wide{64, 0.1};
 
-/// The rows of a vector that a larger space has too.
-void widen(VectorXcd& a, Index columns)
+/// X^H A X of the vectors whose real parts come first and whose imaginary parts come next.
+MatrixXcd on_vectors(const MultiVector& parts, Mat A)
 {
-  const Index known = a.size();
-  a.conservativeResize(columns);
-  a.tail(columns - known).setZero();
-}
-
-/// Makes the pairs that are not exact those of the problem on the subspace, each once. Returns which of them it found;
-/// the others stay what they were.
-std::vector<char> solve_on_subspace(const LossyMatrices& problem, Group& group)
-{
-  constexpr double near = 1e-5, far = 1e-3; // of lambda: what may draw a pair to itself, what it cannot be
-  std::vector<char> found(group.size(), 0);
-  std::vector<DenseEigenpair> solved;
-  const auto is_known = [&](const DenseEigenpair& pair, const Sameness& limits)
-  { return std::ranges::any_of(solved, [&](const DenseEigenpair& other) { return are_one(other, pair, limits); }); };
-  for (CorrectedMode& mode : group)
-    if (mode.error <= tolerance) solved.push_back(mode.pair);
-  for (std::size_t k = 0; k < group.size(); ++k)
+  constexpr Index at_once = 64;
+  const Index count = parts.columns() / 2;
+  MatrixXd products(2 * count, 2 * count);
+  for (Index first = 0; first < 2 * count; first += at_once)
   {
-    CorrectedMode& mode = group[k];
-    if (mode.error <= tolerance) continue;
-    DenseEigenpair pair = mode.pair;
-    if (!solve_lossy(problem, pair)) continue;
-    if (is_known(pair, perhaps))
-    {
-      const auto distance = [&](const DenseEigenpair& other)
-      { return std::abs(other.lambda - pair.lambda) / std::abs(pair.lambda); };
-      std::vector<DenseEigenpair> others;
-      std::ranges::copy_if(solved, std::back_inserter(others),
-                           [&](const DenseEigenpair& other) { return distance(other) < near; });
-      DenseEigenpair beside = mode.pair;
-      if (solve_lossy_beside(problem, others, beside) && distance(beside) < far && !is_known(beside, perhaps))
-        pair = std::move(beside);
-      else if (is_known(pair, {}))
-      {
-        mode.drawn_to = pair.lambda;
-        continue;
-      }
-    }
-    found[k] = 1;
-    solved.push_back(pair);
-    mode.pair = std::move(pair);
+    const Index some = std::min(at_once, 2 * count - first);
+    products.middleCols(first, some) =
+        inner_products(parts, product(A, {parts.comm, parts.entries.middleCols(first, some)}));
   }
-  return found;
+  MatrixXcd result(count, count);
+  result.real() = products.topLeftCorner(count, count) + products.bottomRightCorner(count, count);
+  result.imag() = products.topRightCorner(count, count) - products.bottomLeftCorner(count, count);
+  return result;
 }
 
-/// Solves the modes on the subspace; residuals that are not small join it, until none is left. What is
-/// exact stays so, since the subspace only grows.
-void solve_group(ComplexSubspace& space, Group& group, const PencilFactor& P)
+/// Pairs by their parts: the real parts of all vectors, then the imaginary ones.
+struct Starts
 {
-  for (int pass = 0;; ++pass)
-  {
-    end_if_asked(space.V.comm);
-    for (CorrectedMode& mode : group) mode.drawn_to.reset();
-    MultiVector residuals{space.V.comm, MatrixXd(space.V.entries.rows(), 0)};
-    for (CorrectedMode& mode : group) widen(mode.pair.y, space.V.columns());
-    const std::vector<char> found = solve_on_subspace(space.entries, group);
-    for (std::size_t k = 0; k < group.size(); ++k)
-    {
-      const auto& [lambda, y] = group[k].pair;
-      double& error = group[k].error;
-      if (error <= tolerance) continue;
-      error = HUGE_VAL;
-      if (!found[k]) continue;
-      const MultiVector residual = residual_of(space, loss_factors(lambda), y, error);
-      if (error > tolerance) append(residuals, residual);
-    }
-    if (residuals.columns() == 0 || pass == passes) return;
-    orthonormalise(residuals, share * share);
-    if (!extend(space, P.solve(residuals))) return;
-  }
-}
+  MultiVector parts;
+  std::vector<DenseEigenpair> pairs{}; // coefficients of the vectors, rising |lambda|
 
-/// Whether two pairs of a problem with this matrix are the same. Collective.
-bool are_one(const Eigenpair& a, const Eigenpair& b, Mat A)
-{
-  if (std::abs(a.lambda - b.lambda) >= same_lambda * std::abs(a.lambda)) return false;
-  MultiVector of_a = empty_multivector(A), of_b = of_a;
-  for (const Vec part : {a.real.get(), a.imaginary.get()}) append(of_a, part);
-  for (const Vec part : {b.real.get(), b.imaginary.get()}) append(of_b, part);
-  const MatrixXd shared = inner_products(of_b, of_a);
-  const double re = shared(0, 0) + shared(1, 1), im = shared(0, 1) - shared(1, 0); // b^H a
-  Eigen::Matrix2d times;                                                           // (b_real, b_imaginary) by b^H a
-  times << re, im, -im, re;
-  of_a.entries -= of_b.entries * times;
-  return column_norms(of_a).norm() < same_vector;
-}
-
-/// The lambda of a pair that stands twice, if there is any. Collective.
-std::optional<Complex> doubled(const std::vector<Eigenpair>& pairs, Mat A)
-{
-  for (std::size_t k = 1; k < pairs.size(); ++k)
-    for (std::size_t l = 0; l < k; ++l)
-      if (are_one(pairs[l], pairs[k], A)) return pairs[k].lambda;
-  return std::nullopt;
-}
-
-/// Pairs with losses.
-struct LossyPairs
-{
-  std::vector<Eigenpair> pairs{};
-  std::optional<Complex> doubled{}; // the lambda of two modes
+  std::size_t count() const { return pairs.size(); }
+  double size(std::size_t k) const { return std::abs(pairs[k].lambda); }
 };
 
-/// Solves groups of at most so many pairs.
-LossyPairs solve_in_groups(const std::vector<Eigenpair>& without_losses, const ComplexSubspace& empty,
-                           ShiftInvert& pencil, std::size_t in_group)
+/// The pairs with losses on the span of those without, which are taken.
+Starts start(std::vector<Eigenpair> without, const QuadraticProblem& problem, Mat K_loss)
 {
-  LossyPairs result;
-  std::vector<Complex> eigenvalues;
-  for (const Eigenpair& pair : without_losses)
+  Starts starts{empty_multivector(problem.K)};
+  for (const auto part : {&Eigenpair::real, &Eigenpair::imaginary})
+    for (Eigenpair& pair : without)
+    {
+      append(starts.parts, pair.*part);
+      pair.*part = {};
+    }
+  const MatrixXcd K = on_vectors(starts.parts, problem.K) + Complex(0, 1) * on_vectors(starts.parts, K_loss);
+  starts.pairs = solve_dense_quadratic_shared(starts.parts.comm, on_vectors(starts.parts, problem.M),
+                                              on_vectors(starts.parts, problem.C), K);
+  std::ranges::sort(starts.pairs, {}, [](const DenseEigenpair& pair) { return std::abs(pair.lambda); });
+  return starts;
+}
+
+/// An orthonormal basis of the real and imaginary parts of starts from `first` to `end`.
+MultiVector basis_of(const Starts& starts, std::size_t first, std::size_t end)
+{
+  const Index count = starts.parts.columns() / 2, some = static_cast<Index>(end - first);
+  MatrixXd a(2 * count, 2 * some);
+  for (Index k = 0; k < some; ++k)
   {
-    eigenvalues.push_back(pair.lambda);
-    result.pairs.push_back({pair.lambda, copy_of(pair.real), copy_of(pair.imaginary), pair.backward_error});
+    const Eigen::VectorXcd& y = starts.pairs[first + static_cast<std::size_t>(k)].y;
+    a.col(k) << y.real(), -y.imag();
+    a.col(some + k) << y.imag(), y.real();
   }
-  for (const auto& [places, first, end] : neighbouring_pairs(eigenvalues, in_group))
+  MultiVector basis = combination(starts.parts, a);
+  orthonormalise(basis, independent * independent);
+  return basis;
+}
+
+/// Where a slice from the start `first` on ends: at the widest gap of those that leave it enough pairs.
+std::size_t end_of_slice(const Starts& starts, std::size_t first, std::size_t most)
+{
+  std::size_t end = std::min(first + most, starts.count());
+  if (end == starts.count()) return end;
+  const auto gap = [&](std::size_t i) { return starts.size(i) / starts.size(i - 1); };
+  for (std::size_t i = end - 1; i > first + most / 2; --i)
+    if (gap(i) > gap(end)) end = i;
+  return end;
+}
+
+/// The pairs near the starts, in slices of |lambda|.
+std::vector<Eigenpair> solve_in_slices(const Starts& starts, const QuadraticProblem& problem, Mat K_loss,
+                                       ShiftInvert& pencil, const Width& width)
+{
+  std::vector<Eigenpair> result;
+  const double beyond = 1 + width.beyond;
+  double lower = std::sqrt(vibration_floor(norms_of(problem)));
+  for (std::size_t first = 0, end = 0; first < starts.count(); first = end)
   {
-    ComplexSubspace space = empty;
-    MultiVector shapes = empty.V;
-    for (const std::size_t place : places)
-      for (const Vec part : {without_losses[place].real.get(), without_losses[place].imaginary.get()})
-        append(shapes, part);
-    extend(space, shapes);
-    const MatrixXd a = inner_products(space.V, shapes);
-    std::vector<DenseEigenpair> without;
-    for (std::size_t k = 0; k < places.size(); ++k)
-    {
-      const auto column = static_cast<Index>(2 * k);
-      const VectorXcd y = a.col(column).cast<Complex>() + Complex(0, 1) * a.col(column + 1);
-      without.push_back({eigenvalues[places[k]], y.normalized()});
-    }
-    const std::vector<DenseEigenpair> with = with_losses(space.entries, without);
-    Group group;
-    for (std::size_t k = first; k < end; ++k) group.push_back({with[k]});
-    const double middle = eigenvalues[places[(first + end - 1) / 2]].imag();
-    move_to(pencil, 1.0001 * middle * middle);
-    solve_group(space, group, *pencil.factor);
-    for (std::size_t k = first; k < end; ++k)
-    {
-      Eigenpair& pair = result.pairs[places[k]];
-      const CorrectedMode& mode = group[k - first];
-      const DenseEigenpair& own = mode.pair;
-      const MultiVector y = vector_of(space, own.y);
-      copy_column(y, 0, pair.real);
-      copy_column(y, 1, pair.imaginary);
-      pair.lambda = own.lambda;
-      pair.backward_error = mode.error;
-      if (mode.drawn_to) result.doubled = mode.drawn_to;
-    }
+    end = end_of_slice(starts, first, width.pairs);
+    const double top = starts.size(end - 1),
+                 upper = end < starts.count() ? std::sqrt(top * starts.size(end)) : top * beyond;
+    std::size_t from = first, to = end;
+    while (from > 0 && (first - from < neighbours || starts.size(from - 1) * beyond > lower)) --from;
+    while (to < starts.count() && (to - end < neighbours || starts.size(to) < upper * beyond)) ++to;
+    move_to(pencil, (lower * lower + upper * upper) / 2);
+    const Window window{lower * lower / (beyond * beyond), upper * upper * beyond * beyond};
+    const Correction correction{window, passes, std::numeric_limits<int>::max(), tolerance, tolerance, share};
+    QuadraticSolution slice =
+        solve_on_subspace(problem, K_loss, basis_of(starts, from, to), *pencil.factor, correction);
+    std::ranges::copy_if(std::move_iterator(slice.pairs.begin()), std::move_iterator(slice.pairs.end()),
+                         std::back_inserter(result),
+                         [&](const Eigenpair& pair)
+                         {
+                           const double size = std::abs(pair.lambda);
+                           return size >= lower && size < upper && pair.backward_error <= spurious;
+                         });
+    lower = upper;
   }
   return result;
 }
@@ -195,25 +147,33 @@ LossyPairs solve_in_groups(const std::vector<Eigenpair>& without_losses, const C
 void correct_loss(QuadraticSolution& solution, const QuadraticProblem& problem, Mat K_loss,
                   const PencilOptions& options)
 {
-  const ComplexSubspace empty = empty_subspace({problem.M, problem.C, problem.K, K_loss});
-  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
-  LossyPairs found;
-  for (const std::size_t in_group : {usual_group, largest_group})
+  const auto real = std::stable_partition(solution.pairs.begin(), solution.pairs.end(),
+                                          [](const Eigenpair& pair) { return pair.lambda.imag() > 0; });
+  std::vector<Eigenpair> without(std::move_iterator(solution.pairs.begin()), std::move_iterator(real));
+  solution.pairs.erase(solution.pairs.begin(), real);
+  if (!without.empty())
   {
-    found = {}; // before others take memory
-    found = solve_in_groups(solution.pairs, empty, pencil, in_group);
-    if (!found.doubled) found.doubled = doubled(found.pairs, problem.K);
-    if (!found.doubled) break;
-  }
-  solution.pairs = std::move(found.pairs);
-  if (found.doubled && solution.outcome.kind == OutcomeKind::converged)
-  {
-    solution.outcome.kind = OutcomeKind::not_converged;
-    solution.outcome.reason = describe_doubled(*found.doubled);
+    const std::size_t count = without.size();
+    const Starts starts = start(std::move(without), problem, K_loss);
+    const auto expected = static_cast<std::size_t>(
+        std::ranges::count_if(starts.pairs, [&](const DenseEigenpair& pair)
+                              { return std::abs(pair.lambda) < near_end * starts.size(starts.count() - 1); }));
+    ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
+    std::vector<Eigenpair> found;
+    for (const Width& width : {usual, wide})
+    {
+      found = solve_in_slices(starts, problem, K_loss, pencil, width);
+      if (found.size() >= expected) break;
+    }
+    if ((found.size() < expected || starts.count() < count) && solution.outcome.kind == OutcomeKind::converged)
+    {
+      solution.outcome.kind = OutcomeKind::not_converged;
+      solution.outcome.reason = format("with loss factors %zu modes were found of %zu", found.size(), count);
+    }
+    std::ranges::move(found, std::back_inserter(solution.pairs));
   }
   solution.outcome.residual = 0;
-  for (const Eigenpair& pair : solution.pairs)
-    solution.outcome.residual = std::max(solution.outcome.residual, pair.backward_error);
+  sort_and_measure(solution);
 }
 
 } // namespace squeal

@@ -2,8 +2,8 @@
 /// Modes of structures with loss factors (src/README.md, section 3.11): those of complex stiffness,
 ///     (lambda^2 M + lambda C_0 + K + i K_loss) y = 0,   Im(lambda) > 0.
 ///
-/// Groups of neighbouring pairs are solved on the subspace of their vectors. Residuals join it as (K - tau M)^-1 r
-/// until all are small.
+/// The problem on the span of all pairs without losses shows where pairs with losses lie. Slices of |lambda| are solved
+/// on subspaces that residuals correct.
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/modes/quadratic.hpp"
 

@@ -1,10 +1,10 @@
 #include "squeal/modes/projection.hpp"
 
-#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/run_control.hpp"
+#include "subspace.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -21,48 +21,10 @@ namespace
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// A matrix A of the problem with A V and V'A V, which grow with V.
-struct Projected
-{
-  Mat matrix = nullptr;
-  MultiVector image;
-  MatrixXd entries{};
-};
-
-/// V has gained its last columns, W: V'A V gains the columns V'(A W) and the rows W'(A V).
-void extend(Projected& projected, const MultiVector& V, Index gained)
-{
-  const MultiVector W = columns_from(V, V.columns() - gained), AW = product(projected.matrix, W);
-  const MatrixXd below = inner_products(W, projected.image);
-  append(projected.image, AW);
-  projected.entries.conservativeResize(V.columns(), V.columns());
-  projected.entries.bottomLeftCorner(below.rows(), below.cols()) = below;
-  projected.entries.rightCols(gained) = inner_products(V, AW);
-}
-
-struct Subspace
-{
-  MultiVector V;
-  Projected M, C, K;
-};
-
-/// V gains what X adds to its span. Returns false if that is nothing.
-bool extend(Subspace& space, MultiVector X)
-{
-  PetscInt n = 0;
-  check(MatGetSize(space.K.matrix, &n, nullptr));
-  if (X.columns() == 0 || space.V.columns() >= n) return false;
-  const Index gained = extend_orthonormal(space.V, std::move(X));
-  if (gained == 0) return false;
-  for (Projected* projected : {&space.M, &space.C, &space.K}) extend(*projected, space.V, gained);
-  return true;
-}
-
 /// The pairs of the small problem in the window, largest growth ratio first.
 std::vector<DenseEigenpair> solve_small(const Subspace& space, const Window& window)
 {
-  std::vector<DenseEigenpair> found =
-      solve_dense_quadratic_shared(space.V.comm, space.M.entries, space.C.entries, space.K.entries);
+  std::vector<DenseEigenpair> found = solve_lossy_shared(space.V.comm, entries_of(space));
   std::erase_if(found, [&](const DenseEigenpair& pair) { return !window.holds(pair.lambda); });
   std::sort(found.begin(), found.end(),
             [](const DenseEigenpair& a, const DenseEigenpair& b)
@@ -74,22 +36,6 @@ constexpr std::size_t at_once = 64; // pairs expanded at a time
 // Columns of V, over those that a restart keeps. Pairs that friction turns far take eight passes and more, whose dense
 // problems would take most of the time; with half as many columns twice as many passes follow.
 constexpr Index most_of_kept = 2;
-using Pairs = std::span<const DenseEigenpair>;
-
-/// lambda^power y of each pair: the real parts of all, then the imaginary parts.
-MatrixXd coefficients(Pairs pairs, int power)
-{
-  const auto count = static_cast<Index>(pairs.size());
-  MatrixXd result(pairs.front().y.size(), 2 * count);
-  for (Index k = 0; k < count; ++k)
-  {
-    const DenseEigenpair& pair = pairs[static_cast<std::size_t>(k)];
-    const Eigen::VectorXcd column = std::pow(pair.lambda, power) * pair.y;
-    result.col(k) = column.real();
-    result.col(count + k) = column.imag();
-  }
-  return result;
-}
 
 /// V keeps the span of its first columns and of the pairs alone. Collective.
 void restart(Subspace& space, Index first, Pairs pairs)
@@ -101,61 +47,31 @@ void restart(Subspace& space, Index first, Pairs pairs)
                [&]
                {
                  MatrixXd kept(size, first + 2 * static_cast<Index>(pairs.size()));
-                 kept << MatrixXd::Identity(size, first), coefficients(pairs, 0);
+                 kept << MatrixXd::Identity(size, first), coefficients(pairs, 2);
                  Eigen::ColPivHouseholderQR<MatrixXd> orthogonal(kept);
                  orthogonal.setThreshold(dependent);
                  Q = orthogonal.householderQ() * MatrixXd::Identity(size, orthogonal.rank());
                });
   broadcast(Q, space.V.comm);
-  space.V = combination(space.V, Q);
-  for (Projected* projected : {&space.M, &space.C, &space.K})
-  {
-    projected->image = combination(projected->image, Q);
-    projected->entries = Q.transpose() * projected->entries * Q;
-  }
-}
-
-/// Of pairs V a: the real parts of all, then the imaginary parts.
-struct Residuals
-{
-  MultiVector columns;
-  Eigen::VectorXd sizes{}; // of the columns, over the sizes of a pair's terms
-
-  double backward_error(Index pair) const { return std::hypot(sizes(pair), sizes(sizes.size() / 2 + pair)); }
-};
-
-Residuals residuals_of(const Subspace& space, const QuadraticNorms& norms, Pairs pairs)
-{
-  const auto count = static_cast<Index>(pairs.size());
-  Residuals residuals{combination(space.K.image, coefficients(pairs, 0))};
-  MatrixXd& columns = residuals.columns.entries;
-  columns.noalias() += space.C.image.entries * coefficients(pairs, 1);
-  columns.noalias() += space.M.image.entries * coefficients(pairs, 2);
-  residuals.sizes = column_norms(residuals.columns);
-  for (Index k = 0; k < count; ++k)
-  {
-    const double w = std::abs(pairs[static_cast<std::size_t>(k)].lambda);
-    for (const Index column : {k, count + k}) residuals.sizes(column) /= w * w * norms.M + w * norms.C + norms.K;
-  }
-  return residuals;
+  combine(space, Q);
 }
 
 /// Calls visit(pairs, their residuals) for so many pairs at a time that these take little memory.
-template <class Visit> void for_residuals(const Subspace& space, const QuadraticNorms& norms, Pairs pairs, Visit visit)
+template <class Visit> void for_residuals(const Subspace& space, Pairs pairs, Visit visit)
 {
   for (std::size_t first = 0; first < pairs.size(); first += at_once)
   {
     const Pairs some = pairs.subspan(first, std::min(at_once, pairs.size() - first));
-    visit(some, residuals_of(space, norms, some));
+    visit(some, residuals_of(space, some));
   }
 }
 
 /// The residuals of pairs that are not small enough. Pairs whose residuals are move to `exact`.
-MultiVector residuals_left(const Subspace& space, const QuadraticNorms& norms, Pairs pairs,
-                           const Correction& correction, std::vector<std::complex<double>>& exact)
+MultiVector residuals_left(const Subspace& space, Pairs pairs, const Correction& correction,
+                           std::vector<std::complex<double>>& exact)
 {
-  MultiVector left = empty_multivector(space.K.matrix);
-  for_residuals(space, norms, pairs,
+  MultiVector left = empty_multivector(space.terms[2].matrix);
+  for_residuals(space, pairs,
                 [&](Pairs some, const Residuals& residuals)
                 {
                   const auto count = static_cast<Index>(some.size());
@@ -174,20 +90,20 @@ MultiVector residuals_left(const Subspace& space, const QuadraticNorms& norms, P
 }
 
 /// y = V a of all pairs.
-std::vector<Eigenpair> expand(const Subspace& space, const QuadraticNorms& norms, Pairs pairs)
+std::vector<Eigenpair> expand(const Subspace& space, Pairs pairs)
 {
   std::vector<Eigenpair> result;
-  for_residuals(space, norms, pairs,
+  for_residuals(space, pairs,
                 [&](Pairs some, const Residuals& residuals)
                 {
                   const auto count = static_cast<Index>(some.size());
-                  const MultiVector y = combination(space.V, coefficients(some, 0));
+                  const MultiVector y = vectors_of(space, some);
                   for (Index k = 0; k < count; ++k)
                   {
                     Eigenpair& pair = result.emplace_back();
                     pair.lambda = some[static_cast<std::size_t>(k)].lambda;
                     pair.backward_error = residuals.backward_error(k);
-                    check(MatCreateVecs(space.K.matrix, pair.real.put(), pair.imaginary.put()));
+                    check(MatCreateVecs(space.terms[2].matrix, pair.real.put(), pair.imaginary.put()));
                     copy_column(y, k, pair.real);
                     copy_column(y, count + k, pair.imaginary);
                   }
@@ -229,13 +145,11 @@ MultiVector largest_directions(MultiVector residuals, double share)
 
 } // namespace
 
-QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector basis, const PencilFactor& P,
-                                    const Correction& correction)
+QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Mat K_loss, MultiVector basis,
+                                    const PencilFactor& P, const Correction& correction)
 {
   QuadraticSolution result;
-  const QuadraticNorms norms = norms_of(problem);
-  const MultiVector none = empty_multivector(problem.K);
-  Subspace space{none, {problem.M, none, {}}, {problem.C, none, {}}, {problem.K, none, {}}};
+  Subspace space = empty_subspace({problem.M, problem.C, problem.K, K_loss});
   extend(space, std::move(basis));
   const Index first = space.V.columns();
   std::vector<std::complex<double>> exact;
@@ -246,7 +160,7 @@ QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector
     const Pairs corrected(found.data(), std::min(found.size(), static_cast<std::size_t>(correction.pairs)));
     const auto is_better = [&](Pairs pairs)
     {
-      MultiVector left = residuals_left(space, norms, pairs, correction, exact);
+      MultiVector left = residuals_left(space, pairs, correction, exact);
       if (left.columns() == 0) return false;
       MultiVector more = P.solve(largest_directions(std::move(left), correction.share));
       const Index kept = first + 2 * static_cast<Index>(found.size());
@@ -255,7 +169,7 @@ QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector
     };
     result.outcome.iterations = pass;
     if (pass < correction.passes && is_better(still_open(corrected, exact))) continue;
-    result.pairs = expand(space, norms, found);
+    result.pairs = expand(space, found);
     const auto is_exact = [&](const Eigenpair& pair)
     { return pair.backward_error <= std::sqrt(2.) * correction.tolerance_of(pair.lambda); };
     const std::span measured(result.pairs.data(), corrected.size());
@@ -281,7 +195,7 @@ QuadraticSolution solve_projected(const QuadraticProblem& problem, Mat M, Mat K,
     if (settings.passes > 0) move_to(stiffness, shift_below_zero(M, K));
     const double omega = two_pi * settings.band;
     const Window window{vibration_floor(norms_of(problem)), omega * omega};
-    result = solve_on_subspace(problem, std::move(shapes), *stiffness.factor,
+    result = solve_on_subspace(problem, nullptr, std::move(shapes), *stiffness.factor,
                                {window, settings.passes, settings.candidates, 1e-15, 1e-15, 0});
   }
   result.outcome.kind = modes.outcome.kind;

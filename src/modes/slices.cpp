@@ -73,7 +73,7 @@ void find_pairs(Slice& slice, const QuadraticProblem& problem, ShiftInvert& penc
   for (const std::complex<double> theta : nearest.theta) slice.smallest = std::min(slice.smallest, std::abs(theta));
   const Correction correction{{least, limit}, passes, std::numeric_limits<int>::max(),
                               tolerance,      sharp,  residual_share};
-  slice.pairs = solve_on_subspace(problem, std::move(nearest.space), *pencil.factor, correction).pairs;
+  slice.pairs = solve_on_subspace(problem, nullptr, std::move(nearest.space), *pencil.factor, correction).pairs;
   std::erase_if(slice.pairs, [](const Eigenpair& pair) { return pair.backward_error > spurious; });
 }
 

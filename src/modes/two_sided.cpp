@@ -1,10 +1,9 @@
 #include "squeal/modes/two_sided.hpp"
 
-#include "complex_subspace.hpp"
+#include "subspace.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <Eigen/LU>
 #include <Eigen/SVD>
 
 namespace squeal
@@ -15,7 +14,6 @@ namespace
 
 using Complex = std::complex<double>;
 using Eigen::MatrixXcd;
-using Eigen::VectorXcd;
 
 constexpr double tolerance = 1e-13; // backward error: derivatives are off by it to first order
 constexpr double near = 1e-6;       // backward errors from which on lambda follows the vectors
@@ -23,10 +21,10 @@ constexpr int passes = 60;          // each adds two vectors to a side, with whi
 constexpr double beside = 1e-4;     // of tau from -Re(lambda^2), which is an eigenvalue of the pencil without damping
 
 /// The vector that the problem on the subspace takes nearest to zero.
-VectorXcd null_vector(const ComplexSubspace& space, const ComplexFactors& factor)
+DenseEigenpair null_vector(const Subspace& space, Complex lambda)
 {
-  const Eigen::BDCSVD<MatrixXcd> svd(sum(space.entries, factor), Eigen::ComputeFullV);
-  return svd.matrixV().col(svd.matrixV().cols() - 1);
+  const Eigen::BDCSVD<MatrixXcd> svd(sum(entries_of(space), loss_factors(lambda)), Eigen::ComputeFullV);
+  return {lambda, svd.matrixV().col(svd.matrixV().cols() - 1)};
 }
 
 /// x'y without conjugation, of real and imaginary parts.
@@ -37,16 +35,15 @@ Complex bilinear(const MultiVector& x, const MultiVector& y)
 }
 
 /// By the two-sided Rayleigh quotient.
-Complex change_of_lambda(const ComplexSubspace& space, Complex lambda, const MultiVector& left,
-                         const MultiVector& right)
+Complex change_of_lambda(const Subspace& space, Complex lambda, const MultiVector& left, const MultiVector& right)
 {
   std::array<Complex, 4> products{};
   Complex residual = 0;
   const ComplexFactors factor = loss_factors(lambda);
   for (std::size_t k = 0; k < 4; ++k)
-    if (space.matrices[k])
+    if (space.terms[k].matrix)
     {
-      products[k] = bilinear(left, product(space.matrices[k], right));
+      products[k] = bilinear(left, product(space.terms[k].matrix, right));
       residual += factor[k] * products[k];
     }
   return -residual / (2. * lambda * products[0] + products[1]);
@@ -70,27 +67,26 @@ TwoSidedMode find_two_sided(TwoSidedProblem& problem, Complex lambda, const Mult
   const auto& [M, C, K] = problem.matrices;
   move_to(problem.pencil, -(1 + beside) * (lambda * lambda).real());
   const PencilFactor& P = *problem.pencil.factor;
-  ComplexSubspace right = empty_subspace({M, C, K, problem.K_loss}),
-                  left = empty_subspace({problem.M_t, problem.C_t, problem.K_t, problem.K_loss_t});
+  Subspace right = empty_subspace({M, C, K, problem.K_loss}),
+           left = empty_subspace({problem.M_t, problem.C_t, problem.K_t, problem.K_loss_t});
   extend(right, start);
   extend(left, P.solve_transposed(product(problem.M_t, start)));
   TwoSidedMode mode{lambda, {}, {}, HUGE_VAL};
   for (int pass = 0;; ++pass)
   {
-    const ComplexFactors before = loss_factors(mode.lambda);
-    const VectorXcd y = null_vector(right, before), x = null_vector(left, before);
-    mode.right = vector_of(right, y);
-    mode.left = vector_of(left, x);
+    DenseEigenpair y = null_vector(right, mode.lambda), x = null_vector(left, mode.lambda);
+    mode.right = vectors_of(right, {&y, 1});
+    mode.left = vectors_of(left, {&x, 1});
     const bool follows = mode.backward_error < near;
     if (follows) mode.lambda += change_of_lambda(right, mode.lambda, mode.left, mode.right);
     if (lambda.imag() == 0) mode.lambda.imag(0);
-    double of_right = 0, of_left = 0;
-    const ComplexFactors now = loss_factors(mode.lambda);
-    const MultiVector r = residual_of(right, now, y, of_right), s = residual_of(left, now, x, of_left);
+    y.lambda = x.lambda = mode.lambda;
+    const Residuals r = residuals_of(right, {&y, 1}), s = residuals_of(left, {&x, 1});
+    const double of_right = r.backward_error(0), of_left = s.backward_error(0);
     mode.backward_error = std::max(of_right, of_left);
     if ((follows && mode.backward_error <= tolerance) || pass == passes) return mode;
-    const bool wider_right = of_right > tolerance && extend(right, P.solve(r)),
-               wider_left = of_left > tolerance && extend(left, P.solve_transposed(s));
+    const bool wider_right = of_right > tolerance && extend(right, P.solve(r.columns)),
+               wider_left = of_left > tolerance && extend(left, P.solve_transposed(s.columns));
     if (!wider_right && !wider_left && follows) return mode;
   }
 }

@@ -91,7 +91,6 @@ struct SolvedPairs
 {
   std::vector<TwoSidedPair> pairs; // falling growth rate
   std::vector<double> right, left; // backward errors of the vectors
-  std::optional<Complex> doubled;  // a mode that loss factors make of two
 
   double backward_error(std::size_t k) const { return left[k] <= right[k] ? right[k] : left[k]; } // NaN of either
 };
@@ -242,8 +241,7 @@ enum class Extent
 /// The backward errors of pairs of the projected problem.
 SolvedPairs with_errors(const ModesBasis& modes, const ProjectedSliding& on_basis, std::vector<TwoSidedPair> pairs)
 {
-  SolvedPairs solved{std::move(pairs), {}, {}, {}};
-  if (on_basis.K_loss.size() > 0) solved.doubled = doubled_lambda(solved.pairs);
+  SolvedPairs solved{std::move(pairs), {}, {}};
   solved.right = backward_errors(modes, on_basis, solved.pairs, Side::right);
   solved.left = backward_errors(modes, on_basis, solved.pairs, Side::left);
   return solved;
@@ -287,13 +285,9 @@ void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const
   if (places.empty() || places.size() > few) return;
   for (const std::size_t k : places) pairs.push_back(solved.pairs[k]);
   const LossyMatrices on_shapes = without_sketch(on_basis, modes.basis.shapes());
-  const auto& [M, C, K, K_loss] = on_shapes;
   const MatrixXd &V = on_basis.independent, V_transposed = V.transpose();
   if (V.size() > 0) transform(pairs, V_transposed, V_transposed);
-  if (K_loss.size() > 0)
-    refine_lossy_shared(modes.basis.T.comm, on_shapes, pairs);
-  else
-    refine_pairs_shared(modes.basis.T.comm, M, C, K, pairs);
+  refine_lossy_shared(modes.basis.T.comm, on_shapes, pairs);
   if (V.size() > 0) transform(pairs, V, V);
   SolvedPairs refined = with_errors(modes, on_basis, std::move(pairs));
   for (std::size_t i = 0; i < places.size(); ++i)
@@ -304,7 +298,6 @@ void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const
     solved.right[k] = refined.right[i];
     solved.left[k] = refined.left[i];
   }
-  if (K_loss.size() > 0) solved.doubled = doubled_lambda(solved.pairs);
 }
 
 /// The pairs of the projected problem in the window, falling growth rate.
@@ -313,22 +306,15 @@ SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_
 {
   const MPI_Comm comm = modes.basis.T.comm;
   LossyMatrices problem = without_sketch(on_basis, modes.basis.shapes());
-  const auto& [M, C, K, K_loss] = problem;
   InvariantSubspaces spaces;
   if (extent == Extent::near_band)
   {
-    spaces = invariant_subspaces_shared(comm, M, K, undamped_reach * undamped_reach * window.limit);
+    spaces = invariant_subspaces_shared(comm, problem[0], problem[2], undamped_reach * undamped_reach * window.limit);
     for (MatrixXd& A : problem)
       if (A.size() > 0) A = (spaces.left.transpose() * A * spaces.right).eval();
   }
-  std::vector<TwoSidedPair> pairs = solve_two_sided_shared(comm, M, C, K, std::sqrt(window.limit));
-  const auto beyond = [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); };
-  std::erase_if(pairs, beyond);
-  if (K_loss.size() > 0)
-  {
-    add_losses_shared(comm, problem, pairs);
-    std::erase_if(pairs, beyond);
-  }
+  std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(comm, problem, std::sqrt(window.limit));
+  std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); });
   if (extent == Extent::near_band) transform(pairs, spaces.right, spaces.left);
   if (const MatrixXd& V = on_basis.independent; V.size() > 0) transform(pairs, V, V);
   std::stable_sort(pairs.begin(), pairs.end(),
@@ -376,11 +362,6 @@ PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const Proj
         format("%d of %zu eigenvalues have backward errors above %.0e, the largest %.0f times its "
                "tolerance: allow more corrections by -sweep_passes",
                static_cast<int>(inexact), solved.pairs.size(), problem.tolerance, largest_excess(solved, problem));
-  }
-  if (solved.doubled)
-  {
-    result.outcome.kind = OutcomeKind::not_converged;
-    result.outcome.reason = describe_doubled(*solved.doubled);
   }
   for (std::size_t k = 0; k < solved.pairs.size(); ++k)
   {
@@ -477,7 +458,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
     SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
     if (extent == Extent::near_band) refine_few(modes, on_basis, problem, solved);
     double now = largest_excess(solved, problem);
-    if (extent == Extent::near_band && ((now > 1 && now > slow * before) || solved.doubled))
+    if (extent == Extent::near_band && now > 1 && now > slow * before)
     {
       SolvedPairs whole = solve_projected(modes, on_basis, window, Extent::whole);
       const double of_whole = largest_excess(whole, problem);
@@ -498,7 +479,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
       if (leads) modes.shared = modes.basis.shapes();
       continue;
     }
-    const bool misses = now > 1 || solved.doubled;
+    const bool misses = now > 1;
     if (misses && complete(modes, problem))
     {
       extent = Extent::whole;

@@ -108,16 +108,9 @@ std::vector<std::vector<double>> training_values(const RobustnessProblem& proble
 /// The modes in the band with both vectors.
 std::vector<TwoSidedPair> two_sided_modes(const ReducedMatrices& at, double band)
 {
-  std::vector<TwoSidedPair> pairs = solve_two_sided_shared(MPI_COMM_SELF, at.M, at.C, at.K);
-  const auto keep_below = [&](double end)
-  { std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !in_band(pair, end); }); };
-  if (at.K_loss.size() > 0)
-  {
-    keep_below(followed_band * band);
-    add_losses_shared(MPI_COMM_SELF, {at.M, at.C, at.K, at.K_loss}, pairs);
-    if (const auto lambda = doubled_lambda(pairs)) throw Error(describe_doubled(*lambda));
-  }
-  keep_below(band);
+  std::vector<TwoSidedPair> pairs =
+      solve_two_sided_lossy_shared(MPI_COMM_SELF, {at.M, at.C, at.K, at.K_loss}, HUGE_VAL);
+  std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !in_band(pair, band); });
   return pairs;
 }
 

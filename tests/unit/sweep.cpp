@@ -8,6 +8,7 @@
 #include <doctest/doctest.h>
 #include <Eigen/QR>
 #include <random>
+#include <span>
 
 using namespace squeal;
 using Complex = std::complex<double>;
@@ -59,26 +60,25 @@ TEST_CASE("pairs take losses, with both vectors, whatever the bases of the two s
   K.diagonal() += Eigen::VectorXd::LinSpaced(n, 10, 400);
   const MatrixXd P = rotation(), R = rotation(), K_loss = 0.2 * K + part * part.transpose() / n;
   const LossyMatrices problem{P * M * R, P * C * R, P * K * R, P * K_loss * R};
-  std::vector<TwoSidedPair> pairs = solve_two_sided_shared(PETSC_COMM_WORLD, problem[0], problem[1], problem[2]);
-  const std::size_t count = pairs.size();
-  add_losses_shared(PETSC_COMM_WORLD, problem, pairs);
+  const std::size_t count = solve_two_sided_shared(PETSC_COMM_WORLD, problem[0], problem[1], problem[2]).size();
+  const std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
   REQUIRE(pairs.size() == count);
   for (std::size_t i = 0; i < count; ++i)
   {
     const auto& [lambda, right, left] = pairs[i];
     const MatrixXcd Q = sum(problem, loss_factors(lambda));
-    const double settled = 1e-11 * (std::norm(lambda) * M.norm() + K.norm()); // lambda moved by 1e-12 of itself at last
+    const double settled = 1e-11 * (std::norm(lambda) * M.norm() + K.norm());
     CHECK((Q * right).norm() < settled);
     CHECK((left.transpose() * Q).norm() < settled);
     for (std::size_t j = 0; j < i; ++j) CHECK(std::abs(lambda - pairs[j].lambda) > 1e-6 * std::abs(lambda));
   }
 }
 
-TEST_CASE("pairs of a problem larger than the span of their neighbours take their losses, each its own")
+TEST_CASE("pairs below a limit of a larger problem take their losses, each its own")
 {
   std::mt19937 generator(9);
   std::uniform_real_distribution<double> random(-1, 1);
-  const int n = 240; // more than twice the real and imaginary parts of both vectors of 22 neighbours
+  const int n = 240;
   const auto matrix = [&] { return MatrixXd::NullaryExpr(n, n, [&] { return random(generator); }).eval(); };
   const MatrixXd M = MatrixXd::Identity(n, n), C = 1e-2 * matrix(), part = matrix().leftCols(40);
   MatrixXd K = Eigen::VectorXd::LinSpaced(n, 10, 2400).asDiagonal();
@@ -87,14 +87,15 @@ TEST_CASE("pairs of a problem larger than the span of their neighbours take thei
   K += 1e-2 * matrix();
   const LossyMatrices problem{M, C, K, 0.05 * K + 0.1 * part * part.transpose()};
   const double limit = 26; // of the lower quarter: the others are far away
-  std::vector<TwoSidedPair> pairs = solve_two_sided_shared(PETSC_COMM_WORLD, M, C, K, limit);
-  const std::vector<TwoSidedPair> without = pairs;
-  add_losses_shared(PETSC_COMM_WORLD, problem, pairs);
-  REQUIRE(pairs.size() >= 60);
+  std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, limit);
+  std::erase_if(pairs, [&](const TwoSidedPair& pair) { return std::abs(pair.lambda) > limit; });
+  std::vector<TwoSidedPair> all = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
+  std::erase_if(all, [&](const TwoSidedPair& pair) { return std::abs(pair.lambda) > limit; });
+  CHECK(pairs.size() == all.size());
+  REQUIRE(pairs.size() >= 55);
   for (std::size_t i = 0; i < pairs.size(); ++i)
   {
     const auto& [lambda, right, left] = pairs[i];
-    if (std::abs(without[i].lambda) > limit) continue; // perhaps unfinished
     INFO("lambda ", lambda.real(), " ", lambda.imag());
     const MatrixXcd Q = sum(problem, loss_factors(lambda));
     const Complex change = (left.transpose() * Q * right).value() /
@@ -117,7 +118,7 @@ TEST_CASE("modes keep themselves as they take losses, however near to lock-in an
 {
   std::mt19937 generator(3);
   std::uniform_real_distribution<double> random(-1, 1);
-  const int n = 60; // more than neighbours hold, so that their span is not the whole space
+  const int n = 60;
   const auto matrix = [&] { return MatrixXd::NullaryExpr(n, n, [&] { return random(generator); }).eval(); };
   const MatrixXd M = MatrixXd::Identity(n, n), damping = matrix(), coupling = matrix();
   MatrixXd part = matrix().leftCols(10);
@@ -129,14 +130,12 @@ TEST_CASE("modes keep themselves as they take losses, however near to lock-in an
       K.block(20, 20, 2, 2) << 210, 5, -5, 220 + 10 * distance; // the two meet at distance 0
       K += damped * coupling;
       const LossyMatrices problem{M, damped * damping, K, 1e-2 * K + 0.1 * part * part.transpose()};
-      const std::vector<TwoSidedPair> without = solve_two_sided_shared(PETSC_COMM_WORLD, M, problem[1], K);
-      std::vector<TwoSidedPair> pairs = without;
-      add_losses_shared(PETSC_COMM_WORLD, problem, pairs);
+      const std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
+      CHECK(pairs.size() == static_cast<std::size_t>(n));
       for (std::size_t i = 0; i < pairs.size(); ++i)
       {
         const auto& [lambda, right, left] = pairs[i];
-        INFO("distance ", distance, " damped ", damped, " lambda ", without[i].lambda.real(), " ",
-             without[i].lambda.imag());
+        INFO("distance ", distance, " damped ", damped, " lambda ", lambda.real(), " ", lambda.imag());
         const MatrixXcd Q = sum(problem, loss_factors(lambda));
         const double size = std::norm(lambda) + std::abs(lambda) * damped + K.norm();
         CHECK((Q * right).norm() < 1e-11 * size);
@@ -165,10 +164,8 @@ TEST_CASE("near neighbours that a loss factor mixes stay two")
         part(19) = std::cos(angle);
         part(20) = std::sin(angle);
         const LossyMatrices problem{M, damping, K, eta * K(19, 19) * part * part.transpose()};
-        std::vector<DenseEigenpair> without = solve_dense_quadratic(M, damping, K);
-        std::vector<TwoSidedPair> pairs = solve_two_sided_shared(PETSC_COMM_WORLD, M, damping, K);
-        add_losses_shared(PETSC_COMM_WORLD, problem, pairs);
-        const std::vector<DenseEigenpair> modes = with_losses(problem, without);
+        const std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
+        const std::vector<DenseEigenpair> modes = solve_lossy_shared(PETSC_COMM_WORLD, problem);
         REQUIRE(pairs.size() == static_cast<std::size_t>(n));
         REQUIRE(modes.size() == static_cast<std::size_t>(n));
         for (std::size_t i = 0; i < pairs.size(); ++i)
@@ -222,11 +219,34 @@ TEST_CASE("pairs below a limit are those of the whole problem, with both vectors
 
 TEST_CASE("one loss factor everywhere gives the closed form of complex stiffness")
 {
-  const MatrixXd one = MatrixXd::Identity(1, 1);
-  const double eta = 0.3, w = 7;
-  std::vector<TwoSidedPair> pairs = {{Complex(0, w), Eigen::VectorXcd::Ones(1), Eigen::VectorXcd::Ones(1)}};
-  add_losses_shared(PETSC_COMM_WORLD, {one, 0 * one, w * w * one, eta * w * w * one}, pairs);
-  CHECK(std::abs(pairs[0].lambda - Complex(0, w) * std::sqrt(Complex(1, eta))) < 1e-13 * w);
+  const MatrixXd one = MatrixXd::Identity(1, 1), none = MatrixXd::Zero(1, 1);
+  const double w = 7;
+  for (const double eta : {0.02, 0.3, 5.})
+  {
+    const LossyMatrices problem{one, none, w * w * one, eta * w * w * one};
+    const std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
+    REQUIRE(pairs.size() == 1);
+    const Complex exact = Complex(0, w) * std::sqrt(Complex(1, eta));
+    CHECK(std::abs(pairs[0].lambda - exact) < 1e-13 * w);
+  }
+}
+
+TEST_CASE("what is overdamped without losses does not vibrate with them, and what diverges stays as it is")
+{
+  MatrixXd M = MatrixXd::Identity(4, 4), C = MatrixXd::Zero(4, 4), K = MatrixXd::Zero(4, 4);
+  K.diagonal() << 9, 16, 1, -4;
+  C(2, 2) = 50;
+  const LossyMatrices problem{M, C, K, 0.1 * K.cwiseAbs()};
+  std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
+  const auto real = std::ranges::stable_partition(pairs, [](const auto& pair) { return pair.lambda.imag() > 0; });
+  REQUIRE(pairs.size() == 6);
+  REQUIRE(real.size() == 4);
+  for (const auto& [lambda, right, left] : std::span(pairs).first(2))
+  {
+    const double w = std::abs(lambda.imag() - 3) < 0.5 ? 3 : 4;
+    CHECK(std::abs(lambda - Complex(0, w) * std::sqrt(Complex(1, 0.1))) < 1e-12);
+  }
+  CHECK(std::ranges::count_if(real, [](const auto& pair) { return std::abs(pair.lambda - 2.) < 1e-12; }) == 1);
 }
 
 TEST_CASE("left and right vectors of unsymmetric quadratic problems solve them, and are biorthogonal")

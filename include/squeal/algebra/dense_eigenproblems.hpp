@@ -1,7 +1,7 @@
 #pragma once
 /// Eigenproblems of dense matrices, solved by Eigen with LAPACK underneath (src/README.md, section 8.8). Matrices are
-/// square. Functions whose name ends in _shared are collective; the others work on one rank alone. Where LAPACK does
-/// not converge they throw Error.
+/// square; `Matrix` is Eigen::MatrixXd or MatrixXcd. Functions whose name ends in _shared are collective; the others
+/// work on one rank alone. Where LAPACK does not converge they throw Error.
 #include "squeal/algebra/dense_matrix.hpp"
 
 #include <cmath>
@@ -47,13 +47,13 @@ TwoSidedPair two_sided_pair(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C, 
 
 /// Makes pairs that are nearly those of a problem its own, by inverse iteration from their vectors and the two-sided
 /// Rayleigh quotient; the matrices are those of rank 0. Collective.
-void refine_pairs_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& C, const Eigen::MatrixXd& K,
-                         std::vector<TwoSidedPair>& pairs);
+template <class Matrix> void refine_pairs_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Matrix& K,
+                                                 std::vector<TwoSidedPair>& pairs);
 
 /// The pairs of solve_dense_quadratic with their left vectors, from the matrices of rank 0, on every rank: all with
 /// |lambda| <= limit, and perhaps more. Collective.
-std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
-                                                 const Eigen::MatrixXd& K, double limit = HUGE_VAL);
+template <class Matrix> std::vector<TwoSidedPair>
+solve_two_sided_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Matrix& K, double limit = HUGE_VAL);
 
 /// Gives every rank the pairs of rank 0, whose vectors have so many rows. Collective.
 void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Eigen::Index rows);
@@ -70,8 +70,8 @@ InvariantSubspaces invariant_subspaces_shared(MPI_Comm comm, const Eigen::Matrix
                                               double limit);
 
 /// The pairs of solve_dense_quadratic from the matrices of rank 0, on every rank. Collective.
-std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Eigen::MatrixXd& M,
-                                                         const Eigen::MatrixXd& C, const Eigen::MatrixXd& K);
+template <class Matrix> std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Matrix& M,
+                                                                                 const Matrix& C, const Matrix& K);
 
 /// All eigenpairs of A, the largest modulus first, of a complex pair first the one with Im(lambda) > 0.
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const Eigen::MatrixXd& A);
@@ -106,11 +106,13 @@ SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const Eigen::Mat
                                                  double shift);
 
 /// The real Schur form A = Q T Q', with 2 x 2 diagonal blocks in T for complex eigenvalues.
-struct SchurForm
+template <class Matrix> struct SchurFormOf
 {
-  Eigen::MatrixXd T, Q;
+  Matrix T, Q;
   std::vector<std::complex<double>> eigenvalues; // in the order of T's diagonal
 };
+
+using SchurForm = SchurFormOf<Eigen::MatrixXd>;
 
 /// Nothing if the QR algorithm does not converge.
 std::optional<SchurForm> schur_form(const Eigen::MatrixXd& A);

@@ -30,9 +30,10 @@ struct Correction
   }
 };
 
-/// `basis` spans the first V. Backward errors are those of `problem` itself. The caller sets outcome.kind.
-QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, MultiVector basis, const PencilFactor& P,
-                                    const Correction& correction);
+/// `basis` spans the first V. Backward errors are those of `problem` itself. With the K_loss of loss factors, which may
+/// be null, only pairs that oscillate are sought, by complex stiffness. The caller sets outcome.kind.
+QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Mat K_loss, MultiVector basis,
+                                    const PencilFactor& P, const Correction& correction);
 
 /// How the route by projection is taken.
 struct ProjectionSettings
