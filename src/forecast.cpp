@@ -1,7 +1,7 @@
 /// Memory by what each stage holds at its peak: what is resident after the model is made, by the system's own count,
-/// and copies of matrices, factors by their symbolic analysis, dense operators and vectors. Time by the operations of
-/// factors and products, and by the memory that steps read (src/README.md, section 8.9). The constants of time are
-/// fitted to runs of the TGV brake.
+/// and copies of matrices, factors by their symbolic analysis, dense operators and vectors. Time by the two pieces of
+/// work that runs repeat: a factor, by its operations, and a step, by the memory that it reads (src/README.md, section
+/// 8.9).
 #include "squeal/forecast.hpp"
 
 #include "squeal/algebra/factor_forecast.hpp"
@@ -25,19 +25,10 @@ namespace squeal
 namespace
 {
 
-// Of operations and of memory read, by runs of the TGV brake with 5048, 33 224 and 97 742 degrees of freedom:
-constexpr double equilibrium_factors = 2, equilibrium_passes = 140; // over K: ordering, springs, residuals
-constexpr double modes_factors = 13, modes_vectors = 9;
-constexpr double read_passes = 1.3, made_factors = 2; // over factor and W; of what they take to be made
-constexpr double dense_operations = 10;               // of a cube of twice the degrees of freedom
-constexpr double seconds_of_no_model = 2.5e-5;        // a step of inputs/oscillator, which is all overhead
-constexpr double periods_to_a_cycle = 50;             // of shooting from the estimate: 41 to 47
-constexpr double periods_of_multipliers = 60;
-constexpr double periods_beside_reduced = 100; // of the full model, with those of the multipliers
-constexpr double reduction_products = 16;      // of dofs x shapes by shapes
-constexpr double reduced_steps = 20000;        // over a matrix of shapes
-constexpr int usual_steps = 128;               // a period, where they are chosen
-constexpr double day = 86400;                  // [s]
+constexpr double usual_periods = 50;        // of shooting from the estimate to a cycle
+constexpr int usual_steps = 128;            // a period, where they are chosen
+constexpr double seconds_of_calls = 2.5e-5; // a step of a model of one mass, which is all calls
+constexpr double day = 86400;               // [s]
 constexpr double dense_copies = 24; // of n x n numbers in a dense quadratic problem: a pencil of size 2 n, six times
 // A slice takes about 100 pairs with their guards, and passes append two directions a pair. So V has 300 columns on
 // the brake; with its products, a copy while it grows, shapes, residuals and three right sides of a solve:
@@ -79,7 +70,7 @@ double steps_of(const Scene& scene, const ProgramOptions& options)
   const double motions = motions_of(scene);
   if (!scene.cycle.enabled && motions == 0) return steps;
   const double a_period = steps_of_period(scene);
-  const double cycle = a_period * std::min(periods_to_a_cycle, static_cast<double>(options.cycle.shooting.max_periods));
+  const double cycle = a_period * std::min(usual_periods, static_cast<double>(options.cycle.shooting.max_periods));
   const double starts = scene.cycle.starts, points = scene.branch ? scene.branch->points : 0;
   const double of_scene = scene.cycle.enabled ? cycle * (1 + starts + points) + a_period * scene.cycle.free_periods : 0;
   return steps + of_scene + motions * (cycle + a_period * scene.cycle.free_periods);
@@ -254,37 +245,6 @@ double memory_of_points(double points)
   return number * numbers_of_point * points;
 }
 
-/// One factorisation of K bordered by B, and the dense work of the pairs, which is rank 0's.
-double seconds_of_equilibrium(const Sizes& sizes, const Speed& speed)
-{
-  return (equilibrium_factors * sizes.factor.operations + std::pow(sizes.pairs, 3)) / speed.operations +
-         equilibrium_passes * matrix_entry * sizes.entries / sizes.ranks / speed.bytes;
-}
-
-/// The count's L D L', the search's factor and what a slice of 100 pairs does with its vectors. How many slices the
-/// band takes is not known before.
-double seconds_of_modes(const Sizes& sizes, const ModesSettings& settings, PetscInt dense_limit, const Speed& speed)
-{
-  if (sizes.dofs <= static_cast<double>(dense_limit))
-    return dense_operations * std::pow(2 * sizes.dofs, 3) / speed.operations;
-  const double factors = settings.method == ModesMethod::projection ? 2 : 3; // an L U takes two L L'
-  return (modes_factors * factors * sizes.factor.inner_operations +
-          modes_vectors * vectors_of_modes * vectors_of_modes * sizes.dofs) /
-         speed.operations / sizes.ranks;
-}
-
-/// To a cycle and its multipliers: periods of the full model, and before them, where the scene leaves it open, the
-/// making of a reduced model and its motion to a cycle.
-double seconds_of_cycle(const Sizes& sizes, const Scene& scene, double step_seconds, const Speed& speed)
-{
-  const double a_period = steps_of_period(scene) * step_seconds;
-  if (scene.fidelity == CycleModel::full) return (periods_to_a_cycle + periods_of_multipliers) * a_period;
-  const double shapes = std::min(sizes.pairs + vectors_of_modes_kept, sizes.dofs);
-  const double making = reduction_products * sizes.dofs * shapes * shapes / speed.operations / sizes.ranks;
-  const double moving = reduced_steps * number * shapes * shapes / speed.bytes;
-  return making + moving + (scene.fidelity == CycleModel::automatic ? periods_beside_reduced * a_period : 0);
-}
-
 Speed measured_speed(MPI_Comm comm)
 {
   constexpr Eigen::Index size = 512, numbers = 8 << 20; // 64 MB, more than a cache
@@ -325,13 +285,6 @@ double Forecast::bytes() const
   return most;
 }
 
-double Forecast::seconds() const
-{
-  double sum = 0;
-  for (const StageForecast& stage : stages) sum += stage.seconds;
-  return sum;
-}
-
 Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options, SpeedTaken taken)
 {
   Forecast forecast;
@@ -351,24 +304,18 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
       std::max(whole_operator ? sizes.condensed_operator() : 0, 4 * number * sizes.pairs * sizes.pairs);
   // two products a step, each of which reads half of W, or the rows of E twice
   const double contact = in_factor ? 4 * number * sizes.factor.border_entries : sizes.condensed_operator();
-  forecast.step_seconds =
-      seconds_of_no_model + read_passes * (sizes.factor.bytes + contact) / sizes.ranks / speed.bytes;
-  const auto add = [&](Stage stage, double bytes, double seconds = 0) {
-    forecast.stages.push_back({stage, forecast.held + bytes, seconds});
-  };
-  add(Stage::equilibrium, memory_of_equilibrium(sizes), seconds_of_equilibrium(sizes, speed));
-  if (seeks_modes(scene))
-    add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes, comm),
-        seconds_of_modes(sizes, scene.modes, options.modes.dense_limit, speed));
+  forecast.step_seconds = seconds_of_calls + (sizes.factor.bytes + contact) / sizes.ranks / speed.bytes;
+  forecast.factor_seconds = sizes.factor.operations / speed.operations;
+  const auto add = [&](Stage stage, double bytes) { forecast.stages.push_back({stage, forecast.held + bytes}); };
+  add(Stage::equilibrium, memory_of_equilibrium(sizes));
+  if (seeks_modes(scene)) add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes, comm));
   if (scene.response) add(Stage::response, memory_of_response(sizes, scene, options, comm));
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
-    add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient),
-        made_factors * sizes.factor.operations / speed.operations +
-            steps_of_transient(scene.transient) * forecast.step_seconds);
+    add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient));
   const bool as_full = scene.fidelity == CycleModel::automatic && scene.cycle.start.kind == CycleStartKind::coarse;
   const double cycle = memory_of_cycle(sizes, as_full ? CycleModel::full : scene.fidelity, in_factor, free);
-  if (scene.cycle.enabled) add(Stage::cycle, cycle, seconds_of_cycle(sizes, scene, forecast.step_seconds, speed));
+  if (scene.cycle.enabled) add(Stage::cycle, cycle);
   if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)) + (motions_of(scene) > 0 ? cycle : 0));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
   forecast.steps = steps_of(scene, options);
@@ -393,14 +340,12 @@ std::string text_of(const Forecast& forecast)
   text += format("; at most %.3g MB, with up to 120 modes\n", 1e-6 * forecast.bytes());
   if (forecast.several_ranks)
     text += format("  of what follows the model, %.3g MB on rank 0 alone\n", 1e-6 * forecast.on_rank_zero);
-  text += format("  time forecast, by %.2g Gflop/s and %.2g GB/s a rank: about", 1e-9 * forecast.speed.operations,
-                 1e-9 * forecast.speed.bytes);
-  for (const StageForecast& stage : forecast.stages)
-    if (stage.seconds > 0) text += format(" %s %s,", word(stage.stage), duration(stage.seconds).c_str());
-  text += " in all " + duration(forecast.seconds()) + "; with up to 120 modes, and a motion that settles on a cycle\n";
+  text += format("  time forecast, by %.2g Gflop/s and %.2g GB/s a rank: a factor %s", 1e-9 * forecast.speed.operations,
+                 1e-9 * forecast.speed.bytes, duration(forecast.factor_seconds).c_str());
   if (forecast.steps > 0)
-    text += format("  at most %.3g time steps of %.2g s, %s\n", forecast.steps, forecast.step_seconds,
+    text += format("; about %.3g time steps of %.2g s, %s", forecast.steps, forecast.step_seconds,
                    duration(forecast.seconds_of_steps()).c_str());
+  text += "\n";
   return text;
 }
 

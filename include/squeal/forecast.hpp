@@ -9,11 +9,11 @@
 namespace squeal
 {
 
-/// The resident memory of all ranks together at its peak in a stage, and the stage's time.
+/// The resident memory of all ranks together at its peak in a stage.
 struct StageForecast
 {
   Stage stage;
-  double bytes = 0, seconds = 0; // seconds 0: not known before
+  double bytes = 0;
 };
 
 /// Of one rank while all work: operations of a matrix product [1/s], memory that is read [byte/s].
@@ -34,15 +34,15 @@ struct Forecast
   double held = 0;                   // [bytes] resident already: libraries, mesh and matrices of all ranks
   double on_rank_zero = 0;           // [bytes] of what follows, on rank 0 alone
   std::vector<StageForecast> stages; // those that will run
-  double steps = 0;                  // of time, at most
+  double steps = 0;                  // of time
   double step_seconds = 0;           // one step
+  double factor_seconds = 0;         // one factor of K
   bool several_ranks = false;
   FactorKind factor = FactorKind::automatic; // of K bordered by B, and what it takes of a rank [bytes]
   double factor_share = 0, factor_limit = 0; // limit: of a supernodal one
   Speed speed;
 
   double bytes() const;
-  double seconds() const; // of the stages whose time is known before
   double seconds_of_steps() const { return steps * step_seconds; }
 };
 
@@ -52,7 +52,7 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
 /// How the matrices will be factored, in a line.
 std::string factor_text(const Forecast& forecast);
 
-/// The forecast in a line each of the factor, memory, time of stages and steps.
+/// The forecast in a line each of the factor, memory and time.
 std::string text_of(const Forecast& forecast);
 
 /// Collective. Why the run is not started without --force: it would take more memory than the machine and this

@@ -297,7 +297,7 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.W = condensed_operator(step, interface, options.storage);
   step.matrices = pair_matrices(structure.M, structure.K);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
-  if (is_large(structure)) return_freed_memory(); // fronts of the factor, and what W was added up from
+  return_freed_memory(); // fronts of the factor, and what W was added up from
   return step;
 }
 
