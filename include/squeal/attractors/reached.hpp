@@ -15,9 +15,9 @@ namespace squeal
 enum class ReachedKind
 {
   rest,      // the motion decayed
-  steady,    // the mean energy of every tenth of the window is within half a percent
-  varying,   // it is not, but it has no trend: no cycle attracts there
-  unsettled, // the energy still has a trend, or its distance from the last mean falls
+  steady,    // the mean energy is known to half a percent
+  varying,   // it is not, but it is stationary, and its spread does not fall to a half: no cycle attracts there
+  unsettled, // the energy is not stationary, or its spread falls
 };
 
 inline constexpr std::array reached_words = {"rest", "steady", "varying", "unsettled"};
