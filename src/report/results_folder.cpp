@@ -26,8 +26,8 @@ namespace
 {
 
 constexpr const char* lock_file = "running";
-constexpr const char *partial_ending = ".partial", *old_ending = ".old"; // of folders beside the place
-constexpr const char* inner_partial = "partial";                         // the folder in a place that stays
+constexpr const char* partial_ending = ".partial";  // of the folder beside the place
+constexpr const char* earlier_folder = ".replaced"; // the results that are replaced, while they are
 
 bool is_result(const fs::path& name)
 {
@@ -55,15 +55,17 @@ std::string new_identity()
               "); name a folder you may write to with --output DIR");
 }
 
-/// Whether the folder itself can be replaced by another one beside it.
-bool can_be_replaced(const fs::path& folder)
+/// Refuses a place that another folder beside it cannot replace.
+void refuse_fixed(const fs::path& place)
 {
   struct stat own = {}, parent = {};
-  if (stat(folder.parent_path().c_str(), &parent) != 0) return true; // it will be made
-  if (access(folder.parent_path().c_str(), W_OK) != 0) return false;
-  if (stat(folder.c_str(), &own) != 0) return true;
-  std::error_code none;
-  return own.st_dev == parent.st_dev && !fs::equivalent(folder, fs::current_path(), none);
+  const fs::path above = place.parent_path();
+  if (stat(above.c_str(), &parent) != 0) return; // it will be made
+  if (access(above.c_str(), W_OK) != 0) refuse_folder(place, above.string() + ": " + std::strerror(errno));
+  if (stat(place.c_str(), &own) != 0) return;
+  if (own.st_dev != parent.st_dev) refuse_folder(place, "results replace the folder, and this one is a mount point");
+  if (std::error_code none; fs::equivalent(place, fs::current_path(), none))
+    refuse_folder(place, "results replace the folder, and this one is the working folder");
 }
 
 bool holds_only_results(const fs::path& folder)
@@ -103,40 +105,28 @@ void rename_or_throw(const fs::path& from, const fs::path& to)
 
 } // namespace
 
-FolderLock::~FolderLock()
-{
-  if (file_ >= 0) close(file_);
-}
-
-std::string FolderLock::take(const fs::path& folder, const std::string& run)
+std::string ResultsFolder::lock(const fs::path& folder)
 {
   const fs::path path = folder / lock_file;
   struct flock whole = {};
   whole.l_type = F_WRLCK;
   whole.l_whence = SEEK_SET;
-  for (int attempt = 0; attempt < 100; ++attempt)
+  file_ = open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+  if (file_ < 0) refuse_folder(folder, std::strerror(errno));
+  // a file system without locks refuses otherwise: there two runs into one folder go unseen
+  if (fcntl(file_, F_OFD_SETLK, &whole) != 0 && (errno == EAGAIN || errno == EACCES))
   {
-    file_ = open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
-    if (file_ < 0) refuse_folder(folder, std::strerror(errno));
-    // a file system without locks refuses otherwise: there two runs into one folder go unseen
-    if (fcntl(file_, F_OFD_SETLK, &whole) != 0 && (errno == EAGAIN || errno == EACCES))
-    {
-      std::array<char, 512> holder{};
-      const ssize_t size = read(file_, holder.data(), holder.size() - 1);
-      return size > 0 ? holder.data() : "unknown";
-    }
-    // a run that ended meanwhile has moved its folder away: the file locked is then another one's
-    struct stat locked = {}, there = {};
-    if (fstat(file_, &locked) == 0 && stat(path.c_str(), &there) == 0 && locked.st_ino == there.st_ino)
-    {
-      if (ftruncate(file_, 0) != 0 || write(file_, run.data(), run.size()) < 0)
-        refuse_folder(folder, std::strerror(errno));
-      return {};
-    }
-    close(std::exchange(file_, -1));
-    fs::create_directory(folder);
+    std::array<char, 512> holder{};
+    const ssize_t size = read(file_, holder.data(), holder.size() - 1);
+    return size > 0 ? holder.data() : "unknown";
   }
-  return "several runs that end and begin";
+  // a run that ended meanwhile has moved its folder away: the file locked is then another one's
+  struct stat locked = {}, there = {};
+  if (fstat(file_, &locked) != 0 || stat(path.c_str(), &there) != 0 || locked.st_ino != there.st_ino)
+    return "one that is just ending";
+  if (ftruncate(file_, 0) != 0 || write(file_, run_.data(), run_.size()) < 0)
+    refuse_folder(folder, std::strerror(errno));
+  return {};
 }
 
 ResultsFolder::ResultsFolder(const fs::path& place, Beginning beginning, MPI_Comm comm) : comm_(comm)
@@ -171,23 +161,21 @@ void ResultsFolder::make(Beginning beginning)
   run_ = new_identity();
   if (fs::exists(place_) && (!fs::is_directory(place_) || access(place_.c_str(), W_OK) != 0))
     refuse_folder(place_, fs::is_directory(place_) ? std::strerror(EACCES) : std::strerror(ENOTDIR));
-  if (const fs::path ending = place_.extension(); ending == partial_ending || ending == old_ending)
-    refuse_folder(place_, "runs into a folder without " + ending.string() + " use this name meanwhile");
+  if (place_.extension() == partial_ending)
+    refuse_folder(place_, std::string("runs into a folder without ") + partial_ending + " use this name meanwhile");
   if (fs::is_symlink(place_)) refuse_folder(place_, "it is a link to what does not exist");
   for (fs::path above = place_.parent_path(); above.has_relative_path(); above = above.parent_path())
     if (above.extension() == partial_ending && fs::exists(above / lock_file))
       refuse_folder(place_, "a run works in " + above.string());
-  const fs::path partial =
-      can_be_replaced(place_) ? fs::path(place_.string() + partial_ending) : place_ / inner_partial;
-  for (fs::path above = partial.parent_path(); !fs::exists(above); above = above.parent_path())
-    made_.insert(made_.begin(), above);
-  for (const fs::path& folder : made_) fs::create_directory(folder);
+  refuse_fixed(place_);
+  const fs::path partial = place_.string() + partial_ending;
+  fs::create_directories(partial.parent_path());
   refuse_foreign(partial);
   const bool is_new = fs::create_directory(partial);
   std::string holder;
   try
   {
-    holder = lock_.take(partial, run_);
+    holder = lock(partial);
   }
   catch (...)
   {
@@ -197,7 +185,13 @@ void ResultsFolder::make(Beginning beginning)
   if (!holder.empty())
     throw Error("another run writes into " + place_.string() + " (" + holder +
                 ": its start, machine and process); wait for its end, or name another folder with --output DIR");
+  if (const fs::path earlier = partial / earlier_folder; fs::exists(earlier)) // a run was killed in publish
+  {
+    if (fs::exists(place_)) refuse_folder(place_, earlier.string() + " holds its earlier results: move them away");
+    rename_or_throw(earlier, place_);
+  }
   partial_ = partial; // from here on it is ours to remove
+  remove_earlier();
   const bool goes_on = beginning == Beginning::from_checkpoints;
   for (const auto& entry : fs::directory_iterator(partial_))
     if (entry.path().filename() != lock_file && !(goes_on && entry.path() == checkpoints()))
@@ -209,6 +203,7 @@ void ResultsFolder::make(Beginning beginning)
 ResultsFolder::~ResultsFolder()
 {
   if (!published_ && !kept_ && rank_of(comm_) == 0) undo();
+  if (file_ >= 0) close(file_);
 }
 
 void ResultsFolder::undo()
@@ -216,7 +211,6 @@ void ResultsFolder::undo()
   std::error_code ignored;
   if (!partial_.empty() && !copied_ && fs::exists(checkpoints(), ignored)) return; // --restart goes on from them
   if (!partial_.empty()) fs::remove_all(partial_, ignored);
-  for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder) fs::remove(*folder, ignored);
 }
 
 std::string ResultsFolder::keep_finished()
@@ -234,52 +228,17 @@ fs::path ResultsFolder::meanwhile(const fs::path& file) const
   return inside.empty() || *inside.begin() == ".." || inside.has_parent_path() ? file : partial_ / inside;
 }
 
-/// Of the earlier results, which are in the partial folder now, files of another origin, such as pictures, are taken
-/// along, and the rest is removed. What cannot be moved stays there, and no other run removes it.
-void ResultsFolder::replace_earlier()
+/// Removes the results that were replaced, here or by a run that was killed meanwhile. Files of another origin, such as
+/// pictures, are taken along.
+void ResultsFolder::remove_earlier()
 {
-  std::error_code ignored;
+  const fs::path earlier = place_ / earlier_folder;
+  std::error_code failed;
   std::vector<fs::path> names;
-  for (const auto& entry : fs::directory_iterator(partial_, ignored)) names.push_back(entry.path().filename());
-  fs::remove(partial_ / lock_file, ignored); // first: it would make the folder one that a run may empty
+  for (const auto& entry : fs::directory_iterator(earlier, failed)) names.push_back(entry.path().filename());
   for (const fs::path& name : names)
-    if (is_result(name) || name == lock_file || fs::exists(place_ / name, ignored))
-      fs::remove_all(partial_ / name, ignored);
-    else if (std::rename((partial_ / name).c_str(), (place_ / name).c_str()) != 0)
-      std::fprintf(stderr, "squeal: warning: %s stays in %s: %s\n", name.c_str(), partial_.c_str(),
-                   std::strerror(errno));
-  fs::remove(partial_, ignored); // if nothing is left
-}
-
-void ResultsFolder::move_whole()
-{
-  const fs::path old = place_.string() + old_ending;
-  if (renameat2(AT_FDCWD, partial_.c_str(), AT_FDCWD, place_.c_str(), RENAME_EXCHANGE) == 0)
-  {
-    replace_earlier();
-    return;
-  }
-  if (errno != ENOENT && errno != EINVAL && errno != ENOSYS && errno != ENOTSUP)
-    refuse_move(partial_, place_, std::strerror(errno));
-  if (fs::exists(place_) && !holds_only_results(place_)) return move_by_file();
-  if (fs::exists(place_)) rename_or_throw(place_, old); // a file system that cannot exchange
-  rename_or_throw(partial_, place_);
-  std::error_code ignored;
-  fs::remove_all(old, ignored);
-}
-
-void ResultsFolder::move_by_file()
-{
-  fs::create_directories(place_);
-  const char *const report = word(ResultFile::report), *const options = word(ResultFile::options);
-  fs::remove(place_ / report);
-  for (const char* name : result_file_names) fs::remove_all(place_ / name);
-  rename_or_throw(partial_ / options, place_ / options); // by which folders are known to be a run's
-  for (const auto& entry : fs::directory_iterator(partial_))
-    if (const fs::path name = entry.path().filename(); name != report && name != lock_file)
-      rename_or_throw(entry.path(), place_ / name);
-  rename_or_throw(partial_ / report, place_ / report);
-  fs::remove_all(partial_);
+    if (!is_result(name) && !fs::exists(place_ / name) && !failed) fs::rename(earlier / name, place_ / name, failed);
+  if (!failed) fs::remove_all(earlier, failed); // else the next run tries again
 }
 
 void ResultsFolder::publish(Checkpoints checkpoints)
@@ -293,10 +252,9 @@ void ResultsFolder::publish(Checkpoints checkpoints)
                    if (fs::exists(place_) && !fs::is_directory(place_))
                      refuse_move(partial_, place_, std::strerror(ENOTDIR)); // it has come there meanwhile
                    if (checkpoints == Checkpoints::removed) fs::remove_all(this->checkpoints());
-                   if (partial_.parent_path() != place_)
-                     move_whole();
-                   else
-                     move_by_file();
+                   if (fs::exists(place_)) rename_or_throw(place_, partial_ / earlier_folder);
+                   rename_or_throw(partial_, place_);
+                   remove_earlier();
                  }
                  catch (const fs::filesystem_error& error)
                  {
@@ -310,9 +268,8 @@ void ResultsFolder::publish(Checkpoints checkpoints)
 
 bool is_used_meanwhile(const fs::path& file, const fs::path& place)
 {
-  if (file.parent_path() != place)
-    return file == place.string() + partial_ending || file == place.string() + old_ending;
-  return file.filename() == lock_file || file.filename() == inner_partial || file.extension() == unfinished_ending;
+  if (file.parent_path() != place) return file == place.string() + partial_ending;
+  return file.filename() == lock_file || file.filename() == earlier_folder || file.extension() == unfinished_ending;
 }
 
 bool is_same_file(const fs::path& a, const fs::path& b)

@@ -85,15 +85,36 @@ def test_every_file_names_its_run_and_tools_refuse_a_mixture(converged):
     assert subprocess.run(plot, capture_output=True).returncode == 0
 
 
-def test_the_working_folder_keeps_the_users_files(tmp_path):
+def test_the_working_folder_is_refused_and_keeps_the_users_files(tmp_path):
     shutil.copy(SCENE, tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
-    for _ in range(2):
-        done = subprocess.run([os.environ["SQUEAL"], "scene.toml", "--output", ".", *SHORT], cwd=tmp_path, capture_output=True)
-        assert done.returncode == 0
-    assert (tmp_path / "scene.toml").read_text() == SCENE.read_text() and (tmp_path / "notes.txt").read_text() == "mine"
-    assert (tmp_path / "report.json").exists() and not (tmp_path / "partial").exists()
+    done = subprocess.run([os.environ["SQUEAL"], "scene.toml", "--output", ".", *SHORT], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1 and "this one is the working folder" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+    assert {file.name for file in tmp_path.iterdir()} == {"scene.toml", "notes.txt"}
     assert not list(tmp_path.parent.glob(tmp_path.name + "?*"))
+
+
+@pytest.mark.parametrize("killed", ["before the new results had the place", "before the earlier ones were gone"])
+def test_a_kill_between_the_moves_loses_nothing(converged, tmp_path, killed):
+    """The next run ends the move."""
+    output = converged(SCENE, *SHORT, ranks=1).output
+    (output / "energy.png").write_text("a picture")
+    if killed.startswith("before the new"):
+        partial = output.parent / (output.name + ".partial")
+        partial.mkdir()
+        (partial / "running").write_text("a run")
+        output.rename(partial / ".replaced")
+    else:
+        earlier = tmp_path / "earlier"
+        output.rename(earlier)
+        shutil.copytree(earlier, output)
+        (output / "energy.png").unlink()
+        earlier.rename(output / ".replaced")
+    run = json.loads((output / "report.json" if output.exists() else partial / ".replaced" / "report.json").read_text())["run"]
+    converged(SCENE, *SHORT, "--output", output, ranks=1)
+    assert (output / "energy.png").read_text() == "a picture"
+    assert json.loads((output / "report.json").read_text())["run"] != run
+    assert not (output / ".replaced").exists() and not list(output.parent.glob("*.partial"))
 
 
 def test_a_state_inside_the_results_comes_with_them(converged, tmp_path):
@@ -191,8 +212,7 @@ def test_nothing_of_the_users_is_replaced(squeal, tmp_path, name):
     assert before == (sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes())
 
 
-def test_pictures_stay_and_the_results_still_come_in_one_move(converged, endless, tmp_path):
-    """Beside a picture the files used to be replaced one by one, and a kill in between left the earlier results in pieces."""
+def test_pictures_stay_where_the_folder_is_replaced(converged):
     output = converged(SCENE, *SHORT, ranks=1).output
     (output / "energy.png").write_text("a picture")
     (output / "notes").mkdir()
@@ -273,13 +293,3 @@ def test_a_full_file_system_too(small_disk, kilobytes):
     assert done.returncode == 1 and len(messages) == 1, done.stderr
     assert "No space left" in messages[0] and "MB are free" in messages[0] and "--output" in messages[0]
     assert not list(disk.iterdir())
-
-
-def test_checkpoints_leave_the_last_space_to_results(small_disk):
-    output = small_disk(10000) / "results"
-    done = subprocess.run([os.environ["SQUEAL"], SCENE, "--set", "cycle.enabled=false", "--set", "transient.periods=50",
-                           "--output", output, "--checkpoint", "0.01"], capture_output=True, text=True)
-    assert done.returncode == 0 and done.stderr.count("no checkpoint is kept") == 1, done.stderr
-    assert (output / "report.json").exists() and not (output / "checkpoint").exists()
-
-

@@ -1,9 +1,9 @@
 #pragma once
-/// The results of a run as one whole. Stages write into a folder beside the results' place, PLACE.partial. It takes
-/// that place in one move when the run ends. Earlier results stay until then.
+/// The results of a run as one whole. Stages write into a folder beside the results' place, PLACE.partial. When the run
+/// ends, the earlier results move into it and it takes the place; then the earlier ones are removed, but for files of
+/// another origin. A run that is killed between leaves both, and the next one ends the move.
 ///
-/// PLACE may be a working folder, a mount point, or a folder whose parent is read-only. Then the files themselves are
-/// moved: report.json goes first and comes last. Other files than results stay in PLACE.
+/// A working folder, a mount point and a folder whose parent is read-only cannot be replaced so, and are refused.
 #include "squeal/report/result_files.hpp"
 #include "squeal/scene/scene.hpp"
 
@@ -11,22 +11,6 @@
 
 namespace squeal
 {
-
-/// The file that holds a lock on a folder as long as its process lives; the system frees the lock of one that died.
-class FolderLock
-{
-public:
-  FolderLock() = default;
-  ~FolderLock();
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
-
-  /// Locks a folder for the run. Returns who holds it; empty: it is this process now.
-  std::string take(const std::filesystem::path& folder, const std::string& run);
-
-private:
-  int file_ = -1;
-};
 
 /// Whether the run keeps checkpoints.
 enum class Checkpoints
@@ -76,17 +60,15 @@ public:
   std::string keep_finished();
 
 private:
-  void make(Beginning beginning); // on rank 0
-  void move_whole();              // on rank 0
-  void move_by_file();            // on rank 0
-  void replace_earlier();         // on rank 0
-  void undo();                    // on rank 0
+  void make(Beginning beginning);                        // on rank 0
+  std::string lock(const std::filesystem::path& folder); // returns who holds it; empty: it is this process now
+  void remove_earlier();                                 // on rank 0
+  void undo();                                           // on rank 0
 
   MPI_Comm comm_;
   std::filesystem::path place_, partial_;
   std::string run_;
-  std::vector<std::filesystem::path> made_; // folders above the partial one, outermost first
-  FolderLock lock_;
+  int file_ = -1; // holds a lock as long as the process lives; the system frees that of one that died
   bool published_ = false, kept_ = false, copied_ = false;
 };
 
