@@ -2,6 +2,7 @@
 
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/attractors/reached.hpp"
+#include "squeal/base/checkpoint.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/cycle/cycle_checkpoint.hpp"
@@ -348,7 +349,7 @@ CoarseStart run_coarse(Chain& fine)
   const Model& model = fine.coarse->model;
   Report report;
   Chain chain{scene, options, model, report, {}};
-  chain.resumes = false; // the checkpoint is of the fine mesh
+  const WithoutCheckpoints of_fine_mesh;
   report.equilibrium = find_equilibrium(model.structure, model.interface, options.equilibrium);
   if (report.equilibrium.outcome.kind == OutcomeKind::converged)
   {

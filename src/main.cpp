@@ -266,11 +266,12 @@ bool is_other_rank()
   return !rank.empty() && rank != "0";
 }
 
-/// The scene, the options and the contents of input files, by which checkpoints are distinguished from those of another
-/// run. Options of the session, about logs and memory, do not matter. Of one rank.
+/// The program, the ranks, the scene, the options and the contents of input files, by which checkpoints are
+/// distinguished from those of another run. Options of the session, about logs and memory, do not matter. Of one rank.
 std::string request_text(const Scene& scene, const std::vector<std::filesystem::path>& inputs, ProgramOptions options)
 {
-  std::string text = resolved_scene(scene);
+  std::string text =
+      format("squeal %s on %d ranks\n", SQUEAL_VERSION, ranks_of(PETSC_COMM_WORLD)) + resolved_scene(scene);
   for (const Option& option : options_of(options)) text += option.name + " " + value_of(option) + "\n";
   for (const std::filesystem::path& file : inputs)
   {
@@ -403,7 +404,7 @@ int main(int argc, char** argv)
   argv = words.data();
   stay_alone();
   Session session(argc, argv, nullptr);
-  note_ranks();
+  end_with_launcher();
   const int rank = rank_of(PETSC_COMM_WORLD);
   if (arguments.help || arguments.version || arguments.reference)
   {

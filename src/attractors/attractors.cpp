@@ -1,12 +1,12 @@
 #include "squeal/attractors/attractors.hpp"
 
 #include "starts.hpp"
-#include "swarm_checkpoint.hpp"
 
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -16,8 +16,17 @@ namespace squeal
 namespace
 {
 
-constexpr int block = 50;        // periods between two looks at the energies
-constexpr double at_rest = 1e-4; // of the least energy of a start
+constexpr int block = 50;              // periods between two looks at the energies
+constexpr double at_rest = 1e-4;       // of the least energy of a start
+constexpr std::size_t coordinates = 4; // of the least stable modes
+
+/// What is seen of one trajectory.
+struct Watched
+{
+  std::vector<double> energies; // [J] fluctuating, of each step
+  std::array<double, coordinates> last{}, squares{};
+  std::array<std::vector<double>, coordinates> crossings; // [s] upwards through zero
+};
 
 /// Trajectories that are integrated together.
 class Swarm
@@ -36,7 +45,6 @@ public:
     for (std::size_t i = 0; i < std::min(coordinates, problem.modes.size()); ++i)
       shapes_.push_back(problem.modes[i].real);
     for (NamedStart& start : starts) states_.push_back(std::move(start.state));
-    restore_swarm(progress());
     for (State& state : states_) works_.push_back(begin_steps(step_, structure, interface, state));
   }
 
@@ -52,16 +60,8 @@ public:
       const std::vector<StepReport> reports =
           advance(step_, problem_.sliding.structure, problem_.sliding.interface, works_, states_);
       for (std::size_t k = 0; k < states_.size(); ++k) watch(reports[k], k);
-      const Request asked = request(comm);
-      if (asked != Request::none) keep_swarm(progress());
-      if (asked == Request::end) throw Interrupted{};
+      end_if_asked(comm);
     }
-  }
-
-  /// Keeps what the last checkpoint does not hold, where it is worth one. Collective.
-  void end()
-  {
-    if (checkpoint_is_worth_it(comm_of(problem_.sliding.structure.load))) keep_swarm(progress());
   }
 
   std::vector<ReachedMotion> reached() const
@@ -88,8 +88,6 @@ private:
     const MeanValue frequency = frequency_of(crossings);
     return frequency.value > 0 ? 2 / frequency.value : step_.h * steps_per_period_;
   }
-
-  SwarmProgress progress() { return {problem_.sliding.structure, step_.h, steps_, states_, watched_}; }
 
   /// Takes the energy of the fluctuation and the velocities along the modes.
   void watch(const StepReport& report, std::size_t k)
@@ -150,9 +148,7 @@ Attractors find_attractors(const AttractorProblem& problem, const AttractorOptio
   Swarm swarm(problem, std::move(starts));
   Progress progress(comm_of(problem.sliding.structure.load), "attractors", static_cast<double>(options.periods));
   std::vector<ReachedMotion> motions;
-  long target = block; // of periods, after which the energies are looked at
-  while (target < swarm.periods()) target += block;
-  for (;; target += block)
+  for (long target = block;; target += block) // of periods, after which the energies are looked at
   {
     while (swarm.periods() < target) swarm.integrate_period();
     found.periods = target;
@@ -160,7 +156,6 @@ Attractors find_attractors(const AttractorProblem& problem, const AttractorOptio
     progress.update(static_cast<double>(target), format("%ld periods", target));
     if (all_settled(motions, target) || target + block > options.periods) break;
   }
-  swarm.end();
   const bool settled = all_settled(motions, std::numeric_limits<long>::max());
   found.motions = joined(std::move(motions));
   found.outcome = {

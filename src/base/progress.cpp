@@ -2,26 +2,9 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
-#include <unistd.h>
 
 namespace squeal
 {
-
-namespace
-{
-
-/// Whether the output is read on a terminal. mpirun gives every rank a pseudo-terminal whatever becomes of the output.
-/// So the output of the parent process must be a terminal too.
-bool writes_to_terminal()
-{
-  if (!isatty(STDOUT_FILENO)) return false;
-  std::error_code none;
-  const auto parent = std::filesystem::read_symlink("/proc/" + std::to_string(getppid()) + "/fd/1", none);
-  return parent.string().rfind("/dev/pts/", 0) == 0 || parent.string().rfind("/dev/tty", 0) == 0;
-}
-
-} // namespace
 
 Progress::Progress(MPI_Comm comm, std::string stage, double total)
     : stage_(std::move(stage)), total_(std::max(total, 1e-300)), start_(std::chrono::steady_clock::now()), last_(start_)
@@ -30,13 +13,6 @@ Progress::Progress(MPI_Comm comm, std::string stage, double total)
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_rank(MPI_COMM_WORLD, &world_rank); // work on a communicator of each rank is printed by one of them
   prints_ = rank == 0 && world_rank == 0;
-  terminal_ = prints_ && writes_to_terminal();
-}
-
-Progress::~Progress()
-{
-  if (line_is_open_) std::fputs("\n", stdout);
-  if (prints_) std::fflush(stdout);
 }
 
 void Progress::update(double done, const std::string& note)
@@ -47,20 +23,9 @@ void Progress::update(double done, const std::string& note)
   const double elapsed = std::chrono::duration<double>(now - start_).count();
   const double remaining = fraction > 0 ? elapsed * (1 - fraction) / fraction : 0;
   const int tenth = static_cast<int>(10 * fraction + 1e-9);
-  if (terminal_)
-  {
-    if (now - last_ < std::chrono::milliseconds(100) && fraction < 1) return;
-    const int filled = static_cast<int>(24 * fraction);
-    std::printf("\r  %-11s [%.*s%*s] %3.0f %%  %4.0f s left  %s\033[K", stage_.c_str(), filled,
-                "========================", 24 - filled, "", 100 * fraction, remaining, note.c_str());
-    line_is_open_ = true;
-  }
-  else
-  {
-    if (tenth == tenth_ && now - last_ < std::chrono::seconds(30)) return;
-    std::printf("  %-11s %3.0f %%  %6.1f s  %4.0f s left  %s\n", stage_.c_str(), 100 * fraction, elapsed, remaining,
-                note.c_str());
-  }
+  if (tenth == tenth_ && now - last_ < std::chrono::seconds(30)) return;
+  std::printf("  %-11s %3.0f %%  %6.1f s  %4.0f s left  %s\n", stage_.c_str(), 100 * fraction, elapsed, remaining,
+              note.c_str());
   tenth_ = tenth;
   last_ = now;
   std::fflush(stdout);

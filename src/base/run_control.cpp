@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <sys/prctl.h>
 #include <unistd.h>
 #include <utility>
-#include <vector>
 
 namespace squeal
 {
@@ -48,10 +46,9 @@ struct Control
 {
   RunLimits limits;
   Clock::time_point begun = Clock::now(), last_checkpoint = begun, last_agreed = begun;
-  int every = 1, since = 0; // calls of request() between two agreements
+  int every = 1, since = 0; // calls of end_is_asked() between two agreements
   int ended_by = 0;         // agreed: a signal's number, or by_time_limit
   bool checkpoint_due = false;
-  std::vector<pid_t> peers; // ranks of this machine
   int together = 0;         // number of ranks that work together; 0: all
   bool undisturbed = false; // nothing is asked
 };
@@ -67,15 +64,6 @@ volatile std::sig_atomic_t signal_received = 0;
 void note_signal(int number)
 {
   signal_received = number;
-  alarm(1);
-}
-
-/// A peer that is gone will never answer: the launcher is ending what an abort left.
-void look_for_peers(int)
-{
-  for (const pid_t peer : control().peers)
-    if (kill(peer, 0) != 0 && errno == ESRCH) _exit(1);
-  alarm(1);
 }
 
 void handle(int number, void (*handler)(int))
@@ -85,32 +73,6 @@ void handle(int number, void (*handler)(int))
   action.sa_flags = SA_RESTART;
   sigemptyset(&action.sa_mask);
   sigaction(number, &action, nullptr);
-}
-
-/// The ranks of this machine whose numbers of processes mean the same to all of them.
-std::vector<pid_t> peers_of_this_machine()
-{
-  MPI_Comm machine = MPI_COMM_NULL;
-  MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
-  int ranks = 1;
-  MPI_Comm_size(machine, &ranks);
-  std::vector<int> all(static_cast<std::size_t>(ranks));
-  const int own = static_cast<int>(getpid());
-  MPI_Allgather(&own, 1, MPI_INT, all.data(), 1, MPI_INT, machine);
-  MPI_Comm_free(&machine);
-  std::vector<pid_t> peers;
-  for (const int peer : all)
-    if (peer != own && kill(peer, 0) == 0) peers.push_back(peer);
-  return peers;
-}
-
-/// A rank is started by mpirun or srun and has no business without it. A run of one process outlives its shell.
-void end_with_launcher()
-{
-  if (rank_by_launcher.empty()) return;
-  const pid_t launcher = getppid();
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != launcher) _exit(1); // it died in between
 }
 
 double seconds_since(Clock::time_point time)
@@ -152,38 +114,36 @@ const std::string& launched_rank()
   return rank_by_launcher;
 }
 
-void note_ranks()
+void end_with_launcher()
 {
-  control().peers = peers_of_this_machine();
-  end_with_launcher();
+  if (rank_by_launcher.empty()) return;
+  const pid_t launcher = getppid();
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != launcher) _exit(1); // it died in between
 }
 
 void begin_run_control(const RunLimits& limits)
 {
   control().limits = limits;
-  handle(SIGALRM, look_for_peers);
   for (const auto& [number, name] : ending_signals) handle(number, note_signal);
   if (ignores_hangup) handle(SIGHUP, SIG_IGN);
 }
 
 void end_run_control()
 {
-  alarm(0);
-  std::signal(SIGALRM, SIG_DFL);
   for (const auto& [number, name] : ending_signals) std::signal(number, SIG_DFL);
 }
 
-Request request(MPI_Comm comm)
+bool end_is_asked(MPI_Comm comm)
 {
   Control& own = control();
-  if (own.undisturbed) return Request::none;
+  if (own.undisturbed) return false;
   int ranks = 1, all = own.together;
   MPI_Comm_size(comm, &ranks);
   if (all == 0) MPI_Comm_size(MPI_COMM_WORLD, &all);
-  if (ranks < all) return Request::none; // the other ranks would not know, and would agree at another time
+  if (ranks < all) return false; // the other ranks would not know, and would agree at another time
   if (++own.since >= own.every) agree_on_requests(comm);
-  if (own.ended_by != 0) return Request::end;
-  return own.checkpoint_due ? Request::checkpoint : Request::none;
+  return own.ended_by != 0;
 }
 
 WorkOfPart::WorkOfPart(MPI_Comm part)
@@ -204,14 +164,6 @@ Undisturbed::Undisturbed()
 Undisturbed::~Undisturbed()
 {
   control().undisturbed = false;
-}
-
-Request request_of_part(MPI_Comm part)
-{
-  agree_on_requests(part);
-  const Control& own = control();
-  if (own.ended_by != 0) return Request::end;
-  return own.checkpoint_due ? Request::checkpoint : Request::none;
 }
 
 int without_losing_signals(int success, const std::function<int()>& metis)
@@ -237,7 +189,7 @@ bool is_asked_here()
 
 void end_if_asked(MPI_Comm comm)
 {
-  if (request(comm) == Request::end) throw Interrupted{};
+  if (end_is_asked(comm)) throw Interrupted{};
 }
 
 bool checkpoint_is_due()

@@ -3,11 +3,9 @@
 #include "squeal/base/error.hpp"
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
-#include <fcntl.h>
 #include <sys/statvfs.h>
-#include <unistd.h>
-#include <utility>
 
 namespace squeal
 {
@@ -40,55 +38,24 @@ std::string space_text(const fs::path& place, std::size_t needed, int code)
               (is_lack_of_space(code) ? space_text(place, needed, code) : ""));
 }
 
-/// A file in the making, removed unless it is moved to its place.
-class Draft
+/// Writes a file and closes it; false where the system refuses, with the reason in errno.
+bool write(const std::string& path, std::string_view bytes)
 {
-public:
-  explicit Draft(const fs::path& place)
-      : path_(place.string() + unfinished_ending),
-        file_(open(path_.c_str(), O_CREAT | O_WRONLY | O_TRUNC | O_CLOEXEC, 0666))
-  {
-  }
-  ~Draft()
-  {
-    if (file_ >= 0) ::close(file_);
-    if (!path_.empty()) unlink(path_.c_str());
-  }
-  Draft(const Draft&) = delete;
-  Draft& operator=(const Draft&) = delete;
-
-  /// Each returns false where the system refuses, with the reason in errno.
-  bool is_open() const { return file_ >= 0; }
-  bool write(std::string_view bytes, Flush flush)
-  {
-    while (!bytes.empty())
-    {
-      const ssize_t written = ::write(file_, bytes.data(), bytes.size());
-      if (written < 0 && errno != EINTR) return false;
-      if (written > 0) bytes.remove_prefix(static_cast<std::size_t>(written));
-    }
-    return flush == Flush::by_system || fsync(file_) == 0 || errno == EINVAL; // pipes and devices know no fsync
-  }
-  bool close() { return ::close(std::exchange(file_, -1)) == 0; }
-  bool move_to(const fs::path& place)
-  {
-    if (std::rename(path_.c_str(), place.c_str()) != 0) return false;
-    path_.clear();
-    return true;
-  }
-
-private:
-  std::string path_;
-  int file_;
-};
+  std::FILE* const file = std::fopen(path.c_str(), "wbe");
+  if (!file) return false;
+  const bool whole = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
+  return std::fclose(file) == 0 && whole;
+}
 
 } // namespace
 
-void write_whole_file(const fs::path& place, std::string_view bytes, Flush flush)
+void write_whole_file(const fs::path& place, std::string_view bytes)
 {
-  Draft draft(place);
-  if (!draft.is_open() || !draft.write(bytes, flush) || !draft.close() || !draft.move_to(place))
-    refuse(place, bytes.size(), errno);
+  const std::string draft = place.string() + unfinished_ending;
+  if (write(draft, bytes) && std::rename(draft.c_str(), place.c_str()) == 0) return;
+  const int code = errno;
+  std::remove(draft.c_str());
+  refuse(place, bytes.size(), code);
 }
 
 } // namespace squeal

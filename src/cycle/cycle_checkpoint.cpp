@@ -27,8 +27,9 @@ bool is_near(Vec start, Vec end)
   return by <= near * first;
 }
 
-void describe_orbit(Checkpoint& checkpoint, const FileOrder& order, const std::array<Vec, 2>& state, double& period)
+void describe_orbit(Checkpoint& checkpoint, const Structure& structure, const std::array<Vec, 2>& state, double& period)
 {
+  const FileOrder order(structure);
   for (const Vec part : state) order.describe(checkpoint, part);
   describe(checkpoint, period);
 }
@@ -37,21 +38,20 @@ void describe_orbit(Checkpoint& checkpoint, const FileOrder& order, const std::a
 
 std::optional<ResumedOrbit> kept_cycle(const Structure& structure)
 {
-  std::optional<Checkpoint> checkpoint = kept_everywhere(name_of_file, comm_of(structure.load));
-  if (!checkpoint) return {};
-  const FileOrder order(structure);
   ResumedOrbit orbit{{zeros_like(structure.load), zeros_like(structure.load), 0, {}}};
-  describe_orbit(*checkpoint, order, {orbit.state.u, orbit.state.v}, orbit.period);
+  const auto describe = [&](Checkpoint& checkpoint) {
+    describe_orbit(checkpoint, structure, {orbit.state.u, orbit.state.v}, orbit.period);
+  };
+  if (!restore(name_of_file, comm_of(structure.load), describe)) return {};
   return orbit;
 }
 
 void keep_cycle(const Structure& structure, Vec start, double period)
 {
-  checkpoint_made();
-  if (!checkpoints_are_kept()) return;
-  Checkpoint checkpoint;
-  describe_orbit(checkpoint, FileOrder(structure), {displacement(start), velocity(start)}, period);
-  if (rank_of(comm_of(structure.load)) == 0) keep(checkpoint, name_of_file);
+  keep(name_of_file, comm_of(structure.load),
+       [&](Checkpoint& checkpoint) {
+         describe_orbit(checkpoint, structure, {displacement(start), velocity(start)}, period);
+       });
 }
 
 void CycleKeeper::watch(Flow& flow)

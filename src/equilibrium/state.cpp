@@ -92,7 +92,7 @@ void write_state(const State& state, const Structure& structure, const std::file
                  std::string bytes;
                  append_vector(u, bytes);
                  append_vector(v, bytes);
-                 write_whole_file(file, bytes, Flush::now);
+                 write_whole_file(file, bytes);
                });
 }
 

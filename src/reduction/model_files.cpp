@@ -67,7 +67,7 @@ void write_reduced_matrices(const SlidingEquilibrium& sliding, const std::vector
   {
     std::filesystem::create_directories(folder);
     const auto file = [&](const char* name, const std::string& bytes)
-    { write_whole_file(folder / (std::string(name) + ".petsc"), bytes, Flush::by_system); };
+    { write_whole_file(folder / (std::string(name) + ".petsc"), bytes); };
     for (const auto& [name, matrix] :
          {std::pair{"M", &model.M_z}, std::pair{"C", &model.C_z}, std::pair{"K", &model.K_z}, std::pair{"B", &model.G},
           std::pair{"G", &gyroscopic}})

@@ -358,7 +358,7 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
                [&]
                {
                  file->keep();
-                 write_whole_file(xdmf, xdmf_text(layout, report.run), Flush::by_system);
+                 write_whole_file(xdmf, xdmf_text(layout, report.run));
                });
 }
 

@@ -74,7 +74,7 @@ void Hdf5File::keep()
     throw Error("cannot write " + place_.string() + ": HDF5 does not hand out the file that it made in memory");
   char* const bytes = *static_cast<char**>(memory);
   std::fill_n(bytes + consistency_flags, 4, '\0'); // no longer open for writing
-  write_whole_file(place_, {bytes, static_cast<std::size_t>(size)}, Flush::by_system);
+  write_whole_file(place_, {bytes, static_cast<std::size_t>(size)});
   H5Fclose(std::exchange(id_, -1));
 }
 

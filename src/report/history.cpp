@@ -16,21 +16,11 @@ namespace
 
 void write_group(Hdf5File& file, const std::string& group, const History& history, const Scene& scene)
 {
-  const auto write = [&](const std::string& name, const auto& data, const std::string& unit)
-  { file.write(group + "/" + name, {data.size()}, data, unit); };
-  write("time", history.time, "s");
-  write("energy", history.energy, "J");
-  write("fluctuating_energy", history.fluctuating_energy, "J");
-  write("damping_power", history.damping_power, "W");
-  write("contact_power", history.contact_power, "W");
-  write("load_power", history.load_power, "W");
-  write("drive_power", history.drive_power, "W");
-  write("normal_force", history.normal_force, "N");
-  write("open", history.open, "pairs");
-  write("stick", history.stick, "pairs");
-  write("slip", history.slip, "pairs");
+  const auto write = [&](const std::string& name, const char* unit, const auto& series)
+  { file.write(group + "/" + name, {series.size()}, series, unit); };
+  for_each_series(write, history);
   const std::size_t probes = std::min(scene.probes.size(), history.probes.size());
-  for (std::size_t i = 0; i < probes; ++i) write("probes/" + scene.probes[i].name, history.probes[i], "m");
+  for (std::size_t i = 0; i < probes; ++i) write("probes/" + scene.probes[i].name, "m", history.probes[i]);
 }
 
 /// The spectrum of a settled motion, and its lines, strongest first. `unit`: of the amplitudes.

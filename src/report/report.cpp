@@ -93,18 +93,15 @@ void write_request(const Scene& scene, const std::string& run, const std::filesy
   on_rank_zero(comm,
                [&]
                {
-                 write_whole_file(output / word(ResultFile::resolved_scene), provenance(run) + resolved_scene(scene),
-                                  Flush::by_system);
-                 write_whole_file(output / word(ResultFile::options), provenance(run) + option_text(),
-                                  Flush::by_system);
+                 write_whole_file(output / word(ResultFile::resolved_scene), provenance(run) + resolved_scene(scene));
+                 write_whole_file(output / word(ResultFile::options), provenance(run) + option_text());
                });
 }
 
 void write_results(const Report& report, const Scene& scene, const FieldNodes& nodes,
                    const std::filesystem::path& output, MPI_Comm comm)
 {
-  const auto write = [&](ResultFile file, const std::string& text)
-  { write_whole_file(output / word(file), text, Flush::by_system); };
+  const auto write = [&](ResultFile file, const std::string& text) { write_whole_file(output / word(file), text); };
   on_rank_zero(comm,
                [&]
                {

@@ -1,7 +1,6 @@
 #include "squeal/settled/motion.hpp"
 
 #include "squeal/base/progress.hpp"
-#include "squeal/base/run_control.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -67,20 +66,6 @@ bool parted(const std::vector<MeanValue>& exponents, double together)
   if (exponents.size() < 2) return true;
   const MeanValue &first = exponents[0], &second = exponents[1];
   return first.value - together * first.error > second.value + together * second.error;
-}
-
-/// Samples the next period. Where the run is asked to end within it, what came before is kept.
-PeriodSample sample_or_keep(const PeriodSampler& sampler, const MotionKeeper& keeper, const MotionProgress& now)
-{
-  try
-  {
-    return sampler(now.state);
-  }
-  catch (const Interrupted&)
-  {
-    keeper.keep(now);
-    throw;
-  }
 }
 
 /// Appends what was seen of a period.
@@ -151,31 +136,25 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
           format("%ld exponents are zero within their bars: ", static_cast<long>(zero)) + more};
 }
 
-ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, const MotionKeeper& keeper, Vec state,
-                              double period, const SettledOptions& options)
+ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, Vec state, double period,
+                              const SettledOptions& options)
 {
   ExaminedMotion motion;
   TangentBundle bundle = make_bundle(flow, state, options.exponents);
-  const MotionProgress now{motion, bundle, state};
-  keeper.restore(now);
   Progress progress(comm_of(displacement(state)), "settled", static_cast<double>(options.periods));
   const auto most = static_cast<std::size_t>(options.periods);
   std::size_t target = std::min<std::size_t>(128, most);
-  while (target < motion.periods()) target = std::min(2 * target, most); // undecided there before the restart
   for (;; target = std::min(2 * target, most))
   {
     while (motion.periods() < target)
     {
-      const PeriodSample sample = sample_or_keep(sampler, keeper, now);
+      const PeriodSample sample = sampler(state);
       append(sample, motion);
       follow_period(flow, bundle);
-      if (checkpoint_is_due()) keeper.keep(now);
       progress.update(static_cast<double>(motion.periods()), format("energy %.4g", sample.means.front()));
     }
     examine(bundle, period, motion);
-    if (motion.verdict.kind == MotionKind::undecided && target < most) continue;
-    if (checkpoint_is_worth_it(comm_of(state))) keeper.keep(now);
-    return motion;
+    if (motion.verdict.kind != MotionKind::undecided || target == most) return motion;
   }
 }
 

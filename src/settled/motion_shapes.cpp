@@ -77,12 +77,6 @@ void add_sample(MotionShapes& motion, Mat M, Vec v, Vec Mv, PetscInt most)
   for (Eigen::Index i = 0; i < q.size(); ++i) motion.coordinates[static_cast<std::size_t>(i)].push_back(q(i));
 }
 
-void cut_samples(MotionShapes& motion, std::size_t count)
-{
-  motion.squares.resize(count);
-  for (auto& coordinate : motion.coordinates) coordinate.resize(count);
-}
-
 void keep_strongest(MotionShapes& motion, std::size_t first)
 {
   const auto count = static_cast<Eigen::Index>(motion.squares.size()), shapes = motion.V.columns();

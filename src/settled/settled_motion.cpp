@@ -1,7 +1,5 @@
 #include "squeal/settled/settled_motion.hpp"
 
-#include "settled_checkpoint.hpp"
-
 #include "squeal/base/mean.hpp"
 #include "squeal/base/run_control.hpp"
 
@@ -30,20 +28,10 @@ enum Channel : std::size_t
 /// Appends a history to another.
 void append(const History& from, History& to)
 {
-  const auto join = [](const auto& tail, auto& all) { all.insert(all.end(), tail.begin(), tail.end()); };
-  join(from.time, to.time);
-  join(from.energy, to.energy);
-  join(from.fluctuating_energy, to.fluctuating_energy);
-  join(from.damping_power, to.damping_power);
-  join(from.contact_power, to.contact_power);
-  join(from.load_power, to.load_power);
-  join(from.drive_power, to.drive_power);
-  join(from.normal_force, to.normal_force);
-  join(from.open, to.open);
-  join(from.stick, to.stick);
-  join(from.slip, to.slip);
+  const auto join = [](auto, auto, const auto& tail, auto& all) { all.insert(all.end(), tail.begin(), tail.end()); };
+  for_each_series(join, from, to);
   to.probes.resize(from.probes.size());
-  for (std::size_t i = 0; i < from.probes.size(); ++i) join(from.probes[i], to.probes[i]);
+  for (std::size_t i = 0; i < from.probes.size(); ++i) join("", "", from.probes[i], to.probes[i]);
 }
 
 double swing(const std::vector<double>& probe)
@@ -83,7 +71,6 @@ PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, PetscIn
   map.records.resize(static_cast<std::size_t>(map.steps));
   map.recorded_start = {};
   History history;
-  const std::size_t sampled_before = motion.shapes.squares.size();
   long step = 0;
   const Monitor keep_sample = [&](const State& at, const StepReport&, const StepWork& work)
   {
@@ -92,11 +79,7 @@ PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, PetscIn
   };
   const MarchSummary summary =
       march(map.step, map.sliding, map.steps, now, {probe_rows, history, keep_sample, map.records});
-  if (summary.interrupted)
-  {
-    cut_samples(motion.shapes, sampled_before);
-    throw Interrupted{};
-  }
+  if (summary.interrupted) throw Interrupted{};
   map.unconverged += summary.unconverged;
   map.reactions = now.reactions;
   check(VecCopy(now.u, displacement(state)));
@@ -233,13 +216,7 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
   motion.shapes = no_shapes(problem.sliding.structure.M);
   motion.sampled_steps = steps_between_samples(motion.steps_per_period, motion.period / motion.steps_per_period);
   const auto sampler = [&](Vec now) { return integrate_period(map, problem.probes, now, options.shapes, motion); };
-  const MotionKeeper keeper{[&](const MotionProgress& now) {
-                              restore_settled({map, motion, now});
-                            },
-                            [&](const MotionProgress& now) {
-                              keep_settled({map, motion, now});
-                            }};
-  motion.examined = examine_motion(flow, sampler, keeper, state, motion.period, options);
+  motion.examined = examine_motion(flow, sampler, state, motion.period, options);
   name_means(motion, problem.sliding.interface.pairs);
   motion.end = {copy_of(displacement(state)), copy_of(velocity(state)), motion.history.time.back(), map.reactions};
   const std::size_t windows = motion.examined.periods(), samples = motion.shapes.squares.size() / windows;

@@ -1,7 +1,6 @@
 #include "squeal/study/sweep.hpp"
 
 #include "squeal/base/run_control.hpp"
-#include "sweep_checkpoint.hpp"
 #include "sweep_groups.hpp"
 #include "sweep_motions.hpp"
 #include "sweeper.hpp"
@@ -62,19 +61,18 @@ Sweep run_in_groups(const SweepProblem& problem, const std::vector<SweepLine>& l
   const RankGroup group(comm, groups);
   std::vector<std::vector<SweepLine>> shares;
   for (int g = 0; g < groups; ++g) shares.push_back(share_of(lines, g, groups));
-  const std::string checkpoint = format("sweep_%d_of_%d", group.number() + 1, groups);
   Sweep own;
   try
   {
-    work_in_parts(
-        comm,
-        [&] {
-          own = visit(problem, {group.comm(), true, checkpoint}, shares[static_cast<std::size_t>(group.number())]);
-        });
+    work_in_parts(comm,
+                  [&]
+                  {
+                    const WorkOfPart part(group.comm());
+                    own = visit(problem, group.comm(), shares[static_cast<std::size_t>(group.number())]);
+                  });
   }
   catch (const Interrupted&) // on all ranks, of groups that were done, too
   {
-    if (own.outcome.kind != OutcomeKind::interrupted) keep_sweep(own, checkpoint, group.comm());
     own.outcome.kind = OutcomeKind::interrupted;
   }
   Sweep whole = joined(shared(own, group, groups, comm), shares);
@@ -106,9 +104,8 @@ Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm)
   const std::vector<SweepLine> lines = lines_of(problem.settings);
   const std::size_t total = points_of(lines);
   const int groups = groups_of(problem.options.groups, {total, fewest}, comm);
-  const auto linear = [&] {
-    return groups > 1 ? run_in_groups(problem, lines, groups, comm) : visit(problem, {comm, false, "sweep"}, lines);
-  };
+  const auto linear = [&]
+  { return groups > 1 ? run_in_groups(problem, lines, groups, comm) : visit(problem, comm, lines); };
   Sweep sweep = problem.settings.stages == SweepStages::cycle ? with_motions(linear, problem, comm) : linear();
   assess(sweep, problem.settings.key, total);
   return sweep;

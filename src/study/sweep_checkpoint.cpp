@@ -1,8 +1,5 @@
 #include "sweep_checkpoint.hpp"
 
-#include "squeal/base/petsc.hpp"
-#include "squeal/base/run_control.hpp"
-
 namespace squeal
 {
 
@@ -36,20 +33,6 @@ void describe(Checkpoint& checkpoint, SweptMotion& motion)
   describe_all(checkpoint, motion.outcome, motion.heard, motion.kind, motion.frequency_hz, motion.energy.value,
                motion.energy.error, motion.stability, motion.multiplier, motion.multiplier_error, motion.estimate,
                motion.residual, motion.peak_to_peak, motion.steps_per_period, motion.periods);
-}
-
-void keep_sweep(const Sweep& sweep, const std::string& name, MPI_Comm comm)
-{
-  checkpoint_made();
-  if (checkpoints_are_kept() && rank_of(comm) == 0) keep(written(sweep), name);
-}
-
-Sweep kept_sweep(const std::string& name, MPI_Comm comm)
-{
-  Sweep sweep;
-  sweep.outcome.kind = OutcomeKind::converged;
-  if (std::optional<Checkpoint> checkpoint = kept_everywhere(name, comm)) describe(*checkpoint, sweep);
-  return sweep;
 }
 
 } // namespace squeal

@@ -1,5 +1,6 @@
 #pragma once
-/// The points of a sweep that is not finished, as a checkpoint.
+/// The points of a sweep and the motions at them as lists of numbers, for other groups of ranks and for a restart.
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/checkpoint.hpp"
 #include "squeal/study/sweep.hpp"
 
@@ -11,10 +12,16 @@ void describe(Checkpoint& checkpoint, Sweep& sweep);
 
 void describe(Checkpoint& checkpoint, SweptMotion& motion);
 
-/// Keeps the points so far under a name. Collective.
-void keep_sweep(const Sweep& sweep, const std::string& name, MPI_Comm comm);
-
-/// The points to go on from; none where the run begins. Collective.
-Sweep kept_sweep(const std::string& name, MPI_Comm comm);
+/// Copies a value of one rank to every rank. Collective.
+template <class Value> Value of_rank(int rank, Value value, MPI_Comm comm)
+{
+  Checkpoint written;
+  describe(written, value);
+  std::vector<double> numbers = written.numbers();
+  broadcast(numbers, comm, rank);
+  Checkpoint read(std::move(numbers));
+  describe(read, value);
+  return value;
+}
 
 } // namespace squeal

@@ -1,7 +1,6 @@
 #include "sweep_groups.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
-#include "squeal/base/broadcast.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/base/run_control.hpp"
 #include "sweep_checkpoint.hpp"
@@ -177,11 +176,7 @@ std::vector<Sweep> shared(const Sweep& own, const RankGroup& group, int groups, 
 {
   std::vector<Sweep> parts;
   for (int g = 0; g < groups; ++g)
-  {
-    std::string bytes = g == group.number() ? written(own).bytes() : std::string();
-    broadcast(bytes, comm, first_rank(g, groups, ranks_of(comm)));
-    parts.push_back(value_of<Sweep>(*Checkpoint::from(bytes)));
-  }
+    parts.push_back(of_rank(first_rank(g, groups, ranks_of(comm)), g == group.number() ? own : Sweep{}, comm));
   return parts;
 }
 

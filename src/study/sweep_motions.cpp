@@ -1,6 +1,5 @@
 #include "sweep_motions.hpp"
 
-#include "squeal/base/broadcast.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "sweep_checkpoint.hpp"
@@ -12,9 +11,6 @@ namespace squeal
 namespace
 {
 
-/// Of the modes of all points, once they are done.
-constexpr const char* name_of_modes = "sweep_modes";
-
 /// Points of the scene where a mode grows.
 std::vector<std::size_t> places_of_motions(const Sweep& sweep)
 {
@@ -24,11 +20,10 @@ std::vector<std::size_t> places_of_motions(const Sweep& sweep)
   return places;
 }
 
-/// The motion at a point. What cannot be computed there is in its outcome. The stages at a point keep checkpoints of
-/// their own, from which they go on.
-SweptMotion motion_at(const SweepProblem& problem, const SweptPlace& place, const std::string& name, MPI_Comm comm)
+/// The motion at a point. What cannot be computed there is in its outcome.
+SweptMotion motion_at(const SweepProblem& problem, const SweptPlace& place, MPI_Comm comm)
 {
-  const CheckpointNames names(name + ".");
+  const WithoutCheckpoints of_stages;
   SweptMotion motion;
   try
   {
@@ -55,20 +50,16 @@ void seek_motions(Sweep& sweep, const std::vector<std::size_t>& places, const Sw
   {
     SweepPoint& point = sweep.points[place];
     const std::string name = format("sweep_motion_%06zu", place);
-    if (const std::optional<Checkpoint> kept = kept_everywhere(name, comm))
-      point.motion = value_of<SweptMotion>(*kept);
-    else
+    SweptMotion motion;
+    const Description described = [&](Checkpoint& checkpoint) { describe(checkpoint, motion); };
+    if (!restore(name, comm, described))
     {
       end_if_asked(comm);
-      point.motion = motion_at(problem, {point.values, point.reversed}, name, comm);
-      if (checkpoints_are_kept() && rank_of(comm) == 0)
-      {
-        keep(written(*point.motion), name);
-        const CheckpointNames names(name + ".");
-        CheckpointNames::remove_all();
-      }
+      motion = motion_at(problem, {point.values, point.reversed}, comm);
+      keep(name, comm, described);
     }
-    progress.update(++done, point.motion->heard);
+    point.motion = motion;
+    progress.update(++done, motion.heard);
   }
 }
 
@@ -103,9 +94,10 @@ void seek_in_groups(Sweep& sweep, const std::vector<std::size_t>& places, const 
     for (const std::size_t place : share_of(places, g, groups))
     {
       std::optional<SweptMotion>& motion = sweep.points[place].motion;
-      std::string bytes = g == group.number() && motion ? written(*motion).bytes() : std::string();
-      broadcast(bytes, comm, first_rank(g, groups, ranks_of(comm)));
-      if (!bytes.empty()) motion = value_of<SweptMotion>(*Checkpoint::from(bytes));
+      const int from = first_rank(g, groups, ranks_of(comm));
+      int is_known = motion.has_value();
+      MPI_Bcast(&is_known, 1, MPI_INT, from, comm);
+      if (is_known != 0) motion = of_rank(from, motion.value_or(SweptMotion{}), comm);
     }
   if (ended) throw Interrupted{};
 }
@@ -114,13 +106,8 @@ void seek_in_groups(Sweep& sweep, const std::vector<std::size_t>& places, const 
 
 Sweep with_motions(const std::function<Sweep()>& linear, const SweepProblem& problem, MPI_Comm comm)
 {
-  Sweep sweep = kept_sweep(name_of_modes, comm);
-  if (sweep.points.empty())
-  {
-    sweep = linear();
-    if (sweep.outcome.kind == OutcomeKind::interrupted) return sweep;
-    keep_sweep(sweep, name_of_modes, comm);
-  }
+  Sweep sweep = linear();
+  if (sweep.outcome.kind == OutcomeKind::interrupted) return sweep;
   const std::vector<std::size_t> places = places_of_motions(sweep);
   const int groups = groups_of(problem.options.groups, {places.size(), 1}, comm);
   try

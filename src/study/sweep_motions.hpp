@@ -5,8 +5,8 @@
 namespace squeal
 {
 
-/// The sweep that `linear` makes, or the one that was made before a restart, with the motions of the scene's points
-/// where modes grow. Groups of ranks seek some of them each. Collective.
+/// The sweep that `linear` makes, with the motions of the scene's points where modes grow; those that were known before
+/// a restart are taken. Groups of ranks seek some of them each. Collective.
 Sweep with_motions(const std::function<Sweep()>& linear, const SweepProblem& problem, MPI_Comm comm);
 
 } // namespace squeal

@@ -5,7 +5,6 @@
 #include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
-#include "sweep_checkpoint.hpp"
 #include "swept_model.hpp"
 #include "thresholds.hpp"
 
@@ -14,7 +13,6 @@
 #include <cmath>
 #include <deque>
 #include <ranges>
-#include <tuple>
 
 namespace squeal
 {
@@ -33,11 +31,10 @@ constexpr int many_changes = 2; // of contact in a step: beyond, a half may need
 class Sweeper
 {
 public:
-  Sweeper(const SweepProblem& problem, SharePlace place)
-      : problem_(problem), model_(problem, place.comm, [this] { end_if_asked_here(); }), place_(std::move(place)),
-        sweep_(kept_sweep(place_.checkpoint, place_.comm)),
-        kept_(static_cast<std::size_t>(std::ranges::count(sweep_.points, false, &SweepPoint::inserted)))
+  Sweeper(const SweepProblem& problem, MPI_Comm comm)
+      : problem_(problem), comm_(comm), model_(problem, comm, [comm] { end_if_asked(comm); })
   {
+    sweep_.outcome.kind = OutcomeKind::converged;
   }
 
   /// Visits these lines. Where the run is asked to end, the points done stay.
@@ -49,8 +46,6 @@ public:
     }
     catch (const Interrupted&) // on all ranks of this share alike
     {
-      go_back();
-      if (!sweep_.points.empty()) keep_sweep(sweep_, place_.checkpoint, place_.comm);
       sweep_.outcome.kind = OutcomeKind::interrupted;
     }
     sweep_.basis = static_cast<int>(model_.shapes());
@@ -61,13 +56,12 @@ public:
 private:
   void visit_all(const std::vector<SweepLine>& lines)
   {
-    note_complete();
-    Progress progress(place_.comm, "sweep", static_cast<double>(points_of(lines)));
+    Progress progress(comm_, "sweep", static_cast<double>(points_of(lines)));
     progress_ = &progress;
     for (const SweepLine& line : lines)
       for (const std::vector<double>& values : line.points)
       {
-        end_if_asked_here();
+        end_if_asked(comm_);
         model_.prepare({values, line.reversed});
       }
     if (model_.model()) tolerance_ = tolerance_on(model_.model()->structure);
@@ -76,32 +70,7 @@ private:
       train(lines.front());
       if (lines.size() > 1) train(lines.back());
     }
-    lines_ = lines;
     for (const SweepLine& line : lines) run_line(line);
-  }
-
-  /// What is recorded is not of a step between points that is under way.
-  void note_complete()
-  {
-    complete_ = {sweep_.points.size(), sweep_.thresholds.size(), sweep_.tracks,          sweep_.lost,
-                 sweep_.cut_short,     sweep_.least_mac,         sweep_.least_mac_across};
-  }
-
-  /// To what was recorded before that step.
-  void go_back()
-  {
-    sweep_.points.resize(complete_.points);
-    sweep_.thresholds.resize(complete_.thresholds);
-    std::tie(sweep_.tracks, sweep_.lost, sweep_.cut_short) =
-        std::tie(complete_.tracks, complete_.lost, complete_.cut_short);
-    std::tie(sweep_.least_mac, sweep_.least_mac_across) = std::tie(complete_.least_mac, complete_.least_mac_across);
-  }
-
-  Request asked() const { return place_.of_part ? request_of_part(place_.comm) : request(place_.comm); }
-
-  void end_if_asked_here() const
-  {
-    if (asked() == Request::end) throw Interrupted();
   }
 
   /// Makes the basis by the ends and the middle of a line that has points between them, which then need few
@@ -112,7 +81,7 @@ private:
     const std::size_t last = line.points.size() - 1;
     for (const std::size_t place : {last, std::size_t{0}, last / 2})
     {
-      end_if_asked_here();
+      end_if_asked(comm_);
       const SweptPlace at{line.points[place], line.reversed};
       if (model_.equilibrium_at(at).outcome.kind == OutcomeKind::converged) model_.train_at(at, tolerance_);
     }
@@ -123,17 +92,7 @@ private:
     std::optional<Followed> before;
     for (const std::vector<double>& values : line.points)
     {
-      if (done_ < kept_)
-      {
-        if (++done_ == kept_ && line.ordered) before = restored_end(line);
-        continue;
-      }
-      note_complete();
-      if (const Request now = asked(); now != Request::none)
-      {
-        if (now == Request::end) throw Interrupted();
-        keep_sweep(sweep_, place_.checkpoint, place_.comm);
-      }
+      end_if_asked(comm_);
       std::optional<Followed> now = evaluate({values, line.reversed});
       progress_->update(static_cast<double>(++done_), "");
       if (!now) continue;
@@ -151,38 +110,6 @@ private:
     }
   }
 
-  /// The point that a line came to before the restart, if any of it did not fail.
-  std::optional<Followed> restored_end(const SweepLine& line)
-  {
-    const std::vector<double>& end = line.points.back();
-    for (auto point = sweep_.points.rbegin(); point != sweep_.points.rend(); ++point)
-    {
-      const bool of_line = point->reversed == line.reversed &&
-                           std::equal(end.begin() + 1, end.end(), point->values.begin() + 1, point->values.end());
-      if (!of_line) return std::nullopt;
-      if (point->outcome.kind == OutcomeKind::converged) return restored(*point);
-    }
-    return std::nullopt;
-  }
-
-  /// A point that was recorded, with its modes computed again.
-  std::optional<Followed> restored(const SweepPoint& recorded)
-  {
-    const SweepPoint point = recorded; // recording a failure would move it
-    std::optional<Followed> again = evaluate({point.values, point.reversed});
-    if (!again) return again;
-    again->tracks.assign(again->modes.pairs.size(), -1);
-    std::vector<std::complex<double>> known, found;
-    std::vector<int> tracks;
-    for (const auto* modes : {&point.modes, &point.beyond})
-      for (const SweptMode& mode : *modes) known.push_back(mode.lambda), tracks.push_back(mode.track);
-    for (const TwoSidedPair& pair : again->modes.pairs) found.push_back(pair.lambda);
-    if (known.size() > found.size()) return again;
-    const std::vector<std::size_t> places = nearest_places(known, found);
-    for (std::size_t i = 0; i < places.size(); ++i) again->tracks[places[i]] = tracks[i];
-    return again;
-  }
-
   /// The modes at a point; nothing if it fails, which is recorded: a point between others once, though a step may be
   /// divided there for several reasons.
   std::optional<Followed> evaluate(Followed point)
@@ -197,7 +124,7 @@ private:
   /// Returns false if the point fails.
   bool find_modes_of(Followed& point)
   {
-    end_if_asked_here();
+    end_if_asked(comm_);
     const Equilibrium& at = model_.equilibrium_at({point.values, point.reversed});
     point.closed = static_cast<int>(std::ranges::count(at.closed, 1));
     point.modes.outcome = at.outcome;
@@ -231,8 +158,6 @@ private:
   {
     now.tracks.assign(now.modes.pairs.size(), -1);
     if (!begins(line)) return begin_anew(now); // the group that the point is of knows its tracks
-    for (const bool reversed : {false, true})
-      if (std::optional<Followed>& start = starts_[reversed]; !start && kept_ > 0) start = restored_start(reversed);
     const std::optional<Followed>&own = starts_[now.reversed], &other = starts_[!now.reversed];
     if (own)
       carry_over(*own, now, 0);
@@ -252,26 +177,6 @@ private:
 
   /// Whether the first point of this line is that of a line of the sweep.
   static bool begins(const SweepLine& line) { return !line.known || line.points.size() == 1; }
-
-  /// The first point of the last line with points, as it was recorded.
-  std::optional<Followed> restored_start(bool reversed)
-  {
-    const SweepPoint* start = nullptr;
-    for (const SweepLine& line : lines_)
-    {
-      if (line.reversed != reversed || !begins(line)) continue;
-      const auto found =
-          std::ranges::find_if(sweep_.points,
-                               [&](const SweepPoint& point)
-                               {
-                                 return point.reversed == reversed && point.outcome.kind == OutcomeKind::converged &&
-                                        std::equal(point.values.begin() + 1, point.values.end(),
-                                                   line.points.front().begin() + 1, line.points.front().end());
-                               });
-      if (found != sweep_.points.end()) start = &*found;
-    }
-    return start ? restored(*start) : std::nullopt;
-  }
 
   static void take_over(const Followed& before, Followed& now, const std::vector<Match>& matches)
   {
@@ -524,29 +429,21 @@ private:
   }
 
   const SweepProblem& problem_;
+  const MPI_Comm comm_;
   SweptModel model_;
-  SharePlace place_;
   Sweep sweep_;
-  std::size_t kept_; // points of the scene that were done before a restart
   double tolerance_ = exact_tolerance;
   Progress* progress_ = nullptr;
-  std::vector<SweepLine> lines_{};
   std::array<std::optional<Followed>, 2> starts_{}; // of the last line in either direction of rotation
   std::size_t done_ = 0;                            // points
-  struct
-  {
-    std::size_t points = 0, thresholds = 0;
-    int tracks = 0, lost = 0, cut_short = 0;
-    double least_mac = 1, least_mac_across = 1;
-  } complete_{}; // recorded
 };
 
 } // namespace
 
-Sweep visit(const SweepProblem& problem, const SharePlace& place, const std::vector<SweepLine>& lines)
+Sweep visit(const SweepProblem& problem, MPI_Comm comm, const std::vector<SweepLine>& lines)
 {
   const OneThread alone; // points are many dense problems of a few hundred rows
-  return Sweeper(problem, place).run(lines);
+  return Sweeper(problem, comm).run(lines);
 }
 
 } // namespace squeal

@@ -4,21 +4,11 @@
 #include "lines.hpp"
 #include "squeal/study/sweep.hpp"
 
-#include <string>
-
 namespace squeal
 {
 
-/// Where a share of the points is visited, and the name of its checkpoint.
-struct SharePlace
-{
-  MPI_Comm comm;
-  bool of_part; // of the ranks
-  std::string checkpoint;
-};
-
-/// Visits all points of these lines, after those that the checkpoint holds. Collective. outcome: "interrupted" where
-/// the run was asked to end, else "converged"; the points done are in the checkpoint, too.
-Sweep visit(const SweepProblem& problem, const SharePlace& place, const std::vector<SweepLine>& lines);
+/// Visits all points of these lines. Collective. outcome: "interrupted" where the run was asked to end, else
+/// "converged"; the points done stay.
+Sweep visit(const SweepProblem& problem, MPI_Comm comm, const std::vector<SweepLine>& lines);
 
 } // namespace squeal

@@ -1,14 +1,15 @@
 /// The time loop: marching with a history, and the run that follows one mode (headers: the equations).
 #include "squeal/transient/transient.hpp"
 
-#include "march_checkpoint.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/equilibrium/file_order.hpp"
 #include "squeal/transient/growth.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 namespace squeal
@@ -16,6 +17,8 @@ namespace squeal
 
 namespace
 {
+
+constexpr const char* name_of_checkpoint = "transient";
 
 /// Distance of a state to the equilibrium, and its products, at the current step.
 struct Fluctuation
@@ -160,6 +163,29 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
   outcome.iterations = static_cast<int>(summary.contact_iterations_mean * static_cast<double>(summary.steps) + 0.5);
 }
 
+/// What a march has reached.
+struct MarchProgress
+{
+  const Structure& structure;
+  MarchSummary& summary;
+  double& iterations; // of contact in all
+  State& state;
+  History& history;
+};
+
+void describe(Checkpoint& checkpoint, const MarchProgress& progress)
+{
+  MarchSummary& summary = progress.summary;
+  State& state = progress.state;
+  describe_all(checkpoint, summary.steps, summary.unconverged, summary.as_one, summary.first_unconverged,
+               summary.contact_residual_max, summary.fall_of_friction_max, summary.energy_defect_max,
+               progress.iterations, state.time, state.reactions, progress.history.probes);
+  for_each_series([&](auto, auto, auto& series) { describe(checkpoint, series); }, progress.history);
+  const FileOrder order(progress.structure);
+  order.describe(checkpoint, state.u);
+  order.describe(checkpoint, state.v);
+}
+
 } // namespace
 
 MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, long steps, State& state,
@@ -178,8 +204,14 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     history.probes.resize(static_cast<std::size_t>(rows));
   }
   double iterations = 0;
-  const MarchProgress progress{summary, iterations, state, history};
-  if (checkpoint) checkpoint->restore(progress);
+  const MPI_Comm comm = comm_of(structure.load);
+  const Description described = [&](Checkpoint& kept)
+  {
+    describe(kept, MarchProgress{structure, summary, iterations, state, history});
+    checkpoint(kept);
+  };
+  if (checkpoint && restore(name_of_checkpoint, comm, described) && rank_of(comm) == 0)
+    std::printf("  goes on from the checkpoint after %ld of %ld steps\n", summary.steps, steps);
   StepWork work = begin_steps(step, structure, interface, state);
   while (summary.steps < steps)
   {
@@ -202,13 +234,11 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     history.fluctuating_energy.push_back(energy(fluctuation, state, work));
     if (monitor) monitor(state, report, work);
     if (!std::isfinite(report.energy)) break;
-    const Request asked = request(comm_of(structure.load));
-    if (checkpoint && asked == Request::checkpoint) checkpoint->keep(progress);
-    summary.interrupted = asked == Request::end && summary.steps < steps;
+    summary.interrupted = end_is_asked(comm) && summary.steps < steps;
     if (summary.interrupted) break;
+    if (checkpoint && checkpoint_is_due()) keep(name_of_checkpoint, comm, described);
   }
-  if (checkpoint && (summary.interrupted || checkpoint_is_worth_it(comm_of(structure.load))))
-    checkpoint->keep(progress);
+  if (checkpoint && (summary.interrupted || checkpoint_is_worth_it(comm))) keep(name_of_checkpoint, comm, described);
   summary.contact_iterations_mean = iterations / static_cast<double>(std::max(summary.steps, 1L));
   return summary;
 }
@@ -269,10 +299,11 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
     progress.update(static_cast<double>(trajectory.history.time.size()),
                     format("energy %.4g J, open %d, stick %d", report.energy, report.open, report.stick));
   };
-  const MarchCheckpoint checkpoint(structure, {steps, step.h, step.theta}, amplitude, slides);
+  const Description followed = [&](Checkpoint& checkpoint)
+  { describe_all(checkpoint, slides, amplitude.time, amplitude.log_modulus); };
   const double wall = MPI_Wtime();
-  const MarchSummary summary = march(step, sliding, steps, trajectory.end,
-                                     {probes, trajectory.history, watch, {}, &checkpoint, &settings.ramps});
+  const MarchSummary summary =
+      march(step, sliding, steps, trajectory.end, {probes, trajectory.history, watch, {}, followed, &settings.ramps});
   trajectory.seconds_per_step = (MPI_Wtime() - wall) / static_cast<double>(std::max(summary.steps, 1L));
   trajectory.factor_seconds = step.factor_seconds;
   trajectory.condensed_seconds = step.condensed_seconds;

@@ -454,8 +454,8 @@ def test_the_pictures_are_drawn(pin, cycles, converged):
 
 
 @pytest.mark.parametrize("ranks, divisions, start, end, points", [(1, 2, 0.4, 0.5, 3), (2, 1, 0.05, 0.35, 24)])
-def test_an_interrupted_sweep_goes_on_where_it_was(ranks, divisions, start, end, points, squeal, tmp_path):
-    """The same points and thresholds as in one piece, whatever was done before the end; two ranks are two groups. Between
+def test_an_interrupted_sweep_keeps_its_points_and_begins_again(ranks, divisions, start, end, points, squeal, tmp_path):
+    """What is done is written; the restart finds the same points and thresholds as in one piece; two ranks are two groups. Between
     0.4 and 0.5 a pair of nine opens: points are put in, and one mode ends there and another begins."""
     pin = PIN[:PIN.index("modes.method=full") - 1]  # modes leave the scene's own band and come back
     pin += ["--set", f"mesh.parameters.divisions={divisions}"]

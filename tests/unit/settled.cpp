@@ -100,9 +100,8 @@ struct Motion
     SettledOptions options;
     options.periods = periods;
     options.exponents = std::min<PetscInt>(4, 2 * static_cast<PetscInt>(u.size()));
-    const MotionKeeper none{[](const MotionProgress&) {}, [](const MotionProgress&) {}};
     return examine_motion(
-        model.flow, [this](Vec now) { return sample(now); }, none, state, period, options);
+        model.flow, [this](Vec now) { return sample(now); }, state, period, options);
   }
 };
 

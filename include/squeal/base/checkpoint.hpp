@@ -1,17 +1,18 @@
 #pragma once
-/// Checkpoints: lists of numbers from which a run that was killed goes on. Every stage that computes for long keeps its
-/// own file of them; all are made on rank 0.
+/// Checkpoints: lists of numbers from which a run that was killed goes on. A stage describes its state once; the
+/// description writes it and reads it. Files are made on rank 0, one for each stage.
 #include "squeal/base/outcome.hpp"
 
 #include <array>
 #include <complex>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <mpi.h>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace squeal
@@ -25,16 +26,17 @@ std::uint64_t check_sum(std::string_view bytes, std::uint64_t so_far = empty_che
 class Checkpoint
 {
 public:
+  Checkpoint() = default; // to be written
+  explicit Checkpoint(std::vector<double> numbers) : numbers_(std::move(numbers)), reads_(true) {}
+
   bool reads() const { return reads_; }
+  const std::vector<double>& numbers() const { return numbers_; }
 
   /// Error: the list that is read has ended.
   void pass(double& number);
 
   /// Error: the list that is read has not as many left.
   void pass_size(std::size_t& size);
-
-  std::string bytes() const;                                       // with a check sum
-  static std::optional<Checkpoint> from(const std::string& bytes); // to be read; nothing: they are damaged
 
 private:
   std::vector<double> numbers_;
@@ -78,21 +80,8 @@ template <class... Values> void describe_all(Checkpoint& checkpoint, Values&... 
   (describe(checkpoint, values), ...);
 }
 
-/// A list that holds the value.
-template <class Value> Checkpoint written(Value value)
-{
-  Checkpoint checkpoint;
-  describe(checkpoint, value);
-  return checkpoint;
-}
-
-/// The value that a list holds. Error: the list is too short.
-template <class Value> Value value_of(Checkpoint checkpoint)
-{
-  Value value;
-  describe(checkpoint, value);
-  return value;
-}
+/// Describes the state of a stage, to be written or read.
+using Description = std::function<void(Checkpoint&)>;
 
 /// Where a run keeps its checkpoints.
 struct CheckpointPlace
@@ -105,33 +94,24 @@ struct CheckpointPlace
 /// Sets the place of this run. Error: the checkpoints to go on from are of another request.
 void open_checkpoints(const CheckpointPlace& place);
 
-/// While one lives, the names of this process's checkpoints begin with `prefix`: work that is done several times in a
-/// run keeps its checkpoints apart.
-class CheckpointNames
+/// While one lives, none is kept or read: for work that repeats stages of the run with other numbers.
+class WithoutCheckpoints
 {
 public:
-  explicit CheckpointNames(const std::string& prefix);
-  CheckpointNames(const CheckpointNames&) = delete;
-  CheckpointNames& operator=(const CheckpointNames&) = delete;
-  ~CheckpointNames();
+  WithoutCheckpoints();
+  WithoutCheckpoints(const WithoutCheckpoints&) = delete;
+  WithoutCheckpoints& operator=(const WithoutCheckpoints&) = delete;
+  ~WithoutCheckpoints();
 
-  /// Removes all that are kept with the prefix.
-  static void remove_all();
+private:
+  CheckpointPlace before_;
 };
 
-/// Whether checkpoints are kept at all.
-bool checkpoints_are_kept();
+/// Writes a checkpoint under a name, whole or not at all. A disk that is full is a warning: the run is worth more.
+/// Collective.
+void keep(const std::string& name, MPI_Comm comm, const Description& describe);
 
-/// Writes one under a name, whole or not at all. A disk that is full is a warning: the run is worth more.
-void keep(const Checkpoint& checkpoint, const std::string& name);
-
-/// The one of this name of the run that is gone on with; nothing where there is none.
-std::optional<Checkpoint> kept(const std::string& name);
-
-/// Removes the one of this name.
-void remove_kept(const std::string& name);
-
-/// The same on every rank. Collective.
-std::optional<Checkpoint> kept_everywhere(const std::string& name, MPI_Comm comm);
+/// Sets the state from the checkpoint of the run that is gone on with; false where there is none. Collective.
+bool restore(const std::string& name, MPI_Comm comm, const Description& describe);
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #pragma once
-/// Progress of a long stage, printed by rank 0 with the remaining time, as if all parts of the work took as long. On a
-/// terminal it is a bar, otherwise a line at every tenth of the work or every half minute.
+/// Progress of a long stage, printed by rank 0 with the remaining time, as if all parts of the work took as long: a
+/// line at every tenth of the work or every half minute.
 #include <chrono>
 #include <mpi.h>
 #include <string>
@@ -15,18 +15,11 @@ public:
   /// `total` is the expected amount of work, in steps or periods. Only rank 0 of MPI_COMM_WORLD prints.
   Progress(MPI_Comm comm, std::string stage, double total);
 
-  /// Ends the line of the bar.
-  ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
-
   /// Prints that `done` of the work is done, with a note such as the residual.
   void update(double done, const std::string& note);
 
 private:
   bool prints_ = false;
-  bool terminal_ = false;
-  bool line_is_open_ = false;
   std::string stage_;
   double total_ = 0; // steps or periods
   int tenth_ = -1;   // of the last line printed

@@ -24,31 +24,23 @@ struct RunLimits
 /// The rank that mpirun or srun gave this process; empty if neither started it. Known before MPI is up.
 const std::string& launched_rank();
 
-/// Notes the ranks of this machine; from here on a rank whose launcher dies ends with it. Collective, before all else.
-void note_ranks();
+/// From here on a rank whose launcher dies ends with it: mpirun's or srun's ranks have no business without it, and a
+/// run of one process outlives its shell.
+void end_with_launcher();
 
-/// From here on SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU are requests to end. A rank that is asked to end
-/// while another rank of its machine is gone ends at once: it would wait for that one for ever.
+/// From here on SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU are requests to end.
 void begin_run_control(const RunLimits& limits);
 
 /// From here on signals end the process as usual.
 void end_run_control();
 
-/// What is asked of the run.
-enum class Request
-{
-  none,
-  checkpoint,
-  end,
-};
+/// Whether the run is asked to end, agreed by all ranks. Collective, and cheap enough to be asked after every time
+/// step. Ranks talk after each step where steps take longer than a millisecond, else after every sixteenth. Of fewer
+/// ranks than work together nothing is ever asked.
+bool end_is_asked(MPI_Comm comm);
 
-/// What is asked of the run, agreed by all ranks. Collective, and cheap enough to be asked after every time step.
-/// Ranks talk after each step where steps take longer than a millisecond, else after every sixteenth. Of fewer ranks
-/// than work together nothing is ever asked.
-Request request(MPI_Comm comm);
-
-/// While one lives, `part` is all ranks that work together: request() asks them. join_parts comes after. Collective
-/// among them.
+/// While one lives, `part` is all ranks that work together: end_is_asked() asks them. join_parts comes after.
+/// Collective among them.
 class WorkOfPart
 {
 public:
@@ -57,10 +49,6 @@ public:
   WorkOfPart& operator=(const WorkOfPart&) = delete;
   ~WorkOfPart();
 };
-
-/// The same of a part of the ranks that works by itself, by what these know and their first one's clock. Collective
-/// among them, at any time; join_parts comes after.
-Request request_of_part(MPI_Comm part);
 
 /// After parts of the ranks have worked by themselves: throws Interrupted if any of them was asked to end. Collective
 /// of all ranks.
@@ -82,10 +70,11 @@ bool checkpoint_is_worth_it(MPI_Comm comm);
 /// Notes that a checkpoint was made; the next is due a period later.
 void checkpoint_made();
 
-/// "by SIGTERM" or "by the time limit"; empty while nobody asked. The same on all ranks once request() has said so.
+/// "by SIGTERM" or "by the time limit"; empty while nobody asked. The same on all ranks once end_is_asked() has said
+/// so.
 std::string who_asked_to_end();
 
-/// While one lives, request() asks for nothing: for short work without which what is known would be lost. By all ranks.
+/// While one lives, nothing is asked: for short work without which what is known would be lost. By all ranks.
 class Undisturbed
 {
 public:

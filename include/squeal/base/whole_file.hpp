@@ -9,15 +9,8 @@ namespace squeal
 /// What the name of a file ends in until it is whole.
 inline constexpr const char* unfinished_ending = ".part";
 
-/// When the file must be on the disk.
-enum class Flush
-{
-  by_system, // the file survives the end of the process
-  now,       // and the end of the machine
-};
-
 /// Writes a file; one that was there stays until the new one is whole. Error: the file, the system's reason, the space
 /// that it needs and the space that is free.
-void write_whole_file(const std::filesystem::path& place, std::string_view bytes, Flush flush);
+void write_whole_file(const std::filesystem::path& place, std::string_view bytes);
 
 } // namespace squeal

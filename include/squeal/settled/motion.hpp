@@ -71,28 +71,13 @@ struct ExaminedMotion
   std::size_t periods() const { return channels.empty() ? 0 : channels.front().size(); }
 };
 
-/// What an examined motion has reached after a whole period.
-struct MotionProgress
-{
-  ExaminedMotion& motion; // its channels and samples
-  TangentBundle& bundle;
-  Vec state;
-};
-
-/// How a motion that is examined for long is kept and gone on with.
-struct MotionKeeper
-{
-  std::function<void(const MotionProgress&)> restore; // changes nothing where there is nothing to go on from
-  std::function<void(const MotionProgress&)> keep;
-};
-
 /// The kind that exponents, energies of the periods and base frequencies show.
 MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<const double> energies,
                            const BaseFrequencies& base);
 
 /// Integrates 128 periods, and twice as many until the kind is decided or the options' number is reached. The state
-/// goes along. It is kept when a checkpoint is due, and when the sampler throws Interrupted. Collective.
-ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, const MotionKeeper& keeper, Vec state,
-                              double period, const SettledOptions& options);
+/// goes along. Collective.
+ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, Vec state, double period,
+                              const SettledOptions& options);
 
 } // namespace squeal

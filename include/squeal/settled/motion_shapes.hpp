@@ -32,9 +32,6 @@ int steps_between_samples(int steps, double step_size);
 /// Collective.
 void add_sample(MotionShapes& motion, Mat M, Vec v, Vec Mv, PetscInt most);
 
-/// Leaves the samples from a number on out again.
-void cut_samples(MotionShapes& motion, std::size_t count);
-
 /// Turns the shapes to the principal axes of the samples from `first` on, the strongest first. Those of least energy go
 /// that hold 1e-6 of it together. Collective.
 void keep_strongest(MotionShapes& motion, std::size_t first);

@@ -1,5 +1,6 @@
 #pragma once
 /// The transient: theta steps from a start state, and what is recorded of them (src/README.md, sections 4.9, 4.12).
+#include "squeal/base/checkpoint.hpp"
 #include "squeal/transient/estimate.hpp"
 #include "squeal/transient/step_guards.hpp"
 #include "squeal/transient/theta_step.hpp"
@@ -24,6 +25,22 @@ struct History
   std::vector<std::vector<double>> probes; // [probe][step] [m]
 };
 
+/// Calls visit(name, unit, series of each history...) for each series but those of the probes.
+template <class Visit, class... Histories> void for_each_series(const Visit& visit, Histories&... histories)
+{
+  visit("time", "s", histories.time...);
+  visit("energy", "J", histories.energy...);
+  visit("fluctuating_energy", "J", histories.fluctuating_energy...);
+  visit("damping_power", "W", histories.damping_power...);
+  visit("contact_power", "W", histories.contact_power...);
+  visit("load_power", "W", histories.load_power...);
+  visit("drive_power", "W", histories.drive_power...);
+  visit("normal_force", "N", histories.normal_force...);
+  visit("open", "pairs", histories.open...);
+  visit("stick", "pairs", histories.stick...);
+  visit("slip", "pairs", histories.slip...);
+}
+
 /// What `march` counted.
 struct MarchSummary
 {
@@ -38,18 +55,16 @@ struct MarchSummary
   double contact_iterations_mean = 0;
 };
 
-class MarchCheckpoint;
-
 /// What is kept of a march: `history` gains energies, powers, counts and the rows of `probes` (null: none) of each
 /// step.
 struct Recorder
 {
   Mat probes = nullptr;
   History& history;
-  Monitor monitor;                             // may be empty
-  std::span<StepRecord> records{};             // of each step, for its tangent; may be empty
-  const MarchCheckpoint* checkpoint = nullptr; // null: none is kept
-  const Ramps* ramps = nullptr;                // null: load, drive and friction are the scene's own
+  Monitor monitor;                 // may be empty
+  std::span<StepRecord> records{}; // of each step, for its tangent; may be empty
+  Description checkpoint{};        // of what a checkpoint holds beside the march; empty: none is kept
+  const Ramps* ramps = nullptr;    // null: load, drive and friction are the scene's own
 };
 
 /// Takes `steps` steps from `state`, which becomes the end, and records them. Collective.
