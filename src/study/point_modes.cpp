@@ -413,7 +413,7 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   check(MatNorm(modes.M_z, NORM_1, &modes.norms.M));
   check(MatNorm(C_z, NORM_1, &modes.norms.C));
   check(MatNorm(modes.K_z, NORM_1, &modes.norms.K));
-  RealModes real = solve_most_real_modes_below(modes.M_z, modes.K_z, basis_band * problem.band, problem.options);
+  RealModes real = solve_real_modes_below(modes.M_z, modes.K_z, basis_band * problem.band, problem.options);
   if (real.omega.size() < fewest) real = solve_real_modes(modes.M_z, modes.K_z, fewest, problem.options);
   MultiVector shapes = empty_multivector(modes.K_z);
   for (const Owned<Vec>& shape : real.shapes) append(shapes, shape);
