@@ -385,16 +385,9 @@ bool in_band(const TwoSidedPair& pair, double band)
 
 ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>& closed)
 {
-  ModesBasis modes{{make_basis(problem.structure, problem.interface, sketched)}};
+  ModesBasis modes{make_basis(problem.structure, problem.interface, sketched)};
   rebase(modes, problem, closed);
   return modes;
-}
-
-void turn_round(ModesBasis& modes)
-{
-  if (!modes.turned)
-    modes.turned = GrownBasis{leading_part(modes.basis, modes.shared), std::vector<char>(modes.attached.size(), 0)};
-  std::swap<GrownBasis>(modes, *modes.turned);
 }
 
 void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed)
@@ -417,16 +410,7 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   if (real.omega.size() < fewest) real = solve_real_modes(modes.M_z, modes.K_z, fewest, problem.options);
   MultiVector shapes = empty_multivector(modes.K_z);
   for (const Owned<Vec>& shape : real.shapes) append(shapes, shape);
-  const MultiVector news = product(modes.contact.Z, shapes);
-  extend(modes.basis, news);
-  if (modes.turned)
-  {
-    set_structure(modes.turned->basis, structure);
-    extend(modes.turned->basis, news);
-    modes.turned->attached.assign(closed.size(), 0);
-  }
-  else
-    modes.shared = modes.basis.shapes();
+  extend(modes.basis, product(modes.contact.Z, shapes));
   modes.pencil = make_shift_invert(modes.K_z, modes.M_z, Symmetry::symmetric, problem.options.pencil);
   move_to(modes.pencil, shift_below_zero(modes.M_z, modes.K_z));
 }
@@ -443,14 +427,12 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   const auto& [structure, interface, equilibrium] = problem.sliding;
   set_structure(modes.basis, structure);
   const LinearisedPoint point = linearise_point(problem.sliding);
-  const bool at_start = !modes.turned && modes.basis.shapes() == modes.shared;
   attach(modes, interface, point.contact.pairs);
-  if (at_start) modes.shared = modes.basis.shapes();
   const double end = two_pi * followed_band * problem.band;
   const Window window{vibration_floor(modes.norms), end * end};
   Extent extent =
       problem.tolerance <= modes.whole_up_to || modes.basis.shapes() <= small_basis ? Extent::whole : Extent::near_band;
-  double before = HUGE_VAL, first = 0;
+  double before = HUGE_VAL;
   for (PetscInt pass = 0;; ++pass)
   {
     problem.end_if_asked();
@@ -468,17 +450,11 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
       now = of_whole;
     }
     before = now;
-    if (pass == 0) first = now;
-    const bool leads = !modes.turned && modes.basis.shapes() == modes.shared && now > std::sqrt(first);
     MultiVector residuals{modes.basis.T.comm, MatrixXd(modes.basis.T.entries.rows(), 0)};
     if (pass < problem.passes)
       for (const Side side : {Side::right, Side::left})
         append_residuals(modes, problem, point, inexact(solved, problem, side), side, residuals);
-    if (correct(modes, std::move(residuals)))
-    {
-      if (leads) modes.shared = modes.basis.shapes();
-      continue;
-    }
+    if (correct(modes, std::move(residuals))) continue;
     const bool misses = now > 1;
     if (misses && complete(modes, problem))
     {

@@ -283,26 +283,6 @@ SlidingBasis make_basis(const Structure& structure, const Interface& interface, 
   return basis;
 }
 
-SlidingBasis leading_part(const SlidingBasis& basis, Index shapes)
-{
-  const Index columns = basis.sketched + shapes;
-  SlidingBasis part{{basis.T.comm, basis.T.entries.leftCols(columns)}, basis.sketched, basis.contact_dofs};
-  const auto of_image = [&](const BasisImage& image)
-  {
-    return BasisImage{image.sign,
-                      copy_of(image.matrix),
-                      {image.contact_rows.comm, image.contact_rows.entries.leftCols(columns)},
-                      image.products.topLeftCorner(columns, columns)};
-  };
-  for (const auto image : {&SlidingBasis::M, &SlidingBasis::C, &SlidingBasis::K, &SlidingBasis::K_loss,
-                           &SlidingBasis::G, &SlidingBasis::H})
-    if ((basis.*image).matrix.get() && !(basis.rayleigh && image == &SlidingBasis::C))
-      part.*image = of_image(basis.*image);
-  part.rayleigh = basis.rayleigh;
-  if (basis.rayleigh) part.C.matrix = copy_of(basis.C.matrix);
-  return part;
-}
-
 void set_structure(SlidingBasis& basis, const Structure& structure)
 {
   const Owned<Mat> C_0 = structure.K_loss.get() ? without_loss(structure.C, structure) : Owned<Mat>{};

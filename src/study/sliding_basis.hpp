@@ -66,9 +66,6 @@ MultiVector combination_of_shapes(const SlidingBasis& basis, const Eigen::Matrix
 /// Appends what the shapes X add to the span. Returns the number of columns gained.
 Eigen::Index extend(SlidingBasis& basis, MultiVector X);
 
-/// A basis of the first shapes alone.
-SlidingBasis leading_part(const SlidingBasis& basis, Eigen::Index shapes);
-
 /// Takes over the matrices of a structure where they have changed.
 void set_structure(SlidingBasis& basis, const Structure& structure);
 

@@ -51,13 +51,10 @@ public:
   /// Between the modes of two points of a line.
   ModeForms forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to, const PointModes& second);
 
-  /// The number of shapes that the bases of both directions of rotation have in common.
-  Eigen::Index shared_shapes() const { return basis_ ? basis_->shared : 0; }
-
   /// At the point visited last; null: at none.
   const BrakeModel* model() const { return model_ ? &*model_ : nullptr; }
 
-  /// Of the larger basis.
+  /// Of the basis.
   Eigen::Index shapes() const;
   int passes() const { return basis_ ? basis_->passes : 0; }
 
@@ -82,7 +79,6 @@ private:
   Owned<Mat> K_{}, B_{}; // of the compliance
   std::optional<ModesBasis> basis_{};
   std::map<SweptPlace, PointModes> trained_{};
-  bool basis_reversed_ = false; // the direction whose basis is at hand
 };
 
 } // namespace squeal
