@@ -71,7 +71,9 @@ Equilibrium SweptModel::find(const SweptPlace& place)
   go_to(place);
   const auto& [structure, interface] = *model_;
   if (interface.pairs == 0) return find_equilibrium(structure, interface, equilibrium_options_);
-  return find_equilibrium(structure, interface, compliance(), closed_, equilibrium_options_);
+  Equilibrium equilibrium = find_equilibrium(structure, interface, compliance(), closed_, equilibrium_options_);
+  if (equilibrium.outcome.kind == OutcomeKind::converged) closed_ = equilibrium.closed;
+  return equilibrium;
 }
 
 const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
@@ -92,7 +94,6 @@ const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
     model_.reset();
     equilibrium.outcome = {OutcomeKind::no_equilibrium, error.what(), 0, 1};
   }
-  if (equilibrium.outcome.kind == OutcomeKind::converged) closed_ = equilibrium.closed;
   return equilibria_[place] = std::move(equilibrium);
 }
 
