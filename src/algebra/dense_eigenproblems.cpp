@@ -51,8 +51,7 @@ MatrixXcd solve_transposed(const Eigen::PartialPivLU<MatrixXcd>& A, const Matrix
   return A.transpose().solve(x);
 }
 
-/// The pairs of a quadratic problem with Im(lambda) >= 0 and the wanted vectors; with both vectors all with
-/// |lambda| <= limit, and perhaps more.
+/// The pairs of a quadratic problem with Im(lambda) >= 0 and |lambda| <= limit, and the wanted vectors.
 ///
 /// With lambda = omega nu, nu = shift + 1/mu and Q = Q(shift) of the scaled matrices, Q mu^2 + (C + 2 shift M) mu + M
 /// is singular. Its companion matrix is [-Q^-1 (C + 2 shift M), -Q^-1 M; I, 0] on (mu y, y). Left vectors of the
@@ -75,11 +74,11 @@ template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& 
   A.topLeftCorner(n, n) = factor.solve(-c - 2 * shift * m);
   A.topRightCorner(n, n) = factor.solve(-m);
   A.bottomLeftCorner(n, n).setIdentity();
-  const auto [mu, left, right] =
-      which == Vectors::both ? dominant_eigenvectors(A, all ? 0 : 1 / (1 + shift)) : eigenvectors(std::move(A), which);
+  const auto [mu, left, right] = eigenvectors(std::move(A), which);
   std::vector<Index> chosen;
   for (Index j = 0; j < mu.size(); ++j) // Im(lambda) >= 0, and lambda is finite: it is not without mass
-    if (mu(j).imag() <= 0 && std::abs(mu(j)) >= 1e-12) chosen.push_back(j);
+    if (mu(j).imag() <= 0 && std::abs(mu(j)) >= 1e-12 && !(omega * std::abs(shift + 1.0 / mu(j)) > limit))
+      chosen.push_back(j);
   MatrixXcd chi;
   if (left.cols() > 0) chi = solve_transposed(factor, left(Eigen::seqN(0, n), chosen).conjugate());
   for (Index place = 0; const Index j : chosen)
@@ -104,7 +103,7 @@ std::vector<DenseEigenpair> right_pairs(std::vector<TwoSidedPair> pairs)
 InvariantSubspaces invariant_subspaces(const MatrixXd& M, const MatrixXd& K, double limit)
 {
   const auto factor = regular_factor(MatrixXd(K + limit * M), "the undamped eigenproblem is singular at its shift");
-  const auto [nu, left, right] = dominant_eigenvectors(MatrixXd(factor.solve(M)), 1 / (2 * limit)); // |theta| <= limit
+  const auto [nu, left, right] = eigenvectors(MatrixXd(factor.solve(M)), Vectors::both);
   std::vector<DenseEigenpair> of_right, of_left; // real and imaginary parts of a pair have one |theta|
   for (Index j = 0; j < nu.size(); ++j)
     if (nu(j) != 0. && std::abs(1. / nu(j) - limit) <= limit)
