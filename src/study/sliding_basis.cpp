@@ -165,7 +165,6 @@ void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact, Mat B)
   LiftByZ& lift = basis.by_Z;
   if (lift.Z.get() && equal(lift.Z, contact.Z)) return;
   lift.Z = copy_of(contact.Z);
-  lift.by_Y.clear();
   PetscInt rows_of_B = 0;
   check(MatGetSize(B, &rows_of_B, nullptr));
   if (rows_of_B > 0) lift.of_B = product(B, basis.T);
@@ -188,37 +187,6 @@ void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact, Mat B)
     image->lifted_products =
         image->products + image->sign * shared_sum(rows.transpose() * lift.change.entries, basis.T.comm);
   }
-}
-
-/// T_Y'A T_Z of each image. Where no tangent moves a pivot D_Y is linear in mu, and two other points tell it: they are
-/// taken where they need not be extrapolated far, since that magnifies rounding.
-std::vector<MatrixXd> projected_images(SlidingBasis& basis, const MultiVector& by_Y)
-{
-  constexpr double rounding = 1e-14, farthest = 8; // of the change; in steps from one point to the other
-  std::vector<LiftByY>& known = basis.by_Z.by_Y;
-  if (known.size() == 2)
-  {
-    const MatrixXd &first = known[0].change.entries, step = known[1].change.entries - first,
-                   here = by_Y.entries - first;
-    std::array<double, 3> sums{here.cwiseProduct(step).sum(), step.squaredNorm(), by_Y.entries.squaredNorm()};
-    MPI_Allreduce(MPI_IN_PLACE, sums.data(), 3, MPI_DOUBLE, MPI_SUM, by_Y.comm);
-    const double way = sums[1] > 0 ? sums[0] / sums[1] : HUGE_VAL;
-    double rest = std::abs(way) <= farthest ? (here - way * step).squaredNorm() : HUGE_VAL;
-    MPI_Allreduce(MPI_IN_PLACE, &rest, 1, MPI_DOUBLE, MPI_SUM, by_Y.comm);
-    if (rest <= rounding * rounding * sums[2])
-    {
-      std::vector<MatrixXd> result;
-      for (std::size_t k = 0; k < known[0].projected.size(); ++k)
-        result.push_back((1 - way) * known[0].projected[k] + way * known[1].projected[k]);
-      return result;
-    }
-    known.erase(known.begin());
-  }
-  std::vector<MatrixXd> result;
-  for (const BasisImage* image : images_of(basis))
-    result.push_back(image->lifted_products + inner_products(by_Y, image->lifted_rows));
-  known.push_back({by_Y, result});
-  return result;
 }
 
 /// On the rows of B, symmetric or not.
@@ -323,18 +291,18 @@ ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat 
 {
   lift_by_Z(basis, contact, B);
   const MultiVector by_Y = change_by_lift(basis, contact, basis.by_Z.pivots, contact.Y);
-  std::vector<MatrixXd> projected = projected_images(basis, by_Y);
-  const std::vector<BasisImage*> images = images_of(basis);
-  const auto taken = [&](const BasisImage& image) -> MatrixXd
+  const auto lifted = [&](const BasisImage& image) -> MatrixXd
   {
-    const auto place = std::ranges::find(images, &image);
-    if (place == images.end()) return {};
-    return std::move(projected[static_cast<std::size_t>(place - images.begin())]);
+    if (!image.matrix.get()) return {};
+    return image.lifted_products + inner_products(by_Y, image.lifted_rows);
   };
-  ProjectedSliding result{taken(basis.M), taken(basis.C), taken(basis.K), taken(basis.K_loss)};
-  if (basis.rayleigh) result.C = basis.rayleigh->of_mass * result.M + basis.rayleigh->of_stiffness * result.K;
-  if (basis.G.matrix.get()) result.C += taken(basis.G);
-  if (basis.H.matrix.get()) result.K += taken(basis.H);
+  ProjectedSliding result{lifted(basis.M), {}, lifted(basis.K), lifted(basis.K_loss)};
+  if (basis.rayleigh)
+    result.C = basis.rayleigh->of_mass * result.M + basis.rayleigh->of_stiffness * result.K;
+  else
+    result.C = lifted(basis.C);
+  if (basis.G.matrix.get()) result.C += lifted(basis.G);
+  if (basis.H.matrix.get()) result.K += lifted(basis.H);
   if (damping) result.C += projected_on_pairs(basis, contact, by_Y, B, {damping, true});
   if (stiffness) result.K += projected_on_pairs(basis, contact, by_Y, B, {stiffness, false});
   result.kept = basis.by_Z.kept;

@@ -23,13 +23,6 @@ struct BasisImage
   Eigen::MatrixXd lifted_products{}; // T'A T_Z
 };
 
-/// D_Y of a point, and T_Y'A T_Z of each matrix there.
-struct LiftByY
-{
-  MultiVector change{};
-  std::vector<Eigen::MatrixXd> projected{};
-};
-
 /// The lift by Z, which stays while the closed pairs, T and the matrices do: friction changes Y alone.
 struct LiftByZ
 {
@@ -38,7 +31,6 @@ struct LiftByZ
   std::vector<Eigen::Index> pivots{};     // local rows
   std::vector<Eigen::Index> in_contact{}; // their places among the contact's degrees of freedom
   MultiVector of_B{};                     // B T
-  std::vector<LiftByY> by_Y{};            // the latest, two at most
   Eigen::MatrixXd kept{};                 // inner products of the shapes without the pivots
   Eigen::MatrixXd independent{};          // combinations of shapes that stay so without the pivots; empty: all do
 };
