@@ -222,55 +222,18 @@ std::vector<Complex> dense_quadratic_eigenvalues(const MatrixXd& M, const Matrix
   return values_of(right_pairs(solve_companion(M, C, K, Vectors::none, HUGE_VAL)));
 }
 
-namespace
+TwoSidedPair two_sided_pair(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, Complex lambda)
 {
-
-/// Three steps of inverse iteration from the pair's vectors.
-template <class Matrix> void iterate(const Matrix& M, const Matrix& C, const Matrix& K, TwoSidedPair& pair)
-{
-  const Complex near = pair.lambda * (1 + 1e-10); // so that no pivot vanishes
-  const MatrixXcd Q =
-      near * near * M.template cast<Complex>() + near * C.template cast<Complex>() + K.template cast<Complex>();
+  const Complex near = lambda * (1 + 1e-10); // so that no pivot vanishes
+  const MatrixXcd Q = near * near * M + near * C + K;
   const Eigen::PartialPivLU<MatrixXcd> factor(Q);
+  TwoSidedPair pair{lambda, VectorXcd::Ones(K.rows()), VectorXcd::Ones(K.rows())};
   for (int iteration = 0; iteration < 3; ++iteration)
   {
     pair.right = factor.solve(pair.right).normalized();
     pair.left = factor.transpose().solve(pair.left).normalized();
   }
-}
-
-/// The root of left'(lambda^2 M + lambda C + K) right that is nearest to the pair's lambda.
-template <class Matrix>
-Complex rayleigh_quotient(const Matrix& M, const Matrix& C, const Matrix& K, const TwoSidedPair& pair)
-{
-  const auto form = [&](const Matrix& A) -> Complex { return pair.left.transpose() * (A * pair.right); };
-  const Complex m = form(M), c = form(C), k = form(K), root = std::sqrt(c * c - 4. * m * k);
-  const Complex one = (root - c) / (2. * m), other = (-root - c) / (2. * m);
-  return std::abs(one - pair.lambda) < std::abs(other - pair.lambda) ? one : other;
-}
-
-} // namespace
-
-TwoSidedPair two_sided_pair(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, Complex lambda)
-{
-  TwoSidedPair pair{lambda, VectorXcd::Ones(K.rows()), VectorXcd::Ones(K.rows())};
-  iterate(M, C, K, pair);
   return pair;
-}
-
-template <class Matrix> void refine_pairs_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Matrix& K,
-                                                 std::vector<TwoSidedPair>& pairs)
-{
-  const auto refine = [&]
-  {
-    for (TwoSidedPair& pair : pairs)
-    {
-      iterate(M, C, K, pair);
-      pair.lambda = rayleigh_quotient(M, C, K, pair);
-    }
-  };
-  on_rank_zero(comm, refine);
-  share(comm, pairs, K.rows());
 }
 
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)
@@ -345,13 +308,9 @@ template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const Matrix
                                                           double);
 template std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm, const MatrixXd&, const MatrixXd&,
                                                                   const MatrixXd&);
-template void refine_pairs_shared(MPI_Comm, const MatrixXd&, const MatrixXd&, const MatrixXd&,
-                                  std::vector<TwoSidedPair>&);
 template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&,
                                                           const MatrixXcd&, double);
 template std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&,
                                                                   const MatrixXcd&);
-template void refine_pairs_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&, const MatrixXcd&,
-                                  std::vector<TwoSidedPair>&);
 
 } // namespace squeal

@@ -30,7 +30,6 @@ constexpr Index mixtures = 24;     // of the residuals of a side: more direction
 constexpr Index small_basis = 120; // shapes: such a problem is solved whole at once
 constexpr double undamped_reach = 1.2; // undamped modes on which a large basis is solved first, over the window
 constexpr double slow = 0.8;           // ratio of errors before and after a correction that did not help
-constexpr std::size_t few = 4;         // pairs refined one by one; six take as long as solving the whole
 constexpr double spurious = 1e-8;      // backward error of what is no mode
 
 /// The closed pairs taken out, and on the rows of B the damping of the friction direction and the stiffness of pairs
@@ -274,32 +273,6 @@ void transform(std::vector<TwoSidedPair>& pairs, const MatrixXd& of_right, const
   }
 }
 
-/// Where a few pairs alone miss their tolerance, they are refined on the whole basis.
-void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const PointProblem& problem,
-                SolvedPairs& solved)
-{
-  std::vector<std::size_t> places;
-  std::vector<TwoSidedPair> pairs;
-  for (std::size_t k = 0; k < solved.pairs.size(); ++k)
-    if (solved.backward_error(k) > tolerance_of(solved.pairs[k], problem)) places.push_back(k);
-  if (places.empty() || places.size() > few) return;
-  for (const std::size_t k : places) pairs.push_back(solved.pairs[k]);
-  const LossyMatrices on_shapes = without_sketch(on_basis, modes.basis.shapes());
-  const MatrixXd &V = on_basis.independent, V_transposed = V.transpose();
-  if (V.size() > 0) transform(pairs, V_transposed, V_transposed);
-  refine_lossy_shared(modes.basis.T.comm, on_shapes, pairs);
-  if (V.size() > 0) transform(pairs, V, V);
-  SolvedPairs refined = with_errors(modes, on_basis, std::move(pairs));
-  for (std::size_t i = 0; i < places.size(); ++i)
-  {
-    const std::size_t k = places[i];
-    if (!(refined.backward_error(i) < solved.backward_error(k))) continue;
-    solved.pairs[k] = std::move(refined.pairs[i]);
-    solved.right[k] = refined.right[i];
-    solved.left[k] = refined.left[i];
-  }
-}
-
 /// The pairs of the projected problem in the window, falling growth rate.
 SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_basis, const Window& window,
                             Extent extent)
@@ -438,7 +411,6 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
     problem.end_if_asked();
     const ProjectedSliding on_basis = project(modes.basis, point.contact, interface.B, point.damping, point.stiffness);
     SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
-    if (extent == Extent::near_band) refine_few(modes, on_basis, problem, solved);
     double now = largest_excess(solved, problem);
     if (extent == Extent::near_band && now > 1 && now > slow * before)
     {

@@ -45,11 +45,6 @@ std::vector<std::complex<double>> dense_quadratic_eigenvalues(const Eigen::Matri
 TwoSidedPair two_sided_pair(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C, const Eigen::MatrixXd& K,
                             std::complex<double> lambda);
 
-/// Makes pairs that are nearly those of a problem its own, by inverse iteration from their vectors and the two-sided
-/// Rayleigh quotient; the matrices are those of rank 0. Collective.
-template <class Matrix> void refine_pairs_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Matrix& K,
-                                                 std::vector<TwoSidedPair>& pairs);
-
 /// The pairs of solve_dense_quadratic with |lambda| <= limit and their left vectors, from the matrices of rank 0, on
 /// every rank. Collective.
 template <class Matrix> std::vector<TwoSidedPair>

@@ -33,7 +33,4 @@ std::vector<DenseEigenpair> solve_lossy_shared(MPI_Comm comm, const LossyMatrice
 /// they are. Collective.
 std::vector<TwoSidedPair> solve_two_sided_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, double limit);
 
-/// Makes pairs that oscillate and are nearly those of the problem its own. Collective.
-void refine_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs);
-
 } // namespace squeal
