@@ -88,7 +88,7 @@ ProgramOptions read_program_options(MPI_Comm comm)
   constexpr double part = 0.5; // of the free memory: the rest is for matrices, W and reduced models
   options.factor.by_memory = 1e-9 * part * free_memory(comm) / ranks_of(comm);
   options.factor.known = no_analyses();
-  options.equilibrium.factor = options.modes.factor = options.step.factor = options.factor;
+  options.equilibrium.factor = options.step.factor = options.factor;
   options.modes.pencil = options.pencil;
   return options;
 }

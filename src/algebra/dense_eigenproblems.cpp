@@ -51,8 +51,7 @@ MatrixXcd solve_transposed(const Eigen::PartialPivLU<MatrixXcd>& A, const Matrix
   return A.transpose().solve(x);
 }
 
-/// The pairs of a quadratic problem with Im(lambda) >= 0 and the wanted vectors; with both vectors all with
-/// |lambda| <= limit, and perhaps more.
+/// The pairs of a quadratic problem with Im(lambda) >= 0 and |lambda| <= limit, and the wanted vectors.
 ///
 /// With lambda = omega nu, nu = shift + 1/mu and Q = Q(shift) of the scaled matrices, Q mu^2 + (C + 2 shift M) mu + M
 /// is singular. Its companion matrix is [-Q^-1 (C + 2 shift M), -Q^-1 M; I, 0] on (mu y, y). Left vectors of the
@@ -75,11 +74,11 @@ template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& 
   A.topLeftCorner(n, n) = factor.solve(-c - 2 * shift * m);
   A.topRightCorner(n, n) = factor.solve(-m);
   A.bottomLeftCorner(n, n).setIdentity();
-  const auto [mu, left, right] =
-      which == Vectors::both ? dominant_eigenvectors(A, all ? 0 : 1 / (1 + shift)) : eigenvectors(std::move(A), which);
+  const auto [mu, left, right] = eigenvectors(std::move(A), which);
   std::vector<Index> chosen;
   for (Index j = 0; j < mu.size(); ++j) // Im(lambda) >= 0, and lambda is finite: it is not without mass
-    if (mu(j).imag() <= 0 && std::abs(mu(j)) >= 1e-12) chosen.push_back(j);
+    if (mu(j).imag() <= 0 && std::abs(mu(j)) >= 1e-12 && !(omega * std::abs(shift + 1.0 / mu(j)) > limit))
+      chosen.push_back(j);
   MatrixXcd chi;
   if (left.cols() > 0) chi = solve_transposed(factor, left(Eigen::seqN(0, n), chosen).conjugate());
   for (Index place = 0; const Index j : chosen)
@@ -104,7 +103,7 @@ std::vector<DenseEigenpair> right_pairs(std::vector<TwoSidedPair> pairs)
 InvariantSubspaces invariant_subspaces(const MatrixXd& M, const MatrixXd& K, double limit)
 {
   const auto factor = regular_factor(MatrixXd(K + limit * M), "the undamped eigenproblem is singular at its shift");
-  const auto [nu, left, right] = dominant_eigenvectors(MatrixXd(factor.solve(M)), 1 / (2 * limit)); // |theta| <= limit
+  const auto [nu, left, right] = eigenvectors(MatrixXd(factor.solve(M)), Vectors::both);
   std::vector<DenseEigenpair> of_right, of_left; // real and imaginary parts of a pair have one |theta|
   for (Index j = 0; j < nu.size(); ++j)
     if (nu(j) != 0. && std::abs(1. / nu(j) - limit) <= limit)
@@ -223,55 +222,18 @@ std::vector<Complex> dense_quadratic_eigenvalues(const MatrixXd& M, const Matrix
   return values_of(right_pairs(solve_companion(M, C, K, Vectors::none, HUGE_VAL)));
 }
 
-namespace
+TwoSidedPair two_sided_pair(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, Complex lambda)
 {
-
-/// Three steps of inverse iteration from the pair's vectors.
-template <class Matrix> void iterate(const Matrix& M, const Matrix& C, const Matrix& K, TwoSidedPair& pair)
-{
-  const Complex near = pair.lambda * (1 + 1e-10); // so that no pivot vanishes
-  const MatrixXcd Q =
-      near * near * M.template cast<Complex>() + near * C.template cast<Complex>() + K.template cast<Complex>();
+  const Complex near = lambda * (1 + 1e-10); // so that no pivot vanishes
+  const MatrixXcd Q = near * near * M + near * C + K;
   const Eigen::PartialPivLU<MatrixXcd> factor(Q);
+  TwoSidedPair pair{lambda, VectorXcd::Ones(K.rows()), VectorXcd::Ones(K.rows())};
   for (int iteration = 0; iteration < 3; ++iteration)
   {
     pair.right = factor.solve(pair.right).normalized();
     pair.left = factor.transpose().solve(pair.left).normalized();
   }
-}
-
-/// The root of left'(lambda^2 M + lambda C + K) right that is nearest to the pair's lambda.
-template <class Matrix>
-Complex rayleigh_quotient(const Matrix& M, const Matrix& C, const Matrix& K, const TwoSidedPair& pair)
-{
-  const auto form = [&](const Matrix& A) -> Complex { return pair.left.transpose() * (A * pair.right); };
-  const Complex m = form(M), c = form(C), k = form(K), root = std::sqrt(c * c - 4. * m * k);
-  const Complex one = (root - c) / (2. * m), other = (-root - c) / (2. * m);
-  return std::abs(one - pair.lambda) < std::abs(other - pair.lambda) ? one : other;
-}
-
-} // namespace
-
-TwoSidedPair two_sided_pair(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, Complex lambda)
-{
-  TwoSidedPair pair{lambda, VectorXcd::Ones(K.rows()), VectorXcd::Ones(K.rows())};
-  iterate(M, C, K, pair);
   return pair;
-}
-
-template <class Matrix> void refine_pairs_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Matrix& K,
-                                                 std::vector<TwoSidedPair>& pairs)
-{
-  const auto refine = [&]
-  {
-    for (TwoSidedPair& pair : pairs)
-    {
-      iterate(M, C, K, pair);
-      pair.lambda = rayleigh_quotient(M, C, K, pair);
-    }
-  };
-  on_rank_zero(comm, refine);
-  share(comm, pairs, K.rows());
 }
 
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)
@@ -346,13 +308,9 @@ template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const Matrix
                                                           double);
 template std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm, const MatrixXd&, const MatrixXd&,
                                                                   const MatrixXd&);
-template void refine_pairs_shared(MPI_Comm, const MatrixXd&, const MatrixXd&, const MatrixXd&,
-                                  std::vector<TwoSidedPair>&);
 template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&,
                                                           const MatrixXcd&, double);
 template std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&,
                                                                   const MatrixXcd&);
-template void refine_pairs_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&, const MatrixXcd&,
-                                  std::vector<TwoSidedPair>&);
 
 } // namespace squeal

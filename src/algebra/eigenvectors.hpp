@@ -22,9 +22,4 @@ struct Eigenvectors
 Eigenvectors eigenvectors(Eigen::MatrixXd A, Vectors which);
 Eigenvectors eigenvectors(Eigen::MatrixXcd A, Vectors which);
 
-/// Both vectors of those eigenvalues whose modulus is `edge` or more; of all where they are too many for less work, or
-/// one side has others than the other.
-Eigenvectors dominant_eigenvectors(const Eigen::MatrixXd& A, double edge);
-Eigenvectors dominant_eigenvectors(const Eigen::MatrixXcd& A, double edge);
-
 } // namespace squeal

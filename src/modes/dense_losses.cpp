@@ -97,12 +97,4 @@ std::vector<TwoSidedPair> solve_two_sided_lossy_shared(MPI_Comm comm, const Loss
   return pairs;
 }
 
-void refine_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs)
-{
-  const auto& [M, C, K, K_loss] = problem;
-  if (!has_losses(problem)) return refine_pairs_shared(comm, M, C, K, pairs);
-  const auto [m, c, k] = with_complex_stiffness(problem);
-  refine_pairs_shared(comm, m, c, k, pairs);
-}
-
 } // namespace squeal

@@ -66,9 +66,8 @@ template <class Visit> void for_residuals(const Subspace& space, Pairs pairs, Vi
   }
 }
 
-/// The residuals of pairs that are not small enough. Pairs whose residuals are move to `exact`.
-MultiVector residuals_left(const Subspace& space, Pairs pairs, const Correction& correction,
-                           std::vector<std::complex<double>>& exact)
+/// The residuals of pairs that are not small enough.
+MultiVector residuals_left(const Subspace& space, Pairs pairs, const Correction& correction)
 {
   MultiVector left = empty_multivector(space.terms[2].matrix);
   for_residuals(space, pairs,
@@ -77,13 +76,9 @@ MultiVector residuals_left(const Subspace& space, Pairs pairs, const Correction&
                   const auto count = static_cast<Index>(some.size());
                   std::vector<Index> kept;
                   for (Index k = 0; k < count; ++k)
-                  {
-                    const std::complex<double> lambda = some[static_cast<std::size_t>(k)].lambda;
-                    const std::size_t before = kept.size();
                     for (const Index column : {k, count + k})
-                      if (residuals.sizes(column) > correction.tolerance_of(lambda)) kept.push_back(column);
-                    if (kept.size() == before) exact.push_back(lambda);
-                  }
+                      if (residuals.sizes(column) > correction.tolerance_of(some[static_cast<std::size_t>(k)].lambda))
+                        kept.push_back(column);
                   append(left, {left.comm, residuals.columns.entries(Eigen::all, kept)});
                 });
   return left;
@@ -111,22 +106,6 @@ std::vector<Eigenpair> expand(const Subspace& space, Pairs pairs)
   return result;
 }
 
-/// The pairs but those that are exact already: V keeps them, so that their residuals stay small.
-std::vector<DenseEigenpair> still_open(Pairs pairs, const std::vector<std::complex<double>>& exact)
-{
-  constexpr double same = 1e-9; // what is taken for an exact neighbour's is measured in the end
-  std::vector<DenseEigenpair> open;
-  std::ranges::copy_if(pairs, std::back_inserter(open),
-                       [&](const DenseEigenpair& pair)
-                       {
-                         return std::ranges::none_of(exact,
-                                                     [&](std::complex<double> lambda) {
-                                                       return std::abs(pair.lambda - lambda) <= same * std::abs(lambda);
-                                                     });
-                       });
-  return open;
-}
-
 /// An orthonormal basis of the residuals' directions, down to `share` of the largest. No column counts for more than
 /// 30 times the median: a combination of corrections that is no pair but is in the window would outweigh all others.
 MultiVector largest_directions(MultiVector residuals, double share)
@@ -152,32 +131,23 @@ QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Mat K_loss,
   Subspace space = empty_subspace({problem.M, problem.C, problem.K, K_loss});
   extend(space, std::move(basis));
   const Index first = space.V.columns();
-  std::vector<std::complex<double>> exact;
   for (int pass = 0;; ++pass)
   {
     end_if_asked(comm_of(problem.K));
     const std::vector<DenseEigenpair> found = solve_small(space, correction.window);
-    const Pairs corrected(found.data(), std::min(found.size(), static_cast<std::size_t>(correction.pairs)));
-    const auto is_better = [&](Pairs pairs)
+    const auto is_better = [&]
     {
-      MultiVector left = residuals_left(space, pairs, correction, exact);
+      const Pairs corrected(found.data(), std::min(found.size(), static_cast<std::size_t>(correction.pairs)));
+      MultiVector left = residuals_left(space, corrected, correction);
       if (left.columns() == 0) return false;
       MultiVector more = P.solve(largest_directions(std::move(left), correction.share));
       const Index kept = first + 2 * static_cast<Index>(found.size());
       if (space.V.columns() + more.columns() > most_of_kept * kept) restart(space, first, found);
       return extend(space, std::move(more));
     };
+    if (pass < correction.passes && is_better()) continue;
     result.outcome.iterations = pass;
-    if (pass < correction.passes && is_better(still_open(corrected, exact))) continue;
     result.pairs = expand(space, found);
-    const auto is_exact = [&](const Eigenpair& pair)
-    { return pair.backward_error <= std::sqrt(2.) * correction.tolerance_of(pair.lambda); };
-    const std::span measured(result.pairs.data(), corrected.size());
-    if (pass < correction.passes && !exact.empty() && !std::ranges::all_of(measured, is_exact))
-    {
-      exact.clear();
-      if (is_better(corrected)) continue;
-    }
     sort_and_measure(result);
     return result;
   }

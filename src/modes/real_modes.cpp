@@ -1,21 +1,13 @@
 #include "squeal/modes/real_modes.hpp"
 
-#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/multivector.hpp"
-#include "squeal/base/callback.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/base/integers.hpp"
-#include "squeal/base/progress.hpp"
-#include "squeal/base/run_control.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <memory>
-#include <optional>
 
 namespace squeal
 {
@@ -63,126 +55,10 @@ struct RealPairs
   int number_below(double limit) const { return static_cast<int>((theta.array() < limit).count()); }
 };
 
-/// x = (K - shift M)^-1 b
-using Solve = std::function<void(Vec b, Vec x)>;
-
-/// What SLEPc calls for, and what a call threw.
-struct Inverse
-{
-  const Solve& solve;
-  std::exception_ptr failure{};
-};
-
-PetscErrorCode apply_inverse(PC preconditioner, Vec b, Vec x)
-{
-  Inverse* inverse = nullptr;
-  PetscCall(PCShellGetContext(preconditioner, &inverse));
-  return guarded(inverse->failure,
-                 [&]
-                 {
-                   end_if_asked(comm_of(b));
-                   inverse->solve(b, x);
-                 });
-}
-
-/// A pencil with its inverse at a shift.
-struct ShiftedPencil
-{
-  Mat K = nullptr, M = nullptr;
-  double shift = 0;
-  Solve solve{};
-};
-
-/// By the factor of the steps, which solves for one vector faster than MUMPS. Where K - shift M is not positive
-/// definite, by MUMPS.
-ShiftedPencil shifted_below_zero(Mat K, Mat M, double shift, const ModesOptions& options)
-{
-  const Owned<Mat> A = copy_of(K);
-  check(MatAXPY(A, -shift, M, UNKNOWN_NONZERO_PATTERN));
-  const auto factor = std::make_shared<const Factor>(A, nullptr, options.factor);
-  if (!factor->failed()) return {K, M, shift, [factor](Vec b, Vec x) { solve(*factor, b, x); }};
-  const auto pencil = std::make_shared<ShiftInvert>(make_shift_invert(K, M, Symmetry::symmetric, options.pencil));
-  move_to(*pencil, shift);
-  const auto solve = [pencil](Vec b, Vec x)
-  { copy_column(pencil->factor->solve(columns_of(std::span<const Vec>(&b, 1))), 0, x); };
-  return {K, M, pencil->shift, solve};
-}
-
-/// What SLEPc calls after each restart.
-PetscErrorCode report_converged(EPS, PetscInt, PetscInt converged, PetscScalar*, PetscScalar*, PetscReal*, PetscInt,
-                                void* progress)
-{
-  static_cast<Progress*>(progress)->update(static_cast<double>(converged),
-                                           format("%d found", static_cast<int>(converged)));
-  return PETSC_SUCCESS;
-}
-
-/// Krylov-Schur for the `count` theta nearest the pencil's shift.
-Owned<EPS> make_solver(const ShiftedPencil& pencil, PetscInt count, Inverse& inverse)
-{
-  Owned<EPS> eps;
-  ST transformation = nullptr;
-  KSP solver = nullptr;
-  PC factor = nullptr;
-  check(EPSCreate(comm_of(pencil.K), eps.put()));
-  check(EPSSetOperators(eps, pencil.K, pencil.M));
-  check(EPSSetProblemType(eps, EPS_GHEP));
-  check(EPSSetType(eps, EPSKRYLOVSCHUR));
-  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
-  check(EPSSetTarget(eps, pencil.shift));
-  check(EPSSetDimensions(eps, count, PETSC_DEFAULT, PETSC_DEFAULT));
-  check(EPSSetTolerances(eps, 1e-9, 200));
-  check(EPSGetST(eps, &transformation));
-  check(STSetType(transformation, STSINVERT));
-  check(STSetMatMode(transformation, ST_MATMODE_SHELL));
-  check(STGetKSP(transformation, &solver));
-  check(KSPSetType(solver, KSPPREONLY));
-  check(KSPGetPC(solver, &factor));
-  check(PCSetType(factor, PCSHELL));
-  check(PCShellSetContext(factor, &inverse));
-  check(PCShellSetApply(factor, apply_inverse));
-  return eps;
-}
-
-/// Adds to X, whose columns are M-orthonormal, the `count` eigenvectors nearest the pencil's shift that are
-/// M-orthogonal to them. Returns the number of restarts.
-int append_nearest(MultiVector& X, const ShiftedPencil& pencil, PetscInt count)
-{
-  Inverse inverse{pencil.solve};
-  const Owned<EPS> eps = make_solver(pencil, count, inverse);
-  const auto vector = [&](const MultiVector& columns, Index j)
-  {
-    Owned<Vec> x;
-    check(MatCreateVecs(pencil.K, x.put(), nullptr));
-    copy_column(columns, j, x);
-    return x;
-  };
-  std::vector<Owned<Vec>> known;
-  for (Index j = 0; j < X.columns(); ++j) known.push_back(vector(X, j));
-  std::vector<Vec> borrowed(known.begin(), known.end());
-  if (!known.empty()) check(EPSSetDeflationSpace(eps, static_cast<PetscInt>(known.size()), borrowed.data()));
-  const Owned<Vec> start = vector(random_multivector(pencil.K, 1), 0), x = zeros_like(start);
-  Vec initial = start;
-  check(EPSSetInitialSpace(eps, 1, &initial));
-  Progress progress(comm_of(pencil.K), "real modes", count);
-  check(EPSMonitorSet(eps, report_converged, &progress, nullptr));
-  check_after_callbacks(EPSSolve(eps), inverse.failure);
-  PetscInt iterations = 0, converged = 0;
-  check(EPSGetIterationNumber(eps, &iterations));
-  check(EPSGetConverged(eps, &converged));
-  for (PetscInt i = 0; i < converged; ++i)
-  {
-    check_after_callbacks(EPSGetEigenvector(eps, i, x, nullptr), inverse.failure); // it may apply the inverse
-    append(X, x);
-  }
-  return static_cast<int>(iterations);
-}
-
 /// theta and shapes on the span of X. Beside the motions of a free body 1/(theta - shift) varies by 1e7, and SLEPc's
 /// theta are off by that times the rounding. Here the dense problem is shifted by the mean theta instead.
 RealPairs ritz_pairs(const MultiVector& X, Mat M, Mat K)
 {
-  if (X.columns() == 0) return {.x = X};
   const Eigen::MatrixXd mass = inner_products(X, product(M, X)), stiffness = inner_products(X, product(K, X));
   const double mean = stiffness.trace() / mass.trace();
   const SymmetricEigenpairs ritz =
@@ -215,12 +91,6 @@ Inertia inertia_at(double limit, ShiftInvert& pencil)
   return {pencil.shift, pencil.factor->negative_pivots()};
 }
 
-Inertia inertia_at(double limit, Mat K, Mat M, const PencilOptions& options)
-{
-  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
-  return inertia_at(limit, pencil);
-}
-
 ShiftInvert& pencil_of(RealCount& count)
 {
   if (!count.pencil.factor)
@@ -228,94 +98,79 @@ ShiftInvert& pencil_of(RealCount& count)
   return count.pencil;
 }
 
-/// The modes with theta < limit, at most `count` of them. One factor just below zero finds them, and one above the last
-/// of them counts them. A space grown from one vector may miss copies of multiple modes; those are sought again.
-RealModes search_from_below_zero(Mat M, Mat K, double limit, PetscInt count, const ModesOptions& options)
-{
-  PetscInt n = 0;
-  check(MatGetSize(K, &n, nullptr));
-  const double shift = shift_below_zero(M, K);
-  std::optional<Inertia> inertia;
-  if (std::isfinite(limit)) inertia = inertia_at(limit, K, M, options.pencil);
-  RealPairs found{.x = empty_multivector(K)};
-  RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
-  PetscInt missing = inertia ? inertia->below : count;
-  if (missing == 0) return modes;
-  const ShiftedPencil pencil = shifted_below_zero(K, M, shift, options);
-  for (int attempt = 0; attempt < 6 && missing > 0 && found.x.columns() < n; ++attempt)
-  {
-    const PetscInt wanted = std::min<PetscInt>(n - found.x.columns(), missing + 1);
-    modes.outcome.iterations += append_nearest(found.x, pencil, wanted);
-    found = ritz_pairs(found.x, M, K);
-    // The count is taken above the last mode by 1e-6 of its distance from the shift, far above the error of theta.
-    if (!inertia && found.theta.size() >= count)
-      inertia = inertia_at(found.theta[count - 1] + 1e-6 * (found.theta[count - 1] - shift), K, M, options.pencil);
-    missing = inertia ? inertia->below - found.number_below(inertia->limit)
-                      : count - static_cast<PetscInt>(found.theta.size());
-  }
-  modes.outcome.kind = missing == 0 ? OutcomeKind::converged : OutcomeKind::not_converged;
-  if (missing != 0)
-    modes.outcome.reason = std::to_string(found.theta.size()) + " real modes found, and the inertia says that " +
-                           std::to_string(missing) + " are missing";
-  const Index kept = std::min<Index>(count, found.number_below(limit));
-  found = {found.theta.head(kept), {found.x.comm, found.x.entries.leftCols(kept)}};
-  modes.outcome.residual = largest_residual(found, M, K);
-  for (Index k = 0; k < kept; ++k)
-  {
-    modes.omega.push_back(std::sqrt(std::max(0.0, found.theta[k])));
-    check(MatCreateVecs(K, modes.shapes.emplace_back().put(), nullptr));
-    copy_column(found.x, k, modes.shapes.back());
-  }
-  return modes;
-}
-
 /// The modes with low <= theta < high, found from the middle, about `expected` of them. Where they are too many for one
 /// space, by halves.
 void append_between(double low, double high, int expected, ShiftInvert& pencil, RealModes& modes)
 {
+  constexpr double tolerance = 1e-7; // of the subspace: theta is off by its square
   const double middle = (low + high) / 2;
   move_to(pencil, middle);
   const double radius = (high - low) / 2 + std::abs(pencil.shift - middle);
-  const Nearest nearest = solve_nearest(pencil, std::max(expected, 1), radius, 1e-4);
+  const Nearest nearest = solve_nearest(pencil, std::max(expected, 1), radius, tolerance);
   if (!nearest.converged)
   {
-    append_between(middle, high, expected / 2, pencil, modes);
     append_between(low, middle, expected / 2, pencil, modes);
+    append_between(middle, high, expected / 2, pencil, modes);
     return;
   }
-  const RealPairs found = ritz_pairs(nearest.space, pencil.M, pencil.K);
-  for (Index k = 0; k < found.theta.size(); ++k)
+  RealPairs found = ritz_pairs(nearest.space, pencil.M, pencil.K);
+  const Index first = found.number_below(low), count = found.number_below(high) - first;
+  found = {found.theta.segment(first, count).eval(), {found.x.comm, found.x.entries.middleCols(first, count)}};
+  modes.outcome.residual = std::max(modes.outcome.residual, largest_residual(found, pencil.M, pencil.K));
+  for (Index k = 0; k < count; ++k)
   {
-    if (!(found.theta[k] >= low && found.theta[k] < high)) continue;
     modes.omega.push_back(std::sqrt(std::max(0.0, found.theta[k])));
     check(MatCreateVecs(pencil.K, modes.shapes.emplace_back().put(), nullptr));
     copy_column(found.x, k, modes.shapes.back());
   }
 }
 
-/// The modes with low <= theta < high. No count by inertia assures them: a basis can do without one that is missed.
-RealModes search_between(Mat M, Mat K, double low, double high, const PencilOptions& options)
+/// The modes with theta < limit, in slices of equal width in frequency, so many that one holds about `slice` modes: the
+/// work of a slice grows by the square of their number. A mode on an edge may be missed or found twice, which the count
+/// shows: then other edges follow.
+RealModes search_below(double limit, ShiftInvert& pencil)
 {
-  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
-  RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
-  append_between(low, high, 1, pencil, modes);
-  return modes;
+  constexpr int slice = 150, attempts = 3;
+  const Inertia end = inertia_at(limit, pencil);
+  const int fewest = std::max(1, (end.below + slice - 1) / slice);
+  for (int slices = fewest;; ++slices)
+  {
+    RealModes modes{{OutcomeKind::converged, "", slices, 0}, {}, {}};
+    for (int k = 0; k < slices; ++k)
+    {
+      const double low = k == 0 ? shift_below_zero(pencil.M, pencil.K) : limit * std::pow(1. * k / slices, 2);
+      append_between(low, limit * std::pow((k + 1.) / slices, 2), end.below / slices, pencil, modes);
+    }
+    const auto found = std::lower_bound(modes.omega.begin(), modes.omega.end(), std::sqrt(end.limit));
+    const auto below = static_cast<int>(found - modes.omega.begin());
+    if (below == end.below) return modes;
+    if (slices + 1 < fewest + attempts) continue;
+    modes.outcome.kind = OutcomeKind::not_converged;
+    modes.outcome.reason = format("%d real modes found, and the inertia counts %d", below, end.below);
+    return modes;
+  }
 }
 
-/// Slices of equal width in frequency, so many that one holds about `slice` modes: the work of a slice grows by the
-/// square of their number.
-RealModes search_in_slices(Mat M, Mat K, double omega, const PencilOptions& options)
+/// The first `count` modes, below a limit that the nearest theta to the end of the spectrum give.
+RealModes search_first(PetscInt count, ShiftInvert& pencil)
 {
-  constexpr int slice = 150;
-  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options);
-  const Inertia end = inertia_at(omega * omega, pencil);
-  const int slices = std::max(1, (end.below + slice - 1) / slice);
-  RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
-  for (int k = slices; k > 0; --k)
-  {
-    const double low = k == 1 ? shift_below_zero(M, K) : end.limit * std::pow((k - 1.) / slices, 2);
-    append_between(low, end.limit * std::pow(1. * k / slices, 2), end.below / slices, pencil, modes);
-  }
+  constexpr double rough = 1e-4; // of theta
+  const double shift = shift_below_zero(pencil.M, pencil.K);
+  move_to(pencil, shift);
+  const Nearest nearest = solve_nearest(pencil, count, 0, rough);
+  std::vector<double> theta;
+  for (const std::complex<double> one : nearest.theta) theta.push_back(one.real());
+  std::sort(theta.begin(), theta.end());
+  if (theta.size() < static_cast<std::size_t>(count))
+    return {
+        {OutcomeKind::not_converged, format("%zu of %d real modes found", theta.size(), static_cast<int>(count)), 0, 0},
+        {},
+        {}};
+  const double last = theta[static_cast<std::size_t>(count) - 1];
+  RealModes modes = search_below(last + 10 * rough * (last - shift), pencil);
+  const std::size_t kept = std::min(modes.omega.size(), static_cast<std::size_t>(count));
+  modes.omega.resize(kept);
+  modes.shapes.erase(modes.shapes.begin() + static_cast<std::ptrdiff_t>(kept), modes.shapes.end());
   return modes;
 }
 
@@ -395,7 +250,8 @@ RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& opt
   check(MatGetSize(K, &n, nullptr));
   if (count <= 0) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (n <= options.dense_limit) return first_of(solve_whole(M, K), K, count);
-  return search_from_below_zero(M, K, HUGE_VAL, std::min(count, n), options);
+  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options.pencil);
+  return search_first(std::min(count, n), pencil);
 }
 
 RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options)
@@ -409,15 +265,8 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& 
     const auto below = std::lower_bound(all.lambda.begin(), all.lambda.end(), omega * omega);
     return first_of(all, K, below - all.lambda.begin());
   }
-  return search_from_below_zero(M, K, omega * omega, to_int(n), options);
-}
-
-RealModes solve_most_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options)
-{
-  PetscInt n = 0;
-  check(MatGetSize(K, &n, nullptr));
-  if (n <= options.dense_limit) return solve_real_modes_below(M, K, band, options);
-  return search_in_slices(M, K, two_pi * band, options.pencil);
+  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options.pencil);
+  return search_below(omega * omega, pencil);
 }
 
 RealModes find_real_modes_below(const LinearisedSliding& linearised, double band, const ModesOptions& options)
@@ -435,7 +284,9 @@ RealModes find_real_modes_between(const LinearisedSliding& linearised, double lo
   if (!(low < high)) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (low <= 0 || n <= options.dense_limit) return find_real_modes_below(linearised, high, options);
   const auto theta = [](double frequency_hz) { return std::pow(two_pi * frequency_hz, 2); };
-  RealModes modes = search_between(linearised.M_z, linearised.K_z, theta(low), theta(high), options.pencil);
+  ShiftInvert pencil = make_shift_invert(linearised.K_z, linearised.M_z, Symmetry::symmetric, options.pencil);
+  RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
+  append_between(theta(low), theta(high), 1, pencil, modes);
   to_structure(modes, linearised.contact.Z);
   return modes;
 }

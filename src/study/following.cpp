@@ -223,17 +223,6 @@ ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, Mat 
   return forms;
 }
 
-PointModes leading_part(const PointModes& modes, Index shapes)
-{
-  PointModes part = modes;
-  const Index kept = std::min(shapes, modes.M.rows());
-  for (MatrixXd* A : {&part.M, &part.C}) *A = A->topLeftCorner(kept, kept).eval();
-  for (TwoSidedPair& pair : part.pairs)
-    for (Eigen::VectorXcd* vector : {&pair.right, &pair.left})
-      *vector = vector->head(std::min(shapes, vector->size())).eval();
-  return part;
-}
-
 std::vector<Match> follow(const ModeForms& forms, double clear)
 {
   const auto count = static_cast<std::size_t>(forms.first.rows()), next = static_cast<std::size_t>(forms.second.rows());

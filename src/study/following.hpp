@@ -68,9 +68,6 @@ struct ExpandedModes
 /// Collective.
 ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, Mat M, Mat C);
 
-/// The first shapes of the basis alone.
-PointModes leading_part(const PointModes& modes, Eigen::Index shapes);
-
 /// For each mode of the first point its match at the second one, by the MAC of right with left vectors, which is at
 /// least `clear`. Not collective.
 std::vector<Match> follow(const ModeForms& forms, double clear);

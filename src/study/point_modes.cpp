@@ -30,7 +30,6 @@ constexpr Index mixtures = 24;     // of the residuals of a side: more direction
 constexpr Index small_basis = 120; // shapes: such a problem is solved whole at once
 constexpr double undamped_reach = 1.2; // undamped modes on which a large basis is solved first, over the window
 constexpr double slow = 0.8;           // ratio of errors before and after a correction that did not help
-constexpr std::size_t few = 4;         // pairs refined one by one; six take as long as solving the whole
 constexpr double spurious = 1e-8;      // backward error of what is no mode
 
 /// The closed pairs taken out, and on the rows of B the damping of the friction direction and the stiffness of pairs
@@ -62,16 +61,8 @@ void attach(ModesBasis& modes, const Interface& interface, const std::vector<int
       modes.attached[i] = 1;
     }
   if (pairs.empty()) return;
-  const Owned<Mat> forces = transpose_of(rows_of(interface, pairs, RowsTaken::normal));
-  MultiVector columns{comm_of(forces), MatrixXd::Zero(modes.basis.T.entries.rows(), static_cast<Index>(pairs.size()))};
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(forces, &first, &last));
-  for_each_row(forces,
-               [&](PetscInt row, std::span<const PetscInt> column, std::span<const PetscScalar> value)
-               {
-                 for (std::size_t k = 0; k < column.size(); ++k) columns.entries(row - first, column[k]) = value[k];
-               });
-  const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, columns));
+  const MultiVector forces = normal_forces(interface, pairs);
+  const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, forces));
   extend(modes.basis, product(modes.contact.Z, responses));
 }
 
@@ -274,32 +265,6 @@ void transform(std::vector<TwoSidedPair>& pairs, const MatrixXd& of_right, const
   }
 }
 
-/// Where a few pairs alone miss their tolerance, they are refined on the whole basis.
-void refine_few(const ModesBasis& modes, const ProjectedSliding& on_basis, const PointProblem& problem,
-                SolvedPairs& solved)
-{
-  std::vector<std::size_t> places;
-  std::vector<TwoSidedPair> pairs;
-  for (std::size_t k = 0; k < solved.pairs.size(); ++k)
-    if (solved.backward_error(k) > tolerance_of(solved.pairs[k], problem)) places.push_back(k);
-  if (places.empty() || places.size() > few) return;
-  for (const std::size_t k : places) pairs.push_back(solved.pairs[k]);
-  const LossyMatrices on_shapes = without_sketch(on_basis, modes.basis.shapes());
-  const MatrixXd &V = on_basis.independent, V_transposed = V.transpose();
-  if (V.size() > 0) transform(pairs, V_transposed, V_transposed);
-  refine_lossy_shared(modes.basis.T.comm, on_shapes, pairs);
-  if (V.size() > 0) transform(pairs, V, V);
-  SolvedPairs refined = with_errors(modes, on_basis, std::move(pairs));
-  for (std::size_t i = 0; i < places.size(); ++i)
-  {
-    const std::size_t k = places[i];
-    if (!(refined.backward_error(i) < solved.backward_error(k))) continue;
-    solved.pairs[k] = std::move(refined.pairs[i]);
-    solved.right[k] = refined.right[i];
-    solved.left[k] = refined.left[i];
-  }
-}
-
 /// The pairs of the projected problem in the window, falling growth rate.
 SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_basis, const Window& window,
                             Extent extent)
@@ -385,16 +350,9 @@ bool in_band(const TwoSidedPair& pair, double band)
 
 ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>& closed)
 {
-  ModesBasis modes{{make_basis(problem.structure, problem.interface, sketched)}};
+  ModesBasis modes{make_basis(problem.structure, problem.interface, sketched)};
   rebase(modes, problem, closed);
   return modes;
-}
-
-void turn_round(ModesBasis& modes)
-{
-  if (!modes.turned)
-    modes.turned = GrownBasis{leading_part(modes.basis, modes.shared), std::vector<char>(modes.attached.size(), 0)};
-  std::swap<GrownBasis>(modes, *modes.turned);
 }
 
 void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed)
@@ -413,20 +371,11 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   check(MatNorm(modes.M_z, NORM_1, &modes.norms.M));
   check(MatNorm(C_z, NORM_1, &modes.norms.C));
   check(MatNorm(modes.K_z, NORM_1, &modes.norms.K));
-  RealModes real = solve_most_real_modes_below(modes.M_z, modes.K_z, basis_band * problem.band, problem.options);
+  RealModes real = solve_real_modes_below(modes.M_z, modes.K_z, basis_band * problem.band, problem.options);
   if (real.omega.size() < fewest) real = solve_real_modes(modes.M_z, modes.K_z, fewest, problem.options);
   MultiVector shapes = empty_multivector(modes.K_z);
   for (const Owned<Vec>& shape : real.shapes) append(shapes, shape);
-  const MultiVector news = product(modes.contact.Z, shapes);
-  extend(modes.basis, news);
-  if (modes.turned)
-  {
-    set_structure(modes.turned->basis, structure);
-    extend(modes.turned->basis, news);
-    modes.turned->attached.assign(closed.size(), 0);
-  }
-  else
-    modes.shared = modes.basis.shapes();
+  extend(modes.basis, product(modes.contact.Z, shapes));
   modes.pencil = make_shift_invert(modes.K_z, modes.M_z, Symmetry::symmetric, problem.options.pencil);
   move_to(modes.pencil, shift_below_zero(modes.M_z, modes.K_z));
 }
@@ -443,20 +392,17 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   const auto& [structure, interface, equilibrium] = problem.sliding;
   set_structure(modes.basis, structure);
   const LinearisedPoint point = linearise_point(problem.sliding);
-  const bool at_start = !modes.turned && modes.basis.shapes() == modes.shared;
   attach(modes, interface, point.contact.pairs);
-  if (at_start) modes.shared = modes.basis.shapes();
   const double end = two_pi * followed_band * problem.band;
   const Window window{vibration_floor(modes.norms), end * end};
   Extent extent =
       problem.tolerance <= modes.whole_up_to || modes.basis.shapes() <= small_basis ? Extent::whole : Extent::near_band;
-  double before = HUGE_VAL, first = 0;
+  double before = HUGE_VAL;
   for (PetscInt pass = 0;; ++pass)
   {
     problem.end_if_asked();
     const ProjectedSliding on_basis = project(modes.basis, point.contact, interface.B, point.damping, point.stiffness);
     SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
-    if (extent == Extent::near_band) refine_few(modes, on_basis, problem, solved);
     double now = largest_excess(solved, problem);
     if (extent == Extent::near_band && now > 1 && now > slow * before)
     {
@@ -468,17 +414,11 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
       now = of_whole;
     }
     before = now;
-    if (pass == 0) first = now;
-    const bool leads = !modes.turned && modes.basis.shapes() == modes.shared && now > std::sqrt(first);
     MultiVector residuals{modes.basis.T.comm, MatrixXd(modes.basis.T.entries.rows(), 0)};
     if (pass < problem.passes)
       for (const Side side : {Side::right, Side::left})
         append_residuals(modes, problem, point, inexact(solved, problem, side), side, residuals);
-    if (correct(modes, std::move(residuals)))
-    {
-      if (leads) modes.shared = modes.basis.shapes();
-      continue;
-    }
+    if (correct(modes, std::move(residuals))) continue;
     const bool misses = now > 1;
     if (misses && complete(modes, problem))
     {

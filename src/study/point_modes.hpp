@@ -13,27 +13,19 @@
 namespace squeal
 {
 
-/// What grows with the points of one direction of rotation, whose modes need other corrections than the reversed one's.
-struct GrownBasis
+/// Modes of the frictionless structure in and beyond the band, corrected wherever a point needs it.
+struct ModesBasis
 {
   SlidingBasis basis;
   std::vector<char> attached{}; // pairs beyond those closed at every point whose static shapes the basis holds
   double whole_up_to = 0;       // tolerances for which undamped modes in and near the band were not enough to solve on
-};
-
-/// Modes of the frictionless structure in and beyond the band, corrected wherever a point needs it: those of the
-/// direction of rotation that is at hand, with what both directions have in common.
-struct ModesBasis : GrownBasis
-{
   ClosedContact contact{};    // of the pairs that are closed and rigid at every point: without friction
   std::vector<char> closed{}; // those pairs
   Owned<Mat> M_z{}, K_z{};    // with the springs of pairs that have a compliance where the basis was made
   Owned<Mat> Z_transposed{};
-  ShiftInvert pencil{};               // of K_z, M_z just below zero
-  QuadraticNorms norms{};             // of M_z, C_z and K_z
-  int passes = 0;                     // corrections so far
-  Eigen::Index shared = 0;            // shapes that come first in both directions
-  std::optional<GrownBasis> turned{}; // of the other direction, once it is needed
+  ShiftInvert pencil{};   // of K_z, M_z just below zero
+  QuadraticNorms norms{}; // of M_z, C_z and K_z
+  int passes = 0;         // corrections so far
 };
 
 /// The structure on which a basis is made, with the pairs that are closed there, and the band of its modes [Hz].
@@ -51,11 +43,6 @@ ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>
 
 /// Goes over to fewer closed pairs: their modes join the basis, whose shapes keep their places.
 void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed);
-
-/// Goes over to the basis of the other direction of rotation, which begins with the shapes that both share. Those are
-/// the first corrections too, which hold the part of the friction's effect that is linear in mu: with a reversed
-/// rotation mu changes its sign.
-void turn_round(ModesBasis& modes);
 
 /// What modes are sought on, and how exactly.
 struct PointProblem

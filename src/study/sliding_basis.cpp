@@ -41,12 +41,6 @@ std::vector<Index> dofs_with_entries(Mat B)
   return rows;
 }
 
-/// The sum over all ranks, the same to the last bit everywhere.
-MatrixXd shared_sum(const MatrixXd& local, MPI_Comm comm)
-{
-  return inner_products({comm, MatrixXd::Identity(local.rows(), local.rows())}, {comm, local});
-}
-
 /// Those of matrices that no others give.
 std::vector<BasisImage*> images_of(SlidingBasis& basis)
 {
@@ -66,7 +60,6 @@ bool alike(Mat A, Mat B)
 bool set_matrix(SlidingBasis& basis, BasisImage& image, Mat A)
 {
   if (alike(image.matrix, A)) return false;
-  basis.by_Z.Z = {};
   if (!A)
   {
     image = {image.sign};
@@ -83,7 +76,6 @@ void set_damping(SlidingBasis& basis, Mat M, Mat C, Mat K)
 {
   basis.rayleigh = rayleigh_part(M, C, K);
   basis.C = {};
-  basis.by_Z.Z = {};
   if (basis.rayleigh)
     basis.C.matrix = copy_of(C);
   else
@@ -159,66 +151,30 @@ MatrixXd independent_part(const MatrixXd& kept)
   return parts.y.rightCols((parts.lambda.array() >= trace).count());
 }
 
-/// Sets the lift by Z where it has changed.
-void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact, Mat B)
+/// The lift of T by Z.
+struct LiftByZ
 {
-  LiftByZ& lift = basis.by_Z;
-  if (lift.Z.get() && equal(lift.Z, contact.Z)) return;
-  lift.Z = copy_of(contact.Z);
-  lift.by_Y.clear();
+  MultiVector change{};            // D_Z, of the pivots' rows
+  std::vector<Index> pivots{};     // local rows
+  std::vector<Index> in_contact{}; // their places among the contact's degrees of freedom
+  MultiVector of_B{};              // B T
+  MatrixXd kept{};                 // inner products of the shapes without the pivots
+};
+
+LiftByZ lift_by_Z(const SlidingBasis& basis, const ClosedContact& contact, Mat B)
+{
+  LiftByZ lift{.pivots = local_pivots(contact)};
   PetscInt rows_of_B = 0;
   check(MatGetSize(B, &rows_of_B, nullptr));
   if (rows_of_B > 0) lift.of_B = product(B, basis.T);
-  lift.pivots = local_pivots(contact);
-  lift.in_contact.clear();
   lift.change = change_by_lift(basis, contact, lift.pivots, contact.Z);
   for (const Index pivot : lift.pivots)
     lift.in_contact.push_back(std::lower_bound(basis.contact_dofs.begin(), basis.contact_dofs.end(), pivot) -
                               basis.contact_dofs.begin());
-  const MatrixXd at_pivots = basis.T.entries(lift.pivots, Eigen::all).rightCols(basis.shapes());
+  const MultiVector at_pivots{basis.T.comm, basis.T.entries(lift.pivots, Eigen::all).rightCols(basis.shapes())};
   lift.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) -
-              shared_sum(at_pivots.transpose() * at_pivots, basis.T.comm); // shapes are orthonormal
-  lift.independent = independent_part(lift.kept);
-  const Owned<IS> pivots = pivot_set(contact);
-  for (BasisImage* image : images_of(basis))
-  {
-    const MatrixXd rows = image->contact_rows.entries(lift.in_contact, Eigen::all);
-    image->lifted_rows = product(part_of(image->matrix, pivots, pivots), lift.change);
-    image->lifted_rows.entries += rows;
-    image->lifted_products =
-        image->products + image->sign * shared_sum(rows.transpose() * lift.change.entries, basis.T.comm);
-  }
-}
-
-/// T_Y'A T_Z of each image. Where no tangent moves a pivot D_Y is linear in mu, and two other points tell it: they are
-/// taken where they need not be extrapolated far, since that magnifies rounding.
-std::vector<MatrixXd> projected_images(SlidingBasis& basis, const MultiVector& by_Y)
-{
-  constexpr double rounding = 1e-14, farthest = 8; // of the change; in steps from one point to the other
-  std::vector<LiftByY>& known = basis.by_Z.by_Y;
-  if (known.size() == 2)
-  {
-    const MatrixXd &first = known[0].change.entries, step = known[1].change.entries - first,
-                   here = by_Y.entries - first;
-    std::array<double, 3> sums{here.cwiseProduct(step).sum(), step.squaredNorm(), by_Y.entries.squaredNorm()};
-    MPI_Allreduce(MPI_IN_PLACE, sums.data(), 3, MPI_DOUBLE, MPI_SUM, by_Y.comm);
-    const double way = sums[1] > 0 ? sums[0] / sums[1] : HUGE_VAL;
-    double rest = std::abs(way) <= farthest ? (here - way * step).squaredNorm() : HUGE_VAL;
-    MPI_Allreduce(MPI_IN_PLACE, &rest, 1, MPI_DOUBLE, MPI_SUM, by_Y.comm);
-    if (rest <= rounding * rounding * sums[2])
-    {
-      std::vector<MatrixXd> result;
-      for (std::size_t k = 0; k < known[0].projected.size(); ++k)
-        result.push_back((1 - way) * known[0].projected[k] + way * known[1].projected[k]);
-      return result;
-    }
-    known.erase(known.begin());
-  }
-  std::vector<MatrixXd> result;
-  for (const BasisImage* image : images_of(basis))
-    result.push_back(image->lifted_products + inner_products(by_Y, image->lifted_rows));
-  known.push_back({by_Y, result});
-  return result;
+              inner_products(at_pivots, at_pivots); // shapes are orthonormal
+  return lift;
 }
 
 /// On the rows of B, symmetric or not.
@@ -230,7 +186,7 @@ struct PairMatrix
 
 /// T_Y'B'D B T_Z. Most rows of D are zero: of friction's damping those of normals and, mostly, along the drive. The
 /// others may hold no pivot: then B T_Y and B T_Z are B T there.
-MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& contact, const MultiVector& by_Y, Mat B,
+MatrixXd projected_on_pairs(const LiftByZ& lift, const ClosedContact& contact, const MultiVector& by_Y, Mat B,
                             const PairMatrix& D)
 {
   PetscInt first = 0, last = 0;
@@ -248,7 +204,7 @@ MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& cont
   const Owned<Mat> D_taken = part_of(D.matrix, taken, taken), at_pivots = part_of(B, taken, pivot_set(contact));
   double entries = 0;
   check(MatNorm(at_pivots, NORM_FROBENIUS, &entries));
-  const MultiVector sliding{basis.T.comm, basis.by_Z.of_B.entries(places, Eigen::all)};
+  const MultiVector sliding{by_Y.comm, lift.of_B.entries(places, Eigen::all)};
   if (entries == 0)
   {
     const MultiVector force = product(D_taken, sliding);
@@ -257,7 +213,7 @@ MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& cont
   const auto lifted = [&](const MultiVector& change) {
     return MultiVector{change.comm, sliding.entries + product(at_pivots, change).entries};
   };
-  return inner_products(lifted(by_Y), product(D_taken, lifted(basis.by_Z.change)));
+  return inner_products(lifted(by_Y), product(D_taken, lifted(lift.change)));
 }
 
 } // namespace
@@ -275,32 +231,22 @@ bool equal(Mat A, Mat B)
   return same == PETSC_TRUE;
 }
 
+MultiVector normal_forces(const Interface& interface, const std::vector<int>& pairs)
+{
+  const Owned<Mat> columns = transpose_of(rows_of(interface, pairs, RowsTaken::normal));
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRangeColumn(columns, &first, &last));
+  MultiVector units{comm_of(columns), MatrixXd::Zero(last - first, static_cast<Index>(pairs.size()))};
+  units.entries.middleCols(first, last - first).setIdentity();
+  return product(columns, units);
+}
+
 SlidingBasis make_basis(const Structure& structure, const Interface& interface, Index sketched)
 {
   SlidingBasis basis{random_multivector(structure.K, static_cast<PetscInt>(sketched)), sketched,
                      dofs_with_entries(interface.B)};
   set_structure(basis, structure);
   return basis;
-}
-
-SlidingBasis leading_part(const SlidingBasis& basis, Index shapes)
-{
-  const Index columns = basis.sketched + shapes;
-  SlidingBasis part{{basis.T.comm, basis.T.entries.leftCols(columns)}, basis.sketched, basis.contact_dofs};
-  const auto of_image = [&](const BasisImage& image)
-  {
-    return BasisImage{image.sign,
-                      copy_of(image.matrix),
-                      {image.contact_rows.comm, image.contact_rows.entries.leftCols(columns)},
-                      image.products.topLeftCorner(columns, columns)};
-  };
-  for (const auto image : {&SlidingBasis::M, &SlidingBasis::C, &SlidingBasis::K, &SlidingBasis::K_loss,
-                           &SlidingBasis::G, &SlidingBasis::H})
-    if ((basis.*image).matrix.get() && !(basis.rayleigh && image == &SlidingBasis::C))
-      part.*image = of_image(basis.*image);
-  part.rayleigh = basis.rayleigh;
-  if (basis.rayleigh) part.C.matrix = copy_of(basis.C.matrix);
-  return part;
 }
 
 void set_structure(SlidingBasis& basis, const Structure& structure)
@@ -324,7 +270,6 @@ Index extend(SlidingBasis& basis, MultiVector X)
   MultiVector shapes = columns_from(basis.T, basis.sketched);
   const Index gained = extend_orthonormal(shapes, std::move(X)), size = basis.T.columns() + gained;
   if (gained == 0) return 0;
-  basis.by_Z.Z = {};
   const MultiVector news = columns_from(shapes, shapes.columns() - gained);
   append(basis.T, news);
   for (BasisImage* image : images_of(basis))
@@ -339,26 +284,30 @@ Index extend(SlidingBasis& basis, MultiVector X)
   return gained;
 }
 
-ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness)
+ProjectedSliding project(const SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness)
 {
-  lift_by_Z(basis, contact, B);
-  const MultiVector by_Y = change_by_lift(basis, contact, basis.by_Z.pivots, contact.Y);
-  std::vector<MatrixXd> projected = projected_images(basis, by_Y);
-  const std::vector<BasisImage*> images = images_of(basis);
-  const auto taken = [&](const BasisImage& image) -> MatrixXd
+  const LiftByZ lift = lift_by_Z(basis, contact, B);
+  const MultiVector by_Y = change_by_lift(basis, contact, lift.pivots, contact.Y);
+  const Owned<IS> pivots = pivot_set(contact);
+  const auto lifted = [&](const BasisImage& image) -> MatrixXd
   {
-    const auto place = std::ranges::find(images, &image);
-    if (place == images.end()) return {};
-    return std::move(projected[static_cast<std::size_t>(place - images.begin())]);
+    if (!image.matrix.get()) return {};
+    const MultiVector rows{by_Y.comm, image.contact_rows.entries(lift.in_contact, Eigen::all)};
+    MultiVector at_pivots = product(part_of(image.matrix, pivots, pivots), lift.change);
+    at_pivots.entries += rows.entries;
+    return image.products + image.sign * inner_products(rows, lift.change) + inner_products(by_Y, at_pivots);
   };
-  ProjectedSliding result{taken(basis.M), taken(basis.C), taken(basis.K), taken(basis.K_loss)};
-  if (basis.rayleigh) result.C = basis.rayleigh->of_mass * result.M + basis.rayleigh->of_stiffness * result.K;
-  if (basis.G.matrix.get()) result.C += taken(basis.G);
-  if (basis.H.matrix.get()) result.K += taken(basis.H);
-  if (damping) result.C += projected_on_pairs(basis, contact, by_Y, B, {damping, true});
-  if (stiffness) result.K += projected_on_pairs(basis, contact, by_Y, B, {stiffness, false});
-  result.kept = basis.by_Z.kept;
-  result.independent = basis.by_Z.independent;
+  ProjectedSliding result{lifted(basis.M), {}, lifted(basis.K), lifted(basis.K_loss)};
+  if (basis.rayleigh)
+    result.C = basis.rayleigh->of_mass * result.M + basis.rayleigh->of_stiffness * result.K;
+  else
+    result.C = lifted(basis.C);
+  if (basis.G.matrix.get()) result.C += lifted(basis.G);
+  if (basis.H.matrix.get()) result.K += lifted(basis.H);
+  if (damping) result.C += projected_on_pairs(lift, contact, by_Y, B, {damping, true});
+  if (stiffness) result.K += projected_on_pairs(lift, contact, by_Y, B, {stiffness, false});
+  result.kept = lift.kept;
+  result.independent = independent_part(lift.kept);
   return result;
 }
 

@@ -207,12 +207,10 @@ private:
     take_over(before, now, matches);
   }
 
-  /// Between the first points of lines of both directions of rotation, whose bases are two.
-  std::vector<Match> matches_turned(const Followed& before, const Followed& now) const
+  /// Between the first points of lines of both directions of rotation.
+  static std::vector<Match> matches_turned(const Followed& before, const Followed& now)
   {
-    const Eigen::Index shapes = model_.shared_shapes();
-    std::vector<Match> matches =
-        follow(overlaps_between(leading_part(before.modes, shapes), leading_part(now.modes, shapes)), clear_overlap);
+    std::vector<Match> matches = follow(overlaps_between(before.modes, now.modes), clear_overlap);
     match_coincident(matches, before.modes.pairs, now.modes.pairs);
     return matches;
   }

@@ -71,7 +71,9 @@ Equilibrium SweptModel::find(const SweptPlace& place)
   go_to(place);
   const auto& [structure, interface] = *model_;
   if (interface.pairs == 0) return find_equilibrium(structure, interface, equilibrium_options_);
-  return find_equilibrium(structure, interface, compliance(), closed_, equilibrium_options_);
+  Equilibrium equilibrium = find_equilibrium(structure, interface, compliance(), closed_, equilibrium_options_);
+  if (equilibrium.outcome.kind == OutcomeKind::converged) closed_ = equilibrium.closed;
+  return equilibrium;
 }
 
 const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
@@ -92,7 +94,6 @@ const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
     model_.reset();
     equilibrium.outcome = {OutcomeKind::no_equilibrium, error.what(), 0, 1};
   }
-  if (equilibrium.outcome.kind == OutcomeKind::converged) closed_ = equilibrium.closed;
   return equilibria_[place] = std::move(equilibrium);
 }
 
@@ -131,13 +132,7 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
     if (common.size() != rigid.size())
       throw Error(format("the number of contact pairs changes from %zu to %zu", common.size(), rigid.size()));
     for (std::size_t i = 0; i < common.size(); ++i) common[i] = common[i] && rigid[i];
-    if (!basis_)
-    {
-      basis_ = make_modes_basis(basis_problem(equilibrium), common);
-      basis_reversed_ = place.reversed;
-    }
-    if (basis_reversed_ != place.reversed) turn_round(*basis_);
-    basis_reversed_ = place.reversed;
+    if (!basis_) basis_ = make_modes_basis(basis_problem(equilibrium), common);
     if (common != basis_->closed)
     {
       rebase(*basis_, basis_problem(equilibrium), common);
@@ -234,8 +229,7 @@ ModeForms SweptModel::forms(const SweptPlace& from, const PointModes& first, con
 
 Eigen::Index SweptModel::shapes() const
 {
-  if (!basis_) return 0;
-  return std::max(basis_->basis.shapes(), basis_->turned ? basis_->turned->basis.shapes() : 0);
+  return basis_ ? basis_->basis.shapes() : 0;
 }
 
 MultiVector SweptModel::vectors(const PointModes& modes, Side side) const

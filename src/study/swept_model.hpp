@@ -27,6 +27,9 @@ public:
   /// Finds the equilibrium of a point. The pairs that are closed at all points prepared are those of the basis.
   void prepare(const SweptPlace& place);
 
+  /// The equilibrium of a point, which is not kept. Error: a model has none.
+  Equilibrium find(const SweptPlace& place);
+
   /// What cannot be computed at a point, for whatever reason, is in the outcome.
   const Equilibrium& equilibrium_at(const SweptPlace& place);
   PointModes modes_at(const SweptPlace& place, double tolerance);
@@ -51,19 +54,15 @@ public:
   /// Between the modes of two points of a line.
   ModeForms forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to, const PointModes& second);
 
-  /// The number of shapes that the bases of both directions of rotation have in common.
-  Eigen::Index shared_shapes() const { return basis_ ? basis_->shared : 0; }
-
   /// At the point visited last; null: at none.
   const BrakeModel* model() const { return model_ ? &*model_ : nullptr; }
 
-  /// Of the larger basis.
+  /// The number of shapes of the basis.
   Eigen::Index shapes() const;
   int passes() const { return basis_ ? basis_->passes : 0; }
 
 private:
   void go_to(const SweptPlace& place);
-  Equilibrium find(const SweptPlace& place);
   const PairCompliance& compliance();
   BasisProblem basis_problem(const Equilibrium& equilibrium) const;
   const std::vector<char>& rigid_at(const SweptPlace& place);
@@ -82,7 +81,6 @@ private:
   Owned<Mat> K_{}, B_{}; // of the compliance
   std::optional<ModesBasis> basis_{};
   std::map<SweptPlace, PointModes> trained_{};
-  bool basis_reversed_ = false; // the direction whose basis is at hand
 };
 
 } // namespace squeal

@@ -123,7 +123,7 @@ TEST_CASE("real modes of ten equal bodies are all found, though every frequency 
 }
 
 // Ten free chains. Their rigid motions leave K singular, and the limit lies above the second of six tenfold values.
-// Krylov-Schur solves to 1e-9 in x, and theta is off by its square; rounding of K is 1e-16.
+// Shapes are solved to 1e-7, and theta is off by its square; rounding of K is 1e-16.
 TEST_CASE("real modes of ten equal free bodies include every rigid motion")
 {
   constexpr std::size_t bodies = 10, masses = 6;

@@ -281,11 +281,10 @@ TEST_CASE("real modes of a part of the spectrum are those of one search")
   {
     const double band = 4.5; // [Hz]
     const RealModes all = solve_real_modes_below(linearised.M_z, linearised.K_z, band, {});
-    RealModes sliced = solve_most_real_modes_below(linearised.M_z, linearised.K_z, band, sparse);
+    const RealModes sliced = solve_real_modes_below(linearised.M_z, linearised.K_z, band, sparse);
     REQUIRE(all.omega.size() > 70); // more than one slice
-    std::sort(sliced.omega.begin(), sliced.omega.end());
     REQUIRE(sliced.omega.size() == all.omega.size());
-    for (std::size_t k = 0; k < all.omega.size(); ++k) // theta is off by the square of the subspace's 1e-4
-      CHECK(sliced.omega[k] == doctest::Approx(all.omega[k]).epsilon(1e-7));
+    for (std::size_t k = 0; k < all.omega.size(); ++k) // theta is off by the square of the subspace's 1e-7
+      CHECK(sliced.omega[k] == doctest::Approx(all.omega[k]).epsilon(1e-12));
   }
 }

@@ -45,13 +45,8 @@ std::vector<std::complex<double>> dense_quadratic_eigenvalues(const Eigen::Matri
 TwoSidedPair two_sided_pair(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C, const Eigen::MatrixXd& K,
                             std::complex<double> lambda);
 
-/// Makes pairs that are nearly those of a problem its own, by inverse iteration from their vectors and the two-sided
-/// Rayleigh quotient; the matrices are those of rank 0. Collective.
-template <class Matrix> void refine_pairs_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Matrix& K,
-                                                 std::vector<TwoSidedPair>& pairs);
-
-/// The pairs of solve_dense_quadratic with their left vectors, from the matrices of rank 0, on every rank: all with
-/// |lambda| <= limit, and perhaps more. Collective.
+/// The pairs of solve_dense_quadratic with |lambda| <= limit and their left vectors, from the matrices of rank 0, on
+/// every rank. Collective.
 template <class Matrix> std::vector<TwoSidedPair>
 solve_two_sided_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Matrix& K, double limit = HUGE_VAL);
 
@@ -106,13 +101,11 @@ SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const Eigen::Mat
                                                  double shift);
 
 /// The real Schur form A = Q T Q', with 2 x 2 diagonal blocks in T for complex eigenvalues.
-template <class Matrix> struct SchurFormOf
+struct SchurForm
 {
-  Matrix T, Q;
+  Eigen::MatrixXd T, Q;
   std::vector<std::complex<double>> eigenvalues; // in the order of T's diagonal
 };
-
-using SchurForm = SchurFormOf<Eigen::MatrixXd>;
 
 /// Nothing if the QR algorithm does not converge.
 std::optional<SchurForm> schur_form(const Eigen::MatrixXd& A);

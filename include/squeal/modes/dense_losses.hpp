@@ -29,11 +29,8 @@ Eigen::MatrixXcd sum(const LossyMatrices& A, const ComplexFactors& factors);
 /// The pairs with Im(lambda) > 0 and, without K_loss, the real ones. Collective.
 std::vector<DenseEigenpair> solve_lossy_shared(MPI_Comm comm, const LossyMatrices& problem);
 
-/// All pairs with |lambda| <= limit, and perhaps more, with both vectors. Those that are real without K_loss stay as
+/// All pairs with |lambda| <= limit, with both vectors. Those that are real without K_loss stay as
 /// they are. Collective.
 std::vector<TwoSidedPair> solve_two_sided_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, double limit);
-
-/// Makes pairs that oscillate and are nearly those of the problem its own. Collective.
-void refine_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, std::vector<TwoSidedPair>& pairs);
 
 } // namespace squeal

@@ -3,7 +3,6 @@
 ///     (lambda^2 Y'M Z + lambda Y'(C + C_f) Z + Y'K Z) phi = 0,   u(t) ~ phi exp(lambda t),   Re(lambda) > 0:
 ///     squeal may start.
 /// Z keeps closed pairs closed, Y removes their normal reactions; all three matrices are unsymmetric.
-#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
@@ -125,8 +124,7 @@ struct ModesOptions
   ModesSolver solver = ModesSolver::slices;
   PetscInt candidates = 20; // pairs that each residual pass of the projection corrects
   ModeShapes shapes = ModeShapes::unstable;
-  FactorOptions factor{}; // both listed by themselves
-  PencilOptions pencil{};
+  PencilOptions pencil{}; // listed by themselves
 };
 
 OptionList options_of(ModesOptions& options);

@@ -1,8 +1,8 @@
 #pragma once
-/// Real modes, K x = omega^2 M x (src/README.md, section 3.6). Small problems are solved by LAPACK. Large ones are
-/// solved by SLEPc's Krylov-Schur method about one shift just below zero. By Sylvester's law a factor at a second shift
-/// counts the eigenvalues below it, and modes that are missing are sought again. All functions are collective. Error:
-/// memory runs out, or some motion has neither mass nor stiffness.
+/// Real modes, K x = omega^2 M x (src/README.md, section 3.6). Small problems are solved by LAPACK, large ones in slices
+/// of frequency by block Krylov spaces (shift_invert.hpp). By Sylvester's law the factor at the end of the band counts
+/// the eigenvalues below it. All functions are collective. Error: memory runs out, or some motion has neither mass nor
+/// stiffness.
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/modes/modes.hpp"
 
@@ -48,8 +48,5 @@ RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& opt
 
 /// All modes with frequency below `band` [Hz]. Shapes are x, in the rows of K.
 RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options);
-
-/// The same for a basis, which can do without one that is missed, in less time. In no order.
-RealModes solve_most_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options);
 
 } // namespace squeal
