@@ -169,7 +169,7 @@ CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest
 
 FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options)
 {
-  declare_solver_options();
+  declare_solver_options(comm_of(given.sliding.structure.load));
   FittedCycle result;
   const CycleSettings settings = chosen_settings(given, request);
   const CycleProblem problem = with_settings(given, settings);

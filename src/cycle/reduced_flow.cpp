@@ -118,7 +118,7 @@ Flow flow_of(ReducedMap& map, const EnergyMatrices& energy)
     put(period_end.end, end);
     if (rate) put(period_end.rate, rate);
   };
-  return {period_map, energy.M, energy.K, {}};
+  return {period_map, energy.M, energy.K};
 }
 
 MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state)
