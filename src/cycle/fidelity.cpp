@@ -54,7 +54,8 @@ std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& red
                                   LimitCycle& cycle)
 {
   const CycleProblem& problem = search.problem;
-  const Preconditioner preconditioner = preconditioner_of(search.correction, search.model, problem.sliding.structure);
+  const Preconditioner preconditioner =
+      preconditioner_of(search.correction, coordinates_in(search.model, problem.sliding.structure));
   const Owned<Vec> state = full_motion(search, reduced.state);
   check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
   ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
