@@ -92,8 +92,7 @@ def methods(runs, judge):
     lines = [Line(f"direct transient, {n} steps", direct_points(runs, f"direct_{n}", judge.value[PERIOD]), GREY,
                   "", style) for n, style in zip(a.direct, ("-", "--", ":"))]
     lines += [
-        Line("seven unknowns, and base grown 2, 4 times", [point("seven", "7"), point("grown_2"), point("grown_4", "4")],
-             ORANGE, "D"),
+        Line("seven unknowns", [point("seven")], ORANGE, "D"),
         Line("shooting from the estimate, {} steps", [point(f"full_{n}", str(n)) for n in a.steps], BLUE, "o"),
         Line("shooting from the reduced cycle, {} steps", [point(f"start_{n}", str(n)) for n in a.steps], GREEN, "s"),
         Line("reduced model alone", [point("reduced_all")], "black", "P"),

@@ -157,9 +157,9 @@ std::vector<ReducedPoint> points_of_first_rank(const Branch& branch, MPI_Comm co
     if (i < branch.points.size())
     {
       const BranchPoint& point = branch.points[i];
-      const Eigen::MatrixXd state = columns_of_states(std::array{point.state.get()});
+      const Eigen::VectorXd state = own_coordinates().of(point.state);
       all.resize(state.size() + 2);
-      all << point.parameter, point.period, state.col(0);
+      all << point.parameter, point.period, state;
     }
     broadcast(all, comm);
     points[i] = {all[0], all[1], all.tail(all.size() - 2)};

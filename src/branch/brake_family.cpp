@@ -134,8 +134,6 @@ FlowFamily BrakeFamily::flows()
   family.flow.K = problem_.sliding.structure.K;
   family.flow.integrate = [this](double period, Vec start, Vec end, Vec rate)
   { at_->flow.integrate(period, start, end, rate); };
-  family.flow.integrate_many = [this](double period, std::span<const Vec> starts, std::span<const Vec> ends)
-  { at_->flow.integrate_many(period, starts, ends); };
   family.flow.record_period = [this](double period, Vec start, const TimeGrid& grid)
   { at_->flow.record_period(period, start, grid); };
   family.flow.apply_tangent = [this](std::span<const Vec> states) { at_->flow.apply_tangent(states); };

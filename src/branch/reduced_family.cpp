@@ -317,15 +317,14 @@ Owned<Vec> ReducedFamily::lifted(const VectorXd& state) const
 {
   const Owned<Vec> still = zeros_like(problem_.sliding.structure.load);
   Owned<Vec> result = state_of(problem_.sliding.equilibrium.u, still);
-  add_motion(own_, 1, state.head(own_.size()), displacement(result));
-  add_motion(own_, 1, state.tail(own_.size()), velocity(result));
+  coordinates_in(own_, problem_.sliding.structure).add(state, result);
   return result;
 }
 
 Preconditioner ReducedFamily::lifted_preconditioner(double period, const VectorXd& state)
 {
   lifted_correction_ = monodromy_correction(at_->map, period, {state.head(own_.size()), state.tail(own_.size())});
-  return preconditioner_of(lifted_correction_, own_, problem_.sliding.structure);
+  return preconditioner_of(lifted_correction_, coordinates_in(own_, problem_.sliding.structure));
 }
 
 SlowMotions ReducedFamily::slow_motions(double period, Vec start)
@@ -336,24 +335,10 @@ SlowMotions ReducedFamily::slow_motions(double period, Vec start)
   other_grid_.reset();
   recorded_ = record_contacts(map, period, state);
   const ReducedSpectrum spectrum = large_multipliers(map, period, recorded_, deciding_values);
-  SlowMotions slow;
+  SlowMotions slow = slow_motions_of(spectrum, own_, own_coordinates(), start);
   slow.periods = 2;
-  slow.values = spectrum.values;
-  set_changes(spectrum, multipliers_along(spectrum, map, period, moved), slow);
-  slow.right = states_of_columns(spectrum.right);
-  slow.left = states_of_columns(energy_representatives(own_, spectrum.left));
+  add_changes(multipliers_along(spectrum, map, period, moved), 1, slow);
   slow.confirmed = [] { return true; }; // these are its own
-  slow.correct = [columns = spectrum.columns](std::complex<double> m, Vec real, Vec imaginary)
-  {
-    const MatrixXd parts = columns_of_states(std::array{real, imaginary});
-    Eigen::VectorXcd x(parts.rows());
-    x.real() = parts.col(0);
-    x.imag() = parts.col(1);
-    const Eigen::VectorXcd y = resolvent(columns, m, x) - x / m;
-    MatrixXd result(parts.rows(), 2);
-    result << y.real(), y.imag();
-    copy_columns(result, std::array{real, imaginary});
-  };
   return slow;
 }
 
@@ -427,7 +412,7 @@ FlowFamily ReducedFamily::flows()
   family.parameter_column = [this](double period, Vec start, Vec column)
   { difference_column(flows(), at_->parameter, greatest_ - least_, period, start, column); };
   family.measure = [this](const Orbit& orbit) { return measure(orbit); };
-  family.preconditioner = preconditioner_of(correction_);
+  family.preconditioner = preconditioner_of(correction_, own_coordinates());
   family.renew_preconditioner = [this](double period, Vec start)
   { correction_ = monodromy_correction(at_->map, period, reduced_state(start)); };
   return family;

@@ -54,7 +54,8 @@ std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& red
                                   LimitCycle& cycle)
 {
   const CycleProblem& problem = search.problem;
-  const Preconditioner preconditioner = preconditioner_of(search.correction, search.model, problem.sliding.structure);
+  const Preconditioner preconditioner =
+      preconditioner_of(search.correction, coordinates_in(search.model, problem.sliding.structure));
   const Owned<Vec> state = full_motion(search, reduced.state);
   check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
   ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
@@ -169,7 +170,7 @@ CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest
 
 FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options)
 {
-  declare_solver_options();
+  declare_solver_options(comm_of(given.sliding.structure.load));
   FittedCycle result;
   const CycleSettings settings = chosen_settings(given, request);
   const CycleProblem problem = with_settings(given, settings);

@@ -150,21 +150,6 @@ bool alike(double limit, const std::vector<Complex>& a, const std::vector<Comple
   return have_partners(limit, a, b) && have_partners(limit, b, a);
 }
 
-/// Reduced vectors as states of the full model; of left ones those that act on the model's states by the energy
-/// product.
-std::vector<Owned<Vec>> lifted(const ReducedModel& model, const MatrixXd& vectors, Vec pattern)
-{
-  const Index n = model.size();
-  std::vector<Owned<Vec>> states;
-  for (Index k = 0; k < vectors.cols(); ++k)
-  {
-    states.push_back(zeros_like(pattern));
-    add_motion(model, 1, vectors.col(k).head(n), displacement(states.back()));
-    add_motion(model, 1, vectors.col(k).tail(n), velocity(states.back()));
-  }
-  return states;
-}
-
 /// The sliding modes that decay slowest, as states.
 std::vector<Owned<Vec>> slow_sliding_motions(const std::vector<ComplexMode>& modes, Vec pattern)
 {
@@ -255,17 +240,10 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
 void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, int other_steps, double period,
                      const std::function<std::vector<RecordedContact>(int)>& contacts, SlowMotions& slow)
 {
-  const auto change = [&](const std::vector<Complex>& values, std::size_t i)
-  { return std::abs(values[i]) - std::abs(spectrum.values[i]); };
-  set_changes(spectrum, multipliers_along(spectrum, map, period, contacts(RecordedPeriods::moved)), slow);
+  add_changes(multipliers_along(spectrum, map, period, contacts(RecordedPeriods::moved)), 1, slow);
   if (other_steps == 0) return;
   ReducedMap other{map.model, other_steps, map.theta, map.comm};
-  const auto compared = multipliers_along(spectrum, other, period, contacts(RecordedPeriods::other));
-  for (std::size_t i = 0; i < slow.errors.size(); ++i)
-  {
-    slow.errors[i] += 4. / 3 * std::abs(change(compared, i));
-    slow.rises[i] += 4. / 3 * std::max(0., change(compared, i));
-  }
+  add_changes(multipliers_along(spectrum, other, period, contacts(RecordedPeriods::other)), 4. / 3, slow);
 }
 
 /// Whether the model has as many shapes as the structure has motions.
@@ -293,43 +271,15 @@ bool confirmed_by_fewer_modes(const ReducedMap& map, double period, std::span<co
   return alike(0.95, values, large_multipliers(few, period, contacts, deciding_values).values);
 }
 
-/// x = (A_r - m)^-1 x: the reduced resolvent on the state's coordinates, -1/m on what those miss.
-void correct(const ReducedModel& model, const Structure& structure, const MatrixXd& columns, Complex m, Vec real,
-             Vec imaginary)
-{
-  const auto seen = [&](Vec x)
-  {
-    const ReducedState state = coordinates(model, structure, displacement(x), velocity(x));
-    VectorXd both(2 * model.size());
-    both << state.q, state.v;
-    return both;
-  };
-  Eigen::VectorXcd x(2 * model.size());
-  x.real() = seen(real);
-  x.imag() = seen(imaginary);
-  const Eigen::VectorXcd y = resolvent(columns, m, x);
-  const Complex factor = -1. / m; // of x itself
-  const Owned<Vec> old = copy_of(real);
-  check(VecAXPBY(real, -factor.imag(), factor.real(), imaginary));
-  check(VecAXPBY(imaginary, factor.imag(), factor.real(), old));
-  const auto add = [&](const VectorXd& part, Vec to)
-  {
-    add_motion(model, 1, part.head(model.size()), displacement(to));
-    add_motion(model, 1, part.tail(model.size()), velocity(to));
-  };
-  add(y.real(), real);
-  add(y.imag(), imaginary);
-}
-
-SlowMotions slow_motions_of(const CycleProblem& problem, const ReducedOptions& options, PeriodMap& map, int other_steps,
-                            double period, Vec start)
+SlowMotions slow_motions_along(const CycleProblem& problem, const ReducedOptions& options, PeriodMap& map,
+                               int other_steps, double period, Vec start)
 {
   const MPI_Comm comm = comm_of(problem.sliding.structure.load);
   const RecordedPeriods periods = record_periods(map, other_steps, period, start);
-  SlowMotions slow;
-  slow.periods = other_steps > 0 ? 3 : 2;
-  const auto model = model_for(problem, options, periods, 1, slow.missing);
-  if (!model) return slow;
+  SlowMotions none;
+  none.periods = other_steps > 0 ? 3 : 2;
+  const auto model = model_for(problem, options, periods, 1, none.missing);
+  if (!model) return none;
   const auto contacts = [&](int which)
   {
     return recorded_contacts(*model, problem.sliding.interface.directions,
@@ -337,17 +287,16 @@ SlowMotions slow_motions_of(const CycleProblem& problem, const ReducedOptions& o
   };
   ReducedMap own{*model, map.steps, map.theta, comm};
   auto recorded = contacts(RecordedPeriods::own);
-  ReducedSpectrum spectrum = large_multipliers(own, period, recorded, deciding_values);
-  slow.values = spectrum.values;
+  const ReducedSpectrum spectrum = large_multipliers(own, period, recorded, deciding_values);
   // no motion beside a cycle that shooting finds doubles in a period: shapes that do not fit friction do
-  if (!slow.values.empty() && std::abs(slow.values.front()) > 2)
+  if (!spectrum.values.empty() && std::abs(spectrum.values.front()) > 2)
   {
-    slow.missing = "the reduced model on the recorded contact has motions that the full one lacks";
-    return slow;
+    none.missing = "the reduced model on the recorded contact has motions that the full one lacks";
+    return none;
   }
+  SlowMotions slow = slow_motions_of(spectrum, *model, coordinates_in(*model, problem.sliding.structure), start);
+  slow.periods = none.periods;
   set_grid_errors(spectrum, own, other_steps, period, contacts, slow);
-  slow.right = lifted(*model, spectrum.right, start);
-  slow.left = lifted(*model, energy_representatives(*model, spectrum.left), start);
   slow.others = slow_sliding_motions(problem.modes, start);
   const bool whole = holds_every_motion(*model, eliminated_pairs(problem, periods), start);
   slow.confirmed = [=, steps = map.steps, theta = map.theta, recorded = std::move(recorded), values = spectrum.values]
@@ -356,8 +305,8 @@ SlowMotions slow_motions_of(const CycleProblem& problem, const ReducedOptions& o
     return whole || confirmed_by_fewer_shapes(along, period, recorded, values) ||
            confirmed_by_fewer_modes(along, period, recorded, values);
   };
-  slow.correct = [model, columns = std::move(spectrum.columns), &structure = problem.sliding.structure](
-                     Complex m, Vec real, Vec imaginary) { correct(*model, structure, columns, m, real, imaginary); };
+  slow.correct = [model, correct = std::move(slow.correct)](Complex m, Vec real, Vec imaginary)
+  { correct(m, real, imaginary); };
   return slow;
 }
 
@@ -367,7 +316,7 @@ void add_slow_motions(const CycleProblem& problem, const ReducedOptions& options
                       Flow& flow)
 {
   flow.slow_motions = [&problem, &options, &map, other_steps](double period, Vec start)
-  { return slow_motions_of(problem, options, map, other_steps, period, start); };
+  { return slow_motions_along(problem, options, map, other_steps, period, start); };
 }
 
 Preconditioner recorded_preconditioner(const CycleProblem& problem, const ReducedOptions& options, const PeriodMap& map,
@@ -384,8 +333,8 @@ Preconditioner recorded_preconditioner(const CycleProblem& problem, const Reduce
   const MatrixXd columns = monodromy(reduced, period, contacts);
   const auto correction = std::make_shared<const MonodromyCorrection>(
       monodromy_correction(*model, columns, coordinates(*model, structure, displacement(rate), velocity(rate))));
-  return [model, correction, apply = preconditioner_of(*correction, *model, structure)](double T, Vec x, Vec y)
-  { apply(T, x, y); };
+  return [model, correction, apply = preconditioner_of(*correction, coordinates_in(*model, structure))](
+             double T, Vec x, Vec y) { apply(T, x, y); };
 }
 
 int steps_to_compare(const Structure& structure, int steps)

@@ -140,36 +140,6 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
   integrate_once(map, period, start, end, rate);
 }
 
-/// Several trajectories over one period, together as far as their memory allows.
-void integrate_periods(PeriodMap& map, double period, std::span<const Vec> starts, std::span<const Vec> ends)
-{
-  constexpr std::size_t at_once = 16; // more gains nothing
-  const auto& [structure, interface, equilibrium] = map.sliding;
-  set_period(map, period);
-  for (std::size_t first = 0; first < starts.size(); first += at_once)
-  {
-    const std::size_t count = std::min(at_once, starts.size() - first);
-    std::vector<State> states;
-    std::vector<StepWork> works;
-    for (const Vec start : starts.subspan(first, count))
-    {
-      states.push_back({copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions});
-      works.push_back(begin_steps(map.step, structure, interface, states.back()));
-    }
-    for (int i = 0; i < map.steps; ++i)
-    {
-      for (const StepReport& report : advance(map.step, structure, interface, works, states))
-        if (!report.contact_converged) ++map.unconverged;
-      end_if_asked(comm_of(structure.load));
-    }
-    for (std::size_t k = 0; k < count; ++k)
-    {
-      check(VecCopy(states[k].u, displacement(ends[first + k])));
-      check(VecCopy(states[k].v, velocity(ends[first + k])));
-    }
-  }
-}
-
 } // namespace
 
 void move_by_part(const PeriodMap& map, double part, State& state)
@@ -227,10 +197,7 @@ Flow flow_of(PeriodMap& map)
 {
   const auto integrate = [&map](double period, Vec start, Vec end, Vec rate)
   { integrate_period(map, period, start, end, rate); };
-  const auto integrate_many = [&map](double period, std::span<const Vec> starts, std::span<const Vec> ends)
-  { integrate_periods(map, period, starts, ends); };
-  Flow flow{integrate, map.sliding.structure.M, map.sliding.structure.K, integrate_many};
-  flow.is_near_with_rate = map.keeps_step;
+  Flow flow{integrate, map.sliding.structure.M, map.sliding.structure.K};
   add_tangent(map, flow);
   return flow;
 }

@@ -194,7 +194,7 @@ struct Shot
 /// Shoots from `start`, on one rank: its periods are integrated by `flow`.
 Shot shoot(const ReducedSearch& search, const ReducedCycle& start, const Flow& flow)
 {
-  const Preconditioner preconditioner = preconditioner_of(search.correction);
+  const Preconditioner preconditioner = preconditioner_of(search.correction, own_coordinates());
   Progress progress(PETSC_COMM_SELF, "reduced", 20);
   ConvergenceLog log{progress};
   const Owned<Vec> first = vector_of(start.state);

@@ -26,10 +26,7 @@ Owned<Mat> matrix_of(const MatrixXd& values)
 
 void put(const VectorXd& values, Vec x)
 {
-  PetscScalar* entries = nullptr;
-  check(VecGetArrayWrite(x, &entries));
-  std::copy_n(values.data(), values.size(), entries);
-  check(VecRestoreArrayWrite(x, &entries));
+  set_all_entries(x, {values.data(), static_cast<std::size_t>(values.size())});
 }
 
 void put(const ReducedState& state, Vec x)
@@ -95,13 +92,37 @@ void copy_columns(const MatrixXd& columns, std::span<const Vec> states)
   }
 }
 
-std::vector<Owned<Vec>> states_of_columns(const MatrixXd& columns)
+ReducedCoordinates own_coordinates()
 {
-  const Eigen::Index size = columns.rows() / 2;
-  std::vector<Owned<Vec>> states;
+  const auto of = [](Vec x) { return stacked(reduced_state(x)); };
+  const auto add = [of](const VectorXd& more, Vec x)
+  {
+    const VectorXd sum = of(x) + more;
+    put(ReducedState{sum.head(sum.size() / 2), sum.tail(sum.size() / 2)}, x);
+  };
+  return {of, add};
+}
+
+ReducedCoordinates coordinates_in(const ReducedModel& model, const Structure& structure)
+{
+  const auto of = [&](Vec x) { return stacked(coordinates(model, structure, displacement(x), velocity(x))); };
+  const auto add = [&model](const VectorXd& both, Vec x)
+  {
+    add_motion(model, 1, both.head(model.size()), displacement(x));
+    add_motion(model, 1, both.tail(model.size()), velocity(x));
+  };
+  return {of, add};
+}
+
+std::vector<Owned<Vec>> motions_of(const ReducedCoordinates& coordinates, const MatrixXd& columns, Vec pattern)
+{
+  std::vector<Owned<Vec>> motions;
   for (const auto column : columns.colwise())
-    states.push_back(vector_of(ReducedState{column.head(size), column.tail(size)}));
-  return states;
+  {
+    motions.push_back(zeros_like(pattern));
+    coordinates.add(column, motions.back());
+  }
+  return motions;
 }
 
 EnergyMatrices energy_matrices(const ReducedModel& model)
@@ -118,7 +139,7 @@ Flow flow_of(ReducedMap& map, const EnergyMatrices& energy)
     put(period_end.end, end);
     if (rate) put(period_end.rate, rate);
   };
-  return {period_map, energy.M, energy.K, {}};
+  return {period_map, energy.M, energy.K};
 }
 
 MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state)
@@ -141,26 +162,13 @@ MonodromyCorrection monodromy_correction(const ReducedModel& model, const Matrix
                           "reduced model: the period map has a second multiplier 1")};
 }
 
-Preconditioner preconditioner_of(const MonodromyCorrection& correction)
+Preconditioner preconditioner_of(const MonodromyCorrection& correction, ReducedCoordinates coordinates)
 {
-  return [&correction](double, Vec x, Vec y)
+  return [&correction, coordinates = std::move(coordinates)](double, Vec x, Vec y)
   {
-    const VectorXd both = stacked(reduced_state(x));
-    const VectorXd result = correction.left * (correction.right * both) - both;
-    put(ReducedState{result.head(result.size() / 2), result.tail(result.size() / 2)}, y);
-  };
-}
-
-Preconditioner preconditioner_of(const MonodromyCorrection& correction, const ReducedModel& model,
-                                 const Structure& structure)
-{
-  return [&](double, Vec x, Vec y)
-  {
-    const VectorXd seen = stacked(coordinates(model, structure, displacement(x), velocity(x)));
-    const VectorXd result = correction.left * (correction.right * seen);
+    const VectorXd seen = coordinates.of(x);
     check(VecAXPBY(y, -1, 0, x));
-    add_motion(model, 1, result.head(model.size()), displacement(y));
-    add_motion(model, 1, result.tail(model.size()), velocity(y));
+    coordinates.add(correction.left * (correction.right * seen), y);
   };
 }
 

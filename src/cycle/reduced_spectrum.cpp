@@ -58,6 +58,42 @@ MatrixXd with_fast_rows(const MatrixXd& X, Index size, Index slow)
   return result;
 }
 
+/// (Phi - m)^-1 x + x/m. With C the columns and S the slow coordinates Phi = C S':
+///     (Phi - m)^-1 = -1/m + C (S'C - m)^-1 S'/m
+Eigen::VectorXcd resolvent(const MatrixXd& columns, Complex m, const Eigen::VectorXcd& x)
+{
+  const Index size = columns.rows() / 2, slow = columns.cols() / 2;
+  Eigen::MatrixXcd square = slow_rows(columns, size, slow).cast<Complex>();
+  square.diagonal().array() -= m;
+  const Eigen::VectorXcd z = square.partialPivLu().solve(slow_rows<Eigen::MatrixXcd>(x, size, slow));
+  return columns.cast<Complex>() * z / m;
+}
+
+/// x = (Phi - m)^-1 x: -1/m on what the coordinates miss.
+void apply_resolvent(const MatrixXd& columns, const ReducedCoordinates& coordinates, Complex m, Vec real, Vec imaginary)
+{
+  Eigen::VectorXcd x(columns.rows());
+  x.real() = coordinates.of(real);
+  x.imag() = coordinates.of(imaginary);
+  const Eigen::VectorXcd y = resolvent(columns, m, x);
+  const Complex factor = -1. / m; // of x itself
+  const Owned<Vec> old = copy_of(real);
+  check(VecAXPBY(real, -factor.imag(), factor.real(), imaginary));
+  check(VecAXPBY(imaginary, factor.imag(), factor.real(), old));
+  coordinates.add(y.real(), real);
+  coordinates.add(y.imag(), imaginary);
+}
+
+/// Columns (q, v) that act on a state by the energy product as these left vectors do by the plain one.
+MatrixXd energy_representatives(const ReducedModel& model, const MatrixXd& left)
+{
+  const Index n = model.size();
+  MatrixXd result(left.rows(), left.cols());
+  result << solve_dense(model.K_z, left.topRows(n), "cycle: the reduced model has a motion without stiffness"),
+      model.M_factor.solve(left.bottomRows(n));
+  return result;
+}
+
 } // namespace
 
 ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
@@ -94,32 +130,27 @@ ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<cons
   return result;
 }
 
-/// With C the columns and S the slow coordinates Phi = C S':  (Phi - m)^-1 = -1/m + C (S'C - m)^-1 S'/m
-Eigen::VectorXcd resolvent(const MatrixXd& columns, Complex m, const Eigen::VectorXcd& x)
+SlowMotions slow_motions_of(const ReducedSpectrum& spectrum, const ReducedModel& model,
+                            const ReducedCoordinates& coordinates, Vec pattern)
 {
-  const Index size = columns.rows() / 2, slow = columns.cols() / 2;
-  Eigen::MatrixXcd square = slow_rows(columns, size, slow).cast<Complex>();
-  square.diagonal().array() -= m;
-  const Eigen::VectorXcd z = square.partialPivLu().solve(slow_rows<Eigen::MatrixXcd>(x, size, slow));
-  return columns.cast<Complex>() * z / m;
+  SlowMotions slow;
+  slow.values = spectrum.values;
+  slow.errors.assign(spectrum.values.size(), 0);
+  slow.rises = slow.errors;
+  slow.right = motions_of(coordinates, spectrum.right, pattern);
+  slow.left = motions_of(coordinates, energy_representatives(model, spectrum.left), pattern);
+  slow.correct = [coordinates, columns = spectrum.columns](Complex m, Vec real, Vec imaginary)
+  { apply_resolvent(columns, coordinates, m, real, imaginary); };
+  return slow;
 }
 
-MatrixXd energy_representatives(const ReducedModel& model, const MatrixXd& left)
+void add_changes(const std::vector<Complex>& others, double part, SlowMotions& slow)
 {
-  const Index n = model.size();
-  MatrixXd result(left.rows(), left.cols());
-  result << solve_dense(model.K_z, left.topRows(n), "cycle: the reduced model has a motion without stiffness"),
-      model.M_factor.solve(left.bottomRows(n));
-  return result;
-}
-
-void set_changes(const ReducedSpectrum& spectrum, const std::vector<Complex>& moved, SlowMotions& slow)
-{
-  for (std::size_t i = 0; i < moved.size(); ++i)
+  for (std::size_t i = 0; i < others.size(); ++i)
   {
-    const double change = std::abs(moved[i]) - std::abs(spectrum.values[i]);
-    slow.errors.push_back(std::abs(change));
-    slow.rises.push_back(std::max(0., change));
+    const double change = std::abs(others[i]) - std::abs(slow.values[i]);
+    slow.errors[i] += part * std::abs(change);
+    slow.rises[i] += part * std::max(0., change);
   }
 }
 

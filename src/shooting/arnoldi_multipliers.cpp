@@ -9,15 +9,6 @@ namespace squeal
 namespace
 {
 
-/// Takes the flow's own direction out of x.
-void project(const Monodromy& monodromy, Vec x)
-{
-  if (!monodromy.phase.get()) return;
-  double along = 0;
-  check(VecDot(monodromy.phase, x, &along));
-  check(VecAXPY(x, -along, monodromy.orbit.rate));
-}
-
 struct Krylov
 {
   std::vector<Owned<Vec>> base; // energy-orthonormal
@@ -31,12 +22,10 @@ double residual_of(const Krylov& krylov, const DenseEigenpair& pair)
   return krylov.remainder * std::abs(pair.y(pair.y.size() - 1));
 }
 
-/// The Ritz pairs without that of the shift in time, which is in the space unless it was taken out. `distance`: of the
-/// shift's own multiplier from 1.
+/// The Ritz pairs without that of the shift in time. `distance`: of the shift's own multiplier from 1.
 std::vector<DenseEigenpair> without_shift(const Monodromy& monodromy, const Krylov& krylov, double& distance)
 {
   std::vector<DenseEigenpair> pairs = solve_dense_unsymmetric(krylov.H);
-  if (monodromy.phase.get()) return pairs;
   Eigen::VectorXd flow(krylov.H.rows());
   for (Eigen::Index i = 0; i < flow.size(); ++i)
     flow(i) = energy_product(monodromy.flow, krylov.base[static_cast<std::size_t>(i)], monodromy.orbit.rate);
@@ -60,7 +49,6 @@ Owned<Vec> extend(const Monodromy& monodromy, Krylov& krylov)
   if (k > 0) krylov.H(k, k - 1) = krylov.remainder;
   Owned<Vec> image = copy_of(krylov.base.back().get());
   multiply(monodromy, std::span(&image, 1));
-  project(monodromy, image);
   for (int pass = 0; pass < 2; ++pass)
     for (Eigen::Index i = 0; i <= k; ++i)
     {
@@ -76,10 +64,9 @@ Owned<Vec> extend(const Monodromy& monodromy, Krylov& krylov)
 /// `steps` Arnoldi steps; where `steps` is negative, at most -`steps` until the largest value has converged.
 Krylov arnoldi(const Monodromy& monodromy, Owned<Vec> start, PetscInt steps)
 {
-  constexpr std::size_t looked_at = 8;                     // steps between two looks at the leading value
-  const double nothing = monodromy.exact() ? 1e-13 : 1e-6; // below: rounding, noise of the differences
+  constexpr std::size_t looked_at = 8; // steps between two looks at the leading value
+  constexpr double nothing = 1e-13;    // below: rounding
   Krylov krylov;
-  project(monodromy, start);
   normalise(monodromy.flow, start);
   krylov.base.push_back(std::move(start));
   for (;;)
@@ -93,25 +80,6 @@ Krylov arnoldi(const Monodromy& monodromy, Owned<Vec> start, PetscInt steps)
     check(VecScale(next, 1 / krylov.remainder));
     krylov.base.push_back(std::move(next));
   }
-}
-
-/// The shift's own multiplier, in the middle of what the monodromy matrix makes of it.
-double shift_multiplier(const Monodromy& monodromy)
-{
-  const Owned<Vec> shift = copy_of(monodromy.orbit.rate.get());
-  normalise(monodromy.flow, shift);
-  Owned<Vec> image = copy_of(shift.get());
-  multiply(monodromy, std::span(&image, 1));
-  return energy_product(monodromy.flow, shift, image);
-}
-
-/// Takes the flow's own direction out of the space: an exact eigenvector only as far as the shift's multiplier is 1.
-void take_out_shift(Monodromy& monodromy)
-{
-  const double speed = energy_norm(monodromy.flow, monodromy.orbit.rate);
-  monodromy.phase = zeros_like(monodromy.orbit.rate);
-  energy_image(monodromy.flow, monodromy.orbit.rate, monodromy.phase);
-  check(VecScale(monodromy.phase, 1 / (speed * speed)));
 }
 
 /// What the largest value changes by on the other grids of time, each with an Arnoldi space of its own. Leaves the
@@ -139,27 +107,19 @@ GridErrors change_of_largest(const Monodromy& monodromy, Vec start, PetscInt ste
 
 } // namespace
 
-FloquetAnalysis multipliers_by_arnoldi(Monodromy& monodromy, Owned<Vec> start, PetscInt steps)
+FloquetAnalysis multipliers_by_arnoldi(const Monodromy& monodromy, Owned<Vec> start, PetscInt steps)
 {
   FloquetAnalysis result;
   Multipliers& multipliers = result.multipliers;
   multipliers.method = MultiplierMethod::arnoldi;
   const Orbit& orbit = monodromy.orbit;
-  if (monodromy.exact())
-  {
-    monodromy.flow.record_period(orbit.period, orbit.state, {});
-    check(VecAXPY(start, energy_norm(monodromy.flow, start) / energy_norm(monodromy.flow, orbit.rate), orbit.rate));
-  }
-  else
-    take_out_shift(monodromy);
+  monodromy.flow.record_period(orbit.period, orbit.state, {});
+  check(VecAXPY(start, energy_norm(monodromy.flow, start) / energy_norm(monodromy.flow, orbit.rate), orbit.rate));
   const Krylov krylov = arnoldi(monodromy, copy_of(start.get()), steps);
-  if (!monodromy.exact()) multipliers.trivial_error = std::abs(shift_multiplier(monodromy) - 1);
   const std::vector<DenseEigenpair> pairs = without_shift(monodromy, krylov, multipliers.trivial_error);
-  multipliers.periods = static_cast<long>(krylov.base.size()) + (monodromy.exact() ? 0 : 1);
+  multipliers.periods = static_cast<long>(krylov.base.size());
   if (pairs.empty()) return result;
-  GridErrors of_grid(1);
-  if (monodromy.exact())
-    of_grid = change_of_largest(monodromy, start, steps, pairs.front().lambda, multipliers.periods);
+  const GridErrors of_grid = change_of_largest(monodromy, start, steps, pairs.front().lambda, multipliers.periods);
   for (const DenseEigenpair& pair : pairs)
   {
     const double own = std::max(2 * residual_of(krylov, pair), 1e-9); // rounding

@@ -8,24 +8,8 @@ namespace squeal
 
 void multiply(const Monodromy& monodromy, std::span<const Owned<Vec>> states)
 {
-  const Orbit& orbit = monodromy.orbit;
-  if (monodromy.exact())
-  {
-    monodromy.flow.apply_tangent(std::vector<Vec>(states.begin(), states.end()));
-    if (monodromy.after_product) monodromy.after_product(states.size());
-    return;
-  }
-  const Owned<Vec> moved = zeros_like(orbit.state);
-  for (const Owned<Vec>& state : states)
-  {
-    const double step = monodromy.step / std::max(energy_norm(monodromy.flow, state), 1e-300);
-    check(VecWAXPY(moved, step, state, orbit.state));
-    monodromy.flow.integrate(orbit.period, moved, state, nullptr);
-    check(VecAXPY(state, -1, orbit.state));
-    check(VecAXPY(state, -1, orbit.defect));
-    check(VecScale(state, 1 / step));
-    if (monodromy.after_product) monodromy.after_product(1);
-  }
+  monodromy.flow.apply_tangent(std::vector<Vec>(states.begin(), states.end()));
+  if (monodromy.after_product) monodromy.after_product(states.size());
 }
 
 FastestMotion fastest_motion(const Flow& flow, const DenseEigenpair& pair,

@@ -6,16 +6,12 @@
 namespace squeal
 {
 
-/// dPhi_T/dx, or what it does beside the flow's own direction.
+/// dPhi_T/dx along the period that the flow recorded last.
 struct Monodromy
 {
   const Flow& flow;
   const Orbit& orbit;
-  double step = 0;    // of difference quotients, in the energy norm
-  Owned<Vec> phase{}; // energy image of the unit flow, divided by |d|; null: nothing is taken out
   std::function<void(std::size_t columns)> after_product{}; // called after each product; may be empty
-
-  bool exact() const { return static_cast<bool>(flow.apply_tangent); }
 };
 
 /// x_k = dPhi_T/dx x_k

@@ -76,26 +76,19 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   const Orbit& orbit = monodromy.orbit;
   const Eigen::MatrixXd Q = coordinates_with_mass(monodromy.flow);
   bool finite = true;
-  const auto find_pairs = [&]
+  const auto pairs_on = [&](const TimeGrid& grid)
   {
+    monodromy.flow.record_period(orbit.period, orbit.state, grid);
     multipliers.periods += 2 * dofs;
     const Eigen::MatrixXd whole =
         whole_matrix(orbit, [&](std::span<const Owned<Vec>> states) { multiply(monodromy, states); });
     finite = finite && whole.allFinite();
     return finite ? solve_dense_unsymmetric(Q.transpose() * whole * Q) : std::vector<DenseEigenpair>();
   };
-  const auto pairs_on = [&](const TimeGrid& grid)
-  {
-    monodromy.flow.record_period(orbit.period, orbit.state, grid);
-    return find_pairs();
-  };
-  std::vector<DenseEigenpair> pairs = monodromy.exact() ? pairs_on({}) : find_pairs();
+  std::vector<DenseEigenpair> pairs = pairs_on({});
   std::vector<std::vector<DenseEigenpair>> on_others; // the other grids
-  if (monodromy.exact())
-  {
-    for (const OtherGrid& other : other_grids) on_others.push_back(pairs_on(other.grid));
-    monodromy.flow.record_period(orbit.period, orbit.state, {});
-  }
+  for (const OtherGrid& other : other_grids) on_others.push_back(pairs_on(other.grid));
+  monodromy.flow.record_period(orbit.period, orbit.state, {});
   const auto of_tangent_that_is_not_finite = [&]
   {
     multipliers.stability = Stability::undecided;
@@ -112,7 +105,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   double largest_trivial_error = multipliers.trivial_error;
   // over eight periods the orbit's own error must not lead away from it
   const bool stays = std::pow(std::max(1., std::abs(values.front())), 8) * orbit.residual < 1e-2;
-  if (monodromy.exact() && stays)
+  if (stays)
   {
     constexpr double decays = 0.7; // a period: such a motion decides nothing
     std::vector<Index> places;
@@ -142,7 +135,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
   if (pairs.empty()) return result;
   decide(multipliers, {true, ""}, multipliers.values.size());
-  if (monodromy.exact() && multipliers.stability == Stability::undecided &&
+  if (multipliers.stability == Stability::undecided &&
       largest_trivial_error > 0.5 * multipliers.errors[deciding_place(multipliers)])
     multipliers.would_decide = format(
         "the multiplier of a shift in time, which is 1, misses it by %.1e along a grid of time, as where contact "
@@ -154,14 +147,14 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   return result;
 }
 
+constexpr PetscInt columns_of_whole = 200; // at most, as many as a projection and the search beside it take
+
 /// How the multipliers of a system of so many degrees of freedom are found.
-MultiplierMethod chosen_method(const ShootingOptions& options, const Flow& flow, PetscInt dofs)
+MultiplierMethod chosen_method(const ShootingOptions& options, PetscInt dofs)
 {
   if (options.multiplier_method != MultiplierMethod::automatic) return options.multiplier_method;
-  const bool exact = static_cast<bool>(flow.apply_tangent);
-  if (options.multipliers > 0 ? options.multipliers >= 2 * dofs : dofs <= (exact ? 100 : 25))
-    return MultiplierMethod::whole;
-  return MultiplierMethod::oblique;
+  return 2 * dofs <= (options.multipliers > 0 ? options.multipliers : columns_of_whole) ? MultiplierMethod::whole
+                                                                                        : MultiplierMethod::oblique;
 }
 
 } // namespace
@@ -191,8 +184,8 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
 {
   if (options.multipliers == 0) return {};
   const PetscInt dofs = dofs_of(orbit.state);
-  Monodromy monodromy{problem.flow, orbit, options.difference * orbit.fluctuation};
-  const MultiplierMethod method = chosen_method(options, problem.flow, dofs);
+  Monodromy monodromy{problem.flow, orbit};
+  const MultiplierMethod method = chosen_method(options, dofs);
   if (method == MultiplierMethod::whole) return from_whole_matrix(monodromy, dofs);
   std::optional<Progress> progress;
   if (dofs > large_model)

@@ -6,12 +6,8 @@ namespace squeal
 OptionList options_of(ShootingOptions& options)
 {
   return {
-      {"-cycle_subspace_newtons", &options.subspace_newtons, Range::any,
-       "Newton iterations on the subspace of the mode's shapes; 0: it is not tried; -1: 10 without a finish, else 0"},
-      {"-cycle_base_growths", &options.base_growths, Range::any,
-       "how often the subspace may grow by what it missed; -1: 4 without a finish, else 0"},
-      {"-cycle_difference", &options.difference, Range::positive,
-       "difference step over the fluctuation, in the energy norm"},
+      {"-cycle_subspace_newtons", &options.subspace_newtons, Range::not_negative,
+       "Newton iterations on the period and the paper's six amplitudes; 0: they are not tried"},
       {"-cycle_finish", choice_of(options.finish), Range::any, "finish in the full space: multisecant or none"},
       {"-cycle_clamp", &options.clamp, Range::positive, "longest step of the finish over the fluctuation"},
       {"-cycle_stall", &options.stall, Range::not_negative,

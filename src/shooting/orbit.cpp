@@ -25,16 +25,6 @@ Orbit evaluate(const OrbitProblem& problem, ConvergenceLog& log, Vec state, doub
   return orbit;
 }
 
-Owned<Vec> base_of_differences(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit)
-{
-  if (!problem.flow.is_near_with_rate) return copy_of(orbit.defect.get());
-  Owned<Vec> base = zeros_like(orbit.state);
-  problem.flow.integrate(orbit.period, orbit.state, base, nullptr);
-  ++log.convergence.periods;
-  check(VecAXPY(base, -1, orbit.state));
-  return base;
-}
-
 void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, PetscInt unknowns, double residual_projected)
 {
   Convergence& convergence = log.convergence;

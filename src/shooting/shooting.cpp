@@ -16,38 +16,21 @@ namespace squeal
 namespace
 {
 
-/// Adds (u, 0) and (0, v) to the base.
-void append_shapes(const OrbitProblem& problem, double rank_tolerance, std::vector<Owned<Vec>>& base, Vec u, Vec v)
+/// Newton on the subspace of the shapes. Before a finish only a better orbit is taken; one that falls onto the
+/// equilibrium never is, since the projected residual can only be small there.
+Orbit shoot_on_shapes(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit start,
+                      const std::vector<Vec>& shapes)
 {
-  const Owned<Vec> moved = zeros_like(problem.equilibrium), moving = zeros_like(problem.equilibrium);
-  check(VecCopy(u, displacement(moved)));
-  check(VecCopy(v, velocity(moving)));
-  extend_base(problem.flow, rank_tolerance, base, moved);
-  extend_base(problem.flow, rank_tolerance, base, moving);
-}
-
-/// Newton on the subspace of the shapes, then on subspaces grown by the defect that the last one left. A result that
-/// falls onto the equilibrium is refused: the projected residual can only be small there.
-Orbit shoot_on_subspaces(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit orbit,
-                         const std::vector<Vec>& shapes)
-{
-  const bool finish_follows = options.finish != Finish::none;
-  PetscInt growths = options.base_growths;
-  if (growths < 0) growths = finish_follows ? 0 : 4;
   std::vector<Owned<Vec>> base;
-  for (const Vec shape : shapes) append_shapes(problem, options.rank_tolerance, base, shape, shape);
-  Orbit best = copy_of(orbit);
-  for (PetscInt growth = 0; growth <= growths; ++growth)
+  for (const Vec shape : shapes)
   {
-    const ShootingStage stage = growth == 0 ? ShootingStage::subspace : ShootingStage::grown_subspace;
-    orbit = shoot_on_subspace(problem, options, log, orbit, base, stage);
-    if (collapsing(problem, orbit) || !std::isfinite(orbit.residual)) break;
-    // Without a finish this is the result, whatever the start was worth.
-    if (orbit.residual < best.residual || !finish_follows) best = copy_of(orbit);
-    if (orbit.residual <= problem.tolerance) break;
-    append_shapes(problem, options.rank_tolerance, base, displacement(orbit.defect), velocity(orbit.defect));
+    const Owned<Vec> none = zeros_like(shape), moved = state_of(shape, none), moving = state_of(none, shape);
+    extend_base(problem.flow, options.rank_tolerance, base, moved);
+    extend_base(problem.flow, options.rank_tolerance, base, moving);
   }
-  return best;
+  Orbit orbit = shoot_on_subspace(problem, options, log, start, base);
+  if (collapsing(problem, orbit) || !std::isfinite(orbit.residual)) return start;
+  return options.finish == Finish::none || orbit.residual < start.residual ? std::move(orbit) : std::move(start);
 }
 
 /// A search for an orbit that attracts.
@@ -164,10 +147,8 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
   const auto& [problem, options, log, start] = search;
   Orbit orbit = copy_of(free);
   const double first_return = return_residual(problem, free);
-  const bool on_subspace =
-      options.subspace_newtons > 0 || (options.subspace_newtons < 0 && options.finish == Finish::none);
-  if (orbit.residual > problem.tolerance && on_subspace && !start.shapes.empty())
-    orbit = shoot_on_subspaces(problem, options, log, std::move(orbit), start.shapes);
+  if (orbit.residual > problem.tolerance && options.subspace_newtons > 0 && !start.shapes.empty())
+    orbit = shoot_on_shapes(problem, options, log, std::move(orbit), start.shapes);
   Attempt attempt{shoot_once(problem, options, log, std::move(orbit)), {}, first_return};
   if (!attempt.converged()) return attempt;
   const int rounds = repeats_start(search, attempt.found.orbit) ? start.rounds : 2;
@@ -358,9 +339,9 @@ void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable
   if (other_unstable > 0) outcome.reason += format("; %zu modes are unstable", other_unstable + 1);
 }
 
-void declare_solver_options()
+void declare_solver_options(MPI_Comm comm)
 {
-  declare_subspace_options();
+  declare_subspace_options(comm);
 }
 
 } // namespace squeal

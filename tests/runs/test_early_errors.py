@@ -30,7 +30,7 @@ OPTIONS = {
     "no such word": (["-cycle_finish", "magic"], ["-cycle_finish", "multisecant"]),
     "zero": (["-cycle_clamp", "0"], ["-cycle_clamp", "above 0"]),
     "text for a number": (["-cycle_max_periods", "many"], ["-cycle_max_periods", "many"]),
-    "infinite": (["-cycle_difference", "inf"], ["-cycle_difference", "finite"]),
+    "infinite": (["-cycle_clamp", "inf"], ["-cycle_clamp", "finite"]),
     "a number that overflows": (["-cycle_samples", "4294967297"], ["-cycle_samples", "2147483647"]),
     "an object of PETSc's that squeal has not": (["-mat_type", "magic"], ["-mat_type"]),
     "no type of solver": (["-cycle_snes_type", "magic"], ["-cycle_snes_type magic", "newtonls"]),

@@ -2,6 +2,10 @@
 /// Smooth oscillators with known periodic orbits, as flows for shooting. All their entries are on rank 0.
 #include "squeal/shooting/flow.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
 namespace squeal::test
 {
 
@@ -63,29 +67,85 @@ inline void scatter(const std::vector<double>& x, Vec state)
   }
 }
 
+/// Classical Runge-Kutta over a time.
+inline void run(int steps, double time, const Rate& rate_of, std::vector<double>& x)
+{
+  const double h = time / steps;
+  std::vector<double> k(x.size()), sum(x.size()), at(x.size());
+  for (int step = 0; step < steps && !x.empty(); ++step)
+  {
+    sum.assign(x.size(), 0);
+    at = x;
+    for (int stage = 0; stage < 4; ++stage)
+    {
+      rate_of(at, k);
+      const double weight = stage == 0 || stage == 3 ? h / 6 : h / 3, ahead = stage == 2 ? h : h / 2;
+      for (std::size_t i = 0; i < x.size(); ++i)
+      {
+        sum[i] += weight * k[i];
+        at[i] = x[i] + ahead * k[i];
+      }
+    }
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] += sum[i];
+  }
+}
+
+/// The rate of (x, y), y a small change of x: its derivative along y by a central difference, good to 1e-9.
+inline Rate with_tangent(const Rate& rate_of)
+{
+  return [rate_of](const std::vector<double>& both, std::vector<double>& rate)
+  {
+    const auto size = both.size() / 2;
+    double length = 0;
+    for (std::size_t i = 0; i < size; ++i) length = std::max(length, std::abs(both[size + i]));
+    const double step = 1e-6 / std::max(length, 1e-300);
+    std::vector<double> x(both.begin(), both.begin() + static_cast<std::ptrdiff_t>(size)), ahead = x, behind = x, k;
+    for (std::size_t i = 0; i < size; ++i)
+    {
+      ahead[i] += step * both[size + i];
+      behind[i] -= step * both[size + i];
+    }
+    rate_of(x, rate);
+    rate_of(ahead, k);
+    rate_of(behind, x);
+    for (std::size_t i = 0; i < size; ++i) rate.push_back((k[i] - x[i]) / (2 * step));
+  };
+}
+
+/// Gives the flow the tangent of Runge-Kutta in a number of steps a period.
+inline void add_tangent(Flow& flow, int steps, const Rate& rate_of)
+{
+  struct Recorded
+  {
+    double period = 0;
+    int steps = 0;
+    std::vector<double> start{};
+  };
+  const auto recorded = std::make_shared<Recorded>();
+  flow.record_period = [recorded, steps](double period, Vec start, const TimeGrid& grid) {
+    *recorded = {period, grid.steps(steps), gather(start)};
+  };
+  flow.apply_tangent = [recorded, both_of = with_tangent(rate_of)](std::span<const Vec> states)
+  {
+    for (const Vec state : states)
+    {
+      std::vector<double> both = recorded->start;
+      const std::vector<double> change = gather(state);
+      both.insert(both.end(), change.begin(), change.end());
+      run(recorded->steps, recorded->period, both_of, both);
+      both.erase(both.begin(), both.begin() + static_cast<std::ptrdiff_t>(change.size()));
+      scatter(both, state);
+    }
+  };
+}
+
 /// Classical Runge-Kutta in a number of steps a call.
 inline Flow runge_kutta_in(int steps, Rate rate_of, Mat M, Mat K)
 {
   const auto integrate = [rate_of, steps](double period, Vec start, Vec end, Vec rate)
   {
-    const double h = period / steps;
-    std::vector<double> x = gather(start), k(x.size()), sum(x.size()), at(x.size());
-    for (int step = 0; step < steps && !x.empty(); ++step)
-    {
-      sum.assign(x.size(), 0);
-      at = x;
-      for (int stage = 0; stage < 4; ++stage)
-      {
-        rate_of(at, k);
-        const double weight = stage == 0 || stage == 3 ? h / 6 : h / 3, ahead = stage == 2 ? h : h / 2;
-        for (std::size_t i = 0; i < x.size(); ++i)
-        {
-          sum[i] += weight * k[i];
-          at[i] = x[i] + ahead * k[i];
-        }
-      }
-      for (std::size_t i = 0; i < x.size(); ++i) x[i] += sum[i];
-    }
+    std::vector<double> x = gather(start), k(x.size());
+    run(steps, period, rate_of, x);
     scatter(x, end);
     if (!rate) return;
     if (!x.empty()) rate_of(x, k);
@@ -136,6 +196,7 @@ inline SmoothModel make_smooth_model(const Rate& rate, const std::vector<double>
     model.axes.push_back(on_first_rank(axis));
   }
   model.flow = runge_kutta(rate, model.M, model.K);
+  add_tangent(model.flow, 2000, rate);
   return model;
 }
 

@@ -57,6 +57,7 @@ TEST_CASE("the paper's base is rank-deficient here, and the reduced system is so
 {
   CycleOptions options;
   options.shooting.finish = Finish::none;
+  options.shooting.subspace_newtons = 10;
   const LimitCycle cycle = cycle_of(unilateral_oscillator(0.3, 1), 400, 0, 1e-8, options);
   CHECK(cycle.outcome.kind == OutcomeKind::converged); // the contact space has two dimensions, and the base spans it
   CHECK(cycle.convergence.records.front().unknowns == 5);

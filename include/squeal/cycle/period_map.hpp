@@ -23,7 +23,7 @@ struct KeptStep
   double moved = 0;     // |v(T) - v(0)|/|v(0)|
 };
 
-/// Keeps A and W of the last step size: none is factored for difference quotients.
+/// Keeps A and W of the last step size.
 struct PeriodMap
 {
   SlidingEquilibrium sliding; // what measurements refer to

@@ -14,8 +14,22 @@ ReducedState reduced_state(Vec state);
 /// States as columns (q, v), and such columns into states.
 Eigen::MatrixXd columns_of_states(std::span<const Vec> states);
 void copy_columns(const Eigen::MatrixXd& columns, std::span<const Vec> states);
-/// New states of one rank's own.
-std::vector<Owned<Vec>> states_of_columns(const Eigen::MatrixXd& columns);
+
+/// Between motions and their coordinates (q, v) in a reduced model.
+struct ReducedCoordinates
+{
+  std::function<Eigen::VectorXd(Vec motion)> of;
+  std::function<void(const Eigen::VectorXd& coordinates, Vec motion)> add; // the motion that has these
+};
+
+/// Of states of the reduced model itself.
+ReducedCoordinates own_coordinates();
+
+/// Of motions (du, v) of the full model. Borrows both.
+ReducedCoordinates coordinates_in(const ReducedModel& model, const Structure& structure);
+
+/// New motions like `pattern` with these columns of coordinates.
+std::vector<Owned<Vec>> motions_of(const ReducedCoordinates& coordinates, const Eigen::MatrixXd& columns, Vec pattern);
 
 /// M_z and K_z as matrices of one rank's own, for the energy product.
 struct EnergyMatrices
@@ -43,12 +57,8 @@ MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const R
 MonodromyCorrection monodromy_correction(const ReducedModel& model, const Eigen::MatrixXd& columns,
                                          const ReducedState& flow);
 
-/// P^-1 x = -x + D x on the reduced model. Borrows D.
-Preconditioner preconditioner_of(const MonodromyCorrection& correction);
-
-/// P^-1 x = -x + V D R x on the full model: V the shapes, R the coordinates in them. What they miss is taken as
-/// damped out within a period. Borrows all three.
-Preconditioner preconditioner_of(const MonodromyCorrection& correction, const ReducedModel& model,
-                                 const Structure& structure);
+/// P^-1 x = -x + V D R x: R takes the coordinates, V gives their motion. What they miss is taken as damped out within a
+/// period. Borrows D.
+Preconditioner preconditioner_of(const MonodromyCorrection& correction, ReducedCoordinates coordinates);
 
 } // namespace squeal

@@ -1,8 +1,7 @@
 #pragma once
 /// Largest multipliers of a reduced model's monodromy matrix on recorded contact, with right and left vectors
 /// (src/README.md, sections 6.9 and 7.5). The same on every rank.
-#include "squeal/reduction/reduced_tangent.hpp"
-#include "squeal/shooting/flow.hpp"
+#include "squeal/cycle/reduced_flow.hpp"
 
 #include <complex>
 
@@ -15,9 +14,6 @@ struct ReducedSpectrum
   Eigen::MatrixXd right, left;              // orthonormal bases of the right and left vectors' spans, (q, v)
   Eigen::MatrixXd columns;                  // of the monodromy matrix, along the slow coordinates of q and of v
 };
-
-/// (Phi - m)^-1 x + x/m of the reduced monodromy matrix with these columns; x: (q, v) of a model of `size` shapes.
-Eigen::VectorXcd resolvent(const Eigen::MatrixXd& columns, std::complex<double> m, const Eigen::VectorXcd& x);
 
 /// Which multipliers are wanted.
 struct LargeValues
@@ -33,11 +29,13 @@ inline constexpr LargeValues deciding_values{0.85, 4, 48};
 ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
                                   const LargeValues& wanted);
 
-/// Columns (q, v) that act on a state by the energy product as these left vectors do by the plain one.
-Eigen::MatrixXd energy_representatives(const ReducedModel& model, const Eigen::MatrixXd& left);
+/// The spectrum's values, vectors and resolvent for motions that have these coordinates in the model.
+SlowMotions slow_motions_of(const ReducedSpectrum& spectrum, const ReducedModel& model,
+                            const ReducedCoordinates& coordinates, Vec pattern);
 
-/// Sets the errors and rises of the slow motions to what the moduli change by: `moved` are the values on another grid.
-void set_changes(const ReducedSpectrum& spectrum, const std::vector<std::complex<double>>& moved, SlowMotions& slow);
+/// Adds to the errors and rises of the slow motions a part of what the moduli change by: `others` are the values on
+/// another grid of time.
+void add_changes(const std::vector<std::complex<double>>& others, double part, SlowMotions& slow);
 
 /// The multipliers that these vectors give on other contact or with other steps: eigenvalues of (L'R)^-1 L'Phi R, in
 /// the order of the spectrum's values. Collective among the map's ranks.

@@ -46,17 +46,12 @@ struct Flow
   /// end = Phi_period(start); unless `rate` is null, rate = dPhi/dperiod at the end.
   std::function<void(double period, Vec start, Vec end, Vec rate)> integrate;
   Mat M = nullptr, K = nullptr; // of the energy product
-  /// end_k = Phi_period(start_k), all at once. Empty: starts are integrated one after the other.
-  std::function<void(double period, std::span<const Vec> starts, std::span<const Vec> ends)> integrate_many{};
-  /// Integrates a period and keeps what its tangent needs. Empty: difference quotients take the tangent's place.
+  /// Integrates a period and keeps what its tangent needs. Multisecants alone need none: then it may be empty.
   std::function<void(double period, Vec start, const TimeGrid& grid)> record_period{};
   /// x_k = dPhi_period/dx x_k along the period recorded last, all at once, in place.
   std::function<void(std::span<const Vec> states)> apply_tangent{};
   /// The slow motions of this period, which becomes the one recorded last. Empty: none are known.
   std::function<SlowMotions(double period, Vec start)> slow_motions{};
-  /// A period with its rate ends off by a small part of what it moves its start by: too far for difference quotients
-  /// with ends of periods without.
-  bool is_near_with_rate = false;
 };
 
 /// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; x and y are states. Empty: P = -I.

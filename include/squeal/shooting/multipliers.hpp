@@ -3,8 +3,7 @@
 ///
 /// A small system's matrix is formed whole. A large one's is projected obliquely on approximate right and left vectors
 /// where the flow knows some. Else it is projected on an Arnoldi space in the energy product. All use the flow's exact
-/// tangent; a flow without one is left to difference quotients. The shift in time, whose multiplier is 1, is the value
-/// near 1 whose vector is closest to d.
+/// tangent. The shift in time, whose multiplier is 1, is the value near 1 whose vector is closest to d.
 ///
 /// Each multiplier has an error bar of its own. In a whole matrix none is smaller than the distance of the shift's own
 /// multiplier from 1; a projection's bars do not hold that.
@@ -66,11 +65,11 @@ struct Multipliers
   std::vector<double> errors;               // error bar of each
   std::vector<double> upper;                // bounds of the moduli, where a grid of time only lowers some; or empty
   Stability stability = Stability::not_examined;
-  bool complete = true;               // larger ones than these are unlikely
-  Crossing crossing = Crossing::none; // of an unstable orbit
-  std::string would_decide;           // of an undecided one, in a sentence
-  double trivial_error = 0;           // distance of the shift's own multiplier from 1
-  long periods = 0;                   // columns of the tangent, or difference quotients, over one period each
+  bool complete = true;                                  // larger ones than these are unlikely
+  Crossing crossing = Crossing::none;                    // of an unstable orbit
+  std::string would_decide;                              // of an undecided one, in a sentence
+  double trivial_error = 0;                              // distance of the shift's own multiplier from 1
+  long periods = 0;                                      // columns of the tangent over one period each
   MultiplierMethod method = MultiplierMethod::automatic; // that was used
   std::string refusal;                                   // why the oblique projection did not serve, or did not decide
   std::vector<SeenGrowth> seen{};                        // from smaller and smaller parts; the last is the smallest
@@ -103,9 +102,9 @@ struct FloquetAnalysis
   FastestMotion fastest;
 };
 
-/// All multipliers of a system of up to 100 degrees of freedom, or 25 without an exact tangent. Of a larger one those
-/// of the slow motions, or of as many Arnoldi steps as its leading value needs. These are at most 96, or 24 beyond 10
-/// 000 degrees of freedom. -cycle_multiplier_method forces a method. Collective. Error: as of the flow.
+/// All multipliers of a system whose whole matrix has at most 200 columns. Of a larger one those of the slow motions,
+/// or of as many Arnoldi steps as its leading value needs. These are at most 96, or 24 beyond 10 000 degrees of
+/// freedom. -cycle_multiplier_method forces a method. Collective. Error: as of the flow.
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable);
 

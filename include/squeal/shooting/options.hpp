@@ -41,18 +41,16 @@ inline Words words_of(MultiplierMethod)
 struct ShootingOptions
 {
   Finish finish = Finish::multisecant;
-  PetscInt subspace_newtons = -1; // iterations on a subspace; 0: it is not tried; below 0: 10 without a finish, else 0
-  PetscInt base_growths = -1;     // of the subspace; below 0: 4 without a finish; none with one, which is cheaper
-  double difference = 1e-6;       // step of difference quotients over the fluctuation
-  double rank_tolerance = 1e-7;   // of the subspace's base and of its least-squares solve
-  PetscInt secants = 60;          // kept
-  double secant_drop = 1e-4;      // a secant is dropped when less than this part of it is new
-  double clamp = 0.3;             // longest multisecant step over the fluctuation
-  PetscInt stall = 12;            // iterations without progress before the multisecant stage gives up
-  PetscInt max_periods = 400;     // integrated in all
-  PetscInt free_periods = 320;    // integrated freely in all, where shooting finds no cycle that attracts
-  PetscInt multipliers = -1;      // columns sought; 0: none; below 0: as many as find_multipliers says
-  PetscInt watched_periods = -1;  // integrated beside the orbit found, to see its stability in time; below 0: chosen
+  PetscInt subspace_newtons = 0; // iterations on the subspace; 0: it is not tried
+  double rank_tolerance = 1e-7;  // of the subspace's base
+  PetscInt secants = 60;         // kept
+  double secant_drop = 1e-4;     // a secant is dropped when less than this part of it is new
+  double clamp = 0.3;            // longest multisecant step over the fluctuation
+  PetscInt stall = 12;           // iterations without progress before the multisecant stage gives up
+  PetscInt max_periods = 400;    // integrated in all
+  PetscInt free_periods = 320;   // integrated freely in all, where shooting finds no cycle that attracts
+  PetscInt multipliers = -1;     // columns sought; 0: none; below 0: as many as find_multipliers says
+  PetscInt watched_periods = -1; // integrated beside the orbit found, to see its stability in time; below 0: chosen
   MultiplierMethod multiplier_method = MultiplierMethod::automatic;
 };
 

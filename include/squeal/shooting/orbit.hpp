@@ -44,16 +44,14 @@ struct OrbitProblem
 /// The stages of the solver, as the records of convergence name them.
 enum class ShootingStage
 {
-  free_periods,   // integration without correction
-  subspace,       // Newton on the coordinates of a few given shapes
-  grown_subspace, // the same with the defects of earlier stages among the shapes
+  free_periods, // integration without correction
+  subspace,     // Newton on the coordinates of a few given shapes
   multisecant,
   full_period,  // one evaluation of a full model's flow
   exact_newton, // with the whole matrix of the exact tangent
 };
 
-inline constexpr std::array shooting_stage_words = {"free",        "reduced",     "grown base",
-                                                    "multisecant", "full period", "newton"};
+inline constexpr std::array shooting_stage_words = {"free", "reduced", "multisecant", "full period", "newton"};
 
 inline Words words_of(ShootingStage)
 {
@@ -75,7 +73,7 @@ struct Convergence
 {
   std::vector<NewtonRecord> records;
   int iterations = 0; // Newton and secant steps
-  long periods = 0;   // integrated: every evaluation of the flow, difference quotients included
+  long periods = 0;   // integrated: every evaluation of the flow, columns of the subspace's Newton included
   double residual_projected = std::numeric_limits<double>::quiet_NaN(); // where the subspace was left; NaN: not tried
 };
 
@@ -105,9 +103,6 @@ struct StageResult
 
 /// One evaluation of the flow. Error: as of the flow.
 Orbit evaluate(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period);
-
-/// Phi_T(x) - x of the orbit's own x and T, as quotients of differences with moved starts need it.
-Owned<Vec> base_of_differences(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit);
 
 /// Adds a record. `unknowns`: of the stage's system; 0 where nothing is solved for.
 void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, PetscInt unknowns, double residual_projected);

@@ -1,8 +1,8 @@
 #pragma once
 /// Shooting (src/README.md, section 6): the periodic orbit Phi_T(x) = x of any flow, from a start near it.
 ///
-/// The order of the stages: free periods, the paper's subspace and what it grows by, the full-space finish. Then the
-/// multipliers say whether motions settle on the orbit found.
+/// The order of the stages: free periods, the paper's subspace, the full-space finish. Then the multipliers say whether
+/// motions settle on the orbit found.
 #include "squeal/base/outcome.hpp"
 #include "squeal/shooting/multipliers.hpp"
 
@@ -60,6 +60,6 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
 
 /// Makes the options of the solver on the subspace (-cycle_snes_...) known to PETSc even where it never runs.
 /// Collective.
-void declare_solver_options();
+void declare_solver_options(MPI_Comm comm);
 
 } // namespace squeal
