@@ -1,12 +1,11 @@
 #include "reduced_sliding.hpp"
 
-#include "sliding_basis.hpp"
+#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
-#include "squeal/algebra/shift_invert.hpp"
 #include "squeal/modes/quadratic.hpp"
 
-#include <cmath>
+#include <algorithm>
 #include <numeric>
 
 namespace squeal
@@ -28,11 +27,12 @@ Owned<Mat> energy_of(const Structure& structure, double omega)
   return energy;
 }
 
-std::vector<int> all_pairs(const Interface& interface)
+/// B_n
+Owned<Mat> normal_rows(const Interface& interface)
 {
   std::vector<int> all(static_cast<std::size_t>(interface.pairs));
   std::iota(all.begin(), all.end(), 0);
-  return all;
+  return rows_of(interface, all, RowsTaken::normal);
 }
 
 } // namespace
@@ -40,19 +40,29 @@ std::vector<int> all_pairs(const Interface& interface)
 MultiVector make_pair_shapes(const BrakeModel& model, double omega)
 {
   const auto& [structure, interface] = model;
-  if (interface.pairs == 0) return empty_multivector(structure.K);
-  ShiftInvert energy = make_shift_invert(structure.K, structure.M, Symmetry::symmetric, {});
-  move_to(energy, -omega * omega);
-  const MultiVector forces = normal_forces(interface, all_pairs(interface));
-  MultiVector shapes = energy.factor->solve(forces);
-  for (Index i = 0; i < shapes.columns(); ++i)
-    shapes.entries.col(i) /= std::sqrt(shapes.entries.col(i).dot(forces.entries.col(i)));
+  const Owned<Mat> energy = energy_of(structure, omega);
+  const Factor factor(energy, nullptr, {});
+  if (factor.failed()) throw Error("the stiffness is not positive semidefinite");
+  MultiVector shapes = empty_multivector(structure.K);
+  std::vector<double> force(interface.size());
+  for (std::size_t i = 0; i < static_cast<std::size_t>(interface.pairs); ++i)
+  {
+    const PairView view(force, interface.directions);
+    view.normal(i) = 1;
+    const Owned<Vec> b = zeros_like(structure.load), x = zeros_like(structure.load);
+    add_reactions(interface, force, b);
+    solve(factor, b, x);
+    double work = 0;
+    check(VecDot(b, x, &work));
+    check(VecScale(x, 1 / std::sqrt(work)));
+    append(shapes, x);
+    view.normal(i) = 0;
+  }
   return shapes;
 }
 
 ShapeCollection::ShapeCollection(const BrakeModel& model, const MultiVector& pairs, double omega)
-    : pairs_(pairs), energy_(energy_of(model.structure, omega)),
-      normals_(rows_of(model.interface, all_pairs(model.interface), RowsTaken::normal)),
+    : pairs_(pairs), energy_(energy_of(model.structure, omega)), normals_(normal_rows(model.interface)),
       shapes_(empty_multivector(model.structure.K)), images_(empty_multivector(model.structure.K))
 {
 }
@@ -89,7 +99,7 @@ void ShapeCollection::add(MultiVector vectors, double truncation)
 namespace
 {
 
-/// The closed rigid pairs of a point, which are eliminated, and the others.
+/// Of the pairs of a point, closed and rigid ones, which are eliminated, and the others.
 struct PairsOfPoint
 {
   std::vector<Index> closed{}, open{};

@@ -1,6 +1,6 @@
 #pragma once
-/// Small motions about sliding on a few shapes, at many values of the numbers (src/README.md, section 12.1). It lives
-/// on one rank.
+/// Small motions about sliding on a few shapes, at many values of the numbers (src/README.md, section 12.1). Every
+/// function is collective.
 ///
 /// The shapes T come from modes of other points, without their motion along the normals of the pairs. W are responses
 /// to a normal force on each pair. S = [T, W of the other pairs] is lifted by W of the closed rigid ones to what

@@ -188,20 +188,21 @@ SweepSettings settings_of(const std::vector<UncertainNumber>& numbers)
   return settings;
 }
 
-/// Borrows all.
-SweepProblem sweep_of(const RobustnessProblem& problem, const SweepSettings& settings, const SweepOptions& options)
-{
-  const auto model_at = [&problem](std::span<const double> values, MPI_Comm) { return problem.model_at(values); };
-  return {settings, model_at, {}, problem.modes, problem.modes_options, problem.equilibrium_options, options};
-}
-
 /// The reduced model of a scene with random numbers, on one rank.
 class Sampler
 {
 public:
   explicit Sampler(const RobustnessProblem& problem)
-      : problem_(problem), settings_(settings_of(problem.numbers)),
-        sweep_(sweep_of(problem, settings_, sweep_options_)), swept_(sweep_, MPI_COMM_SELF)
+      : problem_(problem),
+        settings_(settings_of(problem.numbers)), sweep_{settings_,
+                                                        [this](std::span<const double> values, MPI_Comm)
+                                                        { return problem_.model_at(values); },
+                                                        {},
+                                                        problem.modes,
+                                                        problem.modes_options,
+                                                        problem.equilibrium_options,
+                                                        sweep_options_},
+        swept_(sweep_, MPI_COMM_SELF)
   {
     const std::vector<double> medians = values_at(problem.numbers, std::vector<double>(problem.numbers.size(), 0.5));
     const double omega = 0.1 * two_pi * problem.modes.band; // of energies

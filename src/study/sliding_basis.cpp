@@ -41,6 +41,12 @@ std::vector<Index> dofs_with_entries(Mat B)
   return rows;
 }
 
+/// The sum over all ranks, the same to the last bit everywhere.
+MatrixXd shared_sum(const MatrixXd& local, MPI_Comm comm)
+{
+  return inner_products({comm, MatrixXd::Identity(local.rows(), local.rows())}, {comm, local});
+}
+
 /// Those of matrices that no others give.
 std::vector<BasisImage*> images_of(SlidingBasis& basis)
 {
@@ -60,6 +66,7 @@ bool alike(Mat A, Mat B)
 bool set_matrix(SlidingBasis& basis, BasisImage& image, Mat A)
 {
   if (alike(image.matrix, A)) return false;
+  basis.by_Z.Z = {};
   if (!A)
   {
     image = {image.sign};
@@ -76,6 +83,7 @@ void set_damping(SlidingBasis& basis, Mat M, Mat C, Mat K)
 {
   basis.rayleigh = rayleigh_part(M, C, K);
   basis.C = {};
+  basis.by_Z.Z = {};
   if (basis.rayleigh)
     basis.C.matrix = copy_of(C);
   else
@@ -151,30 +159,34 @@ MatrixXd independent_part(const MatrixXd& kept)
   return parts.y.rightCols((parts.lambda.array() >= trace).count());
 }
 
-/// The lift of T by Z.
-struct LiftByZ
+/// Sets the lift by Z where it has changed.
+void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact, Mat B)
 {
-  MultiVector change{};            // D_Z, of the pivots' rows
-  std::vector<Index> pivots{};     // local rows
-  std::vector<Index> in_contact{}; // their places among the contact's degrees of freedom
-  MultiVector of_B{};              // B T
-  MatrixXd kept{};                 // inner products of the shapes without the pivots
-};
-
-LiftByZ lift_by_Z(const SlidingBasis& basis, const ClosedContact& contact, Mat B)
-{
-  LiftByZ lift{.pivots = local_pivots(contact)};
+  LiftByZ& lift = basis.by_Z;
+  if (lift.Z.get() && equal(lift.Z, contact.Z)) return;
+  lift.Z = copy_of(contact.Z);
   PetscInt rows_of_B = 0;
   check(MatGetSize(B, &rows_of_B, nullptr));
   if (rows_of_B > 0) lift.of_B = product(B, basis.T);
+  lift.pivots = local_pivots(contact);
+  lift.in_contact.clear();
   lift.change = change_by_lift(basis, contact, lift.pivots, contact.Z);
   for (const Index pivot : lift.pivots)
     lift.in_contact.push_back(std::lower_bound(basis.contact_dofs.begin(), basis.contact_dofs.end(), pivot) -
                               basis.contact_dofs.begin());
-  const MultiVector at_pivots{basis.T.comm, basis.T.entries(lift.pivots, Eigen::all).rightCols(basis.shapes())};
+  const MatrixXd at_pivots = basis.T.entries(lift.pivots, Eigen::all).rightCols(basis.shapes());
   lift.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) -
-              inner_products(at_pivots, at_pivots); // shapes are orthonormal
-  return lift;
+              shared_sum(at_pivots.transpose() * at_pivots, basis.T.comm); // shapes are orthonormal
+  lift.independent = independent_part(lift.kept);
+  const Owned<IS> pivots = pivot_set(contact);
+  for (BasisImage* image : images_of(basis))
+  {
+    const MatrixXd rows = image->contact_rows.entries(lift.in_contact, Eigen::all);
+    image->lifted_rows = product(part_of(image->matrix, pivots, pivots), lift.change);
+    image->lifted_rows.entries += rows;
+    image->lifted_products =
+        image->products + image->sign * shared_sum(rows.transpose() * lift.change.entries, basis.T.comm);
+  }
 }
 
 /// On the rows of B, symmetric or not.
@@ -186,7 +198,7 @@ struct PairMatrix
 
 /// T_Y'B'D B T_Z. Most rows of D are zero: of friction's damping those of normals and, mostly, along the drive. The
 /// others may hold no pivot: then B T_Y and B T_Z are B T there.
-MatrixXd projected_on_pairs(const LiftByZ& lift, const ClosedContact& contact, const MultiVector& by_Y, Mat B,
+MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& contact, const MultiVector& by_Y, Mat B,
                             const PairMatrix& D)
 {
   PetscInt first = 0, last = 0;
@@ -204,7 +216,7 @@ MatrixXd projected_on_pairs(const LiftByZ& lift, const ClosedContact& contact, c
   const Owned<Mat> D_taken = part_of(D.matrix, taken, taken), at_pivots = part_of(B, taken, pivot_set(contact));
   double entries = 0;
   check(MatNorm(at_pivots, NORM_FROBENIUS, &entries));
-  const MultiVector sliding{by_Y.comm, lift.of_B.entries(places, Eigen::all)};
+  const MultiVector sliding{basis.T.comm, basis.by_Z.of_B.entries(places, Eigen::all)};
   if (entries == 0)
   {
     const MultiVector force = product(D_taken, sliding);
@@ -213,7 +225,7 @@ MatrixXd projected_on_pairs(const LiftByZ& lift, const ClosedContact& contact, c
   const auto lifted = [&](const MultiVector& change) {
     return MultiVector{change.comm, sliding.entries + product(at_pivots, change).entries};
   };
-  return inner_products(lifted(by_Y), product(D_taken, lifted(lift.change)));
+  return inner_products(lifted(by_Y), product(D_taken, lifted(basis.by_Z.change)));
 }
 
 } // namespace
@@ -229,16 +241,6 @@ bool equal(Mat A, Mat B)
   if (alike == 0) return false;
   check(MatEqual(A, B, &same));
   return same == PETSC_TRUE;
-}
-
-MultiVector normal_forces(const Interface& interface, const std::vector<int>& pairs)
-{
-  const Owned<Mat> columns = transpose_of(rows_of(interface, pairs, RowsTaken::normal));
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRangeColumn(columns, &first, &last));
-  MultiVector units{comm_of(columns), MatrixXd::Zero(last - first, static_cast<Index>(pairs.size()))};
-  units.entries.middleCols(first, last - first).setIdentity();
-  return product(columns, units);
 }
 
 SlidingBasis make_basis(const Structure& structure, const Interface& interface, Index sketched)
@@ -270,6 +272,7 @@ Index extend(SlidingBasis& basis, MultiVector X)
   MultiVector shapes = columns_from(basis.T, basis.sketched);
   const Index gained = extend_orthonormal(shapes, std::move(X)), size = basis.T.columns() + gained;
   if (gained == 0) return 0;
+  basis.by_Z.Z = {};
   const MultiVector news = columns_from(shapes, shapes.columns() - gained);
   append(basis.T, news);
   for (BasisImage* image : images_of(basis))
@@ -284,18 +287,14 @@ Index extend(SlidingBasis& basis, MultiVector X)
   return gained;
 }
 
-ProjectedSliding project(const SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness)
+ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness)
 {
-  const LiftByZ lift = lift_by_Z(basis, contact, B);
-  const MultiVector by_Y = change_by_lift(basis, contact, lift.pivots, contact.Y);
-  const Owned<IS> pivots = pivot_set(contact);
+  lift_by_Z(basis, contact, B);
+  const MultiVector by_Y = change_by_lift(basis, contact, basis.by_Z.pivots, contact.Y);
   const auto lifted = [&](const BasisImage& image) -> MatrixXd
   {
     if (!image.matrix.get()) return {};
-    const MultiVector rows{by_Y.comm, image.contact_rows.entries(lift.in_contact, Eigen::all)};
-    MultiVector at_pivots = product(part_of(image.matrix, pivots, pivots), lift.change);
-    at_pivots.entries += rows.entries;
-    return image.products + image.sign * inner_products(rows, lift.change) + inner_products(by_Y, at_pivots);
+    return image.lifted_products + inner_products(by_Y, image.lifted_rows);
   };
   ProjectedSliding result{lifted(basis.M), {}, lifted(basis.K), lifted(basis.K_loss)};
   if (basis.rayleigh)
@@ -304,10 +303,10 @@ ProjectedSliding project(const SlidingBasis& basis, const ClosedContact& contact
     result.C = lifted(basis.C);
   if (basis.G.matrix.get()) result.C += lifted(basis.G);
   if (basis.H.matrix.get()) result.K += lifted(basis.H);
-  if (damping) result.C += projected_on_pairs(lift, contact, by_Y, B, {damping, true});
-  if (stiffness) result.K += projected_on_pairs(lift, contact, by_Y, B, {stiffness, false});
-  result.kept = lift.kept;
-  result.independent = independent_part(lift.kept);
+  if (damping) result.C += projected_on_pairs(basis, contact, by_Y, B, {damping, true});
+  if (stiffness) result.K += projected_on_pairs(basis, contact, by_Y, B, {stiffness, false});
+  result.kept = basis.by_Z.kept;
+  result.independent = basis.by_Z.independent;
   return result;
 }
 

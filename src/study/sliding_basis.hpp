@@ -15,10 +15,24 @@ namespace squeal
 /// A symmetric or skew matrix on T.
 struct BasisImage
 {
-  double sign = 1;            // A' = sign A
-  Owned<Mat> matrix{};        // a copy of A; null: there is none
-  MultiVector contact_rows{}; // of A T, at the degrees of freedom of the contact that this rank has
-  Eigen::MatrixXd products{}; // T'A T
+  double sign = 1;                   // A' = sign A
+  Owned<Mat> matrix{};               // a copy of A; null: there is none
+  MultiVector contact_rows{};        // of A T, at the degrees of freedom of the contact that this rank has
+  Eigen::MatrixXd products{};        // T'A T
+  MultiVector lifted_rows{};         // of A T_Z at the pivots, where T_Z is T lifted by Z
+  Eigen::MatrixXd lifted_products{}; // T'A T_Z
+};
+
+/// The lift by Z, which stays while the closed pairs, T and the matrices do: friction changes Y alone.
+struct LiftByZ
+{
+  Owned<Mat> Z;                           // a copy; null: to be made
+  MultiVector change{};                   // D_Z, of the pivots' rows
+  std::vector<Eigen::Index> pivots{};     // local rows
+  std::vector<Eigen::Index> in_contact{}; // their places among the contact's degrees of freedom
+  MultiVector of_B{};                     // B T
+  Eigen::MatrixXd kept{};                 // inner products of the shapes without the pivots
+  Eigen::MatrixXd independent{};          // combinations of shapes that stay so without the pivots; empty: all do
 };
 
 /// The first columns of T are random vectors, `sketched` of them. They only test: the products with a residual show its
@@ -31,6 +45,7 @@ struct SlidingBasis
   BasisImage M{}, C{}, K{}, K_loss{};       // C without the viscous equivalent of loss factors
   std::optional<Rayleigh> rayleigh{};       // of C, whose image has then the matrix alone
   BasisImage G{-1}, H{-1};
+  LiftByZ by_Z{};
 
   Eigen::Index shapes() const { return T.columns() - sketched; }
 };
@@ -54,16 +69,13 @@ struct ProjectedSliding
 };
 
 /// `damping`, `stiffness`: of the friction direction and S of pairs with a compliance, on the rows of B; may be null.
-ProjectedSliding project(const SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness);
+ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness);
 
 /// The degrees of freedom of x that are no pivots.
 MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact);
 
 /// The reverse, with zeros at the pivots.
 MultiVector with_zero_pivots(const MultiVector& kept, const ClosedContact& contact);
-
-/// A unit force on the normal of each of some pairs, one a column.
-MultiVector normal_forces(const Interface& interface, const std::vector<int>& pairs);
 
 /// Whether two matrices have one layout and equal entries. Collective.
 bool equal(Mat A, Mat B);

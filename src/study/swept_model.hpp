@@ -57,7 +57,7 @@ public:
   /// At the point visited last; null: at none.
   const BrakeModel* model() const { return model_ ? &*model_ : nullptr; }
 
-  /// The number of shapes of the basis.
+  /// Of the basis.
   Eigen::Index shapes() const;
   int passes() const { return basis_ ? basis_->passes : 0; }
 
