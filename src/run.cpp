@@ -184,8 +184,8 @@ Robustness run_robustness(const Chain& chain)
     for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.uncertain[i].key, values[i]});
     return model_with(chain.model, scene, numbers, PETSC_COMM_SELF);
   };
-  return find_robustness({*scene.robustness, scene.uncertain, model_at, scene.modes, chain.options.modes,
-                          chain.options.equilibrium, chain.options.robustness},
+  return find_robustness({*scene.robustness, scene.uncertain, model_at, scene.friction, scene.modes,
+                          chain.options.modes, chain.options.equilibrium, chain.options.robustness},
                          comm_of(chain.model.structure.load));
 }
 

@@ -76,6 +76,7 @@ void add_robustness(const Robustness& robustness, const Scene& scene, Json& entr
   entry["confidence"] = scene.robustness->confidence;
   entry["training_points"] = robustness.trained;
   entry["basis_shapes"] = robustness.basis;
+  entry["model_error"] = robustness.model_error;
   entry["growth_error"] = robustness.outcome.residual;
   entry["wrong_verdicts"] = wrong_verdicts(robustness);
   entry["any"] = probability_entry(robustness.any);

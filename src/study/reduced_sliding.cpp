@@ -3,10 +3,8 @@
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
-#include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 namespace squeal
 {
@@ -27,23 +25,50 @@ Owned<Mat> energy_of(const Structure& structure, double omega)
   return energy;
 }
 
-/// B_n
-Owned<Mat> normal_rows(const Interface& interface)
+OnShapes on_shapes(Mat A, const MultiVector& T, const MultiVector& W)
 {
-  std::vector<int> all(static_cast<std::size_t>(interface.pairs));
-  std::iota(all.begin(), all.end(), 0);
-  return rows_of(interface, all, RowsTaken::normal);
+  if (!A) return {};
+  const MultiVector AT = product(A, T), AW = product(A, W);
+  return {inner_products(T, AT), inner_products(W, AT), inner_products(W, AW)};
+}
+
+/// The sum of terms with their coefficients.
+OnShapes sum_of(const std::vector<OnShapes>& terms, const std::vector<double>& coefficients)
+{
+  OnShapes sum;
+  for (std::size_t k = 0; k < terms.size(); ++k)
+  {
+    if (terms[k].TT.size() == 0) continue;
+    if (sum.TT.size() == 0)
+      sum = {coefficients[k] * terms[k].TT, coefficients[k] * terms[k].WT, coefficients[k] * terms[k].WW};
+    else
+    {
+      sum.TT += coefficients[k] * terms[k].TT;
+      sum.WT += coefficients[k] * terms[k].WT;
+      sum.WW += coefficients[k] * terms[k].WW;
+    }
+  }
+  return sum;
+}
+
+/// The normal rows of B among all of its rows.
+MatrixXd normal_rows(const MatrixXd& B, const Interface& interface)
+{
+  const PairRows<Index> rows(interface.directions);
+  MatrixXd result(interface.pairs, B.cols());
+  for (Index pair = 0; pair < result.rows(); ++pair) result.row(pair) = B.row(rows.normal(pair));
+  return result;
 }
 
 } // namespace
 
-MultiVector make_pair_shapes(const BrakeModel& model, double omega)
+PairShapes make_pair_shapes(const BrakeModel& model, double omega)
 {
   const auto& [structure, interface] = model;
   const Owned<Mat> energy = energy_of(structure, omega);
   const Factor factor(energy, nullptr, {});
   if (factor.failed()) throw Error("the stiffness is not positive semidefinite");
-  MultiVector shapes = empty_multivector(structure.K);
+  PairShapes shapes{empty_multivector(structure.K)};
   std::vector<double> force(interface.size());
   for (std::size_t i = 0; i < static_cast<std::size_t>(interface.pairs); ++i)
   {
@@ -55,23 +80,26 @@ MultiVector make_pair_shapes(const BrakeModel& model, double omega)
     double work = 0;
     check(VecDot(b, x, &work));
     check(VecScale(x, 1 / std::sqrt(work)));
-    append(shapes, x);
+    append(shapes.W, x);
     view.normal(i) = 0;
   }
+  if (interface.pairs > 0) shapes.BW = product(interface.B, shapes.W).entries;
   return shapes;
 }
 
-ShapeCollection::ShapeCollection(const BrakeModel& model, const MultiVector& pairs, double omega)
-    : pairs_(pairs), energy_(energy_of(model.structure, omega)), normals_(normal_rows(model.interface)),
+ShapeCollection::ShapeCollection(const BrakeModel& model, const PairShapes& pairs, double omega)
+    : model_(model), pairs_(pairs), energy_(energy_of(model.structure, omega)),
       shapes_(empty_multivector(model.structure.K)), images_(empty_multivector(model.structure.K))
 {
 }
 
 void ShapeCollection::take_normal_motion_off(MultiVector& vectors) const
 {
-  if (pairs_.columns() == 0) return;
-  vectors.entries -= pairs_.entries * solve_dense(whole_product(normals_, pairs_), whole_product(normals_, vectors),
-                                                  "the normal motions of two pairs are the same");
+  const Interface& interface = model_.interface;
+  if (interface.pairs == 0) return;
+  const MatrixXd motion = normal_rows(product(interface.B, vectors).entries, interface);
+  vectors.entries -= pairs_.W.entries * solve_dense(normal_rows(pairs_.BW, interface), motion,
+                                                    "the normal motions of two pairs are the same");
 }
 
 void ShapeCollection::add(MultiVector vectors, double truncation)
@@ -96,88 +124,154 @@ void ShapeCollection::add(MultiVector vectors, double truncation)
   append(shapes_, news);
 }
 
+ReducedSliding::ReducedSliding(const PolynomialModel& model, const MultiVector& T, const PairShapes& pairs)
+    : BT_(product(model.reference().interface.B, T).entries), BW_(pairs.BW)
+{
+  for (const ModelTerm& term : model.terms())
+    for (std::size_t k = 0; k < terms_.size(); ++k)
+      terms_[k].push_back(on_shapes((term.structure.*matrices_of_structure[k]).get(), T, pairs.W));
+}
+
 namespace
 {
 
-/// Of the pairs of a point, closed and rigid ones, which are eliminated, and the others.
+/// The pairs of a point: closed and rigid ones, which are eliminated, and the others. With the rows B_n + part e.B_t of
+/// the first ones on shapes.
 struct PairsOfPoint
 {
+  const Interface& interface;
   std::vector<Index> closed{}, open{};
+
+  /// `part`: of each pair, 0 or mu.
+  MatrixXd rows_on(const MatrixXd& B, const std::vector<double>& part) const
+  {
+    const std::vector<double> directions = drive_directions(interface);
+    const TangentView e(directions, interface.directions);
+    const PairRows<Index> rows(interface.directions);
+    MatrixXd result(static_cast<Index>(closed.size()), B.cols());
+    for (Index k = 0; k < result.rows(); ++k)
+    {
+      const Index pair = closed[static_cast<std::size_t>(k)];
+      const auto i = static_cast<std::size_t>(pair);
+      result.row(k) = B.row(rows.normal(pair));
+      for (std::size_t d = 0; d < e.of(i).size() && part[i] != 0; ++d)
+        result.row(k) += part[i] * e.of(i)[d] * B.row(rows.tangential(pair) + static_cast<Index>(d));
+    }
+    return result;
+  }
 };
 
 PairsOfPoint pairs_of(const Interface& interface, const std::vector<char>& closed)
 {
-  PairsOfPoint pairs;
+  PairsOfPoint pairs{interface};
   for (std::size_t i = 0; i < closed.size(); ++i)
     (closed[i] && compliance_of(interface, i) == 0 ? pairs.closed : pairs.open).push_back(static_cast<Index>(i));
   return pairs;
 }
 
-/// The rows B_n + part e.B_t of some pairs, from all of B. `part`: of each pair, 0 or mu.
-MatrixXd rows_with(const std::vector<double>& part, const Interface& interface, const std::vector<Index>& pairs,
-                   const MatrixXd& B)
+/// What W of the closed pairs adds to S on either side.
+struct Lifts
 {
-  const std::vector<double> directions = drive_directions(interface);
-  const TangentView e(directions, interface.directions);
-  const PairRows<Index> rows(interface.directions);
-  MatrixXd result(static_cast<Index>(pairs.size()), B.cols());
-  for (Index k = 0; k < result.rows(); ++k)
-  {
-    const Index pair = pairs[static_cast<std::size_t>(k)];
-    const auto i = static_cast<std::size_t>(pair);
-    result.row(k) = B.row(rows.normal(pair));
-    for (std::size_t d = 0; d < e.of(i).size(); ++d)
-      result.row(k) += part[i] * e.of(i)[d] * B.row(rows.tangential(pair) + static_cast<Index>(d));
-  }
-  return result;
-}
-
-/// S lifted by the shapes W of the closed pairs.
-struct LiftedShapes
-{
-  MultiVector Y, Z;
+  MatrixXd Y, Z;
 };
 
-LiftedShapes lifted(const MultiVector& S, const MultiVector& W, const Interface& interface,
-                    const std::vector<Index>& closed)
+Lifts make_lifts(const PairsOfPoint& pairs, const MatrixXd& BS, const MatrixXd& BW)
 {
-  if (closed.empty()) return {S, S};
-  const MatrixXd BS = whole_product(interface.B, S), BW = whole_product(interface.B, W);
-  const std::vector<double> mu = drive_friction(interface), frictionless(mu.size(), 0.);
-  const auto lift = [&](const std::vector<double>& part)
+  const std::vector<double> mu = drive_friction(pairs.interface), frictionless(mu.size(), 0.);
+  const auto lift = [&](const std::vector<double>& part) -> MatrixXd
   {
-    MultiVector result = S;
-    result.entries -=
-        W.entries * solve_dense(rows_with(part, interface, closed, BW), rows_with(part, interface, closed, BS),
-                                "a closed pair is jammed by friction, or fixed by other pairs");
-    return result;
+    if (pairs.closed.empty()) return MatrixXd(0, BS.cols());
+    return -solve_dense(pairs.rows_on(BW, part), pairs.rows_on(BS, part),
+                        "a closed pair is jammed by friction, or fixed by other pairs");
   };
   return {lift(mu), lift(frictionless)};
 }
 
+/// (S + W Y)'A (S + W Z), A' = sign A
+MatrixXd lifted(const OnShapes& A, double sign, const PairsOfPoint& pairs, const Lifts& lifts)
+{
+  const std::vector<Index>&closed = pairs.closed, &open = pairs.open;
+  const Index shapes = A.TT.rows(), opened = static_cast<Index>(open.size());
+  MatrixXd result(shapes + opened, shapes + opened), WS(static_cast<Index>(closed.size()), shapes + opened);
+  const MatrixXd of_open = A.WT(open, Eigen::all);
+  result << A.TT, sign * of_open.transpose(), of_open, A.WW(open, open);
+  WS << A.WT(closed, Eigen::all), A.WW(closed, open);
+  result.noalias() += lifts.Y.transpose() * WS;
+  if (opened == 0) return result; // B_n S = 0
+  const MatrixXd coupled = A.WW(closed, closed) * lifts.Z;
+  result.noalias() += sign * WS.transpose() * lifts.Z;
+  result.noalias() += lifts.Y.transpose() * coupled;
+  return result;
+}
+
+/// S_Y'C_f S_Z, from the rows of B on both.
+MatrixXd friction_damping(const Interface& interface, const Equilibrium& equilibrium, const MatrixXd& left,
+                          const MatrixXd& right)
+{
+  const PairRows<Index> rows(interface.directions);
+  const TangentView drive(interface.drive, interface.directions);
+  const PairView reactions(equilibrium.reactions, interface.directions);
+  MatrixXd force = MatrixXd::Zero(right.rows(), right.cols());
+  for (std::size_t i = 0; i < equilibrium.closed.size(); ++i)
+  {
+    if (!equilibrium.closed[i] || reactions.normal(i) <= 0) continue;
+    const SlidingFriction friction = sliding_friction(interface.friction, reactions.normal(i), drive.of(i));
+    const auto& D = interface.friction.direction_damping ? friction.damping : friction.damping_of_speed;
+    const Index first = rows.tangential(static_cast<Index>(i));
+    for (Index k = 0; k < rows.directions; ++k)
+      for (Index l = 0; l < rows.directions; ++l)
+        force.row(first + k) += D[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)] * right.row(first + l);
+  }
+  return left.transpose() * force;
+}
+
+/// S_Y'B'S B S_Z of the closed pairs with a compliance, from the rows of B on both.
+MatrixXd stiffness_of_pairs(const Interface& interface, const Equilibrium& equilibrium, const MatrixXd& left,
+                            const MatrixXd& right)
+{
+  const PairRows<Index> rows(interface.directions);
+  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
+  const TangentView e(directions, interface.directions);
+  MatrixXd force = MatrixXd::Zero(right.rows(), right.cols());
+  for (std::size_t i = 0; i < equilibrium.closed.size(); ++i)
+  {
+    const double c = compliance_of(interface, i);
+    if (!equilibrium.closed[i] || c == 0) continue;
+    const Index normal = rows.normal(static_cast<Index>(i)), first = rows.tangential(static_cast<Index>(i));
+    force.row(normal) = right.row(normal) / c;
+    for (std::size_t d = 0; d < e.of(i).size(); ++d)
+      force.row(first + static_cast<Index>(d)) = mu[i] * e.of(i)[d] / c * right.row(normal);
+  }
+  return left.transpose() * force;
+}
+
 } // namespace
 
-ReducedMatrices reduced_matrices(const SlidingEquilibrium& sliding, const MultiVector& T, const MultiVector& W)
+ReducedMatrices ReducedSliding::at(const std::vector<double>& coefficients, const Interface& interface,
+                                   const Equilibrium& equilibrium) const
 {
-  const auto& [structure, interface, equilibrium] = sliding;
-  if (W.columns() != interface.pairs)
-    throw Error(format("the number of contact pairs changes from %d to %d", static_cast<int>(W.columns()),
-                       static_cast<int>(interface.pairs)));
   const PairsOfPoint pairs = pairs_of(interface, equilibrium.closed);
-  const auto of_pairs = [&](const std::vector<Index>& which) {
-    return MultiVector{W.comm, W.entries(Eigen::all, which)};
+  MatrixXd BS(BT_.rows(), BT_.cols() + static_cast<Index>(pairs.open.size()));
+  if (interface.pairs > 0) BS << BT_, BW_(Eigen::all, pairs.open);
+  const MatrixXd at_closed = BW_(Eigen::all, pairs.closed);
+  const Lifts lifts = make_lifts(pairs, BS, at_closed);
+  const auto& [M, C, K, G, H, K_loss] = terms_;
+  const auto projected = [&](const std::vector<OnShapes>& terms, double sign) -> MatrixXd
+  {
+    const OnShapes A = sum_of(terms, coefficients);
+    if (A.TT.size() == 0) return MatrixXd::Zero(BS.cols(), BS.cols());
+    return lifted(A, sign, pairs, lifts);
   };
-  MultiVector S = T;
-  append(S, of_pairs(pairs.open));
-  const LiftedShapes shapes = lifted(S, of_pairs(pairs.closed), interface, pairs.closed);
-  const auto seen = [&](Mat A) { return inner_products(shapes.Y, product(A, shapes.Z)); };
-  Owned<Mat> C = sliding_damping(sliding);
-  if (structure.K_loss.get()) C = without_loss(C, structure);
-  ReducedMatrices result{seen(structure.M), seen(C), seen(structure.K), {}, T.columns()};
-  if (structure.H.get()) result.K += seen(structure.H);
-  if (const auto springs = contact_stiffness(interface, equilibrium.closed, PairForces::with_friction); springs.get())
-    result.K += seen(springs);
-  if (structure.K_loss.get()) result.K_loss = seen(structure.K_loss);
+  const auto has = [](const std::vector<OnShapes>& terms)
+  { return std::ranges::any_of(terms, [](const OnShapes& term) { return term.TT.size() > 0; }); };
+  ReducedMatrices result{projected(M, 1), projected(C, 1), projected(K, 1), {}, shapes()};
+  if (has(G)) result.C += projected(G, -1);
+  if (has(H)) result.K += projected(H, -1);
+  if (has(K_loss)) result.K_loss = projected(K_loss, 1);
+  if (interface.pairs == 0) return result;
+  const MatrixXd left = BS + at_closed * lifts.Y, right = pairs.open.empty() ? BS : (BS + at_closed * lifts.Z).eval();
+  result.C += friction_damping(interface, equilibrium, left, right);
+  if (!interface.compliance.empty()) result.K += stiffness_of_pairs(interface, equilibrium, left, right);
   return result;
 }
 

@@ -180,37 +180,17 @@ private:
   std::vector<Complex> own_{};
 };
 
-/// The random numbers as those of a sweep.
-SweepSettings settings_of(const std::vector<UncertainNumber>& numbers)
-{
-  SweepSettings settings;
-  for (const UncertainNumber& number : numbers) settings.key.push_back(number.key);
-  return settings;
-}
-
 /// The reduced model of a scene with random numbers, on one rank.
 class Sampler
 {
 public:
   explicit Sampler(const RobustnessProblem& problem)
-      : problem_(problem),
-        settings_(settings_of(problem.numbers)), sweep_{settings_,
-                                                        [this](std::span<const double> values, MPI_Comm)
-                                                        { return problem_.model_at(values); },
-                                                        {},
-                                                        problem.modes,
-                                                        problem.modes_options,
-                                                        problem.equilibrium_options,
-                                                        sweep_options_},
-        swept_(sweep_, MPI_COMM_SELF)
+      : problem_(problem), model_(problem), omega_(0.1 * two_pi * problem.modes.band),
+        equilibrium_options_(checked_if_asked(problem.equilibrium_options))
   {
+    const PairShapes pairs = make_pair_shapes(model_.reference(), omega_);
+    reduced_.emplace(model_, trained_shapes(pairs), pairs);
     const std::vector<double> medians = values_at(problem.numbers, std::vector<double>(problem.numbers.size(), 0.5));
-    const double omega = 0.1 * two_pi * problem.modes.band; // of energies
-    const BrakeModel reference = problem.model_at(medians);
-    W_ = make_pair_shapes(reference, omega);
-    ShapeCollection shapes(reference, W_, omega);
-    collect_trained(shapes);
-    T_ = shapes.shapes();
     // without it, modes are like none of the reference
     (void)error_of([&] { reference_ = Reference(matrices_at(medians), problem.modes.band); });
   }
@@ -218,11 +198,17 @@ public:
   /// The reduced matrices at a point. Error: there is no equilibrium, or friction jams a closed pair.
   ReducedMatrices matrices_at(const std::vector<double>& values)
   {
-    const Equilibrium equilibrium = swept_.find({values, false});
+    const BrakeModel& model = model_.at(values);
+    const auto& [structure, interface] = model;
+    if (!compliance_ || model_.stiffness_changes() || !compliance_->serves(interface))
+    {
+      compliance_.reset();
+      compliance_.emplace(structure, interface, equilibrium_options_);
+    }
+    Equilibrium equilibrium = find_equilibrium(structure, interface, *compliance_, closed_, equilibrium_options_);
     need(equilibrium.outcome);
-    closed_ = static_cast<int>(std::ranges::count(equilibrium.closed, 1));
-    const auto& [structure, interface] = *swept_.model();
-    return reduced_matrices({structure, interface, equilibrium}, T_, W_);
+    closed_ = equilibrium.closed;
+    return reduced_->at(model_.coefficients(values), interface, equilibrium);
   }
 
   /// The modes in the band; without loss factors without their vectors, which take longer.
@@ -251,7 +237,7 @@ public:
   void evaluate(int place, RobustSample& sample, std::vector<UnstableMode>& unstable)
   {
     const ReducedMatrices at = matrices_at(sample.values);
-    RobustSample found{sample.values, true, closed_};
+    RobustSample found{sample.values, true, static_cast<int>(std::ranges::count(closed_, 1))};
     std::vector<UnstableMode> modes;
     Complex worst;
     for (const TwoSidedPair& pair : pairs_of(at))
@@ -273,35 +259,45 @@ public:
   }
 
   const Reference& reference() const { return reference_; }
-  Index shapes() const { return T_.columns(); }
+  Index shapes() const { return reduced_->shapes(); }
+  double error() const { return model_.error(); }
   int trained() const { return trained_; }
 
 private:
   /// The modes of the training points, on a basis that they share.
-  void collect_trained(ShapeCollection& shapes)
+  MultiVector trained_shapes(const PairShapes& pairs)
   {
+    SweepSettings settings;
+    for (const UncertainNumber& number : problem_.numbers) settings.key.push_back(number.key);
+    const SweepOptions options;
+    const auto model_at = [&](std::span<const double> values, MPI_Comm) { return problem_.model_at(values); };
+    const SweepProblem sweep{settings, model_at, {}, problem_.modes, problem_.modes_options, equilibrium_options_,
+                             options};
+    SweptModel swept(sweep, MPI_COMM_SELF);
     const std::vector<std::vector<double>> points = training_values(problem_);
-    for (const std::vector<double>& values : points) swept_.prepare({values, false});
+    for (const std::vector<double>& values : points) swept.prepare({values, false});
+    ShapeCollection shapes(model_.reference(), pairs, omega_);
     for (const std::vector<double>& values : points)
     {
-      if (swept_.equilibrium_at({values, false}).outcome.kind != OutcomeKind::converged) continue;
-      const PointModes modes = swept_.modes_at({values, false}, problem_.options.tolerance);
+      if (swept.equilibrium_at({values, false}).outcome.kind != OutcomeKind::converged) continue;
+      const PointModes modes = swept.modes_at({values, false}, problem_.options.tolerance);
       if (modes.outcome.kind != OutcomeKind::converged || modes.pairs.empty()) continue;
       for (const Side side : {Side::right, Side::left})
-        shapes.add(swept_.vectors(modes, side), problem_.options.truncation);
+        shapes.add(swept.vectors(modes, side), problem_.options.truncation);
       ++trained_;
     }
     if (trained_ == 0) throw Error("no point of the random numbers has an equilibrium with modes in the band");
+    return shapes.shapes();
   }
 
   const RobustnessProblem& problem_;
-  SweepSettings settings_;
-  SweepOptions sweep_options_{};
-  SweepProblem sweep_;
-  SweptModel swept_;
-  MultiVector T_{}, W_{}; // shapes of modes, and of the forces of pairs
-  int closed_ = 0;        // pairs at the equilibrium found last
+  PolynomialModel model_;
+  double omega_; // of energies, a tenth of the band's
+  EquilibriumOptions equilibrium_options_;
+  std::optional<PairCompliance> compliance_{};
+  std::vector<char> closed_{}; // at the equilibrium found last
   int trained_ = 0;
+  std::optional<ReducedSliding> reduced_{};
   Reference reference_{};
 };
 
@@ -419,6 +415,7 @@ Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
   find_correlations(result, problem.numbers.size());
   result.trained = sampler->trained();
   result.basis = static_cast<int>(sampler->shapes());
+  result.model_error = sampler->error();
   assess(result, failed);
   return result;
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// What the ranks found of random samples, put together: probabilities and correlations (src/README.md, section 12.2).
+/// What the ranks found of random samples, put together: probabilities and correlations (src/README.md, section 12.3).
 #include "squeal/study/robustness.hpp"
 
 namespace squeal

@@ -71,9 +71,7 @@ Equilibrium SweptModel::find(const SweptPlace& place)
   go_to(place);
   const auto& [structure, interface] = *model_;
   if (interface.pairs == 0) return find_equilibrium(structure, interface, equilibrium_options_);
-  Equilibrium equilibrium = find_equilibrium(structure, interface, compliance(), closed_, equilibrium_options_);
-  if (equilibrium.outcome.kind == OutcomeKind::converged) closed_ = equilibrium.closed;
-  return equilibrium;
+  return find_equilibrium(structure, interface, compliance(), closed_, equilibrium_options_);
 }
 
 const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
@@ -94,6 +92,7 @@ const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
     model_.reset();
     equilibrium.outcome = {OutcomeKind::no_equilibrium, error.what(), 0, 1};
   }
+  if (equilibrium.outcome.kind == OutcomeKind::converged) closed_ = equilibrium.closed;
   return equilibria_[place] = std::move(equilibrium);
 }
 

@@ -27,9 +27,6 @@ public:
   /// Finds the equilibrium of a point. The pairs that are closed at all points prepared are those of the basis.
   void prepare(const SweptPlace& place);
 
-  /// The equilibrium of a point, which is not kept. Error: a model has none.
-  Equilibrium find(const SweptPlace& place);
-
   /// What cannot be computed at a point, for whatever reason, is in the outcome.
   const Equilibrium& equilibrium_at(const SweptPlace& place);
   PointModes modes_at(const SweptPlace& place, double tolerance);
@@ -63,6 +60,7 @@ public:
 
 private:
   void go_to(const SweptPlace& place);
+  Equilibrium find(const SweptPlace& place);
   const PairCompliance& compliance();
   BasisProblem basis_problem(const Equilibrium& equilibrium) const;
   const std::vector<char>& rigid_at(const SweptPlace& place);

@@ -49,8 +49,9 @@ struct RobustCheck
   double growth_error = 0, frequency_error = 0;
 };
 
-/// outcome: "converged", "not converged" (samples or checks failed: how many, the first reason), "refused" (no basis is
-/// found, and why), "off". residual: the largest growth error. iterations: number of samples.
+/// outcome: "converged", "not converged" (samples or checks failed: how many, the first reason), "refused" (the
+/// matrices are no polynomial of the numbers), "off". residual: the largest growth error. iterations: number of
+/// samples.
 struct Robustness
 {
   Outcome outcome;
@@ -61,6 +62,7 @@ struct Robustness
   std::vector<double> correlation; // of each number with the largest growth ratio: Spearman's
   int trained = 0;                 // full points that the basis is made of
   int basis = 0;                   // shapes
+  double model_error = 0;          // of the matrices as polynomials of the numbers
 };
 
 /// Options -robustness_...
@@ -79,6 +81,7 @@ struct RobustnessProblem
   const RobustnessSettings& settings;
   const std::vector<UncertainNumber>& numbers;
   std::function<BrakeModel(std::span<const double> values)> model_at; // on MPI_COMM_SELF
+  FrictionLaw friction;                                               // of the scene
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
