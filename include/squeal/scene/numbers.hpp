@@ -54,7 +54,7 @@ std::vector<std::string> contact_names(const Scene& scene);
 std::vector<SceneNumber> from_zero(const Scene& scene, const SceneNumber& number);
 
 /// The unit of a number of a scene, "-" where it has none.
-std::string unit_of_number(const std::string& key);
+std::string unit_of_number(const Scene& scene, const std::string& key);
 
 /// What a number's key calls by its place alone, "part.0.young" or "contact.1.gap": the name of that part, or
 /// "pad on disc". Empty where the key says it itself.
