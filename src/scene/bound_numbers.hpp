@@ -1,5 +1,5 @@
 #pragma once
-/// Numbers of a scene as the members that the scene's keys bind.
+/// Numbers of a scene as the members that the scene's keys bind, with messages about those that are not there.
 #include "scene_keys.hpp"
 
 namespace squeal
@@ -29,6 +29,13 @@ struct EntryKey
 };
 
 std::vector<EntryKey> entries_of(Scene& scene, const std::string& table);
+
+/// The value of a number that a table names, such as "[branch]". Throws Error if the key is not that of a number that
+/// the structure, its contact or its loads have.
+double number_at(const Scene& scene, const std::string& key, const std::string& table);
+
+/// Throws Error, with the place of the member, if the scene is none with this value of the number.
+void need_scene(const Scene& scene, const SceneNumber& number, const std::string& place, const std::string& label);
 
 /// The shortest text that reads back as the same number.
 std::string text_of_number(double value);

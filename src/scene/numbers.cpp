@@ -2,7 +2,6 @@
 #include "squeal/scene/numbers.hpp"
 
 #include "bound_numbers.hpp"
-#include "scene_numbers.hpp"
 #include "squeal/base/error.hpp"
 #include "toml_values.hpp"
 
@@ -36,10 +35,16 @@ template <class Check> void prefixed(const std::string& prefix, Check check)
 
 } // namespace
 
-double number_at(const Scene& scene, const std::string& key, NumberTable table)
+std::vector<SceneNumber> numbers_of(std::span<const std::string> keys, std::span<const double> values)
 {
-  const auto refusal = [&](const std::string& why)
-  { return Error(std::string(word(table)) + " key = \"" + key + "\" " + why); };
+  std::vector<SceneNumber> numbers;
+  for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({keys[i], values[i]});
+  return numbers;
+}
+
+double number_at(const Scene& scene, const std::string& key, const std::string& table)
+{
+  const auto refusal = [&](const std::string& why) { return Error(table + " key = \"" + key + "\" " + why); };
   const std::string first = key.substr(0, key.find('.'));
   if (std::ranges::find(of_the_mesh, first) != of_the_mesh.end())
     throw refusal("would change the mesh; name a number of " + joined(physical));
@@ -79,7 +84,7 @@ public:
     if (numbers == 2 && sweep_.key[0] == sweep_.key[1])
       fail(&sweep_.key, "names \"" + sweep_.key[0] + "\" twice: give two different numbers");
     for (const std::string& key : sweep_.key)
-      prefixed(places_.at(&sweep_.key) + ": ", [&] { (void)number_at(scene_, key, NumberTable::sweep); });
+      prefixed(places_.at(&sweep_.key) + ": ", [&] { (void)number_at(scene_, key, "[sweep]"); });
     check_form();
     for (std::size_t i = 0; i < numbers; ++i)
       for (const auto* list : {&sweep_.from, &sweep_.to})
@@ -149,7 +154,7 @@ void resolve_branch(Scene& scene, const Places& places)
   if (!scene.branch) return;
   BranchSettings& branch = *scene.branch;
   const auto fail = [&](const void* member, const std::string& text) { throw Error(places.at(member) + ": " + text); };
-  prefixed(places.at(&branch.key) + ": ", [&] { branch.own = number_at(scene, branch.key, NumberTable::branch); });
+  prefixed(places.at(&branch.key) + ": ", [&] { branch.own = number_at(scene, branch.key, "[branch]"); });
   if (branch.from == branch.to)
     fail(&branch.to, "[branch] from and to are both " + text_of_number(branch.to) + ": give a range");
   if (branch.own < std::min(branch.from, branch.to) || branch.own > std::max(branch.from, branch.to))
@@ -196,7 +201,7 @@ const std::vector<TableNumbers> linear_in = {
     {"spring", {"stiffness"}}};
 
 /// Those of an entry's numbers that are not zero.
-std::vector<SceneNumber> numbers_of(Scene& scene, const EntryKey& entry, const std::vector<const char*>& keys)
+std::vector<SceneNumber> numbers_in(Scene& scene, const EntryKey& entry, const std::vector<const char*>& keys)
 {
   std::vector<SceneNumber> numbers;
   for (const char* own : keys)
@@ -214,13 +219,13 @@ std::vector<SceneNumber> sensitive_numbers(const Scene& scene)
 {
   std::vector<SceneNumber> numbers;
   for (const std::string& key : scene.sensitivity->numbers)
-    numbers.push_back({key, number_at(scene, key, NumberTable::sensitivity)});
+    numbers.push_back({key, number_at(scene, key, "[sensitivity]")});
   if (!numbers.empty()) return numbers;
   Scene copy = scene;
   for (const auto& [table, keys] : derived_by)
     if (!scene.matrices || table != "damping") // C is given
       for (const EntryKey& entry : entries_of(copy, table))
-        std::ranges::copy(numbers_of(copy, entry, keys), std::back_inserter(numbers));
+        std::ranges::copy(numbers_in(copy, entry, keys), std::back_inserter(numbers));
   return numbers;
 }
 
@@ -235,7 +240,7 @@ std::vector<SceneComponent> components_of(const Scene& scene)
     {
       const bool unique = std::ranges::count(entries, entry.title, &EntryKey::title) == 1;
       SceneComponent component{table, unique ? entry.title : entry.key + " (" + entry.title + ")",
-                               numbers_of(copy, entry, keys)};
+                               numbers_in(copy, entry, keys)};
       for (SceneNumber& number : component.doubled) number.value *= 2;
       if (!component.doubled.empty()) components.push_back(std::move(component));
     }

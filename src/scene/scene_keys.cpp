@@ -205,7 +205,7 @@ SceneKeys keys_of(Contact& c)
   return {
       {"rotor", &c.rotor, "text", "named surface or point that the drive moves", required},
       {"stator", &c.stator, "text", "named surface or point that slides on it", required},
-      {"gap", &c.gap, "m", "initial gap, positive when open", contact},
+      {"gap", &c.gap, "m", "initial gap, positive when open", gap},
       {"reach", &c.reach, "m", "largest distance of the surfaces along the normal; it adds to the gap", not_negative,
        mesh},
       {"normal", &c.normal, "-",
@@ -213,12 +213,12 @@ SceneKeys keys_of(Contact& c)
       {"compliance", &c.compliance, "m3/N",
        "approach of the surfaces over pressure, as of rough linings, in series with the pairs; of points in m/N; 0: "
        "rigid",
-       not_negative, contact},
+       not_negative, gap},
       {"slave", choice_of(c.slave), "word", "side whose nodes have the pairs: the finer or softer one"},
       {"tangents", &c.tangents, "-", "one direction: plane friction along it; or two; when absent, two are chosen",
-       direction, contact},
-      {"rotation", braces(c.rotation), "table", "rotation of the rotor: {axis, centre, rate}", contact},
-      {"velocity", &c.velocity, "m/s", "velocity of the rotor's surface, instead of a rotation", velocity, contact},
+       direction, drive},
+      {"rotation", braces(c.rotation), "table", "rotation of the rotor: {axis, centre, rate}", drive},
+      {"velocity", &c.velocity, "m/s", "velocity of the rotor's surface, instead of a rotation", velocity, drive},
   };
 }
 

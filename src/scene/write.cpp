@@ -175,7 +175,7 @@ std::string rule_text(const SceneKey& key)
 /// A section of the page of keys: heading, and a row for each key.
 std::string page_table(const std::string& head, const std::string& meaning, const SceneKeys& keys)
 {
-  static constexpr std::array effects = {"",        "load", "friction",        "contact",
+  static constexpr std::array effects = {"",        "load", "friction",        "gap", "drive",
                                          "damping", "mass", "stiffness, mass", "mesh"};
   std::string text = "\n### " + markdown_code(head) + ": " + meaning + "\n\n" +
                      markdown_head({"key", "unit", "default", "value", "changes", "meaning"});

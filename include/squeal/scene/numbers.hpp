@@ -14,6 +14,9 @@ struct SceneNumber
   double value = 0;
 };
 
+/// Numbers with these keys and values.
+std::vector<SceneNumber> numbers_of(std::span<const std::string> keys, std::span<const double> values);
+
 /// The key of the friction coefficient.
 inline constexpr const char* friction_coefficient_key = "friction.coefficient";
 
@@ -23,7 +26,8 @@ enum class Effect
   nothing,
   load,
   friction,           // its law
-  contact,            // gaps, drive, compliance, and the rows of the pairs where tangents turn with the drive
+  gap,                // of contacts, and their compliance
+  drive,              // of contacts, and the rows of pairs whose tangents turn with it
   damping,            // C, and the stiffness that loss factors multiply
   mass,               // M, and C by its part of M
   stiffness_and_mass, // M, C and K
