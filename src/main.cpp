@@ -7,7 +7,6 @@
 #include "squeal/report/report.hpp"
 #include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"
-#include "squeal/scene/reference.hpp"
 #include "squeal/session_options.hpp"
 #include "squeal/solver_options.hpp"
 
@@ -185,13 +184,13 @@ void print_help()
               "  SCENE             a scene file (.toml), or a folder that holds a scene.toml\n"
               "%s"
               "  exit code: 0 all converged, 2 a stage did not (the report says which), 3 asked to end, 1 an error\n\n"
-              "%s\n"
+              "Keys of a scene file: squeal --reference keys\n\n"
               "Algorithm options (PETSc options database) [default]\n%s\n"
               "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes\n %s\n"
               "e.g. -cycle_snes_monitor, -modes_pep_monitor, -cycle_snes_rtol 1e-3.\n\n"
               "Options of the whole run, PETSc's:\n%s",
-              SQUEAL_VERSION, argument_reference().c_str(), scene_reference().c_str(), option_reference().c_str(),
-              prefixes.c_str(), session_option_reference().c_str());
+              SQUEAL_VERSION, argument_reference().c_str(), option_reference().c_str(), prefixes.c_str(),
+              session_option_reference().c_str());
 }
 
 /// The page inputs/KEYS.md.
@@ -216,7 +215,7 @@ void print_key_page()
       "Options are of PETSc's database: of the command line, `PETSC_OPTIONS`, and files `.petscrc`.\n\n%s"
       "\n## Options of solvers\n\nOptions of PETSc's and SLEPc's own solvers follow the prefixes%s.\n"
       "One that no solver asks for is an error. Those of the whole run are:\n\n```text\n%s```\n",
-      scene_page().c_str(), arguments.c_str(), option_page().c_str(), prefixes.c_str(),
+      scene_reference().c_str(), arguments.c_str(), option_page().c_str(), prefixes.c_str(),
       session_option_reference().c_str());
 }
 

@@ -1,4 +1,4 @@
-/// squeal_mesher: reads a mesh, or meshes a geometry, with libgmsh. squeal starts it; see src/mesh/mesher_process.cpp.
+/// squeal_mesher: reads a mesh, or meshes a geometry, with libgmsh. squeal starts it; see src/mesh/mesh_file.cpp.
 ///
 ///   squeal_mesher shut-in NAME [parameter value]…   reads the file of this name in a sandbox
 ///   squeal_mesher free NAME [parameter value]…      lets a geometry run what it holds
@@ -158,10 +158,10 @@ int main(int argc, char** argv)
   limit_memory();
 #endif
   for (int inherited = answer_descriptor + 1; inherited < 1024; ++inherited) close(inherited); // MPI's
-  const std::string open = argv[1] == std::string(word(MesherRights::shut_in)) ? shut_in() : "";
+  const std::string open = argv[1] == std::string(shut_in_mesher) ? shut_in() : "";
   MesherAnswer answer = answer_of(argc, argv);
   answer.left_open = open;
-  const std::string bytes = packed(answer);
+  const std::string bytes = packed(std::move(answer));
   for (std::size_t sent = 0; sent < bytes.size();)
   {
     const ssize_t size = write(answer_descriptor, bytes.data() + sent, bytes.size() - sent);

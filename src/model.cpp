@@ -2,8 +2,10 @@
 
 #include "squeal/base/constants.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/base/shared.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/ties.hpp"
+#include "squeal/solid/loads.hpp"
 #include "squeal/solid/matrix_rows.hpp"
 #include "squeal/solid/mesh_piece.hpp"
 #include "squeal/solid/probes.hpp"
@@ -11,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace squeal
 {
@@ -132,25 +135,20 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   return model;
 }
 
-/// The structure and its contact under another law of friction, of which no matrix depends.
-BrakeModel with_friction(const Model& model, const FrictionLaw& friction)
+/// Structure and contact that share all matrices with these.
+BrakeModel sharing(const Structure& own, const Interface& contact)
 {
-  const Structure& own = model.structure;
-  const Interface& contact = model.interface;
   BrakeModel result{{},
-                    {contact.pairs, contact.directions, copy_of(contact.B), contact.gap, contact.drive,
-                     contact.geometry, contact.tangents, contact.compliance, friction}};
+                    {contact.pairs, contact.directions, shared(contact.B.get()), contact.gap, contact.drive,
+                     contact.geometry, contact.tangents, contact.compliance, contact.friction}};
   Structure& structure = result.structure;
   for (const auto matrix :
        {&Structure::M, &Structure::C, &Structure::K, &Structure::G, &Structure::H, &Structure::K_loss})
-    if ((own.*matrix).get()) structure.*matrix = copy_of((own.*matrix).get());
-  for (Mat A : {structure.M.get(), structure.C.get(), structure.K.get(), structure.K_loss.get()})
-    if (A) mark_symmetric(A);
+    structure.*matrix = shared((own.*matrix).get());
   structure.loss_omega = own.loss_omega;
-  structure.load = copy_of(own.load);
+  structure.load = shared(own.load.get());
   structure.elements = own.elements;
   structure.names = own.names;
-  check_interface(result.interface, "contact", comm_of(own.load));
   return result;
 }
 
@@ -171,12 +169,10 @@ Mesh read_mesh_unless_ended(const Scene& scene, MPI_Comm comm)
   return mesh;
 }
 
-/// `mesh`: on rank 0.
-Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
+/// Numbers the mesh of rank 0 and finds its pairs.
+MeshPiece numbered(const Scene& scene, Mesh mesh, ContactPairs& contact, MPI_Comm comm)
 {
-  Model model;
   MeshPiece piece;
-  ContactPairs contact;
   piece.mesh = std::move(mesh);
   end_if_asked(comm);
   on_rank_zero(comm, [&] { contact = make_pairs(piece.mesh, scene); });
@@ -190,10 +186,12 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
   on_rank_zero(comm, number);
   distribute(piece, comm);
   end_if_asked(comm);
-  model.structure = assemble(piece, scene, comm);
-  model.interface = make_interface(contact.pairs, scene, piece.dofs, comm);
-  model.coverage = contact.coverage;
-  model.probes = probe_rows(scene.probes, piece.mesh, piece.dofs, comm);
+  return piece;
+}
+
+/// Leaves the mesh and the degrees of freedom of a piece on rank 0.
+void take_mesh(Model& model, MeshPiece piece, MPI_Comm comm)
+{
   if (rank_of(comm) == 0)
   {
     model.mesh = std::move(piece.mesh);
@@ -201,7 +199,28 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
   }
   else
     model.dofs.size = piece.dofs.size;
+}
+
+Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
+{
+  Model model;
+  ContactPairs contact;
+  MeshPiece piece = numbered(scene, std::move(mesh), contact, comm);
+  model.structure = assemble(piece, scene, comm);
+  model.interface = make_interface(contact.pairs, scene, piece.dofs, comm);
+  model.coverage = contact.coverage;
+  model.probes = probe_rows(scene.probes, piece.mesh, piece.dofs, comm);
+  take_mesh(model, std::move(piece), comm);
   return model;
+}
+
+/// The mesh with points and reference points where the scene has them.
+Mesh with_points(Mesh mesh, const Scene& scene)
+{
+  for (const Point& point : scene.points) mesh.nodes[static_cast<std::size_t>(mesh.points.at(point.name))] = point.at;
+  for (const RigidBody& body : scene.rigid_bodies)
+    mesh.nodes[static_cast<std::size_t>(mesh.points.at(body.name))] = body.at;
+  return mesh;
 }
 
 } // namespace
@@ -219,22 +238,134 @@ Model build_model(const Scene& scene, MPI_Comm comm)
   return model;
 }
 
-Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm)
+NearbyModels::NearbyModels(const Model& model, const Scene& scene, MPI_Comm comm)
+    : model_(model), scene_(scene), comm_(comm)
 {
-  if (scene.matrices) return model_of_matrices(scene, comm);
-  return model_of_mesh(scene, rank_of(comm) == 0 ? model.mesh : Mesh{}, comm);
-}
-
-BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers, MPI_Comm comm)
-{
-  const Scene other = scene_with(scene, numbers);
-  const auto is_friction = [&](const SceneNumber& number)
-  { return effect_of_number(scene, number.key) == Effect::friction; };
   int relation = MPI_UNEQUAL;
   MPI_Comm_compare(comm, comm_of(model.structure.load), &relation);
-  if (relation == MPI_IDENT && std::ranges::all_of(numbers, is_friction)) return with_friction(model, other.friction);
-  Model changed = rebuild_model(model, other, comm);
-  return {std::move(changed.structure), std::move(changed.interface)};
+  if (relation == MPI_IDENT) own_ = {sharing(model.structure, model.interface), Values{}};
+}
+
+std::set<Effect> NearbyModels::changes(const Known& known, const Values& values) const
+{
+  if (!known.values) return {Effect::mesh};
+  std::set<Effect> changed;
+  const auto compare = [&](const Values& these, const Values& others)
+  {
+    for (const auto& [key, value] : these)
+      if (const auto other = others.find(key); other == others.end() || other->second != value)
+        changed.insert(effect_of_number(scene_, key));
+  };
+  compare(values, *known.values);
+  compare(*known.values, values);
+  return changed;
+}
+
+const MeshPiece& NearbyModels::piece(const Scene& scene)
+{
+  if (piece_) return *piece_;
+  piece_ = numbered(scene, rank_of(comm_) == 0 ? with_points(model_.mesh, scene) : Mesh{}, pairs_, comm_);
+  ++made_.mesh;
+  return *piece_;
+}
+
+BrakeModel NearbyModels::made_from_files(const Scene& scene)
+{
+  last_.model = {};
+  Model model = model_of_matrices(scene, comm_);
+  ++made_.matrices;
+  ++made_.load;
+  ++made_.contact;
+  return {std::move(model.structure), std::move(model.interface)};
+}
+
+BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>& from_own,
+                                      const std::set<Effect>& from_last)
+{
+  const auto serves = [](const std::set<Effect>& changed, std::initializer_list<Effect> effects)
+  { return std::ranges::none_of(effects, [&](Effect effect) { return changed.contains(effect); }); };
+  // The model at hand whose part no change enters; null: the part is to be made.
+  const auto at_hand = [&](std::initializer_list<Effect> effects) -> const BrakeModel*
+  {
+    if (serves(from_own, effects)) return &own_.model;
+    return serves(from_last, effects) ? &last_.model : nullptr;
+  };
+  const BrakeModel *const
+      mass_of = at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::mass}),
+      *const stiffness_of = at_hand({Effect::mesh, Effect::stiffness_and_mass}),
+      *const loss_of = at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::damping}),
+      *const damping_of = at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::mass, Effect::damping}),
+      *const load_of = at_hand({Effect::mesh, Effect::load}), *const rows_of = at_hand({Effect::mesh, Effect::drive}),
+      *const contact_of = at_hand({Effect::mesh, Effect::drive, Effect::gap});
+  BrakeModel next;
+  if (damping_of)
+    next = sharing(damping_of->structure, {});
+  else
+  {
+    for (const auto& [of, matrix] : {std::pair{mass_of, &Structure::M}, {stiffness_of, &Structure::K}})
+      if (!of) last_.model.structure.*matrix = {}; // not beside the new one
+    last_.model.structure.C = {};
+    next.structure = assemble(piece(scene), scene, comm_);
+    ++made_.matrices;
+  }
+  Structure& structure = next.structure;
+  if (mass_of) structure.M = shared(mass_of->structure.M.get());
+  if (stiffness_of) structure.K = shared(stiffness_of->structure.K.get());
+  if (stiffness_of) structure.G = shared(stiffness_of->structure.G.get());
+  if (loss_of) structure.K_loss = shared(loss_of->structure.K_loss.get());
+  if (load_of)
+    structure.load = shared(load_of->structure.load.get());
+  else
+  {
+    structure.load = assemble_load(piece(scene).mesh, scene, piece(scene).dofs, comm_);
+    ++made_.load;
+  }
+  if (contact_of)
+    next.interface = sharing({}, contact_of->interface).interface;
+  else
+  {
+    const MeshPiece& mesh = piece(scene);
+    next.interface = make_interface(pairs_.pairs, scene, mesh.dofs, comm_);
+    ++made_.contact;
+    if (rows_of) next.interface.B = shared(rows_of->interface.B.get());
+  }
+  return next;
+}
+
+BrakeModel NearbyModels::at(std::span<const SceneNumber> numbers)
+{
+  const Scene scene = scene_with(scene_, numbers);
+  Values values;
+  for (const auto& [key, value] : numbers) values[key] = value;
+  const std::set<Effect> from_own = changes(own_, values), from_last = changes(last_, values);
+  last_.values.reset(); // until the next model is made
+  if (from_last.contains(Effect::mesh)) piece_.reset();
+  const auto is_friction = [](Effect effect) { return effect == Effect::friction; };
+  if (!scene.matrices)
+    last_.model = made_of_mesh(scene, from_own, from_last);
+  else if (std::ranges::all_of(from_own, is_friction))
+    last_.model = sharing(own_.model.structure, own_.model.interface);
+  else if (!std::ranges::all_of(from_last, is_friction))
+    last_.model = made_from_files(scene);
+  Interface& interface = last_.model.interface;
+  interface.friction = scene.friction;
+  check_interface(interface, "contact", comm_);
+  last_.values = std::move(values);
+  return sharing(last_.model.structure, interface);
+}
+
+Model NearbyModels::whole_at(std::span<const SceneNumber> numbers)
+{
+  const Scene scene = scene_with(scene_, numbers);
+  if (scene.matrices) return model_of_matrices(scene, comm_);
+  Model model;
+  BrakeModel brake = at(numbers);
+  model.structure = std::move(brake.structure);
+  model.interface = std::move(brake.interface);
+  model.probes = probe_rows(scene.probes, piece(scene).mesh, piece(scene).dofs, comm_);
+  model.coverage = pairs_.coverage;
+  take_mesh(model, piece(scene), comm_);
+  return model;
 }
 
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)

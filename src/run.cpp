@@ -119,10 +119,9 @@ BrakeBranch run_branch(const Chain& chain)
   const double tolerance = scene.cycle.tolerance > 0 ? scene.cycle.tolerance : plain_tolerance;
   const std::string reason = no_cycle_to_follow(report.cycle, tolerance);
   if (!reason.empty()) return not_run<BrakeBranch>(OutcomeKind::skipped, reason);
-  const auto model_at = [&](double parameter)
-  {
-    return model_with(chain.model, scene, std::array{SceneNumber{scene.branch->key, parameter}},
-                      comm_of(chain.model.structure.load));
+  NearbyModels models(chain.model, scene, comm_of(chain.model.structure.load));
+  const auto model_at = [&](double parameter) {
+    return models.at(std::array{SceneNumber{scene.branch->key, parameter}});
   };
   return find_branch({*scene.branch, model_at, chain.sliding(), report.cycle, report.modes.modes, scene.fidelity,
                       steps_along_branch(scene.cycle, report.cycle), tolerance, chain.model.probes, scene.modes,
@@ -138,11 +137,12 @@ Sensitivity run_sensitivity(const Chain& chain)
   if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
   if (chain.model.structure.H.get())
     return not_run<Sensitivity>(OutcomeKind::refused, "the structure has a circulatory part");
+  NearbyModels models(chain.model, scene, comm_of(chain.model.structure.load));
   const auto model_at = [&](std::span<const SceneNumber> numbers)
   {
     std::vector<SceneNumber> all;
     for (const SceneNumber& number : numbers) std::ranges::copy(from_zero(scene, number), std::back_inserter(all));
-    return model_with(chain.model, scene, all, comm_of(chain.model.structure.load));
+    return models.at(all);
   };
   std::vector<int> probes;
   for (const Change& change : scene.changes)
@@ -162,13 +162,13 @@ Sweep run_scene_sweep(const Chain& chain)
                                                 "direction of rotation is not known, as another code's friction is "
                                                 "in the symmetric part of K as well: sweep one direction, and the "
                                                 "other one with matrices of its own");
+  std::optional<NearbyModels> models; // of the group of ranks that this one is in
+  const auto models_on = [&](MPI_Comm comm) -> NearbyModels&
+  { return models && models->comm() == comm ? *models : models.emplace(chain.model, scene, comm); };
   const auto model_at = [&](std::span<const double> values, MPI_Comm comm)
-  {
-    std::vector<SceneNumber> numbers;
-    for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.sweep->key[i], values[i]});
-    return model_with(chain.model, scene, numbers, comm);
-  };
-  const auto motion_at = [&](const SweptPlace& place, MPI_Comm comm) { return find_swept_motion(chain, place, comm); };
+  { return models_on(comm).at(numbers_of(scene.sweep->key, values)); };
+  const auto motion_at = [&](const SweptPlace& place, MPI_Comm comm)
+  { return find_swept_motion(chain, place, models_on(comm)); };
   return run_sweep({*scene.sweep, model_at, motion_at, scene.modes, chain.options.modes, chain.options.equilibrium,
                     chain.options.sweep},
                    comm_of(chain.model.structure.load));
@@ -178,12 +178,10 @@ Robustness run_robustness(const Chain& chain)
 {
   const Scene& scene = chain.scene;
   if (!scene.robustness) return not_run<Robustness>(OutcomeKind::off, "the scene has no [robustness]");
-  const auto model_at = [&](std::span<const double> values)
-  {
-    std::vector<SceneNumber> numbers;
-    for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.uncertain[i].key, values[i]});
-    return model_with(chain.model, scene, numbers, PETSC_COMM_SELF);
-  };
+  NearbyModels models(chain.model, scene, PETSC_COMM_SELF);
+  std::vector<std::string> keys;
+  for (const UncertainNumber& number : scene.uncertain) keys.push_back(number.key);
+  const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(keys, values)); };
   return find_robustness({*scene.robustness, scene.uncertain, model_at, scene.friction, scene.modes,
                           chain.options.modes, chain.options.equilibrium, chain.options.robustness},
                          comm_of(chain.model.structure.load));

@@ -15,9 +15,7 @@ namespace
 /// The scene at a point, up to what is heard.
 Scene scene_at(const Scene& scene, const std::vector<double>& values)
 {
-  std::vector<SceneNumber> numbers;
-  for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({scene.sweep->key[i], values[i]});
-  Scene at = scene_with(scene, numbers);
+  Scene at = scene_with(scene, numbers_of(scene.sweep->key, values));
   at.cycle.enabled = true;
   at.cycle.starts = 0;
   at.cycle.save_state.clear();
@@ -95,10 +93,10 @@ SweptMotion motion_of(const Report& report, const Scene& scene)
 
 } // namespace
 
-SweptMotion find_swept_motion(const Chain& chain, const SweptPlace& place, MPI_Comm comm)
+SweptMotion find_swept_motion(const Chain& chain, const SweptPlace& place, NearbyModels& models)
 {
   const Scene scene = scene_at(chain.scene, place.values);
-  Model model = rebuild_model(chain.model, scene, comm);
+  Model model = models.whole_at(numbers_of(chain.scene.sweep->key, place.values));
   if (place.reversed) reverse_rotation(model.structure, model.interface);
   Report report;
   Chain at{scene, chain.options, model, report, {}};

@@ -4,6 +4,9 @@
 #include "squeal/report/report.hpp"
 #include "squeal/scene/numbers.hpp"
 
+#include <map>
+#include <set>
+
 namespace squeal
 {
 
@@ -23,11 +26,56 @@ struct Model
 /// Collective. Error: as of the mesh, the structure and the interface; no mass. Rank 0 reads and numbers the mesh.
 Model build_model(const Scene& scene, MPI_Comm comm);
 
-/// The model of a scene on the same mesh, in the same layout. Collective.
-Model rebuild_model(const Model& model, const Scene& scene, MPI_Comm comm);
+/// How often the parts of models were made.
+struct PartsMade
+{
+  int mesh = 0;     // its numbering and pairs
+  int matrices = 0; // those of the structure that a number changes
+  int load = 0;
+  int contact = 0; // rows, gaps and drive of the pairs
+};
 
-/// Structure and contact of the scene with other values of its numbers, likewise. Collective.
-BrakeModel model_with(const Model& model, const Scene& scene, std::span<const SceneNumber> numbers, MPI_Comm comm);
+/// Models of a scene with other values of its numbers, on the same mesh and in the same layout. A part that no changed
+/// number enters is shared with the model before, or with the scene's own: the handles of matrices are then equal.
+class NearbyModels
+{
+public:
+  /// Borrows both. Parts of `model` are shared where it is on the same communicator.
+  NearbyModels(const Model& model, const Scene& scene, MPI_Comm comm);
+
+  /// Structure and contact with these values; all other numbers have the scene's. Collective. Error: as build_model, or
+  /// they make no scene.
+  BrakeModel at(std::span<const SceneNumber> numbers);
+
+  /// The same with mesh and probes, as build_model returns it. Collective.
+  Model whole_at(std::span<const SceneNumber> numbers);
+
+  MPI_Comm comm() const { return comm_; }
+  const PartsMade& made() const { return made_; }
+
+private:
+  using Values = std::map<std::string, double>;
+
+  /// A model at hand, by its values of numbers.
+  struct Known
+  {
+    BrakeModel model{};
+    std::optional<Values> values{}; // nothing: there is no model
+  };
+
+  std::set<Effect> changes(const Known& known, const Values& values) const;
+  BrakeModel made_from_files(const Scene& scene);
+  BrakeModel made_of_mesh(const Scene& scene, const std::set<Effect>& from_own, const std::set<Effect>& from_last);
+  const MeshPiece& piece(const Scene& scene);
+
+  const Model& model_;
+  const Scene& scene_;
+  MPI_Comm comm_;
+  Known own_{}, last_{};
+  std::optional<MeshPiece> piece_{};
+  ContactPairs pairs_{};
+  PartsMade made_{};
+};
 
 /// What the model is, as far as it is known before anything is solved; warnings and length on rank 0. Collective.
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm);

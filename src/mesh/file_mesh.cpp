@@ -1,4 +1,4 @@
-/// Packing of a mesh into bytes: a magic word, then sizes and contents in the order of the members.
+/// Packing of a mesh into bytes: sizes and contents in the order of the members, between two magic words.
 #include "squeal/mesh/file_mesh.hpp"
 
 #include <cstdint>
@@ -12,80 +12,91 @@ namespace squeal
 namespace
 {
 
-constexpr std::uint64_t magic = 0x3168'7365'6d71'7371; // also the end mark, so that a cut answer is noticed
-
+/// Appends what it passes to bytes.
 class Writer
 {
 public:
-  template <class T> void add(const T& value)
-  {
-    static_assert(std::is_trivially_copyable_v<T>);
-    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-  }
+  void pass(const void* values, std::size_t size) { bytes.append(static_cast<const char*>(values), size); }
+  void check(std::uint64_t) const {}
 
-  template <class List> void add_list(const List& list)
-  {
-    add<std::uint64_t>(list.size());
-    bytes.append(reinterpret_cast<const char*>(list.data()), list.size() * sizeof(typename List::value_type));
-  }
-
-  std::string bytes;
+  std::string bytes{};
 };
 
+/// Sets what it passes from bytes.
 class Reader
 {
 public:
   explicit Reader(const std::string& bytes) : bytes_(bytes) {}
 
-  template <class T> T next()
+  void pass(void* values, std::size_t size)
   {
-    T value;
-    take(&value, sizeof value);
-    return value;
-  }
-
-  template <class List> List next_list()
-  {
-    const auto size = next<std::uint64_t>();
-    if (size > (bytes_.size() - place_) / sizeof(typename List::value_type)) throw std::runtime_error("it is cut off");
-    List list(size, typename List::value_type{});
-    take(list.data(), size * sizeof(typename List::value_type));
-    return list;
-  }
-
-private:
-  void take(void* target, std::size_t size)
-  {
-    if (size > bytes_.size() - place_) throw std::runtime_error("it is cut off");
-    if (size > 0) std::memcpy(target, bytes_.data() + place_, size);
+    check(size);
+    if (size > 0) std::memcpy(values, bytes_.data() + place_, size);
     place_ += size;
   }
 
+  /// Throws if fewer bytes are left.
+  void check(std::uint64_t size) const
+  {
+    if (size > bytes_.size() - place_) throw std::runtime_error("it is no whole mesh");
+  }
+
+private:
   const std::string& bytes_;
   std::size_t place_ = 0;
 };
 
+template <class Archive> void pass(Archive& archive, int& value)
+{
+  archive.pass(&value, sizeof value);
+}
+
+template <class Archive> void pass(Archive& archive, ElementBlock& block);
+
+template <class Archive, class List> void pass(Archive& archive, List& list)
+{
+  using Value = typename List::value_type;
+  constexpr bool is_plain = std::is_trivially_copyable_v<Value>;
+  std::uint64_t size = list.size();
+  archive.pass(&size, sizeof size);
+  archive.check(size); // each value has a byte and more
+  if constexpr (is_plain) archive.check(size * sizeof(Value));
+  list.resize(size);
+  if constexpr (is_plain)
+    archive.pass(list.data(), size * sizeof(Value));
+  else
+    for (Value& value : list) pass(archive, value);
+}
+
+template <class Archive> void pass(Archive& archive, ElementBlock& block)
+{
+  pass(archive, block.dimension);
+  pass(archive, block.type);
+  pass(archive, block.type_name);
+  pass(archive, block.nodes_per_element);
+  pass(archive, block.nodes);
+  pass(archive, block.groups);
+}
+
+template <class Archive> void pass(Archive& archive, MesherAnswer& answer)
+{
+  constexpr std::uint64_t magic = 0x3168'7365'6d71'7371; // at the end as well, so that a cut answer is noticed
+  std::uint64_t begin = magic, end = magic;
+  archive.pass(&begin, sizeof begin);
+  pass(archive, answer.problem);
+  pass(archive, answer.left_open);
+  pass(archive, answer.mesh.nodes);
+  pass(archive, answer.mesh.blocks);
+  archive.pass(&end, sizeof end);
+  if (begin != magic || end != magic) throw std::runtime_error("it is no mesh");
+}
+
 } // namespace
 
-std::string packed(const MesherAnswer& answer)
+std::string packed(MesherAnswer answer)
 {
   Writer writer;
-  writer.add(magic);
-  writer.add_list(answer.problem);
-  writer.add_list(answer.left_open);
-  writer.add_list(answer.mesh.nodes);
-  writer.add<std::uint64_t>(answer.mesh.blocks.size());
-  for (const ElementBlock& block : answer.mesh.blocks)
-  {
-    writer.add(block.dimension);
-    writer.add(block.type);
-    writer.add_list(block.type_name);
-    writer.add(block.nodes_per_element);
-    writer.add_list(block.nodes);
-    writer.add<std::uint64_t>(block.groups.size());
-    for (const std::string& group : block.groups) writer.add_list(group);
-  }
-  writer.add(magic);
+  pass(writer, answer);
   return std::move(writer.bytes);
 }
 
@@ -93,24 +104,7 @@ MesherAnswer unpacked(const std::string& bytes)
 {
   Reader reader(bytes);
   MesherAnswer answer;
-  if (reader.next<std::uint64_t>() != magic) throw std::runtime_error("it is no mesh");
-  answer.problem = reader.next_list<std::string>();
-  answer.left_open = reader.next_list<std::string>();
-  answer.mesh.nodes = reader.next_list<std::vector<Vec3>>();
-  const auto blocks = reader.next<std::uint64_t>();
-  for (std::uint64_t b = 0; b < blocks; ++b)
-  {
-    ElementBlock block;
-    block.dimension = reader.next<int>();
-    block.type = reader.next<int>();
-    block.type_name = reader.next_list<std::string>();
-    block.nodes_per_element = reader.next<int>();
-    block.nodes = reader.next_list<std::vector<int>>();
-    const auto groups = reader.next<std::uint64_t>();
-    for (std::uint64_t g = 0; g < groups; ++g) block.groups.push_back(reader.next_list<std::string>());
-    answer.mesh.blocks.push_back(std::move(block));
-  }
-  if (reader.next<std::uint64_t>() != magic) throw std::runtime_error("it is cut off");
+  pass(reader, answer);
   return answer;
 }
 

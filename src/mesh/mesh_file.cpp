@@ -1,18 +1,38 @@
-/// Mesh files and geometries, read by the mesher.
+/// Mesh files and geometries: what gmsh may be given is checked, then squeal_mesher beside the program is started, and
+/// its answer read from a pipe.
+///
+/// The mesher is spawned and not forked: a fork would copy the memory that MPI has registered. Its environment has no
+/// variables of MPI or of a scheduler's launcher, so that no library in it takes itself for a rank of this run.
 #include "squeal/mesh/mesh_file.hpp"
 
-#include "mesher_process.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/base/run_control.hpp"
 #include "squeal/mesh/mesh_input.hpp"
 
 #include <algorithm>
+#include <array>
+#include <chrono>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern char** environ;
 
 namespace squeal
 {
 
+namespace fs = std::filesystem;
+
 namespace
 {
+
+constexpr std::chrono::seconds longest_wait{3600}, report_after{30};
 
 /// Throws Error if the geometry does not define one of the given parameters.
 void check_parameters(const MeshSource& source, const std::vector<std::string>& known)
@@ -24,7 +44,7 @@ void check_parameters(const MeshSource& source, const std::vector<std::string>& 
 }
 
 /// Throws Error for a file that the mesher must not see.
-MesherTask task_of(const MeshSource& source)
+void check_source(const MeshSource& source)
 {
   const MeshInput input = scan_mesh_input(source.file);
   if (source.statements == Statements::listed) check_first_bytes(source.file);
@@ -32,41 +52,156 @@ MesherTask task_of(const MeshSource& source)
     check_parameters(source, input.parameters);
   else if (!source.parameters.empty())
     throw Error(source.file.string() + ": [mesh.parameters] need a .geo geometry; a mesh file has none. Remove them");
-  const bool trusted = source.statements == Statements::any;
-  return {source.file.string(), trusted ? MesherRights::free : MesherRights::shut_in, source.parameters};
 }
 
-/// Throws the mesher's error. A file that cannot be opened may be one that the script wanted to write.
-[[noreturn]] void fail(const MeshSource& source, const std::string& problem)
+/// The mesher beside the program, or one folder up for programs in a folder of the build.
+fs::path mesher_program()
 {
-  const bool refused = source.statements == Statements::listed && problem.find("open file") != std::string::npos;
-  throw Error(source.file.string() + ": gmsh cannot read or mesh it: " + problem +
-              (refused ? "; no file is written unless --allow-scripts is given" : ""));
+  std::error_code code;
+  const fs::path folder = fs::read_symlink("/proc/self/exe", code).parent_path();
+  for (const fs::path& place : {folder, folder.parent_path()})
+    if (is_file(place / "squeal_mesher")) return place / "squeal_mesher";
+  throw Error("the mesher " + (folder / "squeal_mesher").string() +
+              " is missing: it belongs beside the program; build or install squeal again, and not with "
+              "-DSQUEAL_GMSH=OFF, which leaves matrices and points alone");
+}
+
+std::vector<std::string> environment_without_mpi()
+{
+  constexpr std::array prefixes = {"OMPI_",  "OPAL_",  "ORTE_",  "PRTE_", "PMIX_",  "PMI_", "MPI_",
+                                   "MPICH_", "HYDRA_", "I_MPI_", "MV2_",  "SLURM_", "PALS_"};
+  std::vector<std::string> kept;
+  for (char** variable = environ; *variable; ++variable)
+  {
+    bool mpi = false;
+    for (const char* prefix : prefixes) mpi = mpi || std::strncmp(*variable, prefix, std::strlen(prefix)) == 0;
+    if (!mpi) kept.emplace_back(*variable);
+  }
+  return kept;
+}
+
+std::vector<char*> pointers_to(std::vector<std::string>& texts)
+{
+  std::vector<char*> pointers;
+  for (std::string& text : texts) pointers.push_back(text.data());
+  pointers.push_back(nullptr);
+  return pointers;
+}
+
+std::vector<std::string> arguments_of(const MeshSource& source)
+{
+  const char* rights = source.statements == Statements::any ? free_mesher : shut_in_mesher;
+  std::vector<std::string> arguments = {mesher_program().string(), rights, source.file.string()};
+  for (const auto& [name, value] : source.parameters)
+  {
+    arguments.push_back(name);
+    arguments.push_back(format("%.17g", value));
+  }
+  return arguments;
+}
+
+/// Starts the mesher, which writes its answer to `answer`. Returns 0 or an error number.
+int start(std::vector<std::string> arguments, int answer, pid_t& child)
+{
+  std::vector<std::string> environment = environment_without_mpi();
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, answer, answer_descriptor);
+  const int failed = posix_spawn(&child, arguments[0].c_str(), &actions, nullptr, pointers_to(arguments).data(),
+                                 pointers_to(environment).data());
+  posix_spawn_file_actions_destroy(&actions);
+  return failed;
+}
+
+/// Reads until the mesher closes its end. Returns nothing if it took too long, or the run is asked to end.
+std::string read_answer(int pipe, const std::string& file)
+{
+  const auto began = std::chrono::steady_clock::now();
+  auto reported = began;
+  std::string bytes;
+  std::vector<char> part(1 << 20);
+  while (true)
+  {
+    pollfd waiting{pipe, POLLIN, 0};
+    const int ready = poll(&waiting, 1, 1000);
+    const auto now = std::chrono::steady_clock::now();
+    if (now - began > longest_wait || is_asked_here()) return {};
+    if (now - reported > report_after)
+    {
+      reported = now;
+      std::printf("  gmsh is at work on %s since %.0f s\n", file.c_str(),
+                  std::chrono::duration<double>(now - began).count());
+      std::fflush(stdout);
+    }
+    if (ready <= 0) continue;
+    const ssize_t size = read(pipe, part.data(), part.size());
+    if (size < 0 && errno == EINTR) continue;
+    if (size <= 0) return bytes;
+    bytes.append(part.data(), static_cast<std::size_t>(size));
+  }
+}
+
+/// How the mesher ended, for the message of an answer that is missing.
+std::string end_of(int status)
+{
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) return "was killed, perhaps because memory ran out";
+  if (WIFSIGNALED(status)) return format("crashed (signal %d, %s)", WTERMSIG(status), strsignal(WTERMSIG(status)));
+  return format("ended with exit code %d and gave no mesh", WIFEXITED(status) ? WEXITSTATUS(status) : -1);
+}
+
+/// Runs the mesher. Throws Error if it cannot be started, is killed by a signal, or takes longer than an hour.
+MesherAnswer run_mesher(const MeshSource& source)
+{
+  const std::vector<std::string> arguments = arguments_of(source);
+  const std::string& file = arguments[2];
+  int ends[2] = {-1, -1}, status = 0;
+  if (pipe2(ends, O_CLOEXEC) != 0) throw Error(std::string("the mesher cannot be started: ") + std::strerror(errno));
+  // A descriptor that already has the mesher's number would keep its close-on-exec flag; so the copy gets a larger one.
+  const int to = fcntl(ends[1], F_DUPFD_CLOEXEC, 10);
+  pid_t child = -1;
+  const int failed = start(arguments, to, child);
+  close(to);
+  close(ends[1]);
+  const std::string bytes = failed ? std::string() : read_answer(ends[0], file);
+  close(ends[0]);
+  if (failed) throw Error("the mesher " + arguments[0] + " cannot be started: " + std::strerror(failed));
+  if (bytes.empty()) kill(child, SIGKILL); // it has ended or has taken too long
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR)
+  {
+  }
+  try
+  {
+    return unpacked(bytes);
+  }
+  catch (const std::exception&)
+  {
+    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGSYS)
+      throw Error(file + ": it starts a program, as SystemCall does, which no file may do; --allow-scripts lets a "
+                         "geometry that you trust run what it holds");
+    throw Error(file + ": the mesher (gmsh) " + end_of(status) +
+                ": the file is malformed, or gmsh cannot mesh this geometry; try it in gmsh itself");
+  }
 }
 
 } // namespace
 
-#ifdef SQUEAL_WITH_GMSH
-
 FileMesh read_mesh_file(const MeshSource& source)
 {
+  check_source(source);
   const std::string name = source.file.string();
-  MesherAnswer answer = run_mesher(task_of(source));
+  MesherAnswer answer = run_mesher(source);
   if (!answer.left_open.empty())
     std::printf("  %s is not shut in on this system: %s\n", name.c_str(), answer.left_open.c_str());
-  if (!answer.problem.empty()) fail(source, answer.problem);
+  // A file that cannot be opened may be one that the script wanted to write.
+  const bool refused = source.statements == Statements::listed && answer.problem.find("open file") != std::string::npos;
+  if (!answer.problem.empty())
+    throw Error(name + ": gmsh cannot read or mesh it: " + answer.problem +
+                (refused ? "; no file is written unless --allow-scripts is given" : ""));
   for (Vec3& node : answer.mesh.nodes) node = source.scale * node;
   return std::move(answer.mesh);
 }
-
-#else
-
-FileMesh read_mesh_file(const MeshSource& source)
-{
-  throw Error(source.file.string() + ": this squeal was built without libgmsh and reads no meshes; rebuild with "
-                                     "-DSQUEAL_GMSH=ON, or give matrices or points");
-}
-
-#endif
 
 } // namespace squeal

@@ -49,7 +49,7 @@ StepBias cycle_bias(const Report& report)
 
 std::string number_text(const Scene& scene, const std::string& key)
 {
-  const std::string unit = unit_of_number(key);
+  const std::string unit = unit_of_number(scene, key);
   return label_of_number(scene, key) + (unit == "-" ? "" : " [" + unit + "]");
 }
 

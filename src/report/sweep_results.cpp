@@ -101,7 +101,7 @@ void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
   for (const std::string& key : settings.key)
   {
     entry["names"].push_back(name_of_number(scene, key));
-    entry["units"].push_back(unit_of_number(key));
+    entry["units"].push_back(unit_of_number(scene, key));
   }
   entry["stages"] = word(settings.stages);
   entry["directions"] = word(settings.directions);

@@ -1,28 +1,41 @@
 #pragma once
-/// Numbers of a scene as the members that the scene's keys bind.
+/// Numbers of a scene as the members that the scene's keys bind, with messages about those that are not there.
 #include "scene_keys.hpp"
 
 namespace squeal
 {
 
-/// A number of a scene, with the whole value of its key where it is an entry of one.
-struct BoundNumber
-{
-  double* value = nullptr;
-  std::span<double> entries{}; // of the value that it is part of; empty: it is a value of its own
-  SceneKey key;
-  std::string label; // of the key's table
-};
-
-/// What a key leads to.
+/// A value that a key leads to in a scene.
 struct FoundValue
 {
-  std::string kind{}; // "a number", "text", "a list" and so on; empty: the scene has no such value
-  std::optional<BoundNumber> number{};
+  std::string kind{};          // "a number", "text", "a list" and so on; empty: the scene has no such value
+  double* number = nullptr;    // null: it is none
+  std::span<double> entries{}; // of the list that the number is in; empty: it is a value of its own
+  SceneKey key{};
+  std::string label{}; // of the key's table
+  std::string title{}; // of the entry of a list that its place selects, not its name
+  std::string unit = "-";
+  Effect effect{};
 };
 
-/// Selects an entry of a list by its name, or else by its place. Keys with any other value than a number have a kind.
-FoundValue find_number(Scene& scene, const std::string& key);
+/// Selects an entry of a list by its name, or else by its place.
+FoundValue find_value(Scene& scene, const std::string& key);
+
+/// An entry of a table with the key that leads to it.
+struct EntryKey
+{
+  std::string key; // "part.disc", "spring.0"; "friction" of a table that is no list
+  std::string title;
+};
+
+std::vector<EntryKey> entries_of(Scene& scene, const std::string& table);
+
+/// The value of a number that a table names, such as "[branch]". Throws Error if the key is not that of a number that
+/// the structure, its contact or its loads have.
+double number_at(const Scene& scene, const std::string& key, const std::string& table);
+
+/// Throws Error, with the place of the member, if the scene is none with this value of the number.
+void need_scene(const Scene& scene, const SceneNumber& number, const std::string& place, const std::string& label);
 
 /// The shortest text that reads back as the same number.
 std::string text_of_number(double value);

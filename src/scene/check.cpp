@@ -281,6 +281,7 @@ private:
   void check_frame(const Contact& contact) const
   {
     const auto& tangents = contact.tangents;
+    if (tangents.size() > 2) fail(&contact.tangents, "[[contact]] tangents: give one or two directions");
     if (contact.normal)
       for (const Vec3& tangent : tangents)
         if (std::abs(dot(tangent, *contact.normal)) > largest_cosine)

@@ -2,7 +2,6 @@
 #include "squeal/scene/numbers.hpp"
 
 #include "bound_numbers.hpp"
-#include "scene_numbers.hpp"
 #include "squeal/base/error.hpp"
 #include "toml_values.hpp"
 
@@ -36,10 +35,16 @@ template <class Check> void prefixed(const std::string& prefix, Check check)
 
 } // namespace
 
-double number_at(const Scene& scene, const std::string& key, NumberTable table)
+std::vector<SceneNumber> numbers_of(std::span<const std::string> keys, std::span<const double> values)
 {
-  const auto refusal = [&](const std::string& why)
-  { return Error(std::string(word(table)) + " key = \"" + key + "\" " + why); };
+  std::vector<SceneNumber> numbers;
+  for (std::size_t i = 0; i < values.size(); ++i) numbers.push_back({keys[i], values[i]});
+  return numbers;
+}
+
+double number_at(const Scene& scene, const std::string& key, const std::string& table)
+{
+  const auto refusal = [&](const std::string& why) { return Error(table + " key = \"" + key + "\" " + why); };
   const std::string first = key.substr(0, key.find('.'));
   if (std::ranges::find(of_the_mesh, first) != of_the_mesh.end())
     throw refusal("would change the mesh; name a number of " + joined(physical));
@@ -47,12 +52,12 @@ double number_at(const Scene& scene, const std::string& key, NumberTable table)
     throw refusal("is not a number of the structure, its contact or its loads" + hint_or_list(first, physical) +
                   ", such as " + friction_coefficient_key);
   Scene copy = scene; // keys bind members that can be written
-  const FoundValue found = find_number(copy, key);
+  const FoundValue found = find_value(copy, key);
   if (found.kind.empty())
     throw refusal(std::string("is not in the scene: name a number as --set does, such as ") + friction_coefficient_key);
   if (!found.number)
     throw refusal("is " + found.kind + ", not a number; of a list name an entry, such as force.0.vector.2");
-  return *found.number->value;
+  return *found.number;
 }
 
 void need_scene(const Scene& scene, const SceneNumber& number, const std::string& place, const std::string& label)
@@ -79,7 +84,7 @@ public:
     if (numbers == 2 && sweep_.key[0] == sweep_.key[1])
       fail(&sweep_.key, "names \"" + sweep_.key[0] + "\" twice: give two different numbers");
     for (const std::string& key : sweep_.key)
-      prefixed(places_.at(&sweep_.key) + ": ", [&] { (void)number_at(scene_, key, NumberTable::sweep); });
+      prefixed(places_.at(&sweep_.key) + ": ", [&] { (void)number_at(scene_, key, "[sweep]"); });
     check_form();
     for (std::size_t i = 0; i < numbers; ++i)
       for (const auto* list : {&sweep_.from, &sweep_.to})
@@ -138,64 +143,6 @@ private:
 
 } // namespace
 
-namespace
-{
-
-std::string name_of(const Part& part)
-{
-  return part.name;
-}
-std::string name_of(const Point& point)
-{
-  return point.name;
-}
-std::string name_of(const RigidBody& body)
-{
-  return body.name;
-}
-std::string name_of(const Spring& spring)
-{
-  return spring.from + " to " + spring.to;
-}
-std::string name_of(const Force& force)
-{
-  return "on " + force.on;
-}
-std::string name_of(const Pressure& pressure)
-{
-  return "on " + pressure.on;
-}
-std::string name_of(const Contact& contact)
-{
-  return contact.stator + " on " + contact.rotor;
-}
-
-/// The name of the entry at a place; nothing where the selector is a name.
-template <class List> std::string name_at(const List& list, const std::string& selector)
-{
-  for (const auto& entry : list)
-    if (name_of(entry) == selector) return "";
-  for (std::size_t i = 0; i < list.size(); ++i)
-    if (std::to_string(i) == selector) return name_of(list[i]);
-  return "";
-}
-
-} // namespace
-
-std::string name_of_number(const Scene& scene, const std::string& key)
-{
-  const std::vector<std::string> words = words_of_key(key);
-  std::string name;
-  if (words.size() < 2) return name;
-  for_each_table(scene,
-                 [&](const std::string& table, const auto& entries, const char*)
-                 {
-                   if constexpr (requires { name_of(entries.front()); })
-                     if (words[0] == table) name = name_at(entries, words[1]);
-                 });
-  return name;
-}
-
 std::string label_of_number(const Scene& scene, const std::string& key)
 {
   const std::string name = name_of_number(scene, key);
@@ -207,7 +154,7 @@ void resolve_branch(Scene& scene, const Places& places)
   if (!scene.branch) return;
   BranchSettings& branch = *scene.branch;
   const auto fail = [&](const void* member, const std::string& text) { throw Error(places.at(member) + ": " + text); };
-  prefixed(places.at(&branch.key) + ": ", [&] { branch.own = number_at(scene, branch.key, NumberTable::branch); });
+  prefixed(places.at(&branch.key) + ": ", [&] { branch.own = number_at(scene, branch.key, "[branch]"); });
   if (branch.from == branch.to)
     fail(&branch.to, "[branch] from and to are both " + text_of_number(branch.to) + ": give a range");
   if (branch.own < std::min(branch.from, branch.to) || branch.own > std::max(branch.from, branch.to))
@@ -228,33 +175,42 @@ void resolve_sweep(Scene& scene, const Places& places)
 namespace
 {
 
-/// Keys of one entry of a list, by its place.
-std::string key_of(const char* list, std::size_t place, const char* key)
+/// Numbers of tables by their keys.
+struct TableNumbers
 {
-  return std::string(list) + "." + std::to_string(place) + "." + key;
-}
+  std::string table;
+  std::vector<const char*> keys;
+};
 
-/// The same of an entry with a name.
-std::string key_of(const char* list, const std::string& name, const char* key)
-{
-  const bool plain = std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
-  return std::string(list) + "." + (plain ? name : toml_string(name)) + "." + key;
-}
+const std::vector<TableNumbers> derived_by = {
+    {"friction", {"coefficient"}},
+    {"damping", {"alpha", "beta"}},
+    {"part", {"young", "density", "loss_factor", "alpha", "beta", "rotation.rate"}},
+    {"point", {"mass"}},
+    {"rigid_body", {"mass"}},
+    {"spring", {"stiffness", "damping"}},
+    {"contact", {"rotation.rate"}}};
 
-void add_named(const Scene& scene, std::vector<SceneNumber>& numbers)
+/// What mass and stiffness of a component are linear in.
+const std::vector<TableNumbers> linear_in = {
+    {"part",
+     {"density", "young", "orthotropic.young.0", "orthotropic.young.1", "orthotropic.young.2", "orthotropic.shear.0",
+      "orthotropic.shear.1", "orthotropic.shear.2"}},
+    {"point", {"mass"}},
+    {"rigid_body", {"mass", "inertia.0", "inertia.1", "inertia.2", "inertia.3", "inertia.4", "inertia.5"}},
+    {"spring", {"stiffness"}}};
+
+/// Those of an entry's numbers that are not zero.
+std::vector<SceneNumber> numbers_in(Scene& scene, const EntryKey& entry, const std::vector<const char*>& keys)
 {
-  for (const Part& part : scene.parts)
+  std::vector<SceneNumber> numbers;
+  for (const char* own : keys)
   {
-    numbers.push_back({key_of("part", part.name, "young"), part.material.young});
-    numbers.push_back({key_of("part", part.name, "density"), part.material.density});
-    numbers.push_back({key_of("part", part.name, "loss_factor"), part.loss_factor});
-    if (part.damping) numbers.push_back({key_of("part", part.name, "alpha"), part.damping->alpha});
-    if (part.damping) numbers.push_back({key_of("part", part.name, "beta"), part.damping->beta});
-    if (part.rotation) numbers.push_back({key_of("part", part.name, "rotation.rate"), part.rotation->rate});
+    const std::string key = entry.key + "." + own;
+    if (const FoundValue found = find_value(scene, key); found.number && *found.number != 0)
+      numbers.push_back({key, *found.number});
   }
-  for (const Point& point : scene.points) numbers.push_back({key_of("point", point.name, "mass"), point.mass});
-  for (const RigidBody& body : scene.rigid_bodies)
-    numbers.push_back({key_of("rigid_body", body.name, "mass"), body.mass});
+  return numbers;
 }
 
 } // namespace
@@ -263,73 +219,31 @@ std::vector<SceneNumber> sensitive_numbers(const Scene& scene)
 {
   std::vector<SceneNumber> numbers;
   for (const std::string& key : scene.sensitivity->numbers)
-    numbers.push_back({key, number_at(scene, key, NumberTable::sensitivity)});
+    numbers.push_back({key, number_at(scene, key, "[sensitivity]")});
   if (!numbers.empty()) return numbers;
-  numbers.push_back({friction_coefficient_key, scene.friction.coefficient});
-  if (!scene.matrices) numbers.push_back({"damping.alpha", scene.damping.alpha});
-  if (!scene.matrices) numbers.push_back({"damping.beta", scene.damping.beta});
-  add_named(scene, numbers);
-  for (std::size_t i = 0; i < scene.springs.size(); ++i)
-  {
-    numbers.push_back({key_of("spring", i, "stiffness"), scene.springs[i].stiffness});
-    numbers.push_back({key_of("spring", i, "damping"), scene.springs[i].damping});
-  }
-  for (std::size_t i = 0; i < scene.contacts.size(); ++i)
-    if (scene.contacts[i].rotation)
-      numbers.push_back({key_of("contact", i, "rotation.rate"), scene.contacts[i].rotation->rate});
-  std::erase_if(numbers, [](const SceneNumber& number) { return number.value == 0; });
+  Scene copy = scene;
+  for (const auto& [table, keys] : derived_by)
+    if (!scene.matrices || table != "damping") // C is given
+      for (const EntryKey& entry : entries_of(copy, table))
+        std::ranges::copy(numbers_in(copy, entry, keys), std::back_inserter(numbers));
   return numbers;
 }
-
-namespace
-{
-
-/// A component with numbers that are not zero, if there are any.
-void add_component(std::vector<SceneComponent>& components, SceneComponent component)
-{
-  std::erase_if(component.doubled, [](const SceneNumber& number) { return number.value == 0; });
-  for (SceneNumber& number : component.doubled) number.value *= 2;
-  if (!component.doubled.empty()) components.push_back(std::move(component));
-}
-
-/// Numbers of a list within a table.
-template <class Values> void add_list(std::vector<SceneNumber>& numbers, const std::string& key, const Values& values)
-{
-  for (std::size_t k = 0; k < values.size(); ++k) numbers.push_back({key + "." + std::to_string(k), values[k]});
-}
-
-SceneComponent component_of(const Part& part)
-{
-  SceneComponent component{"part", part.name, {{key_of("part", part.name, "density"), part.material.density}}};
-  component.doubled.push_back({key_of("part", part.name, "young"), part.material.young});
-  if (const auto& orthotropy = part.material.orthotropy)
-  {
-    add_list(component.doubled, key_of("part", part.name, "orthotropic.young"), orthotropy->young);
-    add_list(component.doubled, key_of("part", part.name, "orthotropic.shear"), orthotropy->shear);
-  }
-  return component;
-}
-
-} // namespace
 
 std::vector<SceneComponent> components_of(const Scene& scene)
 {
   std::vector<SceneComponent> components;
-  for (const Part& part : scene.parts) add_component(components, component_of(part));
-  for (const Point& point : scene.points)
-    add_component(components, {"point", point.name, {{key_of("point", point.name, "mass"), point.mass}}});
-  for (const RigidBody& body : scene.rigid_bodies)
+  Scene copy = scene;
+  for (const auto& [table, keys] : linear_in)
   {
-    SceneComponent component{"rigid_body", body.name, {{key_of("rigid_body", body.name, "mass"), body.mass}}};
-    add_list(component.doubled, key_of("rigid_body", body.name, "inertia"), body.inertia);
-    add_component(components, std::move(component));
-  }
-  for (std::size_t i = 0; i < scene.springs.size(); ++i)
-  {
-    std::string name = name_of(scene.springs[i]);
-    const auto same = [&](const Spring& spring) { return name_of(spring) == name; };
-    if (std::ranges::count_if(scene.springs, same) > 1) name = format("spring.%zu (%s)", i, name.c_str());
-    add_component(components, {"spring", name, {{key_of("spring", i, "stiffness"), scene.springs[i].stiffness}}});
+    const std::vector<EntryKey> entries = entries_of(copy, table);
+    for (const EntryKey& entry : entries)
+    {
+      const bool unique = std::ranges::count(entries, entry.title, &EntryKey::title) == 1;
+      SceneComponent component{table, unique ? entry.title : entry.key + " (" + entry.title + ")",
+                               numbers_in(copy, entry, keys)};
+      for (SceneNumber& number : component.doubled) number.value *= 2;
+      if (!component.doubled.empty()) components.push_back(std::move(component));
+    }
   }
   std::string rest;
   for (const Superelement& element : scene.superelements) rest += (rest.empty() ? "" : " and ") + element.name;
@@ -340,8 +254,9 @@ std::vector<SceneComponent> components_of(const Scene& scene)
 
 std::vector<std::string> contact_names(const Scene& scene)
 {
+  Scene copy = scene;
   std::vector<std::string> names;
-  for (const Contact& contact : scene.contacts) names.push_back(name_of(contact));
+  for (const EntryKey& contact : entries_of(copy, "contact")) names.push_back(contact.title);
   return names;
 }
 

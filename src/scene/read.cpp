@@ -16,92 +16,65 @@ class Reader
 public:
   Reader(Places& places, std::filesystem::path folder) : places_(places), folder_(std::move(folder)) {}
 
-  void read_scene(const toml::table& root, Scene& scene)
+  /// `place`, `label`: of the table.
+  void read_keys(const toml::table& table, const SceneKeys& keys, const std::string& place, const std::string& label)
   {
-    std::vector<std::string> known = names_of(keys_of(scene));
-    for_each_table(scene, [&](const std::string& key, auto&, const char*) { known.push_back(key); });
-    check_known(root, known, "");
-    for (const SceneKey& key : keys_of(scene))
-      if (const toml::node* node = root.get(key.name)) read_value(key, *node, "");
-    for_each_table(scene,
-                   [&](const std::string& key, auto& member, const char*)
-                   {
-                     if (const toml::node* node = root.get(key)) read_member(key, *node, member);
-                   });
+    std::vector<std::string> known;
+    for (const SceneKey& key : keys) known.push_back(key.name);
+    for (const auto& [key, value] : table)
+      if (std::ranges::find(known, key.str()) == known.end())
+        throw Error(place_of(value) + ": " + label + "unknown key '" + std::string(key.str()) + "'" +
+                    hint_or_list(std::string(key.str()), known));
+    for (const SceneKey& key : keys)
+    {
+      if (const toml::node* value = table.get(key.name))
+        read_key(key, *value, label);
+      else if (key.need == Need::required)
+        throw Error(place + ": " + label + "needs the key '" + key.name + "' [" + key.unit + "]: " + key.meaning);
+    }
   }
 
 private:
-  static std::vector<std::string> names_of(const SceneKeys& keys)
+  void read_key(const SceneKey& key, const toml::node& node, const std::string& label)
   {
-    std::vector<std::string> names;
-    for (const SceneKey& key : keys) names.push_back(key.name);
-    return names;
+    if (const auto* tables = std::get_if<TableTarget>(&key.target)) return read_tables(key, *tables, node, label);
+    read_value({key, label, folder_}, node);
+    if (const void* const member = member_of(key.target)) places_.given[member] = place_of(node);
   }
 
-  /// Throws Error if a table has a key that is not known.
-  static void check_known(const toml::table& table, const std::vector<std::string>& known, const std::string& label)
+  void read_tables(const SceneKey& key, const TableTarget& tables, const toml::node& node, const std::string& label)
   {
-    for (const auto& [key, value] : table)
-      if (std::find(known.begin(), known.end(), key.str()) == known.end())
-        throw Error(place_of(value) + ": " + label + "unknown key '" + std::string(key.str()) + "'" +
-                    hint_or_list(std::string(key.str()), known));
-  }
-
-  template <class T> void read_member(const std::string& key, const toml::node& node, std::vector<T>& list)
-  {
-    const toml::array* array = node.as_array();
-    if (!array) throw Error(place_of(node) + ": '" + key + "' is a list; write [[" + key + "]]");
-    list.resize(array->size()); // at once, so that the addresses in places_ stay valid
-    for (std::size_t i = 0; i < array->size(); ++i)
+    const bool is_list = tables.form == TableForm::list;
+    if (is_list && !node.is_array())
+      throw Error(place_of(node) + ": '" + key.name + "' is a list; write " + heading_of(key));
+    const std::size_t size = is_list ? node.as_array()->size() : 1;
+    tables.resize(size); // at once, so that the addresses in places_ stay valid
+    for (std::size_t i = 0; i < size; ++i)
     {
-      const toml::node& entry = *array->get(i);
-      std::string label = "[[" + key + "]] ";
-      if (const toml::table* table = entry.as_table(); table && (*table)["name"].is_string())
-        label += shortened((*table)["name"].template value_or<std::string>("")) + " ";
-      read_table(entry, list[i], label);
+      const toml::node& entry = is_list ? *node.as_array()->get(i) : node;
+      const toml::table* table = entry.as_table();
+      const std::string name = table && is_list ? (*table)["name"].value_or<std::string>("") : "";
+      const std::string entry_label = label_of(key, name, label), place = place_of(entry);
+      if (!table) throw Error(place + ": " + entry_label + "is a table, not " + kind_of(entry));
+      const auto [member, own_name, title, keys] = tables.entry(i);
+      places_.given[member] = place;
+      read_keys(*table, keys, place, entry_label);
     }
   }
 
-  template <class T> void read_member(const std::string& key, const toml::node& node, std::optional<T>& table)
+  /// The member that checks of a scene name; null: they name none.
+  static const void* member_of(const Target& target)
   {
-    read_table(node, table.emplace(), "[" + key + "] ");
-  }
-
-  template <class T> void read_member(const std::string& key, const toml::node& node, T& table)
-  {
-    if constexpr (requires { table.enabled; }) table.enabled = true;
-    read_table(node, table, "[" + key + "] ");
-  }
-
-  template <class T> void read_table(const toml::node& node, T& target, const std::string& label)
-  {
-    const toml::table* table = node.as_table();
-    if (!table) throw Error(place_of(node) + ": " + label + "is a table, not " + kind_of(node));
-    places_.given[&target] = place_of(node);
-    const SceneKeys keys = keys_of(target);
-    check_known(*table, names_of(keys), label);
-    for (const SceneKey& key : keys)
-    {
-      if (const toml::node* value = table->get(key.name))
-        read_value(key, *value, label);
-      else if (key.need == Need::required)
-        throw Error(place_of(node) + ": " + label + "needs the key '" + key.name + "' [" + key.unit +
-                    "]: " + key.meaning);
-    }
-  }
-
-  /// Reads the value of a key into its member.
-  void read_value(const SceneKey& key, const toml::node& node, const std::string& label)
-  {
-    squeal::read_value({key, label, folder_}, node);
-    std::visit(
-        [&](auto target)
+    return std::visit(
+        [](const auto& of) -> const void*
         {
-          if constexpr (is_inline_table<decltype(target)>) read_table(node, target->emplace(), label + key.name + " ");
-          if constexpr (std::is_pointer_v<decltype(target)>) places_.given[target] = place_of(node);
-          if constexpr (std::is_same_v<decltype(target), Choice>) places_.given[target.member] = place_of(node);
+          using Kind = std::remove_cvref_t<decltype(of)>;
+          if constexpr (std::is_pointer_v<Kind>) return of;
+          if constexpr (std::is_same_v<Kind, Choice>) return of.member;
+          if constexpr (std::is_same_v<Kind, StartTarget>) return of.kind.member;
+          return nullptr;
         },
-        key.target);
+        target);
   }
 
   Places& places_;
@@ -112,7 +85,7 @@ private:
 
 void read_tables(const toml::table& root, Scene& scene, Places& places)
 {
-  Reader(places, scene.file.parent_path()).read_scene(root, scene);
+  Reader(places, scene.file.parent_path()).read_keys(root, keys_of(scene), scene.file.string(), "");
 }
 
 } // namespace squeal

@@ -67,17 +67,24 @@ public:
 
   void read(const toml::node& node, const Choice& target) const
   {
-    const std::string given = text(node);
     const std::vector<std::string> words(target.words.begin(), target.words.end());
-    const auto found = std::find(words.begin(), words.end(), given);
-    if (found == words.end())
-      throw Error(place_of(node) + ": " + value_.label + value_.key.name + " = '" + given + "' is none of " +
-                  joined(words) + hint_or_list(given, words));
-    target.set(target.member, static_cast<std::size_t>(found - words.begin()));
+    const std::string given = text(node);
+    const auto place = place_of_word(given, words);
+    if (!place) throw refusal(node, given, words, hint_or_list(given, words));
+    target.set(target.member, *place);
   }
 
-  void read(const toml::node& node, Start& target) const { read_start<StartKind>(node, target); }
-  void read(const toml::node& node, CycleStart& target) const { read_start<CycleStartKind>(node, target); }
+  void read(const toml::node& node, const StartTarget& target) const
+  {
+    const auto& kind = target.kind;
+    const std::vector<std::string> words(kind.words.begin(), kind.words.end() - 1);
+    const std::string given = text(node);
+    const auto place = place_of_word(given, words);
+    *target.file = place ? std::filesystem::path() : absolute(given);
+    kind.set(kind.member, place.value_or(words.size()));
+    if (!place && !is_file(*target.file))
+      throw refusal(node, given, words, ", and there is no file " + target.file->string());
+  }
 
   void read(const toml::node& node, std::filesystem::path& target) const
   {
@@ -92,30 +99,25 @@ public:
                   " (paths are relative to the scene file)");
   }
 
-  void read(const toml::node& node, std::vector<Vec3>& target) const
+  /// A value, or a list of them.
+  template <class Value> void read(const toml::node& node, std::vector<Value>& target) const
   {
     const toml::array* array = node.as_array();
+    if constexpr (std::is_same_v<Value, Vec3>) // which is a list itself
+      if (array && !array->empty() && array->get(0)->is_number()) array = nullptr;
     target.clear();
-    if (!array || (!array->empty() && array->get(0)->is_number()))
-      target.push_back(vector(node));
-    else
-      for (const toml::node& entry : *array) target.push_back(vector(entry));
-    if (target.empty() || target.size() > 2) fail(node, "one or two directions");
-  }
-
-  void read(const toml::node& node, std::vector<std::string>& target) const
-  {
-    const toml::array* array = node.as_array();
-    target.clear();
+    const auto add = [&](const toml::node& entry)
+    {
+      Value value{};
+      read(entry, value);
+      target.push_back(value);
+    };
     if (!array)
-      target.push_back(text(node));
+      add(node);
     else
-      for (const toml::node& entry : *array) target.push_back(text(entry));
-    if (target.empty()) fail(node, "at least one name");
+      for (const toml::node& entry : *array) add(entry);
+    if (target.empty()) fail(node, "at least one value");
   }
-
-  void read(const toml::node& node, std::vector<double>& target) const { read_numbers(node, target); }
-  void read(const toml::node& node, std::vector<int>& target) const { read_numbers(node, target); }
 
   /// Rows of a time and a factor, the times rising.
   void read(const toml::node& node, TimeFactor& target) const
@@ -285,43 +287,19 @@ private:
     return text.empty() ? std::filesystem::path() : (value_.folder / text).lexically_normal();
   }
 
-  /// A word of the kinds of start, or a state file.
-  template <class Kind, class Target> void read_start(const toml::node& node, Target& target) const
+  static std::optional<std::size_t> place_of_word(const std::string& word, const std::vector<std::string>& words)
   {
-    const std::string given = text(node);
-    const Words kinds = words_of(Kind::file);
-    std::vector<std::string> words;
-    for (std::size_t place = 0; place < kinds.size(); ++place)
-    {
-      const auto kind = static_cast<Kind>(place);
-      if (kind == Kind::file) continue;
-      words.emplace_back(word(kind));
-      if (given != words.back()) continue;
-      target = {kind, {}};
-      return;
-    }
-    target = {Kind::file, absolute(given)};
-    if (!is_file(target.file))
-      throw Error(place_of(node) + ": " + value_.label + value_.key.name + " = '" + given + "' is none of " +
-                  joined(words) + ", and there is no file " + target.file.string());
+    const auto found = std::ranges::find(words, word);
+    if (found == words.end()) return std::nullopt;
+    return static_cast<std::size_t>(found - words.begin());
   }
 
-  /// A number, or a list of numbers.
-  template <class Number> void read_numbers(const toml::node& node, std::vector<Number>& target) const
+  /// `more`: after the words that are allowed.
+  Error refusal(const toml::node& node, const std::string& given, const std::vector<std::string>& words,
+                const std::string& more) const
   {
-    const toml::array* array = node.as_array();
-    target.clear();
-    const auto add = [&](const toml::node& entry)
-    {
-      Number value{};
-      read(entry, value);
-      target.push_back(value);
-    };
-    if (!array)
-      add(node);
-    else
-      for (const toml::node& entry : *array) add(entry);
-    if (target.empty()) fail(node, "at least one number");
+    return Error(place_of(node) + ": " + value_.label + value_.key.name + " = '" + given + "' is none of " +
+                 joined(words) + more);
   }
 
   const ValuePlace& value_;
@@ -346,15 +324,14 @@ void refuse_value(const SceneKey& key, const std::string& place, const std::stri
 
 void read_value(const ValuePlace& value, const toml::node& node)
 {
+  const ValueReader reader(value);
   std::visit(
-      [&](auto target)
+      [&](const auto& target)
       {
-        const ValueReader reader(value);
-        if constexpr (is_inline_table<decltype(target)>)
-          return;
-        else if constexpr (std::is_pointer_v<decltype(target)>)
+        using Kind = std::remove_cvref_t<decltype(target)>;
+        if constexpr (std::is_pointer_v<Kind>)
           reader.read(node, *target);
-        else
+        else if constexpr (!std::is_same_v<Kind, TableTarget>)
           reader.read(node, target);
       },
       value.key.target);

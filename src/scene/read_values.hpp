@@ -5,10 +5,6 @@
 namespace squeal
 {
 
-/// Whether a target is filled from a table within braces.
-template <class T> constexpr bool is_inline_table =
-    std::is_same_v<T, std::optional<Rotation>*> || std::is_same_v<T, std::optional<Orthotropy>*>;
-
 /// The key of a value and what messages and paths need besides.
 struct ValuePlace
 {
@@ -24,8 +20,8 @@ std::string problem_of_number(Rule rule, double value);
 [[noreturn]] void refuse_value(const SceneKey& key, const std::string& place, const std::string& text,
                                const std::string& expected);
 
-/// Sets the member of the key; leaves one that is filled from a table. Throws Error for a value that is not of the
-/// key's kind, or outside its rule.
+/// Sets the member of a key that is no table. Throws Error for a value that is not of the key's kind, or outside its
+/// rule.
 void read_value(const ValuePlace& value, const toml::node& node);
 
 } // namespace squeal

@@ -149,20 +149,6 @@ std::vector<std::string> words_of_key(const std::string& key)
   return names_of(parse_override(key + "=0"));
 }
 
-toml::node* find_value(toml::table& root, const std::string& key)
-{
-  toml::node* node = &root;
-  for (const std::string& name : words_of_key(key))
-  {
-    std::vector<std::string> known;
-    if (node && node->is_table())
-      node = node->as_table()->get(name);
-    else
-      node = node && node->is_array() ? entry_of(*node->as_array(), name, known) : nullptr;
-  }
-  return node;
-}
-
 std::string place_of(const toml::node& node)
 {
   const auto& source = node.source();

@@ -38,9 +38,6 @@ void apply_override(toml::table& root, const std::string& text);
 /// The words of a key between its dots; a word in quotes may hold dots.
 std::vector<std::string> words_of_key(const std::string& key);
 
-/// Returns the value that an override of this key would replace; null if there is none.
-toml::node* find_value(toml::table& root, const std::string& key);
-
 /// Fills the scene from its tables and records where each value was given.
 void read_tables(const toml::table& root, Scene& scene, Places& places);
 

@@ -1,5 +1,5 @@
 /// Random numbers of a scene: their distributions, and checks of them.
-#include "scene_numbers.hpp"
+#include "bound_numbers.hpp"
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
@@ -80,7 +80,7 @@ void resolve_robustness(Scene& scene, const Places& places)
   for (UncertainNumber& number : scene.uncertain) try
     {
       if (!keys.insert(number.key).second) throw Error("[[uncertain]] " + number.key + " is there twice: keep one");
-      const double own = number_at(scene, number.key, NumberTable::uncertain);
+      const double own = number_at(scene, number.key, "[[uncertain]]");
       if (number.mean == 0 && number.distribution != Distribution::uniform) number.mean = own;
       check_form(number, places);
       if (number.distribution == Distribution::lognormal && number.mean <= 0)

@@ -6,7 +6,6 @@
 /// contribution, zeros included, which gives them one pattern.
 #include "squeal/solid/structure.hpp"
 
-#include "loads.hpp"
 #include "local_dofs.hpp"
 #include "matrices.hpp"
 #include "spin.hpp"
@@ -16,6 +15,7 @@
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/solid/binary.hpp"
 #include "squeal/solid/element.hpp"
+#include "squeal/solid/loads.hpp"
 
 #include <algorithm>
 #include <Eigen/Dense>

@@ -122,6 +122,9 @@ PolynomialModel::PolynomialModel(const RobustnessProblem& problem) : problem_(pr
   }
   reference_ = model_at(centre_);
   model_ = model_at(centre_);
+  model_.structure.K = copy_of(model_.structure.K); // K and the load are changed from point to point
+  mark_symmetric(model_.structure.K);
+  model_.structure.load = copy_of(model_.structure.load);
   terms_.push_back(sum_of({{1, &reference_}}, reference_));
   const auto at = [&](std::initializer_list<std::pair<std::size_t, double>> steps)
   {

@@ -160,11 +160,9 @@ public:
   std::optional<Equilibrium> at(const BrakeModel& model)
   {
     const auto& [structure, interface, equilibrium] = problem_.sliding;
-    PetscBool same_load = PETSC_FALSE;
-    check(VecEqual(model.structure.load, structure.load, &same_load));
-    const bool same = equal(model.structure.K, structure.K) && equal(model.interface.B, interface.B);
-    if (interface.pairs == 0 || (same && same_load == PETSC_TRUE && same_contact(model.interface, interface)))
-      return std::nullopt;
+    const bool same = model.structure.K.get() == structure.K && model.interface.B.get() == interface.B,
+               same_load = model.structure.load.get() == structure.load;
+    if (interface.pairs == 0 || (same && same_load && same_contact(model.interface, interface))) return std::nullopt;
     if (same && !compliance_) compliance_.emplace(structure, interface, options_);
     if (!same || !compliance_->serves(model.interface))
       return find_equilibrium(model.structure, model.interface,

@@ -1,6 +1,7 @@
 #include "sliding_basis.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/base/shared.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>
@@ -56,23 +57,17 @@ std::vector<BasisImage*> images_of(SlidingBasis& basis)
   return images;
 }
 
-/// Both may be null.
-bool alike(Mat A, Mat B)
-{
-  return A && B ? equal(A, B) : !A && !B;
-}
-
 /// `A` may be null. Returns whether it is another one.
 bool set_matrix(SlidingBasis& basis, BasisImage& image, Mat A)
 {
-  if (alike(image.matrix, A)) return false;
+  if (image.matrix.get() == A) return false;
   basis.by_Z.Z = {};
   if (!A)
   {
     image = {image.sign};
     return true;
   }
-  image.matrix = copy_of(A);
+  image.matrix = shared(A);
   const MultiVector AT = product(A, basis.T);
   image.contact_rows = {AT.comm, AT.entries(basis.contact_dofs, Eigen::all)};
   image.products = inner_products(basis.T, AT);
@@ -85,7 +80,7 @@ void set_damping(SlidingBasis& basis, Mat M, Mat C, Mat K)
   basis.C = {};
   basis.by_Z.Z = {};
   if (basis.rayleigh)
-    basis.C.matrix = copy_of(C);
+    basis.C.matrix = shared(C);
   else
     set_matrix(basis, basis.C, C);
 }
@@ -159,6 +154,20 @@ MatrixXd independent_part(const MatrixXd& kept)
   return parts.y.rightCols((parts.lambda.array() >= trace).count());
 }
 
+/// Whether two matrices have one layout and equal entries. Collective.
+bool equal(Mat A, Mat B)
+{
+  std::array<PetscInt, 2> size{}, other{};
+  check(MatGetLocalSize(A, &size[0], &size[1]));
+  check(MatGetLocalSize(B, &other[0], &other[1]));
+  int alike = size == other; // else MatEqual is an error
+  MPI_Allreduce(MPI_IN_PLACE, &alike, 1, MPI_INT, MPI_MIN, comm_of(A));
+  PetscBool same = PETSC_FALSE;
+  if (alike == 0) return false;
+  check(MatEqual(A, B, &same));
+  return same == PETSC_TRUE;
+}
+
 /// Sets the lift by Z where it has changed.
 void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact, Mat B)
 {
@@ -230,19 +239,6 @@ MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& cont
 
 } // namespace
 
-bool equal(Mat A, Mat B)
-{
-  std::array<PetscInt, 2> size{}, other{};
-  check(MatGetLocalSize(A, &size[0], &size[1]));
-  check(MatGetLocalSize(B, &other[0], &other[1]));
-  int alike = size == other; // else MatEqual is an error
-  MPI_Allreduce(MPI_IN_PLACE, &alike, 1, MPI_INT, MPI_MIN, comm_of(A));
-  PetscBool same = PETSC_FALSE;
-  if (alike == 0) return false;
-  check(MatEqual(A, B, &same));
-  return same == PETSC_TRUE;
-}
-
 SlidingBasis make_basis(const Structure& structure, const Interface& interface, Index sketched)
 {
   SlidingBasis basis{random_multivector(structure.K, static_cast<PetscInt>(sketched)), sketched,
@@ -256,7 +252,8 @@ void set_structure(SlidingBasis& basis, const Structure& structure)
   const Owned<Mat> C_0 = structure.K_loss.get() ? without_loss(structure.C, structure) : Owned<Mat>{};
   const Mat C = C_0.get() ? C_0 : structure.C;
   const bool other_M = set_matrix(basis, basis.M, structure.M), other_K = set_matrix(basis, basis.K, structure.K);
-  if (other_M || other_K || !alike(basis.C.matrix, C)) set_damping(basis, structure.M, C, structure.K);
+  if (other_M || other_K || basis.whole_C.get() != structure.C) set_damping(basis, structure.M, C, structure.K);
+  basis.whole_C = shared(structure.C.get());
   set_matrix(basis, basis.K_loss, structure.K_loss);
   set_matrix(basis, basis.G, structure.G);
   set_matrix(basis, basis.H, structure.H);

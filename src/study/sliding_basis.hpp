@@ -16,7 +16,7 @@ namespace squeal
 struct BasisImage
 {
   double sign = 1;                   // A' = sign A
-  Owned<Mat> matrix{};               // a copy of A; null: there is none
+  Owned<Mat> matrix{};               // A, shared with the structure; null: there is none
   MultiVector contact_rows{};        // of A T, at the degrees of freedom of the contact that this rank has
   Eigen::MatrixXd products{};        // T'A T
   MultiVector lifted_rows{};         // of A T_Z at the pivots, where T_Z is T lifted by Z
@@ -43,6 +43,7 @@ struct SlidingBasis
   Eigen::Index sketched = 0;
   std::vector<Eigen::Index> contact_dofs{}; // local rows, ascending
   BasisImage M{}, C{}, K{}, K_loss{};       // C without the viscous equivalent of loss factors
+  Owned<Mat> whole_C{};                     // the structure's, which C was taken from
   std::optional<Rayleigh> rayleigh{};       // of C, whose image has then the matrix alone
   BasisImage G{-1}, H{-1};
   LiftByZ by_Z{};
@@ -76,8 +77,5 @@ MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact);
 
 /// The reverse, with zeros at the pivots.
 MultiVector with_zero_pivots(const MultiVector& kept, const ClosedContact& contact);
-
-/// Whether two matrices have one layout and equal entries. Collective.
-bool equal(Mat A, Mat B);
 
 } // namespace squeal

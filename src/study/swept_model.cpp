@@ -1,8 +1,8 @@
 #include "swept_model.hpp"
 
 #include "squeal/algebra/root.hpp"
+#include "squeal/base/shared.hpp"
 #include "squeal/contact/pairs.hpp"
-#include "squeal/scene/numbers.hpp"
 #include "squeal/study/reversed.hpp"
 
 #include <algorithm>
@@ -13,25 +13,6 @@
 namespace squeal
 {
 
-namespace
-{
-
-/// Place of the friction coefficient among the swept numbers; -1: it is none of them.
-int friction_place(const SweepSettings& settings)
-{
-  const auto found = std::ranges::find(settings.key, friction_coefficient_key);
-  return found == settings.key.end() ? -1 : static_cast<int>(found - settings.key.begin());
-}
-
-/// The values without that of the friction coefficient: a model is built again where they change.
-std::vector<double> without_friction(std::vector<double> values, const SweepSettings& settings)
-{
-  if (const int place = friction_place(settings); place >= 0) values.erase(values.begin() + place);
-  return values;
-}
-
-} // namespace
-
 SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked)
     : problem_(problem), comm_(comm), end_if_asked_(std::move(end_if_asked)),
       equilibrium_options_(checked_if_asked(problem.equilibrium_options))
@@ -41,28 +22,20 @@ SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm, std::function
 void SweptModel::go_to(const SweptPlace& place)
 {
   if (model_ && at_ == place) return;
-  const SweepSettings& settings = problem_.settings;
-  if (!model_ || without_friction(at_.values, settings) != without_friction(place.values, settings))
-  {
-    model_.reset();
-    model_ = problem_.model_at(place.values, comm_);
-    at_ = {place.values};
-  }
-  Interface& interface = model_->interface;
-  if (const int friction = friction_place(settings); friction >= 0)
-    interface.friction.coefficient = place.values[static_cast<std::size_t>(friction)];
-  if (at_.reversed != place.reversed) reverse_rotation(model_->structure, interface);
+  model_.reset();
+  model_ = problem_.model_at(place.values, comm_);
+  if (place.reversed) reverse_rotation(model_->structure, model_->interface);
   at_ = place;
 }
 
 const PairCompliance& SweptModel::compliance()
 {
   const auto& [structure, interface] = *model_;
-  if (compliance_ && equal(K_, structure.K) && equal(B_, interface.B) && compliance_->serves(interface))
+  if (compliance_ && K_.get() == structure.K && B_.get() == interface.B && compliance_->serves(interface))
     return *compliance_;
   compliance_.reset();
-  K_ = copy_of(structure.K);
-  B_ = copy_of(interface.B);
+  K_ = shared(structure.K.get());
+  B_ = shared(interface.B.get());
   return compliance_.emplace(structure, interface, equilibrium_options_);
 }
 

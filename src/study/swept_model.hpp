@@ -76,7 +76,7 @@ private:
   std::vector<char> closed_{};                      // at the equilibrium found last
   std::vector<char> at_every_{};                    // pairs closed and rigid at every point prepared
   std::optional<PairCompliance> compliance_{};
-  Owned<Mat> K_{}, B_{}; // of the compliance
+  Owned<Mat> K_{}, B_{}; // of the compliance, shared with the model that it is of
   std::optional<ModesBasis> basis_{};
   std::map<SweptPlace, PointModes> trained_{};
 };

@@ -405,7 +405,7 @@ TEST_CASE("a number is set through its member as a file would set it, and its ke
   CHECK(effect("cycle.theta") == Effect::nothing);
   CHECK(effect("force.0.vector.2") == Effect::load);
   CHECK(effect("friction.coefficient") == Effect::friction);
-  CHECK(effect("contact.0.rotation.rate") == Effect::contact);
+  CHECK(effect("contact.0.rotation.rate") == Effect::drive);
   CHECK(effect("damping.alpha") == Effect::damping);
   CHECK(effect("part.disc.density") == Effect::mass);
   CHECK(effect("part.disc.young") == Effect::stiffness_and_mass);

@@ -2,9 +2,7 @@
 /// The content of a mesh file, before the scene's parts and surfaces are extracted from it. In this form it goes from
 /// the mesher to the program. This header knows no MPI, because the mesher knows none. Not collective.
 #include "squeal/base/vec3.hpp"
-#include "squeal/base/words.hpp"
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -38,24 +36,14 @@ struct MesherAnswer
 };
 
 /// Returns an answer as bytes.
-std::string packed(const MesherAnswer& answer);
+std::string packed(MesherAnswer answer);
 
 /// Returns the answer that was packed. Throws std::runtime_error if the bytes are not a whole one.
 MesherAnswer unpacked(const std::string& bytes);
 
-/// Rights of a file in the mesher.
-enum class MesherRights
-{
-  shut_in, // it starts no program, opens no connection and writes no file
-  free,    // all that gmsh runs
-};
-
-inline constexpr std::array mesher_rights_names = {"shut-in", "free"};
-
-inline Words words_of(MesherRights)
-{
-  return mesher_rights_names;
-}
+/// First arguments of the mesher: it starts no program, opens no connection and writes no file, or gmsh runs all that
+/// it is given.
+inline constexpr const char *shut_in_mesher = "shut-in", *free_mesher = "free";
 
 /// The descriptor that the mesher writes its answer to.
 inline constexpr int answer_descriptor = 3;

@@ -14,6 +14,9 @@ struct SceneNumber
   double value = 0;
 };
 
+/// Numbers with these keys and values.
+std::vector<SceneNumber> numbers_of(std::span<const std::string> keys, std::span<const double> values);
+
 /// The key of the friction coefficient.
 inline constexpr const char* friction_coefficient_key = "friction.coefficient";
 
@@ -23,7 +26,8 @@ enum class Effect
   nothing,
   load,
   friction,           // its law
-  contact,            // gaps, drive, compliance, and the rows of the pairs where tangents turn with the drive
+  gap,                // of contacts, and their compliance
+  drive,              // of contacts, and the rows of pairs whose tangents turn with it
   damping,            // C, and the stiffness that loss factors multiply
   mass,               // M, and C by its part of M
   stiffness_and_mass, // M, C and K
@@ -54,7 +58,7 @@ std::vector<std::string> contact_names(const Scene& scene);
 std::vector<SceneNumber> from_zero(const Scene& scene, const SceneNumber& number);
 
 /// The unit of a number of a scene, "-" where it has none.
-std::string unit_of_number(const std::string& key);
+std::string unit_of_number(const Scene& scene, const std::string& key);
 
 /// What a number's key calls by its place alone, "part.0.young" or "contact.1.gap": the name of that part, or
 /// "pad on disc". Empty where the key says it itself.

@@ -1,0 +1,178 @@
+/// The keys of the tables of stages and studies.
+#include "stage_keys.hpp"
+
+namespace squeal
+{
+
+namespace
+{
+
+using enum Need;
+using enum Rule;
+
+} // namespace
+
+SceneKeys keys_of(ModesSettings& m)
+{
+  return {
+      {"enabled", &m.enabled, "switch", "run this stage"},
+      {"method", choice_of(m.method), "word",
+       "projection on real modes, the full sparse problem, or both, where the full one decides; auto is full, and both "
+       "where the count of pairs below the band is not confirmed"},
+      {"real_modes", &m.real_modes, "-", "number of real modes of the projection; 0: those of the band", not_negative},
+      {"residual_passes", &m.residual_passes, "-", "corrections of the projection by the residual", not_negative},
+      {"band", &m.band, "Hz", "every mode below is reported", positive},
+      {"reduced_matrices", &m.reduced_matrices, "switch",
+       "writes the brake, reduced to the modes found and to the attachment shapes of all pairs, as a matrix scene into "
+       "reduced/"},
+  };
+}
+
+SceneKeys keys_of(EstimateSettings& e)
+{
+  return {{"enabled", &e.enabled, "switch", "run this stage"}};
+}
+
+SceneKeys keys_of(TransientSettings& t)
+{
+  return {
+      {"enabled", &t.enabled, "switch", "run this stage; true when the table is there"},
+      {"start", StartTarget{choice_of(t.start.kind), &t.start.file}, "word",
+       "mode (a small motion of the unstable mode), estimate (its estimated amplitude), equilibrium (sliding without "
+       "vibration, from which the factors below lead away), rest (no displacement and no velocity), or a state file"},
+      {"amplitude", &t.amplitude, "m", "largest displacement with start = \"mode\"; 0: a tenth of first lift-off",
+       not_negative},
+      {"periods", &t.periods, "-",
+       "length in periods of the unstable mode that is followed; where none is unstable, steps and step_size give the "
+       "length",
+       positive},
+      {"steps_per_period", &t.steps_per_period, "-", "time steps a period", positive},
+      {"steps", &t.steps, "-", "number of time steps, with step_size, instead of periods", not_negative},
+      {"step_size", &t.step_size, "s", "time step, with steps, instead of periods", not_negative},
+      {"theta", &t.theta, "-", "parameter of the theta-method; 0.5 conserves energy", fraction},
+      {"load_factor", &t.ramps.load, "table",
+       "factor in time on all forces and pressures: [[0, 0], [0.1, 1]], rows of a time in s and the factor, straight "
+       "lines between"},
+      {"speed_factor", &t.ramps.speed, "table", "factor in time on the drive velocities of all contacts"},
+      {"friction_factor", &t.ramps.friction, "table", "factor in time on the coefficients of friction", not_negative},
+      {"save_state", &t.save_state, "path", "state file that is written at the end"},
+  };
+}
+
+SceneKeys keys_of(CycleSettings& c)
+{
+  return {
+      {"enabled", &c.enabled, "switch", "run this stage; true when the table is there"},
+      {"start", StartTarget{choice_of(c.start.kind), &c.start.file}, "word",
+       "where the search starts: the unstable modes at their estimates (estimate), the followed mode at an amplitude "
+       "(mode), the end of the run's own transient (transient), the cycle on a coarser mesh (coarse), or a state file"},
+      {"amplitude", &c.amplitude, "m", "largest displacement at start = \"mode\"; 0: twice first lift-off",
+       not_negative},
+      {"coarse_parameters", &c.coarse_parameters, "table",
+       "with start = \"coarse\": values for the DefineConstant of the scene's .geo that make its mesh coarser"},
+      {"coarse_mesh", &c.coarse_mesh, "path",
+       "or a mesh or geometry of its own, with the same parts, surfaces and groups; coarse_parameters are then its own",
+       file},
+      {"steps_per_period", &c.steps_per_period, "-", "time steps a period; 0: chosen", not_negative},
+      {"tolerance", &c.tolerance, "-", "largest residual in the full space that counts as a cycle; 0: chosen",
+       not_negative},
+      {"free_periods", &c.free_periods, "-", "periods integrated before the first Newton step", not_negative},
+      {"starts", &c.starts, "-",
+       "number of starts whose motions are listed: the unstable modes, their pairs, random sums of modes; beside a "
+       "stable equilibrium the mode that decays slowest, or that a given start has most of; 0: where several modes of "
+       "a model of at most 50 degrees of freedom are unstable these, their pairs and five random sums, at most 16; "
+       "else none",
+       not_negative},
+      {"theta", &c.theta, "-", "parameter of the theta-method; 0.5 conserves energy", fraction},
+      {"save_state", &c.save_state, "path", "state file of the cycle's start"},
+  };
+}
+
+SceneKeys keys_of(BranchSettings& b)
+{
+  return {
+      {"key", &b.key, "text",
+       "number of the structure, its contact or its loads, as --set names it: friction.coefficient, force.0.vector.2",
+       required},
+      {"from", &b.from, "-", "its value at one end of the branch, in its own unit", required},
+      {"to", &b.to, "-", "its value at the other end; the scene's own value is between them", required},
+      {"points", &b.points, "-", "number of points if this number alone changed along the branch", positive},
+      {"corrections", &b.corrections, "-",
+       "number of points, evenly spread, where the full model's cycle is found beside a reduced model's; none where "
+       "the full model is followed",
+       not_negative},
+  };
+}
+
+SceneKeys keys_of(SweepSettings& s)
+{
+  return {
+      {"key", &s.key, "texts", "number of the structure, its contact or its loads, as --set names it, or a list of two",
+       required},
+      {"from", &s.from, "-",
+       "its first value, in its own unit; a list of two for two numbers, here and in the next lines"},
+      {"to", &s.to, "-", "its last value"},
+      {"points", &s.points, "-", "number of values from the first to the last", positive},
+      {"values", &s.values, "-", "list of values of a single number, instead of the grid"},
+      {"samples", &s.samples, "-",
+       "number of random points of the ranges, evenly distributed, instead of the grid; 0: none", not_negative},
+      {"seed", &s.seed, "-", "seed of the random points", not_negative},
+      {"directions", choice_of(s.directions), "word", "one direction of rotation, that of the scene, or both"},
+      {"stages", choice_of(s.stages), "word",
+       "at each point the equilibrium alone, or the modes too, or also the cycle where modes grow"},
+  };
+}
+
+SceneKeys keys_of(SensitivitySettings& s)
+{
+  return {{"numbers", &s.numbers, "texts",
+           "derivatives with respect to these numbers only, as --set names them; else friction, moduli, densities, "
+           "loss factors, damping, springs, masses and rates of rotation, where they are not 0"}};
+}
+
+SceneKeys keys_of(Change& c)
+{
+  return {
+      {"probe", &c.probe, "text", "name of the probe where it acts, along the probe's direction", required},
+      {"mass", &c.mass, "kg", "added mass", not_negative},
+      {"damping", &c.damping, "N s/m", "constant of a dashpot to the ground", not_negative},
+      {"stiffness", &c.stiffness, "N/m", "stiffness of a spring to the ground, which is relaxed at equilibrium",
+       not_negative},
+  };
+}
+
+SceneKeys keys_of(ResponseSettings& r)
+{
+  return {
+      {"excitation", &r.excitation, "texts",
+       "names of the probes that are driven, each by a unit force along its direction; without it all are"},
+      {"from", &r.from, "Hz", "lowest frequency", required, positive},
+      {"to", &r.to, "Hz", "highest frequency", required, positive},
+      {"count", &r.count, "-", "number of frequencies, evenly spread, from 2 to 100 000", positive},
+  };
+}
+
+SceneKeys keys_of(RobustnessSettings& r)
+{
+  return {
+      {"samples", &r.samples, "-", "number of random scenes", positive},
+      {"checks", &r.checks, "-", "number of them, the first ones, that are computed by the full problem as well",
+       not_negative},
+      {"seed", &r.seed, "-", "seed of the random numbers", not_negative},
+      {"confidence", &r.confidence, "-", "confidence of the intervals of the probabilities", fraction},
+  };
+}
+
+SceneKeys keys_of(UncertainNumber& u)
+{
+  return {
+      {"key", &u.key, "text", "number of the structure, its contact or its loads, as --set names it", required},
+      {"distribution", choice_of(u.distribution), "word", "normal, lognormal or uniform"},
+      {"mean", &u.mean, "-", "mean of the number itself, in its own unit; 0: the scene's value"},
+      {"deviation", &u.deviation, "-", "standard deviation of the number itself", not_negative},
+      {"from", &u.from, "-", "least value of a uniform number"},
+      {"to", &u.to, "-", "greatest value of a uniform number"},
+  };
+}
+
+} // namespace squeal

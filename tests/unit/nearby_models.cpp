@@ -1,0 +1,128 @@
+// A sweep over each kind of number makes anew the parts of the model that the number enters, and those alone.
+#include "squeal/model.hpp"
+
+#include <array>
+#include <doctest/doctest.h>
+
+using namespace squeal;
+
+namespace
+{
+
+/// A tip that slides on a disc, both on springs.
+Scene two_points()
+{
+  Scene scene;
+  const Motions free{true, false, true, false, false, false};
+  scene.points = {{"tip", {0, 0, 0.1}, 1, free}, {"disc", {0, 0, 0}, 2, free}};
+  scene.springs = {{"tip", ground, {1, 0, 0}, 1e5, 1}, {"tip", ground, {0, 0, 1}, 2e5, 0}};
+  scene.springs.push_back({"disc", ground, {0, 0, 1}, 1e6, 2});
+  scene.springs.push_back({"disc", ground, {1, 0, 0}, 1e6, 2});
+  scene.forces = {{"tip", {0, 0, -5}}};
+  scene.contacts.emplace_back();
+  scene.contacts[0].rotor = "disc";
+  scene.contacts[0].stator = "tip";
+  scene.contacts[0].normal = Vec3{0, 0, 1};
+  scene.contacts[0].velocity = {1, 0, 0};
+  scene.friction.coefficient = 0.3;
+  return scene;
+}
+
+/// Numbers of parts that are made: numbering, matrices, load, contact.
+std::array<int, 4> counts(const PartsMade& made)
+{
+  return {made.mesh, made.matrices, made.load, made.contact};
+}
+
+/// Whether M, C, K, the load and B are the same objects.
+std::array<bool, 5> shared_parts(const BrakeModel& a, const BrakeModel& b)
+{
+  return {a.structure.M.get() == b.structure.M, a.structure.C.get() == b.structure.C,
+          a.structure.K.get() == b.structure.K, a.structure.load.get() == b.structure.load,
+          a.interface.B.get() == b.interface.B};
+}
+
+double difference(Mat A, Mat B)
+{
+  const Owned<Mat> rest = copy_of(A);
+  double size = 0;
+  check(MatAXPY(rest, -1, B, DIFFERENT_NONZERO_PATTERN));
+  check(MatNorm(rest, NORM_FROBENIUS, &size));
+  return size;
+}
+
+/// The model is that of the scene with these numbers, built from nothing.
+void check_model(const BrakeModel& model, const Scene& scene, const std::vector<SceneNumber>& numbers)
+{
+  const Scene other = scene_with(scene, numbers);
+  const Model built = build_model(other, PETSC_COMM_WORLD);
+  for (const auto matrix : {&Structure::M, &Structure::C, &Structure::K})
+    CHECK(difference(model.structure.*matrix, built.structure.*matrix) == 0);
+  CHECK(difference(model.interface.B, built.interface.B) == 0);
+  PetscBool same_load = PETSC_FALSE;
+  check(VecEqual(model.structure.load, built.structure.load, &same_load));
+  CHECK(same_load == PETSC_TRUE);
+  CHECK(model.interface.gap == built.interface.gap);
+  CHECK(model.interface.drive == built.interface.drive);
+  CHECK(model.interface.compliance == built.interface.compliance);
+  CHECK(model.interface.friction.coefficient == built.interface.friction.coefficient);
+}
+
+struct Kind
+{
+  SceneNumber number;
+  std::array<int, 4> made;       // mesh, matrices, load, contact
+  std::array<bool, 5> same_part; // as the scene's own: M, C, K, load, B
+};
+
+} // namespace
+
+TEST_CASE("a number makes anew the parts that it enters alone, whatever number was changed before")
+{
+  const Scene scene = two_points();
+  const Model model = build_model(scene, PETSC_COMM_WORLD);
+  NearbyModels models(model, scene, comm_of(model.structure.load));
+  const BrakeModel own = models.at({});
+  CHECK(counts(models.made()) == std::array<int, 4>{0, 0, 0, 0});
+  CHECK(own.structure.K.get() == model.structure.K);
+  const std::vector<Kind> kinds = {
+      {{"friction.coefficient", 0.4}, {0, 0, 0, 0}, {true, true, true, true, true}},
+      {{"contact.0.gap", -1e-6}, {1, 0, 0, 1}, {true, true, true, true, true}}, // numbers the mesh, once
+      {{"contact.0.compliance", 1e-9}, {0, 0, 0, 1}, {true, true, true, true, true}},
+      {{"contact.0.velocity.0", 2}, {0, 0, 0, 1}, {true, true, true, true, false}},
+      {{"force.0.vector.2", -7}, {0, 0, 1, 0}, {true, true, true, false, true}},
+      {{"spring.0.damping", 3}, {0, 1, 0, 0}, {true, false, true, true, true}},
+      {{"point.tip.mass", 2}, {0, 1, 0, 0}, {false, false, true, true, true}},
+      {{"spring.0.stiffness", 3e5}, {0, 1, 0, 0}, {true, false, false, true, true}},
+      {{"point.tip.at.2", 0.2}, {1, 1, 1, 1}, {false, false, false, false, false}},
+  };
+  for (const Kind& kind : kinds)
+  {
+    CAPTURE(kind.number.key);
+    std::array<int, 4> made = counts(models.made());
+    const BrakeModel changed = models.at({&kind.number, 1});
+    for (std::size_t i = 0; i < made.size(); ++i) made[i] = counts(models.made())[i] - made[i];
+    CHECK(made == kind.made);
+    std::array<bool, 5> same = shared_parts(changed, own);
+    if (kind.number.key == "spring.0.stiffness") same[0] = true; // of one assembly with K
+    CHECK(same == kind.same_part);
+    check_model(changed, scene, {kind.number});
+  }
+}
+
+TEST_CASE("on a grid of a stiffness and the friction coefficient the matrices are made once a stiffness")
+{
+  const Scene scene = two_points();
+  const Model model = build_model(scene, PETSC_COMM_WORLD);
+  NearbyModels models(model, scene, PETSC_COMM_WORLD);
+  const std::vector<std::string> keys = {"spring.0.stiffness", "friction.coefficient"};
+  for (const double stiffness : {2e5, 3e5, 4e5})
+    for (const double friction : {0.1, 0.2, 0.5})
+    {
+      const std::array values{stiffness, friction};
+      check_model(models.at(numbers_of(keys, values)), scene, numbers_of(keys, values));
+    }
+  CHECK(models.made().matrices <= 4); // of a communicator that is not the model's own the first model is built as well
+  CHECK(models.made().load <= 1);
+  CHECK(models.made().contact <= 1);
+}
