@@ -401,19 +401,23 @@ TEST_CASE("a number is set through its member as a file would set it, and its ke
   CHECK_THROWS_AS(with("spring.1.stiffness", 1), Error);
   CHECK_THROWS_AS(with("force.0.vector.3", 1), Error);
 
+  scene.contacts[0].rotation = Rotation{{0, 0, 1}, {}, 5};
+  scene.contacts[0].velocity = {};
+  CHECK(with("contact.0.rotation.centre.0", 0.5).contacts[0].rotation->centre[0] == 0.5);
+
+  scene.parts.emplace_back().name = "disc";
+  scene.parts[0].material.orthotropy.emplace();
   const auto effect = [&](const char* key) { return effect_of_number(scene, key); };
   CHECK(effect("cycle.theta") == Effect::nothing);
   CHECK(effect("force.0.vector.2") == Effect::load);
   CHECK(effect("friction.coefficient") == Effect::friction);
+  CHECK(effect("contact.0.gap") == Effect::gap);
   CHECK(effect("contact.0.rotation.rate") == Effect::drive);
   CHECK(effect("damping.alpha") == Effect::damping);
   CHECK(effect("part.disc.density") == Effect::mass);
   CHECK(effect("part.disc.young") == Effect::stiffness_and_mass);
   CHECK(effect("part.disc.orthotropic.young.0") == Effect::stiffness_and_mass);
   CHECK(effect("point.tip.at.0") == Effect::mesh);
-  scene.contacts[0].rotation = Rotation{{0, 0, 1}, {}, 5};
-  scene.contacts[0].velocity = {};
-  CHECK(with("contact.0.rotation.centre.0", 0.5).contacts[0].rotation->centre[0] == 0.5);
   scene.parts.emplace_back().rotation = Rotation{};
   CHECK(effect("part.disc.density") == Effect::stiffness_and_mass);
 }
