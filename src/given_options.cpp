@@ -3,6 +3,7 @@
 #include "squeal/base/error.hpp"
 #include "squeal/options.hpp"
 #include "squeal/session_options.hpp"
+#include "squeal/solver_options.hpp"
 
 #include <algorithm>
 #include <cstdlib>
@@ -86,6 +87,7 @@ private:
   {
     std::string problem = problem_of_option_name(name);
     if (problem.empty()) problem = problem_of_session_option(name, value);
+    if (problem.empty()) problem = problem_of_solver_type(name, value);
     if (const std::string file = file_written_by(name, value); !file.empty()) given.written.push_back(file);
     if (!problem.empty())
       given.problem = problem + source;

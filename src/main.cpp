@@ -187,8 +187,8 @@ void print_help()
               "  exit code: 0 all converged, 2 a stage did not (the report says which), 3 asked to end, 1 an error\n\n"
               "%s\n"
               "Algorithm options (PETSc options database) [default]\n%s\n"
-              "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes\n %s\n"
-              "e.g. -cycle_snes_monitor, -modes_pep_monitor, -cycle_snes_rtol 1e-3.\n\n"
+              "Options of the solvers themselves, PETSc's, SLEPc's and MUMPS's, follow the prefixes\n %s\n"
+              "e.g. -cycle_snes_monitor, -modes_pep_monitor, -factor_mat_mumps_icntl_14 50.\n\n"
               "Options of the whole run, PETSc's:\n%s",
               SQUEAL_VERSION, argument_reference().c_str(), scene_reference().c_str(), option_reference().c_str(),
               prefixes.c_str(), session_option_reference().c_str());
@@ -214,7 +214,7 @@ void print_key_page()
       "or `none`. A direction is a text such as `\"x\"` or `\"-y\"`, or a vector.\n%s"
       "\n## Arguments\n\n%s\n## Options\n\n"
       "Options are of PETSc's database: of the command line, `PETSC_OPTIONS`, and files `.petscrc`.\n\n%s"
-      "\n## Options of solvers\n\nOptions of PETSc's and SLEPc's own solvers follow the prefixes%s.\n"
+      "\n## Options of solvers\n\nOptions of PETSc's, SLEPc's and MUMPS's own solvers follow the prefixes%s.\n"
       "One that no solver asks for is an error. Those of the whole run are:\n\n```text\n%s```\n",
       scene_page().c_str(), arguments.c_str(), option_page().c_str(), prefixes.c_str(),
       session_option_reference().c_str());
@@ -294,7 +294,6 @@ int run_program(const Arguments& arguments, int argc, char** argv)
   print_sources(arguments.option_sources, comm);
   ProgramOptions options = read_program_options(comm);
   options.force = arguments.force;
-  check_solver_options(options, comm);
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
   if (scene.mesh && arguments.allow_scripts) scene.mesh->statements = Statements::any;

@@ -23,7 +23,6 @@ enum class Value
   options_file, // a file that exists, and holds options
   write_file,   // nothing, or a file that can be written
   viewer,       // [ascii][:file[:format]]
-  solver_view,  // the same
   info,         // nothing, or file[:classes]
   text,
 };
@@ -57,7 +56,7 @@ constexpr std::array session_options = {
     SessionOption{"citations", Value::write_file, "[FILE]  what to cite of PETSc"},
 };
 
-constexpr SessionOption solver_view{"", Value::solver_view, ""};
+constexpr SessionOption solver_view{"", Value::viewer, ""};
 
 // How options end by which solvers print.
 constexpr std::array views = {"_view",           "_view_pre",       "_view_solution",  "_view_mat",
@@ -113,7 +112,6 @@ std::string file_of(const SessionOption& option, const std::string& value)
   case Value::write_file:
     return value;
   case Value::viewer:
-  case Value::solver_view:
     return parts.size() > 1 ? parts[1] : "";
   case Value::info:
     return parts.empty() ? "" : parts[0];
@@ -123,15 +121,13 @@ std::string file_of(const SessionOption& option, const std::string& value)
 }
 
 /// [ascii][:file[:format[:append]]]
-std::string problem_of_viewer(const SessionOption& option, const std::string& value)
+std::string problem_of_viewer(const std::string& value)
 {
   const std::vector<std::string> parts = parts_of(value);
   if (!parts.empty() && !is_one_of(parts[0], {"", "ascii"}))
     return "no viewer is called '" + shortened(parts[0]) + "'; write :FILE, :FILE:FORMAT or nothing";
-  const Strings formats =
-      option.value == Value::solver_view
-          ? Strings{"ascii_info", "ascii_info_detail", "ascii_matlab"}
-          : Strings{"ascii_info", "ascii_info_detail", "ascii_xml", "ascii_csv", "ascii_flamegraph"};
+  const Strings formats = {"ascii_info", "ascii_info_detail", "ascii_matlab",
+                           "ascii_xml",  "ascii_csv",         "ascii_flamegraph"};
   if (parts.size() > 2 && !is_one_of(parts[2], {"", "default"}) &&
       std::ranges::find(formats, parts[2]) == formats.end())
   {
@@ -150,8 +146,7 @@ std::string problem_of_value(const SessionOption& option, const std::string& val
   if (option.value == Value::options_file)
     return is_file(value) && access(value.c_str(), R_OK) == 0 ? "" : "there is no such file, or it cannot be read";
   const std::string file = file_of(option, value);
-  const bool is_viewer = option.value == Value::viewer || option.value == Value::solver_view;
-  std::string problem = is_viewer ? problem_of_viewer(option, value) : "";
+  std::string problem = option.value == Value::viewer ? problem_of_viewer(value) : "";
   if (problem.empty() && !file.empty()) problem = problem_of_new_file(file);
   return problem;
 }

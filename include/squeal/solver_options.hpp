@@ -1,31 +1,36 @@
 #pragma once
-/// Options of the PETSc and SLEPc objects that solve within the stages. They follow a few prefixes; the library of the
-/// object knows what may stand behind each.
-#include "squeal/options.hpp"
+/// Options of the PETSc, SLEPc and MUMPS objects that solve within the stages. They follow a few prefixes; the library
+/// of the object knows what may stand behind each.
+#include "squeal/report/stage.hpp"
 
 #include <array>
+#include <string>
 
 namespace squeal
 {
 
-/// A prefix of options and the solver that takes them.
+/// A prefix of options, and the stage in which the object behind it works.
 struct SolverPrefix
 {
-  const char* text;   // of the options, behind the dash
-  const char* object; // the prefix that the solver object has
-  Stage stage;        // that the object works in
+  const char* text; // without the dash
+  Stage stage;
 };
 
-inline constexpr std::array solver_prefixes = {SolverPrefix{"modes_pep_", "modes_", Stage::modes},
-                                               SolverPrefix{"modes_st_", "modes_", Stage::modes},
-                                               SolverPrefix{"cycle_snes_", "cycle_", Stage::cycle}};
+inline constexpr std::array solver_prefixes = {SolverPrefix{"factor_mat_mumps_", Stage::equilibrium},
+                                               SolverPrefix{"modes_mat_mumps_", Stage::modes},
+                                               SolverPrefix{"modes_real_eps_", Stage::modes},
+                                               SolverPrefix{"modes_real_st_", Stage::modes},
+                                               SolverPrefix{"modes_pep_", Stage::modes},
+                                               SolverPrefix{"modes_st_", Stage::modes},
+                                               SolverPrefix{"cycle_snes_", Stage::cycle},
+                                               SolverPrefix{"cycle_ksp_", Stage::cycle},
+                                               SolverPrefix{"cycle_pc_", Stage::cycle}};
 
 /// The prefix of an option's name, which stands without its dash; null if it has none of these.
 const SolverPrefix* solver_prefix_of(const std::string& name);
 
-/// Tries the options on objects that are thrown away and solve small problems, so that the stages themselves find
-/// nothing wrong later. Collective. Error: a value that PETSc or SLEPc does not take or fails with, or an option that
-/// the object does not ask for. Error, too: an option of a solver that `options` leave out.
-void check_solver_options(const ProgramOptions& options, MPI_Comm comm);
+/// Why a type of solver may not be given: it needs more than an operator, and ends the process without it. Empty: it
+/// may.
+std::string problem_of_solver_type(const std::string& name, const std::string& value);
 
 } // namespace squeal

@@ -141,6 +141,8 @@ Owned<EPS> make_solver(const ShiftedPencil& pencil, PetscInt count, Inverse& inv
   check(PCSetType(factor, PCSHELL));
   check(PCShellSetContext(factor, &inverse));
   check(PCShellSetApply(factor, apply_inverse));
+  check(EPSSetOptionsPrefix(eps, "modes_real_"));
+  check(EPSSetFromOptions(eps));
   return eps;
 }
 
