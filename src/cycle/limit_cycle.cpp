@@ -35,9 +35,6 @@ double unit_norm(const CycleProblem& problem)
 /// Adds to the reason of an outcome what the brake's options can do about it.
 void add_remedies(const PeriodMap& map, Outcome& outcome)
 {
-  if (map.step.law == ContactLaw::velocity && outcome.kind != OutcomeKind::converged)
-    outcome.reason += "; by the velocity law the period map jumps where a step begins open or closed: "
-                      "-transient_contact_law displacement";
   if (map.unconverged > 0)
     outcome.reason += (outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) +
                       " steps left the contact unconverged (-transient_contact_max_it)";

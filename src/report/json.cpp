@@ -123,7 +123,6 @@ Json transient_entry(const Report& report)
   entry["growth_rate_bias"] = transient_bias(report).growth;
   entry["frequency_bias"] = transient_bias(report).frequency;
   entry["normal_force_chatter"] = chatter(transient.history);
-  entry["contact_law"] = word(transient.law);
   entry["energy_defect_max"] = transient.energy_defect_max;
   entry["residual"] = transient.outcome.residual;
   entry["contact_iterations_mean"] = transient.contact_iterations_mean;

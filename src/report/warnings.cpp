@@ -123,8 +123,6 @@ Sentences of_transient(const Report& report)
   const double fit = transient.growth_rate_fit, predicted = transient.predicted.real();
   if (std::abs(fit - predicted) > 0.01 * std::abs(predicted))
     sentences.push_back("the fitted growth rate is not the predicted one: other motion than the mode is in the start");
-  if (transient.law == ContactLaw::velocity)
-    sentences.push_back("by the velocity law the gap drifts, by up to what an impact covers in a step");
   if (transient.energy_defect_max > 1e-8)
     sentences.push_back("the energy identity of the scheme is missed: tighten -transient_contact_tolerance");
   add_chatter(transient.history, sentences);

@@ -277,7 +277,6 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   trajectory.factor_seconds = step.factor_seconds;
   trajectory.condensed_seconds = step.condensed_seconds;
   trajectory.steps = summary.steps;
-  trajectory.law = step.law;
   trajectory.energy_defect_max = summary.energy_defect_max;
   trajectory.contact_iterations_mean = summary.contact_iterations_mean;
   trajectory.contact_steps_as_one = summary.as_one;
