@@ -185,7 +185,7 @@ Robustness run_robustness(const Chain& chain)
     return model_with(chain.model, scene, numbers, PETSC_COMM_SELF);
   };
   return find_robustness({*scene.robustness, scene.uncertain, model_at, scene.friction, scene.modes,
-                          chain.options.modes, chain.options.equilibrium, chain.options.robustness},
+                          chain.options.modes, chain.options.equilibrium},
                          comm_of(chain.model.structure.load));
 }
 

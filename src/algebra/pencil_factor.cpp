@@ -251,13 +251,4 @@ void PencilFactor::solve_by_rows(Parts& parts, MultiVector& Y)
   bring_to_owners(places, solution, parts.layout, parts.comm, Y.entries);
 }
 
-OptionList options_of(PencilOptions& options)
-{
-  return {
-      {"-modes_whole_factor", &options.whole_limit, Range::not_negative,
-       "[GB] of a factor that every rank makes whole, with results that repeat to the last bit; a larger one is "
-       "shared"},
-  };
-}
-
 } // namespace squeal

@@ -104,21 +104,6 @@ void remember(const ContactWork& work, ContactMemory& memory)
 
 } // namespace
 
-OptionList options_of(ContactSettings& settings)
-{
-  return {
-      {"-transient_contact_solver", choice_of(settings.solver), Range::any,
-       "block Gauss-Seidel, or the projection fixed point (fixed_point)"},
-      {"-transient_contact_tolerance", &settings.tolerance, Range::positive,
-       "largest natural map of a pair over the largest reaction; beyond 10 000 degrees of freedom periods of shooting "
-       "that are still far from the cycle take up to 1e-6"},
-      {"-transient_contact_max_it", &settings.max_iterations, Range::natural,
-       "largest number of contact iterations (sweeps) a step"},
-      {"-transient_contact_rho", &settings.rho, Range::below_two,
-       "step of the fixed point over 1/lambda_max(W); 0: chosen by the program"},
-  };
-}
-
 std::vector<ContactResult> solve_contacts(const ContactOperator& W, const FrictionLaw& friction,
                                           const ContactSettings& settings, std::span<const ContactProblem> problems)
 {

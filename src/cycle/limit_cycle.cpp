@@ -36,8 +36,8 @@ double unit_norm(const CycleProblem& problem)
 void add_remedies(const PeriodMap& map, Outcome& outcome)
 {
   if (map.unconverged > 0)
-    outcome.reason += (outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) +
-                      " steps left the contact unconverged (-transient_contact_max_it)";
+    outcome.reason +=
+        (outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) + " steps left the contact unconverged";
 }
 
 /// Shoots from the start with the preconditioner that `make` returns for the map and its flow; it may move the start.
@@ -49,7 +49,7 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
   map.reactions = problem.sliding.equilibrium.reactions;
   map.keeps_step = is_large(problem.sliding.structure);
   Flow flow = flow_of(map);
-  add_slow_motions(problem, options.reduced, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
+  add_slow_motions(problem, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
   CycleKeeper keeper(problem.sliding.structure);
   keeper.watch(flow);
   const Preconditioner& preconditioner = make(map, flow);
@@ -128,7 +128,7 @@ LimitCycle find_cycle_near(const CycleProblem& problem, const CycleOptions& opti
     start.v = velocity(end);
     try
     {
-      at_hand = recorded_preconditioner(problem, options.reduced, map, start.period, rate);
+      at_hand = recorded_preconditioner(problem, map, start.period, rate);
     }
     catch (const LibraryError&) // perhaps on this rank alone
     {

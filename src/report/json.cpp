@@ -42,9 +42,6 @@ Json equilibrium_entry(const Report& report, const Scene& scene)
   entry["normal_force_max"] = normal.greatest;
   entry["residual"] = equilibrium.outcome.residual;
   entry["force_residual"] = equilibrium.force_residual;
-  entry["check_residual"] = equilibrium.check_residual;
-  entry["check_iterations"] = equilibrium.check_iterations;
-  entry["check_difference"] = equilibrium.check_difference;
   entry["auxiliary_stiffness"] = equilibrium.auxiliary_stiffness;
   entry["uniqueness"] = word(equilibrium.uniqueness);
   for (std::size_t i = 0; i < report.contacts.size(); ++i)

@@ -76,9 +76,8 @@ Sentences of_estimate(const Report& report)
   const Estimate& estimate = followed_estimate(report);
   const double lift_off = estimate.lift_off_amplitude;
   if (estimate.outcome.kind == OutcomeKind::no_balance && std::isfinite(lift_off))
-    return {format("no amplitude is predicted; start = \"estimate\" is first lift-off times "
-                   "-estimate_lift_off_multiple, %.5g m by default",
-                   2 * lift_off)};
+    return {format("no amplitude is predicted; start = \"estimate\" is first lift-off times %g, %.5g m",
+                   lift_off_multiple, lift_off_multiple * lift_off)};
   Sentences sentences;
   if (estimate.outcome.kind != OutcomeKind::balance) return sentences;
   if (estimate.amplitude > 3 * lift_off)

@@ -214,19 +214,6 @@ void solve_with_gyroscopic_part(const ThetaStep& step, Mat G, const SteppedMotio
   }
 }
 
-OptionList options_of(StepOptions& options)
-{
-  OptionList list = {
-      {"-transient_contact_operator", choice_of(options.storage), Range::any,
-       "the condensed contact operator W: stored, by columns on several ranks (whole), or in the factor of the step "
-       "(by_factor), which takes no memory; a quarter of the free memory decides"},
-      {"-transient_refuse", &options.refuse, Range::any,
-       "false: march even where theta and the step falsify growth rates"},
-  };
-  for (Option& option : options_of(options.contact)) list.push_back(std::move(option));
-  return list;
-}
-
 Owned<Mat> step_matrix(const Structure& structure, double h, double theta)
 {
   Owned<Mat> A = copy_of(structure.M);
@@ -251,17 +238,16 @@ std::vector<double> added_by_compliance(const ThetaStep& step, const Interface& 
   return added;
 }
 
-ContactOperator condensed_operator(const ThetaStep& step, const Interface& interface, OperatorStorage storage)
+ContactOperator condensed_operator(const ThetaStep& step, const Interface& interface)
 {
   if (interface.pairs == 0) return {};
   const MPI_Comm comm = comm_of(interface.B);
   const auto products = step.factor.condensed_products();
   const auto rows = static_cast<double>(interface.size());
-  if (products && storage == OperatorStorage::automatic)
-    storage = stays_in_factor(rows, products->entries(), free_memory(comm)) ? OperatorStorage::by_factor
-                                                                            : OperatorStorage::whole;
-  if (products && (storage == OperatorStorage::by_factor || is_worth_sharing(rows, ranks_of(comm))))
-    return make_contact_operator({*products, step.h, added_by_compliance(step, interface)}, storage, interface.pairs,
+  const bool by_factor = products && stays_in_factor(rows, products->entries(), free_memory(comm));
+  if (by_factor || (products && is_worth_sharing(rows, ranks_of(comm))))
+    return make_contact_operator({*products, step.h, added_by_compliance(step, interface)},
+                                 by_factor ? OperatorStorage::by_factor : OperatorStorage::whole, interface.pairs,
                                  interface.directions, comm);
   ContactOperator W;
   std::vector<double> entries = whole_operator(step, interface);
@@ -292,7 +278,7 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.contact = options.contact;
   step.factor = factor_held(step_matrix(structure, h, theta), interface, structure.names, options.factor);
   step.factor_seconds = MPI_Wtime() - start;
-  step.W = condensed_operator(step, interface, options.storage);
+  step.W = condensed_operator(step, interface);
   step.matrices = pair_matrices(structure.M, structure.K);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
   return_freed_memory(); // fronts of the factor, and what W was added up from

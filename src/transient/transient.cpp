@@ -136,7 +136,7 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
     outcome.kind = OutcomeKind::not_converged;
     outcome.reason =
         format("contact did not converge in %ld of %ld steps, first at t = %.4g s (largest residual %.4g): "
-               "raise -transient_contact_max_it or shorten the step",
+               "shorten the step",
                summary.unconverged, summary.steps, summary.first_unconverged, summary.contact_residual_max);
   }
   if (summary.fall_of_friction_max >= 1)

@@ -44,8 +44,6 @@ struct ContactSettings
   double rho = 0; // of the fixed point, over 1/lambda_max(W); 0: chosen, and halved when the residual grows
 };
 
-OptionList options_of(ContactSettings& settings);
-
 /// How one problem ended.
 struct ContactResult
 {

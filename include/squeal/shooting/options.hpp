@@ -56,6 +56,4 @@ struct ShootingOptions
   MultiplierMethod multiplier_method = MultiplierMethod::automatic;
 };
 
-OptionList options_of(ShootingOptions& options);
-
 } // namespace squeal

@@ -10,11 +10,8 @@ namespace squeal
 struct StepOptions
 {
   ContactSettings contact{};
-  OperatorStorage storage = OperatorStorage::automatic; // of W
-  bool refuse = true;                                   // what step_guards.hpp refuses
-  FactorOptions factor{};                               // listed by itself
+  bool refuse = true;     // what step_guards.hpp refuses
+  FactorOptions factor{}; // listed by itself
 };
-
-OptionList options_of(StepOptions& options);
 
 } // namespace squeal
