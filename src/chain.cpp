@@ -217,7 +217,8 @@ Response run_response(Chain& chain)
     if (scene.response->excitation.empty() || std::ranges::count(scene.response->excitation, scene.probes[i].name) > 0)
       excitations.push_back(static_cast<int>(i));
   return find_response({chain.model.structure, *chain.linearised, chain.report.modes.modes, chain.model.probes,
-                        excitations, frequencies_of(*scene.response), chain.options.response, chain.options.pencil});
+                        excitations, frequencies_of(*scene.response), chain.options.response,
+                        chain.options.modes.pencil});
 }
 
 std::vector<Estimate> run_estimates(const Chain& chain)
@@ -234,7 +235,7 @@ std::vector<Estimate> run_estimates(const Chain& chain)
   else
     for (const ComplexMode& mode : followed_modes(chain.report, chain.scene))
       estimates.push_back(mode.frequency_hz() > 0
-                              ? estimate_amplitude(chain.sliding(), *chain.linearised, mode, chain.options.estimate)
+                              ? estimate_amplitude(chain.sliding(), *chain.linearised, mode)
                               : not_run<Estimate>(OutcomeKind::skipped, "the mode does not oscillate"));
   return estimates;
 }

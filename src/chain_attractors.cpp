@@ -40,8 +40,7 @@ Attractors run_attractors(const Chain& chain)
   if (chosen) settings.starts = starts_beside(chain.report.modes.unstable_count);
   const auto attractors = [&](const UnstableModes& started)
   {
-    Attractors found =
-        find_attractors({chain.sliding(), modes, started, settings, chain.options.step}, chain.options.attractors);
+    Attractors found = find_attractors({chain.sliding(), modes, started, settings, chain.options.step});
     if (chosen && found.outcome.kind == OutcomeKind::not_converged) found.outcome.kind = OutcomeKind::completed;
     return found;
   };
@@ -52,8 +51,7 @@ Attractors run_attractors(const Chain& chain)
   }
   // a motion may go on beside a stable equilibrium: from the mode that decays slowest, or that a given start has most
   // of, and from random sums of modes
-  const Estimate estimate =
-      estimate_amplitude(chain.sliding(), *chain.linearised, modes.front(), chain.options.estimate);
+  const Estimate estimate = estimate_amplitude(chain.sliding(), *chain.linearised, modes.front());
   if (!std::isfinite(estimate.start_amplitude))
     return not_run<Attractors>(OutcomeKind::skipped, "no amplitude is known at which contact opens or slip reverses");
   return attractors({std::span(modes).first(1), std::span(&estimate, 1)});

@@ -197,16 +197,15 @@ double memory_of_response(const Sizes& sizes, const Scene& scene, const ProgramO
   const double pairs = (driven > 0 ? driven : read) * read;
   const double shapes = std::min(sizes.dofs, static_cast<double>(options.response.shapes) + passes_of_response);
   return 8 * matrix_entry * sizes.entries +
-         forecast_pencil(sizes.factor, sizes.entries, Symmetry::none, options.pencil, comm) +
+         forecast_pencil(sizes.factor, sizes.entries, Symmetry::none, options.modes.pencil, comm) +
          number * (2 * shapes + passes_of_response) * sizes.dofs +
          3 * 2 * number * sizes.ranks * pairs * scene.response->count;
 }
 
 /// Whether W stays in the factor, of the memory that is left beside it.
-bool stays_in_factor(const Sizes& sizes, OperatorStorage storage, double free)
+bool stays_in_factor(const Sizes& sizes, double free)
 {
-  if (sizes.factor.border_entries == 0 || storage == OperatorStorage::whole) return false;
-  return storage == OperatorStorage::by_factor ||
+  return sizes.factor.border_entries > 0 &&
          squeal::stays_in_factor(sizes.contact, sizes.factor.border_entries, free - memory_of_factor(sizes));
 }
 
@@ -298,7 +297,7 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   if (taken == SpeedTaken::measured) forecast.speed = measured_speed(comm);
   const Speed& speed = forecast.speed;
   const double free = free_memory(comm);
-  const bool in_factor = stays_in_factor(sizes, options.step.storage, free);
+  const bool in_factor = stays_in_factor(sizes, free);
   const bool whole_operator = scene.cycle.enabled || (!in_factor && !shares_operator(sizes)); // tangents need one
   forecast.on_rank_zero =
       std::max(whole_operator ? sizes.condensed_operator() : 0, 4 * number * sizes.pairs * sizes.pairs);

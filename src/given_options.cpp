@@ -2,10 +2,12 @@
 
 #include "squeal/base/error.hpp"
 #include "squeal/options.hpp"
-#include "squeal/session_options.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <sstream>
 
@@ -17,8 +19,98 @@ namespace
 
 using Strings = std::vector<std::string>;
 
-constexpr std::size_t largest_file = 1 << 20; // [byte] of options
-constexpr std::size_t most_files = 20;        // of options, so that files that name each other come to an end
+/// The value that an option of PETSc's takes.
+enum class Value
+{
+  flag,   // nothing, or true or false
+  file,   // nothing, or a file that can be written, with more behind a colon
+  viewer, // [ascii][:file[:format[:append]]]
+  text,
+};
+
+struct SessionOption
+{
+  const char* name;
+  Value value;
+  const char* meaning;
+};
+
+// PETSc obeys them while it starts, and ends the process at the first value that it does not take.
+constexpr std::array session_options = {
+    SessionOption{"log_view", Value::viewer, "[:FILE[:FORMAT]]  where the time went, one stage per step of the chain"},
+    SessionOption{"log_view_memory", Value::flag, "  adds memory to -log_view"},
+    SessionOption{"log_all", Value::flag, "  keeps every event"},
+    SessionOption{"log_trace", Value::file, "[FILE]  writes every event as it happens"},
+    SessionOption{"log_exclude", Value::text, "CLASSES  leaves events out"},
+    SessionOption{"info", Value::file, "[FILE[:CLASSES]]  PETSc's own messages"},
+    SessionOption{"history", Value::file, "[FILE]  keeps what PETSc prints"},
+    SessionOption{"options_left", Value::flag, "  lists options that were not used"},
+    SessionOption{"options_view", Value::flag, "  lists options"},
+    SessionOption{"malloc", Value::flag, "  PETSc's own allocator"},
+    SessionOption{"malloc_debug", Value::flag, "  checks memory"},
+    SessionOption{"malloc_dump", Value::flag, "  lists memory that was not freed"},
+    SessionOption{"malloc_view", Value::file, "[FILE]  lists all memory"},
+    SessionOption{"memory_view", Value::flag, "  memory at the end"},
+    SessionOption{"no_signal_handler", Value::flag, "  leaves signals to the system"},
+    SessionOption{"get_total_flops", Value::flag, "  counts operations"},
+    SessionOption{"citations", Value::file, "[FILE]  what to cite of PETSc"},
+};
+
+bool is_one_of(const std::string& word, std::initializer_list<const char*> words)
+{
+  return std::ranges::any_of(words, [&](const char* known) { return word == known; });
+}
+
+Strings parts_of(const std::string& value)
+{
+  Strings parts;
+  std::istringstream stream(value);
+  for (std::string part; std::getline(stream, part, ':');) parts.push_back(part);
+  return parts;
+}
+
+/// Makes the file where it is not there, so that a long run does not end without it.
+std::string problem_of_new_file(const std::string& name)
+{
+  if (name.empty() || std::ofstream(name, std::ios::app)) return {};
+  return shortened(name) + " cannot be written: " + std::strerror(errno);
+}
+
+std::string problem_of_viewer(const Strings& parts)
+{
+  if (!parts.empty() && !is_one_of(parts[0], {"", "ascii"}))
+    return "no viewer is called '" + shortened(parts[0]) + "'; write :FILE, :FILE:FORMAT or nothing";
+  const std::string formats = "ascii_info, ascii_info_detail, ascii_matlab, ascii_xml, ascii_csv, ascii_flamegraph";
+  if (parts.size() > 2 && !is_one_of(parts[2], {"", "default"}) &&
+      (", " + formats + ",").find(", " + parts[2] + ",") == std::string::npos)
+    return "no format is called '" + shortened(parts[2]) + "'; known: " + formats;
+  return parts.size() > 1 ? problem_of_new_file(parts[1]) : "";
+}
+
+std::string problem_of_value(Value kind, const std::string& value)
+{
+  const Strings parts = parts_of(value);
+  if (parts.empty() || kind == Value::text) return {};
+  if (kind == Value::flag)
+    return is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"}) ? "" : "it is true or false";
+  return kind == Value::viewer ? problem_of_viewer(parts) : problem_of_new_file(parts[0]);
+}
+
+/// Why PETSc must not see an option and its value; the name stands without its dash. Empty: it may.
+std::string problem_of_option(const std::string& name, const std::string& value)
+{
+  const auto of_session = std::ranges::find(session_options, name, &SessionOption::name);
+  std::string problem;
+  if (of_session != session_options.end())
+    problem = problem_of_value(of_session->value, value);
+  else if (is_printing_option(name) && solver_prefix_of(name))
+    problem = problem_of_value(Value::viewer, value);
+  else if ((name == "modes_pep_type" && value == "jd") || (name == "cycle_snes_type" && value == "aspin"))
+    problem = "it needs more than an operator";
+  else
+    return problem_of_option_name(name);
+  return problem.empty() ? "" : "option -" + name + " " + shortened(value) + ": " + problem;
+}
 
 bool is_letter(const std::string& word, std::size_t place)
 {
@@ -31,92 +123,78 @@ bool is_option(const std::string& word)
   return word.size() > 1 && word[0] == '-' && (is_letter(word, 1) || (word[1] == '-' && is_letter(word, 2)));
 }
 
-class Examiner
+std::string problem_of_words(const Strings& words)
 {
-public:
-  void examine(const Strings& words, const std::string& source)
+  for (std::size_t i = 0; i < words.size(); ++i)
   {
-    for (std::size_t i = 0; i < words.size() && given.problem.empty(); ++i)
-    {
-      if (!is_option(words[i])) continue;
-      const bool has_value = i + 1 < words.size() && !is_option(words[i + 1]);
-      examine_option(words[i].substr(1), has_value ? words[i + 1] : "", source);
-    }
+    if (!is_option(words[i]))
+      return "unexpected argument '" + shortened(words[i]) +
+             "': a scene is one file that ends in .toml, or a folder that holds a scene.toml";
+    const bool has_value = i + 1 < words.size() && !is_option(words[i + 1]);
+    const std::string name = words[i].substr(1), value = has_value ? words[++i] : "";
+    if (const std::string problem = problem_of_option(name, value); !problem.empty()) return problem;
   }
+  return {};
+}
 
-  /// Passes a file that does not exist.
-  void examine_file(const std::string& name)
+/// The words of a file, without comments.
+Strings words_of_file(const std::string& name)
+{
+  std::ifstream stream(name);
+  if (!is_file(name) || !stream)
+    throw Error("option -options_file " + shortened(name) + ": there is no such file, or it cannot be read");
+  Strings all;
+  for (std::string line; std::getline(stream, line);)
   {
-    if (!given.problem.empty() || !is_file(name)) return;
-    std::ifstream stream(name, std::ios::binary);
-    std::string text(largest_file + 1, '\0');
-    stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-    text.resize(static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > largest_file || text.find('\0') != std::string::npos)
-      given.problem = "file " + shortened(name) + ": it holds no options";
-    else if (++files_ > most_files)
-      given.problem = "option -options_file " + shortened(name) + ": more than 20 files name one another";
-    else if (!words_in(text).empty())
-      given.sources.push_back("file " + shortened(name));
-    std::istringstream lines(text);
-    int number = 0;
-    for (std::string line; given.problem.empty() && std::getline(lines, line);)
-      examine_line(words_in(line), "file " + shortened(name) + ", line " + std::to_string(++number));
+    const Strings words = words_in(line.substr(0, line.find('#')));
+    all.insert(all.end(), words.begin(), words.end());
   }
-
-  GivenOptions given;
-
-private:
-  /// An option and its value, or an alias, and then perhaps a comment.
-  void examine_line(const Strings& words, const std::string& place)
-  {
-    const auto end = std::find_if(words.begin(), words.end(), [](const std::string& word) { return word[0] == '#'; });
-    const Strings line(words.begin(), end);
-    if (line.empty() || line[0][0] == '!' || line[0][0] == '%') return;
-    if (line[0] == "alias" && line.size() == 3) return;
-    if (!is_option(line[0]))
-      given.problem = place + ": '" + shortened(line[0]) + "' is no option";
-    else if (line.size() > 2 || (line.size() == 2 && is_option(line[1])))
-      given.problem = place + ": it must hold one option and its value, but goes on with " + shortened(line.back());
-    else
-      examine_option(line[0].substr(1), line.size() > 1 ? line[1] : "", " (" + place + ")");
-  }
-
-  void examine_option(const std::string& name, const std::string& value, const std::string& source)
-  {
-    std::string problem = problem_of_option_name(name);
-    if (problem.empty()) problem = problem_of_session_option(name, value);
-    if (const std::string file = file_written_by(name, value); !file.empty()) given.written.push_back(file);
-    if (!problem.empty())
-      given.problem = problem + source;
-    else if (names_options_file(name))
-      examine_file(value);
-  }
-
-  std::size_t files_ = 0;
-};
+  return all;
+}
 
 } // namespace
 
 GivenOptions given_options(int argc, char** argv)
 {
-  Examiner examiner;
-  const Strings line(argv + std::min(argc, 1), argv + argc);
-  const char *home = std::getenv("HOME"), *variable = std::getenv("PETSC_OPTIONS");
-  const Strings from_variable = words_in(variable ? variable : "");
-  const auto skips = [](const Strings& words)
-  { return std::find(words.begin(), words.end(), "-skip_petscrc") != words.end(); };
-  if (!skips(line) && !skips(from_variable))
+  const char* variable = std::getenv("PETSC_OPTIONS");
+  Strings from_variable = words_in(variable ? variable : "");
+  GivenOptions given;
+  given.from_variable = !from_variable.empty();
+  Strings words = std::move(from_variable);
+  words.insert(words.end(), argv + std::min(argc, 1), argv + argc);
+  try
   {
-    if (home) examiner.examine_file(std::string(home) + "/.petscrc");
-    std::error_code none;
-    if (!home || !std::filesystem::equivalent(home, ".", none)) examiner.examine_file(".petscrc");
-    examiner.examine_file("petscrc");
+    for (std::size_t i = 0; i < words.size(); ++i)
+      if (words[i] != "-options_file")
+        given.words.push_back(words[i]);
+      else
+        for (std::string& word : words_of_file(++i < words.size() ? words[i] : ""))
+          given.words.push_back(std::move(word));
+    given.problem = problem_of_words(given.words);
   }
-  if (!from_variable.empty()) examiner.given.sources.push_back("the variable PETSC_OPTIONS");
-  examiner.examine(from_variable, " (in PETSC_OPTIONS)");
-  examiner.examine(line, "");
-  return std::move(examiner.given);
+  catch (const Error& error)
+  {
+    given.problem = error.what();
+  }
+  return given;
+}
+
+bool is_printing_option(const std::string& name)
+{
+  constexpr std::array views = {"_view",           "_view_pre",       "_view_solution",  "_view_mat",
+                                "_view_pmat",      "_view_rhs",       "_view_values",    "_view_vectors",
+                                "_error_relative", "_error_absolute", "_error_backward", "_converged_reason",
+                                "_converged_rate"};
+  return std::ranges::any_of(views, [&](const char* ending) { return name.ends_with(ending); }) ||
+         (name.find("_monitor") != std::string::npos && !name.ends_with("_monitor_cancel"));
+}
+
+std::string session_option_reference()
+{
+  std::string text = "  -options_file FILE  more options; # begins a comment\n";
+  for (const SessionOption& option : session_options)
+    text += std::string("  -") + option.name + " " + option.meaning + "\n";
+  return text;
 }
 
 } // namespace squeal

@@ -7,8 +7,6 @@
 #include "squeal/report/report.hpp"
 #include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"
-#include "squeal/session_options.hpp"
-#include "squeal/solver_options.hpp"
 
 #include <algorithm>
 #include <array>
@@ -32,8 +30,8 @@ struct Arguments
   RunLimits limits;
   Beginning beginning = Beginning::afresh;
   bool dry_run = false, help = false, version = false, allow_scripts = false, force = false, reference = false;
-  std::string problem;                     // said after MPI is up, once
-  std::vector<std::string> option_sources; // beside the command line
+  bool options_in_variable = false; // PETSC_OPTIONS
+  std::string problem;              // said after MPI is up, once
 };
 
 constexpr const char* scene_file = "scene.toml"; // of a scene that is a folder
@@ -137,30 +135,16 @@ std::filesystem::path default_output(const std::filesystem::path& scene)
          (scene.filename() == scene_file ? whole.parent_path().filename() : whole.stem());
 }
 
-/// Why a file that PETSc would write may not be written: it is the scene or a result. Empty: it may.
-std::string problem_of_written(const std::vector<std::string>& files, const Arguments& arguments)
+/// The words that PETSc starts with; it looks for no others. Where something is wrong with them there are none.
+std::vector<std::string> options_for_petsc(Arguments& arguments, int argc, char** argv)
 {
-  if (arguments.scene.empty()) return {};
-  std::vector<std::filesystem::path> taken = {arguments.scene};
-  const auto place = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;
-  for (const char* name : result_file_names) taken.push_back(place / name);
-  for (const std::string& file : files)
-    if (std::ranges::any_of(taken, [&](const auto& other) { return is_same_file(file, other); }))
-      return "the output " + shortened(file) + " of PETSc's would fall on the scene or a result: name another file";
-  return {};
-}
-
-/// Checks what PETSc obeys while it starts. Where something is wrong, PETSc starts without any option.
-void examine_options(Arguments& arguments, std::vector<char*>& words)
-{
-  static char skip[] = "-skip_petscrc";
-  GivenOptions given = given_options(static_cast<int>(words.size()), words.data());
-  arguments.option_sources = std::move(given.sources);
-  if (given.problem.empty()) given.problem = problem_of_written(given.written, arguments);
-  if (given.problem.empty()) return;
+  GivenOptions given = given_options(argc, argv);
+  arguments.options_in_variable = given.from_variable;
   if (arguments.problem.empty()) arguments.problem = given.problem;
+  if (!given.problem.empty()) given.words.clear();
   unsetenv("PETSC_OPTIONS");
-  words = {words.front(), skip};
+  given.words.insert(given.words.begin(), "-skip_petscrc");
+  return std::move(given.words);
 }
 
 /// A line for each argument.
@@ -186,8 +170,8 @@ void print_help()
               "  exit code: 0 all converged, 2 a stage did not (the report says which), 3 asked to end, 1 an error\n\n"
               "Keys of a scene file: squeal --reference keys\n\n"
               "Algorithm options (PETSc options database) [default]\n%s\n"
-              "Options of the solvers themselves, PETSc's and SLEPc's, follow the prefixes\n %s\n"
-              "e.g. -cycle_snes_monitor, -modes_pep_monitor, -cycle_snes_rtol 1e-3.\n\n"
+              "Options of the solvers themselves, PETSc's, SLEPc's and MUMPS's, follow the prefixes\n %s\n"
+              "e.g. -cycle_snes_monitor, -modes_pep_monitor, -factor_mat_mumps_icntl_14 50.\n\n"
               "Options of the whole run, PETSc's:\n%s",
               SQUEAL_VERSION, argument_reference().c_str(), option_reference().c_str(), prefixes.c_str(),
               session_option_reference().c_str());
@@ -212,8 +196,8 @@ void print_key_page()
       "`all`,\n"
       "or `none`. A direction is a text such as `\"x\"` or `\"-y\"`, or a vector.\n%s"
       "\n## Arguments\n\n%s\n## Options\n\n"
-      "Options are of PETSc's database: of the command line, `PETSC_OPTIONS`, and files `.petscrc`.\n\n%s"
-      "\n## Options of solvers\n\nOptions of PETSc's and SLEPc's own solvers follow the prefixes%s.\n"
+      "Options are of PETSc's database: of the command line, and of the variable `PETSC_OPTIONS`.\n\n%s"
+      "\n## Options of solvers\n\nOptions of PETSc's, SLEPc's and MUMPS's own solvers follow the prefixes%s.\n"
       "One that no solver asks for is an error. Those of the whole run are:\n\n```text\n%s```\n",
       scene_reference().c_str(), arguments.c_str(), option_page().c_str(), prefixes.c_str(),
       session_option_reference().c_str());
@@ -222,22 +206,6 @@ void print_key_page()
 void print_versions()
 {
   for (const auto& [name, version] : versions()) std::printf("%-7s %s\n", name.c_str(), version.c_str());
-}
-
-void check_leftover_words(int argc, char** argv)
-{
-  if (argc > 1 && argv[1][0] != '-')
-    throw Error("unexpected argument '" + shortened(argv[1]) +
-                "': a scene is one file that ends in .toml, or a folder that holds a scene.toml");
-}
-
-/// Says which options are obeyed that the command line does not show.
-void print_sources(const std::vector<std::string>& sources, MPI_Comm comm)
-{
-  if (rank_of(comm) != 0 || sources.empty()) return;
-  std::string text;
-  for (const std::string& source : sources) text += (text.empty() ? "" : ", ") + source;
-  std::printf("options come from the command line and from %s\n", text.c_str());
 }
 
 /// Throws Error if a state file could not be written after the work. The results' folder will be made.
@@ -285,16 +253,15 @@ std::string request_text(const Scene& scene, const std::vector<std::filesystem::
   return text;
 }
 
-int run_program(const Arguments& arguments, int argc, char** argv)
+int run_program(const Arguments& arguments)
 {
   const MPI_Comm comm = PETSC_COMM_WORLD;
   agree(comm, arguments.problem);
-  check_leftover_words(argc, argv);
   if (arguments.scene.empty()) throw Error("no scene given; usage: squeal SCENE [options], squeal -help explains them");
-  print_sources(arguments.option_sources, comm);
+  if (arguments.options_in_variable && rank_of(comm) == 0)
+    std::printf("options come from the command line and from the variable PETSC_OPTIONS\n");
   ProgramOptions options = read_program_options(comm);
   options.force = arguments.force;
-  check_solver_options(options, comm);
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
   if (scene.mesh && arguments.allow_scripts) scene.mesh->statements = Statements::any;
@@ -396,8 +363,9 @@ int main(int argc, char** argv)
     return 1;
   }
   Arguments arguments = take_arguments(argc, argv);
-  std::vector<char*> words(argv, argv + argc);
-  examine_options(arguments, words);
+  std::vector<std::string> options = options_for_petsc(arguments, argc, argv);
+  std::vector<char*> words = {argv[0]};
+  for (std::string& option : options) words.push_back(option.data());
   argc = static_cast<int>(words.size());
   words.push_back(nullptr);
   argv = words.data();
@@ -412,7 +380,7 @@ int main(int argc, char** argv)
   }
   try
   {
-    const int code = run_program(arguments, argc, argv);
+    const int code = run_program(arguments);
     end_run_control();
     return code;
   }

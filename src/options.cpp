@@ -3,12 +3,10 @@
 #include "squeal/base/free_memory.hpp"
 #include "squeal/base/markdown.hpp"
 #include "squeal/base/petsc.hpp"
+#include "squeal/given_options.hpp"
 #include "squeal/scene/scene.hpp"
-#include "squeal/session_options.hpp"
-#include "squeal/solver_options.hpp"
 
 #include <algorithm>
-#include <sstream>
 
 namespace squeal
 {
@@ -34,38 +32,84 @@ std::string nearest_option(const std::string& option)
 
 } // namespace
 
+OptionList options_of(ProgramOptions& options)
+{
+  ContactSettings& contact = options.step.contact;
+  ShootingOptions& shooting = options.cycle.shooting;
+  return {
+      {"-factor", choice_of(options.factor.kind), Range::any,
+       "factorisation for the step and the equilibrium: supernodal, mumps (both on all ranks), dense (on rank 0)"},
+      {"-factor_limit", &options.factor.limit, Range::any,
+       "[GB] largest share of a rank in a supernodal factor; beyond it several ranks take MUMPS; -1: half of the free "
+       "memory. Every run prints its choice, with what is foreseen"},
+      {"-modes_solver", choice_of(options.modes.solver), Range::any,
+       "solver of larger problems: slices of frequency, or SLEPc's TOAR around zero (toar)"},
+      {"-modes_shapes", choice_of(options.modes.shapes), Range::any,
+       "modes whose shapes fields.h5 holds: the unstable ones, or all"},
+      {"-transient_refuse", &options.step.refuse, Range::any,
+       "false: march even where theta and the step falsify growth rates"},
+      {"-transient_contact_solver", choice_of(contact.solver), Range::any,
+       "block Gauss-Seidel, or the projection fixed point (fixed_point)"},
+      {"-transient_contact_tolerance", &contact.tolerance, Range::positive,
+       "largest natural map of a pair over the largest reaction; beyond 10 000 degrees of freedom periods of shooting "
+       "that are still far from the cycle take up to 1e-6"},
+      {"-transient_contact_rho", &contact.rho, Range::below_two,
+       "step of the fixed point over 1/lambda_max(W); 0: chosen by the program"},
+      {"-cycle_samples", &options.cycle.samples, Range::natural,
+       "number of displacements over the last period in fields.h5"},
+      {"-reduced_modes", &options.cycle.reduced_modes, Range::natural,
+       "largest number of complex modes of a reduced model: the followed one and the nearest in frequency"},
+      {"-cycle_subspace_newtons", &shooting.subspace_newtons, Range::not_negative,
+       "Newton iterations on the period and the paper's six amplitudes; 0: they are not tried"},
+      {"-cycle_finish", choice_of(shooting.finish), Range::any, "finish in the full space: multisecant or none"},
+      {"-cycle_max_periods", &shooting.max_periods, Range::not_negative,
+       "periods that one search integrates at most; another number of steps a period is another search"},
+      {"-cycle_free_periods", &shooting.free_periods, Range::not_negative,
+       "largest number of periods integrated freely while shooting finds no cycle that attracts"},
+      {"-cycle_multipliers", &shooting.multipliers, Range::any,
+       "columns of the exact tangent that the search for Floquet multipliers may take; 0: none; -1: as many as it "
+       "needs, within limits. A number forces that many Arnoldi steps, or bounds the search beside the oblique "
+       "projection"},
+      {"-cycle_watched_periods", &shooting.watched_periods, Range::any,
+       "periods integrated from beside the cycle found, 3 % of its fluctuation along the fastest motion, to see it "
+       "grow or decay; again from a tenth and a hundredth of that where growth and multiplier differ; below 0: 200 "
+       "where the whole tangent of a small model does not decide, else none"},
+      {"-settled_periods", &options.settled.periods, Range::not_negative,
+       "largest number of periods integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 "
+       "beyond 10 000 degrees of freedom"},
+      {"-settled_exponents", &options.settled.exponents, Range::natural,
+       "number of Lyapunov exponents of a settled motion"},
+      {"-sweep_groups", &options.sweep.groups, Range::not_negative,
+       "groups of ranks that share the points, at most one a rank or a point; 0: chosen so that each has four points, "
+       "and memory for a model of its own"},
+      {"-response_tolerance", &options.response.tolerance, Range::positive,
+       "geometric mean of the residual forces of the responses and of the transposed problem, over a unit force"},
+  };
+}
+
+const SolverPrefix* solver_prefix_of(const std::string& name)
+{
+  const auto found =
+      std::ranges::find_if(solver_prefixes, [&](const SolverPrefix& prefix) { return name.starts_with(prefix.text); });
+  return found == solver_prefixes.end() ? nullptr : &*found;
+}
+
 std::string problem_of_option_name(const std::string& name)
 {
   const std::string option = "-" + name;
   ProgramOptions unused;
   const OptionList own = options_of(unused);
-  if (std::any_of(own.begin(), own.end(), [&](const Option& known) { return option == known.name; })) return {};
-  if (is_session_option(name) || solver_prefix_of(name)) return {};
-  return "unknown option " + shortened(option) + "; " + nearest_option(option.substr(0, 60));
-}
-
-OptionList options_of(ProgramOptions& options)
-{
-  OptionList all;
-  for (OptionList list : {options_of(options.factor), options_of(options.equilibrium), options_of(options.modes),
-                          options_of(options.pencil), options_of(options.estimate), options_of(options.step),
-                          options_of(options.cycle), options_of(options.settled), options_of(options.attractors),
-                          options_of(options.sweep), options_of(options.robustness), options_of(options.response)})
-    all.insert(all.end(), list.begin(), list.end());
-  return all;
+  const bool known = std::ranges::find(own, option, &Option::name) != own.end() || solver_prefix_of(name);
+  return known ? "" : "unknown option " + shortened(option) + "; " + nearest_option(option.substr(0, 60));
 }
 
 std::string option_reference()
 {
   ProgramOptions standard;
-  std::ostringstream text;
+  std::string text;
   for (const Option& option : options_of(standard))
-  {
-    text << "  " << option.name;
-    for (std::size_t column = option.name.size(); column < 36; ++column) text << ' ';
-    text << option.meaning << " [" << value_of(option) << "]\n";
-  }
-  return text.str();
+    text += format("  %-36s%s [%s]\n", option.name.c_str(), option.meaning.c_str(), value_of(option).c_str());
+  return text;
 }
 
 std::string option_page()
@@ -89,7 +133,6 @@ ProgramOptions read_program_options(MPI_Comm comm)
   options.factor.by_memory = 1e-9 * part * free_memory(comm) / ranks_of(comm);
   options.factor.known = no_analyses();
   options.equilibrium.factor = options.step.factor = options.factor;
-  options.modes.pencil = options.pencil;
   return options;
 }
 
@@ -103,7 +146,7 @@ void check_options_used(const std::vector<Stage>& stages_run, MPI_Comm comm)
   {
     const SolverPrefix* prefix = solver_prefix_of(names[i]);
     if (!prefix || std::ranges::find(stages_run, prefix->stage) == stages_run.end()) continue;
-    if (is_solver_view(names[i])) continue; // the stage found its answer without this solver
+    if (is_printing_option(names[i])) continue; // the stage found its answer without this solver
     problem += (problem.empty() ? "" : "; ") + ("option -" + std::string(names[i]) + " was never used");
   }
   check(PetscOptionsLeftRestore(nullptr, &count, &names, &values));

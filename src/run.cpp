@@ -183,7 +183,7 @@ Robustness run_robustness(const Chain& chain)
   for (const UncertainNumber& number : scene.uncertain) keys.push_back(number.key);
   const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(keys, values)); };
   return find_robustness({*scene.robustness, scene.uncertain, model_at, scene.friction, scene.modes,
-                          chain.options.modes, chain.options.equilibrium, chain.options.robustness},
+                          chain.options.modes, chain.options.equilibrium},
                          comm_of(chain.model.structure.load));
 }
 
@@ -258,7 +258,6 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   Report report;
   report.run = results.run();
   const Model model = timed(report, Stage::model, comm, [&] { return build_model(scene, comm); });
-  check_step_law(options.step, model.interface);
   report.model = summary_with_doubts(model, scene, comm);
   print_model(report.model, comm);
   std::optional<CoarseModel> coarse;
@@ -326,7 +325,6 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
 void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
 {
   const Model model = build_model(scene, comm);
-  check_step_law(options.step, model.interface);
   if (rank_of(comm) == 0)
     std::printf("# the scene, every default written out\n%s\n# the model\n", resolved_scene(scene).c_str());
   print_model(summary_with_doubts(model, scene, comm), comm);

@@ -7,8 +7,8 @@ import numpy as np
 from atlas_runs import PIN, matrix_scene, plt, run, runs, save
 from common import BLUE, GREEN, ORANGE, RED
 
-LAWS = {"modified": ("displacement", BLUE, "o", "at u + h/2 v (squeal)"), "velocity": ("velocity", GREEN, "s", "on velocities (squeal, by option)"),
-        "end": (None, RED, "^", "at u+"), "start": (None, ORANGE, "v", "at u")}
+LAWS = {"modified": (BLUE, "o", "at u + h/2 v (squeal)"), "velocity": (GREEN, "s", "on velocities"), "end": (RED, "^", "at u+"),
+        "start": (ORANGE, "v", "at u")}
 
 
 class Chain:
@@ -37,12 +37,12 @@ class Chain:
             rows.append((self.gap + u[0], reaction, v @ self.M @ v / 2 + u @ self.K @ u / 2 - self.F @ u))
         return np.array(rows).T
 
-    def squeal(self, results, law, h, steps, name):
+    def squeal(self, results, h, steps, name):
         """The same from a run of squeal."""
         n = len(self.u)
         scene = matrix_scene(results / name, self.M, np.zeros((n, n)), self.K, np.eye(2, n) * [[1], [0]], self.F, [self.gap],
                              [1], start=(self.u, self.v), probes=(0,), more="[modes]\nband = 1\nmethod = 'full'\n")
-        done = run(results, scene, "-transient_contact_law", LAWS[law][0], transient__steps=steps, transient__step_size=h)
+        done = run(results, scene, transient__steps=steps, transient__step_size=h)
         return self.gap + done.history("probes/p0"), done.history("normal_force"), done
 
 
@@ -76,11 +76,11 @@ def contact_law(results):
     """Signorini's law at four places of the step: what is left of an impact, energy of a bouncing bar, its reaction."""
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(14, 4.4))
     sizes = 0.02 / 2.0 ** np.arange(6)
-    for law, (own, colour, marker, label) in LAWS.items():
+    for law, (colour, marker, label) in LAWS.items():
         left.loglog(sizes, [max(spurious_motion(law, h), 1e-16) for h in sizes], marker + "-", color=colour, label=label)
-        if own:
+        if law == "modified":
             for h in sizes[::2]:
-                gap, _, _ = falling_mass().squeal(results, law, h, int(0.9 / h), "falling_mass")
+                gap, _, _ = falling_mass().squeal(results, h, int(0.9 / h), "falling_mass")
                 left.loglog(h, max(np.abs(gap[int(0.6 / h):]).max(), 1e-16), "o", mfc="none", mec="black", ms=11)
     left.plot([], [], "o", mfc="none", mec="black", ms=11, label="runs of squeal")
     left.set(xlabel="time step h [s]", ylabel="motion left after an inelastic impact [m]", ylim=(1e-17, 1e6),
@@ -92,7 +92,7 @@ def contact_law(results):
     bar = bouncing_bar(elements)
     steps = int(32 / h)
     time = h * np.arange(1, steps + 1)
-    for law, (own, colour, marker, label) in LAWS.items():
+    for law, (colour, marker, label) in LAWS.items():
         gap, reaction, energy = bar.march(law, h, steps)
         middle.plot(time[::50], energy[::50] / 500, color=colour, label=label)
         if law in ("modified", "end", "velocity"):
@@ -133,7 +133,7 @@ def contact_mass(results):
         middle.loglog(steps, noise, marker + "-", color=colour, label=label)
     for n, share in ((25, 1), (50, 1), (25, 0), (50, 0)):
         h = 0.3 / (3 * n)
-        _, _, done = bouncing_bar(n, share).squeal(results, "modified", h, int(3 / h), f"bar_{n}_{share}")
+        _, _, done = bouncing_bar(n, share).squeal(results, h, int(3 / h), f"bar_{n}_{share}")
         left.plot(n, -done.history("contact_power").sum() * h, "o", mfc="none", mec="black", ms=11,
                   label="runs of squeal" if (n, share) == (25, 1) else None)
     left.set(xlabel="elements of the bar", ylabel="energy lost in the impact [J] of 500", title="Energy: falls as 1/elements")

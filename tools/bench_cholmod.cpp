@@ -10,6 +10,7 @@
 #include "bench_trajectories.hpp"
 #include "cholmod_handles.hpp"
 #include "squeal/algebra/factor_forecast.hpp"
+#include "squeal/options.hpp"
 #include "squeal/transient/transient.hpp"
 
 #include <cmath>
@@ -344,8 +345,7 @@ void run(int argc, char** argv)
     const Owned<Mat> A = step_matrix(structure, h, 0.5);
     compare_factors(A, interface.B, rounds, figures, comparison);
   }
-  StepOptions options;
-  read_options(options_of(options));
+  const StepOptions options = read_program_options(comm).step;
   const ThetaStep step = make_theta_step(structure, interface, h, 0.5, options);
   for (const int count : {1, 16})
     compare_solves({step, structure, interface, start}, count, 7 * rounds, figures, comparison);

@@ -51,10 +51,13 @@ traj, belt = [], np.tile([0., %(belt)r, 0.], m//3); gauss_seidel(G[:3,:3].copy()
 for tol in (1e-12, 1e-8):  # the first to compare answers, the second to tell times
     u, v, r, took, cont, its = d["u"].copy(), d["v"].copy(), np.zeros(m), [], [], []
     for k in range(steps):
-        t = clock(); free = c.solve(M@v-h*(1-th)*(C@v)-h*(K@(u+h*th*(1-th)*v))+h*F)
-        on = np.flatnonzero(B[0::3]@(u+h*(1-th)*v) <= 0); ix = (3*on[:, None]+np.arange(3)).ravel(); b = (B@free-belt)[ix]
-        t1 = clock(); x, it = gauss_seidel(G if len(ix) == m else np.ascontiguousarray(G[np.ix_(ix, ix)]), b, r[ix], mu, tol); t2 = clock()
-        r[:] = 0; r[ix] = x; w = free+Y@r; u = u+h*(th*w+(1-th)*v); v = w; took.append(clock()-t); cont.append(t2-t1); its.append(it)
+        t = clock(); free = c.solve(M@v-h*(1-th)*(C@v)-h*(K@(u+h*th*(1-th)*v))+h*F); b = B@free-belt; b[0::3] += B[0::3]@(u+h*(1-th)*v)/h
+        t1 = clock(); n_, s_ = r[0::3], np.hypot(r[1::3], r[2::3]); stuck = (n_ > 0) & (mu*n_-s_ > 1e-8*n_.max())
+        past = (1-th)/th*(B@v-belt); past[0::3] = 0; past.reshape(-1, 3)[stuck] = 0; it, turned = 0, True
+        while np.any(turned):  # friction opposes the mean sliding velocity of the step, or that of its end where a pair would turn back
+            r, more = gauss_seidel(G, b+past, r, mu, tol); it += more; p = past.reshape(-1, 3)
+            turned = (r[0::3] > 0) & (((G@r+b+past).reshape(-1, 3)*p).sum(1) < (p*p).sum(1)); p[turned] = 0
+        t2 = clock(); w = free+Y@r; u = u+h*(th*w+(1-th)*v); v = w; took.append(clock()-t); cont.append(t2-t1); its.append(it)
         if tol < 1e-8: traj += [u, v]
 np.concatenate(traj).tofile(folder+"/peer.traj")
 print(json.dumps(dict(step=float(np.median(took[1:])), contact=float(np.median(cont[1:])), cold=cont[0], factor=factor, condensed=condensed, pardiso=pardiso,

@@ -6,6 +6,7 @@
 /// (-transient_…).
 #include "bench_timing.hpp"
 #include "bench_trajectories.hpp"
+#include "squeal/options.hpp"
 #include "squeal/transient/transient.hpp"
 
 #include <algorithm>
@@ -110,8 +111,7 @@ void run(const std::vector<std::string>& words)
   const Interface interface = read_interface(folder, structure, {mu, true}, comm);
   const State start = read_state(words.at(1), structure);
   const double begin = processor_time();
-  StepOptions options;
-  read_options(options_of(options));
+  const StepOptions options = read_program_options(comm).step;
   const ThetaStep step = make_theta_step(structure, interface, h, 0.5, options);
   const double prepared = processor_time() - begin;
 

@@ -174,8 +174,8 @@ def options(folder, random):
         if random.random() < 0.8:
             arguments.append(random.choice(VALUES))
     if random.random() < 0.2:
-        (folder / ".petscrc").write_text(" ".join(arguments) + "\n")
-        arguments = []
+        (folder / "options").write_text(" ".join(arguments) + "\n")
+        arguments = ["-options_file", "options"]
     return arguments
 
 

@@ -185,7 +185,7 @@ def sweep(report):
         words += (f"; {found['followed_modes']} modes followed with a MAC of at least {min(found['least_mac'], found['least_mac_across']):.2f}, "
                   f"{found['lost_modes']} lost on the way")
     if found["steps_cut_short"]:
-        words += (f"; in {found['steps_cut_short']} of the steps more points in between are needed than -sweep_between allows, "
+        words += (f"; in {found['steps_cut_short']} of the steps more points in between are needed than are put there, "
                   "so that modes may be mistaken there and thresholds missed")
     parts = [f"<h3>Sweep of {text(' and '.join(map(number_label, found['keys'], found['names'])))}</h3>", paragraph(words + ".")]
     failed = [[*at(point), text(point["outcome"]), text(point.get("reason", ""))] for point in found["points"] if point["outcome"] != "converged"]

@@ -1,14 +1,12 @@
 #pragma once
-/// All algorithm options of squeal: one struct a stage, each described in its own room; read and refused together.
+/// All options of squeal in one table, read and refused together; and the prefixes by which PETSc's, SLEPc's and
+/// MUMPS's objects take theirs.
 #include "squeal/algebra/bordered_factor.hpp"
-#include "squeal/algebra/pencil_factor.hpp"
-#include "squeal/attractors/attractors.hpp"
 #include "squeal/cycle/options.hpp"
 #include "squeal/report/stage.hpp"
 #include "squeal/settled/motion.hpp"
 #include "squeal/study/response.hpp"
-#include "squeal/study/robustness.hpp"
-#include "squeal/transient/estimate.hpp"
+#include "squeal/study/sweep.hpp"
 #include "squeal/transient/transient.hpp"
 
 namespace squeal
@@ -18,24 +16,39 @@ namespace squeal
 struct ProgramOptions
 {
   FactorOptions factor; // handed on to equilibrium and step
-  PencilOptions pencil; // handed on to modes
   EquilibriumOptions equilibrium;
   ModesOptions modes;
-  EstimateOptions estimate;
   StepOptions step; // of the transient and of the cycle
   CycleOptions cycle;
   SettledOptions settled;
-  AttractorOptions attractors;
   SweepOptions sweep;
   bool force = false; // --force: run whatever the forecast says
-  RobustnessOptions robustness;
   ResponseOptions response;
 };
 
 OptionList options_of(ProgramOptions& options);
 
-/// What is wrong with the name of an option, which stands without its dash. Empty if squeal, a solver of its stages or
-/// PETSc's session may know it. Needs no PETSc.
+/// A prefix of options, and the stage in which the object behind it works.
+struct SolverPrefix
+{
+  const char* text; // without the dash
+  Stage stage;
+};
+
+inline constexpr std::array solver_prefixes = {SolverPrefix{"factor_mat_mumps_", Stage::equilibrium},
+                                               SolverPrefix{"modes_mat_mumps_", Stage::modes},
+                                               SolverPrefix{"modes_real_eps_", Stage::modes},
+                                               SolverPrefix{"modes_real_st_", Stage::modes},
+                                               SolverPrefix{"modes_pep_", Stage::modes},
+                                               SolverPrefix{"modes_st_", Stage::modes},
+                                               SolverPrefix{"cycle_snes_", Stage::cycle},
+                                               SolverPrefix{"cycle_ksp_", Stage::cycle},
+                                               SolverPrefix{"cycle_pc_", Stage::cycle}};
+
+/// The prefix of an option's name, which stands without its dash; null if it has none of these.
+const SolverPrefix* solver_prefix_of(const std::string& name);
+
+/// Why the name of an option, which stands without its dash, is neither squeal's nor one of a prefix. Needs no PETSc.
 std::string problem_of_option_name(const std::string& name);
 
 /// A line for each option: name, meaning, default.
@@ -45,7 +58,7 @@ std::string option_reference();
 std::string option_page();
 
 /// The options of PETSc's database. Collective. Error: a value that an option does not take. Names are checked before
-/// PETSc starts (squeal/session_options.hpp).
+/// PETSc starts (squeal/given_options.hpp).
 ProgramOptions read_program_options(MPI_Comm comm);
 
 /// After the stages, before their results are published; collective. Error: an option of a solver object that nobody

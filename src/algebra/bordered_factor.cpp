@@ -330,17 +330,6 @@ std::shared_ptr<KnownAnalyses> no_analyses()
   return std::make_shared<KnownAnalyses>();
 }
 
-OptionList options_of(FactorOptions& options)
-{
-  return {
-      {"-factor", choice_of(options.kind), Range::any,
-       "factorisation for the step and the equilibrium: supernodal, mumps (both on all ranks), dense (on rank 0)"},
-      {"-factor_limit", &options.limit, Range::any,
-       "[GB] largest share of a rank in a supernodal factor; beyond it several ranks take MUMPS; -1: half of the free "
-       "memory. Every run prints its choice, with what is foreseen"},
-  };
-}
-
 FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
 {
   const int dofs = rows_of(A), border = rows_of(B);

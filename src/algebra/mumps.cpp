@@ -1,8 +1,11 @@
 #include "mumps.hpp"
 
 #include "squeal/base/free_memory.hpp"
+#include "squeal/base/petsc.hpp"
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -70,6 +73,21 @@ Mumps start_mumps(MPI_Comm comm, MumpsSymmetry symmetry)
   control(*mumps, 13) = 1; // no ScaLAPACK, since negative pivots of a root that it factors are not counted
   control(*mumps, 18) = 3; // every rank gives its share of the entries
   return mumps;
+}
+
+void set_controls_from_options(DMUMPS_STRUC_C& mumps, const char* prefix)
+{
+  constexpr std::array own = {5, 9, 13, 18, 19, 20, 21, 26, 27};
+  for (int number = 1; number <= static_cast<int>(std::size(mumps.icntl)); ++number)
+  {
+    if (std::ranges::find(own, number) != own.end()) continue;
+    auto value = static_cast<PetscInt>(control(mumps, number));
+    check(PetscOptionsGetInt(nullptr, prefix, format("-mat_mumps_icntl_%d", number).c_str(), &value, nullptr));
+    control(mumps, number) = static_cast<MUMPS_INT>(value);
+  }
+  for (std::size_t number = 1; number <= std::size(mumps.cntl); ++number)
+    check(PetscOptionsGetReal(nullptr, prefix, format("-mat_mumps_cntl_%zu", number).c_str(), &mumps.cntl[number - 1],
+                              nullptr));
 }
 
 void run(DMUMPS_STRUC_C& mumps, MumpsJob job)

@@ -39,6 +39,10 @@ enum class MumpsSymmetry
 /// An instance without output.
 Mumps start_mumps(MPI_Comm comm, MumpsSymmetry symmetry);
 
+/// Sets the controls that the options -<prefix>mat_mumps_icntl_N and -<prefix>mat_mumps_cntl_N give. Those of the
+/// matrix's format, of the counted pivots and of single solves are the program's own and not asked for.
+void set_controls_from_options(DMUMPS_STRUC_C& mumps, const char* prefix);
+
 /// ICNTL(number), counted from one as in MUMPS's manual.
 inline MUMPS_INT& control(DMUMPS_STRUC_C& mumps, int number)
 {

@@ -34,6 +34,7 @@ Mumps analysed(BorderedEntries& entries)
     mumps->size_schur = entries.border;
     mumps->listvar_schur = kept.data();
   }
+  set_controls_from_options(*mumps, "factor_");
   run(*mumps, MumpsJob::analyse);
   mumps->perm_in = mumps->listvar_schur = nullptr;
   return mumps;

@@ -142,6 +142,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   parts.K = std::move(entries.value); // MUMPS's pointer to them stays valid
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 14) = to_int(options.room);
+  set_controls_from_options(mumps, "modes_");
   mumps.perm_in = positions.data();
   parts.run_together([&] { run(mumps, MumpsJob::analyse); });
   mumps.perm_in = nullptr;
@@ -248,15 +249,6 @@ void PencilFactor::solve_by_rows(Parts& parts, MultiVector& Y)
   run(mumps, MumpsJob::solve);
   places.resize(static_cast<std::size_t>(mumps.info[22]));
   bring_to_owners(places, solution, parts.layout, parts.comm, Y.entries);
-}
-
-OptionList options_of(PencilOptions& options)
-{
-  return {
-      {"-modes_whole_factor", &options.whole_limit, Range::not_negative,
-       "[GB] of a factor that every rank makes whole, with results that repeat to the last bit; a larger one is "
-       "shared"},
-  };
 }
 
 } // namespace squeal

@@ -16,6 +16,7 @@ namespace squeal
 namespace
 {
 
+constexpr long most_periods = 400;
 constexpr int block = 50;              // periods between two looks at the energies
 constexpr double at_rest = 1e-4;       // of the least energy of a start
 constexpr std::size_t coordinates = 4; // of the least stable modes
@@ -133,20 +134,13 @@ bool all_settled(const std::vector<ReachedMotion>& motions, long periods)
 
 } // namespace
 
-OptionList options_of(AttractorOptions& options)
+Attractors find_attractors(const AttractorProblem& problem)
 {
-  return {{"-attractors_periods", &options.periods, Range::positive,
-           "largest number of periods over which the motions of cycle.starts are integrated"},
-          {"-attractors_seed", &options.seed, Range::not_negative, "seed of the random starts"}};
-}
-
-Attractors find_attractors(const AttractorProblem& problem, const AttractorOptions& options)
-{
-  std::vector<NamedStart> starts = make_starts(problem, options);
+  std::vector<NamedStart> starts = make_starts(problem);
   Attractors found;
   for (const NamedStart& start : starts) found.starts.push_back(start.name);
   Swarm swarm(problem, std::move(starts));
-  Progress progress(comm_of(problem.sliding.structure.load), "attractors", static_cast<double>(options.periods));
+  Progress progress(comm_of(problem.sliding.structure.load), "attractors", static_cast<double>(most_periods));
   std::vector<ReachedMotion> motions;
   for (long target = block;; target += block) // of periods, after which the energies are looked at
   {
@@ -154,14 +148,12 @@ Attractors find_attractors(const AttractorProblem& problem, const AttractorOptio
     found.periods = target;
     motions = swarm.reached();
     progress.update(static_cast<double>(target), format("%ld periods", target));
-    if (all_settled(motions, target) || target + block > options.periods) break;
+    if (all_settled(motions, target) || target + block > most_periods) break;
   }
   const bool settled = all_settled(motions, std::numeric_limits<long>::max());
   found.motions = joined(std::move(motions));
-  found.outcome = {
-      settled ? OutcomeKind::completed : OutcomeKind::not_converged,
-      settled ? "" : format("some motions had not settled after %ld periods: -attractors_periods", found.periods), 0,
-      0};
+  found.outcome = {settled ? OutcomeKind::completed : OutcomeKind::not_converged,
+                   settled ? "" : format("some motions had not settled after %ld periods", found.periods), 0, 0};
   return found;
 }
 

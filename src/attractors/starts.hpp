@@ -12,6 +12,6 @@ struct NamedStart
 };
 
 /// Each unstable mode at its estimate, pairs of them, and random sums of modes up to the number asked for.
-std::vector<NamedStart> make_starts(const AttractorProblem& problem, const AttractorOptions& options);
+std::vector<NamedStart> make_starts(const AttractorProblem& problem);
 
 } // namespace squeal

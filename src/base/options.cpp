@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <optional>
 
 namespace squeal
 {
@@ -26,10 +27,6 @@ Bounds bounds_of(Range range)
     return {[](double x) { return x >= 0; }, "at least 0"};
   case Range::natural:
     return {[](double x) { return x >= 1; }, "at least 1"};
-  case Range::up_to_two:
-    return {[](double x) { return x >= 0 && x <= 2; }, "from 0 to 2"};
-  case Range::inside_two:
-    return {[](double x) { return x > 0 && x < 2; }, "above 0 and below 2"};
   case Range::below_two:
     return {[](double x) { return x >= 0 && x < 2; }, "at least 0 and below 2"};
   case Range::any:
@@ -38,88 +35,67 @@ Bounds bounds_of(Range range)
   return {[](double) { return true; }, "a finite number"};
 }
 
-/// The option's text in the database; empty if it is not there.
-std::string text_of(const Option& option)
+/// The option's text in the database, empty where it has no value.
+std::optional<std::string> text_of(const Option& option)
 {
   char text[256] = "";
   PetscBool given = PETSC_FALSE;
   check(PetscOptionsGetString(nullptr, nullptr, option.name.c_str(), text, sizeof text, &given));
-  return given ? text : "";
+  return given ? std::optional<std::string>(text) : std::nullopt;
 }
 
-[[noreturn]] void refuse(const Option& option, const std::string& expected)
+[[noreturn]] void refuse(const Option& option, const std::string& text, const std::string& expected)
 {
-  throw Error("option " + option.name + " = " + text_of(option) + " must be " + expected +
-              "; it is: " + option.meaning);
+  throw Error("option " + option.name + " = " + text + " must be " + expected + "; it is: " + option.meaning);
 }
 
-/// Converts by the library, whose complaint names neither the option nor what it may be.
-template <class Convert> void convert(const Option& option, const char* kind, Convert library_call)
+/// Reads a number; PETSc's own reading lets whole numbers overflow.
+template <class Number>
+void read_number(const Option& option, const std::string& text, Number* member, const char* kind)
 {
-  check(PetscPushErrorHandler(PetscIgnoreErrorHandler, nullptr));
-  const PetscErrorCode code = library_call();
-  check(PetscPopErrorHandler());
-  if (code != PETSC_SUCCESS) refuse(option, kind);
-}
-
-/// Reads a number; PETSc's own reading lets whole numbers overflow. Leaves the member where the option is not given.
-template <class Number> void read_number(const Option& option, Number* member, const char* kind)
-{
-  PetscBool given = PETSC_FALSE;
-  check(PetscOptionsHasName(nullptr, nullptr, option.name.c_str(), &given));
-  if (!given) return;
-  const std::string text = text_of(option);
   const char* const first = text.data() + (text.starts_with('+') ? 1 : 0);
   const char* const last = text.data() + text.size();
   const auto [end, problem] = std::from_chars(first, last, *member);
   const bool fits = problem == std::errc() && end == last && std::isfinite(static_cast<double>(*member));
-  if (!fits) refuse(option, kind);
+  if (!fits) refuse(option, text, kind);
   if (const Bounds bounds = bounds_of(option.range); !bounds.hold(static_cast<double>(*member)))
-    refuse(option, bounds.text);
+    refuse(option, text, bounds.text);
 }
 
-void read(const Option& option, PetscInt* member)
+void read(const Option& option, const std::string& text, PetscInt* member)
 {
-  read_number(option, member, sizeof(PetscInt) == 8 ? "a whole number" : "a whole number of at most 2147483647");
+  read_number(option, text, member, sizeof(PetscInt) == 8 ? "a whole number" : "a whole number of at most 2147483647");
 }
 
-void read(const Option& option, double* member)
+void read(const Option& option, const std::string& text, double* member)
 {
-  read_number(option, member, "a finite number");
+  read_number(option, text, member, "a finite number");
 }
 
-void read(const Option& option, bool* member)
+void read(const Option& option, const std::string& text, bool* member)
 {
-  const char* name = option.name.c_str();
-  PetscBool value = *member ? PETSC_TRUE : PETSC_FALSE;
-  convert(option, "true or false", [&] { return PetscOptionsGetBool(nullptr, nullptr, name, &value, nullptr); });
-  *member = value == PETSC_TRUE;
+  *member = text.empty() || text == "true";
+  if (!*member && text != "false") refuse(option, text, "true or false");
 }
 
-void read(const Option& option, const Choice& member)
+void read(const Option& option, const std::string& text, const Choice& member)
 {
-  const std::string given = text_of(option);
-  PetscBool present = PETSC_FALSE;
-  check(PetscOptionsHasName(nullptr, nullptr, option.name.c_str(), &present));
-  if (!present) return;
   std::string all;
   for (std::size_t place = 0; place < member.words.size(); ++place)
   {
-    if (given == member.words[place])
-    {
-      member.set(member.member, place);
-      return;
-    }
+    if (text == member.words[place]) return member.set(member.member, place);
     all += (all.empty() ? "" : ", ") + std::string(member.words[place]);
   }
-  refuse(option, "one of " + all);
+  refuse(option, text, "one of " + all);
 }
 
 } // namespace
 
 void read_options(const OptionList& options)
 {
-  for (const Option& option : options) std::visit([&](const auto& member) { read(option, member); }, option.member);
+  for (const Option& option : options)
+    if (const auto text = text_of(option))
+      std::visit([&](const auto& member) { read(option, *text, member); }, option.member);
 }
 
 std::string value_of(const Option& option)

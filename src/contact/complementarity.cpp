@@ -175,7 +175,7 @@ double unilateral_residual(const std::vector<double>& reaction, const std::vecto
 }
 
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
-                                       long max_iterations, bool (*is_over)())
+                                       long max_iterations)
 {
   const std::size_t n = problem.q.size();
   const std::vector<double> scale(n, 1 / problem.compliance);
@@ -188,8 +188,7 @@ ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, do
     VectorXd::Map(g.data(), static_cast<Index>(n)) = as_vector(problem.q) + problem.M * as_vector(result.reaction);
     result.residual = unilateral_residual(result.reaction, g, scale, problem.q);
     best = std::min(best, result.residual);
-    if (result.residual <= tolerance || !std::isfinite(result.residual) || result.iterations >= max_iterations ||
-        (is_over && is_over()))
+    if (result.residual <= tolerance || !std::isfinite(result.residual) || result.iterations >= max_iterations)
       return result;
     if (result.iterations % 50 == 49 && result.residual > 10 * best) rho /= 2;
     for (std::size_t i = 0; i < n; ++i) result.reaction[i] = std::max(0., result.reaction[i] - rho * g[i]);

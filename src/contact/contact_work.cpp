@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace squeal
 {
@@ -25,7 +26,7 @@ double residual_of(const ContactWork& work)
   const double largest = largest_reaction(work.r);
   double residual = 0;
   for (std::size_t pair = 0; pair < work.W.pairs(); ++pair)
-    if (work.takes_part(pair)) residual = std::max(residual, defect_of(work, pair, work.velocity(pair), largest));
+    residual = std::max(residual, defect_of(work, pair, work.velocity(pair), largest));
   return residual;
 }
 

@@ -3,8 +3,6 @@
 #include "squeal/contact/force_scale.hpp"
 #include "squeal/contact/solver.hpp"
 
-#include <limits>
-
 namespace squeal
 {
 
@@ -29,12 +27,6 @@ struct ContactWork
     const PairVector free = PairView(b, W.directions()).vector(pair),
                      change = PairView(Wr, W.directions()).vector(pair);
     return {free[0] + change[0], free[1] + change[1], free[2] + change[2]};
-  }
-
-  /// Whether b_n is not infinite.
-  bool takes_part(std::size_t pair) const
-  {
-    return PairView(b, W.directions()).normal(pair) != std::numeric_limits<double>::infinity();
   }
 };
 

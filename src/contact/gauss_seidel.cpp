@@ -148,7 +148,6 @@ template <class Entry> double visit(SweptProblem<Entry>& problem, std::size_t pa
 {
   const ContactWork& work = problem.work;
   const ContactOperator& W = work.W;
-  if (!work.takes_part(pair)) return 0;
   const PairVector w = velocity_of(problem, pair), last = work.reaction(pair);
   const double defect = defect_of(work, pair, w, largest);
   if (defect <= limit) return 0;
@@ -215,10 +214,7 @@ template <class Entry> double estimated_residual(const SweptProblem<Entry>& prob
   double residual = 0;
   where.for_each_own(
       [&](std::size_t pair)
-      {
-        if (problem.work.takes_part(pair))
-          residual = std::max(residual, defect_of(problem.work, pair, velocity_of(problem, pair), largest));
-      });
+      { residual = std::max(residual, defect_of(problem.work, pair, velocity_of(problem, pair), largest)); });
   return residual;
 }
 
@@ -339,12 +335,8 @@ void begin(const Problems<Entry>& problems, const SweptPairs& where, const Conta
     ContactWork& work = problem->work;
     problem->known = work.r;
     where.for_each_own(
-        [&](std::size_t pair)
-        {
-          change_reaction(*problem, pair,
-                          work.takes_part(pair)
-                              ? admissible(work.reaction(pair), velocity_of(*problem, pair), work.friction)
-                              : PairVector{});
+        [&](std::size_t pair) {
+          change_reaction(*problem, pair, admissible(work.reaction(pair), velocity_of(*problem, pair), work.friction));
         });
   }
   for (const Turn& turn : where.turns) act_on_other_patches(problems, where, turn);

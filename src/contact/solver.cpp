@@ -19,7 +19,6 @@ void project(ContactWork& work, double rho)
   const PairView<double> r(work.r, work.W.directions());
   for (std::size_t pair = 0; pair < work.W.pairs(); ++pair)
   {
-    if (!work.takes_part(pair)) continue;
     const PairVector w = work.velocity(pair);
     PairVector next = r.vector(pair);
     for (std::size_t k = 0; k < next.size(); ++k) next[k] -= rho * w[k];
@@ -30,8 +29,6 @@ void project(ContactWork& work, double rho)
 void fixed_point(ContactWork& work, const ContactSettings& settings)
 {
   ContactResult& result = work.result;
-  for (std::size_t pair = 0; pair < work.W.pairs(); ++pair)
-    if (!work.takes_part(pair)) PairView<double>(work.r, work.W.directions()).set(pair, {});
   ContactWork* const alone[] = {&work};
   form_products(alone);
   result.residual = residual_of(work);
@@ -61,23 +58,22 @@ ContactWork start(const ContactOperator& W, const FrictionLaw& friction, const C
   problem.r.resize(W.size(), 0.);
   if (!std::all_of(work.r.begin(), work.r.end(), [](double value) { return std::isfinite(value); }))
     std::fill(work.r.begin(), work.r.end(), 0.);
-  for (const double velocity : problem.b)
-    if (velocity != std::numeric_limits<double>::infinity()) work.speed = std::max(work.speed, std::abs(velocity));
+  for (const double velocity : problem.b) work.speed = std::max(work.speed, std::abs(velocity));
   return work;
 }
 
 /// r(t+h) = sum of c_k r(t - k h): constant, linear, quadratic in time.
-constexpr double extrapolation[3][3] = {{1, 0, 0}, {2, -1, 0}, {3, -3, 1}};
+constexpr std::size_t kept = 3; // solutions of the past
+constexpr double extrapolation[kept][kept] = {{1, 0, 0}, {2, -1, 0}, {3, -3, 1}};
 constexpr int unread_at_most = 20; // extrapolated products gather rounding
 
 /// Puts the extrapolation of least residual into r and W r; false if nothing is remembered that belongs to r.
-bool start_warm(ContactWork& work, const ContactMemory& memory, PetscInt highest_order)
+bool start_warm(ContactWork& work, const ContactMemory& memory)
 {
   if (memory.r.empty() || memory.r[0] != work.r || memory.since_read >= unread_at_most) return false;
   std::vector<double> best_r, best_Wr;
   double least = std::numeric_limits<double>::infinity();
-  const auto orders = std::min(memory.r.size(), static_cast<std::size_t>(highest_order) + 1);
-  for (std::size_t order = 0; order < orders; ++order)
+  for (std::size_t order = 0; order < memory.r.size(); ++order)
   {
     work.r.assign(work.b.size(), 0.);
     work.Wr.assign(work.b.size(), 0.);
@@ -103,25 +99,10 @@ void remember(const ContactWork& work, ContactMemory& memory)
   memory.since_read = work.reads > 0 ? 0 : memory.since_read + 1;
   memory.r.insert(memory.r.begin(), work.r);
   memory.Wr.insert(memory.Wr.begin(), work.Wr);
-  if (memory.r.size() > 3) memory.r.pop_back(), memory.Wr.pop_back();
+  if (memory.r.size() > kept) memory.r.pop_back(), memory.Wr.pop_back();
 }
 
 } // namespace
-
-OptionList options_of(ContactSettings& settings)
-{
-  return {
-      {"-transient_contact_solver", choice_of(settings.solver), Range::any,
-       "block Gauss-Seidel, or the projection fixed point (fixed_point)"},
-      {"-transient_contact_tolerance", &settings.tolerance, Range::positive,
-       "largest natural map of a pair over the largest reaction; beyond 10 000 degrees of freedom periods of shooting "
-       "that are still far from the cycle take up to 1e-6"},
-      {"-transient_contact_max_it", &settings.max_iterations, Range::natural,
-       "largest number of contact iterations (sweeps) a step"},
-      {"-transient_contact_rho", &settings.rho, Range::below_two,
-       "step of the fixed point over 1/lambda_max(W); 0: chosen by the program"},
-  };
-}
 
 std::vector<ContactResult> solve_contacts(const ContactOperator& W, const FrictionLaw& friction,
                                           const ContactSettings& settings, std::span<const ContactProblem> problems)
@@ -137,7 +118,7 @@ std::vector<ContactResult> solve_contacts(const ContactOperator& W, const Fricti
     for (std::size_t k = 0; k < works.size(); ++k)
     {
       all.push_back(&works[k]);
-      if (!start_warm(works[k], problems[k].memory, settings.extrapolation)) cold.push_back(&works[k]);
+      if (!start_warm(works[k], problems[k].memory)) cold.push_back(&works[k]);
     }
     form_products(cold);
     gauss_seidel(all, settings);

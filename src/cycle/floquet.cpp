@@ -199,15 +199,14 @@ std::string lack_of_memory(const Structure& structure, Index shapes, double part
   const double needed = memory_of_reduction(dofs, static_cast<double>(shapes)),
                free = free_memory(comm_of(structure.load));
   if (needed <= part * free) return {};
-  return format("a reduced model of %ld shapes takes %.3g GB, and %.3g GB are free: a larger machine would decide, or "
-                "-reduced_attachments for the leading shapes alone",
+  return format("a reduced model of %ld shapes takes %.3g GB, and %.3g GB are free: a larger machine would decide",
                 static_cast<long>(shapes), 1e-9 * needed, 1e-9 * free);
 }
 
 /// The reduced model for the recorded periods; null where it does not fit this part of the free memory, with the
 /// reason.
-std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const ReducedOptions& options,
-                                              const RecordedPeriods& periods, double part, std::string& missing)
+std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const RecordedPeriods& periods, double part,
+                                              std::string& missing)
 {
   const Interface& interface = problem.sliding.interface;
   const std::vector<PairHistory> pairs = histories(interface, periods.records);
@@ -219,15 +218,16 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   const std::size_t rows = PairRows<std::size_t>(interface.directions).rows_of(roles.active.size());
   const bool follow = slide && rows > 150; // friction, the normal force
   const RealModes beyond = modes_beyond_band(problem);
-  const PetscInt taken = options.attachments > 0 ? options.attachments : attachments_on_recorded_contact;
-  const std::size_t forces = std::min(follow ? roles.active.size() : rows, static_cast<std::size_t>(taken));
+  const std::size_t forces =
+      std::min(follow ? roles.active.size() : rows, static_cast<std::size_t>(attachments_on_recorded_contact));
   missing = lack_of_memory(problem.sliding.structure,
                            static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces), part);
   if (!missing.empty()) return nullptr;
   constexpr double highest = 0.25; // of the modes: what they change says what those beyond them may
   auto model = std::make_shared<ReducedModel>(
       reduce(problem.sliding, problem.modes, roles,
-             {static_cast<int>(problem.modes.size()), 1e-5, taken, follow, &beyond, problem.step.factor, highest}));
+             {static_cast<int>(problem.modes.size()), 1e-5, attachments_on_recorded_contact, follow, &beyond,
+              problem.step.factor, highest}));
   // more pairs may be closed than the shapes can tell apart (section 7.2)
   for (Index i = 0; i < model->of_left_out.size(); ++i)
     model->compliance[static_cast<std::size_t>(i)] += model->of_left_out(i);
@@ -271,14 +271,14 @@ bool confirmed_by_fewer_modes(const ReducedMap& map, double period, std::span<co
   return alike(0.95, values, large_multipliers(few, period, contacts, deciding_values).values);
 }
 
-SlowMotions slow_motions_along(const CycleProblem& problem, const ReducedOptions& options, PeriodMap& map,
+SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map,
                                int other_steps, double period, Vec start)
 {
   const MPI_Comm comm = comm_of(problem.sliding.structure.load);
   const RecordedPeriods periods = record_periods(map, other_steps, period, start);
   SlowMotions none;
   none.periods = other_steps > 0 ? 3 : 2;
-  const auto model = model_for(problem, options, periods, 1, none.missing);
+  const auto model = model_for(problem, periods, 1, none.missing);
   if (!model) return none;
   const auto contacts = [&](int which)
   {
@@ -312,21 +312,19 @@ SlowMotions slow_motions_along(const CycleProblem& problem, const ReducedOptions
 
 } // namespace
 
-void add_slow_motions(const CycleProblem& problem, const ReducedOptions& options, PeriodMap& map, int other_steps,
-                      Flow& flow)
+void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_steps, Flow& flow)
 {
-  flow.slow_motions = [&problem, &options, &map, other_steps](double period, Vec start)
-  { return slow_motions_along(problem, options, map, other_steps, period, start); };
+  flow.slow_motions = [&problem, &map, other_steps](double period, Vec start)
+  { return slow_motions_along(problem, map, other_steps, period, start); };
 }
 
-Preconditioner recorded_preconditioner(const CycleProblem& problem, const ReducedOptions& options, const PeriodMap& map,
-                                       double period, Vec rate)
+Preconditioner recorded_preconditioner(const CycleProblem& problem, const PeriodMap& map, double period, Vec rate)
 {
   const auto& [structure, interface, equilibrium] = problem.sliding;
   RecordedPeriods periods;
   periods.records[RecordedPeriods::own] = contact_of(map.records);
   std::string missing;
-  const auto model = model_for(problem, options, periods, memory_for_shapes(1), missing); // it is kept while shooting
+  const auto model = model_for(problem, periods, memory_for_shapes(1), missing); // it is kept while shooting
   if (!model) return {};
   ReducedMap reduced{*model, map.steps, map.theta, comm_of(structure.load)};
   const auto contacts = recorded_contacts(*model, interface.directions, periods.records[RecordedPeriods::own]);
@@ -348,7 +346,7 @@ FloquetAnalysis examine(const CycleProblem& problem, const CycleOptions& options
   PeriodMap examined{map.sliding, map.options, std::min(map.steps, enough_steps), map.theta};
   examined.reactions = map.reactions;
   Flow flow = flow_of(examined);
-  add_slow_motions(problem, options.reduced, examined,
+  add_slow_motions(problem, examined,
                    map.steps > enough_steps ? map.steps : steps_to_compare(map.sliding.structure, map.steps), flow);
   const Vec u0 = problem.sliding.equilibrium.u;
   const Preconditioner none;

@@ -35,12 +35,9 @@ double unit_norm(const CycleProblem& problem)
 /// Adds to the reason of an outcome what the brake's options can do about it.
 void add_remedies(const PeriodMap& map, Outcome& outcome)
 {
-  if (map.step.law == ContactLaw::velocity && outcome.kind != OutcomeKind::converged)
-    outcome.reason += "; by the velocity law the period map jumps where a step begins open or closed: "
-                      "-transient_contact_law displacement";
   if (map.unconverged > 0)
-    outcome.reason += (outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) +
-                      " steps left the contact unconverged (-transient_contact_max_it)";
+    outcome.reason +=
+        (outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) + " steps left the contact unconverged";
 }
 
 /// Shoots from the start with the preconditioner that `make` returns for the map and its flow; it may move the start.
@@ -52,7 +49,7 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
   map.reactions = problem.sliding.equilibrium.reactions;
   map.keeps_step = is_large(problem.sliding.structure);
   Flow flow = flow_of(map);
-  add_slow_motions(problem, options.reduced, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
+  add_slow_motions(problem, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
   CycleKeeper keeper(problem.sliding.structure);
   keeper.watch(flow);
   const Preconditioner& preconditioner = make(map, flow);
@@ -131,7 +128,7 @@ LimitCycle find_cycle_near(const CycleProblem& problem, const CycleOptions& opti
     start.v = velocity(end);
     try
     {
-      at_hand = recorded_preconditioner(problem, options.reduced, map, start.period, rate);
+      at_hand = recorded_preconditioner(problem, map, start.period, rate);
     }
     catch (const LibraryError&) // perhaps on this rank alone
     {

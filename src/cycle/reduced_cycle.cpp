@@ -16,6 +16,10 @@ namespace squeal
 namespace
 {
 
+constexpr double margin = 1.5;          // pairs that part at this many times the motion's amplitude keep their contact
+constexpr double new_attachment = 1e-5; // an attachment shape is dropped when less than this part of it is new
+constexpr int most_free_periods = 100;  // until the reduced model's motion is periodic
+
 /// Twice the fluctuating energy.
 double doubled_energy(const ReducedModel& model, const ReducedState& state)
 {
@@ -63,8 +67,7 @@ void describe_model(const ReducedSearch& search)
 double highest_joining(const ReducedSearch& search)
 {
   constexpr int long_period = 128; // steps
-  double factor = search.options.reduced.band_factor;
-  if (factor < 0) factor = is_large(search.problem.sliding.structure) && search.steps < long_period ? 3 : 4.5;
+  const double factor = is_large(search.problem.sliding.structure) && search.steps < long_period ? 3 : 4.5;
   return factor * search.problem.unstable.modes.front().frequency_hz();
 }
 
@@ -73,15 +76,13 @@ void build_model(ReducedSearch& search, double amplitude)
 {
   const double clock = MPI_Wtime();
   const CycleProblem& problem = search.problem;
-  const ReducedOptions& options = search.options.reduced;
   // where its cycle is the answer, friction is left free
   const bool sliding =
       search.fidelity.asked != CycleModel::reduced &&
       pairs_that_may_turn(problem.sliding.interface, problem.unstable.modes.front(), amplitude).empty();
   search.model = {}; // before the next one takes memory
-  search.model =
-      reduce(problem.sliding, problem.modes, search.active,
-             {options.modes, options.threshold, options.attachments, sliding, &search.real, problem.step.factor});
+  search.model = reduce(problem.sliding, problem.modes, search.active,
+                        {search.options.reduced_modes, new_attachment, 0, sliding, &search.real, problem.step.factor});
   search.energy = energy_matrices(search.model);
   describe_model(search);
   search.fidelity.reduction_seconds += MPI_Wtime() - clock;
@@ -120,14 +121,13 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
 {
   const double clock = MPI_Wtime();
   Fidelity& fidelity = search.fidelity;
-  const PetscInt periods = search.options.reduced.free_periods;
   ReducedMap map = period_map_of(search, search.steps);
-  Progress progress(map.comm, "reduced model, free", static_cast<double>(periods));
+  Progress progress(map.comm, "reduced model, free", static_cast<double>(most_free_periods));
   double missed = 1, correction = 0;
   const auto limited = [&] { return std::clamp(correction, -0.2 * motion.period, 0.2 * motion.period); };
   // compared every tenth period: whatever the rounding, it stops at the same
   const auto periodic = [&] { return missed <= 5e-3 && fidelity.reduced_periods % 10 == 0; };
-  while (!periodic() && fidelity.reduced_periods < periods)
+  while (!periodic() && fidelity.reduced_periods < most_free_periods)
   {
     end_if_asked(map.comm);
     missed = run_one_period(map, motion, correction);
@@ -260,7 +260,7 @@ std::string size_refusal(const ReducedSearch& search)
   const CycleProblem& problem = search.problem;
   PetscInt dofs = 0;
   check(VecGetSize(problem.sliding.structure.load, &dofs));
-  const std::size_t shapes = std::min(problem.modes.size(), static_cast<std::size_t>(search.options.reduced.modes)) +
+  const std::size_t shapes = std::min(problem.modes.size(), static_cast<std::size_t>(search.options.reduced_modes)) +
                              PairRows<std::size_t>(problem.sliding.interface.directions).rows_of(search.active.size());
   if (2 * shapes <= static_cast<std::size_t>(dofs)) return {};
   return "a reduced model of " + std::to_string(shapes) + " shapes is not small next to " + std::to_string(dofs) +
@@ -310,7 +310,6 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
 {
   const CycleProblem& problem = search.problem;
   const ComplexMode& mode = problem.unstable.modes.front();
-  const double margin = search.options.reduced.margin;
   const std::optional<State> start = cycle_start(problem);
   if (!start) return "there is no amplitude to start from";
   double amplitude = equivalent_amplitude(problem, *start);
@@ -332,7 +331,7 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
     run_until_periodic(search, free, 1.5 * unit * amplitude * amplitude);
     if (!std::isfinite(free.energy)) return "the motion of the reduced model grew beyond all bounds";
     const double reached = std::sqrt(free.energy / unit);
-    if (reached <= 1.2 * amplitude || search.fidelity.reduced_periods >= search.options.reduced.free_periods) break;
+    if (reached <= 1.2 * amplitude || search.fidelity.reduced_periods >= most_free_periods) break;
     motion = full_motion(search, free.state);
     amplitude = 1.5 * reached; // it was still growing
   }

@@ -19,6 +19,8 @@ namespace squeal
 namespace
 {
 
+constexpr int most_corrections = 40; // periods of the full model while the steps a period are refined
+
 /// For errors that fall with this power of the steps: the error at c steps over the difference between a and b steps.
 double error_fraction(int a, int b, int c, double order)
 {
@@ -345,7 +347,7 @@ void refine_steps(const CycleCorrection& correction, LimitCycle& cycle)
   ConvergenceLog log{progress, cycle.convergence}; // which stays where the run is asked to end
   const OrbitProblem orbit = orbit_problem(correction, flow.flow, cycle.orbit.period);
   FullShooting shooting{correction, orbit, log, flow, correction.options.shooting};
-  shooting.options.max_periods = log.convergence.periods + correction.options.reduced.corrections;
+  shooting.options.max_periods = log.convergence.periods + most_corrections;
   shooting.orbit = copy_of(cycle.orbit);
   Orbit last = copy_of(shooting.orbit);
   const auto append = [&](std::vector<CycleAtSteps>& cycles, int steps, double beyond)

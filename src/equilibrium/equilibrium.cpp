@@ -17,12 +17,7 @@ namespace squeal
 namespace
 {
 
-/// Iterations of the fixed point that checks the reactions.
-PetscInt check_iterations(const EquilibriumOptions& options, std::size_t pairs)
-{
-  if (options.check_max_iterations >= 0) return options.check_max_iterations;
-  return pairs <= 600 ? 20000 : 0;
-}
+constexpr long most_splits = 100; // of the status iteration
 
 /// Of every pair: normal r_n + kappa (g - g0), tangential mu r_n e.
 std::vector<double> pair_forces(const Interface& interface, const std::vector<double>& reaction,
@@ -146,20 +141,19 @@ std::vector<char> first_split(const ComplementarityProblem& problem, const Inter
 }
 
 /// The status iteration, with a second chance from the fixed point's set where friction makes it cycle.
-StatusSolution find_split(const ComplementarityProblem& problem, const Interface& interface, PetscInt max_iterations,
-                          double rho, const std::vector<char>& expected)
+StatusSolution find_split(const ComplementarityProblem& problem, const Interface& interface, double rho,
+                          const std::vector<char>& expected)
 {
   if (expected.size() == problem.q.size())
-    if (StatusSolution near = solve_by_status(problem, expected, max_iterations);
-        near.outcome == StatusOutcome::converged)
+    if (StatusSolution near = solve_by_status(problem, expected, most_splits); near.outcome == StatusOutcome::converged)
       return near;
-  StatusSolution solution = solve_by_status(problem, first_split(problem, interface), max_iterations);
+  StatusSolution solution = solve_by_status(problem, first_split(problem, interface), most_splits);
   if (solution.outcome == StatusOutcome::converged || problem.N.size() > 0) return solution;
   const auto projected = solve_by_projection(problem, rho, 1e-8, 5000);
   if (projected.residual > 1e-8) return solution;
   std::vector<char> closed(problem.q.size());
   std::transform(projected.reaction.begin(), projected.reaction.end(), closed.begin(), [](double r) { return r > 0; });
-  StatusSolution again = solve_by_status(problem, std::move(closed), max_iterations);
+  StatusSolution again = solve_by_status(problem, std::move(closed), most_splits);
   again.iterations += solution.iterations;
   return again;
 }
@@ -230,49 +224,36 @@ void settle(const Held& held, const Structure& structure, const Interface& inter
 /// What rank 0 computes from D and the problem.
 struct Checks
 {
-  double residual = 0, check_residual = 0, check_difference = 0;
-  int check_iterations = 0;
+  double residual = 0;
   Uniqueness uniqueness = Uniqueness::not_checked;
 };
 
-Checks check_reactions(const Search& search, const std::vector<double>& gap, const EquilibriumOptions& options)
+Checks check_reactions(const Search& search, const std::vector<double>& gap)
 {
   const std::vector<double>& reaction = search.solution.reaction;
   const std::size_t pairs = gap.size();
   Checks checks;
   std::vector<double> rho(pairs, search.rho);
-  checks.check_residual = unilateral_residual(reaction, gap, rho, gap);
   for (std::size_t i = 0; i < pairs; ++i)
     if (const double own = search.own(static_cast<Eigen::Index>(i)); own > 0) rho[i] = 1 / own;
   checks.residual = unilateral_residual(reaction, gap, rho, gap);
   if (search.problem.N.size() > 0) return checks;
   checks.uniqueness = has_one_solution(search.problem) ? Uniqueness::assured : Uniqueness::not_assured;
-  const PetscInt limit = check_iterations(options, pairs);
-  if (limit == 0 || pairs == 0) return checks;
-  const auto run = solve_by_projection(search.problem, options.check_rho * search.rho, 1e-12, limit, is_asked_here);
-  checks.check_iterations = run.iterations;
-  const double largest = *std::max_element(reaction.begin(), reaction.end());
-  for (std::size_t i = 0; i < pairs && largest > 0; ++i)
-    checks.check_difference = std::max(checks.check_difference, std::abs(run.reaction[i] - reaction[i]) / largest);
-  if (!(run.residual <= 1e-12)) checks.check_difference = std::numeric_limits<double>::quiet_NaN();
   return checks;
 }
 
 /// Sets the residuals, the outcome and what else is checked of a solution.
 void check_solution(const Structure& structure, const Interface& interface, const Search& search,
-                    const EquilibriumOptions& options, Equilibrium& equilibrium)
+                    Equilibrium& equilibrium)
 {
   const MPI_Comm comm = comm_of(structure.load);
   const bool balanced = balances(structure, interface, equilibrium);
   const auto gap = add_compliance(interface, 1, search.solution.reaction, gaps_of(interface, equilibrium.u));
   Checks checks;
   on_rank_zero_with_lent_cores(comm, static_cast<std::size_t>(interface.pairs),
-                               [&] { checks = check_reactions(search, gap, options); });
+                               [&] { checks = check_reactions(search, gap); });
   MPI_Bcast(&checks, sizeof checks, MPI_BYTE, 0, comm);
   equilibrium.outcome.residual = checks.residual;
-  equilibrium.check_residual = checks.check_residual;
-  equilibrium.check_iterations = checks.check_iterations;
-  equilibrium.check_difference = checks.check_difference;
   equilibrium.uniqueness = checks.uniqueness;
   const bool good = checks.residual <= 1e-9 && balanced;
   equilibrium.outcome.kind = good ? OutcomeKind::converged : OutcomeKind::not_converged;
@@ -291,7 +272,7 @@ Outcome failure(const StatusSolution& solution, const Interface& interface)
     outcome.reason = format(
         "no set of closed pairs balances the load at mu = %g: the structure tips, slides away or lifts off", friction);
   else
-    outcome = {OutcomeKind::not_converged, "no fitting set of closed pairs within -equilibrium_max_it",
+    outcome = {OutcomeKind::not_converged, format("no fitting set of closed pairs among %ld", most_splits),
                solution.iterations, 1};
   return outcome;
 }
@@ -316,24 +297,6 @@ bool stays_at_rest(const Structure& structure, const Interface& interface)
 }
 
 } // namespace
-
-OptionList options_of(EquilibriumOptions& options)
-{
-  return {
-      {"-equilibrium_max_it", &options.max_iterations, Range::natural,
-       "status iterations before the equilibrium is given up"},
-      {"-equilibrium_check_max_it", &options.check_max_iterations, Range::any,
-       "iterations of the fixed point that checks the equilibrium; -1: 20000 up to 600 pairs, else 0"},
-      {"-equilibrium_check_rho", &options.check_rho, Range::inside_two,
-       "step of that fixed point over 1/lambda_max, below 2"},
-  };
-}
-
-EquilibriumOptions checked_if_asked(EquilibriumOptions options)
-{
-  options.check_max_iterations = std::max<PetscInt>(options.check_max_iterations, 0);
-  return options;
-}
 
 struct PairCompliance::Parts
 {
@@ -369,7 +332,7 @@ bool PairCompliance::serves(const Interface& interface) const
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
 {
   if (!stays_at_rest(structure, interface))
-    return find_equilibrium(structure, interface, PairCompliance(structure, interface, options), {}, options);
+    return find_equilibrium(structure, interface, PairCompliance(structure, interface, options), {});
   Equilibrium equilibrium;
   equilibrium.u = zeros_like(structure.load);
   equilibrium.directions = interface.directions;
@@ -403,7 +366,7 @@ void displace_without_reactions(const PairCompliance::Parts& parts, const Struct
 } // namespace
 
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const PairCompliance& compliance,
-                             const std::vector<char>& expected, const EquilibriumOptions& options)
+                             const std::vector<char>& expected)
 {
   const MPI_Comm comm = comm_of(structure.load);
   const auto pairs = static_cast<std::size_t>(interface.pairs);
@@ -422,23 +385,24 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   if (pairs > 0)
   {
     const auto& [D_nn, D_nt] = compliance.parts().D;
-    on_rank_zero_with_lent_cores(
-        comm, pairs,
-        [&]
-        {
-          const std::vector<double> mu = drive_friction(interface), sense = senses(interface, compliance.parts().axes);
-          Eigen::VectorXd friction(D_nn.rows()), c(D_nn.rows());
-          for (Eigen::Index i = 0; i < c.size(); ++i)
-          {
-            const auto pair = static_cast<std::size_t>(i);
-            friction(i) = mu[pair] * sense[pair];
-            c(i) = compliance_of(interface, pair);
-          }
-          search.problem = problem_of(D_nn, D_nn + D_nt * friction.asDiagonal(), held.kappa, q, c);
-          search.own = D_nn.diagonal() + c;
-          search.rho = 1 / largest_eigenvalue(D_nn, c, 30);
-          search.solution = find_split(search.problem, interface, options.max_iterations, 1.5 * search.rho, expected);
-        });
+    on_rank_zero_with_lent_cores(comm, pairs,
+                                 [&]
+                                 {
+                                   const std::vector<double> mu = drive_friction(interface),
+                                                             sense = senses(interface, compliance.parts().axes);
+                                   Eigen::VectorXd friction(D_nn.rows()), c(D_nn.rows());
+                                   for (Eigen::Index i = 0; i < c.size(); ++i)
+                                   {
+                                     const auto pair = static_cast<std::size_t>(i);
+                                     friction(i) = mu[pair] * sense[pair];
+                                     c(i) = compliance_of(interface, pair);
+                                   }
+                                   search.problem =
+                                       problem_of(D_nn, D_nn + D_nt * friction.asDiagonal(), held.kappa, q, c);
+                                   search.own = D_nn.diagonal() + c;
+                                   search.rho = 1 / largest_eigenvalue(D_nn, c, 30);
+                                   search.solution = find_split(search.problem, interface, 1.5 * search.rho, expected);
+                                 });
     share(search.solution, pairs, comm);
   }
 
@@ -454,7 +418,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   settle(held, structure, interface, search, equilibrium, comm);
   equilibrium.reactions = pair_forces(interface, search.solution.reaction, interface.gap, 0);
   equilibrium.gaps = search.solution.gap;
-  check_solution(structure, interface, search, options, equilibrium);
+  check_solution(structure, interface, search, equilibrium);
   equilibrium.outcome.iterations = search.solution.iterations;
   return equilibrium;
 }

@@ -255,18 +255,6 @@ double ComplexMode::damping_ratio() const
   return damping_ratio_of(lambda);
 }
 
-OptionList options_of(ModesOptions& options)
-{
-  return {
-      {"-modes_dense_limit", &options.dense_limit, Range::not_negative,
-       "eigenproblems up to this size are solved whole by LAPACK"},
-      {"-modes_solver", choice_of(options.solver), Range::any,
-       "solver of larger problems: slices of frequency, or SLEPc's TOAR around zero (toar)"},
-      {"-modes_shapes", choice_of(options.shapes), Range::any,
-       "modes whose shapes fields.h5 holds: the unstable ones, or all"},
-  };
-}
-
 double instability_of(std::complex<double> lambda)
 {
   return lambda.real() - 1e-8 * std::abs(lambda);

@@ -243,7 +243,7 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
   const Extension attached = extend(basis, count, limits.threshold, limits.at_most);
   if (attached.lost > limits.most_lost)
     throw Error(format("reduced model: half of the free memory holds %ld of %ld attachment shapes, and %.2g of the "
-                       "pairs' own compliance would be lost: a larger machine, or -reduced_attachments to take as many",
+                       "pairs' own compliance would be lost: a larger machine takes more",
                        static_cast<long>(attached.taken), static_cast<long>(attached.taken + attached.left_out),
                        attached.lost));
   const Index of_modes_alone = before + last;

@@ -42,9 +42,6 @@ Json equilibrium_entry(const Report& report, const Scene& scene)
   entry["normal_force_max"] = normal.greatest;
   entry["residual"] = equilibrium.outcome.residual;
   entry["force_residual"] = equilibrium.force_residual;
-  entry["check_residual"] = equilibrium.check_residual;
-  entry["check_iterations"] = equilibrium.check_iterations;
-  entry["check_difference"] = equilibrium.check_difference;
   entry["auxiliary_stiffness"] = equilibrium.auxiliary_stiffness;
   entry["uniqueness"] = word(equilibrium.uniqueness);
   for (std::size_t i = 0; i < report.contacts.size(); ++i)
@@ -123,7 +120,6 @@ Json transient_entry(const Report& report)
   entry["growth_rate_bias"] = transient_bias(report).growth;
   entry["frequency_bias"] = transient_bias(report).frequency;
   entry["normal_force_chatter"] = chatter(transient.history);
-  entry["contact_law"] = word(transient.law);
   entry["energy_defect_max"] = transient.energy_defect_max;
   entry["residual"] = transient.outcome.residual;
   entry["contact_iterations_mean"] = transient.contact_iterations_mean;

@@ -216,7 +216,7 @@ std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
   else
     lines.push_back(unstable_points_text(sweep));
   if (sweep.cut_short > 0)
-    lines.push_back(format("WARNING: in %d of the steps more points in between are needed than -sweep_between allows: "
+    lines.push_back(format("WARNING: in %d of the steps more points in between are needed than are put there: "
                            "modes may be mistaken there, and thresholds missed",
                            sweep.cut_short));
   const std::vector<Track> unstable = unstable_tracks(sweep);

@@ -52,8 +52,8 @@ std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
       "", format("%d of %d pairs closed after %d iterations", normal.closed, pairs, equilibrium.outcome.iterations));
   text +=
       row("", format("normal force %.9g N in all, %.4g to %.4g N a pair", normal.sum, normal.least, normal.greatest));
-  text += row("", format("force residual %.1e, contact residual %.1e, by the fixed point %.1e",
-                         equilibrium.force_residual, equilibrium.outcome.residual, equilibrium.check_residual));
+  text += row("", format("force residual %.1e, contact residual %.1e", equilibrium.force_residual,
+                         equilibrium.outcome.residual));
   if (equilibrium.auxiliary_stiffness > 0)
     text +=
         row("", "a body is held by contact: solved with springs across the pairs, whose force is taken off exactly");

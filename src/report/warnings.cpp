@@ -76,9 +76,8 @@ Sentences of_estimate(const Report& report)
   const Estimate& estimate = followed_estimate(report);
   const double lift_off = estimate.lift_off_amplitude;
   if (estimate.outcome.kind == OutcomeKind::no_balance && std::isfinite(lift_off))
-    return {format("no amplitude is predicted; start = \"estimate\" is first lift-off times "
-                   "-estimate_lift_off_multiple, %.5g m by default",
-                   2 * lift_off)};
+    return {format("no amplitude is predicted; start = \"estimate\" is first lift-off times %g, %.5g m",
+                   lift_off_multiple, lift_off_multiple * lift_off)};
   Sentences sentences;
   if (estimate.outcome.kind != OutcomeKind::balance) return sentences;
   if (estimate.amplitude > 3 * lift_off)
@@ -123,8 +122,6 @@ Sentences of_transient(const Report& report)
   const double fit = transient.growth_rate_fit, predicted = transient.predicted.real();
   if (std::abs(fit - predicted) > 0.01 * std::abs(predicted))
     sentences.push_back("the fitted growth rate is not the predicted one: other motion than the mode is in the start");
-  if (transient.law == ContactLaw::velocity)
-    sentences.push_back("by the velocity law the gap drifts, by up to what an impact covers in a step");
   if (transient.energy_defect_max > 1e-8)
     sentences.push_back("the energy identity of the scheme is missed: tighten -transient_contact_tolerance");
   add_chatter(transient.history, sentences);

@@ -100,16 +100,6 @@ void examine(const TangentBundle& bundle, double period, ExaminedMotion& motion)
 
 } // namespace
 
-OptionList options_of(SettledOptions& options)
-{
-  return {
-      {"-settled_periods", &options.periods, Range::not_negative,
-       "largest number of periods integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 "
-       "beyond 10 000 degrees of freedom"},
-      {"-settled_exponents", &options.exponents, Range::natural, "number of Lyapunov exponents of a settled motion"},
-  };
-}
-
 MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<const double> energies,
                            const BaseFrequencies& base)
 {

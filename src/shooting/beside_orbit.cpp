@@ -157,10 +157,9 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
   if (multipliers.stability == Stability::stable && nearest.growth - nearest.error > 1)
   {
     multipliers.stability = Stability::undecided;
-    multipliers.would_decide =
-        format("by its multipliers it attracts, but a motion beside it was seen to grow %.4g "
-               "times a period: -cycle_multiplier_method whole or arnoldi, or other steps a period",
-               nearest.growth);
+    multipliers.would_decide = format("by its multipliers it attracts, but a motion beside it was seen to grow %.4g "
+                                      "times a period: more -cycle_multipliers, or other steps a period",
+                                      nearest.growth);
     return;
   }
   if (multipliers.stability != Stability::undecided || !multipliers.complete) return;

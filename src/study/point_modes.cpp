@@ -30,6 +30,7 @@ constexpr Index mixtures = 24;     // of the residuals of a side: more direction
 constexpr Index small_basis = 120; // shapes: such a problem is solved whole at once
 constexpr double undamped_reach = 1.2; // undamped modes on which a large basis is solved first, over the window
 constexpr double slow = 0.8;           // ratio of errors before and after a correction that did not help
+constexpr int most_passes = 20;        // corrections of the basis; the first one of a brake may need more than 8
 constexpr double spurious = 1e-8;      // backward error of what is no mode
 
 /// The closed pairs taken out, and on the rows of B the damping of the friction direction and the stiffness of pairs
@@ -331,10 +332,10 @@ PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const Proj
   if (inexact > 0)
   {
     result.outcome.kind = OutcomeKind::not_converged;
-    result.outcome.reason =
-        format("%d of %zu eigenvalues have backward errors above %.0e, the largest %.0f times its "
-               "tolerance: allow more corrections by -sweep_passes",
-               static_cast<int>(inexact), solved.pairs.size(), problem.tolerance, largest_excess(solved, problem));
+    result.outcome.reason = format("%d of %zu eigenvalues have backward errors above %.0e, the largest %.0f times its "
+                                   "tolerance, after %d corrections",
+                                   static_cast<int>(inexact), solved.pairs.size(), problem.tolerance,
+                                   largest_excess(solved, problem), most_passes);
   }
   for (std::size_t k = 0; k < solved.pairs.size(); ++k)
   {
@@ -423,7 +424,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
     }
     before = now;
     MultiVector residuals{modes.basis.T.comm, MatrixXd(modes.basis.T.entries.rows(), 0)};
-    if (pass < problem.passes)
+    if (pass < most_passes)
       for (const Side side : {Side::right, Side::left})
         append_residuals(modes, problem, point, inexact(solved, problem, side), side, residuals);
     if (correct(modes, std::move(residuals))) continue;

@@ -50,7 +50,6 @@ struct PointProblem
   const SlidingEquilibrium& sliding;
   double band = 0;          // [Hz]
   double tolerance = 0;     // on the backward error of right and left vectors
-  PetscInt passes = 0;      // corrections of the basis, at most
   PetscInt dense_limit = 0; // up to this size a problem that these leave inexact is solved on all degrees of freedom
   const std::function<void()>& end_if_asked; // called before each solution
 };

@@ -302,16 +302,6 @@ void solve_band(const ResponseProblem& problem, const Equations& equations, Resp
 
 } // namespace
 
-OptionList options_of(ResponseOptions& options)
-{
-  return {
-      {"-response_tolerance", &options.tolerance, Range::positive,
-       "geometric mean of the residual forces of the responses and of the transposed problem, over a unit force"},
-      {"-response_shapes", &options.shapes, Range::natural,
-       "number of shapes of a basis; where more are needed the band is parted"},
-  };
-}
-
 Response find_response(const ResponseProblem& problem)
 {
   Response response;
@@ -328,8 +318,8 @@ Response find_response(const ResponseProblem& problem)
   else
     solve_band(problem, make_equations(problem), response);
   if (response.outcome.kind == OutcomeKind::not_converged)
-    response.outcome.reason = format(
-        "residuals up to %.1e of a unit force are left: a larger -response_shapes may help", response.outcome.residual);
+    response.outcome.reason = format("residuals up to %.1e of a unit force are left by a basis of %ld shapes",
+                                     response.outcome.residual, static_cast<long>(problem.options.shapes));
   return response;
 }
 

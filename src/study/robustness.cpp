@@ -22,7 +22,10 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXcd;
 
-constexpr double least_share = 0.1; // of a reference mode in an unstable one, below which it is none of them
+constexpr int training = 12;                // points whose modes make the basis
+constexpr double training_tolerance = 1e-6; // backward error of their vectors
+constexpr double truncation = 5e-2;         // part of a vector, in energy norm, that the basis may leave out
+constexpr double least_share = 0.1;         // of a reference mode in an unstable one, below which it is none of them
 
 /// The text of the Error of some work; empty where there is none.
 template <class Work> std::string error_of(Work work)
@@ -97,7 +100,7 @@ std::vector<std::vector<double>> training_values(const RobustnessProblem& proble
 {
   constexpr double tail = 0.01; // quantiles beyond are left to the samples
   std::vector<std::vector<double>> points;
-  for (std::vector<double>& parts : even_points(problem.numbers.size(), problem.options.training))
+  for (std::vector<double>& parts : even_points(problem.numbers.size(), training))
   {
     for (double& part : parts) part = tail + part * (1 - 2 * tail);
     points.push_back(values_at(problem.numbers, parts));
@@ -186,7 +189,7 @@ class Sampler
 public:
   explicit Sampler(const RobustnessProblem& problem)
       : problem_(problem), model_(problem), omega_(0.1 * two_pi * problem.modes.band),
-        equilibrium_options_(checked_if_asked(problem.equilibrium_options))
+        equilibrium_options_(problem.equilibrium_options)
   {
     const PairShapes pairs = make_pair_shapes(model_.reference(), omega_);
     reduced_.emplace(model_, trained_shapes(pairs), pairs);
@@ -205,7 +208,7 @@ public:
       compliance_.reset();
       compliance_.emplace(structure, interface, equilibrium_options_);
     }
-    Equilibrium equilibrium = find_equilibrium(structure, interface, *compliance_, closed_, equilibrium_options_);
+    Equilibrium equilibrium = find_equilibrium(structure, interface, *compliance_, closed_);
     need(equilibrium.outcome);
     closed_ = equilibrium.closed;
     return reduced_->at(model_.coefficients(values), interface, equilibrium);
@@ -280,10 +283,9 @@ private:
     for (const std::vector<double>& values : points)
     {
       if (swept.equilibrium_at({values, false}).outcome.kind != OutcomeKind::converged) continue;
-      const PointModes modes = swept.modes_at({values, false}, problem_.options.tolerance);
+      const PointModes modes = swept.modes_at({values, false}, training_tolerance);
       if (modes.outcome.kind != OutcomeKind::converged || modes.pairs.empty()) continue;
-      for (const Side side : {Side::right, Side::left})
-        shapes.add(swept.vectors(modes, side), problem_.options.truncation);
+      for (const Side side : {Side::right, Side::left}) shapes.add(swept.vectors(modes, side), truncation);
       ++trained_;
     }
     if (trained_ == 0) throw Error("no point of the random numbers has an equilibrium with modes in the band");
@@ -305,8 +307,7 @@ private:
 std::vector<Complex> full_modes(const RobustnessProblem& problem, const std::vector<double>& values)
 {
   const BrakeModel model = problem.model_at(values);
-  const Equilibrium equilibrium =
-      find_equilibrium(model.structure, model.interface, checked_if_asked(problem.equilibrium_options));
+  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, problem.equilibrium_options);
   need(equilibrium.outcome);
   const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
   ModesSettings settings = problem.modes;
@@ -363,14 +364,6 @@ template <class Work> SampleFailure for_own(int count, MPI_Comm comm, Progress& 
 }
 
 } // namespace
-
-OptionList options_of(RobustnessOptions& options)
-{
-  return {
-      {"-robustness_training", &options.training, Range::natural,
-       "points whose modes make the reduced basis of random samples"},
-  };
-}
 
 Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
 {

@@ -152,7 +152,7 @@ class NearbyEquilibria
 {
 public:
   explicit NearbyEquilibria(const SensitivityProblem& problem)
-      : problem_(problem), options_(checked_if_asked(problem.equilibrium_options))
+      : problem_(problem), options_(problem.equilibrium_options)
   {
   }
 
@@ -166,8 +166,8 @@ public:
     if (same && !compliance_) compliance_.emplace(structure, interface, options_);
     if (!same || !compliance_->serves(model.interface))
       return find_equilibrium(model.structure, model.interface,
-                              PairCompliance(model.structure, model.interface, options_), equilibrium.closed, options_);
-    return find_equilibrium(model.structure, model.interface, *compliance_, equilibrium.closed, options_);
+                              PairCompliance(model.structure, model.interface, options_), equilibrium.closed);
+    return find_equilibrium(model.structure, model.interface, *compliance_, equilibrium.closed);
   }
 
 private:

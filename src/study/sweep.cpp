@@ -82,22 +82,6 @@ Sweep run_in_groups(const SweepProblem& problem, const std::vector<SweepLine>& l
 
 } // namespace
 
-OptionList options_of(SweepOptions& options)
-{
-  return {
-      {"-sweep_tolerance", &options.tolerance, Range::not_negative,
-       "backward error of right and left vectors above which the basis of a sweep is corrected; 0: 1e-8, 1e-10 up to "
-       "-modes_dense_limit degrees of freedom and 1e-6 beyond 10 000"},
-      {"-sweep_passes", &options.passes, Range::not_negative, "largest number of corrections of the basis at a point"},
-      {"-sweep_between", &options.between, Range::not_negative,
-       "largest number of points that are put into a step where modes are unclear or pairs open or close; those that "
-       "enclose its thresholds come on top"},
-      {"-sweep_groups", &options.groups, Range::not_negative,
-       "groups of ranks that share the points, at most one a rank or a point; 0: chosen so that each has four points, "
-       "and memory for a model of its own"},
-  };
-}
-
 Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm)
 {
   constexpr std::size_t fewest = 4; // points of a group: two that another one visits as well cost half as much again

@@ -26,6 +26,8 @@ namespace
 /// one, and at points put in between on any, those of 1e-6 leave them within 3e-5, half of those of 33 224 within 7e-8.
 constexpr double tolerance_of_basis = 1e-8, large_tolerance = 1e-6;
 constexpr double threshold_tolerance = 1e-5; // of the number's larger end
+constexpr int most_halvings = 6;             // of a step
+constexpr PetscInt most_between = 100;       // points put into a step where modes are unclear or pairs open or close
 constexpr int many_changes = 2; // of contact in a step: beyond, a half may need fewer; two bodies alike change at once
 
 class Sweeper
@@ -137,7 +139,6 @@ private:
 
   double tolerance_on(const Structure& structure) const
   {
-    if (problem_.options.tolerance > 0) return problem_.options.tolerance;
     if (is_large(structure)) return large_tolerance;
     PetscInt dofs = 0;
     check(VecGetSize(structure.load, &dofs));
@@ -148,8 +149,7 @@ private:
   /// contact of its own, whose shapes would make the basis several times as large.
   double tolerance_of(const Followed& point) const
   {
-    const bool asked = problem_.options.tolerance > 0;
-    return point.inserted && !asked ? std::max(tolerance_, large_tolerance) : tolerance_;
+    return point.inserted ? std::max(tolerance_, large_tolerance) : tolerance_;
   }
 
   /// The first point of a line. Its modes have the tracks of that of the line before in this direction of rotation, or
@@ -190,7 +190,7 @@ private:
   {
     const ModeForms between_both = forms(before, now);
     std::vector<Match> matches = follow(between_both, clear_mac);
-    if (depth < problem_.options.depth && before.values != now.values && !all_clear(before, matches))
+    if (depth < most_halvings && before.values != now.values && !all_clear(before, matches))
     {
       Followed between{now.values, now.reversed, true};
       for (std::size_t k = 0; k < between.values.size(); ++k)
@@ -242,7 +242,7 @@ private:
     const double size = std::max(std::abs(before.values[0]), std::abs(now.values[0]));
     const Equilibrium& at = model_.equilibrium_at({now.values, now.reversed});
     const bool modes = problem_.settings.stages >= SweepStages::modes; // which alone jump
-    return {threshold_tolerance * size, modes ? std::ssize(at.closed) : 0, problem_.options.between};
+    return {threshold_tolerance * size, modes ? std::ssize(at.closed) : 0, most_between};
   }
 
   /// Follows the modes to a point, with points between where they are unclear, and on both sides of places where pairs
@@ -264,7 +264,7 @@ private:
   /// Follows the modes by parts of the step, if it has any reason to be divided and points are left for it.
   bool divided(Followed& before, Followed& now, int depth, bool clear, Division& division)
   {
-    const bool halvable = depth < problem_.options.depth;
+    const bool halvable = depth < most_halvings;
     const int changed = model_.changed_pairs({before.values, before.reversed}, {now.values, now.reversed});
     const bool many = changed > many_changes && halvable, halves = many || (halvable && !clear);
     if (!halves && (changed == 0 || division.left == 0)) return false;

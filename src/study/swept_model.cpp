@@ -15,7 +15,7 @@ namespace squeal
 
 SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked)
     : problem_(problem), comm_(comm), end_if_asked_(std::move(end_if_asked)),
-      equilibrium_options_(checked_if_asked(problem.equilibrium_options))
+      equilibrium_options_(problem.equilibrium_options)
 {
 }
 
@@ -44,7 +44,7 @@ Equilibrium SweptModel::find(const SweptPlace& place)
   go_to(place);
   const auto& [structure, interface] = *model_;
   if (interface.pairs == 0) return find_equilibrium(structure, interface, equilibrium_options_);
-  return find_equilibrium(structure, interface, compliance(), closed_, equilibrium_options_);
+  return find_equilibrium(structure, interface, compliance(), closed_);
 }
 
 const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
@@ -114,7 +114,6 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
     modes = find_point_modes(*basis_, {{model_->structure, model_->interface, equilibrium},
                                        problem_.modes.band,
                                        tolerance,
-                                       problem_.options.passes,
                                        problem_.modes_options.dense_limit,
                                        end_if_asked_});
   }

@@ -270,14 +270,8 @@ double first_amplitude(double level, double size)
 
 } // namespace
 
-OptionList options_of(EstimateOptions& options)
-{
-  return {{"-estimate_lift_off_multiple", &options.lift_off_multiple, Range::positive,
-           "start amplitude over first lift-off where there is no energy balance"}};
-}
-
 Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
-                            const ComplexMode& mode, const EstimateOptions& options)
+                            const ComplexMode& mode)
 {
   const Structure& structure = sliding.structure;
   Estimate result;
@@ -307,7 +301,7 @@ Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedS
   if (first_event == infinity || first_event <= 0)
   {
     result.outcome = {OutcomeKind::no_balance, "nothing saturates the interface force", 0, 0};
-    result.start_amplitude = options.lift_off_multiple * result.lift_off_amplitude;
+    result.start_amplitude = lift_off_multiple * result.lift_off_amplitude;
     return result;
   }
   // Each pair's share of an absolute tolerance; the rule's finer half is far better than the difference it is held to.
@@ -325,9 +319,8 @@ Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedS
   result.mean_energy = energy * result.amplitude * result.amplitude;
   const double q = result.outcome.kind == OutcomeKind::balance ? result.amplitude : result.lift_off_amplitude;
   if (q < infinity) result.phase = best_phase(pairs, q);
-  result.start_amplitude = result.outcome.kind == OutcomeKind::balance
-                               ? result.amplitude
-                               : options.lift_off_multiple * result.lift_off_amplitude;
+  result.start_amplitude =
+      result.outcome.kind == OutcomeKind::balance ? result.amplitude : lift_off_multiple * result.lift_off_amplitude;
   return result;
 }
 

@@ -4,8 +4,6 @@
 #include "squeal/contact/sliding_direction.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <numeric>
 #include <string>
 
@@ -22,22 +20,14 @@ struct StartOfStep
 };
 
 /// From B v_free of a trajectory: normal rows become gap rates (g0 + B_n ut)/h + B_n v_free, of pairs with a compliance
-/// those of section 4.16, tangential ones sliding velocities. ut is in v_theta. Collective; both are on rank 0.
-std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t trajectory, const StartOfStep& start,
-                                          std::vector<double> b)
+/// those of section 4.16, tangential ones sliding velocities. On rank 0; empty elsewhere.
+std::vector<double> free_contact_velocity(const StepBatch& batch, const StartOfStep& start, std::vector<double> b)
 {
   const auto& [step, interface, factors, works, states, reports] = batch;
-  const StepWork& work = works[trajectory];
-  double rounding = 0;
-  if (step.law == ContactLaw::velocity) check(VecNorm(work.v_theta, NORM_INFINITY, &rounding));
   if (b.empty()) return b;
   const PairView velocity(b, interface.directions);
   const PairView moved(start.position, interface.directions);
   const TangentView drive(interface.drive, interface.directions);
-  // A gap at rounding is closed: against the displacements it was rounded from, or a free step's own motion.
-  for (std::size_t i = 0; i < velocity.pairs(); ++i)
-    rounding = std::max(rounding, step.h * std::abs(velocity.normal(i)));
-  rounding *= 1e-10;
   for (std::size_t i = 0; i < velocity.pairs(); ++i)
   {
     const double gap = interface.gap[i] + moved.normal(i);
@@ -47,10 +37,8 @@ std::vector<double> free_contact_velocity(const StepBatch& batch, std::size_t tr
       const double rate = PairView(start.velocity, interface.directions).normal(i);
       velocity.normal(i) += law.by_gap * (gap - step.h * (1 - step.theta) * rate) + law.by_rate * rate;
     }
-    else if (step.law == ContactLaw::displacement)
+    else
       velocity.normal(i) += gap / step.h;
-    else if (gap > rounding)
-      velocity.normal(i) = std::numeric_limits<double>::infinity(); // takes no part: r = 0
     for (std::size_t k = 0; k < drive.of(i).size(); ++k)
       velocity.tangential(i)[k] -= factors.drive_end * drive.of(i)[k];
   }
@@ -67,7 +55,7 @@ struct StepProblem
 std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector<double>& Bv_free)
 {
   const auto& [step, interface, factors, works, states, reports] = batch;
-  const double weight = step.opposed == Opposed::theta ? (1 - step.theta) / step.theta : 0;
+  const double weight = (1 - step.theta) / step.theta;
   const auto size = static_cast<std::ptrdiff_t>(Bv_free.size() / states.size());
   const FrictionLaw law_before = scaled(interface.friction, factors.friction_before);
   std::vector<double> drive = interface.drive;
@@ -84,7 +72,7 @@ std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector
   {
     const std::vector<double>&position = motion[2 * k], &velocity = motion[2 * k + 1];
     const auto first = Bv_free.begin() + static_cast<std::ptrdiff_t>(k) * size;
-    problems[k].free = free_contact_velocity(batch, k, {position, velocity}, {first, first + size});
+    problems[k].free = free_contact_velocity(batch, {position, velocity}, {first, first + size});
     problems[k].past =
         past_sliding(PairView(velocity, interface.directions), TangentView<const double>(drive, interface.directions),
                      status_with(interface, law_before, factors.drive_start, states[k].reactions, velocity), weight);
@@ -119,7 +107,7 @@ std::vector<std::size_t> solve_once(const StepBatch& batch, std::vector<StepProb
   std::vector<ContactProblem> unsolved;
   for (std::size_t j = 0; j < trajectories.size(); ++j)
     unsolved.push_back({b[j], states[trajectories[j]].reactions, works[trajectories[j]].memory});
-  const FrictionLaw law = law_of_step(step, scaled(interface.friction, factors.friction));
+  const FrictionLaw law = law_of_step(scaled(interface.friction, factors.friction), step.theta);
   const std::vector<ContactResult> results = solve_contacts(step.W, law, step.contact, unsolved);
   std::vector<std::size_t> again;
   for (std::size_t j = 0; j < trajectories.size(); ++j)

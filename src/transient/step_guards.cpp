@@ -135,7 +135,7 @@ std::string step_refusal(const Structure& structure, const ComplexMode* mode, do
 
 double fall_of_friction(const ThetaStep& step, const Interface& interface, const std::vector<double>& reactions)
 {
-  const double fall = steepest_fall(law_of_step(step, interface.friction));
+  const double fall = steepest_fall(law_of_step(interface.friction, step.theta));
   if (fall == 0 || interface.pairs == 0) return 0;
   double largest = 0;
   const auto iterate = [&]

@@ -93,11 +93,7 @@ double change_of_gap_rate(const ThetaStep& step, const Interface& interface, con
                           const NormalChange& change)
 {
   const double h = step.h, c = compliance_of(interface, pair);
-  if (c == 0)
-  {
-    if (step.law == ContactLaw::velocity) return 0;
-    return change.moved / h - (change.step_size != 0 ? change.step_size * record.gap[pair] / (h * h) : 0);
-  }
+  if (c == 0) return change.moved / h - (change.step_size != 0 ? change.step_size * record.gap[pair] / (h * h) : 0);
   const CompliantGap law = compliant_gap(c, step.theta, h);
   const double moved = change.moved - h * (1 - step.theta) * change.rate; // at u
   double result = law.by_gap * moved + law.by_rate * change.rate;
@@ -163,7 +159,7 @@ MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> column
                                  for (Index k = 0; k < dmu.size(); ++k)
                                    dmu(k) = columns[static_cast<std::size_t>(k)].friction;
                                  dr = linear_contact_response(
-                                     W, interface.directions, law_of_step(step, interface.friction), record,
+                                     W, interface.directions, law_of_step(interface.friction, step.theta), record,
                                      contact_status(interface, record.reactions, record.contact_velocity), db, dmu);
                                });
   MPI_Bcast(dr.data(), to_int(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));
@@ -190,36 +186,6 @@ void solve_columns(const RecordedStep& of, std::span<const TangentColumn> column
     lambda.assign(dr.data(), dr.data() + dr.size());
   }
   step.factor.backward(lambda, handles(work.v_next));
-}
-
-/// The same with - h G dv_theta on the right, by the passes of the step itself.
-void solve_columns_with_gyroscopic_part(const RecordedStep& of, std::span<const TangentColumn> columns,
-                                        const MatrixXd& db, TangentWork& work)
-{
-  const double h = of.step.h, theta = of.step.theta;
-  std::vector<Owned<Vec>> right, v_theta, Gv, before;
-  for (std::size_t k = 0; k < columns.size(); ++k)
-  {
-    right.push_back(copy_of(work.Av[k].get()));
-    v_theta.push_back(copy_of(columns[k].v.get()));
-    Gv.push_back(zeros_like(columns[k].v));
-    before.push_back(zeros_like(columns[k].v));
-  }
-  product(of.structure.G, handles(v_theta), handles(Gv));
-  GyroscopicPasses passes;
-  double change = HUGE_VAL;
-  while (passes.go_on(change, h))
-  {
-    for (std::size_t k = 0; k < columns.size(); ++k) check(VecWAXPY(work.Av[k], -h, Gv[k], right[k]));
-    solve_columns(of, columns, db, work);
-    std::swap(Gv, before);
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      check(VecAXPBYPCZ(v_theta[k], theta, 1 - theta, 0, work.v_next[k], columns[k].v));
-    product(of.structure.G, handles(v_theta), handles(Gv));
-    change = 0;
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      change = std::max(change, h * relative_change(Gv[k], before[k], work.Av[k]));
-  }
 }
 
 /// M dv+ and K du+ of the columns, which have moved on; A dv+ is in Av.
@@ -264,7 +230,11 @@ void one_step(const RecordedStep& of, std::span<TangentColumn> columns, TangentW
     if (columns[k].step_size != 0) check(VecAXPY(Av[k], columns[k].step_size, record.force));
   }
   if (structure.G.get())
-    solve_columns_with_gyroscopic_part(of, columns, db, work);
+  {
+    std::vector<Vec> v;
+    for (const TangentColumn& column : columns) v.push_back(column.v);
+    solve_with_gyroscopic_part(step, structure.G, {v, v_next, Av}, [&] { solve_columns(of, columns, db, work); });
+  }
   else
     solve_columns(of, columns, std::move(db), work);
   for (std::size_t k = 0; k < columns.size(); ++k)

@@ -11,9 +11,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <numeric>
 #include <string>
+#include <tuple>
 #include <utility>
 
 namespace squeal
@@ -137,63 +136,43 @@ void solve_step(const StepBatch& batch)
     check(VecAXPBYPCZ(works[k].v_theta, step.theta, 1 - step.theta, 0, works[k].v_next, states[k].v));
 }
 
-/// What a trajectory is before its contact is solved, and G v_theta of the last pass.
-struct BeforeContact
-{
-  Owned<Vec> right, Gv, Gv_before;
-  std::vector<double> reactions;
-  ContactMemory memory;
-};
-
-/// The same with - h G v_theta on the right (src/README.md, section 4.17): passes with G v_theta of the pass before,
-/// each with contact solved from where the step began.
+/// The same with the gyroscopic part; contact is solved in each pass from where the step began.
 void solve_step_with_gyroscopic_part(const StepBatch& batch, Mat G)
 {
   const auto& [step, interface, factors, works, states, reports] = batch;
-  std::vector<BeforeContact> before;
+  SteppedMotions motions;
+  std::vector<std::pair<std::vector<double>, ContactMemory>> begun;
   for (std::size_t k = 0; k < states.size(); ++k)
   {
-    before.push_back({copy_of(works[k].Av_next.get()), zeros_like(states[k].v), zeros_like(states[k].v),
-                      states[k].reactions, works[k].memory});
-    check(MatMult(G, states[k].v, before[k].Gv));
+    motions.v.push_back(states[k].v);
+    motions.v_next.push_back(works[k].v_next);
+    motions.Av.push_back(works[k].Av_next);
+    begun.emplace_back(states[k].reactions, works[k].memory);
   }
-  GyroscopicPasses passes;
-  double change = HUGE_VAL;
-  while (passes.go_on(change, step.h))
-  {
-    for (std::size_t k = 0; k < states.size(); ++k)
-    {
-      check(VecWAXPY(works[k].Av_next, -step.h, before[k].Gv, before[k].right));
-      states[k].reactions = before[k].reactions;
-      works[k].memory = before[k].memory;
-    }
-    solve_step(batch);
-    change = 0;
-    for (std::size_t k = 0; k < states.size(); ++k)
-    {
-      BeforeContact& own = before[k];
-      std::swap(own.Gv, own.Gv_before);
-      check(MatMult(G, works[k].v_theta, own.Gv));
-      change = std::max(change, step.h * relative_change(own.Gv, own.Gv_before, works[k].Av_next));
-    }
-  }
+  solve_with_gyroscopic_part(step, G, motions,
+                             [&]
+                             {
+                               for (std::size_t k = 0; k < states.size(); ++k)
+                                 std::tie(states[k].reactions, works[k].memory) = begun[k];
+                               solve_step(batch);
+                             });
 }
 
-} // namespace
-
-bool GyroscopicPasses::go_on(double change, double h)
+/// Whether the gyroscopic part needs another pass: `change` of h G v_theta over A v+ in the last one, `before` in the
+/// one before it, after `count` of them. Error: the passes do not converge.
+bool needs_another_pass(double change, double before, int count, double h)
 {
   constexpr double enough = 1e-15, rounding = 1e-9; // of contact's tolerance; what stays at it does not fall further
   constexpr int most = 60;
-  const bool falls = change <= 0.9 * last_;
-  if (count_ > 1 && (change <= enough || (!falls && change <= rounding))) return false;
-  if (++count_ > most || (count_ > 10 && !falls && change > 1))
+  const bool falls = change <= 0.9 * before;
+  if (count > 1 && (change <= enough || (!falls && change <= rounding))) return false;
+  if (count >= most || (count >= 10 && !falls && change > 1))
     throw Error(format(
         "a step of %g s is too long for the gyroscopic part: its passes do not converge; take more steps a period", h));
-  last_ = change;
   return true;
 }
 
+/// |x - before| over |scale|; overwrites `before`.
 double relative_change(Vec x, Vec before, Vec scale)
 {
   double size = 0, change = 0;
@@ -203,28 +182,36 @@ double relative_change(Vec x, Vec before, Vec scale)
   return change == 0 ? 0 : change / size;
 }
 
-void check_step_law(const StepOptions& options, const Interface& interface)
-{
-  if (!interface.compliance.empty() && options.law == ContactLaw::velocity)
-    throw Error("-transient_contact_law velocity needs rigid pairs: leave it at displacement, or take the compliance "
-                "of the pairs out");
-}
+} // namespace
 
-OptionList options_of(StepOptions& options)
+void solve_with_gyroscopic_part(const ThetaStep& step, Mat G, const SteppedMotions& motions,
+                                const std::function<void()>& solve)
 {
-  OptionList list = {
-      {"-transient_friction", choice_of(options.opposed), Range::any,
-       "friction opposes the sliding velocity at theta, or at the end of the step (end)"},
-      {"-transient_contact_law", choice_of(options.law), Range::any,
-       "contact on displacements, or on velocities (velocity)"},
-      {"-transient_contact_operator", choice_of(options.storage), Range::any,
-       "the condensed contact operator W: stored, by columns on several ranks (whole), or in the factor of the step "
-       "(by_factor), which takes no memory; a quarter of the free memory decides"},
-      {"-transient_refuse", &options.refuse, Range::any,
-       "false: march even where theta and the step falsify growth rates"},
-  };
-  for (Option& option : options_of(options.contact)) list.push_back(std::move(option));
-  return list;
+  const auto& [v, v_next, Av] = motions;
+  std::vector<Owned<Vec>> right, v_theta, Gv, Gv_before;
+  for (std::size_t k = 0; k < v.size(); ++k)
+  {
+    right.push_back(copy_of(Av[k]));
+    v_theta.push_back(copy_of(v[k]));
+    Gv.push_back(zeros_like(v[k]));
+    Gv_before.push_back(zeros_like(v[k]));
+  }
+  const auto multiply = [&]
+  { product(G, std::vector<Vec>(v_theta.begin(), v_theta.end()), std::vector<Vec>(Gv.begin(), Gv.end())); };
+  multiply();
+  double change = HUGE_VAL, before = HUGE_VAL;
+  for (int count = 0; needs_another_pass(change, before, count, step.h); ++count)
+  {
+    for (std::size_t k = 0; k < v.size(); ++k) check(VecWAXPY(Av[k], -step.h, Gv[k], right[k]));
+    solve();
+    std::swap(Gv, Gv_before);
+    for (std::size_t k = 0; k < v.size(); ++k)
+      check(VecAXPBYPCZ(v_theta[k], step.theta, 1 - step.theta, 0, v_next[k], v[k]));
+    multiply();
+    before = std::exchange(change, 0);
+    for (std::size_t k = 0; k < v.size(); ++k)
+      change = std::max(change, step.h * relative_change(Gv[k], Gv_before[k], Av[k]));
+  }
 }
 
 Owned<Mat> step_matrix(const Structure& structure, double h, double theta)
@@ -251,17 +238,16 @@ std::vector<double> added_by_compliance(const ThetaStep& step, const Interface& 
   return added;
 }
 
-ContactOperator condensed_operator(const ThetaStep& step, const Interface& interface, OperatorStorage storage)
+ContactOperator condensed_operator(const ThetaStep& step, const Interface& interface)
 {
   if (interface.pairs == 0) return {};
   const MPI_Comm comm = comm_of(interface.B);
   const auto products = step.factor.condensed_products();
   const auto rows = static_cast<double>(interface.size());
-  if (products && storage == OperatorStorage::automatic)
-    storage = stays_in_factor(rows, products->entries(), free_memory(comm)) ? OperatorStorage::by_factor
-                                                                            : OperatorStorage::whole;
-  if (products && (storage == OperatorStorage::by_factor || is_worth_sharing(rows, ranks_of(comm))))
-    return make_contact_operator({*products, step.h, added_by_compliance(step, interface)}, storage, interface.pairs,
+  const bool by_factor = products && stays_in_factor(rows, products->entries(), free_memory(comm));
+  if (by_factor || (products && is_worth_sharing(rows, ranks_of(comm))))
+    return make_contact_operator({*products, step.h, added_by_compliance(step, interface)},
+                                 by_factor ? OperatorStorage::by_factor : OperatorStorage::whole, interface.pairs,
                                  interface.directions, comm);
   ContactOperator W;
   std::vector<double> entries = whole_operator(step, interface);
@@ -289,12 +275,10 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   ThetaStep step;
   step.h = h;
   step.theta = theta;
-  step.law = options.law;
-  step.opposed = options.opposed;
   step.contact = options.contact;
   step.factor = factor_held(step_matrix(structure, h, theta), interface, structure.names, options.factor);
   step.factor_seconds = MPI_Wtime() - start;
-  step.W = condensed_operator(step, interface, options.storage);
+  step.W = condensed_operator(step, interface);
   step.matrices = pair_matrices(structure.M, structure.K);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
   return_freed_memory(); // fronts of the factor, and what W was added up from

@@ -139,7 +139,7 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
     outcome.kind = OutcomeKind::not_converged;
     outcome.reason =
         format("contact did not converge in %ld of %ld steps, first at t = %.4g s (largest residual %.4g): "
-               "raise -transient_contact_max_it or shorten the step",
+               "shorten the step",
                summary.unconverged, summary.steps, summary.first_unconverged, summary.contact_residual_max);
   }
   if (summary.fall_of_friction_max >= 1)
@@ -308,7 +308,6 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   trajectory.factor_seconds = step.factor_seconds;
   trajectory.condensed_seconds = step.condensed_seconds;
   trajectory.steps = summary.steps;
-  trajectory.law = step.law;
   trajectory.energy_defect_max = summary.energy_defect_max;
   trajectory.contact_iterations_mean = summary.contact_iterations_mean;
   trajectory.contact_steps_as_one = summary.as_one;

@@ -131,14 +131,10 @@ def test_reduced_matrices_keep_the_compliance(converged):
         assert abs(other["growth_rate"] - one["growth_rate"]) < 1e-8 * 2 * np.pi * one["frequency_hz"]
 
 
-@pytest.mark.parametrize("words, parts", [
-    (["--set", "contact.0.compliance=-1e-12"], ["compliance", "zero or a positive number"]),
-    (["--set", "contact.0.compliance=1e-12", "-transient_contact_law", "velocity"], ["-transient_contact_law velocity", "displacement"]),
-])
-def test_bad_compliances_are_refused(squeal, words, parts):
-    run = squeal(*PIN, *words, ranks=1)
+def test_a_negative_compliance_is_refused(squeal):
+    run = squeal(*PIN, "--set", "contact.0.compliance=-1e-12", ranks=1)
     assert run.code == 1
-    for part in parts:
+    for part in ("compliance", "zero or a positive number"):
         assert part in str(run.messages)
 
 

@@ -110,6 +110,6 @@ def test_dry_run_prints_the_model_and_writes_nothing(converged, scene):
 
 def test_help_explains_arguments_and_options(converged):
     printed = converged("-help").printed
-    for words in ("friction", "--reference keys", "-equilibrium_max_it", "-modes_", "-transient_contact_law", "-cycle_finish"):
+    for words in ("friction", "--reference keys", "-settled_periods", "-modes_", "-transient_contact_solver", "-cycle_finish"):
         assert words in printed
     assert printed.count("--dry-run  ") == 1  # by one rank

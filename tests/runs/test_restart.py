@@ -162,8 +162,6 @@ MODES_ONLY = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.d
               "--set", "modes.method=full", "--set", "friction.coefficient=0.5"]
 UNDER_WAY = {  # where a library or another process is at work: ranks, scene and arguments, what the log shows
     "mesher": (2, [*MODES_ONLY, "--set", "mesh.parameters.divisions=6"], "model …"),
-    "check of the equilibrium": (1, [OSCILLATOR, "-equilibrium_check_rho", "1.99999", "-equilibrium_check_max_it", "2147483647"],
-                                 "equilibrium …"),
     "basis of the samples": (1, [*MODES_ONLY, "--set", "robustness.samples=1000", "--set", "uncertain=[{key='friction.coefficient', "
                                  "distribution='uniform', from=0.4, to=0.6}]"], "robustness …"),
     # each rank follows it by itself, so that none may wait for another

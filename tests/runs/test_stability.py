@@ -25,11 +25,9 @@ def test_enough_steps_are_not_refused_and_the_refusal_can_be_lifted(squeal):
     assert coarse.code == 0 and coarse.report["transient"]["growth_rate_fit"] < 0
 
 
-def test_fixed_points_beyond_their_bound_are_refused(squeal):
+def test_a_fixed_point_beyond_its_bound_is_refused(squeal):
     run = squeal(OSCILLATOR, "--set", "cycle.enabled=false", "-transient_contact_rho", "2", ranks=1)
     assert run.code == 1 and "-transient_contact_rho" in run.messages[0] and "below 2" in run.messages[0]
-    run = squeal(OSCILLATOR, "--set", "cycle.enabled=false", "-equilibrium_check_rho", "2.5", ranks=2)
-    assert run.code == 1 and len(run.messages) == 1 and "-equilibrium_check_rho" in run.messages[0]
 
 
 def test_much_friction_warns_that_the_equilibrium_may_not_be_the_only_one(squeal):
@@ -62,7 +60,7 @@ def test_without_a_balance_no_amplitude_is_claimed_and_the_start_is_named(squeal
     run = oscillator_cycle(squeal, 0.3, 1e5)
     estimate = run.report["estimate"]
     assert run.code == 0 and estimate["outcome"] == "no balance" and estimate["amplitude"] is None
-    assert "-estimate_lift_off_multiple" in run.printed
+    assert "first lift-off times 2" in run.printed
     fast = oscillator_cycle(squeal, 0.3, 1000).report  # a balance, but the cycle never notices so fast a belt either
     assert fast["estimate"]["outcome"] == "balance"
     assert abs(run.report["cycle"]["period"] / fast["cycle"]["period"] - 1) < 1e-4
@@ -138,7 +136,7 @@ def test_every_stage_says_what_its_numbers_are_worth(squeal):
     """The step's own error is the discrete theory's: -(omega h)^2/4 of the growth rate, -(omega h)^2/12 of the frequency."""
     run = squeal(OSCILLATOR, "--set", "transient.steps_per_period=50", "--set", "cycle.steps_per_period=200", ranks=1)
     report = run.report
-    for stage, keys in {"equilibrium": ["residual", "force_residual", "check_difference", "uniqueness"],
+    for stage, keys in {"equilibrium": ["residual", "force_residual", "uniqueness"],
                         "modes": ["residual", "count_check"], "estimate": ["residual"],
                         "transient": ["growth_rate_bias", "frequency_bias", "energy_defect_max", "residual"],
                         "cycle": ["residual_full", "growth_rate_bias", "frequency_bias"]}.items():

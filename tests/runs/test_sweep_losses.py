@@ -155,7 +155,7 @@ FRICTION = "{key='friction.coefficient', distribution='uniform', from=0.3, to=0.
 ], ids=["losses", "compliance", "spin", "all"])
 def test_random_numbers_are_single_runs(scene, numbers, converged):
     """Growth within 1e-3 of |lambda|, as it is asked for; the losses move it by up to a hundredth."""
-    run = converged(*scene, *random(*numbers, samples=8, checks=4), "-robustness_training", "6", ranks=1)
+    run = converged(*scene, *random(*numbers, samples=8, checks=4), ranks=1)
     robustness = run.report["robustness"]
     assert robustness["growth_error"] < 1e-3 and robustness["model_error"] < 1e-9
     assert all(check["known"] for check in robustness["checks"])

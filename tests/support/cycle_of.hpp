@@ -20,7 +20,7 @@ inline LimitCycle cycle_of(const SmallModel& model, const CycleSettings& setting
   const Modes modes = find_modes(sliding, linearised, modes_settings, {});
   REQUIRE(!modes.modes.empty());
   const ComplexMode& mode = modes.modes.front();
-  const Estimate estimate = estimate_amplitude(sliding, linearised, mode, {});
+  const Estimate estimate = estimate_amplitude(sliding, linearised, mode);
   const StepOptions step;
   const ModesOptions modes_options;
   const CycleProblem problem{sliding,       linearised, modes.modes, {{&mode, 1}, {&estimate, 1}}, settings, step,

@@ -22,7 +22,7 @@ inline RealModes real_modes_of(const SmallModel& model, const Equilibrium& equil
 inline Estimate estimate_of(const SmallModel& model, const Equilibrium& equilibrium, const ComplexMode& mode)
 {
   const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
-  return estimate_amplitude(sliding, linearise(sliding), mode, {});
+  return estimate_amplitude(sliding, linearise(sliding), mode);
 }
 
 } // namespace squeal::test

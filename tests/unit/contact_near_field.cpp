@@ -107,17 +107,3 @@ TEST_CASE("problems solved together have the answers of each alone, and what is 
   }
   CHECK(sweeps.back() < sweeps.front()); // the extrapolated start is nearer
 }
-
-TEST_CASE("a pair of infinite free velocity takes no part")
-{
-  Vector W = decaying_compliance(), b = velocity_at(0), r, elsewhere;
-  const ContactOperator op = make_contact_operator(W, pairs, 2);
-  const std::size_t out = 51;
-  b[out] = std::numeric_limits<double>::infinity();
-  CHECK(solve_contact(op, b, {0.4}, {}, r).converged);
-  CHECK(r[out] == 0);
-  CHECK(r[out + 1] == 0);
-  b[out] = 1e3; // so far open that nothing closes it
-  CHECK(solve_contact(op, b, {0.4}, {ContactSolver::gauss_seidel, 1e-13, 1000, 0}, elsewhere).converged);
-  CHECK(difference(r, elsewhere) < 1e-8);
-}

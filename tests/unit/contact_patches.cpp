@@ -145,10 +145,9 @@ TEST_CASE("ranks sweep over patches side by side, to the answer of one rank")
     const ServedProducts served(W);
     if (rank_of(comm) != 0) continue;
     const ContactOperator alone = make_contact_operator(dense, pairs, 2);
-    for (const double out : {0.5, std::numeric_limits<double>::infinity()}) // a pair that takes no part
     {
       Vector b = velocity(), together, exact;
-      b[3 * 7] = out;
+      b[3 * 7] = 0.5; // a pair that opens
       const ContactResult result = solve_contact(W, b, {0.4}, {}, together),
                           of_one = solve_contact(alone, b, {0.4}, {}, exact);
       CHECK(result.converged);

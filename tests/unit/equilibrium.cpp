@@ -94,7 +94,7 @@ TEST_CASE("an overturning block: the feet share the weight as statics says, and 
   }
 }
 
-TEST_CASE("pads that partly lift off: every law of the equilibrium, the fixed point's reactions, at any scale of force")
+TEST_CASE("pads that partly lift off: every law of the equilibrium, at any scale of force")
 {
   std::vector<double> reference;
   for (const double load : {1., 1e6, 1e-6})
@@ -103,10 +103,7 @@ TEST_CASE("pads that partly lift off: every law of the equilibrium, the fixed po
     const auto result = find_equilibrium(model.structure, model.interface, {});
     CHECK(result.outcome.kind == OutcomeKind::converged);
     CHECK(result.outcome.residual < 1e-12); // rounding, after settling
-    CHECK(result.check_residual < 1e-12);
     CHECK(result.force_residual < 1e-13);
-    CHECK(result.check_iterations > 0);
-    CHECK(result.check_difference < 1e-9); // residual 1e-12 times the condition of the compliance
     const auto motion = all_entries(result.u);
     const auto e = drive_directions(model.interface);
     int open = 0;
@@ -144,7 +141,7 @@ TEST_CASE("a compliance at hand serves other friction and a drive turned round, 
     other.interface.drive[0] = other.interface.drive[1] = 0;
     REQUIRE(compliance.serves(other.interface));
     const auto afresh = find_equilibrium(other.structure, other.interface, {});
-    const auto found = find_equilibrium(other.structure, other.interface, compliance, {}, {});
+    const auto found = find_equilibrium(other.structure, other.interface, compliance, {});
     CHECK(found.closed == afresh.closed);
     double largest = 0;
     for (std::size_t i = 0; i < afresh.reactions.size(); ++i)

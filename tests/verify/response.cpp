@@ -233,5 +233,5 @@ TEST_CASE("residuals that stay large are no response")
 {
   const Response response = sliding_chain(0.4).response(evenly(0.02, 0.8, 4), bases_of(1));
   CHECK(response.outcome.kind == OutcomeKind::not_converged);
-  CHECK(response.outcome.reason.find("-response_shapes") != std::string::npos);
+  CHECK(response.outcome.reason.find("by a basis of 1 shapes") != std::string::npos);
 }

@@ -52,8 +52,6 @@ struct FactorOptions
   std::shared_ptr<KnownAnalyses> known{}; // one for all copies; null: every matrix is analysed anew
 };
 
-OptionList options_of(FactorOptions& options);
-
 class CondensedProducts;
 
 /// Columns `first` to `last` of a symmetric matrix from row `first` on, one after the other, `height` numbers each.

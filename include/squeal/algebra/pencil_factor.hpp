@@ -24,8 +24,6 @@ struct PencilOptions
   double whole_limit = 0.2; // [GB] of a factor that every rank makes whole
 };
 
-OptionList options_of(PencilOptions& options);
-
 /// A nested dissection, on every rank. It serves every matrix of nearly the same pattern.
 struct EliminationOrder
 {

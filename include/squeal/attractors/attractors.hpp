@@ -19,15 +19,6 @@ struct Attractors
   long periods = 0;                   // of the followed mode, that each was integrated over
 };
 
-/// Options -attractors_...
-struct AttractorOptions
-{
-  PetscInt periods = 400; // at most
-  PetscInt seed = 1;      // of the random starts
-};
-
-OptionList options_of(AttractorOptions& options);
-
 /// The brake about its equilibrium, and the starts that the scene asks for.
 struct AttractorProblem
 {
@@ -38,8 +29,8 @@ struct AttractorProblem
   const StepOptions& step;
 };
 
-/// Integrates the motions of all starts together until their energies have settled, for at most as many periods as the
-/// options allow. Collective. Where the run is asked to end it throws Interrupted.
-Attractors find_attractors(const AttractorProblem& problem, const AttractorOptions& options);
+/// Integrates the motions of all starts together until their energies have settled, for at most 400
+/// periods. Collective. Where the run is asked to end it throws Interrupted.
+Attractors find_attractors(const AttractorProblem& problem);
 
 } // namespace squeal

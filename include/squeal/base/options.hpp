@@ -1,7 +1,6 @@
 #pragma once
-/// Options of PETSc's database as described members of plain structs. Each stage has one struct of options, whose
-/// member initialisers are the only defaults, and one list that describes it, options_of(the struct). The program reads
-/// and checks all lists before its first stage (src/options.cpp), and prints its reference from them.
+/// Options of PETSc's database as described members of plain structs, whose member initialisers are the only defaults.
+/// src/options.cpp has the program's table, which is read and checked before the first stage.
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/words.hpp"
 
@@ -19,8 +18,6 @@ enum class Range
   positive,     // x > 0
   not_negative, // x >= 0
   natural,      // x >= 1
-  up_to_two,    // 0 <= x <= 2
-  inside_two,   // 0 < x < 2
   below_two,    // 0 <= x < 2
 };
 

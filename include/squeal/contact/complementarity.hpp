@@ -92,7 +92,7 @@ struct ProjectionSolution
 /// Iterates r <- max(0, r - rho g), g = q + M r, from r = 0; N must be the identity. `rho` [N/m] is halved when the
 /// residual grows. `tolerance`: of the residual. Ends before it is met where `is_over` says so.
 ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
-                                       long max_iterations, bool (*is_over)() = nullptr);
+                                       long max_iterations);
 
 /// Largest eigenvalue of a symmetric positive semi-definite A with a diagonal added, by power iteration: a lower bound.
 double largest_eigenvalue(const Eigen::MatrixXd& A, const Eigen::VectorXd& added, int iterations);

@@ -53,20 +53,12 @@ struct NearField
   std::size_t entries() const;
 };
 
-/// Where W is stored. automatic: by its entries, but where stays_in_factor says so.
+/// Where W is stored: by its entries, or in the factor.
 enum class OperatorStorage
 {
-  automatic,
   whole,
   by_factor,
 };
-
-inline constexpr std::array operator_storage_words = {"automatic", "whole", "by_factor"};
-
-inline Words words_of(OperatorStorage)
-{
-  return operator_storage_words;
-}
 
 /// Whether a product with a W of so many rows reads fewer numbers by the factor, whose rows of E have so many entries,
 /// or a whole W would take more than a quarter of the memory that is `free` [bytes].

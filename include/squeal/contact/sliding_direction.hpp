@@ -11,7 +11,7 @@ namespace squeal
 {
 
 /// A contact vector with `weight` s on the tangential rows of the pairs that did not stick, and zeros elsewhere.
-/// `velocity`: B v of the step's start; `weight`: (1-theta)/theta, or 0 for friction that opposes s+ everywhere.
+/// `velocity`: B v of the step's start; `weight`: (1-theta)/theta.
 std::vector<double> past_sliding(PairView<const double> velocity, TangentView<const double> drive,
                                  const std::vector<ContactStatus>& status, double weight);
 

@@ -41,11 +41,8 @@ struct ContactSettings
   ContactSolver solver = ContactSolver::gauss_seidel;
   double tolerance = 1e-10; // on the residual
   PetscInt max_iterations = 1000;
-  double rho = 0;             // of the fixed point, over 1/lambda_max(W); 0: chosen, and halved when the residual grows
-  PetscInt extrapolation = 2; // highest order of the warm start's extrapolation in time
+  double rho = 0; // of the fixed point, over 1/lambda_max(W); 0: chosen, and halved when the residual grows
 };
-
-OptionList options_of(ContactSettings& settings);
 
 /// How one problem ended.
 struct ContactResult
@@ -63,7 +60,7 @@ struct ContactMemory
   int since_read = 0; // solutions accepted since W was last read
 };
 
-/// One problem. An infinite b_n keeps its pair out: r = 0. `r`: start in, solution out.
+/// One problem. `r`: start in, solution out.
 struct ContactProblem
 {
   const std::vector<double>& b;

@@ -48,26 +48,15 @@ struct Equilibrium
   std::vector<char> closed;       // per pair
   std::vector<double> gaps;       // [m] per pair, g + c r_n: zero where closed
   double force_residual = 0;      // |K u - F - B'r| / |F|
-  double check_residual = 0;      // the natural map with the fixed point's rho = 1/lambda_max(D_nn)
-  int check_iterations = 0;       // of an independent run of the fixed point; 0: not run
-  double check_difference = 0;    // of its reactions, over the largest; NaN if it did not converge
   double auxiliary_stiffness = 0; // kappa [N/m]; 0: K holds the structure by itself
   Uniqueness uniqueness = Uniqueness::not_checked;
 };
 
-/// Options -equilibrium_...
+/// How an equilibrium is sought.
 struct EquilibriumOptions
 {
-  PetscInt max_iterations = 100;
-  PetscInt check_max_iterations = -1; // of the fixed point; -1: 20000 up to 600 pairs, else none
-  double check_rho = 1.5;             // of the fixed point, over 1/lambda_max(D_nn)
-  FactorOptions factor{};             // listed by itself
+  FactorOptions factor{};
 };
-
-OptionList options_of(EquilibriumOptions& options);
-
-/// For studies of many equilibria: the fixed point, which checks single runs, runs only where it is asked for.
-EquilibriumOptions checked_if_asked(EquilibriumOptions options);
 
 /// The stiffness factored and the compliance D of the pairs, on their normals and the axes they slide along. Neither
 /// load nor friction changes them, nor a drive along the same axes.
@@ -96,7 +85,7 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
 /// The same with a compliance that is at hand and serves the interface, first tried with these closed pairs; empty:
 /// none are expected. Collective.
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const PairCompliance& compliance,
-                             const std::vector<char>& expected, const EquilibriumOptions& options);
+                             const std::vector<char>& expected);
 
 /// A model at its sliding equilibrium, as every stage after it sees it. Borrows all three.
 struct SlidingEquilibrium

@@ -127,8 +127,6 @@ struct ModesOptions
   PencilOptions pencil{}; // listed by themselves
 };
 
-OptionList options_of(ModesOptions& options);
-
 /// Real part less 1e-8 |lambda|, which is what rounding shows on a mode without damping: positive where a mode counts
 /// as unstable, here and everywhere.
 double instability_of(std::complex<double> lambda);

@@ -36,8 +36,6 @@ struct SettledOptions
   PetscInt shapes = 100;  // at most, that the motion is kept on
 };
 
-OptionList options_of(SettledOptions& options);
-
 /// The kind of a motion, or what it is undecided between.
 struct MotionVerdict
 {

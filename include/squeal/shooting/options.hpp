@@ -54,6 +54,4 @@ struct ShootingOptions
   MultiplierMethod multiplier_method = MultiplierMethod::automatic;
 };
 
-OptionList options_of(ShootingOptions& options);
-
 } // namespace squeal

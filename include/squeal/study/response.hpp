@@ -36,8 +36,6 @@ struct ResponseOptions
   PetscInt shapes = 300;   // of a basis; where more are needed the band is parted
 };
 
-OptionList options_of(ResponseOptions& options);
-
 /// What is driven and read, and at which frequencies.
 struct ResponseProblem
 {

@@ -65,16 +65,6 @@ struct Robustness
   double model_error = 0;          // of the matrices as polynomials of the numbers
 };
 
-/// Options -robustness_...
-struct RobustnessOptions
-{
-  PetscInt training = 12;   // points whose modes make the basis
-  double tolerance = 1e-6;  // backward error of their vectors
-  double truncation = 5e-2; // part of a vector, in energy norm, that the basis may leave out
-};
-
-OptionList options_of(RobustnessOptions& options);
-
 /// The scene's random numbers and how a sample is computed.
 struct RobustnessProblem
 {
@@ -85,7 +75,6 @@ struct RobustnessProblem
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
-  const RobustnessOptions& options;
 };
 
 /// Every rank computes samples of its own. Collective.

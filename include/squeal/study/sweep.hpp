@@ -94,17 +94,11 @@ struct Sweep
   int groups = 1;              // of ranks, which shared the points
 };
 
-/// Options -sweep_...
+/// How a sweep is shared.
 struct SweepOptions
 {
-  double tolerance = 0;   // backward error of right and left vectors on the basis; 0: chosen
-  PetscInt passes = 20;   // corrections at a point, at most: the first one of a brake may need more than 8
-  PetscInt depth = 6;     // times that a step is halved, at most
-  PetscInt between = 100; // points put into a step where modes are unclear or pairs open or close, at most
-  PetscInt groups = 0;    // of ranks, at most one a rank or a point; 0: chosen
+  PetscInt groups = 0; // of ranks, at most one a rank or a point; 0: chosen
 };
-
-OptionList options_of(SweepOptions& options);
 
 /// The points to visit and how each is computed.
 struct SweepProblem

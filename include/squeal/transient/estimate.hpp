@@ -36,18 +36,13 @@ struct Estimate
   std::vector<double> curve_amplitude, curve_rate; // q [m] and P_R/E [1/s]
 };
 
-/// Options -estimate_...
-struct EstimateOptions
-{
-  double lift_off_multiple = 2; // of first lift-off: where vibrations start without an energy balance
-};
-
-OptionList options_of(EstimateOptions& options);
+/// Start amplitude over first lift-off where there is no energy balance.
+inline constexpr double lift_off_multiple = 2;
 
 /// The phase is that of the amplitude found, or of first lift-off without balance. Collective. A mode without balance
 /// is an outcome.
 Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
-                            const ComplexMode& mode, const EstimateOptions& options);
+                            const ComplexMode& mode);
 
 /// State u0 + q Re(phi e^{i phase}), v = q Re(lambda phi e^{i phase}) (paper, eqs. 18-19). Absolute, with the reactions
 /// of rest. `amplitude` [m], `phase` [rad].

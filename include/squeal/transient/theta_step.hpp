@@ -15,7 +15,7 @@
 #include "squeal/transient/step_options.hpp"
 #include "squeal/transient/step_record.hpp"
 
-#include <cmath>
+#include <functional>
 #include <optional>
 #include <span>
 
@@ -30,18 +30,9 @@ struct ThetaStep
   std::optional<PairedMatrices> matrices; // M and K, unless they are dense
   Factor factor;                          // of A bordered by B
   ContactOperator W;                      // on rank 0, which other ranks serve
-  ContactLaw law = ContactLaw::displacement;
-  Opposed opposed = Opposed::theta;
   ContactSettings contact;
   double factor_seconds = 0, condensed_seconds = 0; // to factor A with the corner that W is, to prepare W
 };
-
-/// The law of a pair as a function of the step's w_t. So mu is taken at the mean sliding speed |s_theta|, and at |s+|
-/// where friction opposes that everywhere.
-inline FrictionLaw law_of_step(const ThetaStep& step, const FrictionLaw& law)
-{
-  return law_of_step(law, step.opposed == Opposed::theta ? step.theta : 1);
-}
 
 /// A of a step h [s]. [kg] Collective.
 Owned<Mat> step_matrix(const Structure& structure, double h, double theta);
@@ -82,21 +73,18 @@ struct StepFactors
 /// The factors of a step that starts at `time` [s] (src/README.md, section 4.15).
 StepFactors step_factors(const Ramps& ramps, const ThetaStep& step, double time);
 
-/// The passes of a step, or of its tangent, over - h G v_theta on the right (src/README.md, section 4.17).
-class GyroscopicPasses
+/// Vectors of several motions that one step advances together.
+struct SteppedMotions
 {
-public:
-  /// Whether another one is needed; `change`: h G v_theta's in the last one over A v+. Throws Error where they do not
-  /// converge.
-  bool go_on(double change, double h);
-
-private:
-  double last_ = HUGE_VAL;
-  int count_ = 0;
+  std::vector<Vec> v;      // of the start
+  std::vector<Vec> v_next; // of the end, found by the solve
+  std::vector<Vec> Av;     // A v_free on entry, A v+ after the solve
 };
 
-/// |x - before| over |scale|; overwrites `before`.
-double relative_change(Vec x, Vec before, Vec scale);
+/// Solves a step, or its tangent, with - h G v_theta on the right (src/README.md, section 4.17): passes of `solve` with
+/// G v_theta of the pass before. Error: they do not converge.
+void solve_with_gyroscopic_part(const ThetaStep& step, Mat G, const SteppedMotions& motions,
+                                const std::function<void()>& solve);
 
 /// Must be called again after the state was changed by anything but `advance`.
 StepWork begin_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state);

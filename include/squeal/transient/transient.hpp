@@ -77,7 +77,6 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
 struct Trajectory
 {
   Outcome outcome;
-  ContactLaw law = ContactLaw::displacement;
   double theta = 0;     // [-]
   double step_size = 0; // [s]
   double periods = 0;   // [-] of the followed mode
