@@ -128,6 +128,7 @@ std::string option_page()
 ProgramOptions read_program_options(MPI_Comm comm)
 {
   ProgramOptions options;
+  check(PetscOptionsClearValue(nullptr, "-skip_petscrc")); // the program's own, not to be asked for again
   on_every_rank(comm, [&] { read_options(options_of(options)); });
   constexpr double part = 0.5; // of the free memory: the rest is for matrices, W and reduced models
   options.factor.by_memory = 1e-9 * part * free_memory(comm) / ranks_of(comm);

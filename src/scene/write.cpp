@@ -58,7 +58,8 @@ std::string print(const Motions& motions)
 
 std::string print(const MeasuredRatio& measured)
 {
-  return "[" + print(measured.frequency_hz) + ", " + print(measured.ratio) + "]";
+  const std::string frequency = print(measured.frequency_hz), ratio = print(measured.ratio);
+  return "[" + frequency + ", " + ratio + "]";
 }
 
 /// A vector, or a list of any values.
@@ -197,7 +198,10 @@ std::string resolved_scene(const Scene& scene)
   for (const SceneKey& key : keys)
     if (is_section(key))
       for (std::size_t i = 0; i < std::get<TableTarget>(key.target).size(); ++i)
-        text += "\n" + heading_of(key) + "\n" + table_text(std::get<TableTarget>(key.target).entry(i).keys);
+      {
+        const std::string heading = heading_of(key);
+        text += "\n" + heading + "\n" + table_text(std::get<TableTarget>(key.target).entry(i).keys);
+      }
   return text;
 }
 

@@ -58,8 +58,7 @@ public:
 private:
   void visit_all(const std::vector<SweepLine>& lines)
   {
-    Progress progress(comm_, "sweep", static_cast<double>(points_of(lines)));
-    progress_ = &progress;
+    progress_.emplace(comm_, "sweep", static_cast<double>(points_of(lines)));
     for (const SweepLine& line : lines)
       for (const std::vector<double>& values : line.points)
       {
@@ -431,7 +430,7 @@ private:
   SweptModel model_;
   Sweep sweep_;
   double tolerance_ = exact_tolerance;
-  Progress* progress_ = nullptr;
+  std::optional<Progress> progress_;
   std::array<std::optional<Followed>, 2> starts_{}; // of the last line in either direction of rotation
   std::size_t done_ = 0;                            // points
 };

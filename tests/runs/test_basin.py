@@ -186,7 +186,7 @@ def test_of_two_cycles_of_the_pin_the_start_decides(squeal):
     one_attempt = ["-cycle_free_periods", "0", "-settled_periods", "1", "--set", "cycle.start=mode"]
     smaller, larger = (squeal(*PIN, *one_attempt, "--set", f"cycle.amplitude={factor * estimate!r}", ranks=1).report["cycle"]
                        for factor in (0.8, 4))
-    for cycle, growth, tolerance in (smaller, 1.00012, 3e-5), (larger, 1.03, 0.01):
+    for cycle, growth, tolerance in (smaller, 1.00012, 1e-4), (larger, 1.03, 0.01):  # as below, by projection
         largest = cycle["multipliers"]["values"][0]
         assert abs(abs(complex(largest["real"], largest["imaginary"])) - growth) < tolerance
     assert larger["outcome"] == "unstable cycle" and larger["multipliers"]["crossing"] == "Neimark-Sacker"
