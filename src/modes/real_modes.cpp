@@ -131,6 +131,7 @@ void append_between(double low, double high, int expected, ShiftInvert& pencil, 
 RealModes search_below(double limit, ShiftInvert& pencil)
 {
   constexpr int slice = 150, attempts = 3;
+  constexpr double rounding = 1e-8; // of theta: the inertia says on which side of the limit such a mode lies
   const Inertia end = inertia_at(limit, pencil);
   const int fewest = std::max(1, (end.below + slice - 1) / slice);
   for (int slices = fewest;; ++slices)
@@ -139,14 +140,24 @@ RealModes search_below(double limit, ShiftInvert& pencil)
     for (int k = 0; k < slices; ++k)
     {
       const double low = k == 0 ? shift_below_zero(pencil.M, pencil.K) : limit * std::pow(1. * k / slices, 2);
-      append_between(low, limit * std::pow((k + 1.) / slices, 2), end.below / slices, pencil, modes);
+      const double high = limit * (k + 1 == slices ? 1 + rounding : std::pow((k + 1.) / slices, 2));
+      append_between(low, high, end.below / slices, pencil, modes);
     }
-    const auto found = std::lower_bound(modes.omega.begin(), modes.omega.end(), std::sqrt(end.limit));
-    const auto below = static_cast<int>(found - modes.omega.begin());
-    if (below == end.below) return modes;
-    if (slices + 1 < fewest + attempts) continue;
-    modes.outcome.kind = OutcomeKind::not_converged;
-    modes.outcome.reason = format("%d real modes found, and the inertia counts %d", below, end.below);
+    const auto below = [&](double theta)
+    {
+      const auto found = std::lower_bound(modes.omega.begin(), modes.omega.end(), std::sqrt(theta));
+      return static_cast<int>(found - modes.omega.begin());
+    };
+    const bool counted =
+        below(end.limit * (1 - rounding)) <= end.below && end.below <= below(end.limit * (1 + rounding));
+    if (!counted && slices + 1 < fewest + attempts) continue;
+    if (!counted)
+      modes.outcome = {OutcomeKind::not_converged,
+                       format("%d real modes found, and the inertia counts %d", below(end.limit), end.below),
+                       modes.outcome.iterations, modes.outcome.residual};
+    const int kept = counted && end.limit == limit ? end.below : below(limit);
+    modes.omega.resize(static_cast<std::size_t>(kept));
+    modes.shapes.erase(modes.shapes.begin() + kept, modes.shapes.end());
     return modes;
   }
 }
