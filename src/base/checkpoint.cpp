@@ -143,14 +143,14 @@ void open_checkpoints(const CheckpointPlace& given)
                 "): give those, or begin again without --restart");
 }
 
-CheckpointNames::CheckpointNames(const std::string& given)
+CheckpointNames::CheckpointNames(const std::string& given) : before_(prefix())
 {
-  prefix() = given;
+  prefix() += given;
 }
 
 CheckpointNames::~CheckpointNames()
 {
-  prefix().clear();
+  prefix() = before_;
 }
 
 void CheckpointNames::remove_all()

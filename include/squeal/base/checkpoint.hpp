@@ -105,8 +105,8 @@ struct CheckpointPlace
 /// Sets the place of this run. Error: the checkpoints to go on from are of another request.
 void open_checkpoints(const CheckpointPlace& place);
 
-/// While one lives, the names of this process's checkpoints begin with `prefix`: work that is done several times in a
-/// run keeps its checkpoints apart.
+/// While one lives, the names of this process's checkpoints begin with `prefix` after those of others: work that is
+/// done several times in a run keeps its checkpoints apart.
 class CheckpointNames
 {
 public:
@@ -117,6 +117,9 @@ public:
 
   /// Removes all that are kept with the prefix.
   static void remove_all();
+
+private:
+  std::string before_;
 };
 
 /// Whether checkpoints are kept at all.
