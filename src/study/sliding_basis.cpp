@@ -262,19 +262,6 @@ MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& cont
 
 } // namespace
 
-bool equal(Mat A, Mat B)
-{
-  std::array<PetscInt, 2> size{}, other{};
-  check(MatGetLocalSize(A, &size[0], &size[1]));
-  check(MatGetLocalSize(B, &other[0], &other[1]));
-  int alike = size == other; // else MatEqual is an error
-  MPI_Allreduce(MPI_IN_PLACE, &alike, 1, MPI_INT, MPI_MIN, comm_of(A));
-  PetscBool same = PETSC_FALSE;
-  if (alike == 0) return false;
-  check(MatEqual(A, B, &same));
-  return same == PETSC_TRUE;
-}
-
 SlidingBasis make_basis(const Structure& structure, const Interface& interface, Index sketched)
 {
   SlidingBasis basis{random_multivector(structure.K, static_cast<PetscInt>(sketched)), sketched,

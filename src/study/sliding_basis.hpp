@@ -88,7 +88,4 @@ MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact);
 /// The reverse, with zeros at the pivots.
 MultiVector with_zero_pivots(const MultiVector& kept, const ClosedContact& contact);
 
-/// Whether two matrices have one layout and equal entries. Collective.
-bool equal(Mat A, Mat B);
-
 } // namespace squeal

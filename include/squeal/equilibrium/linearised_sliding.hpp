@@ -66,6 +66,9 @@ Owned<Mat> contact_stiffness(const Interface& interface, const std::vector<char>
 /// A + B of any symmetry.
 Owned<Mat> sum_of(Mat A, Mat B);
 
+/// Whether two matrices have one layout and equal entries. Collective.
+bool equal(Mat A, Mat B);
+
 /// Normal reactions lambda_n per pair that a motion phi e^{s t} takes are (s^2 M + s C + K) phi, from the pivots' rows
 /// of (s^2 M + s C + K) phi = R' lambda_n; 0 on open pairs. Every choice of rows agrees if s and phi are an eigenpair.
 struct ReactionOperator
