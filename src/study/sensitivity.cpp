@@ -152,28 +152,24 @@ class NearbyEquilibria
 {
 public:
   explicit NearbyEquilibria(const SensitivityProblem& problem)
-      : problem_(problem), options_(checked_if_asked(problem.equilibrium_options))
+      : problem_(problem), searched_(checked_if_asked(problem.equilibrium_options))
   {
+    searched_.expect(problem.sliding.equilibrium.closed);
   }
 
   /// Nothing where it is the equilibrium of the problem itself.
   std::optional<Equilibrium> at(const BrakeModel& model)
   {
     const auto& [structure, interface, equilibrium] = problem_.sliding;
-    const bool same = model.structure.K.get() == structure.K && model.interface.B.get() == interface.B,
-               same_load = model.structure.load.get() == structure.load;
-    if (interface.pairs == 0 || (same && same_load && same_contact(model.interface, interface))) return std::nullopt;
-    if (same && !compliance_) compliance_.emplace(structure, interface, options_);
-    if (!same || !compliance_->serves(model.interface))
-      return find_equilibrium(model.structure, model.interface,
-                              PairCompliance(model.structure, model.interface, options_), equilibrium.closed, options_);
-    return find_equilibrium(model.structure, model.interface, *compliance_, equilibrium.closed, options_);
+    const bool same = model.structure.K.get() == structure.K && model.interface.B.get() == interface.B &&
+                      model.structure.load.get() == structure.load && same_contact(model.interface, interface);
+    if (interface.pairs == 0 || same) return std::nullopt;
+    return searched_.at(model.structure, model.interface);
   }
 
 private:
   const SensitivityProblem& problem_;
-  EquilibriumOptions options_;
-  std::optional<PairCompliance> compliance_{}; // of the problem's own K and B
+  Equilibria searched_;
 };
 
 /// Derivatives by numbers, of all modes at once.
