@@ -83,39 +83,6 @@ std::vector<double> senses(const Interface& interface, const std::vector<double>
   return result;
 }
 
-/// What reactions do to gaps, pairs x pairs: D_nn of normal ones, D_nt of friction along the axes. On rank 0.
-struct GapCompliance
-{
-  Eigen::MatrixXd D_nn, D_nt;
-};
-
-/// From the condensed operator D of two rows a pair. Collective.
-GapCompliance gap_compliance(const Factor& factor, int pairs, MPI_Comm comm)
-{
-  GapCompliance D;
-  if (pairs == 0) return D;
-  if (rank_of(comm) == 0) D = {Eigen::MatrixXd(pairs, pairs), Eigen::MatrixXd(pairs, pairs)};
-  const PairRows<std::size_t> rows(1);
-  const auto copy = [&](const CondensedStrip& strip, std::size_t i, std::size_t j)
-  {
-    const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
-    D.D_nn(row, column) = D.D_nn(column, row) = strip.entry(rows.normal(i), rows.normal(j));
-    D.D_nt(column, row) = strip.entry(rows.tangential(i), rows.normal(j));
-    if (i > j) D.D_nt(row, column) = strip.entry(rows.normal(i), rows.tangential(j));
-  };
-  factor.read_condensed(
-      [&](const CondensedStrip& strip)
-      {
-        constexpr std::size_t together = 32; // rows, whose transposes stay in the cache
-        const std::size_t first = rows.pair_of(strip.first), last = rows.pair_of(strip.last),
-                          end = rows.pair_of(strip.first + strip.height);
-        for (std::size_t begin = first; begin < end; begin += together)
-          for (std::size_t j = first; j < last; ++j)
-            for (std::size_t i = std::max(j, begin); i < std::min(begin + together, end); ++i) copy(strip, i, j);
-      });
-  return D;
-}
-
 /// `c`: compliances of the pairs. The unknown gap is then g + c r.
 ComplementarityProblem problem_of(const Eigen::MatrixXd& D_nn, Eigen::MatrixXd with_friction, double kappa,
                                   const std::vector<double>& q, const Eigen::VectorXd& c)

@@ -147,38 +147,14 @@ bool same_contact(const Interface& a, const Interface& b)
          drive_directions(a) == drive_directions(b);
 }
 
-/// The equilibrium of a model that differs in one number, with as little work as it needs.
-class NearbyEquilibria
-{
-public:
-  explicit NearbyEquilibria(const SensitivityProblem& problem)
-      : problem_(problem), searched_(checked_if_asked(problem.equilibrium_options))
-  {
-    searched_.expect(problem.sliding.equilibrium.closed);
-  }
-
-  /// Nothing where it is the equilibrium of the problem itself.
-  std::optional<Equilibrium> at(const BrakeModel& model)
-  {
-    const auto& [structure, interface, equilibrium] = problem_.sliding;
-    const bool same = model.structure.K.get() == structure.K && model.interface.B.get() == interface.B &&
-                      model.structure.load.get() == structure.load && same_contact(model.interface, interface);
-    if (interface.pairs == 0 || same) return std::nullopt;
-    return searched_.at(model.structure, model.interface);
-  }
-
-private:
-  const SensitivityProblem& problem_;
-  Equilibria searched_;
-};
-
 /// Derivatives by numbers, of all modes at once.
 class NumberDerivatives
 {
 public:
   NumberDerivatives(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held)
-      : problem_(problem), vectors_(vectors), held_(held), equilibria_(problem)
+      : problem_(problem), vectors_(vectors), held_(held), equilibria_(checked_if_asked(problem.equilibrium_options))
   {
+    equilibria_.expect(problem.sliding.equilibrium.closed);
   }
 
   std::vector<NumberDerivative> by(const SceneNumber& number)
@@ -191,10 +167,13 @@ private:
   std::optional<AtHeldVectors> hold_at(const std::string& key, double value)
   {
     const BrakeModel model = problem_.model_with(std::array{SceneNumber{key, value}});
-    const std::optional<Equilibrium> other = equilibria_.at(model);
-    const Equilibrium& equilibrium = other ? *other : problem_.sliding.equilibrium;
-    if (equilibrium.outcome.kind != OutcomeKind::converged || equilibrium.closed != problem_.sliding.equilibrium.closed)
-      return std::nullopt;
+    const auto& [structure, interface, own] = problem_.sliding;
+    const bool same = model.structure.K.get() == structure.K && model.interface.B.get() == interface.B &&
+                      model.structure.load.get() == structure.load && same_contact(model.interface, interface);
+    std::optional<Equilibrium> other;
+    if (interface.pairs > 0 && !same) other = equilibria_.at(model.structure, model.interface);
+    const Equilibrium& equilibrium = other ? *other : own;
+    if (equilibrium.outcome.kind != OutcomeKind::converged || equilibrium.closed != own.closed) return std::nullopt;
     return at_held_vectors({model.structure, model.interface, equilibrium}, vectors_);
   }
 
@@ -320,7 +299,7 @@ private:
   const SensitivityProblem& problem_;
   const HeldVectors& vectors_;
   const AtHeldVectors& held_;
-  NearbyEquilibria equilibria_;
+  Equilibria equilibria_;
 };
 
 /// By the change of the residual, with vectors and reactions held and the equilibrium free to change.
