@@ -1,5 +1,9 @@
 #include "squeal/coarse.hpp"
 
+#include "squeal/base/checkpoint.hpp"
+#include "squeal/find_motion.hpp"
+
+#include <algorithm>
 #include <cmath>
 
 namespace squeal
@@ -21,16 +25,7 @@ Scene scene_on_coarse_mesh(const Scene& scene)
     coarse.mesh->parameters = given.coarse_parameters;
   }
   coarse.cycle.start = {};
-  coarse.cycle.coarse_parameters.clear();
-  coarse.cycle.coarse_mesh.clear();
   coarse.cycle.save_state.clear();
-  coarse.cycle.starts = 0;
-  coarse.transient = {};
-  coarse.branch.reset();
-  coarse.sweep.reset();
-  coarse.sensitivity.reset();
-  coarse.robustness.reset();
-  coarse.changes.clear();
   coarse.probes.clear();
   return coarse;
 }
@@ -63,20 +58,58 @@ CoarseModel::CoarseModel(const Scene& fine_scene, const Model& fine, MPI_Comm co
 {
 }
 
-CarriedCycle carried_cycle(const CoarseModel& coarse, const CycleOfMesh& cycle, const Equilibrium& fine,
-                           const ComplexMode& followed)
+std::optional<CoarseModel> coarse_model_of(const Scene& scene, const Model& model)
+{
+  if (!scene.cycle.enabled || scene.cycle.start.kind != CycleStartKind::coarse) return {};
+  return std::optional<CoarseModel>(std::in_place, scene, model, comm_of(model.structure.load));
+}
+
+namespace
+{
+
+/// The cycle of the coarse mesh about the equilibrium of the fine one.
+GivenStart carried(const Interpolation& interpolation, const SlidingPoint& coarse, const LimitCycle& cycle,
+                   const SlidingPoint& fine)
 {
   constexpr double same_mode = 0.1;
-  const double ratio = followed.frequency_hz() / cycle.followed.frequency_hz();
+  const double ratio = fine.modes.modes.front().frequency_hz() / coarse.modes.modes.front().frequency_hz();
   const double faster = std::abs(ratio - 1) < same_mode ? ratio : 1;
-  const Owned<Vec> moved = copy_of(cycle.state.u.get());
-  check(VecAXPY(moved, -1, cycle.equilibrium.u));
-  CarriedCycle carried{{zeros_like(fine.u), zeros_like(fine.u), 0, fine.reactions}, cycle.period / faster};
-  coarse.interpolation.apply(moved, carried.state.u);
-  check(VecAXPY(carried.state.u, 1, fine.u));
-  coarse.interpolation.apply(cycle.state.v, carried.state.v);
-  check(VecScale(carried.state.v, faster));
-  return carried;
+  const Vec rest = fine.equilibrium.u;
+  const Owned<Vec> moved = copy_of(cycle.measured.start.u.get());
+  check(VecAXPY(moved, -1, coarse.equilibrium.u));
+  GivenStart start{{zeros_like(rest), zeros_like(rest), 0, fine.equilibrium.reactions}, cycle.orbit.period / faster};
+  interpolation.apply(moved, start.state.u);
+  check(VecAXPY(start.state.u, 1, rest));
+  interpolation.apply(cycle.measured.start.v, start.state.v);
+  check(VecScale(start.state.v, faster));
+  return start;
+}
+
+} // namespace
+
+CoarseStart find_coarse_start(const CoarseModel& coarse, const SlidingPoint& fine, const Scene& scene,
+                              const ProgramOptions& options)
+{
+  const std::string reason = no_mode_to_follow(fine, scene);
+  if (!reason.empty()) return not_run<CoarseStart>(OutcomeKind::skipped, reason);
+  Scene coarse_scene = coarse.scene;
+  const CycleSettings chosen = first_settings(fine, scene, options);
+  constexpr double tolerance = 1e-3; // the mesh's own error is larger
+  coarse_scene.cycle.steps_per_period = chosen.steps_per_period;
+  coarse_scene.cycle.tolerance = std::max(chosen.tolerance, tolerance);
+  ProgramOptions coarse_options = options;
+  coarse_options.cycle.shooting.multipliers = 0;
+  const WithoutCheckpoints of_fine_mesh;
+  const SlidingPoint point = find_point(coarse.model, coarse_scene, coarse_options, within_a_stage);
+  const LimitCycle cycle = find_cycle(point, coarse_scene, coarse_options);
+  CoarseStart start{cycle.outcome, coarse.model.dofs.size, coarse.model.interface.pairs};
+  if (!has_run(cycle.outcome)) start.outcome.kind = OutcomeKind::not_converged;
+  if (start.outcome.kind != OutcomeKind::converged) return start;
+  start.period = cycle.orbit.period;
+  start.mean_fluctuating_energy = cycle.measured.mean_fluctuating_energy;
+  start.periods = cycle.convergence.periods;
+  start.carried = carried(coarse.interpolation, point, cycle, fine);
+  return start;
 }
 
 } // namespace squeal

@@ -6,7 +6,7 @@
 
 #include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/base/free_memory.hpp"
-#include "squeal/chain.hpp"
+#include "squeal/point.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
 #include <algorithm>
@@ -74,11 +74,6 @@ double steps_of(const Scene& scene, const ProgramOptions& options)
   const double starts = scene.cycle.starts, points = scene.branch ? scene.branch->points : 0;
   const double of_scene = scene.cycle.enabled ? cycle * (1 + starts + points) + a_period * scene.cycle.free_periods : 0;
   return steps + of_scene + motions * (cycle + a_period * scene.cycle.free_periods);
-}
-
-bool seeks_modes(const Scene& scene)
-{
-  return scene.modes.enabled || scene.cycle.enabled || follows_a_mode(scene.transient);
 }
 
 /// The resident memory of this process [bytes]; 0 where the system does not say.

@@ -1,6 +1,7 @@
 #include "squeal/swept_motion.hpp"
 
-#include "squeal/base/run_control.hpp"
+#include "squeal/coarse.hpp"
+#include "squeal/find_motion.hpp"
 #include "squeal/report/heard.hpp"
 #include "squeal/study/reversed.hpp"
 
@@ -23,30 +24,6 @@ Scene scene_at(const Scene& scene, const std::vector<double>& values)
   at.transient.save_state.clear();
   at.branch.reset();
   return at;
-}
-
-/// Runs the stages to the settled motion, each of which says why it does not run.
-void run_stages(Chain& chain)
-{
-  const auto& [structure, interface] = std::tie(chain.model.structure, chain.model.interface);
-  Report& report = chain.report;
-  const MPI_Comm comm = comm_of(structure.load);
-  report.equilibrium = find_equilibrium(structure, interface, chain.options.equilibrium);
-  report.modes = run_modes(chain);
-  report.estimates = run_estimates(chain);
-  report.transient = run_transient(chain);
-  if (report.transient.outcome.kind == OutcomeKind::interrupted) throw Interrupted{};
-  std::optional<CoarseModel> coarse;
-  if (chain.scene.cycle.start.kind == CycleStartKind::coarse)
-  {
-    coarse.emplace(chain.scene, chain.model, comm);
-    chain.coarse = &*coarse;
-    report.coarse = run_coarse(chain);
-  }
-  if (chain.scene.cycle.start.kind == CycleStartKind::file)
-    chain.cycle_file = read_state(chain.scene.cycle.start.file, structure);
-  seek_motion(chain, [](Stage, const auto& work) { return work(); });
-  if (report.cycle.cut_short) throw Interrupted{};
 }
 
 /// What is kept of a cycle that was found.
@@ -75,33 +52,36 @@ void take_settled(const SettledMotion& settled, SweptMotion& motion)
 
 SweptMotion motion_of(const Report& report, const Scene& scene)
 {
-  const LimitCycle& cycle = report.cycle;
+  const auto& [cycle, fidelity, settled, followed, attempts] = report.motion;
+  const Outcome& equilibrium = report.point.equilibrium.outcome;
   SweptMotion motion;
   motion.heard = heard(report, scene);
-  motion.outcome =
-      report.equilibrium.outcome.kind == OutcomeKind::converged ? cycle.outcome : report.equilibrium.outcome;
+  motion.outcome = equilibrium.kind == OutcomeKind::converged ? cycle.outcome : equilibrium;
   motion.steps_per_period = cycle.steps_per_period;
-  motion.periods = cycle.convergence.periods + static_cast<long>(report.settled.examined.periods());
+  motion.periods = cycle.convergence.periods + static_cast<long>(settled.examined.periods());
   if (const Estimate& estimate = followed_estimate(report); estimate.outcome.kind == OutcomeKind::balance)
     motion.estimate = estimate.amplitude;
-  const bool settled = has_run(report.settled.outcome);
   const bool found = cycle.outcome.kind == OutcomeKind::converged || !cycle.multipliers.values.empty();
   if (has_run(cycle.outcome) && found) take_cycle(cycle, motion);
-  if (settled) take_settled(report.settled, motion);
+  if (has_run(settled.outcome)) take_settled(settled, motion);
   return motion;
 }
 
 } // namespace
 
-SweptMotion find_swept_motion(const Chain& chain, const SweptPlace& place, NearbyModels& models)
+SweptMotion find_swept_motion(NearbyModels& models, const Scene& scene, const ProgramOptions& options,
+                              const SweptPlace& place)
 {
-  const Scene scene = scene_at(chain.scene, place.values);
-  Model model = models.whole_at(numbers_of(chain.scene.sweep->key, place.values));
-  if (place.reversed) reverse_rotation(model.structure, model.interface);
+  const Scene at = scene_at(scene, place.values);
+  Model there = models.whole_at(numbers_of(scene.sweep->key, place.values));
+  if (place.reversed) reverse_rotation(there.structure, there.interface);
+  const StageRunner run = within_a_stage;
   Report report;
-  Chain at{scene, chain.options, model, report, {}};
-  run_stages(at);
-  return motion_of(report, scene);
+  const SlidingPoint& point = report.point = find_point(there, at, options, run);
+  report.transient = run_stage(run, Stage::transient, [&] { return find_transient(point, at, options); });
+  if (const auto coarse = coarse_model_of(at, there)) report.coarse = find_coarse_start(*coarse, point, at, options);
+  report.motion = find_motion(point, motion_start(point, at, report.transient, report.coarse), at, options, run);
+  return motion_of(report, at);
 }
 
 } // namespace squeal

@@ -1,6 +1,8 @@
 #pragma once
 /// The scene on a coarser mesh, whose cycle starts the search for the scene's own (src/README.md, section 6.3).
 #include "squeal/model.hpp"
+#include "squeal/options.hpp"
+#include "squeal/report/report.hpp"
 #include "squeal/solid/interpolation.hpp"
 
 namespace squeal
@@ -17,26 +19,13 @@ struct CoarseModel
   Interpolation interpolation; // to the fine mesh
 };
 
-/// A cycle, and the equilibrium and the followed mode that belong to it.
-struct CycleOfMesh
-{
-  const Equilibrium& equilibrium;
-  const ComplexMode& followed;
-  const State& state;
-  double period = 0; // [s]
-};
+/// The coarse mesh of the scene's start; none where the scene starts otherwise. Collective.
+std::optional<CoarseModel> coarse_model_of(const Scene& scene, const Model& model);
 
-/// A start on the fine mesh.
-struct CarriedCycle
-{
-  State state;
-  double period = 0; // [s]
-  int rounds = 1;    // as many as the period may be of the cycle
-};
-
-/// The cycle of the coarse mesh about the equilibrium of the fine one. Its time is scaled by the frequencies of the two
-/// meshes' followed modes where these differ by at most a tenth: a coarse mesh is too stiff. Collective.
-CarriedCycle carried_cycle(const CoarseModel& coarse, const CycleOfMesh& cycle, const Equilibrium& fine,
-                           const ComplexMode& followed);
+/// Finds the cycle on the coarse mesh, at the steps a period with which the search at the fine point begins, and
+/// carries it over. Its time is scaled by the frequencies of the two meshes' followed modes where these differ by at
+/// most a tenth: a coarse mesh is too stiff. Collective.
+CoarseStart find_coarse_start(const CoarseModel& coarse, const SlidingPoint& fine, const Scene& scene,
+                              const ProgramOptions& options);
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #pragma once
 /// The model of a scene: from a mesh, from points and springs, or from matrices; everything after it is the same.
-#include "squeal/contact/interface.hpp"
+#include "squeal/contact/model.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/scene/numbers.hpp"
 
@@ -9,19 +9,6 @@
 
 namespace squeal
 {
-
-/// A model in all its parts.
-struct Model
-{
-  // On rank 0; empty on a matrix scene. Scenes with stages that make models on groups of ranks, [sweep] and
-  // [robustness], have the mesh on every rank.
-  Mesh mesh;
-  DofMap dofs; // rank 0's; elsewhere its size alone
-  Structure structure;
-  Interface interface;
-  std::vector<Coverage> coverage; // one a contact; empty on a matrix scene
-  Owned<Mat> probes;              // a row per probe of the scene
-};
 
 /// Collective. Error: as of the mesh, the structure and the interface; no mass. Rank 0 reads and numbers the mesh.
 Model build_model(const Scene& scene, MPI_Comm comm);

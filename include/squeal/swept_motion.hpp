@@ -1,12 +1,14 @@
 #pragma once
-/// The chain of stages to what is heard, at a point of a sweep.
-#include "squeal/chain.hpp"
+/// What is heard at a point of a sweep.
+#include "squeal/model.hpp"
+#include "squeal/options.hpp"
 
 namespace squeal
 {
 
-/// What is heard on the chain's scene with the values of a point, by the settings of its cycle. `models`: of the
-/// chain's scene. Collective on their communicator. Error: the scene cannot be computed there.
-SweptMotion find_swept_motion(const Chain& chain, const SweptPlace& place, NearbyModels& models);
+/// What is heard on the scene with the values of a point, by the settings of its cycle. `models`: of the scene.
+/// Collective on their communicator. Error: the scene cannot be computed there.
+SweptMotion find_swept_motion(NearbyModels& models, const Scene& scene, const ProgramOptions& options,
+                              const SweptPlace& place);
 
 } // namespace squeal

@@ -77,7 +77,7 @@ SlidingEquilibrium BrakeFamily::sliding()
 {
   BrakeAt& at = *at_;
   if (!at.equilibrium_known)
-    at.equilibrium = find_equilibrium(at.model.structure, at.model.interface, problem_.equilibrium_options);
+    at.equilibrium = Equilibria(problem_.equilibrium_options).at(at.model.structure, at.model.interface);
   at.equilibrium_known = true;
   return at.map.sliding;
 }

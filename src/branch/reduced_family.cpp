@@ -102,7 +102,7 @@ double distance(const ReducedModel& found, const ReducedModel& exact)
 /// The energy norm of the followed mode at an amplitude of 1.
 double unit_norm(const BrakeBranchProblem& problem)
 {
-  const ComplexMode& mode = problem.own_modes.front();
+  const ComplexMode& mode = problem.followed;
   const Owned<Vec> v = zeros_like(mode.real);
   check(VecAXPY(v, mode.lambda.real(), mode.real));
   check(VecAXPY(v, -mode.lambda.imag(), mode.imaginary));
@@ -168,10 +168,10 @@ PairsSeen pairs_seen_in(const BrakeBranchProblem& problem, double margin)
     for (std::size_t i = 0; i < pairs; ++i) seen.add(i, statuses[i]);
   double amplitude = margin * problem.cycle.orbit.fluctuation / unit_norm(problem);
   MPI_Bcast(&amplitude, 1, MPI_DOUBLE, 0, comm_of(structure.load)); // sums may differ in their last bit
-  for (const int pair : pairs_that_may_turn(interface, problem.own_modes.front(), amplitude))
+  for (const int pair : pairs_that_may_turn(interface, problem.followed, amplitude))
     if (equilibrium.closed[static_cast<std::size_t>(pair)])
       seen.add(static_cast<std::size_t>(pair), ContactStatus::stick);
-  for (const int pair : pairs_that_may_change(interface, equilibrium, problem.own_modes.front(), amplitude))
+  for (const int pair : pairs_that_may_change(interface, equilibrium, problem.followed, amplitude))
     for (const ContactStatus status : {ContactStatus::open, ContactStatus::slip})
       seen.add(static_cast<std::size_t>(pair), status);
   return seen;

@@ -80,13 +80,12 @@ std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& red
   return {};
 }
 
+constexpr const char* several_modes = "several modes are unstable: only the full model's shooting excites them all";
+
 /// The cycle by way of the reduced model's. Returns why there is none, or nothing.
 std::string find_by_reduced_model(ReducedSearch& search, StepChoice steps, LimitCycle& cycle)
 {
-  if (search.problem.unstable.modes.size() > 1)
-    return "several modes are unstable: only the full model's shooting excites them all";
-  if (search.problem.given_period > 0 && search.fidelity.asked == CycleModel::automatic)
-    return "the search starts from a cycle that is nearly known, which the full model takes up at once";
+  if (search.problem.unstable.modes.size() > 1) return several_modes;
   ReducedCycle reduced;
   if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
   const double clock = MPI_Wtime();
@@ -97,58 +96,33 @@ std::string find_by_reduced_model(ReducedSearch& search, StepChoice steps, Limit
   return reason;
 }
 
-/// The cycle of the full model, from the estimate.
-void find_by_full_model(const CycleProblem& problem, const CycleOptions& options, StepChoice steps, FittedCycle& result)
+/// Lets `search` find the cycle with the chosen settings, unless these are refused. A cycle that answers is saved.
+template <class Search> FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request,
+                                                      const Fidelity& tried, const Search& search)
 {
-  const double clock = MPI_Wtime();
+  declare_solver_options(comm_of(given.sliding.structure.load));
+  FittedCycle result;
+  const CycleSettings settings = chosen_settings(given, request);
+  const CycleProblem problem = with_settings(given, settings);
+  if (const std::string refusal = step_refusal_of(problem, settings.steps_per_period); !refusal.empty())
+  {
+    result.cycle.outcome = {OutcomeKind::refused, refusal, 0, 0};
+    return result;
+  }
   Fidelity& fidelity = result.fidelity;
-  fidelity.used = CycleModel::full;
-  LimitCycle found = find_cycle_from_start(problem, options);
-  found.convergence.periods += fidelity.full_periods; // of a search that stalled
-  result.cycle = std::move(found);
-  fidelity.full_periods = result.cycle.convergence.periods;
-  if (steps == StepChoice::by_accuracy && !result.cycle.cut_short)
-  {
-    const Preconditioner preconditioner = estimated_preconditioner(problem, options.band_factor);
-    refine_or_cut_short({problem, options, preconditioner, fidelity}, result.cycle);
-  }
-  fidelity.full_seconds += MPI_Wtime() - clock;
-}
-
-/// The cycle on the model asked for, or on the full one where "auto" cannot do without it.
-void find_on_model(const CycleProblem& problem, const CycleOptions& options, StepChoice steps, FittedCycle& result)
-{
-  Fidelity& fidelity = result.fidelity;
-  if (fidelity.asked != CycleModel::full)
-  {
-    fidelity.used = CycleModel::reduced;
-    fidelity.contact_tolerance = 1e-3 * fidelity.accuracy;
-    ReducedSearch search{problem, options, fidelity, problem.settings.steps_per_period};
-    // a start need not be better; slow motions multiply its error
-    search.tolerance = fidelity.asked == CycleModel::automatic ? 1e-3 : 3e-4 * fidelity.accuracy;
-    try
-    {
-      fidelity.reason = find_by_reduced_model(search, steps, result.cycle);
-    }
-    catch (const LibraryError&) // perhaps on this rank alone
-    {
-      throw;
-    }
-    catch (const Error& error) // on every rank alike: the reduced model is the same on all
-    {
-      if (fidelity.asked == CycleModel::reduced) throw;
-      fidelity.reason = error.what();
-    }
-    if (fidelity.reason.empty()) return;
-  }
-  if (fidelity.asked == CycleModel::reduced)
-  {
-    result.cycle.outcome.kind = problem.unstable.modes.size() > 1 ? OutcomeKind::refused : OutcomeKind::not_converged;
-    result.cycle.outcome.reason = fidelity.reason;
-    result.cycle.orbit.residual = std::nan(""); // no period of the full model was made
-    return;
-  }
-  find_by_full_model(problem, options, steps, result);
+  fidelity = tried;
+  fidelity.asked = request.model;
+  fidelity.accuracy = request.accuracy;
+  if (request.model != CycleModel::full) fidelity.contact_tolerance = 1e-3 * request.accuracy;
+  fidelity.verdict_steps = settings.steps_per_period;
+  const bool open = request.model == CycleModel::automatic && given.settings.steps_per_period == 0;
+  search(problem, open ? StepChoice::by_accuracy : StepChoice::given, result);
+  if (!result.answers) return result;
+  fidelity.steps_per_period = result.cycle.steps_per_period;
+  const State& start = result.cycle.measured.start;
+  const std::filesystem::path& file = settings.save_state;
+  if (!file.empty() && start.u.get()) write_state(start, problem.sliding.structure, file);
+  return result;
 }
 
 } // namespace
@@ -168,27 +142,65 @@ CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest
   return settings;
 }
 
-FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options)
+std::string no_reduced_search(const CycleProblem& problem)
 {
-  declare_solver_options(comm_of(given.sliding.structure.load));
-  FittedCycle result;
-  const CycleSettings settings = chosen_settings(given, request);
-  const CycleProblem problem = with_settings(given, settings);
-  if (const std::string refusal = step_refusal_of(problem, settings.steps_per_period); !refusal.empty())
+  if (problem.unstable.modes.size() > 1) return several_modes;
+  return problem.given_period > 0
+             ? "the search starts from a cycle that is nearly known, which the full model takes up at once"
+             : "";
+}
+
+FittedCycle find_on_reduced_model(const CycleProblem& given, const FidelityRequest& request,
+                                  const CycleOptions& options)
+{
+  const bool asked = request.model == CycleModel::reduced;
+  const auto search = [&](const CycleProblem& problem, StepChoice steps, FittedCycle& result)
   {
-    result.cycle.outcome = {OutcomeKind::refused, refusal, 0, 0};
-    return result;
-  }
-  result.fidelity.asked = request.model;
-  result.fidelity.accuracy = request.accuracy;
-  result.fidelity.verdict_steps = settings.steps_per_period;
-  const bool open = request.model == CycleModel::automatic && given.settings.steps_per_period == 0;
-  find_on_model(problem, options, open ? StepChoice::by_accuracy : StepChoice::given, result);
-  result.fidelity.steps_per_period = result.cycle.steps_per_period;
-  const State& start = result.cycle.measured.start;
-  const std::filesystem::path& file = settings.save_state;
-  if (!file.empty() && start.u.get()) write_state(start, problem.sliding.structure, file);
-  return result;
+    Fidelity& fidelity = result.fidelity;
+    fidelity.used = CycleModel::reduced;
+    ReducedSearch reduced{problem, options, fidelity, problem.settings.steps_per_period};
+    reduced.tolerance = asked ? 3e-4 * fidelity.accuracy : 1e-3; // a start need not be better; slow motions multiply it
+    try
+    {
+      fidelity.reason = find_by_reduced_model(reduced, steps, result.cycle);
+    }
+    catch (const LibraryError&) // perhaps on this rank alone
+    {
+      throw;
+    }
+    catch (const Error& error) // on every rank alike: the reduced model is the same on all
+    {
+      if (asked) throw;
+      fidelity.reason = error.what();
+    }
+    if (fidelity.reason.empty()) return;
+    result.answers = asked;
+    result.cycle.outcome.kind = problem.unstable.modes.size() > 1 ? OutcomeKind::refused : OutcomeKind::not_converged;
+    result.cycle.outcome.reason = fidelity.reason;
+    result.cycle.orbit.residual = std::nan(""); // no period of the full model was made
+  };
+  return find_fitted_cycle(given, request, {}, search);
+}
+
+FittedCycle find_on_full_model(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options,
+                               const Fidelity& tried)
+{
+  const auto search = [&](const CycleProblem& problem, StepChoice steps, FittedCycle& result)
+  {
+    const double clock = MPI_Wtime();
+    Fidelity& fidelity = result.fidelity;
+    fidelity.used = CycleModel::full;
+    result.cycle = find_cycle_from_start(problem, options);
+    result.cycle.convergence.periods += fidelity.full_periods; // of a search that stalled
+    fidelity.full_periods = result.cycle.convergence.periods;
+    if (steps == StepChoice::by_accuracy && !result.cycle.cut_short)
+    {
+      const Preconditioner preconditioner = estimated_preconditioner(problem, options.band_factor);
+      refine_or_cut_short({problem, options, preconditioner, fidelity}, result.cycle);
+    }
+    fidelity.full_seconds += MPI_Wtime() - clock;
+  };
+  return find_fitted_cycle(given, request, tried, search);
 }
 
 } // namespace squeal

@@ -4,7 +4,9 @@
 #include "held_stiffness.hpp"
 #include "squeal/algebra/lent_cores.hpp"
 #include "squeal/base/broadcast.hpp"
+#include "squeal/base/shared.hpp"
 #include "squeal/contact/complementarity.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -74,39 +76,6 @@ std::vector<double> senses(const Interface& interface, const std::vector<double>
   for (std::size_t i = 0; i < static_cast<std::size_t>(interface.pairs); ++i)
     result.push_back(drive_speed(interface, i) == 0 ? 0 : std::copysign(1, dot(drive.of(i), axis.of(i))));
   return result;
-}
-
-/// What reactions do to gaps, pairs x pairs: D_nn of normal ones, D_nt of friction along the axes. On rank 0.
-struct GapCompliance
-{
-  Eigen::MatrixXd D_nn, D_nt;
-};
-
-/// From the condensed operator D of two rows a pair. Collective.
-GapCompliance gap_compliance(const Factor& factor, int pairs, MPI_Comm comm)
-{
-  GapCompliance D;
-  if (pairs == 0) return D;
-  if (rank_of(comm) == 0) D = {Eigen::MatrixXd(pairs, pairs), Eigen::MatrixXd(pairs, pairs)};
-  const PairRows<std::size_t> rows(1);
-  const auto copy = [&](const CondensedStrip& strip, std::size_t i, std::size_t j)
-  {
-    const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
-    D.D_nn(row, column) = D.D_nn(column, row) = strip.entry(rows.normal(i), rows.normal(j));
-    D.D_nt(column, row) = strip.entry(rows.tangential(i), rows.normal(j));
-    if (i > j) D.D_nt(row, column) = strip.entry(rows.normal(i), rows.tangential(j));
-  };
-  factor.read_condensed(
-      [&](const CondensedStrip& strip)
-      {
-        constexpr std::size_t together = 32; // rows, whose transposes stay in the cache
-        const std::size_t first = rows.pair_of(strip.first), last = rows.pair_of(strip.last),
-                          end = rows.pair_of(strip.first + strip.height);
-        for (std::size_t begin = first; begin < end; begin += together)
-          for (std::size_t j = first; j < last; ++j)
-            for (std::size_t i = std::max(j, begin); i < std::min(begin + together, end); ++i) copy(strip, i, j);
-      });
-  return D;
 }
 
 /// `c`: compliances of the pairs. The unknown gap is then g + c r.
@@ -298,61 +267,47 @@ bool stays_at_rest(const Structure& structure, const Interface& interface)
 
 } // namespace
 
-struct PairCompliance::Parts
+struct Equilibria::Kept
 {
+  Owned<Mat> K, B;
   std::vector<double> axes; // of each pair, as TangentView reads them
   Held held;
   GapCompliance D;
-  mutable Unloaded unloaded{}; // of the last load
+  Unloaded unloaded{}; // of the last load
+
+  Kept(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
+      : K(shared(structure.K.get())), B(shared(interface.B.get())), axes(sliding_axes(interface)),
+        held(hold(structure, along(interface, axes), options.factor)),
+        D(gap_compliance(held.factor, interface.pairs, comm_of(structure.load)))
+  {
+  }
+
+  /// Whether it is that of this model. The same on all ranks.
+  bool serves(const Structure& structure, const Interface& interface) const
+  {
+    constexpr double rounding = 1e-12; // of unit vectors
+    if (K.get() != structure.K || B.get() != interface.B) return false;
+    const std::vector<double> directions = drive_directions(interface), sense = senses(interface, axes);
+    const TangentView<const double> e(directions, interface.directions), axis(axes, interface.directions);
+    for (std::size_t i = 0; i < sense.size(); ++i)
+      for (std::size_t k = 0; k < e.of(i).size(); ++k)
+        if (std::abs(e.of(i)[k] - sense[i] * axis.of(i)[k]) > rounding) return false;
+    return true;
+  }
 };
-
-PairCompliance::PairCompliance(const Structure& structure, const Interface& interface,
-                               const EquilibriumOptions& options)
-    : parts_(std::make_unique<Parts>(sliding_axes(interface)))
-{
-  parts_->held = hold(structure, along(interface, parts_->axes), options.factor);
-  parts_->D = gap_compliance(parts_->held.factor, interface.pairs, comm_of(structure.load));
-}
-
-PairCompliance::PairCompliance(PairCompliance&&) noexcept = default;
-PairCompliance& PairCompliance::operator=(PairCompliance&&) noexcept = default;
-PairCompliance::~PairCompliance() = default;
-
-bool PairCompliance::serves(const Interface& interface) const
-{
-  constexpr double rounding = 1e-12; // of unit vectors
-  const std::vector<double> directions = drive_directions(interface), sense = senses(interface, parts_->axes);
-  const TangentView<const double> e(directions, interface.directions), axis(parts_->axes, interface.directions);
-  for (std::size_t i = 0; i < sense.size(); ++i)
-    for (std::size_t k = 0; k < e.of(i).size(); ++k)
-      if (std::abs(e.of(i)[k] - sense[i] * axis.of(i)[k]) > rounding) return false;
-  return true;
-}
-
-Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
-{
-  if (!stays_at_rest(structure, interface))
-    return find_equilibrium(structure, interface, PairCompliance(structure, interface, options), {});
-  Equilibrium equilibrium;
-  equilibrium.u = zeros_like(structure.load);
-  equilibrium.directions = interface.directions;
-  equilibrium.outcome = {OutcomeKind::converged, "", 0, 0};
-  return equilibrium;
-}
 
 namespace
 {
 
-void displace_without_reactions(const PairCompliance::Parts& parts, const Structure& structure,
-                                const Interface& interface, Vec u)
+void displace_without_reactions(Equilibria::Kept& kept, const Structure& structure, const Interface& interface, Vec u)
 {
-  auto& [load, known, gap] = parts.unloaded;
+  auto& [load, known, gap] = kept.unloaded;
   PetscBool same = PETSC_FALSE;
   if (load.get()) check(VecEqual(load, structure.load, &same));
   if (!same || gap != interface.gap)
   {
     const std::vector<double> nothing(interface.gap.size(), 0.);
-    const Held& held = parts.held;
+    const Held& held = kept.held;
     check(VecSet(u, 0));
     displace(held, structure, interface, pair_forces(interface, nothing, nothing, held.kappa), u);
     load = copy_of(structure.load);
@@ -363,33 +318,30 @@ void displace_without_reactions(const PairCompliance::Parts& parts, const Struct
   check(VecCopy(known, u));
 }
 
-} // namespace
-
-Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const PairCompliance& compliance,
-                             const std::vector<char>& expected)
+Equilibrium find_with(Equilibria::Kept& kept, const Structure& structure, const Interface& interface,
+                      const std::vector<char>& expected)
 {
   const MPI_Comm comm = comm_of(structure.load);
   const auto pairs = static_cast<std::size_t>(interface.pairs);
-  const PairCompliance::Parts& parts = compliance.parts();
-  const Held& held = parts.held;
+  const Held& held = kept.held;
 
   Equilibrium equilibrium;
   equilibrium.u = zeros_like(structure.load);
   equilibrium.directions = interface.directions;
   equilibrium.auxiliary_stiffness = held.kappa;
-  displace_without_reactions(parts, structure, interface, equilibrium.u);
+  displace_without_reactions(kept, structure, interface, equilibrium.u);
   const std::vector<double> q = gaps_of(interface, equilibrium.u);
 
   Search search;
   search.solution.outcome = StatusOutcome::converged;
   if (pairs > 0)
   {
-    const auto& [D_nn, D_nt] = compliance.parts().D;
+    const auto& [D_nn, D_nt] = kept.D;
     on_rank_zero_with_lent_cores(comm, pairs,
                                  [&]
                                  {
                                    const std::vector<double> mu = drive_friction(interface),
-                                                             sense = senses(interface, compliance.parts().axes);
+                                                             sense = senses(interface, kept.axes);
                                    Eigen::VectorXd friction(D_nn.rows()), c(D_nn.rows());
                                    for (Eigen::Index i = 0; i < c.size(); ++i)
                                    {
@@ -421,6 +373,38 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
   check_solution(structure, interface, search, equilibrium);
   equilibrium.outcome.iterations = search.solution.iterations;
   return equilibrium;
+}
+
+} // namespace
+
+Equilibria::Equilibria(const EquilibriumOptions& options) : options_(options) {}
+
+Equilibria::~Equilibria() = default;
+
+Equilibrium Equilibria::at(const Structure& structure, const Interface& interface)
+{
+  Equilibrium equilibrium;
+  if (stays_at_rest(structure, interface))
+  {
+    equilibrium.u = zeros_like(structure.load);
+    equilibrium.directions = interface.directions;
+    equilibrium.outcome = {OutcomeKind::converged, "", 0, 0};
+    return equilibrium;
+  }
+  if (!kept_ || !kept_->serves(structure, interface))
+  {
+    kept_.reset(); // before the next is made: both may be large
+    kept_ = std::make_unique<Kept>(structure, interface, options_);
+    ++factors_;
+  }
+  equilibrium = find_with(*kept_, structure, interface, expected_);
+  if (equilibrium.outcome.kind == OutcomeKind::converged) expected_ = equilibrium.closed;
+  return equilibrium;
+}
+
+Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
+{
+  return Equilibria(options).at(structure, interface);
 }
 
 } // namespace squeal

@@ -150,4 +150,30 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
   return held;
 }
 
+GapCompliance gap_compliance(const Factor& factor, int pairs, MPI_Comm comm)
+{
+  GapCompliance D;
+  if (pairs == 0) return D;
+  if (rank_of(comm) == 0) D = {Eigen::MatrixXd(pairs, pairs), Eigen::MatrixXd(pairs, pairs)};
+  const PairRows<std::size_t> rows(1);
+  const auto copy = [&](const CondensedStrip& strip, std::size_t i, std::size_t j)
+  {
+    const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
+    D.D_nn(row, column) = D.D_nn(column, row) = strip.entry(rows.normal(i), rows.normal(j));
+    D.D_nt(column, row) = strip.entry(rows.tangential(i), rows.normal(j));
+    if (i > j) D.D_nt(row, column) = strip.entry(rows.normal(i), rows.tangential(j));
+  };
+  factor.read_condensed(
+      [&](const CondensedStrip& strip)
+      {
+        constexpr std::size_t together = 32; // rows, whose transposes stay in the cache
+        const std::size_t first = rows.pair_of(strip.first), last = rows.pair_of(strip.last),
+                          end = rows.pair_of(strip.first + strip.height);
+        for (std::size_t begin = first; begin < end; begin += together)
+          for (std::size_t j = first; j < last; ++j)
+            for (std::size_t i = std::max(j, begin); i < std::min(begin + together, end); ++i) copy(strip, i, j);
+      });
+  return D;
+}
+
 } // namespace squeal

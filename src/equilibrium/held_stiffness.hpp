@@ -1,6 +1,8 @@
 #pragma once
-/// The stiffness of the equilibrium, factored (src/README.md, section 2.3).
+/// The stiffness of the equilibrium, factored, and the compliance of the pairs by it (src/README.md, section 2.3).
 #include "squeal/contact/condensed.hpp"
+
+#include <Eigen/Core>
 
 namespace squeal
 {
@@ -15,5 +17,14 @@ struct Held
 
 /// Error: a body that neither supports nor contact hold (which one).
 Held hold(const Structure& structure, const Interface& interface, const FactorOptions& options);
+
+/// What reactions do to gaps, pairs x pairs: D_nn of normal ones, D_nt of friction along the axes. On rank 0.
+struct GapCompliance
+{
+  Eigen::MatrixXd D_nn, D_nt;
+};
+
+/// From the condensed operator D of two rows a pair. Collective.
+GapCompliance gap_compliance(const Factor& factor, int pairs, MPI_Comm comm);
 
 } // namespace squeal

@@ -9,10 +9,8 @@ namespace squeal
 namespace
 {
 
-StepBias bias_of(const Report& report, std::complex<double> discrete)
+StepBias bias_of(std::complex<double> lambda, std::complex<double> discrete)
 {
-  if (report.modes.modes.empty()) return {};
-  const std::complex<double> lambda = report.modes.modes.front().lambda;
   if (lambda.imag() == 0) return {};
   return {discrete.real() / lambda.real() - 1, discrete.imag() / lambda.imag() - 1};
 }
@@ -37,14 +35,16 @@ NormalForces normal_forces(const Equilibrium& equilibrium)
 
 StepBias transient_bias(const Report& report)
 {
-  return bias_of(report, report.transient.predicted);
+  if (report.point.modes.modes.empty()) return {};
+  return bias_of(report.point.modes.modes.front().lambda, report.transient.predicted);
 }
 
 StepBias cycle_bias(const Report& report)
 {
-  if (report.modes.modes.empty() || !(report.cycle.orbit.period > 0)) return {};
-  const double h = report.cycle.orbit.period / report.cycle.steps_per_period;
-  return bias_of(report, discrete_eigenvalue(report.modes.modes.front().lambda, report.cycle.theta, h));
+  if (report.point.modes.modes.empty() || !(report.motion.cycle.orbit.period > 0)) return {};
+  const double h = report.motion.cycle.orbit.period / report.motion.cycle.steps_per_period;
+  const std::complex<double> lambda = report.point.modes.modes[report.motion.followed.index].lambda;
+  return bias_of(lambda, discrete_eigenvalue(lambda, report.motion.cycle.theta, h));
 }
 
 std::string number_text(const Scene& scene, const std::string& key)

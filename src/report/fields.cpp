@@ -109,7 +109,7 @@ void write_mesh(Hdf5File& file, const Mesh& mesh, Layout& layout)
 class Gather
 {
 public:
-  Gather(const FieldNodes& nodes) : nodes_(nodes)
+  Gather(const Model& nodes) : nodes_(nodes)
   {
     check(VecScatterCreateToZero(nodes.structure.load, scatter_.put(), whole_.put()));
   }
@@ -139,14 +139,14 @@ public:
   }
 
 private:
-  const FieldNodes nodes_;
+  const Model& nodes_;
   Owned<VecScatter> scatter_;
   Owned<Vec> whole_;
 };
 
 /// Reactions of the equilibrium at the nodes of the pairs. Those of a pair are at its own node, and by their weights
 /// at the nodes of the other side. Either side has the sum of all.
-void write_contact(Hdf5File& file, const Equilibrium& equilibrium, const FieldNodes& nodes, Layout& layout)
+void write_contact(Hdf5File& file, const Equilibrium& equilibrium, const Model& nodes, Layout& layout)
 {
   const PairView reactions(equilibrium.reactions, equilibrium.directions);
   const std::vector<ContactPair>& pairs = nodes.interface.geometry;
@@ -315,8 +315,8 @@ double sample_time(const LimitCycle& cycle, std::size_t sample)
 
 } // namespace
 
-void write_fields(const Report& report, const Scene& scene, const FieldNodes& nodes,
-                  const std::filesystem::path& output, MPI_Comm comm)
+void write_fields(const Report& report, const Scene& scene, const Model& nodes, const std::filesystem::path& output,
+                  MPI_Comm comm)
 {
   const auto place = output / word(ResultFile::fields), xdmf = output / word(ResultFile::field_places);
   if (scene.matrices) return;
@@ -326,19 +326,19 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
                [&]
                {
                  write_mesh(file.emplace(place, report.run), nodes.mesh, layout);
-                 write_pairs(*file, report.equilibrium, nodes.interface);
+                 write_pairs(*file, report.point.equilibrium, nodes.interface);
                  if (!scene.probes.empty())
                    file->write("probes/node", {scene.probes.size()}, probed_nodes(scene.probes, nodes.mesh),
                                "index in mesh/nodes");
                });
   const Gather gather(nodes);
-  if (report.equilibrium.u.get())
+  if (report.point.equilibrium.u.get())
   {
-    write_nodal(file, gather, report.equilibrium.u, "equilibrium/displacement", "m", comm);
+    write_nodal(file, gather, report.point.equilibrium.u, "equilibrium/displacement", "m", comm);
     layout.still.push_back({"displacement at equilibrium [m]", "equilibrium/displacement", Center::node, 3});
-    on_rank_zero(comm, [&] { write_contact(*file, report.equilibrium, nodes, layout); });
+    on_rank_zero(comm, [&] { write_contact(*file, report.point.equilibrium, nodes, layout); });
   }
-  write_modes(file, gather, report.modes, layout, comm);
+  write_modes(file, gather, report.point.modes, layout, comm);
   on_rank_zero(comm,
                [&]
                {
@@ -346,13 +346,13 @@ void write_fields(const Report& report, const Scene& scene, const FieldNodes& no
                    file->write("modes/" + std::to_string(++number) + "/pair_power", {causes.pair_powers.size()},
                                causes.pair_powers, "1/s");
                });
-  if (has_run(report.settled.outcome))
-    write_motion_shapes(file, gather, report.settled.shapes, nodes.structure.load, layout, comm);
-  const auto& samples = report.cycle.measured.displacements;
+  if (has_run(report.motion.settled.outcome))
+    write_motion_shapes(file, gather, report.motion.settled.shapes, nodes.structure.load, layout, comm);
+  const auto& samples = report.motion.cycle.measured.displacements;
   for (std::size_t i = 0; i < samples.size(); ++i)
   {
     write_nodal(file, gather, samples[i], cycle_data(i), "m", comm);
-    layout.time.push_back(sample_time(report.cycle, i));
+    layout.time.push_back(sample_time(report.motion.cycle, i));
   }
   on_rank_zero(comm,
                [&]

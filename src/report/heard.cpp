@@ -35,7 +35,7 @@ std::string largest_swing(const Scene& scene, const Swings& swings, const Size& 
 /// Where the frequency is 2 % or more off the nearest unstable mode's, that too: a shift that a listener hears.
 std::string beside_mode(const Report& report, double frequency_hz)
 {
-  const auto unstable = report.modes.unstable();
+  const auto unstable = report.point.modes.unstable();
   const auto end = // those that oscillate come first
       std::find_if(unstable.begin(), unstable.end(), [](const ComplexMode& mode) { return mode.frequency_hz() == 0; });
   if (end == unstable.begin()) return {};
@@ -91,7 +91,7 @@ std::string energy_text(const MeanValue& energy)
 
 std::string settled_text(const Report& report, const Scene& scene)
 {
-  const ExaminedMotion& motion = report.settled.examined;
+  const ExaminedMotion& motion = report.motion.settled.examined;
   const MotionVerdict& verdict = motion.verdict;
   const double first = motion.base.first, second = motion.base.second;
   std::string text;
@@ -112,15 +112,15 @@ std::string settled_text(const Report& report, const Scene& scene)
            format(", strongest line %.5g Hz", first);
     break;
   }
-  MeanValue energy = report.settled.fluctuating_energy;
-  energy.error += report.settled.step_error;
+  MeanValue energy = report.motion.settled.fluctuating_energy;
+  energy.error += report.motion.settled.step_error;
   text += beside_mode(report, first) + energy_text(energy) +
-          largest_swing(scene, report.settled.peak_to_peak, [](const MeanValue& swing) { return swing.value; });
-  if (!depends_on_steps(report.settled)) return text;
+          largest_swing(scene, report.motion.settled.peak_to_peak, [](const MeanValue& swing) { return swing.value; });
+  if (!depends_on_steps(report.motion.settled)) return text;
   return text +
          format("; by %d steps a period, and half as many change the energy by %.0f %%: more may change the kind",
-                report.settled.steps_per_period,
-                100 * report.settled.step_error / report.settled.fluctuating_energy.value);
+                report.motion.settled.steps_per_period,
+                100 * report.motion.settled.step_error / report.motion.settled.fluctuating_energy.value);
 }
 
 /// How many of the scene's other starts lead to the cycle, and where most of the others lead; empty: all that have
@@ -128,7 +128,7 @@ std::string settled_text(const Report& report, const Scene& scene)
 std::string starts_text(const Report& report)
 {
   const Attractors& attractors = report.attractors;
-  const LimitCycle& cycle = report.cycle;
+  const LimitCycle& cycle = report.motion.cycle;
   if (!has_run(attractors.outcome) || attractors.motions.empty()) return {};
   std::size_t all = 0, here = 0;
   const ReachedMotion* other = nullptr; // they come by falling number of starts
@@ -152,12 +152,12 @@ std::string starts_text(const Report& report)
 
 std::string cycle_text(const Report& report, const Scene& scene)
 {
-  const LimitCycle& cycle = report.cycle;
+  const LimitCycle& cycle = report.motion.cycle;
   const double frequency = 1 / cycle.orbit.period;
   return format("squeals at %.5g Hz", frequency) + beside_mode(report, frequency) +
          largest_swing(scene, cycle.measured.peak_to_peak, [](double swing) { return swing; }) +
          stability_text(cycle.multipliers) + starts_text(report) +
-         (report.modes.unstable_count == 0 ? ", beside a stable equilibrium that another start leads to" : "");
+         (report.point.modes.unstable_count == 0 ? ", beside a stable equilibrium that another start leads to" : "");
 }
 
 /// The motion that most of the starts lead to beside a stable equilibrium; empty: all that have settled come to rest.
@@ -177,13 +177,14 @@ std::string beside_rest(const Report& report)
 /// Without a cycle.
 std::string linear_text(const Report& report)
 {
-  if (report.equilibrium.outcome.kind != OutcomeKind::converged) return "nothing is known: no equilibrium was found";
-  if (!has_run(report.modes.outcome)) return "nothing is known: the modes were not computed";
-  if (report.modes.unstable_count == 0)
-    return report.modes.outcome.kind == OutcomeKind::converged
+  if (report.point.equilibrium.outcome.kind != OutcomeKind::converged)
+    return "nothing is known: no equilibrium was found";
+  if (!has_run(report.point.modes.outcome)) return "nothing is known: the modes were not computed";
+  if (report.point.modes.unstable_count == 0)
+    return report.point.modes.outcome.kind == OutcomeKind::converged
                ? "silent: no mode grows in the band" + beside_rest(report)
                : "nothing is known: the modes are incomplete";
-  const ComplexMode& mode = report.modes.modes.front();
+  const ComplexMode& mode = report.point.modes.modes.front();
   if (mode.frequency_hz() == 0)
     return format("the equilibrium diverges without oscillating, by a factor e in %.3g s", 1 / mode.growth_rate());
   return format("the equilibrium is unstable at %.5g Hz", mode.frequency_hz());
@@ -193,15 +194,15 @@ std::string linear_text(const Report& report)
 
 std::string heard(const Report& report, const Scene& scene)
 {
-  if (has_run(report.settled.outcome)) return settled_text(report, scene);
-  const Outcome& outcome = report.cycle.outcome;
+  if (has_run(report.motion.settled.outcome)) return settled_text(report, scene);
+  const Outcome& outcome = report.motion.cycle.outcome;
   if (outcome.kind == OutcomeKind::converged) return cycle_text(report, scene);
   if (!has_run(outcome)) return linear_text(report);
-  if (outcome.kind == OutcomeKind::collapsed_to_equilibrium && report.modes.unstable_count == 0)
+  if (outcome.kind == OutcomeKind::collapsed_to_equilibrium && report.point.modes.unstable_count == 0)
     return linear_text(report) + ", and the motion from cycle.start falls to rest";
-  if (outcome.kind == OutcomeKind::unstable_cycle && !report.cycle.multipliers.values.empty())
-    return format("passes by a cycle at %.5g Hz", 1 / report.cycle.orbit.period) +
-           beside_mode(report, 1 / report.cycle.orbit.period) + stability_text(report.cycle.multipliers) +
+  if (outcome.kind == OutcomeKind::unstable_cycle && !report.motion.cycle.multipliers.values.empty())
+    return format("passes by a cycle at %.5g Hz", 1 / report.motion.cycle.orbit.period) +
+           beside_mode(report, 1 / report.motion.cycle.orbit.period) + stability_text(report.motion.cycle.multipliers) +
            "; what it leads to was not found";
   const std::string end = report.ended_by.empty()
                               ? "the search for a cycle ended with " + std::string(word(outcome.kind))

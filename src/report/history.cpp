@@ -72,16 +72,16 @@ void write_history(const Report& report, const Scene& scene, const std::filesyst
 {
   Hdf5File file(place, report.run);
   if (has_run(report.transient.outcome)) write_group(file, "transient", report.transient.history, scene);
-  if (has_run(report.cycle.outcome))
+  if (has_run(report.motion.cycle.outcome))
   {
-    write_group(file, "cycle", report.cycle.measured.history, scene);
-    write_statuses(file, report.cycle.measured.statuses);
+    write_group(file, "cycle", report.motion.cycle.measured.history, scene);
+    write_statuses(file, report.motion.cycle.measured.statuses);
   }
-  if (has_run(report.settled.outcome))
+  if (has_run(report.motion.settled.outcome))
   {
-    write_group(file, "settled", report.settled.history, scene);
-    write_spectrum(file, report.settled.examined.spectrum, report.settled.spectrum_probe < 0 ? "N" : "m");
-    if (!scene.matrices) write_coordinates(file, report.settled);
+    write_group(file, "settled", report.motion.settled.history, scene);
+    write_spectrum(file, report.motion.settled.examined.spectrum, report.motion.settled.spectrum_probe < 0 ? "N" : "m");
+    if (!scene.matrices) write_coordinates(file, report.motion.settled);
   }
   if (has_run(report.response.outcome)) write_response(file, report.response, scene);
   if (has_run(report.branch.outcome)) write_branch(file, report.branch, scene);

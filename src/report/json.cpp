@@ -31,7 +31,7 @@ Json entry_of(const Outcome& outcome)
 
 Json equilibrium_entry(const Report& report, const Scene& scene)
 {
-  const Equilibrium& equilibrium = report.equilibrium;
+  const Equilibrium& equilibrium = report.point.equilibrium;
   Json entry = entry_of(equilibrium.outcome);
   if (!has_run(equilibrium.outcome)) return entry;
   const NormalForces normal = normal_forces(equilibrium);
@@ -159,11 +159,12 @@ Json multiplier_entry(const Multipliers& multipliers)
 
 Json cycle_entry(const Report& report, const Scene& scene)
 {
-  const LimitCycle& cycle = report.cycle;
+  const LimitCycle& cycle = report.motion.cycle;
   Json entry = entry_of(cycle.outcome);
   if (!has_run(cycle.outcome) || cycle.outcome.kind == OutcomeKind::refused) return entry;
   entry["period"] = cycle.orbit.period;
   entry["frequency_hz"] = 1 / cycle.orbit.period;
+  entry["mode"] = report.motion.followed.index;
   entry["steps_per_period"] = cycle.steps_per_period;
   entry["tolerance"] = cycle.tolerance;
   entry["residual_projected"] = cycle.convergence.residual_projected;
@@ -203,7 +204,7 @@ Json base_entry(const BaseFrequencies& base)
 
 Json settled_entry(const Report& report, const Scene& scene)
 {
-  const SettledMotion& settled = report.settled;
+  const SettledMotion& settled = report.motion.settled;
   const ExaminedMotion& motion = settled.examined;
   Json entry = entry_of(settled.outcome);
   if (!has_run(settled.outcome)) return entry;
@@ -242,6 +243,14 @@ Json settled_entry(const Report& report, const Scene& scene)
   for (std::size_t i = 0; i < std::min(most, motion.spectrum.lines.size()); ++i)
     entry["lines"].push_back(
         {{"frequency_hz", motion.spectrum.lines[i].frequency_hz}, {"amplitude", motion.spectrum.lines[i].amplitude}});
+  return entry;
+}
+
+Json attempt_entry(const Attempt& attempt)
+{
+  Json entry = entry_of(attempt.outcome);
+  entry["name"] = attempt.name;
+  entry["steps_per_period"] = attempt.steps_per_period;
   return entry;
 }
 
@@ -332,22 +341,24 @@ std::string report_json(const Report& report, const Scene& scene)
                    {"memory_bytes", report.model.memory_bytes},
                    {"rounding_hz", report.model.rounding_hz}};
   add_coverage(report.model.coverage, scene, json["model"]);
-  const double factor = std::max(report.transient.factor_seconds, report.cycle.costs.factor_seconds);
+  const double factor = std::max(report.transient.factor_seconds, report.motion.cycle.costs.factor_seconds);
   if (factor > 0) // A was factored: what one step size costs before the first step
   {
     json["model"]["factor_seconds"] = factor;
     json["model"]["condensed_operator_seconds"] =
-        std::max(report.transient.condensed_seconds, report.cycle.costs.condensed_seconds);
+        std::max(report.transient.condensed_seconds, report.motion.cycle.costs.condensed_seconds);
   }
   json[word(Stage::equilibrium)] = equilibrium_entry(report, scene);
-  json[word(Stage::modes)] = modes_entry(report.modes);
+  json[word(Stage::modes)] = modes_entry(report.point.modes);
   json[word(Stage::estimate)] = estimate_entry(followed_estimate(report));
   json[word(Stage::response)] = study_entry(report.response, scene, add_response);
   json[word(Stage::transient)] = transient_entry(report);
   json[word(Stage::coarse)] = coarse_entry(report.coarse);
   json[word(Stage::cycle)] = cycle_entry(report, scene);
+  for (const Attempt& attempt : report.motion.attempts)
+    json[word(Stage::cycle)]["attempts"].push_back(attempt_entry(attempt));
   json[word(Stage::settled)] = settled_entry(report, scene);
-  json["fidelity"] = fidelity_entry(report.fidelity);
+  json["fidelity"] = fidelity_entry(report.motion.fidelity);
   json[word(Stage::attractors)] = attractors_entry(report);
   json[word(Stage::branch)] = study_entry(report.branch, scene, add_branch);
   json[word(Stage::sensitivity)] = study_entry(report.sensitivity, scene, add_sensitivity);

@@ -48,19 +48,20 @@ std::string provenance(const std::string& run)
 const Estimate& followed_estimate(const Report& report)
 {
   static const Estimate none;
-  return report.estimates.empty() ? none : report.estimates.front();
+  if (report.motion.followed.estimate) return *report.motion.followed.estimate;
+  return report.point.estimates.empty() ? none : report.point.estimates.front();
 }
 
 std::array<std::pair<Stage, Outcome>, 13> outcomes_of(const Report& report)
 {
-  return {{{Stage::equilibrium, report.equilibrium.outcome},
-           {Stage::modes, report.modes.outcome},
+  return {{{Stage::equilibrium, report.point.equilibrium.outcome},
+           {Stage::modes, report.point.modes.outcome},
            {Stage::estimate, followed_estimate(report).outcome},
            {Stage::response, report.response.outcome},
            {Stage::transient, report.transient.outcome},
            {Stage::coarse, report.coarse.outcome},
-           {Stage::cycle, report.cycle.outcome},
-           {Stage::settled, report.settled.outcome},
+           {Stage::cycle, report.motion.cycle.outcome},
+           {Stage::settled, report.motion.settled.outcome},
            {Stage::attractors, report.attractors.outcome},
            {Stage::branch, report.branch.outcome},
            {Stage::sensitivity, report.sensitivity.outcome},
@@ -98,8 +99,8 @@ void write_request(const Scene& scene, const std::string& run, const std::filesy
                });
 }
 
-void write_results(const Report& report, const Scene& scene, const FieldNodes& nodes,
-                   const std::filesystem::path& output, MPI_Comm comm)
+void write_results(const Report& report, const Scene& scene, const Model& nodes, const std::filesystem::path& output,
+                   MPI_Comm comm)
 {
   const auto write = [&](ResultFile file, const std::string& text) { write_whole_file(output / word(file), text); };
   on_rank_zero(comm,

@@ -43,9 +43,15 @@ std::string outcome_text(const Outcome& outcome)
   return text + (outcome.reason.empty() ? "" : ": " + outcome.reason);
 }
 
+/// Nothing of a stage that is off.
+std::string outcome_row(const char* stage, const Outcome& outcome)
+{
+  return outcome.kind == OutcomeKind::off ? "" : row(stage, outcome_text(outcome));
+}
+
 std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
 {
-  std::string text = row("equilibrium", outcome_text(equilibrium.outcome));
+  std::string text = outcome_row("equilibrium", equilibrium.outcome);
   if (!has_run(equilibrium.outcome) || equilibrium.outcome.kind == OutcomeKind::no_equilibrium) return text;
   const NormalForces normal = normal_forces(equilibrium);
   text += row(
@@ -68,7 +74,7 @@ std::string mode_line(const ComplexMode& mode)
 
 std::string modes_text(const Modes& modes)
 {
-  std::string text = row("modes", outcome_text(modes.outcome));
+  std::string text = outcome_row("modes", modes.outcome);
   if (!has_run(modes.outcome)) return text;
   text +=
       row("", format("%d unstable of %zu modes below %.5g Hz, method \"%s\", largest backward error %.1e",
@@ -86,7 +92,7 @@ std::string modes_text(const Modes& modes)
 
 std::string estimate_text(const Estimate& estimate)
 {
-  std::string text = row("estimate", outcome_text(estimate.outcome));
+  std::string text = outcome_row("estimate", estimate.outcome);
   if (!has_run(estimate.outcome)) return text;
   if (estimate.outcome.kind == OutcomeKind::balance) text += row("", format("amplitude %.5g m", estimate.amplitude));
   text += row("", format("first lift-off at %.5g m, first slip reversal at %.5g m", estimate.lift_off_amplitude,
@@ -99,7 +105,7 @@ std::string estimate_text(const Estimate& estimate)
 std::string transient_text(const Report& report)
 {
   const Trajectory& transient = report.transient;
-  std::string text = row("transient", outcome_text(transient.outcome));
+  std::string text = outcome_row("transient", transient.outcome);
   if (!has_run(transient.outcome)) return text;
   text += row("", format("%ld steps of %.5g s, %.5g periods, theta %.4g", transient.steps, transient.step_size,
                          transient.periods, transient.theta));
@@ -120,8 +126,8 @@ std::string transient_text(const Report& report)
 
 std::string cycle_text(const Report& report, const Scene& scene)
 {
-  const LimitCycle& cycle = report.cycle;
-  std::string text = row("cycle", outcome_text(cycle.outcome));
+  const LimitCycle& cycle = report.motion.cycle;
+  std::string text = outcome_row("cycle", cycle.outcome);
   if (!has_run(cycle.outcome) || cycle.outcome.kind == OutcomeKind::refused) return text;
   const std::string projected = std::isfinite(cycle.convergence.residual_projected)
                                     ? format("%.2e", cycle.convergence.residual_projected)
@@ -148,7 +154,7 @@ std::string cycle_text(const Report& report, const Scene& scene)
   if (!cycle.multipliers.values.empty())
     text += row("", format("%s by %zu multipliers at %d steps a period: the largest is %.6f, error bar %.1e",
                            word(cycle.multipliers.stability), cycle.multipliers.values.size(),
-                           report.fidelity.verdict_steps, std::abs(cycle.multipliers.values.front()),
+                           report.motion.fidelity.verdict_steps, std::abs(cycle.multipliers.values.front()),
                            cycle.multipliers.errors.front()));
   const std::size_t probes = std::min(scene.probes.size(), cycle.measured.peak_to_peak.size());
   for (std::size_t i = 0; i < probes; ++i)
@@ -219,13 +225,22 @@ std::string fidelity_text(const Fidelity& fidelity)
   return text;
 }
 
-/// A stage that most scenes have off, and the lines that it has if it ran.
+/// The outcome of a stage, and the lines that it has if it ran.
 template <class Lines> std::string optional_text(const char* head, const Outcome& outcome, Lines lines)
 {
-  if (outcome.kind == OutcomeKind::off) return "";
-  std::string text = row(head, outcome_text(outcome));
+  std::string text = outcome_row(head, outcome);
   if (has_run(outcome))
     for (const std::string& line : lines()) text += row("", line);
+  return text;
+}
+
+/// The attempts to find a motion, where one did not suffice.
+std::string attempts_text(const std::vector<Attempt>& attempts)
+{
+  std::string text;
+  if (attempts.size() < 2) return text;
+  for (const auto& [name, steps, outcome] : attempts)
+    text += row(text.empty() ? "attempts" : "", name + format(", %d steps a period: ", steps) + outcome_text(outcome));
   return text;
 }
 
@@ -256,22 +271,21 @@ std::string table(const Report& report, const Scene& scene)
 {
   const ModelSummary& model = report.model;
   std::string text = "\n" + (scene.title.empty() ? scene.file.filename().string() : scene.title) + "\n";
-  text += row("heard", heard(report, scene));
   text += row("model", format("%lld degrees of freedom, %ld elements, %d contact pairs, %d rank%s",
                               static_cast<long long>(model.dofs), model.elements, model.pairs, model.ranks,
                               model.ranks == 1 ? "" : "s")) +
           warning_rows(model.warnings);
   const Warnings warnings = warnings_of(report);
-  text += equilibrium_text(report.equilibrium, model.pairs) + warning_rows(warnings.equilibrium);
-  text += modes_text(report.modes) + warning_rows(warnings.modes);
+  text += equilibrium_text(report.point.equilibrium, model.pairs) + warning_rows(warnings.equilibrium);
+  text += modes_text(report.point.modes) + warning_rows(warnings.modes);
   text += estimate_text(followed_estimate(report)) + warning_rows(warnings.estimate);
   text += optional_text("response", report.response.outcome, [&] { return response_lines(report.response, scene); }) +
           warning_rows(warnings.response);
   text += transient_text(report) + warning_rows(warnings.transient);
   text += optional_text("coarse start", report.coarse.outcome, [&] { return coarse_lines(report.coarse); });
   text += cycle_text(report, scene) + warning_rows(warnings.cycle);
-  text += settled_text(report.settled, scene);
-  text += fidelity_text(report.fidelity);
+  text += settled_text(report.motion.settled, scene);
+  text += fidelity_text(report.motion.fidelity) + attempts_text(report.motion.attempts);
   text += optional_text("attractors", report.attractors.outcome, [&] { return attractor_lines(report.attractors); });
   text += optional_text("branch", report.branch.outcome, [&] { return branch_lines(report.branch, scene); });
   text += optional_text("sensitivity", report.sensitivity.outcome,
@@ -279,7 +293,7 @@ std::string table(const Report& report, const Scene& scene)
   text += optional_text("sweep", report.sweep.outcome, [&] { return sweep_lines(report.sweep, scene); });
   text += optional_text("robustness", report.robustness.outcome,
                         [&] { return robustness_lines(report.robustness, scene); });
-  return text + timings_text(report);
+  return text + timings_text(report) + row("heard", heard(report, scene));
 }
 
 void print_table(const Report& report, const Scene& scene, MPI_Comm comm)

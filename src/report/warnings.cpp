@@ -16,9 +16,9 @@ using Sentences = std::vector<std::string>;
 Sentences of_equilibrium(const Report& report)
 {
   Sentences sentences;
-  if (report.equilibrium.uniqueness == Uniqueness::not_assured)
+  if (report.point.equilibrium.uniqueness == Uniqueness::not_assured)
     sentences.push_back("with this much friction other equilibria may exist beside this one");
-  const Equilibrium& equilibrium = report.equilibrium;
+  const Equilibrium& equilibrium = report.point.equilibrium;
   if (report.model.pairs > 0 && equilibrium.outcome.kind == OutcomeKind::converged &&
       std::none_of(equilibrium.closed.begin(), equilibrium.closed.end(), [](char closed) { return closed; }))
     sentences.push_back(
@@ -42,7 +42,7 @@ const char* count_remedy(const Modes& modes)
 Sentences of_modes(const Report& report)
 {
   Sentences sentences;
-  const Modes& modes = report.modes;
+  const Modes& modes = report.point.modes;
   if (modes.modes.empty() && modes.outcome.kind == OutcomeKind::converged)
     sentences.push_back(format("no mode lies below %g Hz", modes.band) +
                         (report.model.length > 0
@@ -91,7 +91,7 @@ Sentences of_estimate(const Report& report)
 
 Sentences of_response(const Report& report)
 {
-  const Modes& modes = report.modes;
+  const Modes& modes = report.point.modes;
   if (modes.unstable_count > 0)
     return {format("%d of the modes are unstable: no vibration settles on these responses, and no rig measures them",
                    modes.unstable_count)};
@@ -131,17 +131,17 @@ Sentences of_transient(const Report& report)
 Sentences of_cycle(const Report& report)
 {
   Sentences sentences;
-  const LimitCycle& cycle = report.cycle;
+  const LimitCycle& cycle = report.motion.cycle;
   if (cycle.outcome.kind != OutcomeKind::converged) return sentences;
   const StepBias bias = cycle_bias(report);
   if (std::abs(bias.growth) > 0.1)
     sentences.push_back(format("theta and the step change the growth rate by %+.0f %%: the cycle's amplitude suffers",
                                100 * bias.growth));
-  if (cycle.orbit.residual > 1e-3 && report.fidelity.used == CycleModel::full)
+  if (cycle.orbit.residual > 1e-3 && report.motion.fidelity.used == CycleModel::full)
     sentences.push_back("a residual this large is no proof of a periodic motion");
   add_chatter(cycle.measured.history, sentences);
-  const auto grow =
-      std::ranges::count_if(report.modes.unstable(), [](const ComplexMode& mode) { return mode.frequency_hz() > 0; });
+  const auto grow = std::ranges::count_if(report.point.modes.unstable(),
+                                          [](const ComplexMode& mode) { return mode.frequency_hz() > 0; });
   if (grow > 1 && !has_run(report.attractors.outcome))
     sentences.push_back(format("%td modes are unstable, and other starts may lead to other motions: cycle.starts = 8 "
                                "shows them, by as many motions of some hundred periods",
@@ -158,13 +158,13 @@ Sentences of_cycle(const Report& report)
 Warnings warnings_of(const Report& report)
 {
   Warnings warnings;
-  if (has_run(report.equilibrium.outcome)) warnings.equilibrium = of_equilibrium(report);
-  if (has_run(report.modes.outcome)) warnings.modes = of_modes(report);
+  if (has_run(report.point.equilibrium.outcome)) warnings.equilibrium = of_equilibrium(report);
+  if (has_run(report.point.modes.outcome)) warnings.modes = of_modes(report);
   if (has_run(followed_estimate(report).outcome)) warnings.estimate = of_estimate(report);
   if (has_run(report.response.outcome)) warnings.response = of_response(report);
   if (has_run(report.transient.outcome) && report.transient.outcome.kind != OutcomeKind::refused)
     warnings.transient = of_transient(report);
-  if (has_run(report.cycle.outcome)) warnings.cycle = of_cycle(report);
+  if (has_run(report.motion.cycle.outcome)) warnings.cycle = of_cycle(report);
   return warnings;
 }
 

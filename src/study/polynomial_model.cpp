@@ -122,9 +122,7 @@ PolynomialModel::PolynomialModel(const RobustnessProblem& problem) : problem_(pr
   }
   reference_ = model_at(centre_);
   model_ = model_at(centre_);
-  model_.structure.K = copy_of(model_.structure.K); // K and the load are changed from point to point
-  mark_symmetric(model_.structure.K);
-  model_.structure.load = copy_of(model_.structure.load);
+  model_.structure.load = copy_of(model_.structure.load); // it is changed from point to point
   terms_.push_back(sum_of({{1, &reference_}}, reference_));
   const auto at = [&](std::initializer_list<std::pair<std::size_t, double>> steps)
   {
@@ -212,7 +210,13 @@ const BrakeModel& PolynomialModel::at(const std::vector<double>& values)
 {
   const std::vector<double> x = coefficients(values);
   auto& [structure, interface] = model_;
-  if (stiffness_changes()) check(MatZeroEntries(structure.K));
+  const bool stiffness_changed = stiffness_changes();
+  if (stiffness_changed)
+  {
+    structure.K = copy_of(reference_.structure.K); // others may share the one before
+    mark_symmetric(structure.K);
+    check(MatZeroEntries(structure.K));
+  }
   check(VecSet(structure.load, 0));
   std::ranges::fill(interface.gap, 0.);
   std::ranges::fill(interface.drive, 0.);
@@ -220,7 +224,7 @@ const BrakeModel& PolynomialModel::at(const std::vector<double>& values)
   for (std::size_t k = 0; k < terms_.size(); ++k)
   {
     const ModelTerm& term = terms_[k];
-    if (stiffness_changes() && term.structure.K.get()) add(structure.K, x[k], term.structure.K);
+    if (stiffness_changed && term.structure.K.get()) add(structure.K, x[k], term.structure.K);
     check(VecAXPY(structure.load, x[k], term.structure.load));
     add(interface.gap, x[k], term.gap);
     add(interface.drive, x[k], term.drive);

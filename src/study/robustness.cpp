@@ -189,7 +189,7 @@ class Sampler
 public:
   explicit Sampler(const RobustnessProblem& problem)
       : problem_(problem), model_(problem), omega_(0.1 * two_pi * problem.modes.band),
-        equilibrium_options_(problem.equilibrium_options)
+        equilibrium_options_(problem.equilibrium_options), equilibria_(equilibrium_options_)
   {
     const PairShapes pairs = make_pair_shapes(model_.reference(), omega_);
     reduced_.emplace(model_, trained_shapes(pairs), pairs);
@@ -203,12 +203,7 @@ public:
   {
     const BrakeModel& model = model_.at(values);
     const auto& [structure, interface] = model;
-    if (!compliance_ || model_.stiffness_changes() || !compliance_->serves(interface))
-    {
-      compliance_.reset();
-      compliance_.emplace(structure, interface, equilibrium_options_);
-    }
-    Equilibrium equilibrium = find_equilibrium(structure, interface, *compliance_, closed_);
+    Equilibrium equilibrium = equilibria_.at(structure, interface);
     need(equilibrium.outcome);
     closed_ = equilibrium.closed;
     return reduced_->at(model_.coefficients(values), interface, equilibrium);
@@ -296,7 +291,7 @@ private:
   PolynomialModel model_;
   double omega_; // of energies, a tenth of the band's
   EquilibriumOptions equilibrium_options_;
-  std::optional<PairCompliance> compliance_{};
+  Equilibria equilibria_;
   std::vector<char> closed_{}; // at the equilibrium found last
   int trained_ = 0;
   std::optional<ReducedSliding> reduced_{};
@@ -307,7 +302,7 @@ private:
 std::vector<Complex> full_modes(const RobustnessProblem& problem, const std::vector<double>& values)
 {
   const BrakeModel model = problem.model_at(values);
-  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, problem.equilibrium_options);
+  const Equilibrium equilibrium = Equilibria(problem.equilibrium_options).at(model.structure, model.interface);
   need(equilibrium.outcome);
   const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
   ModesSettings settings = problem.modes;

@@ -147,42 +147,14 @@ bool same_contact(const Interface& a, const Interface& b)
          drive_directions(a) == drive_directions(b);
 }
 
-/// The equilibrium of a model that differs in one number, with as little work as it needs.
-class NearbyEquilibria
-{
-public:
-  explicit NearbyEquilibria(const SensitivityProblem& problem)
-      : problem_(problem), options_(problem.equilibrium_options)
-  {
-  }
-
-  /// Nothing where it is the equilibrium of the problem itself.
-  std::optional<Equilibrium> at(const BrakeModel& model)
-  {
-    const auto& [structure, interface, equilibrium] = problem_.sliding;
-    const bool same = model.structure.K.get() == structure.K && model.interface.B.get() == interface.B,
-               same_load = model.structure.load.get() == structure.load;
-    if (interface.pairs == 0 || (same && same_load && same_contact(model.interface, interface))) return std::nullopt;
-    if (same && !compliance_) compliance_.emplace(structure, interface, options_);
-    if (!same || !compliance_->serves(model.interface))
-      return find_equilibrium(model.structure, model.interface,
-                              PairCompliance(model.structure, model.interface, options_), equilibrium.closed);
-    return find_equilibrium(model.structure, model.interface, *compliance_, equilibrium.closed);
-  }
-
-private:
-  const SensitivityProblem& problem_;
-  EquilibriumOptions options_;
-  std::optional<PairCompliance> compliance_{}; // of the problem's own K and B
-};
-
 /// Derivatives by numbers, of all modes at once.
 class NumberDerivatives
 {
 public:
   NumberDerivatives(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held)
-      : problem_(problem), vectors_(vectors), held_(held), equilibria_(problem)
+      : problem_(problem), vectors_(vectors), held_(held), equilibria_(problem.equilibrium_options)
   {
+    equilibria_.expect(problem.sliding.equilibrium.closed);
   }
 
   std::vector<NumberDerivative> by(const SceneNumber& number)
@@ -195,10 +167,13 @@ private:
   std::optional<AtHeldVectors> hold_at(const std::string& key, double value)
   {
     const BrakeModel model = problem_.model_with(std::array{SceneNumber{key, value}});
-    const std::optional<Equilibrium> other = equilibria_.at(model);
-    const Equilibrium& equilibrium = other ? *other : problem_.sliding.equilibrium;
-    if (equilibrium.outcome.kind != OutcomeKind::converged || equilibrium.closed != problem_.sliding.equilibrium.closed)
-      return std::nullopt;
+    const auto& [structure, interface, own] = problem_.sliding;
+    const bool same = model.structure.K.get() == structure.K && model.interface.B.get() == interface.B &&
+                      model.structure.load.get() == structure.load && same_contact(model.interface, interface);
+    std::optional<Equilibrium> other;
+    if (interface.pairs > 0 && !same) other = equilibria_.at(model.structure, model.interface);
+    const Equilibrium& equilibrium = other ? *other : own;
+    if (equilibrium.outcome.kind != OutcomeKind::converged || equilibrium.closed != own.closed) return std::nullopt;
     return at_held_vectors({model.structure, model.interface, equilibrium}, vectors_);
   }
 
@@ -324,7 +299,7 @@ private:
   const SensitivityProblem& problem_;
   const HeldVectors& vectors_;
   const AtHeldVectors& held_;
-  NearbyEquilibria equilibria_;
+  Equilibria equilibria_;
 };
 
 /// By the change of the residual, with vectors and reactions held and the equilibrium free to change.

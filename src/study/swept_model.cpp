@@ -1,7 +1,6 @@
 #include "swept_model.hpp"
 
 #include "squeal/algebra/root.hpp"
-#include "squeal/base/shared.hpp"
 #include "squeal/contact/pairs.hpp"
 #include "squeal/study/reversed.hpp"
 
@@ -14,8 +13,7 @@ namespace squeal
 {
 
 SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked)
-    : problem_(problem), comm_(comm), end_if_asked_(std::move(end_if_asked)),
-      equilibrium_options_(problem.equilibrium_options)
+    : problem_(problem), comm_(comm), end_if_asked_(std::move(end_if_asked)), searched_(problem.equilibrium_options)
 {
 }
 
@@ -28,25 +26,6 @@ void SweptModel::go_to(const SweptPlace& place)
   at_ = place;
 }
 
-const PairCompliance& SweptModel::compliance()
-{
-  const auto& [structure, interface] = *model_;
-  if (compliance_ && K_.get() == structure.K && B_.get() == interface.B && compliance_->serves(interface))
-    return *compliance_;
-  compliance_.reset();
-  K_ = shared(structure.K.get());
-  B_ = shared(interface.B.get());
-  return compliance_.emplace(structure, interface, equilibrium_options_);
-}
-
-Equilibrium SweptModel::find(const SweptPlace& place)
-{
-  go_to(place);
-  const auto& [structure, interface] = *model_;
-  if (interface.pairs == 0) return find_equilibrium(structure, interface, equilibrium_options_);
-  return find_equilibrium(structure, interface, compliance(), closed_);
-}
-
 const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
 {
   const auto known = equilibria_.find(place);
@@ -54,7 +33,8 @@ const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
   Equilibrium equilibrium;
   try
   {
-    equilibrium = find(place);
+    go_to(place);
+    equilibrium = searched_.at(model_->structure, model_->interface);
   }
   catch (const LibraryError&)
   {
@@ -65,7 +45,6 @@ const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
     model_.reset();
     equilibrium.outcome = {OutcomeKind::no_equilibrium, error.what(), 0, 1};
   }
-  if (equilibrium.outcome.kind == OutcomeKind::converged) closed_ = equilibrium.closed;
   return equilibria_[place] = std::move(equilibrium);
 }
 
@@ -160,7 +139,7 @@ std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, 
   const auto scale = [](double at_end) { return at_end > 0 ? at_end : 1; };
   const double of_reaction = scale(reaction(opens ? first : last)), of_gap = scale((opens ? last : first).gaps[pair]);
   constexpr double least = std::numeric_limits<double>::min(); // a zero would be of neither side
-  closed_ = first.closed; // what is expected next: not what was visited before, which a restart does not
+  searched_.expect(first.closed); // what is expected next: not what was visited before, which a restart does not
   std::optional<double> failed;
   std::vector<SweptPlace> visited;
   const auto contact = [&](double value) -> std::optional<double>

@@ -60,23 +60,18 @@ public:
 
 private:
   void go_to(const SweptPlace& place);
-  Equilibrium find(const SweptPlace& place);
-  const PairCompliance& compliance();
   BasisProblem basis_problem(const Equilibrium& equilibrium) const;
   const std::vector<char>& rigid_at(const SweptPlace& place);
 
   const SweepProblem& problem_;
   MPI_Comm comm_;
   std::function<void()> end_if_asked_;
-  EquilibriumOptions equilibrium_options_;
+  Equilibria searched_;
   std::optional<BrakeModel> model_{}; // at the point visited last
   SweptPlace at_{};
   std::map<SweptPlace, Equilibrium> equilibria_{};
   std::map<SweptPlace, std::vector<char>> rigid_{}; // closed pairs without a compliance
-  std::vector<char> closed_{};                      // at the equilibrium found last
   std::vector<char> at_every_{};                    // pairs closed and rigid at every point prepared
-  std::optional<PairCompliance> compliance_{};
-  Owned<Mat> K_{}, B_{}; // of the compliance, shared with the model that it is of
   std::optional<ModesBasis> basis_{};
   std::map<SweptPlace, PointModes> trained_{};
 };

@@ -44,6 +44,7 @@ def test_every_file_is_whole(converged, scene):
     assert growth == sorted(growth, reverse=True)
     for mode in report["modes"]["modes"]:
         assert {"frequency_hz", "growth_rate", "damping_ratio", "backward_error"} <= set(mode)
+    assert [(tried["name"], tried["outcome"]) for tried in report["cycle"]["attempts"]] == [("cycle, full model", "converged")]
     assert (run.output / "resolved.toml").exists() and (run.output / "options.txt").exists()
 
     # Two ranks solve the reduced system alike: each of its norms is printed once.

@@ -132,7 +132,12 @@ def test_where_no_cycle_of_the_pin_attracts_the_settled_motion_answers(converged
     assert settled["kind"] in ("irregular", "quasi-periodic", "undecided")
     if settled["kind"] == "undecided":
         assert settled["between"] and settled["would_decide"]
-    assert f"  heard        {report['heard']}" in run.printed and "no cycle attracts" in report["heard"]
+    assert run.printed.index(f"  heard        {report['heard']}") > run.printed.index("  in all")  # the answer comes last
+    assert "no cycle attracts" in report["heard"]
+    attempts = report["cycle"]["attempts"]
+    assert [attempt["name"] for attempt in attempts] == ["cycle, full model", "settled motion"]
+    assert [attempt["outcome"] for attempt in attempts] == ["not periodic", "settled"] and attempts[0]["reason"]
+    assert all(attempt["name"] in run.printed for attempt in attempts)
     assert f"{settled['base_frequencies_hz']['first']:.5g}" in report["heard"]
     energy = settled["mean_fluctuating_energy"]
     assert 0 < energy["error"] < energy["mean"]
@@ -198,6 +203,8 @@ def test_a_grid_too_coarse_for_a_light_foot_is_no_irregular_motion(squeal, tmp_p
     run = squeal(scene, "-settled_periods", "128", ranks=1)
     cycle = run.report["cycle"]
     assert run.code == 0 and "squeals at" in run.report["heard"]
+    steps = [attempt["steps_per_period"] for attempt in cycle["attempts"]]
+    assert steps[0] == 64 and steps == sorted(steps) and steps[-1] >= 256 and cycle["attempts"][-1]["outcome"] == "converged"
     assert cycle["period"] == pytest.approx(1 / 0.19081, rel=1e-3)
     assert cycle["mean_fluctuating_energy"] == pytest.approx(11.89, rel=1e-2)
     largest = cycle["multipliers"]["values"][0]

@@ -106,11 +106,6 @@ History history_of(std::size_t steps)
   return history;
 }
 
-FieldNodes nodes_of(const Model& model)
-{
-  return {model.mesh, model.dofs, model.structure, model.interface};
-}
-
 /// Every stage ran.
 Report full_report(const Model& model)
 {
@@ -118,30 +113,30 @@ Report full_report(const Model& model)
   report.model.dofs = model.dofs.size;
   report.model.pairs = 2;
   report.model.elements = static_cast<long>(model.mesh.elements.size());
-  report.equilibrium.outcome = {OutcomeKind::converged, "", 3, 1e-12};
-  report.equilibrium.u = ramp(model, 1);
-  report.equilibrium.reactions = {3, 0.6, 0, 0, 0, 0, 7, 1.4, 0};
-  report.equilibrium.closed = {1, 0, 1};
-  report.modes.outcome = {OutcomeKind::converged, "", 1, 1e-13};
-  report.modes.method = ModesMethod::full;
+  report.point.equilibrium.outcome = {OutcomeKind::converged, "", 3, 1e-12};
+  report.point.equilibrium.u = ramp(model, 1);
+  report.point.equilibrium.reactions = {3, 0.6, 0, 0, 0, 0, 7, 1.4, 0};
+  report.point.equilibrium.closed = {1, 0, 1};
+  report.point.modes.outcome = {OutcomeKind::converged, "", 1, 1e-13};
+  report.point.modes.method = ModesMethod::full;
   ComplexMode mode;
   mode.lambda = {5, 2 * std::acos(-1.) * 100};
   mode.real = ramp(model, 2);
   mode.imaginary = ramp(model, 3);
-  report.modes.modes.push_back(std::move(mode));
-  report.modes.unstable_count = 1;
-  report.estimates.emplace_back().outcome = {OutcomeKind::no_balance, "the curve has no root", 0, 0};
+  report.point.modes.modes.push_back(std::move(mode));
+  report.point.modes.unstable_count = 1;
+  report.point.estimates.emplace_back().outcome = {OutcomeKind::no_balance, "the curve has no root", 0, 0};
   report.transient.outcome = {OutcomeKind::completed, "", 10, 1e-11};
   report.transient.growth_rate_fit = std::numeric_limits<double>::quiet_NaN();
   report.transient.history = history_of(11);
-  report.cycle.outcome = {OutcomeKind::converged, "", 4, 1e-6};
-  report.cycle.orbit.period = 0.01;
-  report.cycle.steps_per_period = 5;
-  report.cycle.measured.history = history_of(5);
-  report.cycle.measured.peak_to_peak = {1e-6};
-  report.cycle.measured.statuses = {{ContactStatus::open, ContactStatus::slip},
-                                    {ContactStatus::stick, ContactStatus::slip}};
-  for (int i = 0; i < 4; ++i) report.cycle.measured.displacements.push_back(ramp(model, i));
+  report.motion.cycle.outcome = {OutcomeKind::converged, "", 4, 1e-6};
+  report.motion.cycle.orbit.period = 0.01;
+  report.motion.cycle.steps_per_period = 5;
+  report.motion.cycle.measured.history = history_of(5);
+  report.motion.cycle.measured.peak_to_peak = {1e-6};
+  report.motion.cycle.measured.statuses = {{ContactStatus::open, ContactStatus::slip},
+                                           {ContactStatus::stick, ContactStatus::slip}};
+  for (int i = 0; i < 4; ++i) report.motion.cycle.measured.displacements.push_back(ramp(model, i));
   report.timings = {{Stage::modes, 1.5, 1.25}};
   return report;
 }
@@ -188,7 +183,7 @@ TEST_CASE("fields: every set the XDMF names is in the file with that shape, and 
 {
   const TemporaryFolder folder;
   const Model model = one_of_each();
-  write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path, PETSC_COMM_WORLD);
+  write_results(full_report(model), scene_of_test(), model, folder.path, PETSC_COMM_WORLD);
   if (rank_of(PETSC_COMM_WORLD) != 0) return;
 
   const std::string xdmf = text_of(folder.path / "fields.xdmf");
@@ -221,7 +216,7 @@ TEST_CASE("history: one entry a step, statuses as step by pair")
 {
   const TemporaryFolder folder;
   const Model model = one_of_each();
-  write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path, PETSC_COMM_WORLD);
+  write_results(full_report(model), scene_of_test(), model, folder.path, PETSC_COMM_WORLD);
   if (rank_of(PETSC_COMM_WORLD) != 0) return;
   const hid_t file = H5Fopen((folder.path / "history.h5").c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   std::vector<hsize_t> shape;
@@ -265,7 +260,7 @@ TEST_CASE("report.json has the documented keys; what is not a number is null; a 
   for (const auto& [stage, keys] : documented)
     for (const auto& key : keys) CHECK_MESSAGE(json[stage].contains(key), stage, ".", key);
 
-  report.cycle.outcome = {OutcomeKind::skipped, "no mode is unstable", 0, 0};
+  report.motion.cycle.outcome = {OutcomeKind::skipped, "no mode is unstable", 0, 0};
   const Json skipped = Json::parse(report_json(report, scene_of_test()));
   CHECK(skipped["cycle"] == Json{{"outcome", "skipped"}, {"reason", "no mode is unstable"}});
 }
@@ -275,7 +270,7 @@ TEST_CASE("the table never shows figures of a cycle that did not converge")
   const Model model = one_of_each();
   Report report = full_report(model);
   CHECK(table(report, scene_of_test()).find("mean energy") != std::string::npos);
-  report.cycle.outcome = {OutcomeKind::not_converged, "the residual stalled", 9, 0.1};
+  report.motion.cycle.outcome = {OutcomeKind::not_converged, "the residual stalled", 9, 0.1};
   const std::string text = table(report, scene_of_test());
   CHECK(text.find("mean energy") == std::string::npos);
   CHECK(text.find("NOT CONVERGED: the residual stalled") != std::string::npos);
@@ -286,14 +281,12 @@ TEST_CASE("a folder that cannot be written is an error on every rank, and nothin
   const TemporaryFolder folder;
   const Model model = one_of_each();
   folder.write("taken", "a file where the folder should be");
-  CHECK_THROWS_AS(
-      write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path / "taken", PETSC_COMM_WORLD),
-      Error);
+  CHECK_THROWS_AS(write_results(full_report(model), scene_of_test(), model, folder.path / "taken", PETSC_COMM_WORLD),
+                  Error);
   // A folder in the place of a result file: the file's move fails, its draft must go.
   on_rank_zero(PETSC_COMM_WORLD, [&] { fs::create_directories(folder.path / "out" / "history.h5" / "full"); });
-  CHECK_THROWS_AS(
-      write_results(full_report(model), scene_of_test(), nodes_of(model), folder.path / "out", PETSC_COMM_WORLD),
-      Error);
+  CHECK_THROWS_AS(write_results(full_report(model), scene_of_test(), model, folder.path / "out", PETSC_COMM_WORLD),
+                  Error);
   if (rank_of(PETSC_COMM_WORLD) != 0) return;
   CHECK_FALSE(fs::exists(folder.path / "out" / "history.h5.part"));
   CHECK_FALSE(fs::exists(folder.path / "out" / "report.json"));
@@ -305,7 +298,7 @@ TEST_CASE("a matrix scene has no mesh to draw and writes no fields")
   const Model model = one_of_each();
   Scene scene = scene_of_test();
   scene.matrices = folder.path;
-  write_results(full_report(model), scene, nodes_of(model), folder.path, PETSC_COMM_WORLD);
+  write_results(full_report(model), scene, model, folder.path, PETSC_COMM_WORLD);
   CHECK_FALSE(fs::exists(folder.path / "fields.h5"));
   CHECK(fs::exists(folder.path / "report.json"));
 }

@@ -63,7 +63,8 @@ struct BrakeBranchProblem
   std::function<BrakeModel(double parameter)> model_at; // with matrices of the layout of the scene's own
   SlidingEquilibrium sliding;                           // of the scene itself
   const LimitCycle& cycle;                              // where the branch starts
-  const std::vector<ComplexMode>& own_modes;            // of the scene, the followed one first
+  const std::vector<ComplexMode>& own_modes;            // of the scene
+  const ComplexMode& followed;                          // of these, by the cycle
   CycleModel fidelity = CycleModel::full;               // automatic: reduced where that is far smaller
   int steps_per_period = 0;
   double tolerance = 0; // on the full-space residual

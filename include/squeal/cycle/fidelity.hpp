@@ -52,14 +52,23 @@ struct FittedCycle
 {
   LimitCycle cycle;
   Fidelity fidelity;
+  bool answers = true; // false: the full model follows, fidelity.reason says why
 };
 
 /// The settings, with steps and tolerance where the scene leaves them open.
 CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest& request);
 
-/// Finds the cycle on the model that the request names, or for "auto" on the smallest one that its accuracy allows.
-/// Collective. A search that fails has its outcome and reason. Error: a reduced model that was asked for cannot be
-/// made.
-FittedCycle find_fitted_cycle(const CycleProblem& problem, const FidelityRequest& request, const CycleOptions& options);
+/// Why no reduced model leads to the cycle that "auto" seeks; empty if one may. Not collective.
+std::string no_reduced_search(const CycleProblem& problem);
+
+/// Finds the cycle by way of the reduced model's, which was asked for or may do. Collective. A search that fails has
+/// its outcome and reason. Error: a reduced model that was asked for cannot be made.
+FittedCycle find_on_reduced_model(const CycleProblem& problem, const FidelityRequest& request,
+                                  const CycleOptions& options);
+
+/// Finds the cycle of the full model from the problem's start. `tried`: the account of a reduced model that was tried
+/// before. Collective.
+FittedCycle find_on_full_model(const CycleProblem& problem, const FidelityRequest& request, const CycleOptions& options,
+                               const Fidelity& tried);
 
 } // namespace squeal

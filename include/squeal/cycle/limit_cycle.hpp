@@ -44,7 +44,7 @@ struct CycleProblem
   SlidingEquilibrium sliding;
   const LinearisedSliding& linearised;
   const std::vector<ComplexMode>& modes; // all in the band
-  UnstableModes unstable;                // the first of the modes; the cycle follows the very first
+  UnstableModes unstable;                // those that it starts from; the cycle follows the first
   const CycleSettings& settings;
   const StepOptions& step;
   const ModesOptions& modes_options; // of real modes beyond the band

@@ -58,34 +58,35 @@ struct EquilibriumOptions
   FactorOptions factor{};
 };
 
-/// The stiffness factored and the compliance D of the pairs, on their normals and the axes they slide along. Neither
-/// load nor friction changes them, nor a drive along the same axes.
-class PairCompliance
+/// Equilibria of models of one layout, one after the other. The stiffness factored and the compliance D of the pairs,
+/// on their normals and the axes they slide along, are kept while the models share K and B and have these axes.
+/// Neither load nor friction changes them.
+class Equilibria
 {
 public:
-  /// Error: K is singular on a body that contact does not hold either (which body). Collective.
-  PairCompliance(const Structure& structure, const Interface& interface, const EquilibriumOptions& options);
-  PairCompliance(PairCompliance&&) noexcept;
-  PairCompliance& operator=(PairCompliance&&) noexcept;
-  ~PairCompliance();
+  explicit Equilibria(const EquilibriumOptions& options);
+  Equilibria(const Equilibria&) = delete;
+  Equilibria& operator=(const Equilibria&) = delete;
+  ~Equilibria();
 
-  /// Whether the drive of this interface, which has the same B, is along the axes. The same on all ranks.
-  bool serves(const Interface& interface) const;
+  /// Finds the equilibrium, first with the closed pairs that are expected: those of the one before. Collective. Error:
+  /// K is singular on a body that contact does not hold either (which body).
+  Equilibrium at(const Structure& structure, const Interface& interface);
 
-  struct Parts;
-  const Parts& parts() const { return *parts_; }
+  void expect(const std::vector<char>& closed) { expected_ = closed; }
+  int factors() const { return factors_; } // made so far
+
+  struct Kept;
 
 private:
-  std::unique_ptr<Parts> parts_;
+  EquilibriumOptions options_;
+  std::unique_ptr<Kept> kept_;
+  std::vector<char> expected_{}; // empty: none are
+  int factors_ = 0;
 };
 
-/// Error: K is singular on a body that contact does not hold either (which body). Collective.
+/// A single equilibrium. Collective. Error: as of Equilibria.
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options);
-
-/// The same with a compliance that is at hand and serves the interface, first tried with these closed pairs; empty:
-/// none are expected. Collective.
-Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const PairCompliance& compliance,
-                             const std::vector<char>& expected);
 
 /// A model at its sliding equilibrium, as every stage after it sees it. Borrows all three.
 struct SlidingEquilibrium

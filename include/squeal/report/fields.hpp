@@ -6,7 +6,7 @@ namespace squeal
 {
 
 /// Collective. A matrix scene has no nodes and leaves no such files.
-void write_fields(const Report& report, const Scene& scene, const FieldNodes& nodes,
-                  const std::filesystem::path& output, MPI_Comm comm);
+void write_fields(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
+                  MPI_Comm comm);
 
 } // namespace squeal

@@ -5,7 +5,7 @@
 namespace squeal
 {
 
-/// The first line of the table, and `heard` in report.json.
+/// The last row of the table, and `heard` in report.json.
 std::string heard(const Report& report, const Scene& scene);
 
 } // namespace squeal

@@ -4,16 +4,17 @@
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/branch/brake_branch.hpp"
 #include "squeal/contact/resultants.hpp"
-#include "squeal/cycle/fidelity.hpp"
 #include "squeal/report/stage.hpp"
-#include "squeal/settled/settled_motion.hpp"
+#include "squeal/settled/found_motion.hpp"
 #include "squeal/study/response.hpp"
 #include "squeal/study/robustness.hpp"
 #include "squeal/study/sensitivity.hpp"
 #include "squeal/study/sweep.hpp"
+#include "squeal/transient/sliding_point.hpp"
 
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -45,32 +46,30 @@ struct Timing
 /// The cycle on the coarser mesh that the search starts from.
 struct CoarseStart
 {
-  Outcome outcome; // of the cycle there
+  Outcome outcome{OutcomeKind::off, "the scene has no cycle.start = \"coarse\"", 0, 0}; // of the cycle there
   PetscInt dofs = 0;
   int pairs = 0;
-  double period = 0;                  // [s]
-  double mean_fluctuating_energy = 0; // [J]
-  long periods = 0;                   // integrated
+  double period = 0;                   // [s]
+  double mean_fluctuating_energy = 0;  // [J]
+  long periods = 0;                    // integrated
+  std::optional<GivenStart> carried{}; // on the scene's own mesh
 };
 
-/// A stage that did not run has the outcome "off" (by the scene) or "skipped", with the reason.
+/// Each result is written once, and no stage reads it here. A stage that did not run has the outcome "off" (by the
+/// scene) or "skipped", with the reason.
 struct Report
 {
   std::string run;      // the identity that every file of the run carries
   std::string ended_by; // "by SIGTERM" where the run was asked to end; empty: it was not
   int exit_code = -1;   // -1: the run goes on
   ModelSummary model;
-  Equilibrium equilibrium;
+  SlidingPoint point;
   std::vector<ContactResultant> contacts; // of the equilibrium, one a contact of the scene; empty on a matrix scene
   std::vector<double> equilibrium_probes; // [m] at the equilibrium, one a probe
-  Modes modes;
-  std::vector<Estimate> estimates; // of the unstable modes, the followed one first; else one that says why not
   Response response;
   Trajectory transient;
   CoarseStart coarse;
-  LimitCycle cycle;
-  Fidelity fidelity;     // of the cycle
-  SettledMotion settled; // where no cycle attracts
+  Motion motion;
   Attractors attractors;
   BrakeBranch branch;
   Sensitivity sensitivity;
@@ -85,15 +84,6 @@ const Estimate& followed_estimate(const Report& report);
 /// The outcome of every stage but the model, in the order in which they run.
 std::array<std::pair<Stage, Outcome>, 13> outcomes_of(const Report& report);
 
-/// Where the nodes of the fields are.
-struct FieldNodes
-{
-  const Mesh& mesh;
-  const DofMap& dofs;
-  const Structure& structure;
-  const Interface& interface;
-};
-
 /// Rank 0 prints the table a person reads.
 void print_table(const Report& report, const Scene& scene, MPI_Comm comm);
 
@@ -101,8 +91,8 @@ void print_table(const Report& report, const Scene& scene, MPI_Comm comm);
 void write_request(const Scene& scene, const std::string& run, const std::filesystem::path& output, MPI_Comm comm);
 
 /// Collective. Writes all results into `output`, each file whole or not at all. Error: what could not be written.
-void write_results(const Report& report, const Scene& scene, const FieldNodes& nodes,
-                   const std::filesystem::path& output, MPI_Comm comm);
+void write_results(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
+                   MPI_Comm comm);
 
 /// Name and version of squeal, its commit, and of the libraries it runs on.
 std::vector<std::pair<std::string, std::string>> versions();

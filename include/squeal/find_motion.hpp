@@ -1,0 +1,33 @@
+#pragma once
+/// The search for what vibrates: cycle, else settled motion (src/README.md, sections 6, 7.8 and 7.10). Ways are tried
+/// in one order, each where it applies; every attempt is noted with why it ended. All functions are collective.
+#include "squeal/point.hpp"
+#include "squeal/report/report.hpp"
+
+namespace squeal
+{
+
+/// What the scene starts the search from, if it is not the modes.
+struct MotionStart
+{
+  std::optional<GivenStart> given;
+  std::string missing; // why it is not there; empty if it is
+};
+
+/// The start that the scene names: a file, the end of the transient, or the cycle of the coarse mesh. Error: as of
+/// read_state.
+MotionStart motion_start(const SlidingPoint& point, const Scene& scene, const Trajectory& transient,
+                         const CoarseStart& coarse);
+
+/// Finds the cycle, and where none attracts the motion that is settled on. "auto" goes through the ways again at four
+/// times the steps a period, while these may decide on a small model.
+Motion find_motion(const SlidingPoint& point, const MotionStart& start, const Scene& scene,
+                   const ProgramOptions& options, const StageRunner& run);
+
+/// Finds the cycle alone, from the modes, within a stage.
+LimitCycle find_cycle(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
+
+/// The settings with which the search begins.
+CycleSettings first_settings(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
+
+} // namespace squeal

@@ -1,0 +1,42 @@
+#pragma once
+/// The small motions about sliding that a scene asks for. All functions that find something are collective.
+#include "squeal/options.hpp"
+#include "squeal/run_stage.hpp"
+#include "squeal/transient/sliding_point.hpp"
+
+namespace squeal
+{
+
+/// Finds the equilibrium of the model, and what the scene's stages need of the small motions about it. A run that goes
+/// on takes the modes of its checkpoint.
+SlidingPoint find_point(const Model& model, const Scene& scene, const ProgramOptions& options, const StageRunner& run);
+
+/// The unstable modes. Where none is, and the cycle is sought from a state that the scene gives, the one that decays
+/// slowest: a cycle may attract beside a stable equilibrium.
+std::span<const ComplexMode> followed_modes(const SlidingPoint& point, const Scene& scene);
+
+/// Estimates the amplitude of one mode.
+Estimate estimate_of(const SlidingPoint& point, const ComplexMode& mode);
+
+/// Whether all of the modes that grow do so without oscillating.
+bool only_diverges(std::span<const ComplexMode> unstable);
+
+/// Why no motion can be sought from these modes; empty if one can. They may diverge without oscillating.
+std::string no_mode_among(const SlidingPoint& point, std::span<const ComplexMode> modes);
+
+/// Why a stage of unstable modes cannot run; empty if it can.
+std::string no_unstable_mode(const SlidingPoint& point);
+
+/// Why a stage that follows a mode cannot run; empty if it can.
+std::string no_mode_to_follow(const SlidingPoint& point, const Scene& scene);
+
+/// Whether a stage of the scene needs the modes.
+bool seeks_modes(const Scene& scene);
+
+/// Whether it has up to small_model degrees of freedom.
+bool is_small(const SlidingPoint& point);
+
+/// Integrates the theta steps that the scene asks for, from its start.
+Trajectory find_transient(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
+
+} // namespace squeal

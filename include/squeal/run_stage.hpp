@@ -1,0 +1,41 @@
+#pragma once
+/// How a stage is run: it leaves its result, or why it has none.
+#include "squeal/base/outcome.hpp"
+#include "squeal/base/run_control.hpp"
+#include "squeal/report/stage.hpp"
+
+#include <functional>
+
+namespace squeal
+{
+
+/// Runs the work of a stage, which returns whether the end of the run cut it short. Returns why the stage has no
+/// result; empty if it has one.
+using StageRunner = std::function<std::string(Stage which, const std::function<bool()>& work)>;
+
+/// Runs a stage within another one. Throws Interrupted where the end of the run cuts it short.
+inline std::string within_a_stage(Stage, const std::function<bool()>& work)
+{
+  if (work()) throw Interrupted{};
+  return {};
+}
+
+/// The result of a stage that did not run, with the reason.
+template <class Result> Result not_run(OutcomeKind kind, const std::string& reason)
+{
+  Result result;
+  result.outcome = {kind, reason, 0, 0};
+  return result;
+}
+
+/// The result of the work, or why it was left out.
+template <class Work> auto run_stage(const StageRunner& run, Stage which, const Work& work)
+{
+  decltype(work()) result;
+  const auto all = [&] { return result = work(), result.outcome.kind == OutcomeKind::interrupted; };
+  const std::string left_out = run(which, all);
+  if (!left_out.empty()) result = not_run<decltype(work())>(OutcomeKind::skipped, left_out);
+  return result;
+}
+
+} // namespace squeal

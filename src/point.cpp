@@ -1,0 +1,139 @@
+#include "squeal/point.hpp"
+
+#include "squeal/base/constants.hpp"
+#include "squeal/modes/modes_checkpoint.hpp"
+
+namespace squeal
+{
+
+namespace
+{
+
+bool starts_without_a_mode(const TransientSettings& settings)
+{
+  return settings.start.kind != StartKind::mode && settings.start.kind != StartKind::estimate;
+}
+
+/// From a state file or from rest for a given number of steps, the transient needs no mode.
+bool follows_a_mode(const TransientSettings& settings)
+{
+  return settings.enabled && (!starts_without_a_mode(settings) || settings.steps == 0);
+}
+
+std::string no_oscillation_among(const SlidingPoint& point, std::span<const ComplexMode> modes)
+{
+  const std::string reason = no_mode_among(point, modes);
+  return reason.empty() && only_diverges(modes) ? "the equilibrium diverges without oscillating" : reason;
+}
+
+Modes modes_at(const SlidingPoint& point, const Scene& scene, const ModesOptions& options)
+{
+  if (point.equilibrium.outcome.kind != OutcomeKind::converged)
+    return not_run<Modes>(OutcomeKind::skipped, "there is no equilibrium to linearise about");
+  if (!seeks_modes(scene)) return not_run<Modes>(OutcomeKind::off, "the scene turns it off");
+  const Structure& structure = point.model->structure;
+  if (auto kept = kept_modes(structure)) return std::move(*kept);
+  Modes modes = find_modes(point.sliding(), *point.linearised, scene.modes, options);
+  if (checkpoint_is_worth_it(comm_of(structure.load))) keep_modes(modes, structure);
+  return modes;
+}
+
+std::vector<Estimate> estimates_at(const SlidingPoint& point, const Scene& scene)
+{
+  std::vector<Estimate> estimates;
+  const std::string reason = no_mode_to_follow(point, scene);
+  if (!scene.estimate.enabled && !scene.cycle.enabled && !follows_a_mode(scene.transient))
+    estimates.push_back(not_run<Estimate>(OutcomeKind::off, "the scene turns it off"));
+  else if (!reason.empty())
+    estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, reason));
+  else
+    for (const ComplexMode& mode : followed_modes(point, scene)) estimates.push_back(estimate_of(point, mode));
+  return estimates;
+}
+
+} // namespace
+
+SlidingPoint find_point(const Model& model, const Scene& scene, const ProgramOptions& options, const StageRunner& run)
+{
+  SlidingPoint point{&model, {}, {}, {}, {}};
+  point.equilibrium = run_stage(
+      run, Stage::equilibrium, [&] { return find_equilibrium(model.structure, model.interface, options.equilibrium); });
+  point.modes = run_stage(run, Stage::modes,
+                          [&]
+                          {
+                            const bool found = point.equilibrium.outcome.kind == OutcomeKind::converged;
+                            if (found && (seeks_modes(scene) || scene.response))
+                              point.linearised = linearise(point.sliding());
+                            return modes_at(point, scene, options.modes);
+                          });
+  const std::string left_out =
+      run(Stage::estimate, [&] { return point.estimates = estimates_at(point, scene), false; });
+  if (!left_out.empty()) point.estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, left_out));
+  return point;
+}
+
+std::span<const ComplexMode> followed_modes(const SlidingPoint& point, const Scene& scene)
+{
+  const CycleStartKind start = scene.cycle.start.kind;
+  const bool given = scene.cycle.enabled && (start == CycleStartKind::file || start == CycleStartKind::transient);
+  if (point.modes.unstable_count > 0 || !given || point.modes.modes.empty()) return point.modes.unstable();
+  return std::span(point.modes.modes).first(1);
+}
+
+Estimate estimate_of(const SlidingPoint& point, const ComplexMode& mode)
+{
+  if (point.model->interface.pairs == 0)
+    return not_run<Estimate>(OutcomeKind::skipped, "there is no contact that would limit the growth");
+  if (mode.frequency_hz() == 0) return not_run<Estimate>(OutcomeKind::skipped, "the mode does not oscillate");
+  return estimate_amplitude(point.sliding(), *point.linearised, mode);
+}
+
+bool only_diverges(std::span<const ComplexMode> unstable) // those that oscillate come first
+{
+  return !unstable.empty() && unstable.front().lambda.real() > 0 && unstable.front().frequency_hz() == 0;
+}
+
+std::string no_mode_among(const SlidingPoint& point, std::span<const ComplexMode> modes)
+{
+  if (point.equilibrium.outcome.kind != OutcomeKind::converged) return "there is no equilibrium to start from";
+  if (point.modes.modes.empty()) return "no mode was found in the band";
+  if (modes.empty()) return "the equilibrium is stable: no mode grows in the band";
+  return {};
+}
+
+std::string no_unstable_mode(const SlidingPoint& point)
+{
+  return no_oscillation_among(point, point.modes.unstable());
+}
+
+std::string no_mode_to_follow(const SlidingPoint& point, const Scene& scene)
+{
+  return no_oscillation_among(point, followed_modes(point, scene));
+}
+
+bool seeks_modes(const Scene& scene)
+{
+  return scene.modes.enabled || scene.cycle.enabled || follows_a_mode(scene.transient);
+}
+
+bool is_small(const SlidingPoint& point)
+{
+  PetscInt dofs = 0;
+  check(VecGetSize(point.model->structure.load, &dofs));
+  return dofs <= small_model;
+}
+
+Trajectory find_transient(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options)
+{
+  const TransientSettings& settings = scene.transient;
+  const std::string reason = no_mode_to_follow(point, scene);
+  if (!settings.enabled) return not_run<Trajectory>(OutcomeKind::off, "the scene has no [transient], or turns it off");
+  if (point.equilibrium.outcome.kind != OutcomeKind::converged || (!reason.empty() && !starts_without_a_mode(settings)))
+    return not_run<Trajectory>(OutcomeKind::skipped, reason);
+  const ComplexMode* followed = reason.empty() ? &point.modes.modes.front() : nullptr;
+  const UnstableModes started{followed_modes(point, scene), point.estimates};
+  return integrate(point.sliding(), followed, settings, options.step,
+                   transient_start(point.sliding(), started, settings), point.model->probes);
+}
+
+} // namespace squeal
