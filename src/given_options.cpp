@@ -123,18 +123,31 @@ bool is_option(const std::string& word)
   return word.size() > 1 && word[0] == '-' && (is_letter(word, 1) || (word[1] == '-' && is_letter(word, 2)));
 }
 
-std::string problem_of_words(const Strings& words)
+/// The file that PETSc writes by an option of its session, or by one that prints; empty: it writes none.
+std::string written_by(const std::string& name, const std::string& value)
 {
+  const auto of_session = std::ranges::find(session_options, name, &SessionOption::name);
+  const Value kind = of_session != session_options.end() ? of_session->value
+                     : is_printing_option(name)          ? Value::viewer
+                                                         : Value::text;
+  const Strings parts = parts_of(value);
+  if (kind == Value::viewer) return parts.size() > 1 ? parts[1] : "";
+  return kind == Value::file && !parts.empty() ? parts[0] : "";
+}
+
+void examine(GivenOptions& given)
+{
+  const Strings& words = given.words;
   for (std::size_t i = 0; i < words.size(); ++i)
   {
     if (!is_option(words[i]))
-      return "unexpected argument '" + shortened(words[i]) +
-             "': a scene is one file that ends in .toml, or a folder that holds a scene.toml";
+      throw Error("unexpected argument '" + shortened(words[i]) +
+                  "': a scene is one file that ends in .toml, or a folder that holds a scene.toml");
     const bool has_value = i + 1 < words.size() && !is_option(words[i + 1]);
     const std::string name = words[i].substr(1), value = has_value ? words[++i] : "";
-    if (const std::string problem = problem_of_option(name, value); !problem.empty()) return problem;
+    if (const std::string problem = problem_of_option(name, value); !problem.empty()) throw Error(problem);
+    if (const std::string file = written_by(name, value); !file.empty()) given.written.push_back(file);
   }
-  return {};
 }
 
 /// The words of a file, without comments.
@@ -170,7 +183,7 @@ GivenOptions given_options(int argc, char** argv)
       else
         for (std::string& word : words_of_file(++i < words.size() ? words[i] : ""))
           given.words.push_back(std::move(word));
-    given.problem = problem_of_words(given.words);
+    examine(given);
   }
   catch (const Error& error)
   {
