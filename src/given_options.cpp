@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -69,11 +70,15 @@ Strings parts_of(const std::string& value)
   return parts;
 }
 
-/// Makes the file where it is not there, so that a long run does not end without it.
+/// Tries whether the file can be written, so that a long run does not end without it. Leaves none behind.
 std::string problem_of_new_file(const std::string& name)
 {
-  if (name.empty() || std::ofstream(name, std::ios::app)) return {};
-  return shortened(name) + " cannot be written: " + std::strerror(errno);
+  if (name.empty()) return {};
+  std::error_code none;
+  const bool is_new = !std::filesystem::exists(name, none);
+  if (!std::ofstream(name, std::ios::app)) return shortened(name) + " cannot be written: " + std::strerror(errno);
+  if (is_new) std::filesystem::remove(name, none);
+  return {};
 }
 
 std::string problem_of_viewer(const Strings& parts)

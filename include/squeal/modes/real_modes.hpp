@@ -1,8 +1,8 @@
 #pragma once
-/// Real modes, K x = omega^2 M x (src/README.md, section 3.6). Small problems are solved by LAPACK, large ones in slices
-/// of frequency by block Krylov spaces (shift_invert.hpp). By Sylvester's law the factor at the end of the band counts
-/// the eigenvalues below it. All functions are collective. Error: memory runs out, or some motion has neither mass nor
-/// stiffness.
+/// Real modes, K x = omega^2 M x (src/README.md, section 3.6). Small problems are solved by LAPACK, large ones in
+/// slices of frequency by block Krylov spaces (shift_invert.hpp). By Sylvester's law the factor at the end of the band
+/// counts the eigenvalues below it. All functions are collective. Error: memory runs out, or some motion has neither
+/// mass nor stiffness.
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/modes/modes.hpp"
 
