@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 
 namespace squeal
@@ -81,6 +82,13 @@ std::string problem_of_new_file(const std::string& name)
   return {};
 }
 
+/// The file that PETSc writes by a value; empty: it writes none.
+std::string written_by(Value kind, const Strings& parts)
+{
+  if (kind == Value::viewer) return parts.size() > 1 ? parts[1] : "";
+  return kind == Value::file && !parts.empty() ? parts[0] : "";
+}
+
 std::string problem_of_viewer(const Strings& parts)
 {
   if (!parts.empty() && !is_one_of(parts[0], {"", "ascii"}))
@@ -89,7 +97,7 @@ std::string problem_of_viewer(const Strings& parts)
   if (parts.size() > 2 && !is_one_of(parts[2], {"", "default"}) &&
       (", " + formats + ",").find(", " + parts[2] + ",") == std::string::npos)
     return "no format is called '" + shortened(parts[2]) + "'; known: " + formats;
-  return parts.size() > 1 ? problem_of_new_file(parts[1]) : "";
+  return {};
 }
 
 std::string problem_of_value(Value kind, const std::string& value)
@@ -98,18 +106,24 @@ std::string problem_of_value(Value kind, const std::string& value)
   if (parts.empty() || kind == Value::text) return {};
   if (kind == Value::flag)
     return is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"}) ? "" : "it is true or false";
-  return kind == Value::viewer ? problem_of_viewer(parts) : problem_of_new_file(parts[0]);
+  const std::string problem = kind == Value::viewer ? problem_of_viewer(parts) : "";
+  return problem.empty() ? problem_of_new_file(written_by(kind, parts)) : problem;
+}
+
+/// The kind of value of an option of the session, or of one by which a solver prints; nothing: another option.
+std::optional<Value> kind_of(const std::string& name)
+{
+  const auto of_session = std::ranges::find(session_options, name, &SessionOption::name);
+  if (of_session != session_options.end()) return of_session->value;
+  return is_printing_option(name) && solver_prefix_of(name) ? std::optional(Value::viewer) : std::nullopt;
 }
 
 /// Why PETSc must not see an option and its value; the name stands without its dash. Empty: it may.
 std::string problem_of_option(const std::string& name, const std::string& value)
 {
-  const auto of_session = std::ranges::find(session_options, name, &SessionOption::name);
   std::string problem;
-  if (of_session != session_options.end())
-    problem = problem_of_value(of_session->value, value);
-  else if (is_printing_option(name) && solver_prefix_of(name))
-    problem = problem_of_value(Value::viewer, value);
+  if (const std::optional<Value> kind = kind_of(name))
+    problem = problem_of_value(*kind, value);
   else if ((name == "modes_pep_type" && value == "jd") || (name == "cycle_snes_type" && value == "aspin"))
     problem = "it needs more than an operator";
   else
@@ -128,18 +142,6 @@ bool is_option(const std::string& word)
   return word.size() > 1 && word[0] == '-' && (is_letter(word, 1) || (word[1] == '-' && is_letter(word, 2)));
 }
 
-/// The file that PETSc writes by an option of its session, or by one that prints; empty: it writes none.
-std::string written_by(const std::string& name, const std::string& value)
-{
-  const auto of_session = std::ranges::find(session_options, name, &SessionOption::name);
-  const Value kind = of_session != session_options.end() ? of_session->value
-                     : is_printing_option(name)          ? Value::viewer
-                                                         : Value::text;
-  const Strings parts = parts_of(value);
-  if (kind == Value::viewer) return parts.size() > 1 ? parts[1] : "";
-  return kind == Value::file && !parts.empty() ? parts[0] : "";
-}
-
 void examine(GivenOptions& given)
 {
   const Strings& words = given.words;
@@ -151,7 +153,8 @@ void examine(GivenOptions& given)
     const bool has_value = i + 1 < words.size() && !is_option(words[i + 1]);
     const std::string name = words[i].substr(1), value = has_value ? words[++i] : "";
     if (const std::string problem = problem_of_option(name, value); !problem.empty()) throw Error(problem);
-    if (const std::string file = written_by(name, value); !file.empty()) given.written.push_back(file);
+    const std::string file = written_by(kind_of(name).value_or(Value::text), parts_of(value));
+    if (!file.empty()) given.written.push_back(file);
   }
 }
 

@@ -5,8 +5,8 @@
 namespace squeal
 {
 
-/// What is heard on the chain's scene with the values of a point, by the settings of its cycle. `models`: of the
-/// chain's scene. Collective on their communicator. Error: the scene cannot be computed there.
+/// Finds what is heard on the chain's scene with the values of a point, by the settings of its cycle. `models`: those
+/// near the chain's scene. Collective on their communicator. Error: the scene cannot be computed there.
 SweptMotion find_swept_motion(const Chain& chain, const SweptPlace& place, NearbyModels& models);
 
 } // namespace squeal
