@@ -8,7 +8,9 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 
 namespace squeal
@@ -69,11 +71,22 @@ Strings parts_of(const std::string& value)
   return parts;
 }
 
-/// Makes the file where it is not there, so that a long run does not end without it.
+/// Tries whether the file can be written, so that a long run does not end without it. Leaves none behind.
 std::string problem_of_new_file(const std::string& name)
 {
-  if (name.empty() || std::ofstream(name, std::ios::app)) return {};
-  return shortened(name) + " cannot be written: " + std::strerror(errno);
+  if (name.empty()) return {};
+  std::error_code none;
+  const bool is_new = !std::filesystem::exists(name, none);
+  if (!std::ofstream(name, std::ios::app)) return shortened(name) + " cannot be written: " + std::strerror(errno);
+  if (is_new) std::filesystem::remove(name, none);
+  return {};
+}
+
+/// The file that PETSc writes by a value; empty: it writes none.
+std::string written_by(Value kind, const Strings& parts)
+{
+  if (kind == Value::viewer) return parts.size() > 1 ? parts[1] : "";
+  return kind == Value::file && !parts.empty() ? parts[0] : "";
 }
 
 std::string problem_of_viewer(const Strings& parts)
@@ -84,7 +97,7 @@ std::string problem_of_viewer(const Strings& parts)
   if (parts.size() > 2 && !is_one_of(parts[2], {"", "default"}) &&
       (", " + formats + ",").find(", " + parts[2] + ",") == std::string::npos)
     return "no format is called '" + shortened(parts[2]) + "'; known: " + formats;
-  return parts.size() > 1 ? problem_of_new_file(parts[1]) : "";
+  return {};
 }
 
 std::string problem_of_value(Value kind, const std::string& value)
@@ -93,18 +106,24 @@ std::string problem_of_value(Value kind, const std::string& value)
   if (parts.empty() || kind == Value::text) return {};
   if (kind == Value::flag)
     return is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"}) ? "" : "it is true or false";
-  return kind == Value::viewer ? problem_of_viewer(parts) : problem_of_new_file(parts[0]);
+  const std::string problem = kind == Value::viewer ? problem_of_viewer(parts) : "";
+  return problem.empty() ? problem_of_new_file(written_by(kind, parts)) : problem;
+}
+
+/// The kind of value of an option of the session, or of one by which a solver prints; nothing: another option.
+std::optional<Value> kind_of(const std::string& name)
+{
+  const auto of_session = std::ranges::find(session_options, name, &SessionOption::name);
+  if (of_session != session_options.end()) return of_session->value;
+  return is_printing_option(name) && solver_prefix_of(name) ? std::optional(Value::viewer) : std::nullopt;
 }
 
 /// Why PETSc must not see an option and its value; the name stands without its dash. Empty: it may.
 std::string problem_of_option(const std::string& name, const std::string& value)
 {
-  const auto of_session = std::ranges::find(session_options, name, &SessionOption::name);
   std::string problem;
-  if (of_session != session_options.end())
-    problem = problem_of_value(of_session->value, value);
-  else if (is_printing_option(name) && solver_prefix_of(name))
-    problem = problem_of_value(Value::viewer, value);
+  if (const std::optional<Value> kind = kind_of(name))
+    problem = problem_of_value(*kind, value);
   else if ((name == "modes_pep_type" && value == "jd") || (name == "cycle_snes_type" && value == "aspin"))
     problem = "it needs more than an operator";
   else
@@ -123,18 +142,20 @@ bool is_option(const std::string& word)
   return word.size() > 1 && word[0] == '-' && (is_letter(word, 1) || (word[1] == '-' && is_letter(word, 2)));
 }
 
-std::string problem_of_words(const Strings& words)
+void examine(GivenOptions& given)
 {
+  const Strings& words = given.words;
   for (std::size_t i = 0; i < words.size(); ++i)
   {
     if (!is_option(words[i]))
-      return "unexpected argument '" + shortened(words[i]) +
-             "': a scene is one file that ends in .toml, or a folder that holds a scene.toml";
+      throw Error("unexpected argument '" + shortened(words[i]) +
+                  "': a scene is one file that ends in .toml, or a folder that holds a scene.toml");
     const bool has_value = i + 1 < words.size() && !is_option(words[i + 1]);
     const std::string name = words[i].substr(1), value = has_value ? words[++i] : "";
-    if (const std::string problem = problem_of_option(name, value); !problem.empty()) return problem;
+    if (const std::string problem = problem_of_option(name, value); !problem.empty()) throw Error(problem);
+    const std::string file = written_by(kind_of(name).value_or(Value::text), parts_of(value));
+    if (!file.empty()) given.written.push_back(file);
   }
-  return {};
 }
 
 /// The words of a file, without comments.
@@ -170,7 +191,7 @@ GivenOptions given_options(int argc, char** argv)
       else
         for (std::string& word : words_of_file(++i < words.size() ? words[i] : ""))
           given.words.push_back(std::move(word));
-    given.problem = problem_of_words(given.words);
+    examine(given);
   }
   catch (const Error& error)
   {

@@ -135,11 +135,25 @@ std::filesystem::path default_output(const std::filesystem::path& scene)
          (scene.filename() == scene_file ? whole.parent_path().filename() : whole.stem());
 }
 
+/// Why a file that PETSc would write may not be written: it is the scene or a result. Empty: it may.
+std::string problem_of_written(const std::vector<std::string>& files, const Arguments& arguments)
+{
+  if (arguments.scene.empty()) return {};
+  std::vector<std::filesystem::path> taken = {arguments.scene};
+  const auto place = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;
+  for (const char* name : result_file_names) taken.push_back(place / name);
+  for (const std::string& file : files)
+    if (std::ranges::any_of(taken, [&](const auto& other) { return is_same_file(file, other); }))
+      return "the output " + shortened(file) + " of PETSc's would fall on the scene or a result: name another file";
+  return {};
+}
+
 /// The words that PETSc starts with; it looks for no others. Where something is wrong with them there are none.
 std::vector<std::string> options_for_petsc(Arguments& arguments, int argc, char** argv)
 {
   GivenOptions given = given_options(argc, argv);
   arguments.options_in_variable = given.from_variable;
+  if (given.problem.empty()) given.problem = problem_of_written(given.written, arguments);
   if (arguments.problem.empty()) arguments.problem = given.problem;
   if (!given.problem.empty()) given.words.clear();
   unsetenv("PETSC_OPTIONS");

@@ -34,7 +34,7 @@ public:
   /// they make no scene.
   BrakeModel at(std::span<const SceneNumber> numbers);
 
-  /// The same with mesh and probes, as build_model returns it. Collective.
+  /// The model with mesh and probes, as build_model returns it. Collective.
   Model whole_at(std::span<const SceneNumber> numbers);
 
   MPI_Comm comm() const { return comm_; }

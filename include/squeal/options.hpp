@@ -37,8 +37,6 @@ struct SolverPrefix
 
 inline constexpr std::array solver_prefixes = {SolverPrefix{"factor_mat_mumps_", Stage::equilibrium},
                                                SolverPrefix{"modes_mat_mumps_", Stage::modes},
-                                               SolverPrefix{"modes_real_eps_", Stage::modes},
-                                               SolverPrefix{"modes_real_st_", Stage::modes},
                                                SolverPrefix{"modes_pep_", Stage::modes},
                                                SolverPrefix{"modes_st_", Stage::modes},
                                                SolverPrefix{"cycle_snes_", Stage::cycle},

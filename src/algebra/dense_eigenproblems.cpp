@@ -99,7 +99,7 @@ std::vector<DenseEigenpair> right_pairs(std::vector<TwoSidedPair> pairs)
   return result;
 }
 
-/// By the eigenvalues nu = 1/(theta + limit) of (K + limit M)^-1 M, whose left vectors u give (K + limit M)^-T u.
+/// Bases by the eigenvalues nu = 1/(theta + limit) of (K + limit M)^-1 M, whose left vectors u give (K + limit M)^-T u.
 InvariantSubspaces invariant_subspaces(const MatrixXd& M, const MatrixXd& K, double limit)
 {
   const auto factor = regular_factor(MatrixXd(K + limit * M), "the undamped eigenproblem is singular at its shift");
@@ -164,11 +164,6 @@ template <class Matrix> std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Com
   on_rank_zero(comm, [&] { pairs = solve_companion(M, C, K, Vectors::both, limit); });
   share(comm, pairs, K.rows());
   return pairs;
-}
-
-std::vector<DenseEigenpair> solve_dense_quadratic(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
-{
-  return right_pairs(solve_companion(M, C, K, Vectors::right, HUGE_VAL));
 }
 
 template <class Matrix> std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Matrix& M,

@@ -21,7 +21,7 @@ constexpr int block = 50;              // periods between two looks at the energ
 constexpr double at_rest = 1e-4;       // of the least energy of a start
 constexpr std::size_t coordinates = 4; // of the least stable modes
 
-/// What is seen of one trajectory.
+/// One trajectory as it is seen.
 struct Watched
 {
   std::vector<double> energies; // [J] fluctuating, of each step

@@ -271,8 +271,7 @@ bool confirmed_by_fewer_modes(const ReducedMap& map, double period, std::span<co
   return alike(0.95, values, large_multipliers(few, period, contacts, deciding_values).values);
 }
 
-SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map,
-                               int other_steps, double period, Vec start)
+SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, int other_steps, double period, Vec start)
 {
   const MPI_Comm comm = comm_of(problem.sliding.structure.load);
   const RecordedPeriods periods = record_periods(map, other_steps, period, start);

@@ -35,7 +35,7 @@ struct Width
   double beyond = 0;
 };
 
-/// What serves where modes differ by more than losses change them, in little time, and what a cluster may need.
+/// The width that serves, in little time, where modes differ by more than losses change them; and that of a cluster.
 constexpr Width usual{16, 0.02}, wide{64, 0.1};
 
 /// X^H A X of the vectors whose real parts come first and whose imaginary parts come next.

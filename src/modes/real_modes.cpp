@@ -152,9 +152,10 @@ RealModes search_below(double limit, ShiftInvert& pencil)
         below(end.limit * (1 - rounding)) <= end.below && end.below <= below(end.limit * (1 + rounding));
     if (!counted && slices + 1 < fewest + attempts) continue;
     if (!counted)
-      modes.outcome = {OutcomeKind::not_converged,
-                       format("%d real modes found, and the inertia counts %d", below(end.limit), end.below),
-                       modes.outcome.iterations, modes.outcome.residual};
+    {
+      modes.outcome.kind = OutcomeKind::not_converged;
+      modes.outcome.reason = format("%d real modes found, and the inertia counts %d", below(end.limit), end.below);
+    }
     const int kept = counted && end.limit == limit ? end.below : below(limit);
     modes.omega.resize(static_cast<std::size_t>(kept));
     modes.shapes.erase(modes.shapes.begin() + kept, modes.shapes.end());

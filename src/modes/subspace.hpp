@@ -44,7 +44,7 @@ Eigen::MatrixXd coefficients(Pairs pairs, std::size_t term);
 /// y = V a of each pair: the real parts of all, then the imaginary parts.
 MultiVector vectors_of(const Subspace& space, Pairs pairs);
 
-/// Of pairs V a: the real parts of all, then the imaginary parts.
+/// Residuals of pairs V a: the real parts of all, then the imaginary parts.
 struct Residuals
 {
   MultiVector columns;

@@ -191,7 +191,7 @@ const std::vector<TableNumbers> derived_by = {
     {"spring", {"stiffness", "damping"}},
     {"contact", {"rotation.rate"}}};
 
-/// What mass and stiffness of a component are linear in.
+/// Numbers that the mass and the stiffness of a component are linear in.
 const std::vector<TableNumbers> linear_in = {
     {"part",
      {"density", "young", "orthotropic.young.0", "orthotropic.young.1", "orthotropic.young.2", "orthotropic.shear.0",
@@ -200,7 +200,7 @@ const std::vector<TableNumbers> linear_in = {
     {"rigid_body", {"mass", "inertia.0", "inertia.1", "inertia.2", "inertia.3", "inertia.4", "inertia.5"}},
     {"spring", {"stiffness"}}};
 
-/// Those of an entry's numbers that are not zero.
+/// An entry's numbers that are not zero.
 std::vector<SceneNumber> numbers_in(Scene& scene, const EntryKey& entry, const std::vector<const char*>& keys)
 {
   std::vector<SceneNumber> numbers;

@@ -339,9 +339,4 @@ void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable
   if (other_unstable > 0) outcome.reason += format("; %zu modes are unstable", other_unstable + 1);
 }
 
-void declare_solver_options(MPI_Comm comm)
-{
-  declare_subspace_options(comm);
-}
-
 } // namespace squeal

@@ -1,6 +1,7 @@
 #include "subspace_newton.hpp"
 
 #include "squeal/base/callback.hpp"
+#include "squeal/shooting/shooting.hpp"
 
 #include <cmath>
 
@@ -178,7 +179,7 @@ Owned<SNES> make_solver(MPI_Comm comm, PetscInt iterations, double tolerance)
 
 } // namespace
 
-void declare_subspace_options(MPI_Comm comm)
+void declare_solver_options(MPI_Comm comm)
 {
   (void)make_solver(comm, 1, 0);
 }

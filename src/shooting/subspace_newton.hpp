@@ -18,7 +18,4 @@ namespace squeal
 Orbit shoot_on_subspace(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
                         const Orbit& start, const std::vector<Owned<Vec>>& base);
 
-/// Makes the options of its solver known to PETSc even where it never runs.
-void declare_subspace_options(MPI_Comm comm);
-
 } // namespace squeal

@@ -54,7 +54,7 @@ public:
   /// At the point visited last; null: at none.
   const BrakeModel* model() const { return model_ ? &*model_ : nullptr; }
 
-  /// Of the basis.
+  /// Shapes in the basis, and its corrections so far.
   Eigen::Index shapes() const;
   int passes() const { return basis_ ? basis_->passes : 0; }
 

@@ -136,7 +136,7 @@ void solve_step(const StepBatch& batch)
     check(VecAXPBYPCZ(works[k].v_theta, step.theta, 1 - step.theta, 0, works[k].v_next, states[k].v));
 }
 
-/// The same with the gyroscopic part; contact is solved in each pass from where the step began.
+/// Solves the step with the gyroscopic part; contact is solved in each pass from where the step began.
 void solve_step_with_gyroscopic_part(const StepBatch& batch, Mat G)
 {
   const auto& [step, interface, factors, works, states, reports] = batch;

@@ -163,7 +163,7 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
   outcome.iterations = static_cast<int>(summary.contact_iterations_mean * static_cast<double>(summary.steps) + 0.5);
 }
 
-/// What a march has reached.
+/// How far a march has come.
 struct MarchProgress
 {
   const Structure& structure;

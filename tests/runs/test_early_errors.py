@@ -90,7 +90,6 @@ LATE = {
     "no number for a solver": ([*TOAR, "-modes_pep_tol", "magic"], ["magic", "no numeric value"]),
     "a linear solver's option that it has not": (["-cycle_ksp_rtoll", "1"], ["-cycle_ksp_rtoll was never used"]),
     "a solver that slices leave out": (["-modes_pep_tol", "1e-9"], ["-modes_pep_tol was never used"]),
-    "an eigensolver that a small model leaves out": (["-modes_real_eps_tol", "1e-9"], ["-modes_real_eps_tol was never used"]),
     "no option of the eigensolver": ([*TOAR, "-modes_pep_tool", "1"], ["-modes_pep_tool was never used"]),
     "no option of the transformation": ([*TOAR, "-modes_st_ksp_rtoll", "1"], ["-modes_st_ksp_rtoll was never used"]),
     "a control of MUMPS that is the program's own": (["-factor", "mumps", "-factor_mat_mumps_icntl_18", "1"],
@@ -136,9 +135,6 @@ FACTORS = {
                                  "-modes_mat_mumps_icntl_4", "2"], r"memory relaxation +(\(effective\) )?= +33"),
     "the pivots of the modes": (["-modes_mat_mumps_cntl_1", "0.125", "-modes_mat_mumps_icntl_3", "6",
                                  "-modes_mat_mumps_icntl_4", "2"], "0.1250"),
-    "the EPS of the real modes": (["--set", "modes.method=projection", "-modes_real_eps_ncv", "91", "-modes_real_eps_view"], r"\(ncv\): 91"),
-    "the ST of the real modes": (["--set", "modes.method=projection", "-modes_real_st_ksp_type", "gmres", "-modes_real_eps_view"],
-                                 "type: gmres"),
 }
 
 

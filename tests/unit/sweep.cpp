@@ -261,7 +261,7 @@ TEST_CASE("left and right vectors of unsymmetric quadratic problems solve them, 
     K.diagonal() += Eigen::VectorXd::LinSpaced(n, 10, 100);
     const std::vector<TwoSidedPair> pairs = solve_two_sided_shared(PETSC_COMM_WORLD, M, C, K);
     REQUIRE(static_cast<int>(pairs.size()) >= n);
-    const std::vector<DenseEigenpair> right_only = solve_dense_quadratic(M, C, K);
+    const std::vector<DenseEigenpair> right_only = solve_dense_quadratic_shared(PETSC_COMM_SELF, M, C, K);
     REQUIRE(right_only.size() == pairs.size());
     for (std::size_t i = 0; i < pairs.size(); ++i)
     {

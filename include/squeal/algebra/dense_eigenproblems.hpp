@@ -21,11 +21,6 @@ struct DenseEigenpair
   Eigen::VectorXcd y; // 2-norm 1
 };
 
-/// The pairs (lambda^2 M + lambda C + K) y = 0 with Im(lambda) >= 0 and finite lambda. M, C and K are square, of one
-/// size and not symmetric in general.
-std::vector<DenseEigenpair> solve_dense_quadratic(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
-                                                  const Eigen::MatrixXd& K);
-
 /// An eigenvalue with both of its vectors: Q(lambda) right = 0, left' Q(lambda) = 0, Q = lambda^2 M + lambda C + K; the
 /// prime transposes without conjugation. 2-norms are 1. Q may have loss factors too (dense_losses.hpp).
 struct TwoSidedPair
@@ -37,7 +32,7 @@ struct TwoSidedPair
 /// The vectors of one side as columns; empty without pairs.
 Eigen::MatrixXcd vectors_of(std::span<const TwoSidedPair> pairs, Eigen::VectorXcd TwoSidedPair::*side);
 
-/// The eigenvalues of solve_dense_quadratic alone, which take a quarter of the time.
+/// The eigenvalues of solve_dense_quadratic_shared alone, on one rank, which take a quarter of the time.
 std::vector<std::complex<double>> dense_quadratic_eigenvalues(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
                                                               const Eigen::MatrixXd& K);
 
@@ -45,8 +40,8 @@ std::vector<std::complex<double>> dense_quadratic_eigenvalues(const Eigen::Matri
 TwoSidedPair two_sided_pair(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C, const Eigen::MatrixXd& K,
                             std::complex<double> lambda);
 
-/// The pairs of solve_dense_quadratic with |lambda| <= limit and their left vectors, from the matrices of rank 0, on
-/// every rank. Collective.
+/// The pairs of solve_dense_quadratic_shared with |lambda| <= limit and their left vectors, from the matrices of rank
+/// 0, on every rank. Collective.
 template <class Matrix> std::vector<TwoSidedPair>
 solve_two_sided_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Matrix& K, double limit = HUGE_VAL);
 
@@ -64,7 +59,8 @@ struct InvariantSubspaces
 InvariantSubspaces invariant_subspaces_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& K,
                                               double limit);
 
-/// The pairs of solve_dense_quadratic from the matrices of rank 0, on every rank. Collective.
+/// The pairs (lambda^2 M + lambda C + K) y = 0 with Im(lambda) >= 0 and finite lambda, from the matrices of rank 0, on
+/// every rank. M, C and K are of one size and not symmetric in general. Collective.
 template <class Matrix> std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Matrix& M,
                                                                                  const Matrix& C, const Matrix& K);
 

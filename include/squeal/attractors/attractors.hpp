@@ -30,7 +30,7 @@ struct AttractorProblem
 };
 
 /// Integrates the motions of all starts together until their energies have settled, for at most 400
-/// periods. Collective. Where the run is asked to end it throws Interrupted.
+/// periods of the followed mode. Collective. Where the run is asked to end it throws Interrupted.
 Attractors find_attractors(const AttractorProblem& problem);
 
 } // namespace squeal

@@ -22,10 +22,10 @@ struct ReducedCoordinates
   std::function<void(const Eigen::VectorXd& coordinates, Vec motion)> add; // the motion that has these
 };
 
-/// Of states of the reduced model itself.
+/// Coordinates of states of the reduced model itself.
 ReducedCoordinates own_coordinates();
 
-/// Of motions (du, v) of the full model. Borrows both.
+/// Coordinates of motions (du, v) of the full model. Borrows both.
 ReducedCoordinates coordinates_in(const ReducedModel& model, const Structure& structure);
 
 /// New motions like `pattern` with these columns of coordinates.

@@ -8,7 +8,7 @@ namespace squeal
 /// Leaves the modes as they are. Collective.
 void keep_modes(Modes& modes, const Structure& structure);
 
-/// Those of the run that is gone on with; nothing where there are none. Collective.
+/// Modes of the run that is gone on with; nothing where there are none. Collective.
 std::optional<Modes> kept_modes(const Structure& structure);
 
 } // namespace squeal

@@ -104,7 +104,7 @@ struct FloquetAnalysis
 
 /// All multipliers of a system whose whole matrix has at most 200 columns. Of a larger one those of the slow motions,
 /// or of as many Arnoldi steps as its leading value needs. These are at most 96, or 24 beyond 10 000 degrees of
-/// freedom. -cycle_multiplier_method forces a method. Collective. Error: as of the flow.
+/// freedom. ShootingOptions may force a method. Collective. Error: as of the flow.
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable);
 

@@ -11,7 +11,7 @@ struct StepOptions
 {
   ContactSettings contact{};
   bool refuse = true;     // what step_guards.hpp refuses
-  FactorOptions factor{}; // listed by itself
+  FactorOptions factor{}; // those of ProgramOptions
 };
 
 } // namespace squeal
