@@ -204,10 +204,10 @@ void write_branch(Hdf5File& file, const BrakeBranch& branch, const Scene& scene)
     write("probes/" + scene.probes[i].name, "m", points, [i](Cycle p) { return p.measures.peak_to_peak[i]; });
   std::vector<EquilibriumStability> known = branch.equilibria;
   std::erase_if(known, [](const EquilibriumStability& equilibrium) { return !equilibrium.known; });
-  using Equilibria = const EquilibriumStability&;
-  write("equilibrium/parameter", "unit of the key", known, [](Equilibria e) { return e.parameter; });
-  write("equilibrium/growth_rate", "1/s", known, [](Equilibria e) { return e.growth_rate; });
-  write("equilibrium/frequency", "Hz", known, [](Equilibria e) { return e.frequency_hz; });
+  using Judged = const EquilibriumStability&;
+  write("equilibrium/parameter", "unit of the key", known, [](Judged e) { return e.parameter; });
+  write("equilibrium/growth_rate", "1/s", known, [](Judged e) { return e.growth_rate; });
+  write("equilibrium/frequency", "Hz", known, [](Judged e) { return e.frequency_hz; });
 }
 
 std::vector<std::string> branch_lines(const BrakeBranch& branch, const Scene& scene)
