@@ -53,11 +53,17 @@ std::vector<Estimate> estimates_at(const SlidingPoint& point, const Scene& scene
 
 } // namespace
 
-SlidingPoint find_point(const Model& model, const Scene& scene, const ProgramOptions& options, const StageRunner& run)
+SlidingPoint find_sliding(const Model& model, const ProgramOptions& options, const StageRunner& run)
 {
   SlidingPoint point{&model, {}, {}, {}, {}};
   point.equilibrium = run_stage(
       run, Stage::equilibrium, [&] { return find_equilibrium(model.structure, model.interface, options.equilibrium); });
+  return point;
+}
+
+SlidingPoint with_small_motions(SlidingPoint point, const Scene& scene, const ProgramOptions& options,
+                                const StageRunner& run)
+{
   point.modes = run_stage(run, Stage::modes,
                           [&]
                           {
@@ -70,6 +76,11 @@ SlidingPoint find_point(const Model& model, const Scene& scene, const ProgramOpt
       run(Stage::estimate, [&] { return point.estimates = estimates_at(point, scene), false; });
   if (!left_out.empty()) point.estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, left_out));
   return point;
+}
+
+SlidingPoint find_point(const Model& model, const Scene& scene, const ProgramOptions& options, const StageRunner& run)
+{
+  return with_small_motions(find_sliding(model, options, run), scene, options, run);
 }
 
 std::span<const ComplexMode> followed_modes(const SlidingPoint& point, const Scene& scene)

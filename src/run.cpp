@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <optional>
+#include <utility>
 
 namespace squeal
 {
@@ -130,12 +131,14 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
     result = run_stage(runner, which, work);
     if (has_run(result.outcome)) save();
   };
-  const SlidingPoint& point = report.point = find_point(model, scene, options, runner);
+  const SlidingPoint& point = report.point = find_sliding(model, options, runner);
   if (point.equilibrium.outcome.kind == OutcomeKind::converged)
   {
     report.contacts = contact_resultants(model.interface, point.equilibrium.reactions, scene.contacts);
     report.equilibrium_probes = probe_values(model.probes, point.equilibrium.u);
   }
+  save();
+  report.point = with_small_motions(std::move(report.point), scene, options, runner);
   save();
   if (scene.modes.reduced_matrices && !point.modes.modes.empty())
     write_reduced_matrices(point.sliding(), point.modes.modes, options.step.factor,

@@ -7,8 +7,15 @@
 namespace squeal
 {
 
-/// Finds the equilibrium of the model, and what the scene's stages need of the small motions about it. A run that goes
-/// on takes the modes of its checkpoint.
+/// Finds the equilibrium of the model: a point that knows no small motions yet.
+SlidingPoint find_sliding(const Model& model, const ProgramOptions& options, const StageRunner& run);
+
+/// Adds what the scene's stages need of the small motions about the equilibrium. A run that goes on takes the modes of
+/// its checkpoint.
+SlidingPoint with_small_motions(SlidingPoint point, const Scene& scene, const ProgramOptions& options,
+                                const StageRunner& run);
+
+/// Both of these.
 SlidingPoint find_point(const Model& model, const Scene& scene, const ProgramOptions& options, const StageRunner& run);
 
 /// The unstable modes. Where none is, and the cycle is sought from a state that the scene gives, the one that decays

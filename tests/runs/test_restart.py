@@ -23,6 +23,7 @@ WITH_VERDICT = [*LOSSY_PIN, "--set", "mesh.parameters.divisions=2"]
 PIN = [*WITH_VERDICT, "-cycle_multipliers", "0"]  # the verdict takes as long as the cycle, and longer on ranks
 FOUR_PAIRS = [*LOSSY_PIN, "--set", "mesh.parameters.divisions=1", "-cycle_multipliers", "0"]
 OF_THE_CLOCK = {"run", "timings", "processor_seconds", "exit_code", "memory_bytes"}
+OF_THE_WAY = {"attempts"}  # a run that goes on begins with the orbit of its checkpoint
 
 
 def start(output, *arguments, ranks=1, scene=OSCILLATOR, stdout=subprocess.PIPE):
@@ -60,9 +61,10 @@ def partial(output):
 
 
 def numbers(value):
-    """A report without what the clock decides."""
+    """A report without what the clock and the kill decide."""
     if isinstance(value, dict):
-        return {key: numbers(entry) for key, entry in value.items() if key not in OF_THE_CLOCK and "seconds" not in key}
+        left_out = OF_THE_CLOCK | OF_THE_WAY
+        return {key: numbers(entry) for key, entry in value.items() if key not in left_out and "seconds" not in key}
     return [numbers(entry) for entry in value] if isinstance(value, list) else value
 
 
