@@ -178,12 +178,12 @@ MeshPiece numbered(const Scene& scene, Mesh mesh, ContactPairs& contact, MPI_Com
   on_rank_zero(comm, [&] { contact = make_pairs(piece.mesh, scene); });
   broadcast_pairs(contact, comm);
   end_if_asked(comm);
-  const auto number = [&]
+  const auto part_and_number = [&]
   {
     piece.partition = partition_mesh(piece.mesh, contact.pairs, ranks_of(comm));
     piece.dofs = number_dofs(piece.mesh, scene, piece.partition, comm);
   };
-  on_rank_zero(comm, number);
+  on_rank_zero(comm, part_and_number);
   distribute(piece, comm);
   end_if_asked(comm);
   return piece;

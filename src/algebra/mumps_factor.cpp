@@ -9,7 +9,7 @@ namespace
 {
 
 // ICNTL(26): the halves of a solve around a Schur complement, or a solve without one.
-constexpr int whole_solve = 0, condense = 1, expand = 2;
+constexpr int whole_solve = 0, condense = 1, expand_border = 2;
 
 std::size_t area(int rows, int columns)
 {
@@ -90,7 +90,7 @@ std::vector<double> MumpsFactor::forward(const std::vector<double>& b, int colum
 void MumpsFactor::backward(const std::vector<double>& lambda, std::vector<double>& x)
 {
   if (on_rank_zero_) reduced_ = lambda;
-  solve_half(border_ > 0 ? expand : whole_solve);
+  solve_half(border_ > 0 ? expand_border : whole_solve);
   const auto dofs = static_cast<std::size_t>(dofs_), length = dofs + static_cast<std::size_t>(border_);
   const auto count = on_rank_zero_ ? static_cast<std::size_t>(columns_) : 0;
   x.resize(dofs * count);

@@ -17,7 +17,7 @@ namespace
 
 constexpr int worth_dividing = 2000; // nodes: METIS orders them in the time of some messages
 
-std::size_t at(idx_t number)
+std::size_t index_of(idx_t number)
 {
   return static_cast<std::size_t>(number);
 }
@@ -76,16 +76,16 @@ Division divided(WeightedGraph whole)
   }
   std::array<idx_t, 3> count{};
   std::vector<idx_t> number(weights.size());
-  for (std::size_t node = 0; node < number.size(); ++node) number[node] = count[at(division.part[node])]++;
+  for (std::size_t node = 0; node < number.size(); ++node) number[node] = count[index_of(division.part[node])]++;
   for (idx_t node = 0; node < size; ++node)
   {
-    const idx_t part = division.part[at(node)];
+    const idx_t part = division.part[index_of(node)];
     if (part == 2) continue;
-    WeightedGraph& half = division.halves[at(part)];
+    WeightedGraph& half = division.halves[index_of(part)];
     for (const idx_t neighbour : graph.of(node))
-      if (division.part[at(neighbour)] == part) half.graph.neighbours.push_back(number[at(neighbour)]);
+      if (division.part[index_of(neighbour)] == part) half.graph.neighbours.push_back(number[index_of(neighbour)]);
     half.graph.offsets.push_back(static_cast<idx_t>(half.graph.neighbours.size()));
-    half.weights.push_back(weights[at(node)]);
+    half.weights.push_back(weights[index_of(node)]);
   }
   return division;
 }
@@ -94,16 +94,16 @@ Division divided(WeightedGraph whole)
 std::vector<idx_t> joined(const std::vector<idx_t>& part, const std::array<std::vector<idx_t>, 2>& of_halves)
 {
   std::array<std::size_t, 3> count{};
-  for (const idx_t here : part) ++count[at(here)];
+  for (const idx_t here : part) ++count[index_of(here)];
   if (of_halves[0].size() != count[0] || of_halves[1].size() != count[1]) return {};
   const std::array<std::size_t, 3> first{0, count[0], count[0] + count[1]};
   std::array<std::size_t, 3> next{};
   std::vector<idx_t> position;
   for (const idx_t here : part)
   {
-    const std::size_t k = next[at(here)]++;
-    position.push_back(static_cast<idx_t>(first[at(here)]) +
-                       (here == 2 ? static_cast<idx_t>(k) : of_halves[at(here)][k]));
+    const std::size_t k = next[index_of(here)]++;
+    position.push_back(static_cast<idx_t>(first[index_of(here)]) +
+                       (here == 2 ? static_cast<idx_t>(k) : of_halves[index_of(here)][k]));
   }
   return position;
 }

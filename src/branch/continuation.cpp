@@ -180,7 +180,7 @@ bool shrinks_to_a_point(const BranchSide& side)
          last < small * side.orbits.front().corrected.orbit.fluctuation;
 }
 
-ExaminedOrbit copy_of(const ExaminedOrbit& orbit)
+ExaminedOrbit copied(const ExaminedOrbit& orbit)
 {
   return {{squeal::copy_of(orbit.corrected.orbit), orbit.corrected.parameter, 0}, orbit.multipliers, orbit.measures};
 }
@@ -199,7 +199,7 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Branch
 {
   const int points = corrector.settings.points;
   BranchSide side{{}, {}, known_beyond(start.multipliers)};
-  side.orbits.push_back(copy_of(start));
+  side.orbits.push_back(copied(start));
   refer_to(corrector, side.orbits.back().corrected);
   // The smallest step must resolve a change of contact also where the range is far wider than the value at the start.
   const double of_range = std::clamp(std::abs(start.corrected.parameter) / corrector.scales.parameter, 1e-3, 1.);

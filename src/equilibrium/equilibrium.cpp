@@ -60,13 +60,6 @@ std::vector<double> gaps_of(const Interface& interface, Vec u)
   return gap;
 }
 
-/// The displacement without reactions under a load. Points of a sweep mostly have one load.
-struct Unloaded
-{
-  Owned<Vec> load{}, u{}; // null until they are known
-  std::vector<double> gap{};
-};
-
 /// Whether each pair's drive is along its axis, which D was made for: 1, -1 against it, 0 without a drive.
 std::vector<double> senses(const Interface& interface, const std::vector<double>& axes)
 {
@@ -273,7 +266,11 @@ struct Equilibria::Kept
   std::vector<double> axes; // of each pair, as TangentView reads them
   Held held;
   GapCompliance D;
-  Unloaded unloaded{}; // of the last load
+  struct Unloaded // the displacement without reactions
+  {
+    Owned<Vec> load{}, u{}; // null until they are known
+    std::vector<double> gap{};
+  } unloaded{}; // of the last load: points of a sweep mostly have one
 
   Kept(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
       : K(shared(structure.K.get())), B(shared(interface.B.get())), axes(sliding_axes(interface)),

@@ -17,8 +17,8 @@ namespace squeal
 namespace
 {
 
-using Point = Eigen::Vector2d;
-using Polygon = std::vector<Point>;
+using PlanePoint = Eigen::Vector2d;
+using Polygon = std::vector<PlanePoint>;
 
 constexpr double facing = 0.2;        // cosine: faces steeper than 78 degrees to each other do not press on each other
 constexpr double least_share = 1e-10; // of the slave face's area: smaller overlaps are rounding
@@ -40,7 +40,7 @@ double twice_area(const Polygon& polygon)
   double sum = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i)
   {
-    const Point &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const PlanePoint &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
     sum += (a(0) - polygon[0](0)) * (b(1) - polygon[0](1)) - (a(1) - polygon[0](1)) * (b(0) - polygon[0](0));
   }
   return sum;
@@ -62,9 +62,9 @@ Polygon clip(Polygon polygon, const Polygon& window)
   std::vector<double> left;
   for (std::size_t k = 0; k < window.size() && !polygon.empty(); ++k)
   {
-    const Point &a = window[k], side = window[(k + 1) % window.size()] - a;
+    const PlanePoint &a = window[k], side = window[(k + 1) % window.size()] - a;
     left.clear();
-    for (const Point& p : polygon) left.push_back(side(0) * (p(1) - a(1)) - side(1) * (p(0) - a(0)));
+    for (const PlanePoint& p : polygon) left.push_back(side(0) * (p(1) - a(1)) - side(1) * (p(0) - a(0)));
     kept.clear();
     for (std::size_t i = 0; i < polygon.size(); ++i)
     {
@@ -78,7 +78,7 @@ Polygon clip(Polygon polygon, const Polygon& window)
 }
 
 /// The shape functions of a face at a point of the plane.
-ShapeFunctions functions_at(FaceShape shape, const NodePositions& x, const Point& point, double size)
+ShapeFunctions functions_at(FaceShape shape, const NodePositions& x, const PlanePoint& point, double size)
 {
   constexpr double rounding = 1e-15;
   constexpr int most = 20; // three are enough on any face without a corner of 180 degrees
@@ -87,7 +87,7 @@ ShapeFunctions functions_at(FaceShape shape, const NodePositions& x, const Point
   ShapeFunctions at = shape_functions(shape, xi);
   for (int i = 0; i < most; ++i)
   {
-    const Point off = x.topRows<2>() * at.N - point;
+    const PlanePoint off = x.topRows<2>() * at.N - point;
     if (off.norm() <= rounding * size) break;
     const Eigen::Matrix2d J = x.topRows<2>() * at.dN.topRows<2>().transpose();
     xi.head<2>() -= J.inverse() * off;
@@ -126,7 +126,7 @@ SlaveInPlane in_plane(const PlacedFace& face, const Eigen::Vector3d& along)
 }
 
 /// The point of a triangle with these barycentric coordinates.
-Point point_of(const Polygon& triangle, const NodeValues& weights)
+PlanePoint point_of(const Polygon& triangle, const NodeValues& weights)
 {
   return weights(0) * triangle[0] + weights(1) * triangle[1] + weights(2) * triangle[2];
 }
@@ -137,7 +137,7 @@ struct Overlap
   FaceValues area;
   FaceMatrix gram, coupling;
   double least_gap = 0, nearest_gap = 0; // [m] at the Gauss points; the latter of least modulus
-  Point at;                              // of the least gap
+  PlanePoint at;                         // of the least gap
 };
 
 Overlap integrate(const SlaveInPlane& slave, const PlacedFace& master, const NodePositions& x, const Polygon& polygon)
@@ -151,7 +151,7 @@ Overlap integrate(const SlaveInPlane& slave, const PlacedFace& master, const Nod
     const double jacobian = slave.stretch * twice_area(triangle);
     for (const auto& [xi, weight, corner] : triangle_rule(triangles ? 3 : 4))
     {
-      const Point point = point_of(triangle, corner.N);
+      const PlanePoint point = point_of(triangle, corner.N);
       const FaceValues phi = functions_at(slave.face.shape, slave.x, point, slave.size).N;
       const FaceValues N = functions_at(master.shape, x, point, slave.size).N;
       const FaceValues chi = multiplier_functions(slave.face.shape, phi);
@@ -175,14 +175,14 @@ FaceValues whole_area(const SlaveInPlane& slave)
     const Polygon triangle{slave.corners[0], slave.corners[k], slave.corners[k + 1]};
     for (const auto& [xi, weight, corner] : triangle_rule(3))
     {
-      const Point point = point_of(triangle, corner.N);
+      const PlanePoint point = point_of(triangle, corner.N);
       phi += weight * twice_area(triangle) * functions_at(slave.face.shape, slave.x, point, slave.size).N;
     }
   }
   return slave.stretch * multiplier_functions(slave.face.shape, phi);
 }
 
-Vec3 place_of(const SlaveInPlane& slave, const Point& at)
+Vec3 place_of(const SlaveInPlane& slave, const PlanePoint& at)
 {
   const Eigen::Vector3d place = slave.origin + slave.frame.topRows<2>().transpose() * at;
   return {place(0), place(1), place(2)};

@@ -20,13 +20,13 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr int passes = 30;            // of residual correction, at most: losses of 2 and more take over 12
-constexpr double tolerance = 1e-13;   // backward error
-constexpr double share = 1e-3;        // directions of residuals below this part of the largest wait for the next pass
-constexpr double independent = 1e-6;  // the same of a first subspace
-constexpr double spurious = 1e-8;     // backward error of what is no pair
-constexpr double near_end = 0.98;     // of the largest |lambda|: pairs from there on may leave the slices
-constexpr std::size_t neighbours = 3; // of a slice's pairs, at each end
+constexpr int most_corrections = 30;     // of residual correction, at most: losses of 2 and more take over 12
+constexpr double loss_tolerance = 1e-13; // backward error
+constexpr double waiting_share = 1e-3; // directions of residuals below this part of the largest wait for the next pass
+constexpr double independent = 1e-6;   // the same of a first subspace
+constexpr double spurious_loss_pair = 1e-8; // backward error of what is no pair
+constexpr double near_end = 0.98;           // of the largest |lambda|: pairs from there on may leave the slices
+constexpr std::size_t neighbours = 3;       // of a slice's pairs, at each end
 
 /// Pairs of a slice, at most, and how far beyond its ends |lambda| pairs are corrected too, since they may come in.
 struct Width
@@ -127,7 +127,8 @@ std::vector<Eigenpair> solve_in_slices(const Starts& starts, const QuadraticProb
     while (to < starts.count() && (to - end < neighbours || starts.size(to) < upper * beyond)) ++to;
     move_to(pencil, (lower * lower + upper * upper) / 2);
     const Window window{lower * lower / (beyond * beyond), upper * upper * beyond * beyond};
-    const Correction correction{window, passes, std::numeric_limits<int>::max(), tolerance, tolerance, share};
+    const Correction correction{window,         most_corrections, std::numeric_limits<int>::max(),
+                                loss_tolerance, loss_tolerance,   waiting_share};
     QuadraticSolution slice =
         solve_on_subspace(problem, K_loss, basis_of(starts, from, to), *pencil.factor, correction);
     std::ranges::copy_if(std::move_iterator(slice.pairs.begin()), std::move_iterator(slice.pairs.end()),
@@ -135,7 +136,7 @@ std::vector<Eigenpair> solve_in_slices(const Starts& starts, const QuadraticProb
                          [&](const Eigenpair& pair)
                          {
                            const double size = std::abs(pair.lambda);
-                           return size >= lower && size < upper && pair.backward_error <= spurious;
+                           return size >= lower && size < upper && pair.backward_error <= spurious_loss_pair;
                          });
     lower = upper;
   }

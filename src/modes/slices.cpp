@@ -22,13 +22,13 @@ constexpr double reach_of_count = 1.05; // over the band
 // The angle by which friction turns theta [rad], twice the change of the damping ratio: of most pairs, and of those
 // that a second search includes.
 constexpr double usual_angle = 0.06, wide_angle = 0.2;
-constexpr int passes = 16;                         // of residual correction, at most
-constexpr double subspace_tolerance = 1e-9;        // for V to be invariant
-constexpr double tolerance = 1e-12, sharp = 1e-14; // backward errors of pairs, and of nearly critical ones
+constexpr int slice_passes = 16;                        // of residual correction, at most
+constexpr double subspace_tolerance = 1e-9;             // for V to be invariant
+constexpr double pair_tolerance = 1e-12, sharp = 1e-14; // backward errors of pairs, and of nearly critical ones
 // Vectors beside a slice's own, by their number. Without them what its ends are corrected by has most of its
 // neighbours.
 constexpr double guards = 0.3;
-constexpr double spurious = 1e-8;       // backward error of what is no pair
+constexpr double spurious_pair = 1e-8;  // backward error of what is no pair
 constexpr double rigid_share = 1e-6;    // theta below this part of the largest may be a free body's
 constexpr double residual_share = 1e-2; // a pass divides residuals by about ten: a quarter of them stay
 
@@ -71,10 +71,10 @@ void find_pairs(Slice& slice, const QuadraticProblem& problem, ShiftInvert& penc
   Nearest nearest = solve_nearest(pencil, slice.expected, radius, subspace_tolerance, guards);
   if (!nearest.converged) return;
   for (const std::complex<double> theta : nearest.theta) slice.smallest = std::min(slice.smallest, std::abs(theta));
-  const Correction correction{{least, limit}, passes, std::numeric_limits<int>::max(),
-                              tolerance,      sharp,  residual_share};
+  const Correction correction{{least, limit}, slice_passes, std::numeric_limits<int>::max(),
+                              pair_tolerance, sharp,        residual_share};
   slice.pairs = solve_on_subspace(problem, nullptr, std::move(nearest.space), *pencil.factor, correction).pairs;
-  std::erase_if(slice.pairs, [](const Eigenpair& pair) { return pair.backward_error > spurious; });
+  std::erase_if(slice.pairs, [](const Eigenpair& pair) { return pair.backward_error > spurious_pair; });
 }
 
 QuadraticSolution join(std::vector<Slice> slices)

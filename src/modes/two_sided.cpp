@@ -15,10 +15,10 @@ namespace
 using Complex = std::complex<double>;
 using Eigen::MatrixXcd;
 
-constexpr double tolerance = 1e-13; // backward error: derivatives are off by it to first order
-constexpr double near = 1e-6;       // backward errors from which on lambda follows the vectors
-constexpr int passes = 60;          // each adds two vectors to a side, with which small problems stay small
-constexpr double beside = 1e-4;     // of tau from -Re(lambda^2), which is an eigenvalue of the pencil without damping
+constexpr double two_sided_tolerance = 1e-13; // backward error: derivatives are off by it to first order
+constexpr double near = 1e-6;                 // backward errors from which on lambda follows the vectors
+constexpr int two_sided_passes = 60;          // each adds two vectors to a side, with which small problems stay small
+constexpr double beside = 1e-4; // of tau from -Re(lambda^2), which is an eigenvalue of the pencil without damping
 
 /// The vector that the problem on the subspace takes nearest to zero.
 DenseEigenpair null_vector(const Subspace& space, Complex lambda)
@@ -84,9 +84,9 @@ TwoSidedMode find_two_sided(TwoSidedProblem& problem, Complex lambda, const Mult
     const Residuals r = residuals_of(right, {&y, 1}), s = residuals_of(left, {&x, 1});
     const double of_right = r.backward_error(0), of_left = s.backward_error(0);
     mode.backward_error = std::max(of_right, of_left);
-    if ((follows && mode.backward_error <= tolerance) || pass == passes) return mode;
-    const bool wider_right = of_right > tolerance && extend(right, P.solve(r.columns)),
-               wider_left = of_left > tolerance && extend(left, P.solve_transposed(s.columns));
+    if ((follows && mode.backward_error <= two_sided_tolerance) || pass == two_sided_passes) return mode;
+    const bool wider_right = of_right > two_sided_tolerance && extend(right, P.solve(r.columns)),
+               wider_left = of_left > two_sided_tolerance && extend(left, P.solve_transposed(s.columns));
     if (!wider_right && !wider_left && follows) return mode;
   }
 }

@@ -150,7 +150,7 @@ std::string starts_text(const Report& report)
                 other->starts.size(), elsewhere.c_str());
 }
 
-std::string cycle_text(const Report& report, const Scene& scene)
+std::string cycle_sentence(const Report& report, const Scene& scene)
 {
   const LimitCycle& cycle = report.motion.cycle;
   const double frequency = 1 / cycle.orbit.period;
@@ -196,7 +196,7 @@ std::string heard(const Report& report, const Scene& scene)
 {
   if (has_run(report.motion.settled.outcome)) return settled_text(report, scene);
   const Outcome& outcome = report.motion.cycle.outcome;
-  if (outcome.kind == OutcomeKind::converged) return cycle_text(report, scene);
+  if (outcome.kind == OutcomeKind::converged) return cycle_sentence(report, scene);
   if (!has_run(outcome)) return linear_text(report);
   if (outcome.kind == OutcomeKind::collapsed_to_equilibrium && report.point.modes.unstable_count == 0)
     return linear_text(report) + ", and the motion from cycle.start falls to rest";

@@ -62,7 +62,7 @@ long wrong_verdicts(const Robustness& robustness)
                                { return check.known && check.unstable != check.unstable_reduced; });
 }
 
-std::string text_of(const Probability& probability, double confidence)
+std::string probability_text(const Probability& probability, double confidence)
 {
   return format("%.4g (%.4g to %.4g at %g %%), %d of %d samples", probability.estimate(), probability.lower,
                 probability.upper, 100 * confidence, probability.count, probability.samples);
@@ -140,11 +140,11 @@ std::vector<std::string> robustness_lines(const Robustness& robustness, const Sc
              "%.1e |lambda|, %ld wrong verdicts",
              robustness.samples.size(), scene.uncertain.size(), robustness.basis, robustness.trained,
              robustness.checks.size(), robustness.outcome.residual, wrong_verdicts(robustness)),
-      "probability of squeal " + text_of(robustness.any, confidence)};
+      "probability of squeal " + probability_text(robustness.any, confidence)};
   for (const RobustMode& mode : robustness.modes)
     lines.push_back(
         (mode.number < 0 ? std::string("other modes: ") : format("mode at %.6g Hz: ", frequency_hz_of(mode.lambda))) +
-        text_of(mode.unstable, confidence) +
+        probability_text(mode.unstable, confidence) +
         format(", growth %.4g 1/s in the middle", part_of(mode.growth_rates, 0.5)));
   for (std::size_t i = 0; i < robustness.correlation.size(); ++i)
     lines.push_back(format("rank correlation of growth with %s: %+.2f",

@@ -48,7 +48,7 @@ std::span<double> numbers_of(const Target& target, WordsLeft& words)
   return (**vectors)[*place];
 }
 
-std::string kind_of(const Target& target)
+std::string kind_of_target(const Target& target)
 {
   if (std::holds_alternative<bool*>(target)) return "true or false";
   const bool is_list = std::holds_alternative<Vec3*>(target) || std::holds_alternative<std::optional<Vec3>*>(target) ||
@@ -95,7 +95,7 @@ FoundValue find_among(const SceneKeys& keys, const std::string& label, WordsLeft
       found = {a_number, &entries[*place], entries, *key, label};
   }
   else if (words.empty())
-    found.kind = kind_of(key->target);
+    found.kind = kind_of_target(key->target);
   if (found.effect == Effect::nothing) found.effect = key->effect;
   if (found.unit == "-" && has_unit(key->unit)) found.unit = key->unit;
   return found;

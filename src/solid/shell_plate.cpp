@@ -16,10 +16,10 @@ namespace squeal
 namespace
 {
 
-template <int n> using Gradients = Eigen::Matrix<double, 2, n>;
+template <int n> using PlaneGradients = Eigen::Matrix<double, 2, n>;
 
 /// Returns the edge function of side k: its tangential component is 1/L on this side and zero on the others.
-template <int n> Eigen::Vector2d edge_function(Eigen::Index k, const NodeValues& N, const Gradients<n>& g)
+template <int n> Eigen::Vector2d edge_function(Eigen::Index k, const NodeValues& N, const PlaneGradients<n>& g)
 {
   const auto j = (k + 1) % n;
   if constexpr (n == 3) return N(k) * g.col(j) - N(j) * g.col(k);
@@ -36,8 +36,8 @@ void add_plate(ShellStrains<n>& B, const PlanePositions<n>& X, const Eigen::Vect
   const ShapeFunctions at = shape_functions(n == 3 ? FaceShape::triangle3 : FaceShape::quad4, xi);
   const ShapeFunctions quadratic = shape_functions(n == 3 ? FaceShape::triangle6 : FaceShape::quad8, xi);
   const Eigen::Matrix2d inverse = (at.dN.topRows<2>() * X.transpose()).inverse();
-  const Gradients<n> g = inverse * at.dN.topRows<2>();
-  const Gradients<n> P = inverse * quadratic.dN.topRows<2>().rightCols(n);
+  const PlaneGradients<n> g = inverse * at.dN.topRows<2>();
+  const PlaneGradients<n> P = inverse * quadratic.dN.topRows<2>().rightCols(n);
   for (Eigen::Index i = 0; i < n; ++i)
   {
     B.template block<3, 1>(4, 6 * i + 4) << g(0, i), 0, g(1, i);   // beta_x = ry

@@ -18,9 +18,9 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr PetscInt sketched = 32;   // random vectors: a norm is off by 13 % (one standard deviation)
-constexpr double variance = 1. / 3; // of their entries, even in (-1, 1)
-constexpr double rounding = 1e-14;  // backward error that no correction makes smaller
+constexpr PetscInt sketched = 32;     // random vectors: a norm is off by 13 % (one standard deviation)
+constexpr double variance = 1. / 3;   // of their entries, even in (-1, 1)
+constexpr double least_error = 1e-14; // backward error that no correction makes smaller
 
 /// Factors of M, C, K and K_loss.
 std::array<Complex, 4> factors_at(Complex s)
@@ -69,7 +69,7 @@ void estimate_residuals(const HarmonicBasis& basis, ResponseEnd side, double ome
   {
     const double size = own.sizes[static_cast<std::size_t>(j)];
     residuals(j) = left.col(j).norm() / std::sqrt(variance * sketched) / size;
-    defects(j) = residuals(j) / std::max(tolerance, rounding * scale * a.col(j).norm() / size); // |V a| = |a|
+    defects(j) = residuals(j) / std::max(tolerance, least_error * scale * a.col(j).norm() / size); // |V a| = |a|
   }
 }
 

@@ -22,16 +22,17 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index sketched = 32;     // random vectors: their mean square is off by 25 % (one standard deviation)
-constexpr double basis_band = 1.1; // of the real modes, over the band
-constexpr std::size_t fewest = 20; // real modes
-constexpr double share = 0.02;     // directions of corrections below this part of the largest wait for the next pass
+constexpr Index sketched_sides = 32; // random vectors: their mean square is off by 25 % (one standard deviation)
+constexpr double basis_band = 1.1;   // of the real modes, over the band
+constexpr std::size_t fewest = 20;   // real modes
+constexpr double waiting_share =
+    0.02;                          // directions of corrections below this part of the largest wait for the next pass
 constexpr Index mixtures = 24;     // of the residuals of a side: more directions than that wait for the next pass
 constexpr Index small_basis = 120; // shapes: such a problem is solved whole at once
 constexpr double undamped_reach = 1.2; // undamped modes on which a large basis is solved first, over the window
 constexpr double slow = 0.8;           // ratio of errors before and after a correction that did not help
 constexpr int most_passes = 20;        // corrections of the basis; the first one of a brake may need more than 8
-constexpr double spurious = 1e-8;      // backward error of what is no mode
+constexpr double spurious_mode = 1e-8; // backward error of what is no mode
 
 /// The closed pairs taken out, and on the rows of B the damping of the friction direction and the stiffness of pairs
 /// with a compliance; null where there is none.
@@ -302,7 +303,7 @@ bool correct(ModesBasis& modes, MultiVector residuals)
   PetscInt unknowns = 0;
   check(MatGetSize(modes.K_z, &unknowns, nullptr));
   if (residuals.columns() == 0 || modes.basis.shapes() >= unknowns) return false;
-  orthonormalise(residuals, share * share);
+  orthonormalise(residuals, waiting_share * waiting_share);
   const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, residuals));
   ++modes.passes;
   return extend(modes.basis, product(modes.contact.Z, responses)) > 0;
@@ -340,7 +341,7 @@ PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const Proj
   for (std::size_t k = 0; k < solved.pairs.size(); ++k)
   {
     const double error = solved.backward_error(k);
-    if (error > std::max(spurious, problem.tolerance)) continue;
+    if (error > std::max(spurious_mode, problem.tolerance)) continue;
     result.outcome.residual = std::max(result.outcome.residual, error);
     result.pairs.push_back(std::move(solved.pairs[k]));
     result.errors.push_back(error);
@@ -359,7 +360,7 @@ bool in_band(const TwoSidedPair& pair, double band)
 
 ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>& closed)
 {
-  ModesBasis modes{make_basis(problem.structure, problem.interface, sketched)};
+  ModesBasis modes{make_basis(problem.structure, problem.interface, sketched_sides)};
   rebase(modes, problem, closed);
   return modes;
 }

@@ -12,7 +12,7 @@ namespace
 {
 
 constexpr double accepted = 1e-5; // error of M, C and K beside their size: growth rates are off by as much, at most
-constexpr double rounding = 1e-12;
+constexpr double rounding_of_fit = 1e-12;
 
 bool is_friction(const std::string& key)
 {
@@ -38,7 +38,7 @@ bool differ(Mat A, Mat B)
 {
   const Owned<Mat> difference = copy_of(A);
   check(MatAXPY(difference, -1, B, DIFFERENT_NONZERO_PATTERN));
-  return size_of(difference) > rounding * size_of(B);
+  return size_of(difference) > rounding_of_fit * size_of(B);
 }
 
 /// A += factor B on equal patterns.
@@ -56,7 +56,7 @@ void add(std::vector<double>& a, double factor, const std::vector<double>& b)
 /// A null matrix in place of one that is rounding.
 void drop_if_zero(Owned<Mat>& A, Mat reference)
 {
-  if (size_of(A) <= rounding * size_of(reference)) A = {};
+  if (size_of(A) <= rounding_of_fit * size_of(reference)) A = {};
 }
 
 /// A model with C without the viscous equivalent of loss factors.

@@ -13,7 +13,7 @@ namespace squeal
 namespace
 {
 
-using Places = std::vector<std::size_t>;
+using PointNumbers = std::vector<std::size_t>;
 
 /// Points of one step, at most. Three thresholds of up to 4 log2(1e5) points each (algebra/root.hpp) are fewer.
 constexpr int most_points = 200;
@@ -24,14 +24,14 @@ double instability(const Followed& point, std::size_t place)
 }
 
 /// The unstable modes among these come first, by falling growth.
-Places by_growth(const Followed& point, Places places)
+PointNumbers by_growth(const Followed& point, PointNumbers places)
 {
   std::ranges::stable_sort(places,
                            [&](std::size_t a, std::size_t b) { return instability(point, a) > instability(point, b); });
   return places;
 }
 
-std::size_t unstable_among(const Followed& point, const Places& places)
+std::size_t unstable_among(const Followed& point, const PointNumbers& places)
 {
   return static_cast<std::size_t>(
       std::ranges::count_if(places, [&](std::size_t place) { return instability(point, place) > 0; }));
@@ -40,7 +40,7 @@ std::size_t unstable_among(const Followed& point, const Places& places)
 /// Modes of two points that are each other's as a whole; or those of the band that are nobody's.
 struct Group
 {
-  Places from, to; // matched ones stand at the same place of both
+  PointNumbers from, to; // matched ones stand at the same place of both
   bool matched = true;
 };
 
@@ -82,9 +82,9 @@ bool changes(const Followed& a, const Followed& b, const Group& group)
 }
 
 /// Where modes go that are matched among themselves alone; nothing: they mix with others, or are lost.
-std::optional<Places> images(const Places& places, const std::vector<Match>& matches)
+std::optional<PointNumbers> images(const PointNumbers& places, const std::vector<Match>& matches)
 {
-  Places to;
+  PointNumbers to;
   for (const std::size_t i : places)
   {
     if (matches[i].to < 0) return std::nullopt;
@@ -136,7 +136,7 @@ private:
   struct Known
   {
     const Followed* point;
-    Places places;
+    PointNumbers places;
   };
 
   std::optional<Followed> point_at(double value)
@@ -169,7 +169,7 @@ private:
     const std::size_t before = unstable_among(a, group.from), after = unstable_among(b, group.to);
     if (!group.matched || before == after) return false;
     const std::size_t rank = std::min(before, after);
-    const auto ranked = [&](const Followed& point, const Places& places)
+    const auto ranked = [&](const Followed& point, const PointNumbers& places)
     { return instability(point, by_growth(point, places)[rank]); };
     std::vector<Known> known = {{&a, group.from}, {&b, group.to}};
     bool clear = true;
@@ -179,7 +179,7 @@ private:
       if (!here) return std::nullopt;
       const Known& nearest = *std::ranges::min_element(
           known, {}, [&](const Known& one) { return std::abs(one.point->values[0] - value); });
-      const std::optional<Places> places = images(nearest.places, search_.follow(*nearest.point, *here));
+      const std::optional<PointNumbers> places = images(nearest.places, search_.follow(*nearest.point, *here));
       points.push_back(std::move(*here));
       clear = places.has_value();
       if (!clear) return std::nullopt;
@@ -194,7 +194,7 @@ private:
   /// fewer. Modes that only seem to change places are none.
   void record(const Followed& a, Followed& b, const Group& group)
   {
-    const Places from = by_growth(a, group.from), to = by_growth(b, group.to);
+    const PointNumbers from = by_growth(a, group.from), to = by_growth(b, group.to);
     const std::size_t before = unstable_among(a, from), after = unstable_among(b, to);
     const bool gained = after > before;
     std::vector<int> tracks = tracks_that_change(a, b, group, gained);
