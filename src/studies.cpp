@@ -140,9 +140,9 @@ Robustness run_robustness(const Model& model, const Scene& scene, const ProgramO
   NearbyModels models(model, scene, PETSC_COMM_SELF);
   std::vector<std::string> keys;
   for (const UncertainNumber& number : scene.uncertain) keys.push_back(number.key);
-  const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(keys, values)); };
+  const auto model_at = [&](std::span<const double> values, MPI_Comm) { return models.at(numbers_of(keys, values)); };
   return find_robustness(
-      {*scene.robustness, scene.uncertain, model_at, scene.friction, scene.modes, options.modes, options.equilibrium},
+      {*scene.robustness, scene.uncertain, model_at, scene.modes, options.modes, options.equilibrium},
       comm_of(model.structure.load));
 }
 

@@ -74,9 +74,7 @@ void add_robustness(const Robustness& robustness, const Scene& scene, Json& entr
 {
   entry["samples"] = robustness.samples.size();
   entry["confidence"] = scene.robustness->confidence;
-  entry["training_points"] = robustness.trained;
   entry["basis_shapes"] = robustness.basis;
-  entry["model_error"] = robustness.model_error;
   entry["growth_error"] = robustness.outcome.residual;
   entry["wrong_verdicts"] = wrong_verdicts(robustness);
   entry["any"] = probability_entry(robustness.any);
@@ -136,10 +134,10 @@ std::vector<std::string> robustness_lines(const Robustness& robustness, const Sc
   if (robustness.samples.empty()) return {};
   const double confidence = scene.robustness->confidence;
   std::vector<std::string> lines = {
-      format("%zu samples of %zu random numbers on %d shapes from %d points; %zu computed in full: growth off by "
-             "%.1e |lambda|, %ld wrong verdicts",
-             robustness.samples.size(), scene.uncertain.size(), robustness.basis, robustness.trained,
-             robustness.checks.size(), robustness.outcome.residual, wrong_verdicts(robustness)),
+      format("%zu samples of %zu random numbers on %d shapes; %zu computed in full: growth off by %.1e |lambda|, "
+             "%ld wrong verdicts",
+             robustness.samples.size(), scene.uncertain.size(), robustness.basis, robustness.checks.size(),
+             robustness.outcome.residual, wrong_verdicts(robustness)),
       "probability of squeal " + probability_text(robustness.any, confidence)};
   for (const RobustMode& mode : robustness.modes)
     lines.push_back(

@@ -67,15 +67,6 @@ MatrixXcd form(const ExpandedModes& lefts, const ExpandedModes& rights, const Mu
   return result + bilinear(lefts.left, C_right);
 }
 
-MatrixXd all_macs(const ModeForms& forms)
-{
-  MatrixXd macs(forms.there.rows(), forms.there.cols());
-  for (Index i = 0; i < macs.rows(); ++i)
-    for (Index j = 0; j < macs.cols(); ++j)
-      macs(i, j) = folded(std::abs(forms.there(i, j) * forms.back(j, i) / (forms.first(i, i) * forms.second(j, j))));
-  return macs;
-}
-
 /// The MAC of two subspaces: the least modulus of the eigenvalues of first^-1 there second^-1 back, which are 1 for
 /// equal ones. It does not depend on the vectors that span them, which are nearly parallel at lock-in.
 double subspace_mac(const ModeForms& forms, const Places& from, const Places& to)
@@ -194,6 +185,15 @@ double folded(double ratio)
 {
   if (!std::isfinite(ratio)) return 0;
   return ratio > 1 ? 1 / ratio : ratio;
+}
+
+MatrixXd all_macs(const ModeForms& forms)
+{
+  MatrixXd macs(forms.there.rows(), forms.there.cols());
+  for (Index i = 0; i < macs.rows(); ++i)
+    for (Index j = 0; j < macs.cols(); ++j)
+      macs(i, j) = folded(std::abs(forms.there(i, j) * forms.back(j, i) / (forms.first(i, i) * forms.second(j, j))));
+  return macs;
 }
 
 ModeForms forms_between(const PointModes& from, const PointModes& to)

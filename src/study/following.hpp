@@ -45,6 +45,9 @@ struct ModeForms
   Eigen::MatrixXcd first, second;
 };
 
+/// The MAC of each mode of the first with each of the second point.
+Eigen::MatrixXd all_macs(const ModeForms& forms);
+
 /// On the basis that both points share; equal pairs are closed. Not collective.
 ModeForms forms_between(const PointModes& from, const PointModes& to);
 

@@ -368,7 +368,7 @@ ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>
 void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed)
 {
   const Structure& structure = problem.structure;
-  set_structure(modes.basis, structure);
+  set_model(modes.basis, structure, problem.interface);
   modes.closed = closed;
   modes.attached.assign(closed.size(), 0);
   modes.contact = eliminate_closed_pairs(structure, problem.interface, closed);
@@ -400,7 +400,7 @@ MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, cons
 PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
 {
   const auto& [structure, interface, equilibrium] = problem.sliding;
-  set_structure(modes.basis, structure);
+  set_model(modes.basis, structure, interface);
   const LinearisedPoint point = linearise_point(problem.sliding);
   attach(modes, interface, point.contact.pairs);
   const double end = two_pi * followed_band * problem.band;
@@ -411,7 +411,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   for (PetscInt pass = 0;; ++pass)
   {
     problem.end_if_asked();
-    const ProjectedSliding on_basis = project(modes.basis, point.contact, interface.B, point.damping, point.stiffness);
+    const ProjectedSliding on_basis = project(modes.basis, point.contact, point.damping, point.stiffness);
     SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
     double now = largest_excess(solved, problem);
     if (extent == Extent::near_band && now > 1 && now > slow * before)

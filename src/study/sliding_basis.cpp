@@ -74,6 +74,21 @@ bool set_matrix(SlidingBasis& basis, BasisImage& image, Mat A)
   return true;
 }
 
+/// Other degrees of freedom of the contact need other rows of every image.
+void set_contact(SlidingBasis& basis, Mat B)
+{
+  if (basis.B.get() == B) return;
+  std::vector<Index> dofs = dofs_with_entries(B);
+  int changed = dofs != basis.contact_dofs;
+  MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, comm_of(B));
+  basis.B = shared(B);
+  basis.by_Z.Z = {};
+  if (changed == 0) return;
+  basis.contact_dofs = std::move(dofs);
+  basis.whole_C = {};
+  for (BasisImage* image : {&basis.M, &basis.C, &basis.K, &basis.K_loss, &basis.G, &basis.H}) image->matrix = {};
+}
+
 void set_damping(SlidingBasis& basis, Mat M, Mat C, Mat K)
 {
   basis.rayleigh = rayleigh_part(M, C, K);
@@ -169,14 +184,14 @@ bool equal(Mat A, Mat B)
 }
 
 /// Sets the lift by Z where it has changed.
-void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact, Mat B)
+void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact)
 {
   LiftByZ& lift = basis.by_Z;
   if (lift.Z.get() && equal(lift.Z, contact.Z)) return;
   lift.Z = copy_of(contact.Z);
   PetscInt rows_of_B = 0;
-  check(MatGetSize(B, &rows_of_B, nullptr));
-  if (rows_of_B > 0) lift.of_B = product(B, basis.T);
+  check(MatGetSize(basis.B, &rows_of_B, nullptr));
+  if (rows_of_B > 0) lift.of_B = product(basis.B, basis.T);
   lift.pivots = local_pivots(contact);
   lift.in_contact.clear();
   lift.change = change_by_lift(basis, contact, lift.pivots, contact.Z);
@@ -207,9 +222,10 @@ struct PairMatrix
 
 /// T_Y'B'D B T_Z. Most rows of D are zero: of friction's damping those of normals and, mostly, along the drive. The
 /// others may hold no pivot: then B T_Y and B T_Z are B T there.
-MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& contact, const MultiVector& by_Y, Mat B,
+MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& contact, const MultiVector& by_Y,
                             const PairMatrix& D)
 {
+  const Mat B = basis.B;
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(B, &first, &last));
   std::vector<PetscInt> rows;
@@ -241,14 +257,14 @@ MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& cont
 
 SlidingBasis make_basis(const Structure& structure, const Interface& interface, Index sketched)
 {
-  SlidingBasis basis{random_multivector(structure.K, static_cast<PetscInt>(sketched)), sketched,
-                     dofs_with_entries(interface.B)};
-  set_structure(basis, structure);
+  SlidingBasis basis{random_multivector(structure.K, static_cast<PetscInt>(sketched)), sketched};
+  set_model(basis, structure, interface);
   return basis;
 }
 
-void set_structure(SlidingBasis& basis, const Structure& structure)
+void set_model(SlidingBasis& basis, const Structure& structure, const Interface& interface)
 {
+  set_contact(basis, interface.B);
   const Owned<Mat> C_0 = structure.K_loss.get() ? without_loss(structure.C, structure) : Owned<Mat>{};
   const Mat C = C_0.get() ? C_0 : structure.C;
   const bool other_M = set_matrix(basis, basis.M, structure.M), other_K = set_matrix(basis, basis.K, structure.K);
@@ -284,9 +300,9 @@ Index extend(SlidingBasis& basis, MultiVector X)
   return gained;
 }
 
-ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness)
+ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat damping, Mat stiffness)
 {
-  lift_by_Z(basis, contact, B);
+  lift_by_Z(basis, contact);
   const MultiVector by_Y = change_by_lift(basis, contact, basis.by_Z.pivots, contact.Y);
   const auto lifted = [&](const BasisImage& image) -> MatrixXd
   {
@@ -300,8 +316,8 @@ ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat 
     result.C = lifted(basis.C);
   if (basis.G.matrix.get()) result.C += lifted(basis.G);
   if (basis.H.matrix.get()) result.K += lifted(basis.H);
-  if (damping) result.C += projected_on_pairs(basis, contact, by_Y, B, {damping, true});
-  if (stiffness) result.K += projected_on_pairs(basis, contact, by_Y, B, {stiffness, false});
+  if (damping) result.C += projected_on_pairs(basis, contact, by_Y, {damping, true});
+  if (stiffness) result.K += projected_on_pairs(basis, contact, by_Y, {stiffness, false});
   result.kept = basis.by_Z.kept;
   result.independent = basis.by_Z.independent;
   return result;

@@ -41,7 +41,8 @@ struct SlidingBasis
 {
   MultiVector T;
   Eigen::Index sketched = 0;
-  std::vector<Eigen::Index> contact_dofs{}; // local rows, ascending
+  Owned<Mat> B{};                           // shared with the interface
+  std::vector<Eigen::Index> contact_dofs{}; // of B: local rows, ascending
   BasisImage M{}, C{}, K{}, K_loss{};       // C without the viscous equivalent of loss factors
   Owned<Mat> whole_C{};                     // the structure's, which C was taken from
   std::optional<Rayleigh> rayleigh{};       // of C, whose image has then the matrix alone
@@ -59,8 +60,8 @@ MultiVector combination_of_shapes(const SlidingBasis& basis, const Eigen::Matrix
 /// Appends what the shapes X add to the span. Returns the number of columns gained.
 Eigen::Index extend(SlidingBasis& basis, MultiVector X);
 
-/// Takes over the matrices of a structure where they have changed.
-void set_structure(SlidingBasis& basis, const Structure& structure);
+/// Takes over the matrices of a model where they have changed.
+void set_model(SlidingBasis& basis, const Structure& structure, const Interface& interface);
 
 /// The structure at a point, on T: Y'M Z, Y'(C + G + C_f) Z, Y'(K + H + B'S B) Z, with the inner products and the
 /// independent combinations of the lift.
@@ -70,7 +71,7 @@ struct ProjectedSliding
 };
 
 /// `damping`, `stiffness`: of the friction direction and S of pairs with a compliance, on the rows of B; may be null.
-ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat B, Mat damping, Mat stiffness);
+ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat damping, Mat stiffness);
 
 /// The degrees of freedom of x that are no pivots.
 MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact);

@@ -34,7 +34,9 @@ class Sweeper
 {
 public:
   Sweeper(const SweepProblem& problem, MPI_Comm comm)
-      : problem_(problem), comm_(comm), model_(problem, comm, [comm] { end_if_asked(comm); })
+      : problem_(problem), comm_(comm),
+        model_({problem.model_at, problem.modes, problem.modes_options, problem.equilibrium_options}, comm,
+               [comm] { end_if_asked(comm); })
   {
     sweep_.outcome.kind = OutcomeKind::converged;
   }

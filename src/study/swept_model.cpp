@@ -12,8 +12,9 @@
 namespace squeal
 {
 
-SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked)
-    : problem_(problem), comm_(comm), end_if_asked_(std::move(end_if_asked)), searched_(problem.equilibrium_options)
+SweptModel::SweptModel(SweptProblem problem, MPI_Comm comm, std::function<void()> end_if_asked)
+    : problem_(std::move(problem)), comm_(comm), end_if_asked_(std::move(end_if_asked)),
+      searched_(problem_.equilibrium_options)
 {
 }
 
@@ -111,6 +112,12 @@ void SweptModel::train_at(const SweptPlace& place, double tolerance)
 {
   PointModes modes = modes_at(place, tolerance);
   if (modes.outcome.kind == OutcomeKind::converged) trained_[place] = std::move(modes);
+}
+
+void SweptModel::forget(const SweptPlace& place)
+{
+  equilibria_.erase(place);
+  rigid_.erase(place);
 }
 
 bool SweptModel::same_pairs_closed(const SweptPlace& a, const SweptPlace& b)

@@ -17,12 +17,21 @@ struct ContactChange
   std::optional<double> failed{}; // where an equilibrium failed in the search, which has no other result then
 };
 
+/// How models and modes of the points are made.
+struct SweptProblem
+{
+  std::function<BrakeModel(std::span<const double> values, MPI_Comm comm)> model_at;
+  const ModesSettings& modes;
+  const ModesOptions& modes_options;
+  const EquilibriumOptions& equilibrium_options;
+};
+
 class SweptModel
 {
 public:
   /// Calls `end_if_asked` between parts of long work: equilibria of a search, corrections of the basis.
   SweptModel(
-      const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked = [] {});
+      SweptProblem problem, MPI_Comm comm, std::function<void()> end_if_asked = [] {});
 
   /// Finds the equilibrium of a point. The pairs that are closed at all points prepared are those of the basis.
   void prepare(const SweptPlace& place);
@@ -33,6 +42,9 @@ public:
 
   /// Makes the basis by a point, whose modes are then at hand when they are asked for next.
   void train_at(const SweptPlace& place, double tolerance);
+
+  /// Gives back the memory of a point.
+  void forget(const SweptPlace& place);
 
   /// The vectors of modes found at the point visited last, in the structure's degrees of freedom: the real parts of
   /// all, then the imaginary ones.
@@ -63,7 +75,7 @@ private:
   BasisProblem basis_problem(const Equilibrium& equilibrium) const;
   const std::vector<char>& rigid_at(const SweptPlace& place);
 
-  const SweepProblem& problem_;
+  SweptProblem problem_;
   MPI_Comm comm_;
   std::function<void()> end_if_asked_;
   Equilibria searched_;

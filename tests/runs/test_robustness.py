@@ -125,7 +125,6 @@ def test_samples_of_the_pin_are_single_runs(converged):
     assert sum(counts) == robustness["wrong_verdicts"] <= 1
     assert all(check["known"] for check in robustness["checks"])
     assert any(check["unstable_modes"] > 0 for check in robustness["checks"])
-    assert robustness["model_error"] < 1e-9  # all of them enter linearly, or as products of two
     # a sample whose growth is beyond that error
     row = next(row for row in rows_of(run)
                if abs(float(row["growth_rate"])) > 2 * robustness["growth_error"] * 2 * np.pi * float(row["frequency_hz"]))
@@ -179,11 +178,13 @@ def test_bad_input(ask, message, squeal):
     assert run.code == 1 and message in run.errors, run.errors
 
 
-def test_numbers_that_move_the_contact_are_refused(squeal):
-    run = squeal(*PIN, *random("{key='contact.0.rotation.centre.0', distribution='uniform', from=-0.01, to=0.01}",
-                               samples=10, checks=0), ranks=1)
+def test_numbers_that_move_the_contact(converged):
+    """The direction of sliding turns, and the rows of contact with it."""
+    run = converged(*PIN, "--set", "friction.coefficient=0.4",
+                    *random("{key='contact.0.rotation.centre.0', distribution='uniform', from=-0.03, to=0.03}",
+                            samples=6, checks=6), ranks=1)
     robustness = run.report["robustness"]
-    assert robustness["outcome"] == "refused" and "rows of contact" in robustness["reason"]
+    assert robustness["growth_error"] < 1e-3 and robustness["wrong_verdicts"] == 0
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

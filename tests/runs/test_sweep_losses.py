@@ -157,7 +157,7 @@ def test_random_numbers_are_single_runs(scene, numbers, converged):
     """Growth within 1e-3 of |lambda|, as it is asked for; the losses move it by up to a hundredth."""
     run = converged(*scene, *random(*numbers, samples=8, checks=4), ranks=1)
     robustness = run.report["robustness"]
-    assert robustness["growth_error"] < 1e-3 and robustness["model_error"] < 1e-9
+    assert robustness["growth_error"] < 1e-3
     assert all(check["known"] for check in robustness["checks"])
     assert any(check["unstable_modes"] > 0 for check in robustness["checks"])
     row = max(samples_of(run), key=lambda row: float(row["growth_rate"]))
@@ -167,7 +167,9 @@ def test_random_numbers_are_single_runs(scene, numbers, converged):
     assert min(abs(found.real - one.real) / abs(one) for one in single if abs(one - found) < 0.01 * abs(one)) < 1e-3
 
 
-def test_a_number_that_brings_what_the_medians_lack_is_refused(squeal):
-    run = squeal(*SPINNING, *random("{key='part.disc.rotation.rate', distribution='uniform', from=-100, to=100}", samples=10,
-                                    checks=0), ranks=1)
-    assert run.report["robustness"]["outcome"] == "refused" and "what spins" in run.report["robustness"]["reason"]
+def test_a_number_may_bring_what_the_medians_lack(converged):
+    """At the median nothing spins."""
+    run = converged(*SPINNING, *random("{key='part.disc.rotation.rate', distribution='uniform', from=-100, to=100}", samples=4,
+                                       checks=4), ranks=1)
+    robustness = run.report["robustness"]
+    assert robustness["growth_error"] < 1e-3 and robustness["wrong_verdicts"] == 0

@@ -1,6 +1,6 @@
 #pragma once
-/// How likely modes are unstable where numbers of the scene are random (src/README.md, section 12). Many samples are
-/// computed by reduced models on a basis of sliding modes of a few. Full models of some are the check.
+/// How likely modes are unstable where numbers of the scene are random (src/README.md, section 12). Samples are points
+/// of a sweep, on one basis that they share (section 10.2). Full models of some are the check.
 #include "squeal/study/sweep.hpp"
 
 namespace squeal
@@ -49,9 +49,8 @@ struct RobustCheck
   double growth_error = 0, frequency_error = 0;
 };
 
-/// outcome: "converged", "not converged" (samples or checks failed: how many, the first reason), "refused" (the
-/// matrices are no polynomial of the numbers), "off". residual: the largest growth error. iterations: number of
-/// samples.
+/// outcome: "converged", "not converged" (samples or checks failed: how many, the first reason), "off". residual: the
+/// largest growth error. iterations: number of samples.
 struct Robustness
 {
   Outcome outcome;
@@ -60,9 +59,7 @@ struct Robustness
   Probability any;               // at least one unstable mode
   std::vector<RobustCheck> checks;
   std::vector<double> correlation; // of each number with the largest growth ratio: Spearman's
-  int trained = 0;                 // full points that the basis is made of
-  int basis = 0;                   // shapes
-  double model_error = 0;          // of the matrices as polynomials of the numbers
+  int basis = 0;                   // shapes in the end
 };
 
 /// The scene's random numbers and how a sample is computed.
@@ -70,8 +67,7 @@ struct RobustnessProblem
 {
   const RobustnessSettings& settings;
   const std::vector<UncertainNumber>& numbers;
-  std::function<BrakeModel(std::span<const double> values)> model_at; // on MPI_COMM_SELF
-  FrictionLaw friction;                                               // of the scene
+  std::function<BrakeModel(std::span<const double> values, MPI_Comm comm)> model_at; // on MPI_COMM_SELF
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
