@@ -14,7 +14,7 @@ namespace
 
 constexpr std::size_t random_modes = 6; // the least stable ones
 
-State at_rest(const Equilibrium& equilibrium)
+State resting(const Equilibrium& equilibrium)
 {
   return {copy_of(equilibrium.u.get()), zeros_like(equilibrium.u), 0, equilibrium.reactions};
 }
@@ -31,7 +31,7 @@ double reference_amplitude(const UnstableModes& unstable)
 /// The sum of the least stable modes with random phases, each 0.1 to 2 times as large as the reference.
 State random_start(const AttractorProblem& problem, std::mt19937_64& generator)
 {
-  State start = at_rest(problem.sliding.equilibrium);
+  State start = resting(problem.sliding.equilibrium);
   const double reference = reference_amplitude(problem.unstable);
   for (std::size_t i = 0; i < std::min(random_modes, problem.modes.size()); ++i)
   {
@@ -53,7 +53,7 @@ std::vector<NamedStart> make_starts(const AttractorProblem& problem)
   const auto add = [&](const std::string& name, std::initializer_list<std::size_t> numbers)
   {
     if (starts.size() >= wanted) return;
-    State state = at_rest(equilibrium);
+    State state = resting(equilibrium);
     for (const std::size_t i : numbers)
     {
       const auto motion = estimated_motion(equilibrium, problem.unstable.modes[i], problem.unstable.estimates[i]);
