@@ -29,7 +29,8 @@ struct Arguments
   std::vector<std::string> overrides;
   RunLimits limits;
   Beginning beginning = Beginning::afresh;
-  bool dry_run = false, help = false, version = false, allow_scripts = false, force = false, reference = false;
+  bool dry_run = false, help = false, version = false, allow_scripts = false, force = false;
+  std::string reference;            // page to print; empty: none
   bool options_in_variable = false; // PETSC_OPTIONS
   std::string problem;              // said after MPI is up, once
 };
@@ -77,11 +78,12 @@ const std::array known_arguments = {
              [](Arguments& arguments, const std::string&) { arguments.version = true; }},
     Argument{"--help", nullptr, "this text; -help and -h as well",
              [](Arguments& arguments, const std::string&) { arguments.help = true; }},
-    Argument{"--reference", "keys", "the page of all keys, options and arguments, as Markdown",
+    Argument{"--reference", "PAGE", "keys or results: the page of all keys, options and arguments, or of all results",
              [](Arguments& arguments, const std::string& value)
              {
-               arguments.reference = value == "keys";
-               if (!arguments.reference) arguments.problem = "--reference " + shortened(value) + ": it takes keys";
+               arguments.reference = value;
+               if (value != "keys" && value != "results")
+                 arguments.problem = "--reference " + shortened(value) + ": it takes keys or results";
              }},
     Argument{"--allow-scripts", nullptr,
              "lets the scene's geometry run commands and write files, as gmsh's statements can",
@@ -215,6 +217,12 @@ void print_key_page()
       "One that no solver asks for is an error. Those of the whole run are:\n\n```text\n%s```\n",
       scene_reference().c_str(), arguments.c_str(), option_page().c_str(), prefixes.c_str(),
       session_option_reference().c_str());
+}
+
+/// The page inputs/RESULTS.md.
+void print_result_page()
+{
+  std::fputs(result_page().c_str(), stdout);
 }
 
 void print_versions()
@@ -387,9 +395,13 @@ int main(int argc, char** argv)
   Session session(argc, argv, nullptr);
   end_with_launcher();
   const int rank = rank_of(PETSC_COMM_WORLD);
-  if (arguments.help || arguments.version || arguments.reference)
+  if (arguments.help || arguments.version || !arguments.reference.empty())
   {
-    if (rank == 0) arguments.help ? print_help() : arguments.version ? print_versions() : print_key_page();
+    if (rank == 0)
+      arguments.help                     ? print_help()
+      : arguments.version                ? print_versions()
+      : arguments.reference == "results" ? print_result_page()
+                                         : print_key_page();
     return 0;
   }
   try

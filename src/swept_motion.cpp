@@ -2,7 +2,7 @@
 
 #include "squeal/coarse.hpp"
 #include "squeal/find_motion.hpp"
-#include "squeal/report/heard.hpp"
+#include "squeal/report/report.hpp"
 #include "squeal/study/reversed.hpp"
 
 #include <cmath>

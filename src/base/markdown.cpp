@@ -9,9 +9,11 @@ std::string markdown_row(const std::vector<std::string>& cells)
   for (const std::string& cell : cells)
   {
     row += ' ';
+    bool is_code = false;
     for (const char letter : cell)
     {
-      if (letter == '|' || letter == '<') row += '\\';
+      is_code ^= letter == '`';
+      if (letter == '|' || (letter == '<' && !is_code)) row += '\\';
       row += letter;
     }
     row += cell.empty() ? "|" : " |";

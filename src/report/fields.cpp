@@ -2,11 +2,9 @@
 ///
 /// One temporal collection, a grid per sample of the cycle; the equilibrium and the modes are the same data in each.
 /// Without a cycle it has one grid. XDMF lists an element as its code and then its nodes, in VTK's order.
-#include "squeal/report/fields.hpp"
-
 #include "files.hpp"
 #include "squeal/base/whole_file.hpp"
-#include "squeal/report/result_files.hpp"
+#include "squeal/report/results_folder.hpp"
 #include "squeal/solid/probes.hpp"
 
 #include <algorithm>
@@ -50,32 +48,18 @@ XdmfShape xdmf_shape(Shape shape)
 
 constexpr int polyvertex = 1; // followed by its number of nodes
 
-/// What a field has values at, as XDMF calls it.
-enum class Center
-{
-  node,
-  cell,
-};
-
-constexpr std::array xdmf_centers = {"Node", "Cell"};
-
-Words words_of(Center)
-{
-  return xdmf_centers;
-}
-
-struct Attribute
+/// A field at the nodes, a scalar or a vector, by its name in ParaView and the name of its data.
+struct Field
 {
   std::string name, data;
-  Center center{};
   int components = 1;
 };
 
-/// Where each field of the file stands, for the XDMF text.
+/// Sizes and fields of the file, for the XDMF text.
 struct Layout
 {
   std::size_t nodes = 0, cells = 0, topology = 0; // topology: integers
-  std::vector<Attribute> still;                   // the same at every time
+  std::vector<Field> still;                       // the same at every time
   std::vector<double> time;                       // [s]
 };
 
@@ -99,59 +83,19 @@ void write_mesh(Hdf5File& file, const Mesh& mesh, Layout& layout)
   layout.nodes = mesh.nodes.size();
   layout.cells = part.size();
   layout.topology = topology.size();
-  file.write("mesh/nodes", {layout.nodes, 3}, position, "m");
-  file.write("mesh/topology", {topology.size()}, topology, "XDMF mixed topology");
-  file.write("mesh/part", {part.size()}, part, "index of the scene's part; -1: a point");
-  layout.still.push_back({"part", "mesh/part", Center::cell, 1});
+  file.write("mesh/nodes", position, 3);
+  file.write("mesh/topology", topology);
+  file.write("mesh/part", part);
 }
-
-/// Brings vectors of degrees of freedom to rank 0 as nodal displacements.
-class Gather
-{
-public:
-  Gather(const Model& nodes) : nodes_(nodes)
-  {
-    check(VecScatterCreateToZero(nodes.structure.load, scatter_.put(), whole_.put()));
-  }
-
-  /// Collective. x y z of every node [m] on rank 0, empty elsewhere.
-  std::vector<double> nodal(Vec u) const
-  {
-    check(VecScatterBegin(scatter_, u, whole_, INSERT_VALUES, SCATTER_FORWARD));
-    check(VecScatterEnd(scatter_, u, whole_, INSERT_VALUES, SCATTER_FORWARD));
-    PetscInt size = 0;
-    check(VecGetLocalSize(whole_, &size));
-    if (size == 0) return {};
-    const PetscScalar* values = nullptr;
-    check(VecGetArrayRead(whole_, &values));
-    std::vector<double> displacement;
-    displacement.reserve(3 * nodes_.mesh.nodes.size());
-    for (std::size_t node = 0; node < nodes_.mesh.nodes.size(); ++node)
-      for (int component = 0; component < 3; ++component)
-      {
-        double sum = 0;
-        for (const DofTerm& term : nodes_.dofs.terms_of(static_cast<PetscInt>(6 * node) + component))
-          sum += term.factor * values[term.dof];
-        displacement.push_back(sum);
-      }
-    check(VecRestoreArrayRead(whole_, &values));
-    return displacement;
-  }
-
-private:
-  const Model& nodes_;
-  Owned<VecScatter> scatter_;
-  Owned<Vec> whole_;
-};
 
 /// Reactions of the equilibrium at the nodes of the pairs. Those of a pair are at its own node, and by their weights
 /// at the nodes of the other side. Either side has the sum of all.
-void write_contact(Hdf5File& file, const Equilibrium& equilibrium, const Model& nodes, Layout& layout)
+void write_contact(Hdf5File& file, const Equilibrium& equilibrium, const Model& model, Layout& layout)
 {
   const PairView reactions(equilibrium.reactions, equilibrium.directions);
-  const std::vector<ContactPair>& pairs = nodes.interface.geometry;
+  const std::vector<ContactPair>& pairs = model.interface.geometry;
   if (pairs.empty() || reactions.pairs() != pairs.size()) return;
-  std::vector<double> normal(nodes.mesh.nodes.size(), 0), friction = normal, area = normal, pressure = normal;
+  std::vector<double> normal(model.mesh.nodes.size(), 0), friction = normal, area = normal, pressure = normal;
   const auto add = [&](std::size_t i, int number, double share)
   {
     const auto node = static_cast<std::size_t>(number);
@@ -170,51 +114,46 @@ void write_contact(Hdf5File& file, const Equilibrium& equilibrium, const Model& 
   }
   for (std::size_t node = 0; node < area.size(); ++node)
     pressure[node] = area[node] > 0 ? pressure[node] / area[node] : 0;
-  file.write("equilibrium/normal_reaction", {normal.size()}, normal, "N");
-  file.write("equilibrium/friction_reaction", {friction.size()}, friction, "N");
-  file.write("equilibrium/pressure", {pressure.size()}, pressure, "Pa");
-  layout.still.push_back({"contact pressure at equilibrium [Pa]", "equilibrium/pressure", Center::node, 1});
-  layout.still.push_back({"normal reaction at equilibrium [N]", "equilibrium/normal_reaction", Center::node, 1});
-  layout.still.push_back({"friction at equilibrium [N]", "equilibrium/friction_reaction", Center::node, 1});
+  const auto write = [&](const char* name, const char* data, const std::vector<double>& values)
+  {
+    file.write(data, values);
+    layout.still.push_back({name, data});
+  };
+  write("contact pressure at equilibrium [Pa]", "equilibrium/pressure", pressure);
+  write("normal reaction at equilibrium [N]", "equilibrium/normal_reaction", normal);
+  write("friction at equilibrium [N]", "equilibrium/friction_reaction", friction);
 }
 
 /// The pairs, one a row, with the reactions and pressures of the equilibrium where there is one.
 void write_pairs(Hdf5File& file, const Equilibrium& equilibrium, const Interface& interface)
 {
   const std::vector<ContactPair>& pairs = interface.geometry;
-  const std::size_t n = pairs.size();
-  if (n == 0) return;
-  std::vector<int> node, contact;
-  std::vector<double> position, normal, first, second, area, reaction, pressure;
-  const auto add = [](std::vector<double>& rows, const auto& entries)
-  { rows.insert(rows.end(), entries.begin(), entries.end()); };
-  const bool is_solved = equilibrium.reactions.size() == interface.size();
-  for (std::size_t i = 0; i < n; ++i)
+  if (pairs.empty()) return;
+  const auto write = [&](const char* name, auto value_of)
   {
-    const ContactPair& pair = pairs[i];
-    node.push_back(pair.node);
-    contact.push_back(pair.contact);
-    add(position, pair.position);
-    add(normal, pair.normal);
-    add(first, interface.tangents[i][0]);
-    add(second, interface.tangents[i][1]);
-    area.push_back(pair.area);
-    if (!is_solved) continue;
-    const PairVector r = PairView(equilibrium.reactions, equilibrium.directions).vector(i);
-    add(reaction, r);
-    pressure.push_back(pair.area > 0 ? r[0] / pair.area : 0);
-  }
-  file.write("pairs/node", {n}, node, "index in mesh/nodes, of the slave side");
-  file.write("pairs/contact", {n}, contact, "index of the scene's contact");
-  file.write("pairs/position", {n, 3}, position, "m");
-  file.write("pairs/normal", {n, 3}, normal, "-");
-  file.write("pairs/tangent_1", {n, 3}, first, "-");
-  file.write("pairs/tangent_2", {n, 3}, second, "-");
-  file.write("pairs/area", {n}, area, "m2");
-  file.write("pairs/gap", {n}, interface.gap, "m");
-  if (!is_solved) return;
-  file.write("pairs/reaction", {n, 3}, reaction, "N");
-  file.write("pairs/pressure", {n}, pressure, "Pa");
+    std::vector<decltype(value_of(0))> values;
+    for (std::size_t i = 0; i < pairs.size(); ++i) values.push_back(value_of(i));
+    file.write(name, values);
+  };
+  const auto write_vector = [&](const char* name, auto vector_of)
+  {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+      for (const double entry : vector_of(i)) values.push_back(entry);
+    file.write(name, values, 3);
+  };
+  write("pairs/node", [&](std::size_t i) { return pairs[i].node; });
+  write("pairs/contact", [&](std::size_t i) { return pairs[i].contact; });
+  write("pairs/area", [&](std::size_t i) { return pairs[i].area; });
+  write("pairs/gap", [&](std::size_t i) { return interface.gap[i]; });
+  write_vector("pairs/position", [&](std::size_t i) { return pairs[i].position; });
+  write_vector("pairs/normal", [&](std::size_t i) { return pairs[i].normal; });
+  write_vector("pairs/tangent_1", [&](std::size_t i) { return interface.tangents[i][0]; });
+  write_vector("pairs/tangent_2", [&](std::size_t i) { return interface.tangents[i][1]; });
+  if (equilibrium.reactions.size() != interface.size()) return;
+  const PairView reactions(equilibrium.reactions, equilibrium.directions);
+  write_vector("pairs/reaction", [&](std::size_t i) { return reactions.vector(i); });
+  write("pairs/pressure", [&](std::size_t i) { return pairs[i].area > 0 ? reactions.normal(i) / pairs[i].area : 0; });
 }
 
 std::string data_item(const std::string& data, const std::string& dimensions, const char* type)
@@ -225,14 +164,17 @@ std::string data_item(const std::string& data, const std::string& dimensions, co
 constexpr const char* integers = "NumberType=\"Int\" Precision=\"4\"";
 constexpr const char* reals = "NumberType=\"Float\" Precision=\"8\"";
 
-std::string attribute_text(const Attribute& attribute, const Layout& layout)
+std::string attribute_text(const char* type, const char* center, const std::string& name, const std::string& item)
 {
-  const bool vector = attribute.components == 3;
-  const bool cell = attribute.center == Center::cell;
-  const std::string size = std::to_string(cell ? layout.cells : layout.nodes) + (vector ? " 3" : "");
-  return "        <Attribute Name=\"" + attribute.name + "\" AttributeType=\"" + (vector ? "Vector" : "Scalar") +
-         "\" Center=\"" + word(attribute.center) + "\">" + data_item(attribute.data, size, cell ? integers : reals) +
+  return "        <Attribute Name=\"" + name + "\" AttributeType=\"" + type + "\" Center=\"" + center + "\">" + item +
          "</Attribute>\n";
+}
+
+std::string field_text(const Field& field, const Layout& layout)
+{
+  const bool is_vector = field.components == 3;
+  const std::string size = std::to_string(layout.nodes) + (is_vector ? " 3" : "");
+  return attribute_text(is_vector ? "Vector" : "Scalar", "Node", field.name, data_item(field.data, size, reals));
 }
 
 std::string cycle_data(std::size_t sample)
@@ -256,24 +198,81 @@ std::string xdmf_text(const Layout& layout, const std::string& run)
          << data_item("mesh/topology", std::to_string(layout.topology), integers) << "</Topology>\n"
          << "        <Geometry GeometryType=\"XYZ\">"
          << data_item("mesh/nodes", std::to_string(layout.nodes) + " 3", reals) << "</Geometry>\n";
-    for (const Attribute& attribute : layout.still) text << attribute_text(attribute, layout);
-    if (!layout.time.empty())
-      text << attribute_text({"displacement in the cycle [m]", cycle_data(i), Center::node, 3}, layout);
+    text << attribute_text("Scalar", "Cell", "part", data_item("mesh/part", std::to_string(layout.cells), integers));
+    for (const Field& field : layout.still) text << field_text(field, layout);
+    if (!layout.time.empty()) text << field_text({"displacement in the cycle [m]", cycle_data(i), 3}, layout);
     text << "      </Grid>\n";
   }
   text << "    </Grid>\n  </Domain>\n</Xdmf>\n";
   return text.str();
 }
 
-/// Collective. One nodal vector field into the file of rank 0.
-void write_nodal(std::optional<Hdf5File>& file, const Gather& gather, Vec u, const std::string& data,
-                 const std::string& unit, MPI_Comm comm)
+/// fields.h5 while it is written. The file is rank 0's; functions are collective.
+class Fields
 {
-  const std::vector<double> nodal = gather.nodal(u);
-  on_rank_zero(comm, [&] { file->write(data, {nodal.size() / 3, 3}, nodal, unit); });
-}
+public:
+  Fields(const Model& model, const std::filesystem::path& place, const std::string& run, MPI_Comm comm)
+      : model_(model), comm_(comm)
+  {
+    check(VecScatterCreateToZero(model.structure.load, scatter_.put(), whole_.put()));
+    on_rank_zero(comm, [&] { write_mesh(file_.emplace(place, run, field_sets), model.mesh, layout); });
+  }
 
-void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Modes& modes, Layout& layout, MPI_Comm comm)
+  /// Work on rank 0 alone.
+  template <class Work> void on_file(Work work)
+  {
+    on_rank_zero(comm_, [&] { work(*file_); });
+  }
+
+  /// Writes a vector of degrees of freedom as nodal displacements.
+  void write(Vec u, const std::string& data)
+  {
+    const std::vector<double> values = nodal(u);
+    on_file([&](Hdf5File& file) { file.write(data, values, 3); });
+  }
+
+  /// The same of a field that ParaView shows at all times.
+  void write_still(Vec u, const std::string& data, const std::string& name)
+  {
+    write(u, data);
+    layout.still.push_back({name, data, 3});
+  }
+
+  Layout layout;
+
+private:
+  /// x y z of every node [m] on rank 0, empty elsewhere.
+  std::vector<double> nodal(Vec u) const
+  {
+    check(VecScatterBegin(scatter_, u, whole_, INSERT_VALUES, SCATTER_FORWARD));
+    check(VecScatterEnd(scatter_, u, whole_, INSERT_VALUES, SCATTER_FORWARD));
+    PetscInt size = 0;
+    check(VecGetLocalSize(whole_, &size));
+    if (size == 0) return {};
+    const PetscScalar* values = nullptr;
+    check(VecGetArrayRead(whole_, &values));
+    std::vector<double> displacement;
+    displacement.reserve(3 * model_.mesh.nodes.size());
+    for (std::size_t node = 0; node < model_.mesh.nodes.size(); ++node)
+      for (int component = 0; component < 3; ++component)
+      {
+        double sum = 0;
+        for (const DofTerm& term : model_.dofs.terms_of(static_cast<PetscInt>(6 * node) + component))
+          sum += term.factor * values[term.dof];
+        displacement.push_back(sum);
+      }
+    check(VecRestoreArrayRead(whole_, &values));
+    return displacement;
+  }
+
+  const Model& model_;
+  MPI_Comm comm_;
+  Owned<VecScatter> scatter_;
+  Owned<Vec> whole_;
+  std::optional<Hdf5File> file_; // on rank 0
+};
+
+void write_modes(Fields& fields, const Modes& modes)
 {
   int number = 0;
   for (const ComplexMode& mode : modes.modes)
@@ -281,28 +280,26 @@ void write_modes(std::optional<Hdf5File>& file, const Gather& gather, const Mode
     const bool grows = is_unstable(mode.lambda);
     if (!grows && modes.shapes == ModeShapes::unstable) continue;
     const std::string data = "modes/" + std::to_string(++number) + "/";
-    std::ostringstream name;
-    name << (grows ? "unstable mode " : "mode ") << number << ", " << std::lround(mode.frequency_hz()) << " Hz, ";
-    write_nodal(file, gather, mode.real, data + "real", "m", comm);
-    write_nodal(file, gather, mode.imaginary, data + "imaginary", "m", comm);
-    layout.still.push_back({name.str() + "real part", data + "real", Center::node, 3});
-    layout.still.push_back({name.str() + "imaginary part", data + "imaginary", Center::node, 3});
+    const std::string name =
+        format("%s %d, %ld Hz, ", grows ? "unstable mode" : "mode", number, std::lround(mode.frequency_hz()));
+    fields.write_still(mode.real, data + "real", name + "real part");
+    fields.write_still(mode.imaginary, data + "imaginary", name + "imaginary part");
   }
 }
 
 constexpr Eigen::Index shown_shapes = 6; // of a settled motion in ParaView
 
-void write_motion_shapes(std::optional<Hdf5File>& file, const Gather& gather, const MotionShapes& shapes, Vec like,
-                         Layout& layout, MPI_Comm comm)
+void write_motion_shapes(Fields& fields, const MotionShapes& shapes, Vec like)
 {
   const Owned<Vec> shape = zeros_like(like);
   for (Eigen::Index i = 0; i < shapes.V.columns(); ++i)
   {
     copy_column(shapes.V, i, shape);
     const std::string number = std::to_string(i + 1), data = "settled/shape_" + number;
-    write_nodal(file, gather, shape, data, "kg^-1/2", comm);
     if (i < shown_shapes)
-      layout.still.push_back({"shape " + number + " of the settled motion [kg^-1/2]", data, Center::node, 3});
+      fields.write_still(shape, data, "shape " + number + " of the settled motion [kg^-1/2]");
+    else
+      fields.write(shape, data);
   }
 }
 
@@ -315,51 +312,38 @@ double sample_time(const LimitCycle& cycle, std::size_t sample)
 
 } // namespace
 
-void write_fields(const Report& report, const Scene& scene, const Model& nodes, const std::filesystem::path& output,
+void write_fields(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
                   MPI_Comm comm)
 {
-  const auto place = output / word(ResultFile::fields), xdmf = output / word(ResultFile::field_places);
   if (scene.matrices) return;
-  Layout layout;
-  std::optional<Hdf5File> file; // on rank 0
-  on_rank_zero(comm,
-               [&]
-               {
-                 write_mesh(file.emplace(place, report.run), nodes.mesh, layout);
-                 write_pairs(*file, report.point.equilibrium, nodes.interface);
-                 if (!scene.probes.empty())
-                   file->write("probes/node", {scene.probes.size()}, probed_nodes(scene.probes, nodes.mesh),
-                               "index in mesh/nodes");
-               });
-  const Gather gather(nodes);
-  if (report.point.equilibrium.u.get())
-  {
-    write_nodal(file, gather, report.point.equilibrium.u, "equilibrium/displacement", "m", comm);
-    layout.still.push_back({"displacement at equilibrium [m]", "equilibrium/displacement", Center::node, 3});
-    on_rank_zero(comm, [&] { write_contact(*file, report.point.equilibrium, nodes, layout); });
-  }
-  write_modes(file, gather, report.point.modes, layout, comm);
-  on_rank_zero(comm,
-               [&]
-               {
-                 for (int number = 0; const ModeCauses& causes : report.sensitivity.modes)
-                   file->write("modes/" + std::to_string(++number) + "/pair_power", {causes.pair_powers.size()},
-                               causes.pair_powers, "1/s");
-               });
+  const Equilibrium& equilibrium = report.point.equilibrium;
+  const LimitCycle& cycle = report.motion.cycle;
+  Fields fields(model, output / word(ResultFile::fields), report.run, comm);
+  fields.on_file(
+      [&](Hdf5File& file)
+      {
+        write_pairs(file, equilibrium, model.interface);
+        if (!scene.probes.empty()) file.write("probes/node", probed_nodes(scene.probes, model.mesh));
+        if (equilibrium.u.get()) write_contact(file, equilibrium, model, fields.layout);
+        for (int number = 0; const ModeCauses& causes : report.sensitivity.modes)
+          file.write(format("modes/%d/pair_power", ++number), causes.pair_powers);
+      });
+  if (equilibrium.u.get())
+    fields.write_still(equilibrium.u, "equilibrium/displacement", "displacement at equilibrium [m]");
+  write_modes(fields, report.point.modes);
   if (has_run(report.motion.settled.outcome))
-    write_motion_shapes(file, gather, report.motion.settled.shapes, nodes.structure.load, layout, comm);
-  const auto& samples = report.motion.cycle.measured.displacements;
-  for (std::size_t i = 0; i < samples.size(); ++i)
+    write_motion_shapes(fields, report.motion.settled.shapes, model.structure.load);
+  for (std::size_t i = 0; i < cycle.measured.displacements.size(); ++i)
   {
-    write_nodal(file, gather, samples[i], cycle_data(i), "m", comm);
-    layout.time.push_back(sample_time(report.motion.cycle, i));
+    fields.write(cycle.measured.displacements[i], cycle_data(i));
+    fields.layout.time.push_back(sample_time(cycle, i));
   }
-  on_rank_zero(comm,
-               [&]
-               {
-                 file->keep();
-                 write_whole_file(xdmf, xdmf_text(layout, report.run));
-               });
+  fields.on_file(
+      [&](Hdf5File& file)
+      {
+        file.keep();
+        write_whole_file(output / word(ResultFile::field_places), xdmf_text(fields.layout, report.run));
+      });
 }
 
 } // namespace squeal

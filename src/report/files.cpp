@@ -1,11 +1,11 @@
 #include "files.hpp"
 
 #include "squeal/base/error.hpp"
+#include "squeal/base/markdown.hpp"
 #include "squeal/base/whole_file.hpp"
 
 #include <algorithm>
-#include <functional>
-#include <numeric>
+#include <cmath>
 #include <utility>
 
 namespace squeal
@@ -15,9 +15,6 @@ namespace fs = std::filesystem;
 
 namespace
 {
-
-// Of the superblock of version 0, which HDF5 writes unless it is asked for a later one (HDF5 File Format, II.A).
-constexpr ssize_t consistency_flags = 20, superblock = 96; // [bytes] where the flags are, size
 
 /// Closes an HDF5 object when it goes out of scope.
 class Handle
@@ -46,9 +43,31 @@ void write_attribute(hid_t object, const std::string& name, const std::string& t
   if (H5Awrite(attribute, type, text.c_str()) < 0) throw Error("cannot write attribute " + name);
 }
 
+/// Whether a data set has this name, in which a <placeholder> stands for the rest of a group's name.
+bool is_of(std::string_view pattern, std::string_view name)
+{
+  for (std::size_t at = 0; (at = pattern.find('<')) != std::string_view::npos;)
+  {
+    if (name.substr(0, at) != pattern.substr(0, at)) return false;
+    pattern.remove_prefix(pattern.find('>') + 1);
+    name.remove_prefix(std::min(name.find('/', at), name.size()));
+  }
+  return pattern == name;
+}
+
+/// The numbers of a value: of a word its place among the words.
+Json numbers_of(const Result& result)
+{
+  if (result.value.is_array()) return result.value;
+  if (result.words.empty()) return Json::array({result.value});
+  const auto is_word = [&](const char* one) { return result.value == one; };
+  return Json::array({std::ranges::find_if(result.words, is_word) - result.words.begin()});
+}
+
 } // namespace
 
-Hdf5File::Hdf5File(fs::path place, const std::string& run) : place_(std::move(place))
+Hdf5File::Hdf5File(fs::path place, const std::string& run, std::span<const DataSet> sets)
+    : place_(std::move(place)), sets_(sets)
 {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); // failures become our errors instead of a printed stack
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, place_.string());
@@ -69,53 +88,65 @@ void Hdf5File::keep()
 {
   H5Fflush(id_, H5F_SCOPE_GLOBAL);
   const ssize_t size = H5Fget_file_image(id_, nullptr, 0);
-  void* memory = nullptr; // where the driver keeps the address of the file's bytes: no copy is made
-  if (size < superblock || H5Fget_vfd_handle(id_, H5P_DEFAULT, &memory) < 0)
+  std::string bytes(static_cast<std::size_t>(std::max<ssize_t>(size, 0)), '\0');
+  if (size <= 0 || H5Fget_file_image(id_, bytes.data(), bytes.size()) != size)
     throw Error("cannot write " + place_.string() + ": HDF5 does not hand out the file that it made in memory");
-  char* const bytes = *static_cast<char**>(memory);
-  std::fill_n(bytes + consistency_flags, 4, '\0'); // no longer open for writing
-  write_whole_file(place_, {bytes, static_cast<std::size_t>(size)});
+  write_whole_file(place_, bytes);
   H5Fclose(std::exchange(id_, -1));
 }
 
-void Hdf5File::write_data(const std::string& name, const std::vector<hsize_t>& shape, hid_t type, std::size_t size,
-                          const void* data, const std::string& unit)
+const DataSet& Hdf5File::set_of(const std::string& name) const
+{
+  const auto found = std::ranges::find_if(sets_, [&](const DataSet& set) { return is_of(set.name, name); });
+  if (found == sets_.end()) throw Error("no data set " + name + " is described");
+  return *found;
+}
+
+void Hdf5File::write_data(const DataSet& described, const std::string& name, const std::vector<hsize_t>& shape,
+                          hid_t type, const void* data)
 {
   const std::string what = place_.string() + ":" + name;
-  if (std::accumulate(shape.begin(), shape.end(), hsize_t{1}, std::multiplies<>()) != size)
-    throw Error("cannot write " + what + ": shape and data disagree");
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, what);
   H5Pset_create_intermediate_group(links, 1);
   const Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose, what);
   const Handle set(H5Dcreate2(id_, name.c_str(), type, space, links, H5P_DEFAULT, H5P_DEFAULT), H5Dclose, what);
-  if (size > 0 && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
+  if (shape.front() > 0 && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
     throw Error("cannot write " + what + ": HDF5 refused it; is there memory for the file?");
-  write_attribute(set, "unit", unit);
+  write_attribute(set, "unit", described.unit);
+  write_attribute(set, "meaning", described.meaning);
 }
 
-void Hdf5File::write(const std::string& name, const std::vector<hsize_t>& shape, const std::vector<double>& data,
-                     const std::string& unit)
+void Hdf5File::write_columns(const std::string& group, const Result& list)
 {
-  write_data(name, shape, H5T_NATIVE_DOUBLE, data.size(), data.data(), unit);
+  for (const auto& [first, data_set, cells] : columns_of(list))
+  {
+    if (data_set.empty()) continue;
+    std::vector<double> reals;
+    bool is_whole = true;
+    for (const Result* cell : cells)
+      for (const Json& number : cell ? numbers_of(*cell) : Json::array({nullptr}))
+      {
+        is_whole = is_whole && !number.is_number_float();
+        reals.push_back(number.is_null() ? std::nan("") : number.get<double>());
+      }
+    std::vector<int> integers;
+    for (const double real : reals) integers.push_back(std::isfinite(real) ? static_cast<int>(real) : -1);
+    std::vector<hsize_t> shape = {cells.size()};
+    if (first->value.is_array()) shape.push_back(reals.size() / cells.size());
+    const std::string unit = column_unit(*first);
+    const DataSet set = {"", unit.c_str(), first->meaning};
+    if (is_whole)
+      write_data(set, group + "/" + data_set, shape, H5T_NATIVE_INT, integers.data());
+    else
+      write_data(set, group + "/" + data_set, shape, H5T_NATIVE_DOUBLE, reals.data());
+  }
 }
 
-void Hdf5File::write(const std::string& name, const std::vector<hsize_t>& shape, const std::vector<int>& data,
-                     const std::string& unit)
+std::string page_rows(std::span<const DataSet> sets)
 {
-  write_data(name, shape, H5T_NATIVE_INT, data.size(), data.data(), unit);
-}
-
-void Hdf5File::write(const std::string& name, const std::vector<hsize_t>& shape, const std::vector<unsigned char>& data,
-                     const std::string& unit)
-{
-  write_data(name, shape, H5T_NATIVE_UCHAR, data.size(), data.data(), unit);
-}
-
-std::string csv_text(const std::string& text)
-{
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
+  std::string rows;
+  for (const DataSet& set : sets) rows += markdown_row({markdown_code(set.name), set.unit, set.meaning});
+  return rows;
 }
 
 } // namespace squeal

@@ -1,4 +1,4 @@
-#include "squeal/report/heard.hpp"
+#include "squeal/report/report.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,12 +1,7 @@
 #include "files.hpp"
-#include "robustness_results.hpp"
+#include "results.hpp"
 #include "squeal/base/whole_file.hpp"
-#include "squeal/report/fields.hpp"
-#include "squeal/report/history.hpp"
-#include "squeal/report/json.hpp"
-#include "squeal/report/result_files.hpp"
-#include "sweep_motion_results.hpp"
-#include "sweep_results.hpp"
+#include "squeal/report/results_folder.hpp"
 
 #include <cctype>
 #include <dmumps_c.h>
@@ -103,14 +98,17 @@ void write_results(const Report& report, const Scene& scene, const Model& nodes,
                    MPI_Comm comm)
 {
   const auto write = [&](ResultFile file, const std::string& text) { write_whole_file(output / word(file), text); };
+  const auto write_list = [&](ResultFile file, const Result& list)
+  {
+    if (!list.parts.empty()) write(file, csv_of(list));
+  };
   on_rank_zero(comm,
                [&]
                {
                  write_history(report, scene, output / word(ResultFile::history));
-                 if (has_run(report.sweep.outcome)) write(ResultFile::sweep, sweep_csv(report.sweep, scene));
-                 if (has_motions(report.sweep)) write(ResultFile::sweep_motions, motions_csv(report.sweep, scene));
-                 if (has_run(report.robustness.outcome))
-                   write(ResultFile::robustness, robustness_csv(report.robustness, scene));
+                 write_list(ResultFile::sweep, sweep_modes(report.sweep, scene, Content::results));
+                 write_list(ResultFile::sweep_motions, sweep_motions(report.sweep, scene));
+                 write_list(ResultFile::robustness, robustness_samples(report.robustness, scene, Content::results));
                });
   write_fields(report, scene, nodes, output, comm);
   // Last: where there is a report, the rest is there too.

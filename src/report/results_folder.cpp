@@ -139,14 +139,11 @@ ResultsFolder::ResultsFolder(const fs::path& place, Beginning beginning, MPI_Com
                    place_ = resolved(place);
                    make(beginning);
                  }
-                 catch (const fs::filesystem_error& error)
+                 catch (const std::exception& failure)
                  {
                    undo();
-                   refuse_folder(place, error.code().message());
-                 }
-                 catch (...)
-                 {
-                   undo();
+                   if (const auto* system = dynamic_cast<const fs::filesystem_error*>(&failure))
+                     refuse_folder(place, system->code().message());
                    throw;
                  }
                });
@@ -171,17 +168,9 @@ void ResultsFolder::make(Beginning beginning)
   const fs::path partial = place_.string() + partial_ending;
   fs::create_directories(partial.parent_path());
   refuse_foreign(partial);
-  const bool is_new = fs::create_directory(partial);
-  std::string holder;
-  try
-  {
-    holder = lock(partial);
-  }
-  catch (...)
-  {
-    if (is_new) partial_ = partial; // to be removed
-    throw;
-  }
+  if (fs::create_directory(partial)) partial_ = partial; // to be removed if it cannot be locked
+  const std::string holder = lock(partial);
+  partial_.clear();
   if (!holder.empty())
     throw Error("another run writes into " + place_.string() + " (" + holder +
                 ": its start, machine and process); wait for its end, or name another folder with --output DIR");

@@ -1,13 +1,10 @@
-#include "sweep_results.hpp"
-
-#include "derived.hpp"
+/// Results of sweeps and of random samples.
+#include "results.hpp"
 #include "squeal/scene/numbers.hpp"
-#include "sweep_motion_results.hpp"
 
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <nlohmann/json.hpp>
 
 namespace squeal
 {
@@ -15,20 +12,12 @@ namespace squeal
 namespace
 {
 
-using Json = nlohmann::ordered_json;
-
-/// Of a point or a threshold.
-template <class At> int direction_of(const At& at)
-{
-  return at.reversed ? -1 : 1;
-}
-
 /// A followed mode in one direction of rotation, where it grows most.
 struct Track
 {
   int number = 0;
-  const SweepPoint* point = nullptr;
-  const SweptMode* mode = nullptr;
+  SweptPlace place;
+  SweptMode mode{};
   int points = 0, unstable = 0; // where it was found, and where it is unstable
   double least_mac = 1;
 };
@@ -43,12 +32,11 @@ std::vector<Track> unstable_tracks(const Sweep& sweep)
       if (mode.track < 0) continue;
       Track& track = tracks[{mode.track, point.reversed}];
       track.number = mode.track;
-      ++track.points;
       track.unstable += is_unstable(mode.lambda);
       track.least_mac = std::min(track.least_mac, mode.mac);
-      if (track.mode && track.mode->lambda.real() >= mode.lambda.real()) continue;
-      track.point = &point;
-      track.mode = &mode;
+      if (track.points++ > 0 && track.mode.lambda.real() >= mode.lambda.real()) continue;
+      track.place = {point.values, point.reversed};
+      track.mode = mode;
     }
   std::vector<Track> unstable;
   for (const auto& [key, track] : tracks)
@@ -56,188 +44,246 @@ std::vector<Track> unstable_tracks(const Sweep& sweep)
   return unstable;
 }
 
-Json point_entry(const SweepPoint& point)
+/// Where a point, a threshold or a track is.
+void add_place(Entry out, const char* meaning, const std::vector<double>& values, bool reversed)
 {
-  Json entry = {{"values", point.values}, {"direction", direction_of(point)}};
-  entry["outcome"] = word(point.outcome.kind);
-  if (!point.outcome.reason.empty()) entry["reason"] = point.outcome.reason;
-  entry["inserted"] = point.inserted;
-  entry["closed"] = point.closed;
-  entry["unstable_modes"] = point.unstable;
-  if (point.modes.empty()) return entry;
-  entry["growth_rate"] = point.modes.front().lambda.real();
-  entry["frequency_hz"] = frequency_hz_of(point.modes.front().lambda);
-  return entry;
+  out.show("values", "units of the keys", meaning, values).column("value");
+  out.show("direction", "-", "1: rotation as in the scene, -1: reversed", reversed ? -1 : 1).column("direction");
 }
 
-/// Of points whose modes are not followed.
-std::string unstable_points_text(const Sweep& sweep)
+/// Where a line of a table is: a value of each number.
+void add_line_place(Entry out, const std::vector<double>& values, bool reversed)
 {
-  const SweepPoint* most = nullptr;
-  for (const SweepPoint& point : sweep.points)
-    if (point.unstable > 0 && (!most || most->modes.front().lambda.real() < point.modes.front().lambda.real()))
-      most = &point;
-  const auto count = std::ranges::count_if(sweep.points, [](const SweepPoint& point) { return point.unstable > 0; });
-  std::string text = format("unstable at %td of %zu points", count, sweep.points.size());
-  if (!most) return text;
-  const std::complex<double> lambda = most->modes.front().lambda;
-  return text + format(", most at %s%s: %.7g Hz, growth %.6g 1/s", text_of(most->values).c_str(),
-                       most->reversed ? " reversed" : "", frequency_hz_of(lambda), lambda.real());
+  for (std::size_t i = 0; i < values.size(); ++i)
+    out.add(out.scene().sweep->key[i], "unit of the key", "value of the number", values[i]);
+  if (out.is_example()) out.add("<key>", "unit of the key", "value of each number", 0);
+  out.add("direction", "-", "1: rotation as in the scene, -1: reversed", reversed ? -1 : 1);
+}
+
+void add_motion(Entry out, const SweptMotion& motion)
+{
+  const char *const fluctuating = "mean_fluctuating_energy", *const estimated = "estimated_amplitude";
+  out.add("outcome", "word", "outcome of the search; `settled`: the settled motion answers", word(motion.outcome.kind));
+  out.text("reason", "why it failed, or what is undecided", motion.outcome.reason);
+  out.add("kind", "kind of what attracts", motion.kind).column("kind");
+  out.add("stability", "verdict on the cycle found; empty: none was examined", motion.stability).column("stability");
+  out.add("frequency_hz", "Hz", "of the cycle, or of the strongest line", motion.frequency_hz).column("frequency_hz");
+  out.add(fluctuating, "J", "mean energy about equilibrium", motion.energy.value).column(fluctuating);
+  out.add("energy_error", "J", "of a settled motion: its error", motion.energy.error).column("energy_error");
+  out.add("largest_multiplier", "-", "modulus of the cycle's", motion.multiplier).column("largest_multiplier");
+  out.add("multiplier_error", "-", "its error bar", motion.multiplier_error).column("multiplier_error");
+  out.add(estimated, "m", "amplitude by the energy estimate", motion.estimate).column(estimated);
+  out.add("residual", "-", "full-space residual of the cycle", motion.residual).column("residual");
+  add_probes(out.hidden(), "peak_to_peak", "swing of the probe within a period", motion.peak_to_peak);
+  out.add("steps_per_period", "-", "time steps a period", motion.steps_per_period);
+  out.add("periods_integrated", "-", "periods that were integrated", motion.periods);
+  out.show("heard", "text", "what is heard, in a sentence", motion.heard);
+}
+
+void add_point(Entry out, const SweepPoint& point)
+{
+  add_place(out, "value of each number", point.values, point.reversed);
+  out.add("outcome", "word", "`converged`, or how the point failed", word(point.outcome.kind));
+  out.text("reason", "why it failed", point.outcome.reason);
+  out.add("inserted", "switch", "between the scene's points, where pairs or modes change much", point.inserted);
+  out.add("closed", "-", "closed pairs", point.closed).column("closed");
+  out.show("unstable_modes", "-", "unstable modes in the band", point.unstable).column("unstable_modes");
+  if (out.has(!point.modes.empty()))
+  {
+    const std::complex<double> lambda = point.modes.empty() ? 0 : point.modes.front().lambda;
+    out.show("growth_rate", "1/s", "growth rate of the least stable mode", lambda.real());
+    out.show("frequency_hz", "Hz", "frequency of that mode", frequency_hz_of(lambda));
+  }
+  if (out.has(point.motion.has_value()))
+    add_motion(out.group("motion", "motion"), point.motion.value_or(SweptMotion{}));
+}
+
+void add_track(Entry out, const Track& track)
+{
+  out.show("track", "-", "number of a mode that is unstable somewhere in that direction", track.number);
+  out.show("points", "-", "points in that direction where it was found", track.points);
+  out.show("unstable_points", "-", "those of them where it is unstable", track.unstable);
+  out.show("least_mac", "-", "its least MAC", track.least_mac);
+  out.show("greatest_growth_rate", "1/s", "its greatest growth rate", track.mode.lambda.real());
+  out.show("frequency_hz", "Hz", "its frequency there", frequency_hz_of(track.mode.lambda));
+  add_place(out, "where that is", track.place.values, track.place.reversed);
+}
+
+void add_threshold(Entry out, const Threshold& threshold)
+{
+  add_place(out, "where a mode becomes unstable or stable along the first number", threshold.values,
+            threshold.reversed);
+  out.show("error", "unit of the key", "length of the interval that holds the first value", threshold.error);
+  out.show("track", "-", "number of the mode", threshold.track);
+  out.show("frequency_hz", "Hz", "its frequency there", threshold.frequency_hz);
+  out.show("change", "-", "change of the number of unstable modes with a rising number", threshold.change);
+}
+
+/// A mode of a point; null: the point has none.
+void add_mode(Entry out, const SweepPoint& point, const SweptMode* mode)
+{
+  add_line_place(out, point.values, point.reversed);
+  out.add("inserted", "switch", "as `sweep.points[].inserted`", point.inserted);
+  out.add("outcome", "word", "as `sweep.points[].outcome`", word(point.outcome.kind));
+  out.add("closed_pairs", "-", "closed pairs", point.closed);
+  if (!mode) return;
+  out.add("track", "-", "number of the followed mode; empty: none", mode->track < 0 ? Json() : Json(mode->track));
+  out.add("frequency_hz", "Hz", "its frequency", frequency_hz_of(mode->lambda));
+  out.add("growth_rate", "1/s", "its growth rate", mode->lambda.real());
+  out.add("damping_ratio", "-", "its damping ratio", damping_ratio_of(mode->lambda));
+  out.add("backward_error", "-", "the larger one of its right and its left vector", mode->backward_error);
+  out.add("mac", "-", "MAC with the mode of this track at the point before", mode->mac);
+  out.add("subspace", "-", "modes that were followed together and share this MAC", mode->subspace);
+}
+
+/// The value below which a part of an ascending list is.
+double part_of(const std::vector<double>& ascending, double part)
+{
+  if (ascending.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const double place = part * static_cast<double>(ascending.size() - 1);
+  const auto below = static_cast<std::size_t>(place);
+  const std::size_t above = std::min(below + 1, ascending.size() - 1);
+  return ascending[below] + (place - static_cast<double>(below)) * (ascending[above] - ascending[below]);
+}
+
+void add_probability(Entry out, const char* meaning, const Probability& probability)
+{
+  out.show("unstable_samples", "-", meaning, probability.count);
+  out.show("probability", "-", "their part of all with an equilibrium", probability.estimate());
+  out.show("lower", "-", "lower end of its interval", probability.lower);
+  out.show("upper", "-", "upper end of its interval", probability.upper);
+}
+
+void add_random_mode(Entry out, const RobustMode& mode)
+{
+  const auto &growth = mode.growth_rates, &frequency = mode.frequencies;
+  out.add("mode", "-", "number of a mode of the medians; -1: modes like none of them", mode.number);
+  if (out.has(mode.number >= 0))
+  {
+    out.show("median_frequency_hz", "Hz", "its frequency at the medians", frequency_hz_of(mode.lambda));
+    out.add("median_growth_rate", "1/s", "its growth rate there", mode.lambda.real());
+  }
+  add_probability(out, "samples where it is unstable", mode.unstable);
+  out.add("growth_rate_5", "1/s", "5 % of the growth rates where it is unstable lie below", part_of(growth, 0.05));
+  out.show("growth_rate_50", "1/s", "50 % lie below", part_of(growth, 0.5));
+  out.add("growth_rate_95", "1/s", "95 % lie below", part_of(growth, 0.95));
+  out.add("frequency_hz_5", "Hz", "5 % of the frequencies where it is unstable lie below", part_of(frequency, 0.05));
+  out.add("frequency_hz_50", "Hz", "50 % lie below", part_of(frequency, 0.5));
+  out.add("frequency_hz_95", "Hz", "95 % lie below", part_of(frequency, 0.95));
+}
+
+void add_number(Entry out, const UncertainNumber& number, double correlation)
+{
+  add_key(out, "random number", number.key);
+  out.show("distribution", "its distribution", number.distribution);
+  out.show("rank_correlation", "-", "Spearman's, with the largest growth rate over abs(lambda)", correlation);
+}
+
+void add_check(Entry out, const RobustCheck& check)
+{
+  out.add("sample", "-", "number of a sample that was computed in full, from 0", check.sample);
+  out.add("known", "switch", "both models have modes", check.known);
+  out.add("unstable_modes", "-", "unstable modes of the full model", check.unstable);
+  out.add("unstable_modes_reduced", "-", "unstable modes of the reduced one", check.unstable_reduced);
+  out.add("growth_error", "-", "largest error of a growth rate over abs(lambda)", check.growth_error);
+  out.add("frequency_error", "-", "largest error of an angular frequency over abs(lambda)", check.frequency_error);
+}
+
+void add_random_sample(Entry out, const RobustSample& sample)
+{
+  for (std::size_t i = 0; i < sample.values.size(); ++i)
+    out.add(out.scene().uncertain[i].key, "unit of the key", "value of the random number", sample.values[i]);
+  if (out.is_example()) out.add("<key>", "unit of the key", "value of each random number", 0);
+  out.add("values", "units of the keys", "values of the random numbers", sample.values).column("value");
+  out.add("known", "-", "1: there is an equilibrium", sample.known ? 1 : 0).column("known");
+  out.add("closed_pairs", "-", "closed pairs", sample.closed).column("closed");
+  out.add("unstable_modes", "-", "unstable modes in the band", sample.unstable).column("unstable_modes");
+  out.add("growth_rate", "1/s", "greatest growth rate over abs(lambda)", sample.growth_rate).column("growth_rate");
+  out.add("frequency_hz", "Hz", "frequency of that mode", sample.frequency_hz).column("frequency");
+  out.add("mode", "-", "its number in `robustness.modes[]` if it is unstable; -1: none", sample.mode).column("mode");
 }
 
 } // namespace
 
-std::string text_of(const std::vector<double>& values)
+void add_sweep(Entry out, const Report& report)
 {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ", ") + format("%.7g", value);
-  return text;
-}
-
-void add_sweep(const Sweep& sweep, const Scene& scene, Json& entry)
-{
-  const SweepSettings& settings = *scene.sweep;
-  entry["keys"] = settings.key;
+  const Sweep& sweep = report.sweep;
+  const SweepSettings& settings = *out.scene().sweep;
+  std::vector<std::string> names, units;
   for (const std::string& key : settings.key)
   {
-    entry["names"].push_back(name_of_number(scene, key));
-    entry["units"].push_back(unit_of_number(scene, key));
+    names.push_back(name_of_number(out.scene(), key));
+    units.push_back(unit_of_number(out.scene(), key));
   }
-  entry["stages"] = word(settings.stages);
-  entry["directions"] = word(settings.directions);
-  entry["followed_modes"] = sweep.tracks;
-  entry["lost_modes"] = sweep.lost;
-  entry["steps_cut_short"] = sweep.cut_short;
-  entry["least_mac"] = sweep.least_mac;
-  entry["least_mac_across"] = sweep.least_mac_across;
-  entry["residual"] = sweep.outcome.residual;
-  entry["basis_shapes"] = sweep.basis;
-  entry["basis_corrections"] = sweep.passes;
-  entry["groups"] = sweep.groups;
-  entry["points"] = Json::array();
-  for (const SweepPoint& point : sweep.points)
-  {
-    Json& added = entry["points"].emplace_back(point_entry(point));
-    if (point.motion) added["motion"] = motion_entry(*point.motion, scene);
-  }
-  entry["unstable_tracks"] = Json::array();
-  for (const Track& track : unstable_tracks(sweep))
-    entry["unstable_tracks"].push_back({{"track", track.number},
-                                        {"points", track.points},
-                                        {"unstable_points", track.unstable},
-                                        {"least_mac", track.least_mac},
-                                        {"greatest_growth_rate", track.mode->lambda.real()},
-                                        {"frequency_hz", frequency_hz_of(track.mode->lambda)},
-                                        {"values", track.point->values},
-                                        {"direction", direction_of(*track.point)}});
-  entry["thresholds"] = Json::array();
-  for (const Threshold& threshold : sweep.thresholds)
-    entry["thresholds"].push_back({{"values", threshold.values},
-                                   {"direction", direction_of(threshold)},
-                                   {"error", threshold.error},
-                                   {"track", threshold.track},
-                                   {"frequency_hz", threshold.frequency_hz},
-                                   {"change", threshold.change}});
+  const auto unstable = std::ranges::count_if(sweep.points, [](const SweepPoint& point) { return point.unstable > 0; });
+  out.show("keys", "text", "numbers that are swept", settings.key);
+  out.show("names", "text", "a name for the place in each key; empty where the key says it", names);
+  out.show("units", "text", "unit of each", units);
+  out.add("stages", "stages at each point, as the scene says", settings.stages);
+  out.add("directions", "directions of rotation, as the scene says", settings.directions);
+  out.show("unstable_points", "-", "points where a mode is unstable", unstable);
+  out.show("followed_modes", "-", "modes that were followed; their tracks count from 0", sweep.tracks);
+  out.show("lost_modes", "-", "times that a mode of the band was not found again at the next point", sweep.lost);
+  out.show("steps_cut_short", "-", "steps that need more points: modes may be mistaken", sweep.cut_short);
+  out.show("least_mac", "-", "least MAC of a followed mode with the point before", sweep.least_mac);
+  out.show("least_mac_across", "-", "least MAC where pairs open or close; 1: none below 0.9", sweep.least_mac_across);
+  out.show("residual", "-", "largest backward error of right and left vectors", sweep.outcome.residual);
+  out.add("basis_shapes", "-", "shapes of the basis in the end", sweep.basis);
+  out.add("basis_corrections", "-", "corrections of the basis by residuals", sweep.passes);
+  out.add("groups", "-", "groups of ranks that shared the points", sweep.groups);
+  out.curve("points", add_point, sweep.points);
+  out.list("unstable_tracks", add_track, unstable_tracks(sweep));
+  out.list("thresholds", add_threshold, sweep.thresholds);
 }
 
-void write_sweep(Hdf5File& file, const Sweep& sweep, const Scene& scene)
+Result sweep_modes(const Sweep& sweep, const Scene& scene, Content content)
 {
-  const std::size_t points = sweep.points.size(), tracks = static_cast<std::size_t>(sweep.tracks);
-  const double none = std::numeric_limits<double>::quiet_NaN();
-  std::vector<double> values, frequency(points * tracks, none), growth(points * tracks, none),
-      mac(points * tracks, none);
-  std::vector<int> direction, closed, unstable;
-  for (std::size_t i = 0; i < points; ++i)
-  {
-    const SweepPoint& point = sweep.points[i];
-    values.insert(values.end(), point.values.begin(), point.values.end());
-    direction.push_back(direction_of(point));
-    closed.push_back(point.closed);
-    unstable.push_back(point.unstable);
-    for (const SweptMode& mode : point.modes)
+  Result rows{.kind = Result::Kind::list};
+  const Entry out(rows, scene, content);
+  if (const SweptMode any; out.is_example()) add_mode(out.group(""), {}, &any);
+  for (const SweepPoint& point : sweep.points)
+    if (point.modes.empty())
+      add_mode(out.group(""), point, nullptr);
+    else
+      for (const SweptMode& mode : point.modes) add_mode(out.group(""), point, &mode);
+  return rows;
+}
+
+Result sweep_motions(const Sweep& sweep, const Scene& scene)
+{
+  Result rows{.kind = Result::Kind::list};
+  for (const SweepPoint& point : sweep.points)
+    if (point.motion)
     {
-      if (mode.track < 0) continue;
-      const std::size_t place = i * tracks + static_cast<std::size_t>(mode.track);
-      frequency[place] = frequency_hz_of(mode.lambda);
-      growth[place] = mode.lambda.real();
-      mac[place] = mode.mac;
+      const Entry row = Entry(rows, scene, Content::results).group("");
+      add_line_place(row, point.values, point.reversed);
+      add_motion(row, *point.motion);
     }
-  }
-  if (points == 0) return;
-  file.write("sweep/value", {points, values.size() / points}, values, "units of the keys");
-  file.write("sweep/direction", {points}, direction, "1 as in the scene, -1 reversed");
-  file.write("sweep/closed", {points}, closed, "pairs");
-  file.write("sweep/unstable_modes", {points}, unstable, "-");
-  write_motions(file, sweep, scene);
-  if (tracks == 0) return;
-  file.write("sweep/frequency", {points, tracks}, frequency, "Hz");
-  file.write("sweep/growth_rate", {points, tracks}, growth, "1/s");
-  file.write("sweep/mac", {points, tracks}, mac, "-");
+  return rows;
 }
 
-std::string sweep_csv(const Sweep& sweep, const Scene& scene)
+void add_robustness(Entry out, const Report& report)
 {
-  std::string text;
-  for (const std::string& key : scene.sweep->key) text += csv_text(key) + ",";
-  text += "direction,inserted,outcome,closed_pairs,track,frequency_hz,growth_rate,damping_ratio,backward_error,mac,"
-          "subspace\n";
-  for (const SweepPoint& point : sweep.points)
-  {
-    std::string head;
-    for (const double value : point.values) head += format("%.17g,", value);
-    head += format("%d,%d,%s,%d,", direction_of(point), point.inserted ? 1 : 0, word(point.outcome.kind), point.closed);
-    if (point.modes.empty()) text += head + ",,,,,,\n";
-    for (const SweptMode& mode : point.modes)
-      text += head + (mode.track < 0 ? "" : std::to_string(mode.track)) +
-              format(",%.17g,%.17g,%.17g,%.3g,%.6g,%d\n", frequency_hz_of(mode.lambda), mode.lambda.real(),
-                     damping_ratio_of(mode.lambda), mode.backward_error, mode.mac, mode.subspace);
-  }
-  return text;
+  const Robustness& robustness = report.robustness;
+  const auto is_wrong = [](const RobustCheck& check)
+  { return check.known && check.unstable != check.unstable_reduced; };
+  out.show("samples", "-", "number of samples", robustness.samples.size());
+  out.show("confidence", "-", "confidence of the intervals", out.scene().robustness->confidence);
+  add_probability(out.group("any"), "samples with an unstable mode", robustness.any);
+  out.show("basis_shapes", "-", "shapes of the basis", robustness.basis);
+  out.show("growth_error", "-", "error of growth rates over abs(lambda) in the checks", robustness.outcome.residual);
+  out.show("wrong_verdicts", "-", "checks with another number of unstable modes",
+           std::ranges::count_if(robustness.checks, is_wrong));
+  out.list("modes", add_random_mode, robustness.modes);
+  out.list("numbers", add_number, out.scene().uncertain, robustness.correlation);
+  out.list("checks", add_check, robustness.checks);
 }
 
-std::vector<std::string> sweep_lines(const Sweep& sweep, const Scene& scene)
+Result robustness_samples(const Robustness& robustness, const Scene& scene, Content content)
 {
-  constexpr std::size_t shown = 12;
-  if (sweep.points.empty()) return {};
-  std::string keys;
-  for (const std::string& key : scene.sweep->key) keys += (keys.empty() ? "" : " and ") + number_text(scene, key);
-  std::vector<std::string> lines = {format("%zu points of %s", sweep.points.size(), keys.c_str())};
-  if (scene.sweep->stages == SweepStages::equilibrium) return lines;
-  lines.back() += format("; backward error %.1e at most, on a basis of %d shapes after %d corrections",
-                         sweep.outcome.residual, sweep.basis, sweep.passes);
-  if (sweep.groups > 1) lines.back() += format(", by %d groups of ranks", sweep.groups);
-  if (sweep.tracks > 0)
-  {
-    lines.push_back(
-        format("%d modes followed, MAC %.3f at least, %d lost on the way", sweep.tracks, sweep.least_mac, sweep.lost));
-    if (sweep.least_mac_across < 1)
-      lines.back() += format("; MAC %.3f at least where pairs open or close", sweep.least_mac_across);
-  }
-  else
-    lines.push_back(unstable_points_text(sweep));
-  if (sweep.cut_short > 0)
-    lines.push_back(format("WARNING: in %d of the steps more points in between are needed than are put there: "
-                           "modes may be mistaken there, and thresholds missed",
-                           sweep.cut_short));
-  const std::vector<Track> unstable = unstable_tracks(sweep);
-  for (std::size_t i = 0; i < std::min(shown, unstable.size()); ++i)
-  {
-    const Track& track = unstable[i];
-    lines.push_back(format("mode %d unstable at %d of %d points%s, most at %s: %.7g Hz, growth %.6g 1/s", track.number,
-                           track.unstable, track.points, track.point->reversed ? " reversed" : "",
-                           text_of(track.point->values).c_str(), frequency_hz_of(track.mode->lambda),
-                           track.mode->lambda.real()));
-  }
-  for (std::size_t i = 0; i < std::min(shown, sweep.thresholds.size()); ++i)
-  {
-    const Threshold& t = sweep.thresholds[i];
-    lines.push_back(format("threshold of mode %d at %s%s +- %.1e, %.7g Hz (%+d)", t.track, text_of(t.values).c_str(),
-                           t.reversed ? " reversed" : "", t.error, t.frequency_hz, t.change));
-  }
-  if (sweep.thresholds.size() > shown || unstable.size() > shown)
-    lines.emplace_back("the rest is in report.json and sweep.csv");
-  for (std::string& line : motion_lines(sweep)) lines.push_back(std::move(line));
-  return lines;
+  Result rows;
+  Entry(rows, scene, content).list("samples", add_random_sample, robustness.samples);
+  return std::move(rows.parts.front());
 }
 
 } // namespace squeal

@@ -10,7 +10,7 @@ import h5py
 import pytest
 from conftest import INPUTS, ROOT, Run
 
-GUIDE, KEYS, RESULTS = (INPUTS / f"{name}.md" for name in ("README", "KEYS", "RESULTS"))
+GUIDE, KEYS, RESULTS, FILES = (INPUTS / f"{name}.md" for name in ("README", "KEYS", "RESULTS", "RUNS"))
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?(?!\w)")
 # Relative tolerance of the numbers of a line. Iterations, and which pair opens in which step, move with the rounding.
@@ -111,9 +111,16 @@ def helped(tmp_path_factory):
     return Run(["-help"], 1, tmp_path_factory.mktemp("help")).printed
 
 
-def test_keys_are_what_the_program_writes(tmp_path):
-    """`squeal --reference keys > inputs/KEYS.md` renews the page."""
-    assert Run(["--reference", "keys"], 1, tmp_path).printed == KEYS.read_text()
+@pytest.mark.parametrize("page", [KEYS, RESULTS])
+def test_pages_are_what_the_program_writes(page, tmp_path):
+    """`squeal --reference keys > inputs/KEYS.md` renews the page, `--reference results` the other one."""
+    assert Run(["--reference", page.stem.lower()], 1, tmp_path).printed == page.read_text()
+
+
+def test_every_result_has_a_meaning():
+    """In a row with all of its cells."""
+    rows = [cells for _, cells in tables(RESULTS)]
+    assert len(rows) > 300 and all(len(cells) == 3 and all(cells) for cells in rows)
 
 
 def test_every_key_has_a_meaning():
@@ -223,7 +230,7 @@ def test_every_data_set_is_explained(written, name):
 
 def test_words_of_outcomes_and_choices_are_explained():
     """Every word that the program may write or read, from the tables of its sources."""
-    pages = "".join(page.read_text() for page in (ROOT / "README.md", GUIDE, KEYS, RESULTS))
+    pages = "".join(page.read_text() for page in (ROOT / "README.md", GUIDE, KEYS, RESULTS, FILES))
     found = 0
     for file in [*(ROOT / "include").rglob("*.hpp"), *(ROOT / "src").rglob("*.[ch]pp")]:
         for words in re.findall(r"std::array \w+_words\s*=\s*\{(.*?)\}", file.read_text(), re.S):

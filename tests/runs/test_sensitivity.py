@@ -1,5 +1,7 @@
 """Derivatives against central differences of single runs, powers against the growth rate, changes against their prediction."""
 
+import re
+
 import h5py
 import numpy as np
 import pytest
@@ -217,7 +219,7 @@ def test_changes_move_the_growth_as_predicted(tmp_path, squeal):
     run = squeal(scene, "--set", "transient.enabled=false", "--set", "cycle.enabled=false", ranks=1)
     assert run.code == 0, run.errors
     mode = run.report["sensitivity"]["modes"][0]
-    assert "0.002 kg and 0.001 N s/m at pad_y: growth" in run.printed
+    assert re.search(r"^ +pad_y +0\.002 +0\.001 +0 +-?\d", run.printed, re.M)
     springs = [share["name"] for share in mode["shares"] if share["table"] == "spring"]
     assert "spring.1 (pad to ground)" in springs and len(set(springs)) == len(springs)
     for change in mode["changes"]:
@@ -249,7 +251,7 @@ def test_numbers_are_called_by_name(tmp_path, converged):
     assert mass["value"] == 0.4 and mass["known"]
     sweep = run.report["sweep"]
     assert sweep["names"] == ["", "on caliper"] and sweep["units"] == ["kg", "N"]
-    assert "force.0.vector.2 (on caliper)" in run.printed
+    assert re.search(r"force\.0\.vector\.2$", run.printed, re.M) and re.search(r"names +, on caliper$", run.printed, re.M)
 
 
 def test_ranks_agree(explained, squeal):

@@ -1,10 +1,7 @@
 // ranks: 1 2 3
+#include "squeal/report/report.hpp"
 #include "../support/temporary_folder.hpp"
 #include "squeal/model.hpp"
-#include "squeal/report/fields.hpp"
-#include "squeal/report/history.hpp"
-#include "squeal/report/json.hpp"
-#include "squeal/report/table.hpp"
 
 #include <cmath>
 #include <cstdlib>

@@ -1,5 +1,5 @@
 #pragma once
-/// All results of a run, and its files (report/result_files.hpp) with the printed table. Every number comes with its
+/// All results of a run, and its files (report/results_folder.hpp) with the printed table. Every number comes with its
 /// unit and with what it is worth (residual, backward error, defect).
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/branch/brake_branch.hpp"
@@ -84,7 +84,20 @@ const Estimate& followed_estimate(const Report& report);
 /// The outcome of every stage but the model, in the order in which they run.
 std::array<std::pair<Stage, Outcome>, 13> outcomes_of(const Report& report);
 
-/// Rank 0 prints the table a person reads.
+/// One sentence that says what is heard, and whether it lasts: the last row of the table. Of rank 0, as the three
+/// below.
+std::string heard(const Report& report, const Scene& scene);
+
+/// The table a person reads, line by line.
+std::string table(const Report& report, const Scene& scene);
+
+/// The whole report as JSON: SI units, null for what is not a number.
+std::string report_json(const Report& report, const Scene& scene);
+
+/// The page inputs/RESULTS.md: every result and data set with its unit and meaning.
+std::string result_page();
+
+/// Rank 0 prints the table.
 void print_table(const Report& report, const Scene& scene, MPI_Comm comm);
 
 /// Collective. Writes what was asked for into `output`: the scene with every default, and the options.

@@ -4,13 +4,39 @@
 /// another origin. A run that is killed between leaves both, and the next one ends the move.
 ///
 /// A working folder, a mount point and a folder whose parent is read-only cannot be replaced so, and are refused.
-#include "squeal/report/result_files.hpp"
+#include "squeal/base/words.hpp"
 #include "squeal/scene/scene.hpp"
 
+#include <array>
 #include <mpi.h>
 
 namespace squeal
 {
+
+/// The files of a results folder.
+enum class ResultFile
+{
+  report,
+  history,
+  sweep,
+  sweep_motions,
+  robustness,
+  fields,
+  field_places, // how ParaView finds its way in the fields
+  resolved_scene,
+  options,
+  reduced,     // a folder of matrices
+  checkpoints, // a folder
+};
+
+inline constexpr std::array result_file_names = {"report.json",    "history.h5", "sweep.csv",   "sweep_motions.csv",
+                                                 "robustness.csv", "fields.h5",  "fields.xdmf", "resolved.toml",
+                                                 "options.txt",    "reduced",    "checkpoint"};
+
+inline Words words_of(ResultFile)
+{
+  return result_file_names;
+}
 
 /// Whether the run keeps checkpoints.
 enum class Checkpoints

@@ -1,0 +1,188 @@
+#include "result.hpp"
+
+#include "squeal/base/error.hpp"
+#include "squeal/base/markdown.hpp"
+
+#include <cmath>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// Whether two results are described alike, so that their values make a column.
+bool is_same_result(const Result& a, const Result& b)
+{
+  return a.name == b.name && std::string_view(a.meaning) == b.meaning;
+}
+
+void add_cells(const Result& group, const std::string& place, std::size_t row, std::vector<Column>& columns)
+{
+  for (const Result& part : group.parts)
+  {
+    if (part.kind == Result::Kind::group)
+      add_cells(part, part.data_set.empty() ? place : place + part.data_set + "/", row, columns);
+    if (part.kind != Result::Kind::value) continue;
+    auto column = std::ranges::find_if(columns, [&](const Column& one) { return is_same_result(*one.first, part); });
+    if (column == columns.end())
+      column = columns.insert(column, {&part, part.data_set.empty() ? "" : place + part.data_set, {}});
+    column->cells.resize(row);
+    column->cells.push_back(&part);
+  }
+}
+
+std::string csv_text(const std::string& text)
+{
+  std::string quoted = "\"";
+  for (const char letter : text) quoted += letter == '"' ? "\"\"" : std::string(1, letter);
+  return quoted + "\"";
+}
+
+std::string csv_cell(const Result* result)
+{
+  const Json value = result ? result->value : Json();
+  if (value.is_string()) return csv_text(value.get<std::string>());
+  if (value.is_boolean()) return value.get<bool>() ? "1" : "0";
+  if (!value.is_number_float()) return value.is_null() ? "" : value.dump();
+  return std::isfinite(value.get<double>()) ? format("%.17g", value.get<double>()) : "";
+}
+
+/// "`one`, `another`", without the empty word.
+std::string words_text(Words words)
+{
+  std::string text;
+  for (const std::string one : words)
+    if (!one.empty()) text += (text.empty() ? "" : ", ") + markdown_code(one);
+  return text;
+}
+
+void add_page_rows(const Result& result, const std::string& place, std::string& rows)
+{
+  const std::string name = place + (place.empty() || result.name.empty() ? "" : ".") + result.name;
+  if (result.kind == Result::Kind::value)
+    rows += markdown_row({markdown_code(name + (result.value.is_array() ? "[]" : "")), result.unit,
+                          result.meaning + (result.words.empty() ? "" : ": " + words_text(result.words))});
+  const bool is_list = result.kind == Result::Kind::list || result.kind == Result::Kind::curve;
+  for (const Result& part : result.parts) add_page_rows(part, name + (is_list ? "[]" : ""), rows);
+}
+
+} // namespace
+
+const Result* Result::part(const std::string& of) const
+{
+  const auto found = std::ranges::find(parts, of, &Result::name);
+  return found == parts.end() ? nullptr : &*found;
+}
+
+Result& Entry::add(const std::string& name, const std::string& unit, const char* meaning, Json value) const
+{
+  return at_.parts.emplace_back(Result{Result::Kind::value, name, unit, meaning, std::move(value)});
+}
+
+Result& Entry::error(const std::string& name, const char* meaning, double value) const
+{
+  Result& result = add(name, at_.parts.back().unit, meaning, value);
+  if (shown_) result.place = Result::Place::error_bar;
+  return result;
+}
+
+Entry Entry::hidden() const
+{
+  Entry entry = *this;
+  entry.shown_ = false;
+  return entry;
+}
+
+void Entry::text(const std::string& name, const char* meaning, const std::string& value) const
+{
+  if (has(!value.empty())) show(name, "text", meaning, value);
+}
+
+void Entry::warn(const std::string& sentence) const
+{
+  if (is_example() || !shown_) return;
+  if (!at_.part("warnings")) add("warnings", "text", "", Json::array());
+  std::ranges::find(at_.parts, "warnings", &Result::name)->value.push_back(sentence);
+}
+
+void Entry::mean(const std::string& name, const std::string& unit, const char* meaning, const MeanValue& value) const
+{
+  const Entry entry = group(name);
+  entry.show("mean", unit, meaning, value.value);
+  entry.error("error", "its error bar of 95 %", value.error);
+}
+
+Entry Entry::list(const std::string& name) const
+{
+  const Entry entry = group(name);
+  entry.at_.kind = Result::Kind::list;
+  return entry;
+}
+
+Entry Entry::group(const std::string& name, const std::string& data_set) const
+{
+  Result& result = at_.parts.emplace_back(Result{Result::Kind::group, name});
+  result.data_set = data_set;
+  Entry entry(result, scene_, content_);
+  entry.shown_ = shown_;
+  return entry;
+}
+
+Json json_of(const Result& result)
+{
+  if (result.kind == Result::Kind::value) return result.value;
+  Json json = result.kind == Result::Kind::group ? Json::object() : Json::array();
+  for (const Result& part : result.parts)
+    if (result.kind == Result::Kind::group)
+      json[part.name] = json_of(part);
+    else
+      json.push_back(json_of(part));
+  return json;
+}
+
+std::vector<Column> columns_of(const Result& list)
+{
+  std::vector<Column> columns;
+  for (std::size_t row = 0; const Result& group : list.parts) add_cells(group, "", row++, columns);
+  for (Column& column : columns) column.cells.resize(list.parts.size());
+  return columns;
+}
+
+std::string csv_of(const Result& list)
+{
+  std::vector<Column> columns = columns_of(list);
+  std::erase_if(columns, [](const Column& column) { return column.first->value.is_array(); });
+  std::string text;
+  for (const Column& column : columns) text += (text.empty() ? "" : ",") + csv_text(column.first->name);
+  for (std::size_t row = 0; row < list.parts.size(); ++row)
+    for (const Column& column : columns)
+      text += (&column == &columns.front() ? "\n" : ",") + csv_cell(column.cells[row]);
+  return text + "\n";
+}
+
+std::string column_unit(const Result& result)
+{
+  std::string unit;
+  for (std::size_t i = 0; i < result.words.size(); ++i)
+    if (*result.words[i]) unit += format("%s%zu %s", unit.empty() ? "" : ", ", i, result.words[i]);
+  return unit.empty() ? result.unit : unit;
+}
+
+std::string page_rows(const Result& result)
+{
+  std::string rows;
+  add_page_rows(result, "", rows);
+  return rows;
+}
+
+std::string page_rows_of_columns(const Result& list, const std::string& group)
+{
+  std::string rows;
+  for (const auto& [first, data_set, cells] : columns_of(list))
+    if (!data_set.empty())
+      rows += markdown_row({markdown_code(group + "/" + data_set), column_unit(*first), first->meaning});
+  return rows;
+}
+
+} // namespace squeal

@@ -1,0 +1,161 @@
+#pragma once
+/// A result with its name, unit, meaning and value. A tree of results is what report.json, the printed table, CSV
+/// files, columns of history.h5 and the page inputs/RESULTS.md are written from.
+#include "squeal/base/words.hpp"
+#include "squeal/scene/scene.hpp"
+#include "squeal/settled/statistics.hpp"
+
+#include <algorithm>
+#include <list>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace squeal
+{
+
+using Json = nlohmann::ordered_json;
+
+/// A value, a group of results, or a list of groups.
+struct Result
+{
+  enum class Kind
+  {
+    value,
+    group,
+    list,
+    curve, // a list whose order is a way: the table shows entries spread along it
+  };
+  /// Place of a value in the printed table.
+  enum class Place
+  {
+    none,
+    row,
+    error_bar, // behind the value before
+  };
+
+  Kind kind = Kind::group;
+  std::string name{}, unit{};
+  const char* meaning = "";
+  Json value{};
+  std::list<Result> parts{};
+  Words words{};          // of which the value is one
+  std::string data_set{}; // its name as a column of an HDF5 file; empty: it has none
+  Place place = Place::none;
+
+  /// Makes it a column of the HDF5 group that its list is written to.
+  void column(std::string as) { data_set = std::move(as); }
+
+  /// The part of this name; null: there is none.
+  const Result* part(const std::string& of) const;
+};
+
+/// What a tree is filled with.
+enum class Content
+{
+  results,
+  example, // everything that may ever be written, once: for the page
+};
+
+/// A group that is being filled with results of a scene.
+class Entry
+{
+public:
+  Entry(Result& at, const Scene& scene, Content content) : at_(at), scene_(scene), content_(content) {}
+
+  const Scene& scene() const { return scene_; }
+  bool is_example() const { return content_ == Content::example; }
+
+  /// Whether what exists on this condition is to be added.
+  bool has(bool condition) const { return condition || is_example(); }
+
+  Result& add(const std::string& name, const std::string& unit, const char* meaning, Json value) const;
+
+  /// A value that is one of its enum's words.
+  template <class Enum> Result& add(const std::string& name, const char* meaning, Enum value) const
+  {
+    Result& result = add(name, "word", meaning, word(value));
+    result.words = words_of(value);
+    return result;
+  }
+
+  /// A result that the table shows as well, described as by `add`.
+  template <class... Description> Result& show(const std::string& name, const Description&... description) const
+  {
+    Result& result = add(name, description...);
+    result.place = shown_ ? Result::Place::row : Result::Place::none;
+    return result;
+  }
+
+  /// The same group, filled with results that the table leaves out and that bring no warnings.
+  Entry hidden() const;
+
+  /// The error bar of the result before, in its unit.
+  Result& error(const std::string& name, const char* meaning, double value) const;
+
+  /// A text that is left out where it is empty.
+  void text(const std::string& name, const char* meaning, const std::string& value) const;
+
+  /// A sentence for whoever would be misled by the numbers.
+  void warn(const std::string& sentence) const;
+
+  /// A mean with its error bar.
+  void mean(const std::string& name, const std::string& unit, const char* meaning, const MeanValue& value) const;
+
+  Entry group(const std::string& name) const { return group(name, ""); }
+
+  /// A group whose columns are below this name in an HDF5 file.
+  Entry group(const std::string& name, const std::string& data_set) const;
+
+  /// An empty list, to which groups without a name are added.
+  Entry list(const std::string& name) const;
+
+  /// A group for each item of these lists, which are as long as the shortest.
+  template <class Fill, class... Items>
+  void list(const std::string& name, Fill fill, const std::vector<Items>&... items) const
+  {
+    const Entry entry = list(name);
+    for (std::size_t i = 0; i < std::min({items.size()...}); ++i) fill(entry.group(""), items[i]...);
+    if (is_example()) fill(entry.group(""), Items{}...);
+  }
+
+  template <class Fill, class Item> void curve(const std::string& name, Fill fill, const std::vector<Item>& items) const
+  {
+    list(name, fill, items);
+    at_.parts.back().kind = Result::Kind::curve;
+  }
+
+private:
+  Result& at_;
+  const Scene& scene_;
+  Content content_;
+  bool shown_ = true;
+};
+
+/// The tree as JSON.
+Json json_of(const Result& result);
+
+/// One value of every group of a list; null where a group lacks it.
+struct Column
+{
+  const Result* first = nullptr;
+  std::string data_set; // with the groups that it stands in
+  std::vector<const Result*> cells;
+};
+
+/// The columns of a list, those of groups in its groups among them.
+std::vector<Column> columns_of(const Result& list);
+
+/// A list as CSV: a head, and a line a group. What is not known is empty.
+std::string csv_of(const Result& list);
+
+/// Unit of a column in an HDF5 file: of a word its places.
+std::string column_unit(const Result& result);
+
+/// Rows of the page: name, unit and meaning of each value.
+std::string page_rows(const Result& result);
+
+/// Rows of the page for the columns of a list in an HDF5 group.
+std::string page_rows_of_columns(const Result& list, const std::string& group);
+
+} // namespace squeal
