@@ -161,7 +161,7 @@ int main(int argc, char** argv)
   const std::string open = argv[1] == std::string(shut_in_mesher) ? shut_in() : "";
   MesherAnswer answer = answer_of(argc, argv);
   answer.left_open = open;
-  const std::string bytes = packed(std::move(answer));
+  const std::string bytes = packed(answer);
   for (std::size_t sent = 0; sent < bytes.size();)
   {
     const ssize_t size = write(answer_descriptor, bytes.data() + sent, bytes.size() - sent);

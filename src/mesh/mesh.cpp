@@ -1,11 +1,18 @@
 /// The mesh of a scene: from its file, with the scene's points and reference points.
+///
+/// A superelement's retained nodes are those of the mesh at the same places. Its modal coordinates are carried by nodes
+/// of its own, six a node.
 #include "squeal/mesh/mesh.hpp"
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/build.hpp"
 #include "squeal/mesh/names.hpp"
-#include "superelements.hpp"
+#include "squeal/mesh/row_motions.hpp"
+
+#include <algorithm>
+#include <Eigen/Geometry>
+#include <set>
 
 namespace squeal
 {
@@ -59,6 +66,72 @@ void check_names(const Mesh& mesh, const Scene& scene)
   for (const Probe& probe : scene.probes) named_nodes(mesh, probe.on, "probe '" + probe.name + "'");
 }
 
+/// The node of the mesh, among the candidates, where a retained node is.
+int joined_node(const Mesh& mesh, const std::set<int>& candidates, const PlacedNode& retained, const std::string& user)
+{
+  constexpr double coincident = 1e-6; // of the mesh's size: places in a mesh file have as many digits
+  const auto distance = [&](int node) { return norm(mesh.nodes[static_cast<std::size_t>(node)] - retained.at); };
+  const int nearest =
+      *std::min_element(candidates.begin(), candidates.end(), [&](int a, int b) { return distance(a) < distance(b); });
+  if (distance(nearest) > coincident * diagonal_of(mesh.nodes))
+    throw Error(
+        user + ": node " + std::to_string(retained.node) +
+        format(" at (%g, %g, %g) m meets no node: the nearest is %.3g m away; mesh the parts so that their nodes "
+               "coincide with the retained ones, or name the point or group that has them",
+               retained.at[0], retained.at[1], retained.at[2], distance(nearest)));
+  return nearest;
+}
+
+/// The node of the mesh for each retained node.
+std::map<long, int> joined_nodes(const Mesh& mesh, const Superelement& superelement,
+                                 const std::vector<PlacedNode>& placed, const std::vector<NodeMotion>& rows)
+{
+  const std::string user = "superelement " + superelement.name;
+  std::set<int> candidates, taken;
+  for (const std::string& name : superelement.on)
+    for (const int node : named_nodes(mesh, name, user)) candidates.insert(node);
+  if (candidates.empty()) throw Error(user + ": the groups that it is joined to have no nodes");
+  std::map<long, int> joined;
+  for (const NodeMotion& row : rows)
+  {
+    if (row.motion < 0 || joined.count(row.node)) continue;
+    const auto place = std::ranges::find(placed, row.node, &PlacedNode::node);
+    if (place == placed.end())
+      throw Error(user + ": nodes.txt has no line for node " + std::to_string(row.node) + " of dofs.txt");
+    const int node = joined_node(mesh, candidates, *place, user);
+    if (!taken.insert(node).second)
+      throw Error(user + ": two of its nodes, one of them " + std::to_string(row.node) + ", are at the same place");
+    joined[row.node] = node;
+  }
+  if (joined.empty()) throw Error(user + ": dofs.txt has no motion of a node, so there is nothing to join");
+  return joined;
+}
+
+/// Adds the scene's superelements to the mesh. Throws Error for a retained node that meets no node of the groups it is
+/// joined to, or one that is taken.
+void add_superelements(const Scene& scene, Mesh& mesh)
+{
+  for (const Superelement& superelement : scene.superelements)
+  {
+    const std::vector<NodeMotion> rows = read_row_motions(superelement.folder / "dofs.txt");
+    const std::vector<PlacedNode> placed = read_placed_nodes(superelement.folder / "nodes.txt");
+    const auto joined = joined_nodes(mesh, superelement, placed, rows);
+    std::vector<SuperelementRow> own;
+    int coordinates = 0;
+    for (const NodeMotion& row : rows)
+    {
+      if (row.motion >= 0)
+      {
+        own.push_back({joined.at(row.node), row.motion, false});
+        continue;
+      }
+      if (coordinates % 6 == 0) mesh.nodes.push_back(placed.front().at);
+      own.push_back({static_cast<int>(mesh.nodes.size()) - 1, coordinates++ % 6, true});
+    }
+    mesh.superelements.push_back(std::move(own));
+  }
+}
+
 } // namespace
 
 Mesh read_mesh(const Scene& scene)
@@ -74,6 +147,13 @@ Mesh read_mesh(const Scene& scene)
   check_names(mesh, scene);
   add_superelements(scene, mesh);
   return mesh;
+}
+
+double diagonal_of(const std::vector<Vec3>& nodes)
+{
+  Eigen::AlignedBox3d box;
+  for (const Vec3& node : nodes) box.extend(Eigen::Vector3d(node.data()));
+  return box.diagonal().norm();
 }
 
 void broadcast_mesh(Mesh& mesh, MPI_Comm comm)

@@ -1,7 +1,6 @@
 #include "squeal/solid/element.hpp"
 
-#include "shell_kernel.hpp"
-#include "solid_kernel.hpp"
+#include "kernels.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 namespace squeal

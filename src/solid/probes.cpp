@@ -12,19 +12,6 @@ namespace squeal
 namespace
 {
 
-/// Returns the diagonal of the box around the nodes [m].
-double diagonal(const std::vector<Vec3>& nodes)
-{
-  Vec3 low = nodes.front(), high = nodes.front();
-  for (const Vec3& node : nodes)
-    for (int c = 0; c < 3; ++c)
-    {
-      low[c] = std::min(low[c], node[c]);
-      high[c] = std::max(high[c], node[c]);
-    }
-  return norm(high - low);
-}
-
 int probed_node(const Probe& probe, const Mesh& mesh)
 {
   const std::string user = "probe " + probe.name;
@@ -37,7 +24,7 @@ int probed_node(const Probe& probe, const Mesh& mesh)
   const int nearest =
       *std::min_element(nodes.begin(), nodes.end(), [&](int a, int b) { return distance(a) < distance(b); });
   // A position outside may be meant, to name an end; one beyond 100 lengths of the mesh is a slip, of units say.
-  if (const double size = diagonal(mesh.nodes); size > 0 && distance(nearest) > 100 * size)
+  if (const double size = diagonal_of(mesh.nodes); size > 0 && distance(nearest) > 100 * size)
     throw Error(user + format(": 'at' is %g m from the nearest node of the group, where the whole mesh measures %g m",
                               distance(nearest), size));
   return nearest;

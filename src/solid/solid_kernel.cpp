@@ -13,10 +13,7 @@
 /// Caveats: wedge6 is stiff in bending within the plane of its triangles, as the constant-strain triangle is; it is for
 /// filling, not for beams. tet4 has constant strains and is stiff in all bending. hex8 is exact in bending as a
 /// parallelepiped and stiffer when tapered (MacNeal 1987), as all 8-node bricks are.
-#include "solid_kernel.hpp"
-
-#include "condensation.hpp"
-#include "jacobian.hpp"
+#include "kernels.hpp"
 #include "squeal/mesh/quadrature.hpp"
 
 #include <Eigen/LU>

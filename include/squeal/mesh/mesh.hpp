@@ -76,6 +76,9 @@ struct Mesh
 /// kernel, and solid elements in no part. It does so for a part, group or point that the mesh does not have.
 Mesh read_mesh(const Scene& scene);
 
+/// Diagonal of the box round places [m]. Not collective.
+double diagonal_of(const std::vector<Vec3>& nodes);
+
 /// Gives every rank the mesh that rank 0 has. Collective.
 void broadcast_mesh(Mesh& mesh, MPI_Comm comm);
 
