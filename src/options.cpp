@@ -38,7 +38,7 @@ OptionList options_of(ProgramOptions& options)
   ShootingOptions& shooting = options.cycle.shooting;
   return {
       {"-factor", choice_of(options.factor.kind), Range::any,
-       "factorisation for the step and the equilibrium: supernodal, mumps (both on all ranks), dense (on rank 0)"},
+       "factorisation for the step and the equilibrium: supernodal or mumps, both on all ranks"},
       {"-factor_limit", &options.factor.limit, Range::any,
        "[GB] largest share of a rank in a supernodal factor; beyond it several ranks take MUMPS; -1: half of the free "
        "memory. Every run prints its choice, with what is foreseen"},

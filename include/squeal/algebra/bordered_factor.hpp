@@ -22,13 +22,12 @@ namespace squeal
 /// How a matrix is factored.
 enum class FactorKind
 {
-  automatic,  // dense if A is small or full; else supernodal, or mumps where FactorOptions::limit says so
+  automatic,  // supernodal, or mumps where FactorOptions::limit says so
   supernodal, // L L' by supernodes in METIS's ordering, subtrees by ranks; the fastest
   mumps,      // MUMPS in the same ordering, spread over all ranks
-  dense,      // on rank 0
 };
 
-inline constexpr std::array factor_kind_words = {"automatic", "supernodal", "mumps", "dense"};
+inline constexpr std::array factor_kind_words = {"automatic", "supernodal", "mumps"};
 
 inline Words words_of(FactorKind)
 {
@@ -79,14 +78,14 @@ public:
   /// Whether a pivot was zero or negative: A is not positive definite, and the factor is not to be used.
   bool failed() const;
 
-  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere. MUMPS and the dense factor
-  /// move their storage out: call it once, or read the strips once.
+  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere. MUMPS's factor
+  /// moves its storage out: call it once, or read the strips once.
   std::vector<double> condensed(double scale) const;
 
   /// Gives B A^-1 B' to `take` on rank 0, strip after strip.
   void read_condensed(const std::function<void(const CondensedStrip&)>& take) const;
 
-  /// B A^-1 B' without storing it; nothing of MUMPS and the dense factor, which have stored it already.
+  /// B A^-1 B' without storing it; nothing of MUMPS, which has stored it already.
   std::optional<CondensedProducts> condensed_products() const;
 
   /// B A^-1 b for each b, one after the other; on rank 0 only. `backward` must follow before the next `forward`.
@@ -96,7 +95,7 @@ public:
   /// read on rank 0.
   void backward(const std::vector<double>& lambda, std::span<const Vec> x) const;
 
-  /// Entries of the triangular factor, with the border's rows but for a dense one. Collective.
+  /// Entries of the triangular factor, with the border's rows.
   double entries() const;
 
 private:
