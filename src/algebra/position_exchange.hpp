@@ -3,6 +3,7 @@
 /// supernodal factor. The rows of shared supernodes stay where they are.
 #include "squeal/base/petsc.hpp"
 
+#include <petscsf.h>
 #include <vector>
 
 namespace squeal
@@ -11,8 +12,6 @@ namespace squeal
 class PositionExchange
 {
 public:
-  PositionExchange() = default;
-
   /// `position`: of each row; `owner`: of each position, empty on one rank.
   PositionExchange(const RowLayout& layout, const std::vector<int>& position, const std::vector<int>& owner,
                    MPI_Comm comm);
@@ -24,17 +23,8 @@ public:
   void scatter(const std::vector<double>& x, std::size_t lanes, std::span<double* const> b) const;
 
 private:
-  struct Rows
-  {
-    std::vector<std::size_t> places{}; // of one rank after the other
-    std::vector<int> counts{}, starts{};
-  };
-  static void swap(const Rows& from, const Rows& to, int columns, const std::vector<double>& out,
-                   std::vector<double>& in, MPI_Comm comm);
-
-  MPI_Comm comm_ = MPI_COMM_NULL;
-  Rows rows_, positions_;                                     // that go to, and come from, each rank
-  std::vector<std::pair<std::size_t, std::size_t>> in_place_; // row and position of what is not sent
+  std::vector<std::size_t> positions_; // that this rank fills
+  Owned<PetscSF> rows_;                // from the rows to these
 };
 
 } // namespace squeal

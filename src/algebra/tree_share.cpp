@@ -1,11 +1,11 @@
 #include "tree_share.hpp"
 
 #include "squeal/algebra/panel.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/integers.hpp"
 
 #include <algorithm>
 #include <limits>
-#include <queue>
 #include <utility>
 
 namespace squeal
@@ -14,16 +14,8 @@ namespace squeal
 namespace
 {
 
-void broadcast(std::vector<int>& numbers, MPI_Comm comm)
-{
-  int count = to_int(numbers.size());
-  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
-  numbers.resize(at(count));
-  MPI_Bcast(numbers.data(), count, MPI_INT, 0, comm);
-}
-
 /// Gives every rank what rank 0 analysed.
-void broadcast(SymbolicFactor& symbolic, MPI_Comm comm)
+void share(SymbolicFactor& symbolic, MPI_Comm comm)
 {
   std::vector<int> numbers{symbolic.dofs, symbolic.border, to_int(symbolic.supernodes.size())};
   for (const Supernode& supernode : symbolic.supernodes)
@@ -162,7 +154,7 @@ TreeShare share_tree(SymbolicFactor whole, MPI_Comm comm)
     share.symbolic = std::move(whole);
     return share;
   }
-  broadcast(whole, comm);
+  share(whole, comm);
   const std::vector<int> owner = owners_of(whole, ranks);
   SymbolicFactor& mine = share.symbolic;
   mine.dofs = whole.dofs;
