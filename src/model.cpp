@@ -1,13 +1,11 @@
 #include "squeal/model.hpp"
 
 #include "squeal/base/constants.hpp"
+#include "squeal/base/petsc.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/base/shared.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/ties.hpp"
-#include "squeal/solid/loads.hpp"
 #include "squeal/solid/matrix_rows.hpp"
-#include "squeal/solid/mesh_piece.hpp"
 #include "squeal/solid/probes.hpp"
 
 #include <algorithm>

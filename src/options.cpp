@@ -119,7 +119,7 @@ std::string option_page()
   for (const Option& option : options_of(standard))
   {
     std::string values;
-    for (const char* one : words_of(option)) values += (values.empty() ? "" : ", ") + markdown_code(one);
+    for (const char* one : choices_of(option)) values += (values.empty() ? "" : ", ") + markdown_code(one);
     text += markdown_row({markdown_code(option.name), markdown_code(value_of(option)), values, option.meaning});
   }
   return text;

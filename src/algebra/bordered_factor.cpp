@@ -3,8 +3,8 @@
 #include "cholesky.hpp"
 #include "mumps_factor.hpp"
 #include "squeal/algebra/factor_forecast.hpp"
-#include "squeal/algebra/large_pages.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
+#include "squeal/base/free_memory.hpp"
 
 #include <algorithm>
 #include <optional>

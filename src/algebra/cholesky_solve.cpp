@@ -2,7 +2,7 @@
 #include "cholesky.hpp"
 #include "front.hpp"
 #include "squeal/algebra/panel.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 

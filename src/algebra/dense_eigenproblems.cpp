@@ -2,7 +2,7 @@
 
 #include "eigenvectors.hpp"
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <cmath>
 #include <Eigen/Cholesky>

@@ -1,6 +1,6 @@
 #include "squeal/algebra/dense_matrix.hpp"
 
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <Eigen/LU>
 #include <Eigen/QR>

@@ -1,7 +1,6 @@
 #include "eigenvectors.hpp"
 
 #include "squeal/base/error.hpp"
-#include "squeal/base/integers.hpp"
 
 #include <algorithm>
 #include <Eigen/Eigenvalues>

@@ -3,7 +3,7 @@
 #include "sparse_product.hpp"
 #include "splitmix.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 

@@ -2,7 +2,6 @@
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/base/integers.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/run_control.hpp"
 

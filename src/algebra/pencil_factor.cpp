@@ -3,7 +3,7 @@
 #include "mumps.hpp"
 #include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 #include "symbolic_factor.hpp"
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 
 #include "squeal/algebra/panel.hpp"
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -1,6 +1,6 @@
 #include "triplets.hpp"
 
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 namespace squeal
 {

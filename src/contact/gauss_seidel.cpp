@@ -9,7 +9,7 @@
 #include "gauss_seidel.hpp"
 
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 ///     V = 1/6 sum (a - c) . ((b - a) x (d - a))   over triangles a b d, c the centre.
 /// A negative V means that the element is numbered inside out; it is then mirrored. A surface face is mirrored where
 /// needed so that it is counter-clockwise seen from outside the solid that has the same corners.
-#include "squeal/mesh/build.hpp"
+#include "squeal/mesh/mesh_file.hpp"
 
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/names.hpp"

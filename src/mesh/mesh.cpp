@@ -6,7 +6,7 @@
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/build.hpp"
+#include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/row_motions.hpp"
 

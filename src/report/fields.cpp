@@ -59,9 +59,9 @@ enum class Center
 
 constexpr std::array xdmf_centers = {"Node", "Cell"};
 
-Words words_of(Center)
+const char* word(Center center)
 {
-  return xdmf_centers;
+  return xdmf_centers.at(static_cast<std::size_t>(center));
 }
 
 struct Attribute

@@ -1,6 +1,6 @@
 /// Load T' f: a force is shared equally by its nodes; a pressure p is -p times the integral of N_i n dA, n outward.
 /// The share of a fixed degree of freedom is carried by its support.
-#include "squeal/solid/loads.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shape_functions.hpp"

@@ -1,5 +1,5 @@
 /// Structures given as matrices: M C K G H F of a folder, in PETSc's binary format.
-#include "matrices.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/solid/binary.hpp"
@@ -186,15 +186,8 @@ void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
                                        factor.negative_pivots()));
 }
 
-} // namespace
-
-void mark_symmetric(Mat A)
-{
-  check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
-  check(MatSetOption(A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
-  check(MatSetOption(A, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
-}
-
+/// Gives M, C and K the union of their patterns with the whole diagonal, and marks them as symmetric.
+/// A sum M + a C + b K then needs additions of values only.
 void share_pattern(Structure& structure)
 {
   Owned<Mat> pattern = copy_of(structure.M);
@@ -205,6 +198,15 @@ void share_pattern(Structure& structure)
   structure.M = with_pattern(pattern, structure.M);
   structure.C = with_pattern(pattern, structure.C);
   structure.K = with_pattern(pattern, structure.K);
+}
+
+} // namespace
+
+void mark_symmetric(Mat A)
+{
+  check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
+  check(MatSetOption(A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  check(MatSetOption(A, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
 }
 
 Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)

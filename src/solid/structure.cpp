@@ -7,7 +7,6 @@
 #include "squeal/solid/structure.hpp"
 
 #include "local_dofs.hpp"
-#include "matrices.hpp"
 #include "spin.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/constants.hpp"
@@ -15,7 +14,6 @@
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/solid/binary.hpp"
 #include "squeal/solid/element.hpp"
-#include "squeal/solid/loads.hpp"
 
 #include <algorithm>
 #include <Eigen/Dense>

@@ -4,7 +4,6 @@
 #include "../support/approx.hpp"
 #include "../support/bricks.hpp"
 #include "squeal/solid/matrix_rows.hpp"
-#include "squeal/solid/mesh_piece.hpp"
 #include "squeal/solid/probes.hpp"
 
 #include <algorithm>

@@ -27,12 +27,7 @@ enum class FactorKind
   mumps,      // MUMPS in the same ordering, spread over all ranks
 };
 
-inline constexpr std::array factor_kind_words = {"automatic", "supernodal", "mumps"};
-
-inline Words words_of(FactorKind)
-{
-  return factor_kind_words;
-}
+template <> inline constexpr std::array words_of<FactorKind> = {"automatic", "supernodal", "mumps"};
 
 /// The orders of elimination of the last patterns, on the first rank of those that factor.
 class KnownAnalyses;

@@ -1,6 +1,6 @@
 #pragma once
 /// The mesh, its contact pairs and its partition. Rank 0 holds the whole mesh and prepares all that needs it; another
-/// rank receives a piece (squeal/solid/mesh_piece.hpp). This room includes no PETSc.
+/// rank receives a piece (squeal/solid/dofs.hpp). This room includes no PETSc.
 #include "squeal/scene/scene.hpp"
 
 #include <map>

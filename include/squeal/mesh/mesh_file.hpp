@@ -15,4 +15,7 @@ namespace squeal
 /// the .geo does not define, and in a build without libgmsh.
 FileMesh read_mesh_file(const MeshSource& source);
 
+/// Returns the parts, surfaces and groups of a file under the names that the scene gives. Throws Error as read_mesh.
+Mesh build_mesh(const FileMesh& file, const Scene& scene);
+
 } // namespace squeal

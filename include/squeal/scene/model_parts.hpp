@@ -147,12 +147,7 @@ enum class SlaveSide
   rotor,
 };
 
-inline constexpr std::array slave_side_words = {"stator", "rotor"};
-
-inline Words words_of(SlaveSide)
-{
-  return slave_side_words;
-}
+template <> inline constexpr std::array words_of<SlaveSide> = {"stator", "rotor"};
 
 /// Contact of two named surfaces, whose meshes need not match, or of two named points. Without a reach the surfaces
 /// coincide; with one their distance along the normal is added to the gap. The sliding velocity of a pair is s = B_t v

@@ -16,12 +16,7 @@ enum class ModesMethod
   automatic,  // the full problem, and the projection beside it where the count up to the band is not certified
 };
 
-inline constexpr std::array modes_method_words = {"projection", "full", "both", "auto"};
-
-inline Words words_of(ModesMethod)
-{
-  return modes_method_words;
-}
+template <> inline constexpr std::array words_of<ModesMethod> = {"projection", "full", "both", "auto"};
 
 /// The model on which the limit cycle is computed.
 enum class CycleModel
@@ -31,12 +26,7 @@ enum class CycleModel
   automatic, // reduced as far as the required accuracy allows
 };
 
-inline constexpr std::array cycle_model_words = {"full", "reduced", "auto"};
-
-inline Words words_of(CycleModel)
-{
-  return cycle_model_words;
-}
+template <> inline constexpr std::array words_of<CycleModel> = {"full", "reduced", "auto"};
 
 /// Origin of the initial state of a motion.
 enum class StartKind
@@ -48,12 +38,7 @@ enum class StartKind
   file,        // a state file
 };
 
-inline constexpr std::array start_kind_words = {"mode", "estimate", "equilibrium", "rest", "file"};
-
-inline Words words_of(StartKind)
-{
-  return start_kind_words;
-}
+template <> inline constexpr std::array words_of<StartKind> = {"mode", "estimate", "equilibrium", "rest", "file"};
 
 /// Where a transient starts.
 struct Start
@@ -72,12 +57,7 @@ enum class CycleStartKind
   file,      // a state file
 };
 
-inline constexpr std::array cycle_start_kind_words = {"estimate", "mode", "transient", "coarse", "file"};
-
-inline Words words_of(CycleStartKind)
-{
-  return cycle_start_kind_words;
-}
+template <> inline constexpr std::array words_of<CycleStartKind> = {"estimate", "mode", "transient", "coarse", "file"};
 
 /// Where the search for the cycle starts, with its file.
 struct CycleStart
@@ -173,12 +153,7 @@ enum class SweepDirections
   both, // that of the scene, then the other
 };
 
-inline constexpr std::array sweep_directions_words = {"one", "both"};
-
-inline Words words_of(SweepDirections)
-{
-  return sweep_directions_words;
-}
+template <> inline constexpr std::array words_of<SweepDirections> = {"one", "both"};
 
 /// How far the chain of stages goes at each point of a sweep.
 enum class SweepStages
@@ -188,12 +163,7 @@ enum class SweepStages
   cycle, // or the settled motion, where modes grow
 };
 
-inline constexpr std::array sweep_stages_words = {"equilibrium", "modes", "cycle"};
-
-inline Words words_of(SweepStages)
-{
-  return sweep_stages_words;
-}
+template <> inline constexpr std::array words_of<SweepStages> = {"equilibrium", "modes", "cycle"};
 
 /// Stability at many values of one number of the scene, or of two.
 struct SweepSettings
@@ -240,12 +210,7 @@ enum class Distribution
   uniform,
 };
 
-inline constexpr std::array distribution_words = {"normal", "lognormal", "uniform"};
-
-inline Words words_of(Distribution)
-{
-  return distribution_words;
-}
+template <> inline constexpr std::array words_of<Distribution> = {"normal", "lognormal", "uniform"};
 
 /// A random number of the scene, independent of the others.
 struct UncertainNumber

@@ -2,7 +2,7 @@
 /// From the mesh to the equations of motion of the free degrees of freedom q (src/README.md, section 1.4):
 ///     M q'' + C q' + K q = load + contact forces,   C = sum of alpha M + beta K of each part, and dashpots.
 /// Supports and rigid bodies are exact constraints (squeal/solid/dofs.hpp).
-#include "squeal/solid/mesh_piece.hpp"
+#include "squeal/solid/dofs.hpp"
 
 #include <cstdint>
 
@@ -27,6 +27,9 @@ struct Structure
 /// Returns the structure of a mesh or point scene, of which this rank has a piece. Collective. Throws Error for an
 /// element whose Jacobian is not positive, with its part and place.
 Structure assemble(const MeshPiece& piece, const Scene& scene, MPI_Comm comm);
+
+/// Returns the load T' f of the scene's forces and pressures [N, N m]. Collective; rank 0 has the mesh and T whole.
+Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const DofMap& dofs, MPI_Comm comm);
 
 /// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder, and of G.petsc and H.petsc where
 /// they are there. C and F are zero without their files. Without a B.petsc C and K may be unsymmetric: their skew
