@@ -5,13 +5,12 @@
 #include "squeal/mesh/contact_pairs.hpp"
 
 #include "dual_rows.hpp"
-#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/base/packed.hpp"
 #include "squeal/mesh/names.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 namespace squeal
 {
@@ -276,10 +275,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ContactPair, rotor_node, stator_node, node, p
 
 void broadcast_pairs(ContactPairs& contact, MPI_Comm comm)
 {
-  std::string bytes;
-  nlohmann::json::to_cbor(contact.pairs, bytes);
-  broadcast(bytes, comm);
-  contact.pairs = nlohmann::json::from_cbor(bytes).get<std::vector<ContactPair>>();
+  broadcast_packed(contact.pairs, comm);
   broadcast(contact.coverage, comm);
 }
 

@@ -4,8 +4,8 @@
 /// of its own, six a node.
 #include "squeal/mesh/mesh.hpp"
 
-#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/base/packed.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/row_motions.hpp"
@@ -19,15 +19,6 @@ namespace squeal
 
 namespace
 {
-
-template <class T> void broadcast_lists(std::map<std::string, std::vector<T>>& lists, MPI_Comm comm)
-{
-  std::vector<char> names; // each terminated by a zero
-  for (const auto& [name, list] : lists) names.insert(names.end(), name.c_str(), name.c_str() + name.size() + 1);
-  broadcast(names, comm);
-  for (const char* name = names.data(); name < names.data() + names.size(); name += std::string(name).size() + 1)
-    broadcast(lists[name], comm);
-}
 
 Mesh read_file(const Scene& scene)
 {
@@ -156,21 +147,18 @@ double diagonal_of(const std::vector<Vec3>& nodes)
   return box.diagonal().norm();
 }
 
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Face, shape, nodes, of_shell)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SuperelementRow, node, motion, coordinate)
+
 void broadcast_mesh(Mesh& mesh, MPI_Comm comm)
 {
   broadcast(mesh.nodes, comm);
   broadcast(mesh.elements, comm);
-  broadcast_lists(mesh.surfaces, comm);
-  broadcast_lists(mesh.node_groups, comm);
-  broadcast_lists(mesh.dimensions, comm);
-  std::map<std::string, std::vector<int>> points;
-  for (const auto& [name, node] : mesh.points) points[name] = {node};
-  broadcast_lists(points, comm);
-  for (const auto& [name, node] : points) mesh.points[name] = node.front();
-  auto superelements = mesh.superelements.size();
-  MPI_Bcast(&superelements, sizeof superelements, MPI_BYTE, 0, comm);
-  mesh.superelements.resize(superelements);
-  for (std::vector<SuperelementRow>& rows : mesh.superelements) broadcast(rows, comm);
+  broadcast_packed(mesh.surfaces, comm);
+  broadcast_packed(mesh.node_groups, comm);
+  broadcast_packed(mesh.dimensions, comm);
+  broadcast_packed(mesh.points, comm);
+  broadcast_packed(mesh.superelements, comm);
 }
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #include "squeal/solid/sparse_rows.hpp"
 
-#include "squeal/base/broadcast.hpp"
+#include "squeal/base/packed.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,29 +13,6 @@ void add_displacement(const DofMap& dofs, int node, const Vec3& direction, Spars
   for (int c = 0; c < 3; ++c)
     for (const DofTerm& term : dofs.terms_of(6 * PetscInt{node} + c)) row[term.dof] += direction[c] * term.factor;
 }
-
-namespace
-{
-
-/// Rows one after the other, as they are sent.
-struct SentRows
-{
-  std::vector<std::size_t> sizes;
-  std::vector<DofTerm> entries;
-};
-
-SentRows sent(std::span<const SparseRow> rows)
-{
-  SentRows result;
-  for (const SparseRow& row : rows)
-  {
-    result.sizes.push_back(row.size());
-    for (const auto& [dof, factor] : row) result.entries.push_back({dof, factor});
-  }
-  return result;
-}
-
-} // namespace
 
 std::vector<SparseRow> scattered_rows(std::vector<SparseRow> rows, PetscInt count, MPI_Comm comm)
 {
@@ -50,24 +27,15 @@ std::vector<SparseRow> scattered_rows(std::vector<SparseRow> rows, PetscInt coun
   {
     for (int to = 1; to < ranks_of(comm); ++to)
     {
-      const SentRows others = sent(rows_of(to));
-      send(others.sizes, to, comm);
-      send(others.entries, to, comm);
+      const std::span<const SparseRow> others = rows_of(to);
+      send(packed(std::vector<SparseRow>(others.begin(), others.end())), to, comm);
     }
     rows.resize(rows_of(0).size());
     return rows;
   }
-  SentRows received;
-  receive(received.sizes, 0, comm);
-  receive(received.entries, 0, comm);
-  std::vector<SparseRow> own;
-  auto entry = received.entries.cbegin();
-  for (const std::size_t size : received.sizes)
-  {
-    SparseRow& row = own.emplace_back();
-    for (std::size_t i = 0; i < size; ++i, ++entry) row.emplace_hint(row.end(), entry->dof, entry->factor);
-  }
-  return own;
+  std::string received;
+  receive(received, 0, comm);
+  return unpacked<std::vector<SparseRow>>(received);
 }
 
 Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm)

@@ -8,8 +8,9 @@
 
 #include "local_dofs.hpp"
 #include "spin.hpp"
-#include "squeal/base/broadcast.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/packed.hpp"
 #include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/solid/binary.hpp"
@@ -68,13 +69,7 @@ Eigen::MatrixXd small_matrix(const std::filesystem::path& file, Eigen::Index ord
   if (size.rows != order || size.columns != order)
     throw Error(file.string() + ": " + std::to_string(size.rows) + " x " + std::to_string(size.columns) +
                 ", but dofs.txt beside it has " + std::to_string(order) + " lines");
-  const auto sparse = load_matrix(file, size, size, PETSC_COMM_SELF);
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(order, order);
-  for_each_row(sparse,
-               [&](PetscInt row, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
-               {
-                 for (std::size_t k = 0; k < columns.size(); ++k) A(row, columns[k]) = values[k];
-               });
+  const Eigen::MatrixXd A = dense_copy(load_matrix(file, size, size, PETSC_COMM_SELF));
   constexpr double rounding = 1e-9; // of exported matrices
   if ((A - A.transpose()).cwiseAbs().maxCoeff() > rounding * A.cwiseAbs().maxCoeff())
     throw Error(file.string() + ": not symmetric");
@@ -154,22 +149,9 @@ RowCounts count_entries(const DofMap& dofs, const std::vector<std::vector<PetscI
 std::vector<std::vector<PetscInt>> free_dofs_of(const DofMap& dofs, const std::vector<Contribution>& lumped,
                                                 MPI_Comm comm)
 {
-  std::vector<PetscInt> sizes, together;
-  for (const Contribution& contribution : lumped)
-  {
-    const std::vector<PetscInt> free = free_dofs(dofs, contribution.nodal_dofs);
-    sizes.push_back(static_cast<PetscInt>(free.size()));
-    together.insert(together.end(), free.begin(), free.end());
-  }
-  broadcast(sizes, comm);
-  broadcast(together, comm);
   std::vector<std::vector<PetscInt>> result;
-  auto first = together.cbegin();
-  for (const PetscInt size : sizes)
-  {
-    result.emplace_back(first, first + size);
-    first += size;
-  }
+  for (const Contribution& contribution : lumped) result.push_back(free_dofs(dofs, contribution.nodal_dofs));
+  broadcast_packed(result, comm);
   return result;
 }
 
