@@ -38,6 +38,13 @@ void apply_override(toml::table& root, const std::string& text);
 /// The words of a key between its dots; a word in quotes may hold dots.
 std::vector<std::string> words_of_key(const std::string& key);
 
+/// What a value should be instead, by a rule; empty: the rule allows it.
+std::string problem_of_number(Rule rule, double value);
+
+/// Throws Error for a value of a key that is not as expected. `place`: of the value, with the label of the table.
+[[noreturn]] void refuse_value(const SceneKey& key, const std::string& place, const std::string& text,
+                               const std::string& expected);
+
 /// Fills the scene from its tables and records where each value was given.
 void read_tables(const toml::table& root, Scene& scene, Places& places);
 

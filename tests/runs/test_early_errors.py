@@ -293,14 +293,6 @@ def test_a_limit_of_memory_ends_the_run_or_leaves_it_alone(tmp_path, megabytes):
         assert "memory" in done.stderr and "ulimit -v" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
 
 
-@pytest.mark.parametrize("limit", ["-n 16", "-f 300", "-s 64"])
-def test_a_limit_that_leaves_mpi_too_little_is_one_message(tmp_path, limit):
-    """Of open files, of the size of a file, of the stack."""
-    done = subprocess.run(["bash", "-c", f'ulimit {limit}; exec "$SQUEAL" {OSCILLATOR} --output {tmp_path}/out'], capture_output=True,
-                          text=True, timeout=60)
-    assert done.returncode == 1 and f"ulimit {limit[:2]}" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
-
-
 @pytest.mark.parametrize("force", [1e11, 1e14])
 def test_large_reactions_do_not_hold_up_the_estimate(squeal, force):
     """The tolerance of its quadrature is never below the rounding of what it adds."""

@@ -1,7 +1,7 @@
 #pragma once
-/// A scene: everything physical that a run needs, as plain data in SI units. Sources of this header are read.cpp (from
-/// a file), write.cpp (to text) and check.cpp (contradictions). This room includes neither PETSc nor MPI. Algorithms
-/// are chosen by PETSc options, with one prefix for each stage.
+/// A scene: everything physical that a run needs, as plain data in SI units. Sources of this header are scene.cpp (from
+/// a file), write.cpp (to text), check.cpp (contradictions) and doubts.cpp (possible values that are hardly meant).
+/// This room includes neither PETSc nor MPI. Algorithms are chosen by PETSc options, with one prefix for each stage.
 #include "squeal/scene/model_parts.hpp"
 
 namespace squeal
@@ -286,6 +286,11 @@ struct Scene
 /// Throws Error for every wrong key, type, sign and range, with file, line, key, value, remedy and the nearest known
 /// key.
 Scene read_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides);
+
+/// A sentence for each material that no solid has and each mass that none has, which a slip of units explains, and for
+/// each load that does nothing or turns round, or setting that nothing uses. Of gaps and compliances beside the model's
+/// length [m], unless that is 0.
+std::vector<std::string> doubts_about(const Scene& scene, double length);
 
 /// Returns the scene as TOML with all defaults; read_scene of it gives the same scene.
 std::string resolved_scene(const Scene& scene);
