@@ -1,11 +1,10 @@
 #include "squeal/algebra/paired_matrices.hpp"
 
+#include "registers.hpp"
 #include "sparse_product.hpp"
 #include "squeal/algebra/panel.hpp"
-#include "squeal/algebra/simd.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 namespace squeal
 {
@@ -14,8 +13,6 @@ namespace
 {
 
 using Two = double __attribute__((vector_size(16)));
-using Four = double __attribute__((vector_size(32)));
-using Eight = double __attribute__((vector_size(64))); // for AVX-512: without it GCC keeps arrays of these in memory
 
 /// y += A x for the upper triangles of symmetric matrices. With two parts an Entry belongs to one matrix, and a row of
 /// x holds v and then u of all trajectories, each in so many Vectors. With one part and an Entry of two numbers a row

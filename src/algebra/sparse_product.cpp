@@ -1,9 +1,8 @@
 #include "sparse_product.hpp"
 
-#include "squeal/algebra/simd.hpp"
+#include "registers.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <petscsf.h>
 
 namespace squeal
@@ -14,7 +13,6 @@ namespace
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Four = double __attribute__((vector_size(32)));
 
 constexpr std::size_t lanes = 16; // columns at once
 
