@@ -4,7 +4,7 @@
 /// 8.9).
 #include "squeal/forecast.hpp"
 
-#include "squeal/algebra/factor_forecast.hpp"
+#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/base/available_memory.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/point.hpp"

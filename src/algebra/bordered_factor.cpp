@@ -2,7 +2,6 @@
 
 #include "cholesky.hpp"
 #include "mumps_factor.hpp"
-#include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/free_memory.hpp"
 
@@ -104,7 +103,6 @@ FactorForecast multifrontal_forecast(const SymbolicFactor& symbolic)
     symmetric += columns * (columns + inner);
     forecast.entries += columns * ((columns + 1) / 2 + inner);
     forecast.border_entries += columns * supernode.border;
-    forecast.inner_operations += operations_of(columns, inner);
     not_symmetric += columns * (columns + 2 * inner);
   }
   return forecast;

@@ -1,7 +1,6 @@
 #include "squeal/algebra/pencil_factor.hpp"
 
 #include "mumps.hpp"
-#include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "symbolic_factor.hpp"

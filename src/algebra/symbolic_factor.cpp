@@ -1,7 +1,7 @@
 #include "symbolic_factor.hpp"
 
-#include "splitmix.hpp"
 #include "squeal/algebra/panel.hpp"
+#include "squeal/base/random.hpp"
 #include "squeal/base/run_control.hpp"
 
 #include <algorithm>

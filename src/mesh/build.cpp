@@ -7,7 +7,6 @@
 #include "squeal/mesh/mesh_file.hpp"
 
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>

@@ -7,7 +7,6 @@
 #include "dual_rows.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/packed.hpp"
-#include "squeal/mesh/names.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,6 @@
 #include "dual_rows.hpp"
 
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>

@@ -12,7 +12,6 @@
 #include "squeal/solid/dofs.hpp"
 
 #include "squeal/base/broadcast.hpp"
-#include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/ties.hpp"
 #include "squeal/solid/element.hpp"

@@ -1,7 +1,6 @@
 /// Probe matrices: a row for each probe, which reads one displacement.
 #include "squeal/solid/probes.hpp"
 
-#include "squeal/mesh/names.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>

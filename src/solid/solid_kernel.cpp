@@ -15,6 +15,7 @@
 /// parallelepiped and stiffer when tapered (MacNeal 1987), as all 8-node bricks are.
 #include "kernels.hpp"
 #include "squeal/mesh/quadrature.hpp"
+#include "squeal/mesh/shapes.hpp"
 
 #include <Eigen/LU>
 
@@ -302,6 +303,17 @@ std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec
                        }
                        return stress;
                      });
+}
+
+int dofs_per_node(Shape shape)
+{
+  return is_shell(shape) ? 6 : 3;
+}
+
+ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Material& material, double thickness)
+{
+  const NodePositions X = position_matrix(x);
+  return is_shell(shape) ? shell_matrices(shape, X, material, thickness) : solid_matrices(shape, X, material);
 }
 
 } // namespace squeal

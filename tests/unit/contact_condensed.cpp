@@ -1,7 +1,6 @@
 // ranks: 1 2 3 4
 #include "../support/option.hpp"
 #include "../support/small_models.hpp"
-#include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/contact/condensed.hpp"
 
 #include <array>
