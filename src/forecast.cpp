@@ -14,8 +14,6 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
-#include <sys/mman.h>
-#include <sys/resource.h>
 
 namespace squeal
 {
@@ -36,7 +34,6 @@ constexpr double vectors_of_modes_kept = 200; // of the same 100 pairs
 constexpr double vectors_of_shooting = 100;   // pairs of differences, work of a step, columns of the multipliers
 // A basis grows beyond its limit by what one pass adds; with it its copy while it grows, and the random vectors:
 constexpr double passes_of_response = 40;
-constexpr double start_of_libraries = 400e6; // [byte] OpenBLAS's buffer of 128 MB, those of MPI and of PETSc
 
 double steps_of_transient(const TransientSettings& transient)
 {
@@ -79,28 +76,6 @@ double sum_of_ranks(double value, MPI_Comm comm)
 {
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_SUM, comm);
   return value;
-}
-
-/// Whether this process may take so many more bytes of addresses; the limit is that of ulimit -v.
-bool can_take(double bytes)
-{
-  rlimit limit{};
-  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return true;
-  if (bytes > static_cast<double>(limit.rlim_cur)) return false;
-  const auto size = static_cast<std::size_t>(bytes);
-  void* place = mmap(nullptr, size, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-  if (place == MAP_FAILED) return false;
-  munmap(place, size);
-  return true;
-}
-
-std::string limit_text(double bytes)
-{
-  rlimit limit{};
-  getrlimit(RLIMIT_AS, &limit);
-  return format("it may take %.3g MB of addresses (ulimit -v %llu), and %.3g MB beyond what it has are needed",
-                1e-6 * static_cast<double>(limit.rlim_cur), static_cast<unsigned long long>(limit.rlim_cur / 1024),
-                1e-6 * bytes);
 }
 
 std::string duration(double seconds)
@@ -301,20 +276,11 @@ std::string problem_of(const Forecast& forecast, MPI_Comm comm)
   if (more > available)
     problem = format("the run would take about %.3g GB of memory beyond what the model has, and %.3g GB are free",
                      1e-9 * more, 1e-9 * available);
-  else if (const double share = std::max(forecast.on_rank_zero, more / ranks_of(comm));
-           rank_of(comm) == 0 && !can_take(share))
-    problem = "memory: " + limit_text(share);
   else if (forecast.seconds_of_steps() > day)
     problem = format("the run would make about %.3g time steps of %.2g s, which take %s", forecast.steps,
                      forecast.step_seconds, duration(forecast.seconds_of_steps()).c_str());
   if (!problem.empty()) problem += ": take a smaller model, fewer steps or a larger machine, or give --force to run it";
   return problem;
-}
-
-std::string problem_of_limits()
-{
-  if (can_take(start_of_libraries)) return {};
-  return "memory: " + limit_text(start_of_libraries) + " to start: raise the limit";
 }
 
 } // namespace squeal

@@ -42,12 +42,8 @@ std::string factor_text(const Forecast& forecast);
 /// The forecast in a line each of the factor, memory and time.
 std::string text_of(const Forecast& forecast);
 
-/// Collective. Why the run is not started without --force: it would take more memory than the machine and this
-/// process's limits leave, or more than a day. Empty if it is.
+/// Collective. Why the run is not started without --force: it would take more memory than the machine leaves, or more
+/// than a day. Empty if it is.
 std::string problem_of(const Forecast& forecast, MPI_Comm comm);
-
-/// Whether a limit of this process leaves the libraries too little memory to start with; empty if none does. Needs no
-/// MPI. Below it OpenBLAS tries for ever to allocate its buffer.
-std::string problem_of_limits();
 
 } // namespace squeal

@@ -3,7 +3,6 @@
 #include "toml_values.hpp"
 
 #include <algorithm>
-#include <fstream>
 
 namespace squeal
 {
@@ -14,10 +13,6 @@ namespace
 toml::table parse_file(const std::filesystem::path& file)
 {
   if (!is_file(file)) throw Error("there is no scene file " + shortened(file));
-  std::ifstream stream(file);
-  int number = 0;
-  for (std::string line; std::getline(stream, line);)
-    refuse_deep_key(line, file.string() + ", line " + std::to_string(++number));
   try
   {
     return toml::parse_file(file.string());

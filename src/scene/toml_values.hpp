@@ -28,10 +28,6 @@ std::string hint_or_list(const std::string& word, const std::vector<std::string>
 /// What the parser says, without the names of its own macros.
 std::string text_of(const toml::parse_error& error);
 
-/// Refuses a line of TOML with a key of more than 64 parts: toml++ makes a table in a table of each part, and its
-/// recursion ends the stack. A scene's keys have three.
-void refuse_deep_key(std::string_view line, const std::string& place);
-
 /// Applies "table.key=value" to the tables of a scene.
 void apply_override(toml::table& root, const std::string& text);
 
