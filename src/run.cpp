@@ -25,7 +25,7 @@ std::string run_or_leave_out(Report& report, Stage which, MPI_Comm comm, const s
 {
   if (!report.ended_by.empty()) return "the run was ended " + report.ended_by + " before";
   const char* const name = word(which);
-  const LogStage log(name);
+  const Finally end = log_stage(name);
   if (rank_of(comm) == 0) std::printf("%s …\n", name), std::fflush(stdout);
   const double start = MPI_Wtime(), processor_start = processor_time();
   std::string left_out;

@@ -186,17 +186,13 @@ double peak_memory(MPI_Comm comm)
   return bytes;
 }
 
-LogStage::LogStage(const char* name)
+Finally log_stage(const char* name)
 {
   PetscLogStage stage = -1;
   check(PetscLogStageGetId(name, &stage));
   if (stage < 0) check(PetscLogStageRegister(name, &stage));
   check(PetscLogStagePush(stage));
-}
-
-LogStage::~LogStage()
-{
-  (void)PetscLogStagePop();
+  return Finally([] { (void)PetscLogStagePop(); });
 }
 
 MPI_Comm comm_of(Vec x)

@@ -137,24 +137,16 @@ bool end_is_asked(MPI_Comm comm)
   return own.ended_by != 0;
 }
 
-WorkOfPart::WorkOfPart(MPI_Comm part)
+Finally work_of_part(MPI_Comm part)
 {
   MPI_Comm_size(part, &control().together);
+  return Finally([] { control().together = 0; });
 }
 
-WorkOfPart::~WorkOfPart()
-{
-  control().together = 0;
-}
-
-Undisturbed::Undisturbed()
+Finally undisturbed()
 {
   control().undisturbed = true;
-}
-
-Undisturbed::~Undisturbed()
-{
-  control().undisturbed = false;
+  return Finally([] { control().undisturbed = false; });
 }
 
 int without_losing_signals(int success, const std::function<int()>& metis)

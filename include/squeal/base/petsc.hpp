@@ -3,6 +3,7 @@
 ///
 /// The API of the libraries stays visible: functions borrow raw handles (Vec, Mat, ...), results own them (Owned<Vec>).
 #include "squeal/base/error.hpp"
+#include "squeal/base/finally.hpp"
 
 #include <exception>
 #include <slepc.h>
@@ -155,14 +156,7 @@ double processor_time();
 double peak_memory(MPI_Comm comm);
 
 /// Enters a stage of -log_view for as long as the object lives. A new name is registered.
-class LogStage
-{
-public:
-  explicit LogStage(const char* name);
-  ~LogStage();
-  LogStage(const LogStage&) = delete;
-  LogStage& operator=(const LogStage&) = delete;
-};
+Finally log_stage(const char* name);
 
 /// The communicator of an object; rank and number of ranks in a communicator. None is collective.
 MPI_Comm comm_of(Vec x);
