@@ -6,7 +6,7 @@
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/ties.hpp"
 #include "squeal/solid/matrix_rows.hpp"
-#include "squeal/solid/probes.hpp"
+#include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
 #include <cmath>

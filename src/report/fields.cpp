@@ -7,7 +7,7 @@
 #include "files.hpp"
 #include "squeal/base/whole_file.hpp"
 #include "squeal/report/result_files.hpp"
-#include "squeal/solid/probes.hpp"
+#include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
 #include <cmath>

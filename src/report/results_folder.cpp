@@ -4,7 +4,7 @@
 #include "squeal/base/error.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/whole_file.hpp"
-#include "squeal/mesh/mesh_input.hpp"
+#include "squeal/mesh/mesh_file.hpp"
 
 #include <algorithm>
 #include <cerrno>

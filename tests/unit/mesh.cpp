@@ -1,7 +1,6 @@
 // ranks: 1 2 3
 #include "../support/blocks.hpp"
 #include "squeal/mesh/mesh_file.hpp"
-#include "squeal/mesh/mesh_input.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <doctest/doctest.h>

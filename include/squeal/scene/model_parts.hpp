@@ -122,7 +122,7 @@ struct Superelement
 /// Fixed motions of the nodes of a group.
 struct Support
 {
-  std::string on; // named group or point; rows of a matrix scene (squeal/scene/row_names.hpp), also below
+  std::string on; // named group or point; rows of a matrix scene (RowNames), also below
   Motions fixed{};
 };
 

@@ -2,7 +2,7 @@
 /// Free degrees of freedom q and constraints u = T q on nodal degrees of freedom u (src/README.md, sections 1.4, 1.6).
 /// Nodal degree of freedom 6 * node + c is component c of a node, c = 0..5 for x y z rx ry rz.
 #include "squeal/base/petsc.hpp"
-#include "squeal/mesh/partition.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
 #include "squeal/mesh/row_motions.hpp"
 
 #include <span>
