@@ -56,23 +56,6 @@ void add_point(const std::string& name, const Vec3& position, Mesh& mesh)
   mesh.nodes.push_back(position);
 }
 
-/// Throws Error if the scene names a point, group or surface that the mesh does not have.
-void check_names(const Mesh& mesh, const Scene& scene)
-{
-  for (const RigidBody& body : scene.rigid_bodies)
-    for (const std::string& name : body.surfaces) named_faces(mesh, name, "rigid body '" + body.name + "'");
-  for (const Spring& spring : scene.springs)
-    for (const std::string& name : {spring.from, spring.to})
-      if (name != ground) point_node(mesh, name, "spring");
-  for (const Support& support : scene.supports) named_nodes(mesh, support.on, "support");
-  for (const Force& force : scene.forces) named_nodes(mesh, force.on, "force");
-  for (const Pressure& pressure : scene.pressures) named_faces(mesh, pressure.on, "pressure");
-  for (const Contact& contact : scene.contacts)
-    for (const std::string& name : {contact.rotor, contact.stator})
-      if (!mesh.points.count(name)) named_faces(mesh, name, "contact");
-  for (const Probe& probe : scene.probes) named_nodes(mesh, probe.on, "probe '" + probe.name + "'");
-}
-
 /// The node of the mesh, among the candidates, where a retained node is.
 int joined_node(const Mesh& mesh, const std::set<int>& candidates, const PlacedNode& retained, const std::string& user)
 {
@@ -151,7 +134,8 @@ Mesh read_mesh(const Scene& scene)
   for (const Point& point : scene.points) add_point(point.name, point.at, mesh);
   for (const RigidBody& body : scene.rigid_bodies) add_point(body.name, body.at, mesh);
   if (mesh.nodes.empty()) throw Error("the scene has neither a mesh nor points: nothing to compute");
-  check_names(mesh, scene);
+  for (const RigidBody& body : scene.rigid_bodies) // whose nodes are found by any group
+    for (const std::string& name : body.surfaces) (void)named_faces(mesh, name, "rigid body '" + body.name + "'");
   add_superelements(scene, mesh);
   return mesh;
 }

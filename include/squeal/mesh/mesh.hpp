@@ -73,7 +73,7 @@ struct Mesh
 /// Returns the scene's mesh with its points and reference points; without a mesh file it holds these points only.
 /// Reads the file through libgmsh; not collective. Nodes that no element uses are dropped, and elements numbered inside
 /// out are renumbered. Throws Error for a missing or unreadable file, a mesh without elements, a shape that has no
-/// kernel, and solid elements in no part. It does so for a part, group or point that the mesh does not have.
+/// kernel, and solid elements in no part. It does so for a part or a body's surface that the mesh does not have.
 Mesh read_mesh(const Scene& scene);
 
 /// Look-up of nodes and surfaces by the names that a scene uses. `user` says in messages which table of the scene asks,
