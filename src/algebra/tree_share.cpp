@@ -17,7 +17,7 @@ namespace
 {
 
 /// Gives every rank what rank 0 analysed.
-void share(SymbolicFactor& symbolic, MPI_Comm comm)
+void broadcast_analysis(SymbolicFactor& symbolic, MPI_Comm comm)
 {
   std::array<int, 2> sizes{symbolic.dofs, symbolic.border};
   MPI_Bcast(sizes.data(), 2, MPI_INT, 0, comm);
@@ -137,7 +137,7 @@ TreeShare share_tree(SymbolicFactor whole, MPI_Comm comm)
     share.symbolic = std::move(whole);
     return share;
   }
-  share(whole, comm);
+  broadcast_analysis(whole, comm);
   const std::vector<int> owner = owners_of(whole, ranks);
   SymbolicFactor& mine = share.symbolic;
   mine.dofs = whole.dofs;
