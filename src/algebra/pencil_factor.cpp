@@ -120,8 +120,8 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   parts.whole = is_made_whole(order.entries, symmetry, options, parts.comm);
   const auto entries_of = [&](Mat A)
   {
-    Triplets own;
-    symmetric ? append_lower_triangle(A, own) : append_rows(A, 0, own);
+    Triplets own = symmetric ? lower_triangle(A) : Triplets{};
+    if (!symmetric) append_rows(A, 0, own);
     return parts.whole ? everywhere(std::move(own), parts.comm) : own;
   };
   auto [entries, masses] = on_common_pattern(entries_of(K), entries_of(M));
